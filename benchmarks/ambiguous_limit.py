@@ -20,7 +20,7 @@ import limits
 import numpy as np
 
 from radarsim.app.configs import load
-from radarsim.studies.ambiguous_doppler import exact, filters, study
+from radarsim.studies.ambiguous_doppler import filters, study
 
 SOURCE = Path(__file__).with_suffix(".c")
 DOUBLES = ctypes.POINTER(ctypes.c_double)
@@ -41,7 +41,7 @@ def plan_of(radar: str):
     memory = next(one for one in case.spec.filters if one.name == "memory")
     spec = case.spec.model_copy(update={"filters": (memory,), "baseline": None})
     plan = study.prepare(type(case)(case.name, case.stem, case.study, spec, (), 1, 1))
-    of = exact.gains(filters.members(memory)[0], spec.prior, plan.world.sigma, spec.radar.scan_period_s, spec.scans)
+    of = filters.gains(filters.members(memory)[0], spec.prior, plan.world.sigma, spec.radar.scan_period_s, spec.scans)
     gains = np.zeros((spec.scans, 8))
     gains[:, 1:4], gains[:, 4], gains[:, 5:] = of.range, of.variance, of.velocity
     for k in range(1, spec.scans):

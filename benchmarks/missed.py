@@ -9,8 +9,7 @@ import argparse
 import statistics
 import time
 
-from radarsim.app.configs import load
-from radarsim.app.work import CaseWork
+from radarsim.app.configs import CaseWork, load
 
 WORLDS = (
     ("radar.detection_probability=0.9",),

@@ -21,8 +21,7 @@ import numpy as np
 import sonar
 import sonar_clutter
 
-from radarsim.studies.sonar.clutter.kernels.counts import COUNTS, FALSE_COUNTS, FALSE_KEPT, RATIOS
-from radarsim.studies.sonar.clutter.kernels.gate import PDA
+from radarsim.studies.sonar.clutter.kernels.tracker import COUNTS, FALSE_COUNTS, FALSE_KEPT, PDA, RATIOS
 
 SUMS = 29  # of a filter, scan and coordinate: as in sonar_limit.c
 PLACES = {"error": slice(0, 12), "paired": slice(12, 15), "estimates": slice(15, 18), "joint": slice(21, 25)}

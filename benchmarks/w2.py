@@ -75,8 +75,7 @@ def full_matrix(size: int) -> np.ndarray:
 
 def work(every: int, name: str = "multimodel", filters: int = 1):
     """The whole chain of a shipped config, its first filters."""
-    from radarsim.app.configs import load
-    from radarsim.app.work import CaseWork
+    from radarsim.app.configs import CaseWork, load
 
     (case,) = load(name, (f"report_every={every}", f"scans={SCANS}")).cases
     spec = case.spec.model_copy(update={"filters": case.spec.filters[:filters]})
@@ -118,7 +117,7 @@ def measure_speed(folder) -> dict:
         for every in (1, 10):
             out |= measure_chain(pool, limit, every)
     if len(cores) > 1:
-        from radarsim.engine.collect import collect
+        from radarsim.engine.run import collect
 
         os.sched_setaffinity(0, cores[-2:])
         made = work(10)

@@ -49,7 +49,7 @@ def c_limit(folder: Path):
 def plan(engine: str, estimator: dict, variance: float = 2.25, prior: dict | None = None, truth: dict | None = None):
     """A prepared plan of one estimator on the paper's burst."""
     from radarsim.app.configs import load
-    from radarsim.studies.discriminator import study as discriminator
+    from radarsim.studies.discriminator import study
 
     config = {
         "study": "discriminator",
@@ -63,7 +63,7 @@ def plan(engine: str, estimator: dict, variance: float = 2.25, prior: dict | Non
         "engine": engine,
         "realisations": 1,
     }
-    return discriminator.prepare(load(config).cases[0])
+    return study.prepare(load(config).cases[0])
 
 
 def timed(function) -> float:
@@ -75,7 +75,7 @@ def timed(function) -> float:
 
 def scoring(w3) -> dict:
     """Seconds a burst of the limit's workload, in Numba and in C."""
-    from radarsim.studies.discriminator import study as discriminator
+    from radarsim.studies.discriminator import study
 
     windows = [float(w) * 1e-5 for w in (w3.WIN if w3 else WINDOWS)]
     estimator = {"name": "w3", "schedule": windows, "steps": 4, "tolerance": 1e-12}
@@ -84,12 +84,12 @@ def scoring(w3) -> dict:
         "samples", estimator, 9.0, {"sigma": sigma}, {"phase_rad": 0.6, "doppler_derivatives": [2e3, 3e3, 0.0, 0.0]}
     )
     n, m = 60, 60
-    discriminator.estimate(ours, 0, 2)
+    study.estimate(ours, 0, 2)
     if w3:
         w3.run_c(2)
     pairs = []
     for _ in range(PAIRS):
-        mine = timed(lambda: discriminator.estimate(ours, 0, n)) / n
+        mine = timed(lambda: study.estimate(ours, 0, n)) / n
         limit = timed(lambda: w3.run_c(m)) / m if w3 else float("nan")
         pairs.append((mine, limit))
     evaluations = 4 * sum(round(w * 1e5) for w in windows)
@@ -103,7 +103,7 @@ def scoring(w3) -> dict:
 
 def engines(w3) -> dict:
     """Bursts a second of the engines, and that over bursts a second of the C limit in the same run."""
-    from radarsim.studies.discriminator import study as discriminator
+    from radarsim.studies.discriminator import study
 
     found = {}
     cases = [
@@ -114,15 +114,15 @@ def engines(w3) -> dict:
     ]
     for engine, estimator, n in cases:
         made = plan(engine, estimator)
-        discriminator.estimate(made, 0, 2)
+        study.estimate(made, 0, 2)
         name = f"{engine}_{estimator['name']}"
         pairs = []
         for i in range(PAIRS):
-            mine = timed(partial(discriminator.estimate, made, i * n, n)) / n
+            mine = timed(partial(study.estimate, made, i * n, n)) / n
             pairs.append((mine, timed(partial(w3.run_c, 60)) / 60 if w3 else float("nan")))
         found[f"{name}_bursts_per_s"] = 1 / statistics.median(mine for mine, _ in pairs)
         found[f"{name}_over_limit_bursts"] = statistics.median(limit / mine for mine, limit in pairs)
-        errors, passes = discriminator.estimate(made, 0, n)
+        errors, passes = study.estimate(made, 0, n)
         last = errors[:, 0, made.options["windows"][0] - 1] / made.potential[0, made.options["windows"][0] - 1]
         found[f"{name}_locked"] = float((abs(last) < 5).all(axis=1).mean())
         found[f"{name}_passes"] = float(passes.mean())

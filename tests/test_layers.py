@@ -20,8 +20,8 @@ TEMPLATE = PACKAGE / "app/template/src"  # a study of a package of its own, to w
 
 STUDIES = sorted(path.name for path in (PACKAGE / "studies").iterdir() if (path / "__init__.py").is_file())
 TEMPLATES = sorted(path.name for path in TEMPLATE.iterdir())
-DATA = ("engine.moments", "engine.results")  # the engine's plain data, which studies fill
-CASE = ("config.experiment", "config.fields", "config.identity", "config.rare")
+DATA = ("engine.results",)  # the engine's plain data, which studies fill
+CASE = ("config.experiment", "config.fields")
 ROOMS = {
     "errors": (),
     "language": ("errors",),
@@ -49,7 +49,7 @@ ROOMS = {
 
 # Inside a study: what of the shared rooms a role stands on, and on which roles of its own study.
 GROUND = ("errors", "kernels", "physics", "bursts", *CASE)
-KEYS = ("errors", "config.faults", "config.fields", "config.radial", "config.rare", "physics")
+KEYS = ("errors", "config.document", "config.fields", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
 SHOWN = (*SUMS, "cost", "tables", "figures", "map")
@@ -91,10 +91,10 @@ LIBRARIES = {  # library: the files and rooms that may import it
     "click": {"cli"},
     "rich": {"cli/console.py"},
     "jinja2": {"report/html.py"},
-    "numba": {"kernels/cache.py", "kernels/compile.py", "kernels/lanes.py", "kernels/resolving.py"},
-    "llvmlite": {"kernels/cache.py", "kernels/compile.py", "kernels/lanes.py"},
+    "numba": {"kernels/compile.py", "kernels/lanes.py"},
+    "llvmlite": {"kernels/compile.py", "kernels/lanes.py"},
     "pydantic": {"config", "studies/*/config.py", "studies/*/*/config.py", "studies/*/schema.py"},
-    "pydantic_core": {"config/check.py", "config/fields.py", "config/starter.py"},
+    "pydantic_core": {"config/check.py", "config/fields.py", "config/load.py"},
     "pandas": {"report/tables.py", "report/precision.py", "app/own_data.py"},
 }
 
@@ -109,7 +109,7 @@ class Place(NamedTuple):
 
 
 def place(module: str) -> Place:
-    """The place of a module by its name without `radarsim.`: `studies.sonar.clutter.kernels.field`."""
+    """The place of a module by its name without `radarsim.`: `studies.sonar.clutter.kernels.tracker`."""
     parts = module.split(".")
     if parts[0] == "template":
         return Place("study", ".".join(parts[:2]), "", role(parts[2:]))
@@ -238,12 +238,12 @@ PLANTED = [
     ("config.fields", "radarsim.studies.registry"),
     ("engine.run", "radarsim.config.experiment"),
     ("engine.results", "radarsim.report.tables"),
-    ("kernels.linear", "radarsim.physics.motion"),
+    ("kernels.linear", "radarsim.physics"),
     ("kernels.linear", "radarsim.studies.range_doppler.kernels.rows"),
-    ("physics.motion", "radarsim.errors"),
-    ("bursts.fisher", "radarsim.errors"),
+    ("physics", "radarsim.errors"),
+    ("bursts.estimators", "radarsim.errors"),
     ("bursts.kernels.strip", "radarsim.studies.discriminator.kernels.sums"),
-    ("studies.discriminator.kernels.sums", "radarsim.bursts.fisher"),
+    ("studies.discriminator.kernels.sums", "radarsim.bursts.estimators"),
     ("report.tables", "radarsim.engine.run"),
     ("report.panels", "radarsim.studies.sonar.study"),
     ("report.claims", "radarsim.studies.registry"),
@@ -253,12 +253,12 @@ PLANTED = [
     ("app.outlook", "radarsim.studies.multimodel.study"),
     ("recorded.follow", "radarsim.cli.console"),
     ("recorded.follow", "radarsim.studies.sonar.track"),
-    ("cli.maintenance", "radarsim.studies.sonar.config"),
+    ("cli.console", "radarsim.studies.sonar.config"),
     ("studies.range_doppler.kernels.rows", "radarsim.studies.range_doppler.filters"),
-    ("studies.range_doppler.kernels.rows", "radarsim.physics.motion"),
-    ("studies.range_doppler.config", "radarsim.studies.range_doppler.exact"),
+    ("studies.range_doppler.kernels.rows", "radarsim.physics"),
+    ("studies.range_doppler.config", "radarsim.studies.range_doppler.filters"),
     ("studies.range_doppler.filters", "radarsim.studies.range_doppler.study"),
-    ("studies.range_doppler.exact", "radarsim.report.tables"),
+    ("studies.range_doppler.filters", "radarsim.report.tables"),
     ("studies.range_doppler.study", "radarsim.studies.range_doppler.tables"),
     ("studies.range_doppler.study", "radarsim.engine.run"),
     ("studies.range_doppler.study", "radarsim.studies.registry"),
@@ -269,9 +269,9 @@ PLANTED = [
     ("studies.range_doppler.measures", "radarsim.app.configs"),
     ("studies.range_doppler.track", "radarsim.report.panels"),
     ("studies.multimodel.tables", "radarsim.studies.sonar.tables"),
-    ("studies.multimodel.kernels.sums", "radarsim.studies.discriminator.kernels.sums"),
+    ("studies.multimodel.kernels.strip", "radarsim.studies.discriminator.kernels.sums"),
     ("studies.sonar.manoeuvre.study", "radarsim.studies.sonar.clutter.study"),
-    ("studies.sonar.clutter.kernels.field", "radarsim.studies.sonar.clutter.filters"),
+    ("studies.sonar.clutter.kernels.tracker", "radarsim.studies.sonar.clutter.filters"),
     ("template.random_walk.study", "radarsim.app.run"),
     ("template.random_walk.study", "random_walk.tables"),
     ("template.random_walk.kernels.walk", "random_walk.filters"),

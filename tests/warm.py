@@ -17,7 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 IMPORTS = (  # most of what commands import
     *("numba", "pandas", "scipy.linalg", "scipy.special", "jinja2", "rich.console", "rich.table"),
-    *("radarsim.cli", "radarsim.app.run", "radarsim.app.output", "radarsim.app.decide", "radarsim.report.html"),
+    *("radarsim.cli", "radarsim.app.run", "radarsim.app.result", "radarsim.app.readings", "radarsim.report.html"),
     *("radarsim.kernels.linear", "radarsim.kernels.lanes"),
 )
 LIMIT_S = 300

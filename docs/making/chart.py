@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from radarsim.app.chart import chart
+from radarsim.app.compare import chart
 
 
 def drawn(app, exception) -> None:

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from radarsim.config.fields import in_degrees
-from radarsim.config.json_schema import schema
+from radarsim.config.schema import schema
 from radarsim.studies import registry
 
 COMMON = ("include", "sweep", "realisations", "seed", "figures")

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from radarsim.app.inventory import inventory
+from radarsim.app.stored import inventory
 from radarsim.config.check import models_in
 from radarsim.config.fields import Model
 from radarsim.config.schema import Common
@@ -126,7 +126,7 @@ def in_inventory() -> Iterator[tuple[str, str, str]]:
     """What `radarsim list` says of configs, scenarios, studies and filters."""
     for _, _, rows in inventory():
         for row in rows:
-            yield row[-1], "", "radarsim/app/inventory.py"
+            yield row[-1], "", "radarsim/app/stored.py"
 
 
 def in_scenarios() -> Iterator[tuple[str, str, str]]:

@@ -18,10 +18,10 @@ from itertools import product
 from pathlib import Path
 
 import radarsim
-from radarsim.app import output
-from radarsim.app.chart import described
-from radarsim.report import figures as drawing
-from radarsim.report.chart_text import spoken
+from radarsim.app import result as output
+from radarsim.app.compare import described
+from radarsim.report import figures
+from radarsim.report.chart import spoken
 from radarsim.report.drawing import Figure
 
 ROOT = Path(__file__).parents[2]
@@ -60,7 +60,7 @@ def figures_of(config: str, results: Path) -> dict[str, Figure]:
     if config == CHART:
         return dict(described([]).figures)
     result = radarsim.load(config, out=results)
-    return output.figures(result.cases, result.tables, result.experiment)
+    return output.case_figures(result.cases, result.tables, result.experiment)
 
 
 def stem(config: str, name: str, width: float | None) -> str:
@@ -70,7 +70,7 @@ def stem(config: str, name: str, width: float | None) -> str:
 
 def drawn(figure: Figure, width: float | None) -> tuple[str, bytes]:
     """The ending and the bytes of a picture: SVG, or PNG in as many colours as keep it under MOST_BYTES."""
-    made = drawing.save(figure, ("svg", "png"), width)
+    made = figures.save(figure, ("svg", "png"), width)
     return ("svg", made["svg"]) if len(made["svg"]) < MOST_BYTES else ("png", smaller(made["png"]))
 
 

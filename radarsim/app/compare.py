@@ -1,27 +1,37 @@
-"""`radarsim compare`: stored results side by side on common axes, with their differences. Computes nothing."""
+"""`radarsim compare`: stored results side by side on common axes, with their differences. Computes nothing.
+
+`radarsim chart`: one chart for every device, with the cases of some configs marked on it.
+"""
 
 import os
-from collections.abc import Collection, Hashable, Sequence
+from collections.abc import Callable, Collection, Hashable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from radarsim.app import arguments, stored_tables
-from radarsim.app.configs import load
-from radarsim.app.output import captions
-from radarsim.app.records import recorded_case
-from radarsim.app.repeat import command
-from radarsim.config.experiment import Case, Experiment
-from radarsim.config.identity import canonical, digest, world
+from radarsim.app import configs, stored
+from radarsim.app import configs as arguments
+from radarsim.app.configs import command, load
+from radarsim.app.result import captions, recorded_case
+from radarsim.app.run import namesakes
+from radarsim.config.experiment import Case, Experiment, canonical, digest, world
 from radarsim.errors import ConfigError
-from radarsim.report import asked, files, provenance
+from radarsim.report import compare as figures
+from radarsim.report import compare as sides
+from radarsim.report import compare as table
+from radarsim.report import compare as words
+from radarsim.report import files, tables
+from radarsim.report import html as asked
 from radarsim.report import tables as common
-from radarsim.report.compare import figures, sides, table, words
-from radarsim.report.compare.sides import SERIES, Side
+from radarsim.report.compare import SERIES, Side
+from radarsim.report.drawing import Chart
+from radarsim.studies import registry
 
 if TYPE_CHECKING:
     import pandas as pd
 
+
+# ---- compare ---------------------------------------------------------------------------------------------------------
 FOLDER = "compare"
 
 
@@ -65,7 +75,7 @@ def compare(
     their own. Raises ConfigError where one is missing, with the command
     that computes it, or where they share nothing; StoreError where a stored table is damaged.
     """
-    arguments.directory(out)
+    configs.directory(out)
     if len(sources) < 2:
         raise ConfigError(f"compare: takes two results or more, got {len(sources)}")
     runs = _named(_found(sources, Path(out)))
@@ -90,7 +100,7 @@ def compare(
     contents["compare.html"] = _page(
         runs, sentences, notes, warnings, list(described.values()), made, contents
     ).encode()
-    contents["compare.json"] = provenance.to_json(_record(runs, contents))
+    contents["compare.json"] = files.to_json(_record(runs, contents))
     files.replace_all(folder, contents, stale=_earlier)
     last = words.at_the_end(made)
     kept = (tuple(rows.to_dict("records")) for rows in (made, last))
@@ -113,7 +123,7 @@ def _found(sources: Sequence[str | os.PathLike[str]], out: Path) -> list[Run]:
 
 def _folder(path: Path) -> Run | None:
     """The result in a folder; None where the path is no folder. Raises ConfigError for one that holds no result."""
-    record = stored_tables.record(path)
+    record = stored.record(path)
     if record is None:
         if path.is_dir() and path.name != str(path):
             raise ConfigError(f"{path}: must be a config or the folder of a result: there is no run.json in it")
@@ -124,7 +134,7 @@ def _folder(path: Path) -> Run | None:
 def _stored(source: str | os.PathLike[str], out: Path) -> Run:
     experiment = load(source)
     folder = out / experiment.stem
-    record = stored_tables.record(folder)
+    record = stored.record(folder)
     if record is None:
         raise ConfigError(f"{experiment.stem}: no result in {folder}; `{command(experiment, (), out)}` computes it")
     return Run(experiment.stem, folder, record, experiment)
@@ -142,9 +152,7 @@ def _sides(run: Run) -> list[Side]:
     """The cases of a result that are there, with their rows."""
     wanted = {one.table for one in SERIES}
     outputs = run.record["outputs"]
-    tables = {
-        name: rows for name in sorted(wanted) if (rows := stored_tables.table(run.folder, name, outputs)) is not None
-    }
+    tables = {name: rows for name in sorted(wanted) if (rows := stored.table(run.folder, name, outputs)) is not None}
     made = []
     for name, counts in run.record["cases"].items():
         own = {key: rows[rows["case"] == name] for key, rows in tables.items()}
@@ -187,13 +195,13 @@ def _stale(run: Run) -> list[str]:
 
 def _earlier(folder: Path) -> list[str]:
     """The files of an earlier comparison in a folder."""
-    outputs = provenance.earlier(folder, "compare.json").get("outputs")
+    outputs = files.earlier(folder, "compare.json").get("outputs")
     return [path for path in outputs if isinstance(path, str)] if isinstance(outputs, dict) else []
 
 
 def _replaced(folder: Path, runs: Sequence[Run]) -> list[str]:
     """A note where a folder held another comparison, which is lost."""
-    before = provenance.earlier(folder, "compare.json").get("compared")
+    before = files.earlier(folder, "compare.json").get("compared")
     now = [str(run.folder) for run in runs]
     if not isinstance(before, list) or before == now:
         return []
@@ -208,8 +216,8 @@ def _record(runs: Sequence[Run], contents: "dict[str, bytes]") -> dict[str, Any]
     }
     empty: dict[str, Any] = {"outputs": {}}
     for path, data in sorted(contents.items()):
-        empty = provenance.with_output(empty, path, data)
-    return {"compared": [str(run.folder) for run in runs], "runs": held, "versions": provenance.versions(), **empty}
+        empty = files.with_output(empty, path, data)
+    return {"compared": [str(run.folder) for run in runs], "runs": held, "versions": files.versions(), **empty}
 
 
 def _page(
@@ -237,3 +245,72 @@ def _cases(run: Run) -> list[Case]:
     found = ((name, recorded_case(run.record, name)) for name in run.record["cases"])
     label = run.label if len(run.record["cases"]) == 1 else ""
     return [replace(case, name=label or name) for name, case in found if case is not None]
+
+
+# ---- chart -----------------------------------------------------------------------------------------------------------
+CHART_FOLDER = "chart"
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What was written: the folder, the files in it, a sentence for each case, and the rows of chart.csv."""
+
+    folder: Path
+    files: tuple[str, ...]
+    sentences: tuple[str, ...]
+    rows: tuple[dict[Hashable, object], ...]
+
+
+def chart(
+    configs: Sequence[str | os.PathLike[str]],
+    out: str | os.PathLike[str] = "results",
+    *,
+    overrides: Sequence[str] = (),
+    formats: Sequence[str] = ("svg", "png"),
+    width_mm: float | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
+) -> Drawn:
+    """Draw the chart of the configs' study, with their cases on it, into `out`/chart; nothing is simulated.
+
+    Without configs, of the study that has a chart, with its paper's own devices; a config that is given twice counts
+    once. width_mm is the width of the figures' files in place of their own. progress is told of each figure. Raises
+    ConfigError where the study has none, configs are of several, or two have one name.
+    """
+    arguments.directory(out)
+    experiments = [load(config, overrides) for config in dict.fromkeys(configs)]
+    if faults := namesakes(experiments):
+        raise ConfigError(*faults)
+    made = described([case for one in experiments for case in one.cases])
+    contents = {"chart.csv": tables.to_csv(made.table), "chart.html": made.page.encode()}
+    if formats:
+        from radarsim.report import figures  # Matplotlib
+
+        for n, (name, figure) in enumerate(made.figures.items()):
+            contents |= {f"{name}.{kind}": data for kind, data in figures.save(figure, formats, width_mm).items()}
+            if progress is not None:
+                progress(n + 1, len(made.figures), 0)
+        contents["captions.md"] = captions(made.figures).encode()
+    folder = Path(out) / CHART_FOLDER
+    files.replace_all(folder, contents)
+    return Drawn(folder, tuple(sorted(contents)), made.sentences, tuple(made.table.to_dict("records")))
+
+
+def described(cases: Sequence[Case]) -> Chart:
+    """The chart of some cases, or without any of the one study that has a chart. Raises ConfigError."""
+    studies = list(dict.fromkeys(case.study for case in cases))
+    if len(studies) > 1:
+        raise ConfigError(f"one study a chart, these are of {', '.join(studies)}")
+    for name in studies or registry.names():
+        made = registry.study(name).chart(cases, references(name))
+        if made is not None:
+            return made
+    raise ConfigError(f"study {studies[0]} has no chart")
+
+
+def references(study: str) -> list[Case]:
+    """The devices that a study's chart shows beside one's own: the unswept cases of the shipped config of its name."""
+    try:
+        found = load(study)
+    except ConfigError:
+        return []
+    return [case for case in found.cases if not case.swept and case.study == study]

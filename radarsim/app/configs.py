@@ -1,21 +1,37 @@
-"""Configs, read with all available studies."""
+"""Configs, read with all available studies.
 
+Arguments that Python gives, refused as the command refuses its options.
+
+A case as the engine sees it.
+
+The command that computes a result again, as run.json and messages give it.
+"""
+
+import math
+import operator
 import os
-from collections.abc import Iterable, Mapping
-from functools import cache
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, SupportsFloat, SupportsIndex
 
+import numpy as np
+
+from radarsim.config import document
 from radarsim.config import load as reading
-from radarsim.config import lookup
-from radarsim.config.experiment import Experiment
+from radarsim.config.experiment import Case, Experiment
 from radarsim.config.fields import Model
 from radarsim.errors import ConfigError
 from radarsim.report import files
 from radarsim.studies import registry
+from radarsim.studies.identity import identity
+from radarsim.studies.interface import Plan
+from radarsim.studies.registry import study
 
-lookup.further_folders = registry.folders
+# ---- configs ---------------------------------------------------------------------------------------------------------
+document.further_folders = registry.folders
 
 
 def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Iterable[str] = ()) -> Experiment:
@@ -33,7 +49,7 @@ def shipped(stem: str) -> tuple[Model, ...] | None:
 
     Never of a file of that name that the user has: claims are judged by what is shipped.
     """
-    for folder in (lookup.SHIPPED, *registry.folders()):
+    for folder in (document.SHIPPED, *registry.folders()):
         file = folder / "configs" / f"{stem}.yaml"
         if stem and file.is_file():
             return tuple(case.spec for case in load(file).cases)
@@ -50,7 +66,7 @@ def new(
 
     Raises ConfigError where it is there already, StoreError where it cannot be written.
     """
-    from radarsim.config import own
+    from radarsim.config import load as own
 
     name, text = own.new(name, like, registry, values)
     path = Path(folder) / name
@@ -63,6 +79,198 @@ def new(
 
 def schema_json() -> str:
     """JSON Schema of the YAML, of all studies, as text."""
-    from radarsim.config import json_schema  # pydantic's part takes a tenth of a second to load
+    from radarsim.config import schema  # pydantic's part takes a tenth of a second to load
 
-    return json_schema.schema_json(registry)
+    return schema.schema_json(registry)
+
+
+# ---- arguments -------------------------------------------------------------------------------------------------------
+MOST_THREADS = 1024
+FORMATS = ("svg", "png", "pdf")  # of the figures' files
+NEEDED = ("workers", "depth", "shortest_s", "longest_s", "submit", "finished", "cancel", "forget")  # of an executor
+
+
+def check(
+    *,
+    threads: object = None,
+    workers: object = None,
+    precision: object = None,
+    time_limit: object = None,
+    executor: object = None,
+    out: object = None,
+    overrides: object = (),
+    figures: object = True,
+) -> None:
+    """ConfigError with a line for each invalid argument of `run`."""
+    faults = [
+        *_count("threads", threads),
+        *_count("workers", workers),
+        *_number("precision", precision, 100),
+        *([] if callable(time_limit) else _number("time_limit", time_limit, math.inf)),
+    ]
+    if executor is not None and not all(hasattr(executor, name) for name in NEEDED):
+        faults.append(f"executor: must be an executor of radarsim.engine, got {executor!r}")
+    if out is not None:
+        faults += _directory(out)
+    if isinstance(overrides, str | bytes) or not isinstance(overrides, Iterable):
+        faults.append(f"overrides: must be a list of texts key=value, got {overrides!r}")
+    faults += _formats(figures)
+    if faults:
+        raise ConfigError(*faults)
+
+
+def formats(figures: bool | str | Iterable[str]) -> tuple[str, ...]:
+    """The formats of the figures' files that an argument asks for: True for svg and png; none for False or None.
+
+    Raises ConfigError for a format that there is not.
+    """
+    if faults := _formats(figures):
+        raise ConfigError(*faults)
+    if isinstance(figures, bool) or figures is None:
+        return FORMATS[:2] if figures else ()
+    return (figures,) if isinstance(figures, str) else tuple(figures)
+
+
+def directory(out: object) -> None:
+    """ConfigError for what names no directory."""
+    if faults := _directory(out):
+        raise ConfigError(*faults)
+
+
+def _directory(out: object) -> list[str]:
+    named = isinstance(out, str | os.PathLike) and os.fspath(out)
+    return [] if named and isinstance(named, str) else [f"out: must name a directory, got {out!r}"]
+
+
+def _formats(figures: object) -> list[str]:
+    if isinstance(figures, bool) or figures is None:
+        return []
+    given = [figures] if isinstance(figures, str) or not isinstance(figures, Iterable) else list(figures)
+    allowed = ", ".join(FORMATS)
+    return [f"figures: must be True, False or of {allowed}, got {one!r}" for one in given if one not in FORMATS]
+
+
+def _count(name: str, value: object) -> list[str]:
+    scalar = not isinstance(value, bool) and not getattr(value, "ndim", 0)
+    number = operator.index(value) if isinstance(value, SupportsIndex) and scalar else 0
+    if value is None or 1 <= number <= MOST_THREADS:
+        return []
+    return [f"{name}: must be a whole number from 1 to {MOST_THREADS}, got {value!r}"]
+
+
+def _number(name: str, value: object, most: float) -> list[str]:
+    scalar = not isinstance(value, bool) and not getattr(value, "ndim", 0)
+    number = float(value) if isinstance(value, SupportsFloat) and scalar else math.nan
+    if value is None or (0 < number <= most and math.isfinite(number)):
+        return []
+    bound = f" and ≤ {most:g} %" if math.isfinite(most) else ""
+    return [f"{name}: must be > 0{bound}, got {value!r}"]
+
+
+# ---- work ------------------------------------------------------------------------------------------------------------
+class CaseWork:
+    """A case as the engine sees it: an identity, a block length, and sums to be made. Pickles as the case alone."""
+
+    def __init__(self, case: Case):
+        self.case = case
+
+    def __reduce__(self) -> tuple[type["CaseWork"], tuple[Case]]:
+        return CaseWork, (self.case,)
+
+    @cached_property
+    def plan(self) -> Plan:
+        """The prepared plan, made when first needed."""
+        if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+            raise ConfigError("NUMBA_DISABLE_JIT is set: without the compiler no block is simulated; unset it")
+        return study(self.case.study).prepare(self.case)
+
+    @cached_property
+    def identity(self) -> str:
+        """See `radarsim.studies.identity`."""
+        return identity(self.case)
+
+    @property
+    def block(self) -> int:
+        """Realisations in a block; depends on the study only."""
+        return self.plan.block
+
+    @property
+    def size(self) -> int:
+        """Length of the vector of sums."""
+        return self.plan.layout.size
+
+    def simulate(self, first: int, count: int) -> np.ndarray:
+        """Sums (size,) over realisations first … first + count - 1."""
+        return study(self.case.study).simulate(self.plan, first, count)
+
+    def explain(self, first: int, count: int) -> list[str]:
+        """Where the sums of these realisations are not finite, one line a filter, scan and number of realisations."""
+        axes, layout = self.plan.axes, self.plan.layout
+        bad = np.zeros((len(axes.filters), len(axes.k)), dtype=int)
+        for i in range(first, first + count):
+            error = layout.unpack(self.simulate(i, 1))["error"]
+            bad += ~np.isfinite(error).all(axis=(2, 3))
+        return [
+            f"{self.case.name}: filter {axes.filters[f]!r}, scan {axes.k[k]}: "
+            f"{bad[f, k]} of {count} realisations not finite"
+            for f, k in np.argwhere(bad)[:20]
+        ]
+
+
+# ---- repeat ----------------------------------------------------------------------------------------------------------
+RESULTS = "results"  # the command's default directory
+SHORT = {"realisations": "-n", "seed": "--seed"}
+
+
+Precision = tuple[float, str]  # in per cent, and of which kind of quantity
+
+
+def repeated(asked: Experiment, done: Mapping[str, int], overrides: Sequence[str], precision: Precision | None) -> str:
+    """The command that makes the same tables, or a sentence that says why there is none.
+
+    asked is the experiment as config and overrides give it, done the realisations of each case that the tables hold;
+    precision decided where the cases ended, unless it is None.
+    """
+    if asked.path is None:
+        return "none: the config was given in Python, and stands below"
+    wanted = {case.name: case.realisations for case in asked.cases}
+    counts = {done.get(name, 0) for name in wanted}
+    if all(done.get(name) == count for name, count in wanted.items()):
+        return command(asked, overrides, RESULTS)
+    if len(counts) == 1:
+        kept = [text for text in overrides if text.partition("=")[0].strip() != "realisations"]
+        return command(asked, [*kept, f"realisations={counts.pop()}"], RESULTS)
+    if precision is not None:
+        return command(asked, overrides, RESULTS, precision)
+    return "none: the run was stopped, its cases at different numbers of realisations, which stand below"
+
+
+def command(
+    experiment: Experiment,
+    overrides: Sequence[str],
+    out: str | os.PathLike,
+    precision: Precision | None = None,
+    verb: str = "run",
+) -> str:
+    """The command that runs an experiment, or reads what it came to; a shipped config by its stem."""
+    # In a checkout the shipped folder is a link to configs/.
+    folders = {(folder / "configs").resolve() for folder in (document.SHIPPED, *document.further_folders())}
+    shipped = not experiment.path or Path(experiment.path).resolve().parent in folders
+    words = ["radarsim", verb, experiment.stem if shipped else as_text(experiment.path or "")]
+    for override in overrides:
+        key, _, value = override.partition("=")
+        words += [SHORT[key], value] if key in SHORT else ["--set", override]
+    if precision is not None:
+        percent, of = precision
+        words += ["--precision", f"{percent:.17g}", *(["--of", of] if of != "sigma" else [])]
+    return shlex.join(words) + into(out)
+
+
+def into(out: str | os.PathLike) -> str:
+    """The end of a command that reads or writes a directory of results."""
+    return f" {shlex.join(['--out', as_text(os.fspath(out))])}" if str(out) != RESULTS else ""
+
+
+def as_text(path: str) -> str:
+    """A path as text that can be written; bytes of it that are no UTF-8 escaped."""
+    return os.fsencode(path).decode("utf-8", "backslashreplace")

@@ -1,4 +1,7 @@
-"""What `radarsim doctor` looks at: the machine, and everything that is stored of a result."""
+"""What `radarsim doctor` looks at: the machine, and everything that is stored of a result.
+
+Compiling before the first run: what `radarsim compile` does.
+"""
 
 import hashlib
 import json
@@ -6,34 +9,44 @@ import os
 import re
 import shutil
 import time
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from radarsim.app.records import recorded_case
+from radarsim.app.configs import CaseWork, load
+from radarsim.app.configs import document as lookup
+from radarsim.app.result import recorded_case
 from radarsim.app.selftest import tolerance
-from radarsim.app.work import CaseWork
 from radarsim.config.experiment import Case
-from radarsim.engine.audit import Audit, audited
 from radarsim.engine.blocks import Node, Partial, simulated
-from radarsim.engine.machine import available_cores, described, instruction_set, platform_name
-from radarsim.engine.moments import Sums
-from radarsim.engine.store import folder_of, is_directory
+from radarsim.engine.results import Sums
+from radarsim.engine.store import (
+    Audit,
+    audited,
+    available_cores,
+    described,
+    folder_of,
+    instruction_set,
+    is_directory,
+    platform_name,
+)
 from radarsim.errors import ConfigError, StoreError
 from radarsim.report import files
 
+# ---- doctor ----------------------------------------------------------------------------------------------------------
 LOOKS, LOOK_S = 4, 0.25
 ROUNDINGS = 10  # a power p ≤ 4 of an error, and heavy tails in it
 
 
 def machine() -> dict[str, str]:
     """The machine, what runs on it, and where compiled kernels are kept, a text each."""
-    from radarsim.kernels import cache as compiled
-    from radarsim.report import provenance
+    from radarsim.kernels import compile
+    from radarsim.report import files
 
-    facts, cache = described(), compiled.ROOT
+    facts, cache = described(), compile.ROOT
     kept = [path.stat().st_size for path in cache.rglob("*") if path.is_file()] if cache.is_dir() else []
     writable = "writable" if os.access(cache, os.W_OK) else "not writable"
     free = shutil.disk_usage(Path.cwd()).free
@@ -43,7 +56,7 @@ def machine() -> dict[str, str]:
         "threads": f"{available_cores()} by default",
         "cache": f"{cache}: {len(kept)} files, {sum(kept) / 1e6:.1f} MB, {writable}",
         "disk": f"{free / 1e9:.1f} GB free here",
-        "versions": ", ".join(f"{name} {version}" for name, version in provenance.versions().items()),
+        "versions": ", ".join(f"{name} {version}" for name, version in files.versions().items()),
         "cluster": cluster(),
     }
 
@@ -142,7 +155,7 @@ def _record(folder: Path) -> dict[str, Any]:
 
 def _digest(value: object) -> str | None:
     """SHA-256 of what run.json holds, in hexadecimal; None for what no run writes, such as NaN."""
-    from radarsim.report.provenance import to_json
+    from radarsim.report.files import to_json
 
     try:
         return hashlib.sha256(to_json(value)).hexdigest()
@@ -212,3 +225,27 @@ def agree(work: CaseWork, made: Sums, stored: np.ndarray, platforms: set[str]) -
         if not (np.abs(one - other) <= allowed * scale).all():
             return False
     return True
+
+
+# ---- precompile ------------------------------------------------------------------------------------------------------
+class Compiled(NamedTuple):
+    """What the kernels of a config took: CPU seconds, next to nothing where their machine code was kept."""
+
+    config: str
+    seconds: float
+
+
+def compiled(configs: Sequence[str]) -> Iterator[Compiled]:
+    """Compile the kernels of configs, of all shipped ones where none is named, and keep their machine code.
+
+    A realisation of each case is simulated and forgotten. Raises ConfigError where the machine code cannot be kept.
+    """
+    from radarsim.kernels import compile
+
+    for name in configs or lookup.stems("configs"):
+        started = time.process_time()
+        for case in load(name).cases:
+            CaseWork(case).simulate(0, 1)
+            if "write" in compile.troubles:
+                raise ConfigError(compile.troubles["write"])
+        yield Compiled(name, time.process_time() - started)

@@ -8,14 +8,12 @@ from functools import partial
 
 import numpy as np
 
-from radarsim.app.simulation import check_precision, result_of, table_of, tailed, unknown
-from radarsim.app.work import CaseWork
+from radarsim.app.configs import CaseWork
+from radarsim.app.run import case_result, check_precision, table_of, tailed, unknown
 from radarsim.config.experiment import Experiment
 from radarsim.engine.blocks import Total
-from radarsim.engine.collect import collect
-from radarsim.engine.machine import available_cores
-from radarsim.engine.stock import Stock, stock
-from radarsim.engine.store import Store
+from radarsim.engine.run import collect
+from radarsim.engine.store import Stock, Store, available_cores, stock
 from radarsim.errors import ConfigError
 from radarsim.language import few, listed, tr
 from radarsim.studies import registry
@@ -153,7 +151,7 @@ def needed(experiment: Experiment, work: CaseWork, percent: float, seconds_each:
 
     exact, table = work.plan.gaussian and of == "sigma", table_of(experiment, of)
     count = LEAST if exact else min(max(LEAST, int(PILOT_OF_PRECISION_S / seconds_each)), MOST)
-    result = result_of(work.case, work, collect(work, count))
+    result = case_result(work.case, work, collect(work, count))
     if exact:
         result = precision.gaussian(result)
         axes = result.axes

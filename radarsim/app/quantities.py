@@ -2,16 +2,23 @@
 
 Exact numbers come from the plan of a case, without a realisation. Sampled ones are read from the tables by the names
 that these have in every study: whatever study makes a table `locks` can be asked for its locks.
+
+Where a function of one number reaches a target: every root on a range, or the nearest that it comes.
+
+The function may be undefined in places (not-a-number), as a config's keys are where they do not go together. Positive
+ranges of more than a factor of 20 are searched on a logarithmic scale.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from radarsim.config.document import did_you_mean
 from radarsim.config.experiment import Case
-from radarsim.config.lookup import did_you_mean
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.errors import ConfigError
 from radarsim.language import term, tr
@@ -21,6 +28,8 @@ from radarsim.studies import registry
 if TYPE_CHECKING:
     import pandas as pd
 
+
+# ---- quantities ------------------------------------------------------------------------------------------------------
 UNKNOWN = Estimate(np.nan, np.nan, np.nan)
 UNPAIRED = 4  # times the realisations where a change moves the scans, so that the noise compared is of other scans
 
@@ -146,9 +155,9 @@ def resolved(quantity: Quantity, axes: Axes) -> Quantity:
 
 def unit(quantity: Quantity, axes: Axes) -> str:
     """The unit in which a quantity is given."""
-    from radarsim.report import text
+    from radarsim.report import tables
 
-    return quantity.of.unit or text.unit(dict(axes.components)[str(quantity.component)])
+    return quantity.of.unit or tables.unit(dict(axes.components)[str(quantity.component)])
 
 
 def shortened(quantity: Quantity, case: Case) -> Case:
@@ -271,3 +280,235 @@ def at(quantity: Quantity, series: Series) -> Estimate:
     if len(exactly):
         return Estimate(*(float(part[exactly[0]]) for part in values))
     return Estimate(*(float(np.interp(quantity.at_s, t_s, part)) for part in values))
+
+
+# ---- search ----------------------------------------------------------------------------------------------------------
+WIDE = 20  # high over low from which a range is searched logarithmically
+PER_DECADE, LEAST_POINTS, MOST_POINTS = 5, 25, 61
+EXACTLY = 1e-13  # of a root's size, to which brackets are closed: far below the 1e-9 that is promised
+BILLIONTH = 1e-9
+POLISHED, MOST_POLISHED = 1e-10, 8  # of a root's size, to which secants go on; how many
+FIRST_STEP = 1e-4  # of the range, to the second place at which a root is looked for near another
+GOLDEN = (math.sqrt(5) - 1) / 2
+
+Function = Callable[[float], float]
+
+
+@dataclass(frozen=True)
+class Range:
+    """What is searched: low to high, on a scale that is logarithmic or not, of whole numbers or not."""
+
+    low: float
+    high: float
+    logarithmic: bool
+    whole: bool = False
+
+    def inner(self, x: float) -> float:
+        """A value on the scale of the search."""
+        return math.log(x) if self.logarithmic else x
+
+    def outer(self, u: float) -> float:
+        """The value at a place of the scale, within the range; the nearest whole one where only these are."""
+        x = math.exp(u) if self.logarithmic else u
+        return min(max(float(round(x)) if self.whole else x, self.low), self.high)
+
+    def grid(self, points: int | None = None) -> list[float]:
+        """Places from end to end, even on the scale; whole numbers, all of them where they are few."""
+        if self.whole and self.high - self.low < MOST_POINTS:
+            return [float(n) for n in range(math.ceil(self.low), math.floor(self.high) + 1)]
+        if points is None:
+            decades = (self.inner(self.high) - self.inner(self.low)) / math.log(10) if self.logarithmic else 0
+            points = min(max(LEAST_POINTS, math.ceil(PER_DECADE * decades) + 1), MOST_POINTS)
+        first, step = self.inner(self.low), (self.inner(self.high) - self.inner(self.low)) / (points - 1)
+        found = [self.outer(first + i * step) for i in range(points)]
+        found[0], found[-1] = self.low, self.high
+        return sorted(set(found)) if self.whole else found
+
+
+def searched(low: float, high: float, whole: bool = False) -> Range:
+    """The range from low to high, on the scale that fits it."""
+    return Range(low, high, low > 0 and high / low > WIDE, whole)
+
+
+@dataclass(frozen=True)
+class Found:
+    """The roots on a range, rising; without any, the place where the function comes nearest to zero and its value."""
+
+    roots: tuple[float, ...]
+    nearest: float
+    at_nearest: float
+
+
+def roots_of(function: Function, over: Range, width: float = EXACTLY) -> Found:
+    """All roots that a scan of the range shows: changes of sign, and touching ones where it turns near zero.
+
+    Where the function jumps over zero, the place of the jump counts as one, unless it is undefined between. Brackets
+    are closed to a part `width` of the root, by default to rounding.
+
+    Raises ValueError where the function is defined nowhere on the scan.
+    """
+    places = [(x, function(x)) for x in over.grid()]
+    places = _with_edges(function, over, places)
+    places = _with_turns(function, over, places)
+    known = [(x, y) for x, y in places if not math.isnan(y)]
+    if not known:
+        raise ValueError("not defined on the range")
+    found = [x for x, y in known if y == 0]
+    for (a, ya), (b, yb) in pairwise(places):
+        if ya * yb < 0:
+            found.append(closed(function, over, (a, ya), (b, yb), width=width))
+    found = [x for x in found if not math.isnan(function(x))]
+    nearest, at_nearest = min(known, key=lambda one: abs(one[1]))
+    return Found(tuple(sorted(found)), nearest, at_nearest)
+
+
+def polished(function: Function, over: Range, root: float, rising: float, near_enough: float) -> float | None:
+    """The root of a smooth function near that of a rougher one, by secants on the scale of the search.
+
+    rising is the first slope. To ten digits, or to rounding; of a function that jumps where |function| <= near_enough.
+    None where a step does not bring it nearer.
+    """
+    u, y = over.inner(root), function(root)
+    for _ in range(MOST_POLISHED):
+        size = 1.0 if over.logarithmic else abs(u)
+        if y == 0 or (rising and abs(y / rising) <= POLISHED * size):
+            return over.outer(u)
+        v = over.inner(over.outer(u - y / rising)) if rising else u
+        z = function(over.outer(v)) if v != u else math.nan
+        if not abs(z) <= abs(y) / 2:
+            break
+        u, y, rising = v, z, (z - y) / (v - u)
+    return over.outer(u) if abs(y) <= near_enough else None
+
+
+def near(function: Function, over: Range, root: float, near_enough: float) -> float | None:
+    """The root of a function near that of a rougher one: to a billionth, or where |function| <= near_enough.
+
+    None where the function keeps its sign for as far as a tenth of the range.
+    """
+    u, reach = over.inner(root), over.inner(over.high) - over.inner(over.low)
+
+    def place(u: float) -> tuple[float, float]:
+        x = over.outer(u)
+        return x, function(x)
+
+    one = place(u)
+    if abs(one[1]) <= near_enough:
+        return root
+    step, other = FIRST_STEP * reach, place(u + FIRST_STEP * reach)
+    side, before = (1, other) if abs(other[1]) < abs(one[1]) else (-1, one)
+    if one[1] * other[1] > 0:
+        while before[1] * (other := place(u + side * step))[1] > 0 and step < reach / 10:
+            before, step = other, 2 * step
+        one = before
+    if not one[1] * other[1] <= 0:
+        return None
+    return closed(function, over, one, other, lambda x, y: abs(y) <= near_enough, BILLIONTH)
+
+
+def closed(
+    function: Function,
+    over: Range,
+    one: tuple[float, float],
+    other: tuple[float, float],
+    near_enough: Callable[[float, float], bool] = lambda x, y: False,
+    width: float = EXACTLY,
+) -> float:
+    """The root between two places (x, y) of opposite signs (Chandrupatla, Adv. Eng. Software 28, 1997, 145-149).
+
+    Ends where near_enough(x, y), at a root, or where the bracket is closed to a part `width` of it, by default to
+    rounding; where the function jumps over zero, at the jump. Of whole numbers the one beside the change of sign with
+    the smaller value.
+    """
+    (a, fa), (b, fb) = (over.inner(one[0]), one[1]), (over.inner(other[0]), other[1])
+    c, fc, t = a, fa, 0.5
+    for _ in range(200):
+        x = over.outer(a + t * (b - a))
+        u = over.inner(x)
+        between = abs(over.outer(b) - over.outer(a))
+        if x in (over.outer(a), over.outer(b)) or between <= width * abs(x) or (over.whole and between <= 1):
+            break
+        f = function(x)
+        if f == 0 or near_enough(x, f) or math.isnan(f):
+            return x
+        if (f > 0) == (fa > 0):
+            c, fc = a, fa
+        else:
+            c, b, fc, fb = b, a, fb, fa
+        a, fa = u, f
+        t = _next(a, b, c, fa, fb, fc)
+    u, _ = min(((a, fa), (b, fb)), key=lambda end: abs(end[1]))
+    return over.outer(u)
+
+
+def _next(a: float, b: float, c: float, fa: float, fb: float, fc: float) -> float:
+    """Where to look next between a and b, as a share: inverse quadratic interpolation where it is safe, else half."""
+    if c in (a, b) or fc in (fa, fb):
+        return 0.5
+    xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
+    if not (phi**2 < xi and (1 - phi) ** 2 < 1 - xi):
+        return 0.5
+    share = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+    margin = 2e-15 * max(abs(a), 1e-300) / abs(b - a)
+    return min(max(share, margin), 1 - margin)
+
+
+def _with_edges(function: Function, over: Range, places: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The places with those at which the function begins or ceases to be defined, to a thousandth of a step."""
+    made = list(places)
+    if over.whole:
+        return made
+    for one, other in pairwise(places):
+        if math.isnan(one[1]) == math.isnan(other[1]):
+            continue
+        bad, good = (one, other) if math.isnan(one[1]) else (other, one)
+        for _ in range(10):
+            x = over.outer((over.inner(bad[0]) + over.inner(good[0])) / 2)
+            tried = (x, function(x))
+            bad, good = (tried, good) if math.isnan(tried[1]) else (bad, tried)
+        made.append(good)
+    return sorted(made)
+
+
+def _with_turns(function: Function, over: Range, places: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The places with the extremes, found by golden sections, at which the function turns back before it reaches zero.
+
+    Only where it may reach it: beyond a turn the parabola through the three places comes at most so much nearer; and,
+    where it reaches zero nowhere, the turn that comes nearest.
+    """
+    made = list(places)
+    if over.whole:
+        return made
+    crossed = any(one[1] * other[1] <= 0 for one, other in pairwise(places))
+    for (a, ya), (b, yb), (c, yc) in zip(places, places[1:], places[2:], strict=False):
+        if math.isnan(ya + yb + yc) or not (ya * yb > 0 and yb * yc > 0 and abs(ya) > abs(yb) <= abs(yc)):
+            continue
+        if abs(yb) > 2 * max(abs(ya - yb), abs(yc - yb)) + 1e-12 and (crossed or not _least(places, b)):
+            continue
+        made.append(_turn(function, over, a, c, math.copysign(1.0, yb)))
+    return sorted(made)
+
+
+def _least(places: Sequence[tuple[float, float]], x: float) -> bool:
+    """Whether of all places this is where the function is nearest to zero: the limit, if it is never reached."""
+    return x == min((abs(y), x) for x, y in places if not math.isnan(y))[1]
+
+
+def _turn(function: Function, over: Range, low: float, high: float, sign: float) -> tuple[float, float]:
+    """The least of sign · function between two places; ends early where it crosses zero."""
+    a, b = over.inner(low), over.inner(high)
+    u, v = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
+    fu, fv = sign * function(over.outer(u)), sign * function(over.outer(v))
+    for _ in range(40):
+        if min(fu, fv) <= 0 or b - a < 1e-8 * max(abs(a), abs(b), 1.0):
+            break
+        if fu < fv:
+            b, v, fv = v, u, fu
+            u = b - GOLDEN * (b - a)
+            fu = sign * function(over.outer(u))
+        else:
+            a, u, fu = u, v, fv
+            v = a + GOLDEN * (b - a)
+            fv = sign * function(over.outer(v))
+    place, least = (u, fu) if fu < fv else (v, fv)
+    return over.outer(place), sign * least

@@ -9,17 +9,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from radarsim.app import quantities, search
-from radarsim.app.configs import load
+from radarsim.app import quantities
+from radarsim.app.configs import CaseWork, load
 from radarsim.app.quantities import UNKNOWN, Quantity
-from radarsim.app.simulation import result_of
-from radarsim.app.work import CaseWork
-from radarsim.config import numeric
+from radarsim.app.run import case_result
+from radarsim.config import fields
+from radarsim.config.check import label
+from radarsim.config.document import did_you_mean
 from radarsim.config.experiment import Case
-from radarsim.config.labels import label
-from radarsim.config.lookup import did_you_mean
-from radarsim.engine.collect import collect
 from radarsim.engine.results import Axes, CaseResult
+from radarsim.engine.run import collect
 from radarsim.errors import ConfigError
 from radarsim.language import term, tr
 from radarsim.report.statistics import Estimate
@@ -103,7 +102,7 @@ class Cases:
         holder, _, place = key.rpartition(".")
         if not place.isdecimal():
             return f"{key}={_yaml(value)}"
-        items = {one.path: one.value for one in numeric.keys(self.base.spec) if one.path.rpartition(".")[0] == holder}
+        items = {one.path: one.value for one in fields.keys(self.base.spec) if one.path.rpartition(".")[0] == holder}
         listed = [f"{holder}.{i}" for i in range(len(items))]
         if list(items) != listed or None in items.values():
             return f"{key}={_yaml(value)}"
@@ -124,7 +123,7 @@ class Question:
     key: str
     quantity: Quantity
     equals: float
-    over: search.Range
+    over: quantities.Range
     now: float | None
     unit: str
     overrides: tuple[str, ...]
@@ -149,7 +148,7 @@ def rounded(value: float) -> float:
     return float(f"{value:.12g}")
 
 
-def range_of(found: Sequence[numeric.NumericKey], name: str, between: tuple[float, float] | None) -> search.Range:
+def range_of(found: Sequence[fields.NumericKey], name: str, between: tuple[float, float] | None) -> quantities.Range:
     """What is searched of a key. Raises ConfigError where it has neither bounds nor a value to begin from."""
     key, values = found[0], [one.value for one in found if one.value]
     if between is not None:
@@ -161,17 +160,19 @@ def range_of(found: Sequence[numeric.NumericKey], name: str, between: tuple[floa
             if low > high:
                 ends = " ".join(f"{end:g}" for end in between)
                 raise ConfigError(f"--between: {name} takes whole numbers, and there is none from {ends}")
-        return search.searched(low, high, key.whole)
+        return quantities.searched(low, high, key.whole)
     if math.isfinite(key.low) and math.isfinite(key.high) and not key.whole:
-        return search.searched(key.low, key.high)
+        return quantities.searched(key.low, key.high)
     if not values:
         what = "there is no value to search about" if key.value is None else f"is {key.value:g} in the config"
         raise ConfigError(f"{name}: {what}, and its own range has no end: give --between LO HI")
     if key.low >= 0:
         low, high = max(rounded(min(values) / FACTOR), key.low), min(rounded(max(values) * FACTOR), key.high)
-        return search.searched(math.ceil(low) if key.whole else low, math.floor(high) if key.whole else high, key.whole)
+        return quantities.searched(
+            math.ceil(low) if key.whole else low, math.floor(high) if key.whole else high, key.whole
+        )
     size = 10 * max(map(abs, values))
-    return search.searched(max(-size, key.low), min(size, key.high), key.whole)
+    return quantities.searched(max(-size, key.low), min(size, key.high), key.whole)
 
 
 class Curve:
@@ -259,7 +260,7 @@ class Curve:
 
     def _result(self, case: Case, realisations: int) -> CaseResult:
         work = CaseWork(case)
-        return result_of(case, work, collect(work, realisations, threads=self.threads))
+        return case_result(case, work, collect(work, realisations, threads=self.threads))
 
 
 def predict(told: Callable[[str], None], what: str, seconds: float) -> None:

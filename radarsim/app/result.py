@@ -1,24 +1,102 @@
-"""What a finished experiment gives: tables, figures, files."""
+"""What an earlier run.json says of the cases that it reports, as today's program reads it; what other sources made.
 
+What a finished experiment gives: tables, figures, files.
+
+From finished cases to files: tables, figures, claims, run.json and report.html of one experiment.
+
+What the commands print with --json: plain data, one document a command, with the content of their text output.
+"""
+
+import json
+import math
 import os
+import time
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from radarsim.config.experiment import Experiment
+from radarsim.app import configs
+from radarsim.app.configs import load
+from radarsim.app.stored import classes_of
+from radarsim.config.experiment import Case, Experiment
+from radarsim.engine import store
 from radarsim.engine.results import CaseResult
-from radarsim.errors import DisagreementError
+from radarsim.errors import DisagreementError, RadarsimError
+from radarsim.language import tr
+from radarsim.report import claims, files, notes, rare, seen
+from radarsim.report import tables as common
+from radarsim.report.chart import spoken
+from radarsim.report.claims import page as forest
+from radarsim.report.claims.page import OVER, with_classes
+from radarsim.report.drawing import Figure
 from radarsim.studies.registry import study
 
 if TYPE_CHECKING:
     import pandas as pd
+    from _typeshed import DataclassInstance
 
-    from radarsim.app.output import Written
-    from radarsim.report.drawing import Figure
+    from radarsim.app.compare import Drawn
+    from radarsim.app.outlook import Outlook
+    from radarsim.app.question import Answer
+    from radarsim.app.run import Shares
+    from radarsim.app.stored import Inventory
     from radarsim.report.figures import Canvas
 
+
+# ---- records ---------------------------------------------------------------------------------------------------------
+LABELS = ("case", "swept")  # of a resolved case, beside its keys
+NAMED = 3  # cases in a line
+SURE = 3  # a change that shows in one of m / 3 realisations is missed by m of them with a probability of e⁻³ = 5 %
+
+
+def recorded_case(record: Mapping, name: str) -> Case | None:
+    """A case as run.json resolved it; None where it no longer reads as a config."""
+    try:
+        for case in record["resolved"]["cases"]:
+            if case["case"] == name:
+                keys = {key: value for key, value in case.items() if key not in LABELS}
+                return load({"study": record["study"], **keys}).cases[0]
+    except (RadarsimError, LookupError, TypeError):
+        pass
+    return None
+
+
+def of_other_sources(names: Mapping[str, str]) -> list[str]:
+    """A line on the blocks that other sources made and that are kept, one on those that are not; once in a process.
+
+    names are those of cases, by identity.
+    """
+    found = [one for one in store.settled if one.identity in names]
+    store.settled[:] = [one for one in store.settled if one.identity not in names]
+    lines = []
+    if kept := [one for one in found if one.same]:
+        again, stored = sum(one.again for one in kept), sum(one.stored for one in kept)
+        line = (
+            f"stored blocks of {_listed(kept, names)} were made by other sources; {again:,} of {stored:,} realisations "
+            "were computed again and have the same bytes: all are kept"
+        )
+        if unseen := [one.again for one in kept if one.again < one.stored]:
+            line += f". A change in one realisation of {min(unseen) // SURE:,} would have shown, rarer ones may not"
+        lines.append(line)
+    same = {one.identity for one in kept}
+    if begun := [one for one in found if one.identity not in same]:
+        lines.append(
+            f"stored blocks of {_listed(begun, names)} were made by other sources that give other bytes, and are not "
+            "used; `radarsim clean` removes them"
+        )
+    return lines
+
+
+def _listed(found: list[store.Settled], names: Mapping[str, str]) -> str:
+    cases = list(dict.fromkeys(names[one.identity] for one in found))
+    more = f" and {len(cases) - NAMED} more" if len(cases) > NAMED else ""
+    return f"{', '.join(cases[:NAMED])}{more}"
+
+
+# ---- result ----------------------------------------------------------------------------------------------------------
 MOST_ROWS = 40  # that a notebook shows
 
 
@@ -41,14 +119,14 @@ class Result:
         """What a notebook shows: question, answer, realisations, σ and gain at the last scan; text escaped."""
         from html import escape
 
-        from radarsim.report import provenance
+        from radarsim.report import files
 
         shown = ("case", "filter", "component", "unit", "t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")
         columns = [*shown, *(name for name in ("gain_percent", "gain_lo", "gain_hi") if len(self.gains))]
         rows = self.last_scan[columns].dropna(axis=1, how="all")
         table = rows.to_html(index=False, border=0, float_format=lambda v: f"{v:.4g}", na_rep="", max_rows=MOST_ROWS)
         answer = "".join(f"<p>{escape(line)}</p>" for line in self.answer)
-        count = escape(provenance.span(sorted({case.count for case in self.cases})))
+        count = escape(files.span(sorted({case.count for case in self.cases})))
         return f"<h4>{escape(self.question)}</h4>{answer}<p>{count} realisations; 95 % intervals.</p>{table}"
 
     @property
@@ -80,9 +158,8 @@ class Result:
 
     @cached_property
     def _tables(self) -> dict:
-        from radarsim.app import output
 
-        return output.tables(self.cases, self.experiment.stem)
+        return case_tables(self.cases, self.experiment.stem)
 
     @property
     def curves(self) -> "pd.DataFrame":
@@ -114,9 +191,8 @@ class Result:
 
     @cached_property
     def _described(self) -> "dict[str, Figure]":
-        from radarsim.app import output
 
-        return output.figures(self.cases, self._tables, self.experiment)
+        return case_figures(self.cases, self._tables, self.experiment)
 
     @property
     def figures(self) -> tuple[str, ...]:
@@ -147,30 +223,30 @@ class Result:
         figures may name the formats of their files: svg, png, pdf; width_mm is their width in place of their own. What
         was written comes back. Raises DisagreementError, with all written, where there are `faults`.
         """
-        from radarsim.app import arguments, output
-        from radarsim.report import index, provenance
+        from radarsim.app import configs
+        from radarsim.report import files, html
 
         folder = Path(out) / self.experiment.stem
-        self._tables["claims"] = output.over_readings(self._tables["claims"], self.experiment.study, Path(out))
-        formats = arguments.formats(figures)
-        self.facts["warnings"] = [*self.facts["warnings"], *provenance.replaced(folder, self.experiment)]
+        self._tables["claims"] = over_readings(self._tables["claims"], self.experiment.study, Path(out))
+        formats = configs.formats(figures)
+        self.facts["warnings"] = [*self.facts["warnings"], *files.replaced(folder, self.experiment)]
         facts = self.facts | {"finished": datetime.now(UTC).isoformat("T", "seconds")}
         facts["warnings"] = [*self.faults, *facts["warnings"]]
-        write = partial(output.write, draw=bool(formats), formats=formats, width_mm=width_mm)
+        write = partial(write_files, draw=bool(formats), formats=formats, width_mm=width_mm)
         self.written = write(self.experiment, self.cases, folder, facts, made=self.tables)
-        index.write(Path(out))
+        html.write(Path(out))
         self.check()
         return self.written
 
     @cached_property
     def faults(self) -> tuple[str, ...]:
         """What no chance makes, a line each: exact and measured values apart."""
-        from radarsim.report import agreement, claims
+        from radarsim.report import claims, notes
 
         own, made = study(self.experiment.study), self._tables
         nearly = [case.name for case in self.experiment.cases if own.exact_but_for(case)]
         bounds = ("claims",) if own.exact_errors else ("claims", "curves", "gains")
-        return (*agreement.faults(made, nearly, bounds), *claims.errors(made["claims"]))
+        return (*notes.faults(made, nearly, bounds), *claims.errors(made["claims"]))
 
     def check(self) -> None:
         """Raises DisagreementError where there are `faults`."""
@@ -207,7 +283,8 @@ class Result:
 
     def as_shipped(self) -> list[str]:
         """The claims judged under the shipped reading alone although their paper leaves open what they hang on."""
-        from radarsim.report.claims import classes, first_rows
+        from radarsim.report.claims import first_rows
+        from radarsim.report.claims import page as classes
 
         rows = first_rows(self._tables["claims"].to_dict("records"))
         return [row["claim"] for row in rows if classes.alone(row)]
@@ -224,8 +301,226 @@ class Result:
 
     @cached_property
     def _of_intervals(self) -> list[str]:
-        from radarsim.report import provenance
+        from radarsim.report import files
 
-        return provenance.of_intervals(
-            self.cases, self._tables, partial(study(self.experiment.study).answer, self.cases)
-        )
+        return files.of_intervals(self.cases, self._tables, partial(study(self.experiment.study).answer, self.cases))
+
+
+# ---- output ----------------------------------------------------------------------------------------------------------
+def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
+    """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims.
+
+    A study whose errors are not of all realisations at common scans makes its own curves and gains. stem is the
+    config's: all claims of it are in the table of claims, also those that it cannot judge any more.
+    """
+    of = study(results[0].study)
+    made = measured(results)
+    verdicts = claims.judged(of.claims(), results, made, configs.shipped, stem)
+    made["claims"] = over_readings(verdicts, results[0].study)
+    return notes.noted(made, results, of.exact_errors)
+
+
+def over_readings(verdicts: "pd.DataFrame", name: str, out: Path | None = None) -> "pd.DataFrame":
+    """claims.csv of a study with the classes over all readings: those under `out`, else those that are shipped."""
+    of = study(name)
+    readings, papers = of.readings(), of.claims()
+    if readings is None or papers is None or not len(verdicts):
+        return verdicts
+    own: Any = verdicts.to_dict("records")
+    rows = with_classes(own, classes_of([(readings, papers)], out))
+    return verdicts.assign(**{column: [row[column] for row in rows] for column in OVER})
+
+
+def measured(results: Sequence[CaseResult]) -> dict:
+    """The tables of what was measured alone: curves, gains, and the study's own."""
+    own = study(results[0].study).tables(results)
+    shared = {"curves": common.curves, "gains": common.gains}
+    return {name: own[name] if name in own else table(results) for name, table in shared.items()} | own
+
+
+def case_figures(
+    results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"], experiment: Experiment
+) -> dict[str, Figure]:
+    """The figures of an experiment, described, by the stem of their file: the study's own, and of sweeps."""
+    own = study(results[0].study)
+    drawn = dict(own.figures(results, _banded(made), experiment))
+    if (judged := forest.figure(made["claims"].to_dict("records"))) is not None:
+        drawn["claims"] = judged
+    if any(notes.heavy(made[name]).any() for name in ("curves", "gains")):
+        drawn = {
+            name: _said(figure) if name.startswith(("sigma", "gain")) else figure for name, figure in drawn.items()
+        }
+    if not own.draws_sweeps:
+        drawn |= rare.figures(results, common.groups(made["curves"], "case", "filter", "component"))
+    return {name: seen.crossed(figure) for name, figure in drawn.items()}
+
+
+def _said(figure: Figure) -> Figure:
+    """The figure whose caption says why a band is missing."""
+    said = tr("No band where few large errors decide.")
+    return replace(figure, caption=f"{figure.caption} {said}")
+
+
+def _banded(made: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:
+    """The tables for figures: σ and gains without an interval where theirs is marked."""
+    thinned = {}
+    for name, ends in (("curves", ("sigma_lo", "sigma_hi")), ("gains", ("gain_lo", "gain_hi"))):
+        table = made[name]
+        if (thin := notes.heavy(table)).any():
+            thinned[name] = table.assign(**{end: table[end].mask(thin) for end in ends})
+    return {**made, **thinned}
+
+
+@dataclass(frozen=True)
+class Written:
+    """What was written: the folder, its files by their path in it, the tables, and the sentences of the answer.
+
+    removed are files of an earlier run that this one did not write. seconds: what drawing took, and writing with the
+    report.
+    """
+
+    folder: Path
+    files: tuple[str, ...]
+    removed: tuple[str, ...]
+    tables: Mapping[str, "pd.DataFrame"] = field(repr=False)
+    answer: tuple[str, ...]
+    seconds: Mapping[str, float]
+
+
+ALWAYS = ("curves", "gains")  # tables written without a row too; others only where they have one
+
+
+def write_files(
+    experiment: Experiment,
+    results: Sequence[CaseResult],
+    folder: Path,
+    run: Mapping[str, Any],
+    *,
+    draw: bool = True,
+    made: "Mapping[str, pd.DataFrame] | None" = None,
+    formats: Sequence[str] = ("svg", "png"),
+    width_mm: float | None = None,
+) -> Written:
+    """Write all of an experiment's outputs into folder; every file at once, none half.
+
+    run holds the facts of the run for run.json: see provenance.record; made the tables, where they are at hand; formats
+    those of the figures' files, width_mm their width in place of their own. Outputs of an earlier run that this one
+    does not write (figures without `draw`) are removed, so that nothing stale stands beside new numbers.
+    """
+    from radarsim.report import html
+
+    made = case_tables(results, stem=experiment.stem) if made is None else made
+    contents = {f"{name}.csv": common.to_csv(table) for name, table in made.items() if len(table) or name in ALWAYS}
+    began = time.perf_counter()
+    described = case_figures(results, made, experiment) if draw else {}
+    if draw:
+        from radarsim.report import figures as drawing  # Matplotlib
+
+        made_by = f"radarsim {files.versions()['radarsim']}, {experiment.stem}, config {files.asked(experiment)}"
+        for name, figure in described.items():
+            saved = drawing.save(figure, formats, width_mm, made_by)
+            contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
+        contents["figures/captions.md"] = captions(described).encode()
+    drawn = time.perf_counter()
+    own = study(experiment.study)
+    answer = tuple(own.answer(results, made))
+    of_intervals = files.of_intervals(results, made, partial(own.answer, results))
+    run = {**run, "warnings": [*run.get("warnings", ()), *of_intervals]}
+    record = files.record(experiment, results, run, contents, answer, store.described())
+    page = html.report_page(
+        experiment,
+        made,
+        list(described.values()),
+        record,
+        answer,
+        own.question(experiment),
+        inputs=own.inputs(results),
+        cost=own.cost(made, run),
+        agreement=notes.agreement(made["curves"]) if own.exact_errors else None,
+        drawn_from=own.drawn_from(),
+    )
+    contents["report.html"] = page.encode()
+    contents["run.json"] = files.to_json(files.with_output(record, "report.html", contents["report.html"]))
+    removed = sorted(set(files.outputs(folder)) - set(contents))
+    files.replace_all(folder, contents, stale=files.outputs)
+    seconds = {"drawing": drawn - began, "writing": time.perf_counter() - drawn}
+    return Written(folder, tuple(sorted(contents)), tuple(removed), made, answer, seconds)
+
+
+def captions(described: Mapping[str, Figure]) -> str:
+    """The captions of figures as Markdown: what each shows, then how it is drawn."""
+    parts = [f"## {name}\n\n**{spoken(one.title)}.** {spoken(one.caption)}\n" for name, one in described.items()]
+    return "\n".join([f"# {tr('Captions')}\n", *parts])
+
+
+# ---- documents -------------------------------------------------------------------------------------------------------
+def text(document: object) -> str:
+    """A document as JSON; what is not a number, or not finite, is null."""
+    return json.dumps(_plain(document), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "item"):  # NumPy's numbers
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def fields(one: "DataclassInstance") -> dict[str, Any]:
+    """A dataclass as it is, paths as text."""
+    return {key: str(value) if isinstance(value, Path) else value for key, value in asdict(one).items()}
+
+
+def result(one: "Result") -> dict[str, Any]:
+    """A finished run or report: what was asked and done, the answer, σ at the last scan, verdicts, files."""
+    written = one.written
+    assert written is not None  # the commands write what they print
+    names = {case.name: case.count for case in one.cases}
+    return {
+        "config": one.experiment.stem,
+        "stop": one.facts["stop"],
+        "unmet": one.unmet,
+        "cases": {
+            case.name: {"asked": case.realisations, "done": names.get(case.name, 0), "seed": case.seed}
+            for case in one.experiment.cases
+        },
+        "precision": one.facts.get("precision"),
+        "answer": list(written.answer),
+        "last_scan": one.last_scan.to_dict("records"),
+        "claims": one.verdicts(),
+        "claims_as_shipped": one.verdicts("as_shipped"),
+        "folder": str(written.folder),
+        "files": list(written.files),
+        "warnings": one.warnings,
+    }
+
+
+def share_record(done: "Shares") -> dict[str, Any]:
+    """What a share came to, in realisations, by case."""
+    return {**asdict(done), "unmet": done.unmet, "warnings": done.warnings}
+
+
+def outlook(experiment: "Experiment", one: "Outlook") -> dict[str, Any]:
+    """What a run would take."""
+    return {"config": experiment.stem, "path": experiment.path, **asdict(one)}
+
+
+def answer(one: "Answer") -> dict[str, Any]:
+    """What was solved for: the value with its interval, or the limit where it is not attainable."""
+    return {**asdict(one), "quantity": one.quantity.words}
+
+
+def drawn(one: "Drawn") -> dict[str, Any]:
+    """A chart: the sentences, the rows of chart.csv, and the files."""
+    return {"folder": str(one.folder), "sentences": one.sentences, "cases": one.rows, "files": one.files}
+
+
+def inventory(tables: "Inventory") -> dict[str, list[dict[str, str]]]:
+    """Configs, scenarios, studies and filters: lists of rows by the first word of their title."""
+    return {
+        title.split()[0].lower(): [dict(zip(columns, row, strict=True)) for row in rows]
+        for title, columns, rows in tables
+    }

@@ -1,41 +1,336 @@
-"""One experiment from config to written results: the wiring that the command and Python share."""
+"""The cases of an experiment collected one after the other, to a number of realisations or to a precision.
+
+How long tables, figures and report of an experiment take, measured on a few of its realisations.
+
+One experiment from config to written results: the wiring that the command and Python share.
+"""
 
 import json
 import math
 import os
 import re
 import sys
+import tempfile
 import time
 import unicodedata
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import asdict, replace
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, nullcontext
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from radarsim.app import arguments, simulation, stored_claims
-from radarsim.app.configs import load, shipped
-from radarsim.app.records import of_other_sources
-from radarsim.app.repeat import RESULTS, command, repeated
-from radarsim.app.result import Result
-from radarsim.app.simulation import Progress, RunOptions, SimulatedCases
-from radarsim.app.stored_readings import classes_of
-from radarsim.app.work import CaseWork
-from radarsim.config.experiment import Experiment
-from radarsim.engine import stopping
-from radarsim.engine.collect import stored
+from radarsim.app import configs
+from radarsim.app import result as output
+from radarsim.app import stored as stored_claims
+from radarsim.app.configs import RESULTS, CaseWork, command, load, repeated, shipped
+from radarsim.app.result import Result, of_other_sources
+from radarsim.app.stored import classes_of
+from radarsim.config.experiment import Case, Experiment
+from radarsim.engine import run as stopping
 from radarsim.engine.executors import Executor
-from radarsim.engine.machine import available_cores
 from radarsim.engine.results import CaseResult
-from radarsim.engine.stock import Stock, stock
-from radarsim.engine.stopping import Signals, Stop
+from radarsim.engine.run import Collected, Shared, Signals, Stop, collect, share, stored
+from radarsim.engine.store import Stock, available_cores, stock
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.report import files
 from radarsim.studies import registry
+from radarsim.studies.registry import study
 
 if TYPE_CHECKING:
     from radarsim.report.claims import PaperClaims
+    from radarsim.report.precision import Cell, Table
 
+
+# ---- simulation ------------------------------------------------------------------------------------------------------
+Progress = Callable[[int, int, int], None]
+
+
+@dataclass
+class SimulatedCases:
+    """Of each case that has a realisation done, in the experiment's order, its work and sums.
+
+    stopped is why not all is done; precision is what was asked for, cells hold the widest interval of each case that
+    was looked at.
+    """
+
+    cases: list[tuple[Case, CaseWork, Collected]] = field(default_factory=list)
+    precision: float | None = None
+    cells: "dict[str, Cell]" = field(default_factory=dict)
+    stopped: str | None = None
+
+    @property
+    def done(self) -> dict[str, int]:
+        """Realisations done, by the name of the case."""
+        return {case.name: collected.count for case, _, collected in self.cases}
+
+    @property
+    def unmet(self) -> list[str]:
+        """The targets of time and precision that were not reached, a text each, with the widest interval of all."""
+        reasons = [] if self.stopped is None else [self.stopped]
+        if self.precision is None:
+            return reasons
+        from radarsim.report.precision import OF
+
+        wide = [cell for cell in self.cells.values() if cell.percent >= self.precision]
+        cases = f" in {len(wide)} of {len(self.cells)} cases" if len(self.cells) > 1 else ""
+        if wide:
+            worst = max(wide, key=lambda cell: cell.percent)
+            unit = "%" if OF[worst.of].relative else "points"
+            reasons.append(f"precision of {self.precision:g} {unit} not reached{cases}; worst: {worst}")
+        return reasons
+
+
+@dataclass(frozen=True)
+class Shares:
+    """What computing share `number` of `of` came to, by the name of the case; cases of one identity stand once."""
+
+    config: str
+    number: int
+    of: int
+    cases: dict[str, Shared]
+
+    @property
+    def unmet(self) -> list[str]:
+        """Why not all of it is done."""
+        return list(dict.fromkeys(one.stopped for one in self.cases.values() if one.stopped))
+
+    @property
+    def warnings(self) -> list[str]:
+        """Damage and mixtures that were met."""
+        return list(dict.fromkeys(warning for one in self.cases.values() for warning in one.warnings))
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How an experiment is computed: no option changes a number.
+
+    out is the results directory, None for none; executor, where given, replaces the threads; stop is called between
+    tasks.
+    """
+
+    out: str | os.PathLike[str] | None = None
+    threads: int | None = None
+    stop: Stop | None = None
+    executor: Executor | None = None
+
+
+def simulate(
+    experiment: Experiment,
+    options: RunOptions,
+    *,
+    progress: Progress | None = None,
+    precision: float | None = None,
+    of: str = "sigma",
+) -> SimulatedCases:
+    """Collect every case in turn, cases of one identity once; progress(done, total, from_store) is over all of them.
+
+    precision is in per cent: a case ends at the first look at which every quantity `of` that kind is known so well, and
+    large errors would have been seen (all report.precision). Raises ConfigError where a case has none of that kind.
+    """
+    total = sum(case.realisations for case in experiment.cases)
+    made: dict[tuple[str, int], tuple[CaseWork, Collected, Cell | None]] = {}
+    simulation, done, held = SimulatedCases(precision=precision), 0, 0
+
+    def over_all(case_done: int, _: int, case_held: int) -> None:
+        if progress is not None:
+            progress(done + case_done, total, held + case_held)
+
+    with ExitStack() as stack:
+        if precision is not None and options.out is None:
+            options = replace(options, out=stack.enter_context(tempfile.TemporaryDirectory(prefix="radarsim-")))
+        for case in experiment.cases:
+            work = CaseWork(case)
+            key = (work.identity, case.realisations)
+            if key not in made:
+                collector = _collector(work, options, over_all, collect)
+                wanted = None
+                if precision is not None:
+                    wanted = Wanted(precision, of, table_of(experiment, of), tailed(work, of))
+                made[key] = work, *_collected(case, work, wanted, collector)
+            work, collected, cell = made[key]
+            if collected.count:
+                simulation.cases.append((case, work, collected))
+            if cell is not None:
+                simulation.cells[case.name] = replace(cell, case=case.name)
+            done += collected.count
+            held += collected.from_store
+            if collected.stopped:
+                simulation.stopped = collected.stopped
+                break
+    return simulation
+
+
+def _collector(work: CaseWork, options: RunOptions, progress: Progress, of: Callable[..., Any]) -> Callable[..., Any]:
+    """The engine's `collect` or `share`, by `of`, for a work, as a function of the number of realisations."""
+    means = {"threads": options.threads, "stop": options.stop, "executor": options.executor}
+    return partial(of, work, store=options.out, progress=progress, **means)
+
+
+class Wanted(NamedTuple):
+    """A precision in per cent, of which kind of quantity, the table that holds it, and that of curves if `tailed`."""
+
+    percent: float
+    of: str
+    table: "Table"
+    curves: "Table | None"
+
+
+def tailed(work: CaseWork, of: str) -> "Table | None":
+    """The table of a case's curves where rare large errors may decide a kind of quantity; None where they do not."""
+    from radarsim.report.precision import OF
+
+    return study(work.case.study).curves if OF[of].squares and not work.plan.gaussian else None
+
+
+def table_of(experiment: Experiment, of: str) -> "Table":
+    """The table of a study that holds a kind of quantity, from results; empty where the study makes none."""
+    from radarsim.report import tables
+    from radarsim.report.precision import OF
+
+    own = study(experiment.study)
+    if of not in ("sigma", "gain"):
+        return lambda results: own.tables(results).get(OF[of].table, tables.frame({}))
+    return own.gains if of == "gain" else own.curves
+
+
+def _collected(
+    case: Case, work: CaseWork, wanted: Wanted | None, collector: Callable[[int], Collected]
+) -> "tuple[Collected, Cell | None]":
+    """The sums of a case, and the cell of its widest interval where a precision is asked for."""
+    if wanted is None:
+        return collector(case.realisations), None
+    from radarsim.report.precision import FIRST, FLOOR, least, looks, worst
+
+    looked: list[Collected] = []
+    best, cell = None, None
+    for n in looks(case.realisations, FLOOR if wanted.curves else FIRST):
+        looked.append(collector(n))
+        # Stopped on the way to a look, a run may hold less without a gap than at the look before.
+        if best is None or looked[-1].count > best.count:
+            best = looked[-1]
+            cell = worst(case_result(case, work, best), wanted.table, wanted.of) if best.count else None
+            if cell is None and best.count and wanted.of != "sigma":
+                raise ConfigError(unknown(case, wanted.of))
+        if looked[-1].stopped or cell is None:
+            break
+        if cell.percent < wanted.percent and n >= least(case_result(case, work, best), wanted.curves):
+            break
+    assert best is not None  # there is a look at every number of realisations that check_precision lets pass
+    computed = sum(one.computed for one in looked)
+    whole = replace(
+        best,
+        asked=case.realisations,
+        computed=computed,
+        from_store=max(0, best.count - computed),
+        kernel_seconds=sum(one.kernel_seconds for one in looked),
+        seconds=sum(one.seconds for one in looked),
+        stopped=looked[-1].stopped,
+        warnings=tuple(dict.fromkeys(warning for one in looked for warning in one.warnings)),
+    )
+    return whole, cell
+
+
+def unknown(case: Case, of: str) -> str:
+    """The line for a case that has no quantity of a kind."""
+    from radarsim.report.precision import OF
+
+    return f"{case.name}: of: must be what the case has, got {of}: no {OF[of].words} in {OF[of].table}.csv"
+
+
+def check_precision(experiments: Sequence[Experiment], percent: float, of: str = "sigma") -> None:
+    """ConfigError for an invalid precision, and for every case of too few realisations ever to be looked at."""
+    from radarsim.report.precision import FIRST, OF
+
+    if of not in OF:
+        raise ConfigError(f"of: must be one of {', '.join(OF)}, got {of!r}")
+
+    if not 0 < percent <= 100:
+        raise ConfigError(f"precision: must be > 0 and ≤ 100 %, got {percent:g}")
+    faults = [
+        f"{experiment.path or experiment.stem}: realisations: must be at least {FIRST} for a precision ({FIRST}, "
+        f"{2 * FIRST}, {4 * FIRST}, … and the last are looked at), got {case.realisations} in {case.name}"
+        for experiment in experiments
+        for case in experiment.cases
+        if case.realisations < FIRST
+    ]
+    if faults:
+        raise ConfigError(*faults)
+
+
+def shared(
+    experiment: Experiment, part: tuple[int, int], options: RunOptions, *, progress: Progress | None = None
+) -> Shares:
+    """Put a part of every case, as (2, 3) the second of three, into the store under options.out.
+
+    It ends early where it is stopped.
+    """
+    assert options.out is not None  # a share is nothing but what it stores
+    total = sum(case.realisations for case in experiment.cases) // part[1]
+    made: set[tuple[str, int]] = set()
+    shares: dict[str, Shared] = {}
+    done = held = 0
+
+    def over_all(case_done: int, _: int, case_held: int) -> None:
+        if progress is not None:
+            progress(done + case_done, max(total, done + case_done), held + case_held)
+
+    for case in experiment.cases:
+        work = CaseWork(case)
+        if (key := (work.identity, case.realisations)) in made:
+            continue
+        one = _collector(work, options, over_all, share)(case.realisations, part)
+        made.add(key)
+        shares[case.name] = one
+        done += one.done
+        held += one.from_store
+        if one.stopped:
+            break
+    return Shares(experiment.stem, *part, shares)
+
+
+def case_result(case: Case, work: CaseWork, collected: Collected) -> CaseResult:
+    """A case with its sums and the labels that say what these are; display names are the case's own."""
+    plan = work.plan
+    # Cases that differ in display names alone share their work.
+    axes = plan.axes if work.case == case else study(case.study).relabelled(plan.axes, case)
+    values = collected.values.view()
+    values.flags.writeable = False  # tables and figures are made of them when they are asked for
+    sums = plan.layout.unpack(values)
+    seconds = collected.kernel_seconds
+    return CaseResult(case.name, case.study, case.spec, case.swept, collected.count, sums, axes, seconds)
+
+
+# ---- writing ---------------------------------------------------------------------------------------------------------
+REALISATIONS = 2  # what tables and figures take does not depend on their number
+SPARE = 1.25  # for the report, for files and for what a picture of one case does not show
+
+
+def seconds(experiment: Experiment, figures: bool | str | Sequence[str], width_mm: float | None) -> float:
+    """An estimate of the seconds that writing takes: the tables of the first case, times the cases, and one figure of
+    each kind, times their number, measured here."""
+    case = experiment.cases[0]
+    work = CaseWork(case)
+    result = case_result(case, work, collect(work, REALISATIONS))
+    output.case_tables([result])  # what it loads is not to be counted for every case
+    started = time.perf_counter()
+    made = output.case_tables([result], experiment.stem)
+    tables = (time.perf_counter() - started) * len(experiment.cases)
+    formats = configs.formats(figures)
+    described = output.case_figures([result], made, experiment) if formats else {}
+    if not described:
+        return SPARE * tables
+    from radarsim.report import figures as drawing
+
+    names = list(described)
+    started = time.perf_counter()
+    for name in dict.fromkeys((names[0], names[-1])):
+        drawing.save(described[name], formats, width_mm, "")
+    each = (time.perf_counter() - started) / len(dict.fromkeys((names[0], names[-1])))
+    return SPARE * (tables + each * len(names))
+
+
+# ---- run -------------------------------------------------------------------------------------------------------------
 WORTH_MEASURING_S = 20.0  # of a time limit: within less, measuring what tables and figures take would be most of it
 
 
@@ -113,31 +408,29 @@ def run(
     >>> len(result.curves) > 50
     True
     """
-    from radarsim.app import decide as deciding  # with it the parts that judge and draw, which `check` does without
+    from radarsim.app import readings as deciding  # with it the parts that judge and draw, which `check` does without
 
-    arguments.check(
+    configs.check(
         **{"threads": threads, "workers": workers, "precision": precision, "time_limit": time_limit},
         **{"executor": executor, "out": out, "overrides": overrides, "figures": figures},
     )
     overrides = merged(overrides, realisations, seed)
     experiment = config if isinstance(config, Experiment) else load(config, overrides)
     if precision is not None:
-        simulation.check_precision([experiment], precision, of)
+        check_precision([experiment], precision, of)
     if decide:
         deciding.check(experiment)
     limit = time_limit if time_limit is None or callable(time_limit) else stopping.time_limit(time_limit)
     started, kept = time.perf_counter(), None
     if out is not None and isinstance(limit, stopping.TimeLimit) and limit.left >= WORTH_MEASURING_S:
-        from radarsim.app.writing import seconds as writing_s
-
-        limit = limit.reserving(kept := writing_s(experiment, figures, width_mm))
+        limit = limit.reserving(kept := seconds(experiment, figures, width_mm))
     with cluster(workers, scheduler) if executor is None else nullcontext(executor) as pool:
         threads = pool.workers if pool else int(threads or available_cores())
         options = RunOptions(out, threads, stopping.Either(stop, limit), pool)
         if decide:
             simulated = deciding.simulated(experiment, options, progress)
         else:
-            simulated = simulation.simulated(experiment, options, progress=progress, precision=precision, of=of)
+            simulated = simulate(experiment, options, progress=progress, precision=precision, of=of)
         if stop is not None:
             stop.raise_if_received()
     if not simulated.cases:
@@ -157,7 +450,7 @@ def run(
     return result
 
 
-def share(
+def run_share(
     experiment: Experiment,
     part: tuple[int, int],
     *,
@@ -167,10 +460,10 @@ def share(
     time_limit: Stop | None = None,
     progress: Progress | None = None,
     stop: Signals | None = None,
-) -> simulation.Shares:
+) -> Shares:
     """Compute a part of every case, as (2, 3) the second of three, into the store under out; no tables. See `run`."""
     options = RunOptions(out, threads, stopping.Either(stop, time_limit), executor)
-    done = simulation.shared(experiment, part, options, progress=progress)
+    done = shared(experiment, part, options, progress=progress)
     if stop is not None:
         stop.raise_if_received()
     return done
@@ -234,7 +527,7 @@ def load_result(config: Config, *, out: str | os.PathLike[str] = RESULTS, overri
 
 def from_store(experiment: Experiment, out: str | os.PathLike[str], overrides: Sequence[str]) -> Result:
     """The result from stored blocks alone; as many realisations as the last run, where overrides do not say."""
-    arguments.directory(out)
+    configs.directory(out)
     asked = experiment
     if not any(override.split("=")[0].strip() == "realisations" for override in overrides):
         experiment = as_last_run(experiment, Path(out))
@@ -290,7 +583,7 @@ def as_last_run(experiment: Experiment, out: Path) -> Experiment:
 
 def finished(simulated: SimulatedCases) -> list[CaseResult]:
     """Cases with their sums and the labels that say what these are."""
-    return [simulation.result_of(*one) for one in simulated.cases]
+    return [case_result(*one) for one in simulated.cases]
 
 
 def facts_of(simulated: SimulatedCases, threads: int, seconds: float) -> dict[str, Any]:
@@ -324,7 +617,7 @@ def cache_troubles() -> list[str]:
 
     A kernel that could not be read or kept was compiled, as on a new machine.
     """
-    cache = sys.modules.get("radarsim.kernels.cache")  # nothing is compiled where it is not loaded
+    cache = sys.modules.get("radarsim.kernels.compile")  # nothing is compiled where it is not loaded
     return list(cache.troubles.values()) if cache else []
 
 
@@ -342,12 +635,12 @@ def finite(value: float) -> float | None:
 def draw_claims(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[str]) -> None:
     """Write the forest plot of claims; raises ConfigError for a name that says no format, or where none is judged."""
     from radarsim.report import figures
-    from radarsim.report.claims import forest
+    from radarsim.report.claims import page
 
     kind = Path(path).suffix[1:].lower()
-    if kind not in arguments.FORMATS:
-        raise ConfigError(f"{path}: must end in {', '.join(f'.{one}' for one in arguments.FORMATS)}")
-    figure = forest.figure(rows)
+    if kind not in configs.FORMATS:
+        raise ConfigError(f"{path}: must end in {', '.join(f'.{one}' for one in configs.FORMATS)}")
+    figure = page.figure(rows)
     if figure is None:
         raise ConfigError(f"{path}: no claim is judged here, so there is nothing to draw")
     files.replace_all(Path(path).parent, {Path(path).name: figures.save(figure, (kind,))[kind]})
@@ -390,8 +683,8 @@ def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, 
     Each row has the columns of claims.csv and `config`. Raises ConfigError for what does not exist.
     """
     from radarsim.app import readings
-    from radarsim.report.claims.classes import with_classes
     from radarsim.report.claims.judge import listed, unstored
+    from radarsim.report.claims.page import with_classes
 
     every = papers()
     of = {claim.id: claim.config for paper in every for claim in paper.claims}

@@ -13,8 +13,8 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from radarsim.app import run as experiment
-from radarsim.engine.machine import platform
+from radarsim.app import run
+from radarsim.engine.store import platform
 from radarsim.report import files
 from radarsim.studies import registry
 
@@ -83,7 +83,7 @@ def tables(study: str) -> dict[str, bytes]:
     """The tables of a study's known case, as computed here: CSV by name."""
     from radarsim.report.tables import to_csv
 
-    result = experiment.run(KNOWN / f"{study}.yaml", threads=1)
+    result = run.run(KNOWN / f"{study}.yaml", threads=1)
     return {name: to_csv(result.tables[name]) for name in TABLES}
 
 

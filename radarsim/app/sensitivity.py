@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from radarsim.app import arguments, quantities
+from radarsim.app import configs, quantities
+from radarsim.app.configs import CaseWork
 from radarsim.app.quantities import UNPAIRED, Quantity
 from radarsim.app.question import Cases, Config
-from radarsim.app.work import CaseWork
-from radarsim.config import numeric
+from radarsim.config import fields
+from radarsim.config.check import Label, label
+from radarsim.config.document import did_you_mean
 from radarsim.config.experiment import Case
 from radarsim.config.fields import Study
-from radarsim.config.labels import Label, label
-from radarsim.config.lookup import did_you_mean
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.errors import ConfigError
 from radarsim.language import tr
@@ -95,7 +95,7 @@ def sensitivity(
     base = look.of(cases.base)
     if not np.isfinite(base.whole[0]).any():
         raise ConfigError("there is no estimate there")
-    keys = [key for key in numeric.keys(cases.base.spec) if key.value and not ("." not in key.path and key.whole)]
+    keys = [key for key in fields.keys(cases.base.spec) if key.value and not ("." not in key.path and key.whole)]
     rows, left_out, apart = [], {}, list[str]()
     for n, key in enumerate(keys):
         try:
@@ -134,7 +134,7 @@ def named(spec: Study, path: str) -> Label:
     return found._replace(text=text)
 
 
-def more(key: numeric.NumericKey) -> float:
+def more(key: fields.NumericKey) -> float:
     """A tenth more of a key's value, in size; of whole numbers at least one more."""
     assert key.value is not None
     return key.value + max(1, round(MORE * key.value)) if key.whole else key.value * (1 + MORE)
@@ -234,7 +234,7 @@ class Look:
 
         return self._each(value)
 
-    def rows(self, case: Case, key: numeric.NumericKey, base: Seen, raised: Seen) -> list[dict[Hashable, Any]]:
+    def rows(self, case: Case, key: fields.NumericKey, base: Seen, raised: Seen) -> list[dict[Hashable, Any]]:
         """A row for each filter and component that has an estimate, with the changes from base to raised."""
         made: list[dict[Hashable, Any]] = []
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -327,12 +327,12 @@ def write(
 
     width_mm is the figure's width in place of its own.
     """
-    arguments.directory(out)
+    configs.directory(out)
     contents = {"sensitivity.csv": common.to_csv(table(found))}
     if formats and found.rows:
-        from radarsim.report import figures as drawing  # Matplotlib
+        from radarsim.report import figures  # Matplotlib
 
-        saved = drawing.save(tornado(found), formats, width_mm)
+        saved = figures.save(tornado(found), formats, width_mm)
         contents |= {f"tornado.{kind}": data for kind, data in saved.items()}
     folder = Path(out) / FOLDER / found.stem
     files.replace_all(folder, contents)

@@ -1,4 +1,9 @@
-"""`radarsim solve`: the value of a numeric key at which a quantity reaches a target.
+"""`radarsim solve` where the quantity is simulated, with the same noise at every value.
+
+The interval is the set of values at which the quantity's own 95 % interval holds the target: it covers the true value
+as often as that interval covers.
+
+`radarsim solve`: the value of a numeric key at which a quantity reaches a target.
 
 Where the quantity is known exactly the root is that of the exact function, found here; else see `sampled_search`.
 """
@@ -7,15 +12,175 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import pairwise
 
-from radarsim.app import quantities, question, sampled_search, search
-from radarsim.app.quantities import Quantity
+from radarsim.app import quantities, question
+from radarsim.app.quantities import UNPAIRED, Quantity
 from radarsim.app.question import Answer, Cases, Curve, Question
-from radarsim.config import numeric
+from radarsim.config import fields
 from radarsim.errors import ConfigError
 from radarsim.language import tr
+from radarsim.report.statistics import Estimate
 from radarsim.studies import registry
 
+# ---- sampled search --------------------------------------------------------------------------------------------------
+PILOT_SHARE, PILOT_LEAST = 16, 200  # realisations of the scan: a share of all, but not fewer
+PILOT_POINTS = 13
+WITH_ALL = 13  # values with all realisations: a bracket, the value, both ends of its interval
+MOST_STEPS = 3  # of the scan, by which the pilot's noise may have moved a crossing
+RESIDUE = 0.02  # of its interval: how near a sampled quantity is brought to the target, so that the noise decides
+
+
+def by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answer:
+    """The answer where the quantity is simulated, with the same noise at every value."""
+    over, count = asked.over, curve.realisations
+    grid, pilot = over.grid(PILOT_POINTS), min(count, max(PILOT_LEAST, count // PILOT_SHARE))
+    curve.expected = len(grid) + WITH_ALL
+    curve.simulated(None, 1)  # compiles
+    begun = time.monotonic()
+    attained_now = curve.simulated(None, count).value
+    counts = {"grid": len(grid), "pilot": pilot, "more": WITH_ALL, "count": count}
+    what = tr(
+        "simulates {grid} values of {key} with {pilot} realisations, then about {more} with {count}",
+        **question.said_of(asked),
+        **counts,
+    )
+    question.predict(told, what, (WITH_ALL + len(grid) * pilot / count) * (time.monotonic() - begun))
+    scanned = [(x, curve.simulated(x, pilot).value - asked.equals) for x in grid]
+    known = [one for one in scanned if not math.isnan(one[1])]
+    if not known:
+        raise question.nowhere(asked, curve)
+    question.refuse_without_effect(asked, [y for _, y in known])
+    apart = unpaired(asked, curve)
+    if apart:
+        told("; ".join(apart))
+        count = curve.realisations = UNPAIRED * count
+    answer = partial(question.answered, asked, attained_now, exact=False)
+    best, _ = min(known, key=lambda one: abs(one[1]))
+    places = _changes(scanned) or [grid.index(best)]
+    brackets = [pair for pair in map(partial(_bracket, asked, curve, grid), places) if pair is not None]
+    if not brackets:  # the pilot may have been far off, as where its errors have heavy tails
+        whole = [(x, curve.simulated(x, count).value - asked.equals) for x in grid]
+        brackets = [(whole[i], whole[i + 1]) for i in _changes(whole)]
+        best = min((one for one in whole if not math.isnan(one[1])), key=lambda one: abs(one[1]), default=(best, 0.0))[
+            0
+        ]
+    found = [_interval(asked, curve, *pair) for pair in dict.fromkeys(brackets)]
+    if not found:
+        limit = curve.simulated(best, count)
+        near = limit.lo <= asked.equals <= limit.hi
+        doubt = tr(
+            "its 95 % interval, {lo:.4g} to {hi:.4g} {unit}, holds the target: -n decides",
+            lo=limit.lo,
+            hi=limit.hi,
+            unit=tr(asked.unit),
+        )
+        notes = (doubt,) if near else question.boundary(asked, curve, best)
+        return answer(limit=limit.value, limit_at=best, notes=notes + apart)
+    value = question.nearest([one.value for one in found], asked)
+    own, there = next(one for one in found if one.value == value), curve.simulated(value, count)
+    jumps = not over.whole and not there.lo <= asked.equals <= there.hi
+    return answer(
+        **{"value": value, "lo": own.lo, "hi": own.hi, "attained": there.value},
+        slope=None if jumps else _sampled_slope(curve, own),
+        others=tuple(one.value for one in found if not own.lo <= one.value <= own.hi),
+        notes=(question.JUMPS,) * jumps + (question.WHOLE,) * over.whole + apart + curve.noted(value),
+    )
+
+
+def unpaired(asked: Question, curve: Curve) -> tuple[str, ...]:
+    """Where the key moves the scans, that values are not compared with the same noise, in words.
+
+    The quantity at a time is then read at another scan, whose noise is another.
+    """
+    if len(curve.scans) < 2:
+        return ()
+    words = tr(
+        "{key} moves the scans, whose noise differs: each value has {count} realisations, {times} times as many",
+        key=asked.key,
+        count=UNPAIRED * curve.realisations,
+        times=UNPAIRED,
+    )
+    return (words,)
+
+
+def _changes(scanned: Sequence[tuple[float, float]]) -> list[int]:
+    """Places i of a scan of (x, y) at which y changes its sign to the next place."""
+    return [i for i, ((_, a), (_, b)) in enumerate(pairwise(scanned)) if a * b < 0 or (a == 0 and b != 0)]
+
+
+def _bracket(
+    asked: Question, curve: Curve, grid: Sequence[float], i: int
+) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    """Neighbouring places of the grid between which the quantity crosses the target with all realisations.
+
+    About the place i where the pilot saw it cross or come nearest, from which the noise may have moved it by steps.
+    """
+    for j in sorted(range(i - MOST_STEPS, i + MOST_STEPS + 1), key=lambda j: abs(j - i)):
+        if not 0 <= j < len(grid) - 1:
+            continue
+        ends = [(x, curve.simulated(x, curve.realisations).value - asked.equals) for x in grid[j : j + 2]]
+        if ends[0][1] * ends[1][1] <= 0:
+            return ends[0], ends[1]
+    return None
+
+
+def _interval(asked: Question, curve: Curve, one: tuple[float, float], other: tuple[float, float]) -> Estimate:
+    """A value and the 95 % set about it: all values at which the quantity's own interval holds the target."""
+    over, count, end = asked.over, curve.realisations, asked.equals
+
+    def part(of: str, x: float) -> float:
+        return float(getattr(curve.simulated(x, count), of)) - end
+
+    def close(of: str, x: float, y: float) -> bool:
+        found = curve.simulated(x, count)
+        return not over.whole and abs(y) <= RESIDUE * (found.hi - found.lo)
+
+    value = quantities.closed(partial(part, "value"), over, one, other, partial(close, "value"))
+    if over.whole:
+        value = question.fulfilling(asked, value, lambda n: curve.simulated(n, count).value)
+    rising = other[1] > one[1]
+    ends = []
+    for side, of in ((-1, "hi" if rising else "lo"), (1, "lo" if rising else "hi")):
+        inside, outside = (value, part(of, value)), _outside(over, partial(part, of), value, one, other, side)
+        if inside[1] * outside[1] >= 0 or math.isnan(outside[1]):
+            ends.append(outside[0])  # as far as is searched, the interval holds the target
+        else:
+            ends.append(quantities.closed(partial(part, of), over, inside, outside, partial(close, of)))
+    return Estimate(value, *ends)
+
+
+def _outside(
+    over: quantities.Range,
+    function: Callable[[float], float],
+    value: float,
+    one: tuple[float, float],
+    other: tuple[float, float],
+    side: int,
+) -> tuple[float, float]:
+    """A place on one side of a value at which the function has another sign than there, or the end of the range.
+
+    The first step is a twentieth of the bracket's width on the scale of the search, each further one twice as long.
+    """
+    sign = function(value)
+    step = max(abs(over.inner(other[0]) - over.inner(one[0])) / 20, over.whole)
+    u = over.inner(value)
+    while True:
+        u += side * step
+        x = over.outer(u)
+        y = function(x)
+        if y * sign <= 0 or math.isnan(y) or x in (over.low, over.high):
+            return x, y
+        step *= 2
+
+
+def _sampled_slope(curve: Curve, found: Estimate) -> float | None:
+    """The change of the quantity for one unit of the key, over the interval, of the same noise at both ends."""
+    low, high = (curve.simulated(x, curve.realisations).value for x in (found.lo, found.hi))
+    return None if found.lo == found.hi or math.isnan(high - low) else (high - low) / (found.hi - found.lo)
+
+
+# ---- solve -----------------------------------------------------------------------------------------------------------
 NEAR = 1e-4  # of a value: the step of a derivative
 JUMP = 1e-4  # of a quantity: more than means over patterns of plots may jump where others are merged
 STEP = 1e-3  # on the scale of the search, the step of a rough derivative
@@ -54,7 +219,7 @@ def solve(
     if not math.isfinite(equals):
         raise ConfigError(f"--equals: must be a finite number, got {equals:g}")
     cases = Cases(config, tuple(overrides), case)
-    found = numeric.find(cases.base.spec, key)
+    found = fields.find(cases.base.spec, key)
     quantities.checked(quantity, cases.base)
     axes = quantities.labels(quantity, cases.base)
     quantity = quantities.resolved(quantity, axes)
@@ -64,7 +229,7 @@ def solve(
     asked = Question(
         cases, key, quantity, equals, over, now, quantities.unit(quantity, axes), tuple(overrides), realisations
     )
-    work = _exactly if not sampled and curve.exact(axes) else sampled_search.by_sampling
+    work = _exactly if not sampled and curve.exact(axes) else by_sampling
     return work(asked, curve, told or (lambda line: None))
 
 
@@ -112,7 +277,7 @@ def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answ
     )
 
 
-def roots(asked: Question, curve: Curve) -> search.Found:
+def roots(asked: Question, curve: Curve) -> quantities.Found:
     """Where the exact quantity reaches the target; first looked for roughly where that is much less work.
 
     Raises ValueError where it is defined nowhere.
@@ -122,26 +287,26 @@ def roots(asked: Question, curve: Curve) -> search.Found:
         return curve.exactly(x) - asked.equals
 
     if not curve.rough:
-        return search.roots(missing, asked.over)
+        return quantities.roots_of(missing, asked.over)
     size = max(abs(asked.equals), TINY)
-    found = search.roots(lambda x: curve.roughly(x) - asked.equals, asked.over, ROUGHLY)
+    found = quantities.roots_of(lambda x: curve.roughly(x) - asked.equals, asked.over, ROUGHLY)
     near = [exact_near(missing, curve, asked.over, x, NEAR_ENOUGH * size) for x in found.roots]
     exactly = [x for x in near if x is not None]
     if len(exactly) < len(near) or (not near and abs(found.at_nearest) < DOUBT * size):
-        return search.roots(missing, asked.over)
-    return search.Found(tuple(exactly), found.nearest, found.at_nearest if exactly else missing(found.nearest))
+        return quantities.roots_of(missing, asked.over)
+    return quantities.Found(tuple(exactly), found.nearest, found.at_nearest if exactly else missing(found.nearest))
 
 
 def exact_near(
-    missing: Callable[[float], float], curve: Curve, over: search.Range, x: float, near_enough: float
+    missing: Callable[[float], float], curve: Curve, over: quantities.Range, x: float, near_enough: float
 ) -> float | None:
     """The root near a rough one: by secants, the first that of the rough quantity; where they fail, bracketed."""
     u = over.inner(x)
     ends = over.outer(u - STEP), over.outer(u + STEP)
     low, high = (curve.roughly(end) for end in ends)
     rising = (high - low) / (over.inner(ends[1]) - over.inner(ends[0]))
-    found = search.polished(missing, over, x, rising, near_enough)
-    return search.near(missing, over, x, near_enough) if found is None else found
+    found = quantities.polished(missing, over, x, rising, near_enough)
+    return quantities.near(missing, over, x, near_enough) if found is None else found
 
 
 def timed(work: Callable[[], float]) -> float:
@@ -151,7 +316,7 @@ def timed(work: Callable[[], float]) -> float:
     return time.monotonic() - begun
 
 
-def slope(of: Callable[[float], float], value: float, over: search.Range) -> float | None:
+def slope(of: Callable[[float], float], value: float, over: quantities.Range) -> float | None:
     """The change of a function for one unit of the key, by a central difference within the range; one-sided at an end.
 
     Error of the order of 1e-8 of itself; of whole numbers the change to the next.

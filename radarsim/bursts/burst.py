@@ -3,13 +3,30 @@
 The echo's phase is k(t) θ with θ = (φ₀, f₀, f₁, …, f_n) in rad, Hz, Hz/s, … and
 k(t) = (1, 2πt, 2πt²/2!, …, 2πt^{n+1}/(n+1)!). Kernels count phases in turns and times in windows: p(τ) = Σ b_j τ^j with
 τ = t/T, b_0 = φ₀/2π and b_j = f_{j-1} T^j / j!. A burst is sampled only inside its pulses, at l T_p + m Δt.
+
+How a burst is cut into blocks, and the blocks of every window in terms of those drawn.
+
+Which windows a sequence of discriminators uses (Uss, Baryshev, Djavad 2010, equations 8–17).
+
+A window of length T catches a start with error covariance R_Δ when Z = Δθᵀ H Δθ, H = (Φ + R_pr⁻¹)/2μ, stays below
+the main-lobe threshold c with probability P_Δ. Z is a sum of χ²₁ with the eigenvalues of R_Δ H as weights; the paper
+takes the Gaussian of the same two moments (14), `tail_probability` the sum itself.
 """
 
+import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
+from radarsim.bursts.kernels.lanes import COLUMNS, END, RATIO, SHIFT, W0, W1, W2, WEIGHTS, Z2, M, S
+from radarsim.bursts.kernels.scoring import CENTRE, HALF, SIZE
+from radarsim.bursts.kernels.scoring import W0 as SUM_W
+from radarsim.bursts.kernels.scoring import Z0 as SUM_Z
+
+# ---- burst -----------------------------------------------------------------------------------------------------------
 LIGHT_MPS = 299_792_458.0
 
 
@@ -100,3 +117,254 @@ def balanced_inverse(information: np.ndarray) -> np.ndarray:
     """Inverse (n, n) of a positive definite matrix whose rows differ by many orders of magnitude, as θ's units do."""
     scale = 1.0 / np.sqrt(np.diag(information))
     return np.linalg.inv(information * np.outer(scale, scale)) * np.outer(scale, scale)
+
+
+# ---- blocks ----------------------------------------------------------------------------------------------------------
+def block_edges(windows: list[int], per_window: int, whole: int = 1) -> np.ndarray:
+    """Pulses (B + 1,) where B blocks begin and end: every window ends one, none longer than its time over per_window.
+
+    Long ones are multiples of `whole`: with 8, demodulation fills its registers, at the price of a third more blocks.
+    """
+    edges = [0]
+    for end in sorted(set(windows)):
+        begin = edges[-1]
+        while begin < end:
+            longest = max(1, max(begin, windows[0]) // per_window)
+            # Equal parts of what is left, so that no sliver remains before the window's end.
+            length = math.ceil((end - begin) / math.ceil((end - begin) / longest))
+            begin += length if length < 2 * whole else length // whole * whole
+            edges.append(begin)
+    return np.array(edges)
+
+
+def merged(edges: np.ndarray, pulses: int, per_window: int) -> list[int]:
+    """Indices in edges (B + 1,) where a window's blocks end: as few as may be, none longer than it over per_window.
+
+    A block that was drawn longer stays alone.
+    """
+    last = int(np.searchsorted(edges, pulses))
+    ends, begin = [], 0
+    for i in range(1, last + 1):
+        if i == last or edges[i + 1] - edges[begin] > max(1, pulses / per_window):
+            ends.append(i)
+            begin = i
+    return ends
+
+
+def moments(sums: np.ndarray, row: int, shift: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Sums of a quantity times 1, s, s² over joined blocks (3, joined), from those over the blocks drawn.
+
+    s is now counted from a centre `shift` before theirs; joined blocks begin at starts.
+    """
+    z0, z1, z2 = (sums[row + 2 * n] + 1j * sums[row + 2 * n + 1] for n in range(3))
+    return np.add.reduceat([z0, z1 + shift * z0, z2 + 2.0 * shift * z1 + shift**2 * z0], starts, axis=1)
+
+
+class Tables:
+    """Tables of the windows' blocks for `kernels.lanes`: flat arrays `table` and `weights`."""
+
+    def __init__(self, edges: np.ndarray, sums: np.ndarray, per_window: int):
+        self.edges, self.sums, self.per_window = edges, sums, per_window
+        self.pulses = int(edges[-1])
+        self.rows, self.weights = [np.zeros((0, COLUMNS))], [np.zeros((0, WEIGHTS))]
+        self.known: dict[int, tuple[int, int, int]] = {}
+
+    def window(self, pulses: int) -> tuple[int, int, int]:
+        """First row in the table, first weight and number of blocks of a window; rows are made where they are new."""
+        if pulses not in self.known:
+            ends = merged(self.edges, pulses, self.per_window)
+            self.known[pulses] = sum(map(len, self.rows)), sum(map(len, self.weights)), len(ends)
+            self._add(np.array(ends), pulses / self.pulses)
+        return self.known[pulses]
+
+    def drawn(self, pulses: int) -> tuple[int, int, int]:
+        """As `window` where blocks are used as drawn and no tables are needed."""
+        return 0, 0, int(np.searchsorted(self.edges, pulses))
+
+    def _add(self, ends: np.ndarray, share: float) -> None:
+        starts, drawn = np.append(0, ends[:-1]), self.sums[:, : ends[-1]]
+        count = np.diff(self.edges[: ends[-1] + 1])
+
+        def mean(x: np.ndarray) -> np.ndarray:
+            return np.add.reduceat(count * x, starts) / np.add.reduceat(count, starts)
+
+        joined = np.repeat(np.arange(len(ends)), ends - starts)
+        centre = mean(drawn[CENTRE])
+        shift = drawn[CENTRE] - centre[joined]
+        rms = np.sqrt(mean(2.0 * drawn[HALF] + shift**2))
+        ratio = 1.0 / np.where(rms > 0.0, rms, np.inf)  # a block of one sample has no slope
+        t, width, orders, rows = centre / share, rms / share, np.arange(1, SIZE), np.zeros((len(ends), COLUMNS))
+        bend = np.where(orders > 1, orders * (orders - 1) * t[:, None] ** np.maximum(orders - 2, 0), 0.0)
+        rows[:, M : M + SIZE - 1] = t[:, None] ** orders + 0.5 * bend * width[:, None] ** 2  # means of τ^j
+        rows[:, S : S + SIZE - 1] = orders * t[:, None] ** (orders - 1) * width[:, None]
+        echo, image = (moments(drawn, row, shift, starts) for row in (SUM_Z, SUM_W))
+        image = image * ratio ** np.arange(3)[:, None]
+        for column, value in ((Z2, echo[2] * ratio**2), (W0, image[0]), (W1, image[1]), (W2, image[2])):
+            rows[:, column], rows[:, column + 1] = value.real, value.imag
+        rows[:, END] = ends
+        weights = np.zeros((len(joined), WEIGHTS))
+        weights[:, RATIO], weights[:, SHIFT] = ratio[joined], shift * ratio[joined]
+        self.rows.append(rows)
+        self.weights.append(weights)
+
+    def arrays(self) -> tuple[np.ndarray, np.ndarray]:
+        """Both tables, flat."""
+        return np.concatenate(self.rows).ravel(), np.concatenate(self.weights).ravel()
+
+
+# ---- schedule --------------------------------------------------------------------------------------------------------
+Tail = Literal["gaussian", "exact"]
+PAPER_PROBABILITY, PAPER_FACTOR = 0.99, 3.0
+MOST_WINDOWS = 200
+NODES = 600  # of the tail integral: 10⁻¹² is reached from about 300 on
+
+
+class NoSchedule(ValueError):
+    """No sequence of windows follows from the burst and the forecast."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """When a hand-over counts as safe: P_Δ, threshold c, and the law taken for the quadratic form."""
+
+    probability: float = PAPER_PROBABILITY
+    threshold: float = 1.0
+    tail: Tail = "gaussian"
+
+
+def spread_factor(probability: float) -> float:
+    """Standard deviations that (14) asks for at P_Δ: the normal quantile in the proportion that makes it 3 at 0.99.
+
+    The paper pairs 0.99 with 3, where a one-sided normal quantile would be 2.33.
+    """
+    from scipy.special import ndtri
+
+    return float(PAPER_FACTOR * ndtri(probability) / ndtri(PAPER_PROBABILITY))
+
+
+def tail_probability(weights: np.ndarray, threshold: float) -> float:
+    """P(Σ wᵢ χ²₁ > c) for weights (n,) ≥ 0, to about 10⁻¹².
+
+    Laplace inversion of the moment generating function Π(1 − 2wᵢs)^(−½) along a parabola that starts between the pole
+    at 0 and the first branch point and bends around the cut, where exp(−sc) makes the integrand vanish like a Gaussian.
+    """
+    weights = np.asarray(weights, dtype=float)
+    weights = weights[weights > 1e-14 * weights.max()]
+    edge = 0.5 / weights.max()
+    # The start balances the pole against the edge: near the edge for a small tail.
+    start = edge * max(0.5, 1.0 - 1.0 / (1.0 + threshold * edge))
+    reach = math.asinh(math.sqrt(40.0 / (threshold * start)))
+    w = (np.arange(NODES) + 0.5) * (reach / NODES)
+    v = np.sinh(w)  # fine near the poles, far out to where the integrand has vanished
+    s = start * (1.0 + v**2) + 1j * start * v
+    ds = start * (2.0 * v + 1j) * np.cosh(w)
+    logarithm = -0.5 * np.log(1.0 - 2.0 * weights[:, None] * s).sum(axis=0) - s * threshold
+    return float(np.sum((np.exp(logarithm) / s * ds).imag) * (w[1] - w[0]) / math.pi)
+
+
+def excess(weights: np.ndarray, condition: Condition) -> float:
+    """Negative where a hand-over with weights (n,) is safe: the left side of (14) less c, or the tail's excess."""
+    if condition.tail == "exact":
+        return tail_probability(weights, condition.threshold) - (1.0 - condition.probability)
+    spread = math.sqrt(2.0 * float(np.sum(weights**2)))
+    return float(weights.sum()) + spread_factor(condition.probability) * spread - condition.threshold
+
+
+class Form:
+    """The quadratic form R_Δ H: its eigenvalues (size,), ascending."""
+
+    def __init__(self, covariance: np.ndarray, curvature: np.ndarray):
+        self._scale = np.sqrt(np.diag(curvature))
+        balance = self._scale[:, None] * self._scale
+        self._root = np.linalg.cholesky(curvature / balance)
+        values, self._vectors = np.linalg.eigh(self._root.T @ (covariance * balance) @ self._root)
+        self.values = np.maximum(values, 0.0)
+
+    def leading(self) -> np.ndarray:
+        """The direction (size,) of the largest eigenvalue, one σ long; its largest element, balanced, is positive."""
+        direction = np.linalg.solve(self._root.T, self._vectors[:, -1] * np.sqrt(self.values[-1]))
+        # An eigenvector's sign is LAPACK's choice.
+        return direction * np.sign(direction[np.argmax(np.abs(direction))]) / self._scale
+
+
+@dataclass(frozen=True)
+class Designer:
+    """Solves (15) and (16) for a burst, the prior spreads sigma (size,) of θ, and Φ_θ as a function of time in s."""
+
+    burst: Burst
+    sigma: np.ndarray
+    fisher: Callable[[float], np.ndarray]
+    condition: Condition
+
+    def posterior(self, duration_s: float) -> tuple[np.ndarray, float]:
+        """Φ_θ + R_pr⁻¹ of a window, and μ, of which Φ's first element is the double."""
+        information = self.fisher(duration_s)
+        return information + np.diag(self.sigma**-2.0), 0.5 * float(information[0, 0])
+
+    def first_excess(self, duration_s: float) -> float:
+        """Condition (15). The phase, unknown at first, is left out of the form, though not out of the estimate."""
+        information, ratio = self.posterior(duration_s)
+        error = np.diag(self.sigma[1:] ** 2) - balanced_inverse(information)[1:, 1:]
+        return excess(Form(error, information[1:, 1:] / (2.0 * ratio)).values, self.condition)
+
+    def handover(self, before_s: float) -> Callable[[float], Form]:
+        """The error form when a window hands over to another, as a function of the latter's length (16)."""
+        covariance = balanced_inverse(self.posterior(before_s)[0])
+
+        def form(after_s: float) -> Form:
+            information, ratio = self.posterior(after_s)
+            return Form(covariance - balanced_inverse(information), information / (2.0 * ratio))
+
+        return form
+
+    def handover_excess(self, before_s: float) -> Callable[[float], float]:
+        """Condition (16) on the length of the window after one of before_s."""
+        form = self.handover(before_s)
+        return lambda after_s: excess(form(after_s).values, self.condition)
+
+    def longest(self, criterion: Callable[[float], float], shortest_s: float) -> int:
+        """Pulses of the longest window that meets a criterion: its root, rounded to the nearest whole pulse."""
+        from scipy.optimize import brentq
+
+        if criterion(self.burst.duration_s) <= 0.0:
+            return self.burst.pulses
+        if criterion(shortest_s) >= 0.0:
+            return self.burst.pulses_in(shortest_s)
+        root = brentq(criterion, shortest_s, self.burst.duration_s, xtol=1e-4 * self.burst.pulse_period_s)
+        return self.burst.pulses_in(root)
+
+    def windows(self) -> list[int]:
+        """Window lengths in pulses from T₀ (15) over (16) to the whole burst.
+
+        None is shorter than there are parameters. Raises NoSchedule where over 200 are needed.
+        """
+        period, fewest = self.burst.pulse_period_s, len(self.sigma)
+        sequence = [max(self.longest(self.first_excess, fewest * period), fewest)]
+        while sequence[-1] < self.burst.pulses:
+            if len(sequence) == MOST_WINDOWS:
+                raise NoSchedule(f"it needs over {MOST_WINDOWS} windows")
+            before = sequence[-1] * period
+            following = self.longest(self.handover_excess(before), before * (1.0 + 1e-9))
+            sequence.append(max(following, sequence[-1] + 1))
+        return sequence
+
+
+def denser(windows: list[int], density: int) -> list[int]:
+    """`density` − 1 windows put between each neighbouring pair, in geometric progression."""
+    dense = [windows[0]]
+    for a, b in itertools.pairwise(windows):
+        dense += [round(a * (b / a) ** (i / density)) for i in range(1, density)] + [b]
+    return sorted(set(dense))
+
+
+def handover_directions(designer: Designer, windows: list[int]) -> np.ndarray:
+    """Directions (windows, size) in θ to search along before each window: the leading one of R_Δ at the hand-over.
+
+    One direction is as long as an error of one radian rms over the window; the first window has none.
+    """
+    period = designer.burst.pulse_period_s
+    directions = np.zeros((len(windows), len(designer.sigma)))
+    for k in range(1, len(windows)):
+        form = designer.handover(windows[k - 1] * period)(windows[k] * period)
+        directions[k] = form.leading() / math.sqrt(form.values[-1])
+    return directions

@@ -11,7 +11,7 @@ from radarsim.errors import ClusterError, DisagreementError, TargetUnmet
 
 if TYPE_CHECKING:
     from radarsim.app.result import Result
-    from radarsim.app.simulation import Shares
+    from radarsim.app.run import Shares
     from radarsim.config.experiment import Experiment
 
 
@@ -76,7 +76,7 @@ def run(
         raise click.UsageError("--decide goes with neither --shard nor --precision: claims are judged on all blocks")
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler do not go together: give one of them")
-    from radarsim.engine import stopping
+    from radarsim.engine import run as stopping
 
     limit = stopping.time_limit(time_limit) if time_limit else None
     with stopping.Signals() as stop:
@@ -93,7 +93,7 @@ def run(
             draw = partial(experiment.run, figures=drawing.formats, width_mm=drawing.width_mm)
             compute = partial(draw, overrides=overrides, precision=precision, of=of, decide=decide)
             if shard:
-                compute = partial(experiment.share, part=shard)
+                compute = partial(experiment.run_share, part=shard)
             whole, at_once = precision is None and not decide, pool.workers if pool else threads
             look = None if shard or quiet else partial(_say_what_lacks, out, at_once, whole)
             _compute_each(loaded, partial(compute, **means), out, quiet, as_json, look)
@@ -126,14 +126,14 @@ def _loaded(
     configs: tuple[str, ...], overrides: tuple[str, ...], precision: tuple[float, str] | None, decide: bool
 ) -> "list[Experiment]":
     """The experiments, all checked, with what their claims and a precision ask for."""
-    from radarsim.app import decide as deciding
-    from radarsim.app import run, simulation
+    from radarsim.app import readings, run
+    from radarsim.app import run as simulation
 
     loaded = run.load_all(configs, overrides)
     if precision is not None:
         simulation.check_precision(loaded, *precision)
     for one in loaded if decide else ():
-        deciding.check(one)
+        readings.check(one)
     return loaded
 
 
@@ -149,7 +149,8 @@ def _compute_each(
 
     Raises DisagreementError at the end for what no chance makes, else TargetUnmet for what was not reached.
     """
-    from radarsim.app import documents, simulation
+    from radarsim.app import result
+    from radarsim.app import run as simulation
     from radarsim.cli import console, outcomes
 
     made: list[dict[str, Any]] = []
@@ -168,19 +169,19 @@ def _compute_each(
             continue
         except DisagreementError as error:  # all is written, and the other experiments stand by themselves
             wrong += [line if line.startswith(f"{one.stem}: ") else f"{one.stem}: {line}" for line in error.lines]
-            made.append(documents.result(cast("Result", error.result)))
+            made.append(result.result(cast("Result", error.result)))
             continue
         unmet += [f"{one.stem}: {reason}" for reason in done.unmet]
         if isinstance(done, simulation.Shares):
-            made.append(documents.share(done))
+            made.append(result.share_record(done))
             if not (quiet or as_json):
                 outcomes.print_share(done, out)
         else:
-            made.append(documents.result(done))
+            made.append(result.result(done))
             if not (quiet or as_json):
                 outcomes.print_result(done)
     if as_json:
-        click.echo(documents.text(made))
+        click.echo(result.text(made))
     if wrong:
         raise DisagreementError(*wrong)
     if unmet:
@@ -226,8 +227,8 @@ def check(
     """
     _refuse_together(shard, precision, None, None)
     _refuse_of_nothing(of, precision)
-    from radarsim.app import documents
     from radarsim.app import outlook as overview
+    from radarsim.app import result
     from radarsim.app import run as experiment
     from radarsim.cli import console, outcomes
 
@@ -235,11 +236,11 @@ def check(
     for one in experiment.load_all(configs, experiment.merged(overrides, realisations, seed)):
         with console.Progress(one.stem, quiet=as_json, what="cases") as bar:
             outlook = overview.outlook(one, None, precision, bar.update, of, out, shard)
-        made.append(documents.outlook(one, outlook))
+        made.append(result.outlook(one, outlook))
         if not as_json:
             outcomes.print_outlook(one, outlook)
     if as_json:
-        click.echo(documents.text(made))
+        click.echo(result.text(made))
 
 
 @group.main.command()
@@ -300,18 +301,18 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
       radarsim claims --json
       radarsim claims --figure claims.svg
     """
-    from radarsim.app import documents
+    from radarsim.app import result
     from radarsim.app import run as experiment
-    from radarsim.cli import verdicts
+    from radarsim.cli import papers
 
     rows = experiment.claims(names, out)
     if figure is not None:
         experiment.draw_claims(rows, figure)
     if as_json:
-        click.echo(documents.text(rows))
+        click.echo(result.text(rows))
     elif markdown:
         from radarsim.report.claims import page
 
         click.echo(page.page(rows, {of.paper: of.page for of in experiment.papers()}), nl=False)
     else:
-        verdicts.print_claims(rows, {row["claim"] for row in rows if parts or row["claim"] in names}, out, names)
+        papers.print_claims(rows, {row["claim"] for row in rows if parts or row["claim"] in names}, out, names)

@@ -235,7 +235,7 @@ def completed(ctx: click.Context, param: click.Parameter, incomplete: str) -> "l
     """What may stand for a config on the command line: the stems that are found, YAML files, and folders."""
     from click.shell_completion import CompletionItem
 
-    from radarsim.app.configs import lookup
+    from radarsim.app.configs import document as lookup
 
     folder, begun = os.path.split(incomplete)
     found = [CompletionItem(stem) for stem in lookup.stems("configs") if not folder and stem.startswith(begun)]

@@ -7,21 +7,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.cli.console import counted_cases, field, print_warnings, say, say_aside, show
-from radarsim.cli.verdicts import print_verdicts
+from radarsim.cli.papers import print_verdicts
 from radarsim.language import few, listed, numeral, plural, term, tr
-from radarsim.report.text import clock, known, significant_digits
-from radarsim.report.text import unit as unit_of
+from radarsim.report.tables import clock, known, significant_digits
+from radarsim.report.tables import unit as unit_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from radarsim.app.clean import Cleaned
     from radarsim.app.compare import Compared
     from radarsim.app.doctor import Inspection
-    from radarsim.app.inventory import Inventory
     from radarsim.app.outlook import CaseOutlook, Lacking, Need, Outlook
     from radarsim.app.result import Result
-    from radarsim.app.simulation import Shares
+    from radarsim.app.run import Shares
+    from radarsim.app.stored import Cleaned, Inventory
     from radarsim.config.experiment import Experiment
 
 MOST_BEGUN = 4  # cases of which is said what of them is stored
@@ -73,14 +72,14 @@ def show_last_scan(last: "pd.DataFrame") -> None:
 
 def print_comparison(compared: "Compared") -> None:
     """What stored results differ by at the last common time, and where the files are."""
-    from radarsim.report.compare import words
+    from radarsim.report import compare
 
     rows = [
         (
             f"{row['label']}, {row['filter']}",
             *(row["component"] or str(row["model"]), tr("{t_s:g} s", t_s=row["t_s"])),
-            *(f"{words.value(row[key])} {tr(unit_of(row['unit']))}" for key in ("value", "against")),
-            words.change(row),
+            *(f"{compare.value(row[key])} {tr(unit_of(row['unit']))}" for key in ("value", "against")),
+            compare.change(row),
         )
         for row in compared.last
         if row["quantity"] == compared.last[0]["quantity"]

@@ -7,7 +7,7 @@ import click
 
 from radarsim.cli.group import Count, completed, config_argument, main, set_option
 from radarsim.language import plural, tr
-from radarsim.report.text import labelled
+from radarsim.report.tables import labelled
 
 if TYPE_CHECKING:
     from typing import Any
@@ -58,7 +58,7 @@ def new_study(name: str) -> None:
       pip install -e my_paper
       radarsim run my_paper
     """
-    from radarsim.app.new_study import new_study as write
+    from radarsim.app.reproduce import new_study as write
     from radarsim.cli import console
 
     path = write(name)
@@ -83,18 +83,17 @@ def simulate(config: str, output: str, realisation: int, overrides: tuple[str, .
       radarsim simulate rls2 -o plots.csv
       radarsim track rls2 plots.csv -o track.csv
     """
-    from radarsim.app import run as experiment
+    from radarsim.app import run
     from radarsim.cli import console
-    from radarsim.recorded import follow as recorded
-    from radarsim.recorded import plots
+    from radarsim.recorded import follow, plots
 
-    (loaded,) = experiment.load_all([config], overrides)
-    columns = recorded.simulated(loaded, realisation)
+    (loaded,) = run.load_all([config], overrides)
+    columns = follow.simulated(loaded, realisation)
     plots.write_columns(columns, output, loaded.path)
     count = len(next(iter(columns.values())))
     rows = plural("{count} row", "{count} rows", count)
     console.field("plots", f"{output} ({rows}: {', '.join(columns)})")
-    console.print_warnings(experiment.cache_troubles())
+    console.print_warnings(run.cache_troubles())
 
 
 @main.command(name="import")
@@ -155,12 +154,12 @@ def import_(
       radarsim track range_doppler_own plots.csv -o track.csv
     """
     from radarsim.cli import console
-    from radarsim.recorded.formats import importing, site
+    from radarsim.recorded.formats import importing, sites
 
     options = importing.Options(
         kind,
-        *site.sites_of(places),
-        site.antenna_of(antenna) if antenna else None,
+        *sites.sites_of(places),
+        sites.antenna_of(antenna) if antenna else None,
         tracks,
         importing.zero_of(further["time_from"]),
         further["truth"],
@@ -221,14 +220,14 @@ def track(
     """
     import contextlib
 
-    from radarsim.app import run as experiment
-    from radarsim.cli import console, findings
-    from radarsim.recorded import accuracy, advice, page
-    from radarsim.recorded import follow as recorded
+    from radarsim.app import run
+    from radarsim.cli import console, papers
+    from radarsim.recorded import advice, follow, page
+    from radarsim.recorded import figures as accuracy
     from radarsim.recorded import plots as files
     from radarsim.report.files import Writer
 
-    (loaded,) = experiment.load_all([config], overrides)
+    (loaded,) = run.load_all([config], overrides)
     read = {"the plots": plots, "the config": loaded.path}
     started = False
 
@@ -241,17 +240,17 @@ def track(
 
     sources = [plots, *([loaded.path] if loaded.path else [])]
     with contextlib.ExitStack() as stack:
-        write = stack.enter_context(Writer(output, read)).write if output else findings.echo
+        write = stack.enter_context(Writer(output, read)).write if output else papers.echo
         counter = stack.enter_context(console.Counter("tracking", "rows"))
-        followed = recorded.follow(loaded, plots, sink, further["threads"], counter.update)
-    drawn = recorded.draw(followed, figures, sources) if figures else []
+        followed = follow.follow(loaded, plots, sink, further["threads"], counter.update)
+    drawn = follow.draw(followed, figures, sources) if figures else []
     folder = further["report"]
     if folder or not quiet:
         with console.Counter("judging", "likelihoods") as counter:
             judged = accuracy.judged(followed)
             advised = advice.advised(followed, counter.update)
     if not quiet:
-        findings.report(followed, judged, advised, stderr=output is None)
+        papers.report(followed, judged, advised, stderr=output is None)
     if output:
         console.field("track", output)
     if drawn:
@@ -259,7 +258,7 @@ def track(
     if folder:
         page.write(followed, loaded, plots, judged, advised, folder, sources)
         click.echo(labelled("report", str(Path(folder) / page.NAME)), err=output is None)
-    console.print_warnings(experiment.cache_troubles())
+    console.print_warnings(run.cache_troubles())
 
 
 @main.command()
@@ -285,18 +284,17 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     """
     import json
 
-    from radarsim.app import configs
-    from radarsim.app import run as experiment
-    from radarsim.cli import console, findings
+    from radarsim.app import configs, run
+    from radarsim.cli import console, papers
     from radarsim.recorded import fit as fitting
 
-    (loaded,) = experiment.load_all([config], overrides)
+    (loaded,) = run.load_all([config], overrides)
     with console.Counter("fitting", "likelihoods") as counter:
         found = fitting.fit(loaded, plots, options["filter_name"], options["robust"], counter.update)
     if options["as_json"]:
         click.echo(json.dumps(fitting.as_json(found), indent=2))
     else:
-        findings.report_fit(found)
+        papers.report_fit(found)
     if options["write"]:
         path = Path(options["write"])
         made = configs.new(path.name, loaded.path or config, path.parent, fitting.settings(found))

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from radarsim.app.reproduce import reproduce, summary
 from radarsim.app.run import RESULTS, load_all
 from radarsim.cli import console
-from radarsim.config import lookup
-from radarsim.engine.stopping import Signals
+from radarsim.config import document
+from radarsim.engine.run import Signals
 from radarsim.errors import RadarsimError, StoreError
 
 
@@ -28,7 +28,7 @@ def main(arguments: Sequence[str]) -> int:
     asked, started = parser.parse_args(arguments), time.perf_counter()
     with Signals() as stop:
         try:
-            loaded = load_all(asked.configs or lookup.stems("configs"), asked.set)
+            loaded = load_all(asked.configs or document.stems("configs"), asked.set)
             stems = list(dict.fromkeys(one.stem for one in loaded))
             done = reproduce(stems, asked.out, console.say, stop, asked.set, not asked.no_figures)
             for line in summary(done, asked.out, time.perf_counter() - started):

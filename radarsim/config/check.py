@@ -1,21 +1,27 @@
-"""A document checked against a schema: pydantic's errors, reported in plain text where the value was written."""
+"""A document checked against a schema: pydantic's errors, reported in plain text where the value was written.
+
+What people call a key: one text, symbol and unit for each, from the schema of the study that has it.
+
+A key says it itself: `key("scan period", "time between two plots, s", symbol="Δt")`. The unit is the one that the end
+of the key names; a key that names none, or none that people write, gives it beside the symbol, as `unit`.
+"""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, get_args, get_origin
 
 from pydantic import AfterValidator, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from radarsim.config.document import Document, child
-from radarsim.config.faults import ABSENT, Faults, Path, short
-from radarsim.config.fields import At, Model, NotRead, in_degrees, in_radians, radians
-from radarsim.config.lookup import did_you_mean
+from radarsim.config.document import ABSENT, Document, Faults, KeyPath, child, did_you_mean, short
+from radarsim.config.fields import At, Model, NotRead, Study, in_degrees, in_radians, radians
+from radarsim.config.schema import Common
 
+# ---- check -----------------------------------------------------------------------------------------------------------
 M = TypeVar("M", bound=Model)
 MESSAGES = {
     "missing": "required key is missing",
@@ -71,7 +77,7 @@ class _Found:
     """One of pydantic's errors: its kind, the path of the value as the user wrote it, and what its message needs."""
 
     kind: str
-    path: Path
+    path: KeyPath
     context: dict[str, Any]
     text: str
 
@@ -88,7 +94,7 @@ class _Found:
         return [cls(kind, path, context, error["msg"])]
 
     @classmethod
-    def misfit(cls, fault: At, path: Path, document: Document) -> "_Found":
+    def misfit(cls, fault: At, path: KeyPath, document: Document) -> "_Found":
         """A fault that a cross-check of the mapping at a path found."""
         *above, key = fault.key.split(".")
         outer = [int(step) if step.isdecimal() else step for step in above]
@@ -114,7 +120,7 @@ class _Partial:
             self._read(())
         return self.more
 
-    def _read(self, path: Path) -> Model:
+    def _read(self, path: KeyPath) -> Model:
         """The mapping at a path, without the fields that have faults; raises NotRead if it is no mapping."""
         model, data = model_at(self.model, self.document.data, path), self.document.get(path)
         if path in self.whole or model is None or not isinstance(data, dict):
@@ -140,7 +146,7 @@ class _Partial:
             part.__dict__.pop(each.key, None)  # what is around it must not rely on it
         return part
 
-    def _field(self, path: Path, name: str, info: FieldInfo, model: type[Model]) -> Any:
+    def _field(self, path: KeyPath, name: str, info: FieldInfo, model: type[Model]) -> Any:
         data = self.document.get(path)
         if path in self.whole or self.faults.spoiled(self.document.origin(path), path):
             raise NotRead
@@ -154,7 +160,7 @@ class _Partial:
                 self._validate(mark.func, members, path)
         return members
 
-    def _validate(self, check: Callable[..., Any], members: tuple[Model, ...], path: Path) -> None:
+    def _validate(self, check: Callable[..., Any], members: tuple[Model, ...], path: KeyPath) -> None:
         """Let a check of the whole list see what was read of its members."""
         try:
             check(members)
@@ -235,9 +241,9 @@ def unknown_key(key: object, known: Iterable[str]) -> str:
     return f"unknown key{near} allowed: {', '.join(known)}"
 
 
-def path_in(data: object, location: tuple[int | str, ...], keep_last: bool) -> Path:
+def path_in(data: object, location: tuple[int | str, ...], keep_last: bool) -> KeyPath:
     """The keys of pydantic's location as they stand in the data: without names of union members, `_deg` as written."""
-    path: Path = ()
+    path: KeyPath = ()
     for i, step in enumerate(location):
         written = step
         if child(data, step) is ABSENT and isinstance(data, dict) and isinstance(step, str):
@@ -249,7 +255,7 @@ def path_in(data: object, location: tuple[int | str, ...], keep_last: bool) -> P
     return path
 
 
-def twin(data: object, path: Path, key: str) -> Path:
+def twin(data: object, path: KeyPath, key: str) -> KeyPath:
     """The path of a key below a path, under its `_deg` name where the user wrote that."""
     for step in path:
         data = child(data, step)
@@ -264,7 +270,7 @@ def allowed_keys(model: type[Model]) -> list[str]:
     return [key for name in model.model_fields for key in (name, in_degrees(name)) if key]
 
 
-def model_at(model: type[Model], data: object, path: Path) -> type[Model] | None:
+def model_at(model: type[Model], data: object, path: KeyPath) -> type[Model] | None:
     """The schema of the mapping at a path; of a choice, the member that the data's kind names."""
     current: type[Model] | None = model
     candidates = [model]
@@ -297,7 +303,7 @@ def _fits(model: type[Model], data: object) -> bool:
     return isinstance(data, dict) and all(data.get(name) == tag for name, tag in tags)
 
 
-def refuse_both_units(document: Document, faults: Faults, path: Path = ()) -> None:
+def refuse_both_units(document: Document, faults: Faults, path: KeyPath = ()) -> None:
     """Note every quantity that is given in radians and in degrees at once."""
     data = document.get(path)
     if isinstance(data, list):
@@ -309,3 +315,84 @@ def refuse_both_units(document: Document, faults: Faults, path: Path = ()) -> No
             refuse_both_units(document, faults, (*path, key))
         elif (other := in_radians(str(key))) in data and other:
             faults.add(document.key_origin((*path, key)), (*path, key), f"given as {other} too")
+
+
+# ---- labels ----------------------------------------------------------------------------------------------------------
+UNITS = {
+    **{"m": "m", "s": "s", "mps": "m/s", "mps2": "m/s²", "mps3": "m/s³", "rad": "rad", "deg": "°", "hz": "Hz"},
+    **{"radps": "rad/s", "degps": "°/s", "radps2": "rad/s²", "degps2": "°/s²", "g": "g", "db": "dB"},
+    **{"kgpm2": "kg/m²"},
+}
+
+
+class Label(NamedTuple):
+    """A key in words: "scan period", its symbol in the papers ("Δt", "σ_r": a subscript after _) and its unit.
+
+    Symbol and unit are empty where there is none.
+    """
+
+    text: str
+    symbol: str
+    unit: str
+
+
+def label(keys: Study | type[Study] | None, key: str) -> Label:
+    """The label of a key, dotted or bare, as `sweep` and `--set` name it; keys are a study's, checked or not.
+
+    >>> from radarsim.studies import registry
+    >>> label(registry.keys("range_doppler"), "radar.sigma_velocity_mps")
+    Label(text='σ of the measured radial velocity', symbol='σ_V', unit='m/s')
+
+    A key that no schema tells of is called by its own words:
+
+    >>> label(None, "echo.rise_time_s")
+    Label(text='rise time', symbol='', unit='s')
+    """
+    steps = [step for step in key.split(".") if not step.isdecimal()]
+    stem, _, end = steps[-1].rpartition("_")
+    unit = UNITS.get(end, "") if stem and not stem.endswith("_per") else ""  # hertz per second are not seconds
+    found = _field(keys, steps) if keys is not None else None
+    found = found or _field(Common, steps)
+    if found is None:
+        name = stem if unit else steps[-1]
+        return Label(name.replace("_", " "), "", unit)
+    extra = found.json_schema_extra if isinstance(found.json_schema_extra, dict) else {}
+    text = found.title or (stem if unit else steps[-1]).replace("_", " ")
+    own = unit if in_radians(steps[-1]) else str(extra.get("unit", unit))  # a twin in degrees has no field of its own
+    return Label(text, str(extra.get("symbol", "")), own)
+
+
+def _field(keys: Model | type[Model], steps: list[str]) -> FieldInfo | None:
+    """The field that dotted steps lead to, from the top or, for a bare key, from the members of the study's list."""
+    model = keys if isinstance(keys, type) else type(keys)
+    if steps and _named(steps[0]).isdisjoint(model.model_fields) and issubclass(model, Study):
+        steps = [model.bare_keys, *steps]
+    holders: list[Any] = [keys]
+    found: FieldInfo | None = None
+    for step in steps:
+        at = next(((one, name) for one in holders for name in _named(step) if name in _fields(one)), None)
+        if at is None:
+            return None
+        holder, name = at
+        found = _fields(holder)[name]
+        given = [] if isinstance(holder, type) else list(_models(getattr(holder, name)))
+        holders = [*given, *models_in(found.annotation)]
+    return found
+
+
+def _named(step: str) -> set[str]:
+    """A key, and its twin in radians where it is one in degrees."""
+    return {step, in_radians(step) or step}
+
+
+def _fields(model: Model | type[Model]) -> dict[str, FieldInfo]:
+    return (model if isinstance(model, type) else type(model)).model_fields
+
+
+def _models(value: object) -> Iterator[Model]:
+    """The mappings that a value is or holds: of a choice, the kind that was chosen."""
+    if isinstance(value, Model):
+        yield value
+    elif isinstance(value, tuple | list):
+        for one in value:
+            yield from _models(one)

@@ -1,7 +1,17 @@
-"""Parts that the schemas of all studies are made of: the frozen model, numbers with their limits, and marks on fields.
+"""Scalars of a config: what a plain word of YAML means here, and which Python values stand for it.
+
+Stricter than YAML 1.1 where that surprises (yes, 1:30, 010 and 1_000 are text), wider where it does (1e5 is a number).
+
+Parts that the schemas of all studies are made of: the frozen model, numbers with their limits, and marks on fields.
 
 A key carries its unit (`_m`, `_s`, `_mps`, `_mps2`, `_hz`, `_rad`). Wherever a key ends in `_rad`, its twin in `_deg`
 is understood as well (and `_degps` for `_radps`); the checked object holds radians only.
+
+The numeric keys of a checked config: where each stands, its value, and what it may be.
+
+Keys that studies of range and radial velocity share: a radar's accuracies, and targets in range.
+
+Keys of rare events that several studies share: realisations drawn where an event is frequent, weighted back.
 """
 
 import math
@@ -12,7 +22,19 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from types import FunctionType
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Protocol, Self, TypeVar
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    NamedTuple,
+    Protocol,
+    Self,
+    TypeVar,
+    get_args,
+    get_origin,
+)
 
 from pydantic import (
     AfterValidator,
@@ -31,6 +53,70 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from radarsim.config.document import Faults, KeyPath, Origin, did_you_mean, dotted, short
+from radarsim.errors import ConfigError
+from radarsim.physics import STANDARD_GRAVITY_MPS2, Band, outside_band
+
+# ---- values ----------------------------------------------------------------------------------------------------------
+NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+CONSTANTS = {"true": True, "false": False, "": None, "~": None, "null": None}
+NOT_FINITE = re.compile(r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
+DEEPEST = 50
+
+
+class NotFinite(ValueError):
+    """A number that is infinite or not-a-number."""
+
+
+def from_text(text: str) -> object:
+    """The value of a plain (unquoted) word: number, true, false, nothing, or the text itself."""
+    if text in CONSTANTS:
+        return CONSTANTS[text]
+    if NOT_FINITE.fullmatch(text):
+        raise NotFinite(text)
+    if not NUMBER.fullmatch(text):
+        return text
+    number = float(text)
+    if not math.isfinite(number):
+        raise NotFinite(text)
+    return int(text) if text.lstrip("+-").isdigit() else number
+
+
+def from_python(value: object, path: KeyPath, origin: Origin, faults: Faults) -> object:
+    """A dictionary given in Python as YAML would have given it; NumPy scalars and arrays become plain values."""
+    if len(path) > DEEPEST:
+        faults.spoil(origin, path[:3], f"nested more than {DEEPEST} deep")
+        return None
+    if hasattr(value, "tolist") and not isinstance(value, type):
+        value = value.tolist()
+    match value:
+        case bool() | str():
+            return value
+        case int() | float():
+            return _finite(value, path, origin, faults)
+        case None:
+            faults.spoil(origin, path, "has no value")
+            return None
+        case Mapping():
+            return {str(k): from_python(v, (*path, str(k)), origin, faults) for k, v in value.items()}
+        case list() | tuple():
+            return [from_python(v, (*path, i), origin, faults) for i, v in enumerate(value)]
+    faults.spoil(origin, path, "must be text, a number, true or false, a list or a mapping", value)
+    return None
+
+
+def _finite(value: float | int, path: KeyPath, origin: Origin, faults: Faults) -> float | int | None:
+    try:
+        finite = math.isfinite(value)
+    except OverflowError:  # a whole number beyond the largest float
+        finite = False
+    if not finite:
+        faults.spoil(origin, path, "must be a finite number", value)
+        return None
+    return value
+
+
+# ---- fields ----------------------------------------------------------------------------------------------------------
 T = TypeVar("T")
 V = TypeVar("V")
 Check = TypeVar("Check", bound=Callable[[Any], "Iterator[At]"])
@@ -418,3 +504,372 @@ def unique_names(members: tuple[N, ...]) -> tuple[N, ...]:
 # Of most studies: the list of what is compared, and the name of the one that gains are against; its own name.
 Members = Annotated[tuple[N, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()]
 Baseline = Annotated[Name | None, Design(), NameIn("filters")]
+
+
+# ---- numeric ---------------------------------------------------------------------------------------------------------
+MOST_NAMED = 5  # keys that begin as a mistaken name does and are all suggested
+
+
+@dataclass(frozen=True)
+class NumericKey:
+    """A key that holds a number, as `--set` names it.
+
+    value is None where the key is optional and not given. low and high bound what the schema alone allows (infinite
+    where it does not), in the key's unit; whole: only whole numbers are.
+    """
+
+    path: str
+    value: float | None
+    low: float
+    high: float
+    whole: bool
+
+
+def keys(spec: Study) -> list[NumericKey]:
+    """Every key of a case that holds a number, in the order of its schema, items of lists by their place."""
+    return list(_within(spec, ()))
+
+
+def _within(model: Model, path: tuple[str | int, ...]) -> Iterator[NumericKey]:
+    for name, info in type(model).model_fields.items():
+        yield from _at(getattr(model, name), (*path, name), [info.annotation, *info.metadata])
+
+
+def _at(value: Any, path: tuple[str | int, ...], allowed: Any) -> Iterator[NumericKey]:
+    """The keys at and below a value, of which `allowed` is the annotation and its marks."""
+    if isinstance(value, Model):
+        yield from _within(value, path)
+    elif isinstance(value, tuple | list):
+        for i, item in enumerate(value):
+            yield from _at(item, (*path, i), allowed)
+    elif (_is_number(value) and not _is_choice(allowed)) or (value is None and _takes_numbers(allowed)):
+        low, high, whole = _bounds(allowed)
+        yield NumericKey(dotted(path), value, low, high, whole)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _parts(annotation: Any) -> Iterator[Any]:
+    """An annotation and all that it is made of: members of a choice, items of a list, marks."""
+    yield annotation
+    for inner in annotation if isinstance(annotation, list) else get_args(annotation):
+        yield from _parts(inner)
+    yield from getattr(annotation, "metadata", ()) if not isinstance(annotation, type) else ()
+
+
+def _is_choice(allowed: Any) -> bool:
+    """Whether only listed values are allowed, numbers though they are."""
+    return any(get_origin(part) is Literal for part in _parts(allowed))
+
+
+def _takes_numbers(allowed: Any) -> bool:
+    return any(part in (int, float) for part in _parts(allowed))
+
+
+def _bounds(allowed: Any) -> tuple[float, float, bool]:
+    """Least and greatest value, and whether only whole ones, that the marks of an annotation allow."""
+    low, high, whole = -math.inf, math.inf, False
+    for part in _parts(allowed):
+        if isinstance(part, Whole):
+            low, high, whole = max(low, part.least), min(high, part.most), True
+        low = max([low, *_limits(part, "gt", "ge")])
+        high = min([high, *_limits(part, "lt", "le")])
+    return low, high, whole
+
+
+def _limits(part: Any, *names: str) -> list[float]:
+    """The limits of these names that a mark holds."""
+    held = [getattr(part, name, None) for name in names]
+    return [float(one) for one in held if isinstance(one, int | float)]
+
+
+def find(spec: Study, name: str) -> tuple[NumericKey, ...]:
+    """The numeric keys that a name means: one by its full path; of a bare filter key one in every filter that has it.
+
+    A `_deg` name means its `_rad` twin, value and bounds in degrees. Raises ConfigError, with the nearest known name.
+    """
+    known = keys(spec)
+    path, _, last = name.rpartition(".")
+    twin = in_radians(last)
+    wanted = f"{path}.{twin}".removeprefix(".") if twin else name
+    members = f"{type(spec).bare_keys}."
+    found = [key for key in known if key.path == wanted] or [
+        key for key in known if key.path.startswith(members) and key.path.split(".", 2)[-1] == wanted
+    ]
+    if not found:
+        paths = [key.path for key in known]
+        bare = [one.split(".", 2)[-1] for one in paths if one.startswith(members)]
+        degrees = [f"{head}{other}" for one in paths for head, other in [_in_degrees(one)] if other]
+        raise ConfigError(f"{name}: {_no_such(name, spec, list(dict.fromkeys([*paths, *bare, *degrees])))}")
+    if twin:
+        found = [_degrees(key, name) for key in found]
+    return tuple(found)
+
+
+def _in_degrees(path: str) -> tuple[str, str | None]:
+    head, dot, last = path.rpartition(".")
+    return head + dot, in_degrees(last)
+
+
+def _degrees(key: NumericKey, name: str) -> NumericKey:
+    value = None if key.value is None else math.degrees(key.value)
+    head = key.path.rpartition(".")[0]
+    path = f"{head}.{name.rpartition('.')[2]}".removeprefix(".")
+    return NumericKey(path, value, math.degrees(key.low), math.degrees(key.high), key.whole)
+
+
+def _no_such(name: str, spec: Study, known: list[str]) -> str:
+    """Why a name means no numeric key."""
+    value: Any = spec
+    for step in name.split("."):
+        if isinstance(value, Model) and step in type(value).model_fields:
+            value = getattr(value, step)
+        elif isinstance(value, tuple) and step.isdecimal() and int(step) < len(value):
+            value = value[int(step)]
+        else:
+            near = _several(name, known) or did_you_mean(name, known) or _by_last(name, known)
+            return f"unknown key{near}" + ("" if near and "." not in name else _in_group(name, known))
+    return "holds no number, and only a number can be solved for"
+
+
+def _several(name: str, known: list[str]) -> str:
+    """A suggestion of all the keys that begin as a name does, where they are a few."""
+    begun = [path for path in known if len(name) > 2 and path.startswith(name)]
+    return f"; did you mean {' or '.join(begun)}?" if 1 < len(begun) <= MOST_NAMED else ""
+
+
+def _in_group(name: str, known: list[str]) -> str:
+    """What there is in the group of a name, or which groups and single keys there are."""
+    group = name.rpartition(".")[0]
+    while group and not any(path.startswith(f"{group}.") for path in known):
+        group = group.rpartition(".")[0]
+    inside = [path[len(group) + 1 if group else 0 :] for path in known if not group or path.startswith(f"{group}.")]
+    parts = dict.fromkeys(f"{path.partition('.')[0]}." if "." in path else path for path in inside)
+    return f"; {group or 'there'} {'has' if group else 'are'} {', '.join(parts)}"
+
+
+def _by_last(name: str, known: list[str]) -> str:
+    """A suggestion for a name whose last part alone is right or nearly so: the path before it is wrong or missing."""
+    ends = {path.rpartition(".")[2]: path for path in reversed(known)}
+    near = did_you_mean(name.rpartition(".")[2], list(ends)).removeprefix("; did you mean ").removesuffix("?")
+    return f"; did you mean {ends[near]}?" if near else ""
+
+
+# ---- radial ----------------------------------------------------------------------------------------------------------
+MOST_SCANS = 100_000
+FARTHEST_M = 1e15  # a range that still resolves a metre in double precision
+RESOLVED = 1e-4 * 2.0**52  # range over accuracy at which rounding reaches a ten-thousandth of the accuracy
+NEAREST_M = 100.0  # a target that flies over the radar has no radial motion that a filter could follow
+FASTEST_MPS = 12_000.0  # escape from the Earth
+HARDEST_MPS2 = 1000.0  # about 100 g, more than any missile's
+
+Coefficients = Annotated[tuple[Number, ...], Field(min_length=1, max_length=12)]
+COEFFICIENTS = "derivatives of range at the first plot: m, m/s, m/s², … (the sum of c_i t^i / i!)"
+
+
+class InBand(Model):
+    """What lies in a wave band: its wavelength must."""
+
+    if TYPE_CHECKING:
+        band: Band | None
+        wavelength_m: float
+
+    @cross_check
+    def _in_its_band(self) -> Iterator[At]:
+        limits = outside_band(self.band, self.wavelength_m)
+        if limits is not None:
+            yield at("band", f"{self.band} is {' to '.join(map(short, limits))} m, not {short(self.wavelength_m)}")
+
+
+class Radar(InBand):
+    """A surveillance radar: accuracies of one plot, and the period of its scans."""
+
+    name: Annotated[Name | None, Display()] = key("name", "display name", None)
+    band: Annotated[Band | None, Display()] = key(
+        "wave band", "wave band, for display: by its wavelength, or by its letter (IEEE Std 521)", None
+    )
+    wavelength_m: Positive = key("wavelength", "wavelength, m: gives the Doppler frequency of a velocity", symbol="λ")
+    sigma_range_m: Positive = key("σ of the measured range", "standard deviation of a measured range, m", symbol="σ_r")
+    sigma_velocity_mps: Positive = key(
+        "σ of the measured radial velocity", "standard deviation of a measured radial velocity, m/s", symbol="σ_V"
+    )
+    scan_period_s: Positive = key("scan period", "time between two plots, s", symbol="Δt")
+
+
+class Lasting(Study):
+    """A study whose keys give the length of a run as a number of scans, or as a time in its place."""
+
+    in_place_of: ClassVar[Mapping[str, str]] = {"scans": "duration_s", "duration_s": "scans"}
+    most_scans: ClassVar[int] = MOST_SCANS
+
+    if TYPE_CHECKING:
+        radar: Any
+        scans: int | None
+        duration_s: float | None
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        schema = super().__get_pydantic_json_schema__(core_schema, handler)
+        length = {"oneOf": [{"required": ["scans"]}, {"required": ["duration_s"]}]}
+        return schema | {"allOf": [*schema.get("allOf", []), length]}
+
+    @property
+    def plots(self) -> int:
+        """How many scans there are: as given, or to the last scan within the duration."""
+        if self.duration_s is None:
+            if self.scans is None:
+                raise NotRead("scans")
+            return self.scans
+        return int(self.duration_s / self.radar.scan_period_s * (1 + 1e-12)) + 1
+
+    @cross_check
+    def _length_given(self) -> Iterator[At]:
+        if self.scans is None and self.duration_s is None:
+            yield at("scans", "required key is missing, or duration_s in its place")
+        elif self.scans is not None and self.duration_s is not None:
+            yield at("duration_s", "stands in place of scans: give one of them")
+        elif not 2 <= self.plots <= self.most_scans:
+            yield at("duration_s", f"must be 2 to {self.most_scans} scans of radar.scan_period_s, makes {self.plots}")
+
+
+class Polynomial(Model):
+    """A range that is a polynomial of time; up to the second degree it fits the filters' model exactly."""
+
+    kind: Literal["polynomial"] = key("kind", "a polynomial of any degree up to 11")
+    coefficients: Coefficients = key("derivatives of the range at the first plot", COEFFICIENTS)
+
+    def reach_m(self, t: float) -> float:
+        """A bound on the range up to a time t (s)."""
+        return polynomial_reach_m(self.coefficients, t)
+
+
+def polynomial_reach_m(coefficients: tuple[float, ...], t: float) -> float:
+    """A bound on the size of a polynomial up to a time t (s)."""
+    return sum(abs(c) * t**i / math.factorial(i) for i, c in enumerate(coefficients))
+
+
+class Starting(Model):
+    """What targets that break the model share: a moment at which they do."""
+
+    start_s: NonNegative = key("start time", "time from the first plot at which it begins, s")
+
+
+class AccelerationStart(Starting):
+    """A polynomial that begins to accelerate (or brake) at a moment."""
+
+    kind: Literal["acceleration_start"] = key("kind", "a constant acceleration that sets in at a moment")
+    coefficients: Coefficients = key("derivatives of the range at the first plot", COEFFICIENTS)
+    acceleration_mps2: Annotated[Number, Field(ge=-HARDEST_MPS2, le=HARDEST_MPS2)] = key(
+        "acceleration", "radial acceleration added from then on, m/s²", symbol="a"
+    )
+
+    def reach_m(self, t: float) -> float:
+        """A bound on the range up to a time t (s)."""
+        return polynomial_reach_m(self.coefficients, t) + abs(self.acceleration_mps2) * t**2 / 2
+
+
+class Turn(Starting):
+    """Straight flight in a plane through the radar, a turn of constant load, straight flight again."""
+
+    kind: Literal["turn"] = key("kind", "a turn of given g between two straight legs")
+    range_m: Positive = key("range", "range at the first plot, m")
+    speed_mps: Annotated[Positive, Field(le=FASTEST_MPS)] = key("speed", "speed, constant, m/s")
+    aspect_rad: Number = key(
+        "aspect angle", "direction of flight from the line of sight outwards, rad (pi: straight in)"
+    )
+    acceleration_g: Annotated[Number, Field(ge=-100, le=100)] = key(
+        "acceleration",
+        "lateral acceleration of the turn, standard gravities; positive: to the left",
+        symbol="a",
+        unit="g",
+    )
+    duration_s: Positive = key("duration", "length of the turn, s")
+
+    def reach_m(self, t: float) -> float:
+        """A bound on the range up to a time t (s)."""
+        return self.range_m + self.speed_mps * t
+
+    def closest_m(self, t: float) -> float:
+        """The least distance from the radar up to a time t (s): of two straight legs and of the arc between them."""
+        begin, end = min(self.start_s, t), min(self.start_s + self.duration_s, t)
+        rate = self.acceleration_g * STANDARD_GRAVITY_MPS2 / self.speed_mps
+        x, y, heading = self.range_m, 0.0, self.aspect_rad
+        nearest, x, y = straight_leg(x, y, heading, self.speed_mps * begin)
+        if rate == 0:
+            return min(nearest, straight_leg(x, y, heading, self.speed_mps * (t - begin))[0])
+        radius = self.speed_mps / rate
+        centre = (x - radius * math.sin(heading), y + radius * math.cos(heading))
+        towards = math.atan2(-centre[1] / radius, -centre[0] / radius)  # of the point of the circle nearest the radar
+        turned = (math.copysign(1.0, rate) * (towards + math.pi / 2 - heading)) % (2 * math.pi)
+        if turned <= abs(rate) * (end - begin):
+            nearest = min(nearest, abs(math.hypot(*centre) - abs(radius)))
+        heading += rate * (end - begin)
+        x, y = centre[0] + radius * math.sin(heading), centre[1] - radius * math.cos(heading)
+        return min(nearest, straight_leg(x, y, heading, self.speed_mps * (t - end))[0])
+
+
+def straight_leg(x: float, y: float, heading: float, length: float) -> tuple[float, float, float]:
+    """The least distance from the origin along a straight leg from (x, y), and the point where it ends."""
+    along = min(max(-(x * math.cos(heading) + y * math.sin(heading)), 0.0), length)
+    nearest = math.hypot(x + along * math.cos(heading), y + along * math.sin(heading))
+    return nearest, x + length * math.cos(heading), y + length * math.sin(heading)
+
+
+class FlyBy(Model):
+    """Straight flight at a constant speed past the radar, at a distance."""
+
+    kind: Literal["fly_by"] = key("kind", "straight flight past the radar")
+    distance_m: Annotated[Positive, Field(ge=NEAREST_M)] = key(
+        "distance of closest approach", "distance of closest approach, m"
+    )
+    speed_mps: Annotated[Positive, Field(le=FASTEST_MPS)] = key("speed", "speed, constant, m/s")
+    start_range_m: Positive = key("range at the first plot", "range at the first plot, before closest approach, m")
+
+    @cross_check
+    def _begins_outside(self) -> Iterator[At]:
+        if self.start_range_m < self.distance_m:
+            yield at("start_range_m", f"must be >= distance_m, {short(self.distance_m)}")
+
+    def reach_m(self, t: float) -> float:
+        """A bound on the range up to a time t (s)."""
+        return self.start_range_m + self.speed_mps * t
+
+
+class Recorded(Model):
+    """A flight recorded in a file, smoothed by a spline whose derivatives are the true velocity and acceleration."""
+
+    kind: Literal["recorded"] = key(
+        "kind", "a flight from a CSV file with columns t_s, x_m, y_m, z_m, the radar at the origin"
+    )
+    file: Annotated[str, DataFile()] = key("file", "the file, from the folder of this one")
+
+    def reach_m(self, t: float) -> float:
+        """A bound on the range up to a time t (s): of what is in the file none is known here."""
+        return 0.0
+
+
+def within_reach(target: Any, radar: Radar, last: float) -> Iterator[At]:
+    """The faults of a target that goes so far up to a time `last` (s) that its accuracies drown, or flies over."""
+    finest = min(radar.sigma_range_m, radar.sigma_velocity_mps * radar.scan_period_s)
+    farthest = min(FARTHEST_M, finest * RESOLVED)
+    if target.reach_m(last) > farthest:
+        so_far = f"must stay within {short(float(f'{farthest:.2g}'))} m of the radar up to the last plot"
+        yield at("target", f"{so_far}, at {short(last)} s: beyond, double precision does not resolve its accuracies")
+    elif isinstance(target, Turn) and target.closest_m(last) < NEAREST_M:
+        yield at("target", f"must not fly over the radar: it comes within {short(NEAREST_M)} m of it")
+
+
+# ---- rare ------------------------------------------------------------------------------------------------------------
+# α_0, of the realisations that are drawn as they are: no weight is over ten, and the rare part keeps nine tenths.
+PLAIN_SHARE = 0.1
+
+
+class RareEvent(Model):
+    """An event that is rare: realisations shifted towards it, and weights that make up for it."""
+
+    @property
+    def aimed_at(self) -> str | None:
+        """The name of the filter or estimator whose event is sought; None where it is sought for all."""
+        return None

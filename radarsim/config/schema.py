@@ -1,11 +1,17 @@
-"""The YAML keys that every config may have, and what config knows of the studies: their names and their keys."""
+"""The YAML keys that every config may have, and what config knows of the studies: their names and their keys.
 
-from typing import Annotated, Protocol
+The schema of the YAML as JSON Schema, for editors and for `radarsim schema`.
+"""
 
-from pydantic import Field
+import json
+from typing import Annotated, Any, Literal, Protocol
 
-from radarsim.config.fields import Anything, Model, Name, Stem, Study, Whole, key
+from pydantic import BaseModel, Field
+from pydantic.json_schema import GenerateJsonSchema, models_json_schema
 
+from radarsim.config.fields import Anything, Model, Name, Scenario, Stem, Study, Whole, key
+
+# ---- schema ----------------------------------------------------------------------------------------------------------
 LARGEST_REALISATIONS = 10**12
 LARGEST_SEED = 2**64 - 1
 
@@ -46,3 +52,103 @@ class Studies(Protocol):
 
     def keys(self, name: str) -> type[Study]:
         """The schema of a study's keys, imported when first asked for."""
+
+
+# ---- json schema -----------------------------------------------------------------------------------------------------
+TITLE = "radarsim experiment"
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+class OwnTitles(GenerateJsonSchema):
+    """A key is called what its schema calls it: no title is made of its name."""
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
+
+
+def schema(studies: Studies) -> dict[str, Any]:
+    """JSON Schema of a config, of one of the studies or an `include` of others, and of a scenario."""
+    models = {name: studies.keys(name) for name in studies.usable()}
+    described: tuple[type[BaseModel], ...] = (Common, *models.values())
+    wanted: list[tuple[type[BaseModel], Literal["validation"]]] = [(model, "validation") for model in described]
+    references, whole = models_json_schema(wanted, ref_template="#/$defs/{model}", schema_generator=OwnTitles)
+    definitions = tidy(whole["$defs"])
+
+    def popped(model: type[BaseModel]) -> Any:
+        return definitions.pop(references[(model, "validation")]["$ref"].removeprefix("#/$defs/"))
+
+    common = popped(Common)["properties"]
+    kinds = {name: _experiment(name, popped(model), common) for name, model in models.items()}
+    return {
+        "$schema": DIALECT,
+        "title": TITLE,
+        "oneOf": [{"$ref": f"#/$defs/{name}"} for name in (*kinds, "include", "scenario")],
+        "$defs": {
+            **kinds,
+            "include": _comparison(common, list(models)),
+            "scenario": _scenario(models, kinds),
+            **definitions,
+        },
+    }
+
+
+def _experiment(name: str, study: dict[str, Any], common: dict[str, Any]) -> dict[str, Any]:
+    """A config of one study: the common keys and its own."""
+    kept = {key: value for key, value in common.items() if key not in ("study", "include")}
+    about = {"const": name, "description": study.get("description", name)}  # of a docstring, which -OO leaves out
+    return {
+        **study,
+        "title": name,
+        "properties": {"study": about, **study["properties"], **kept},
+        "required": ["study", *study.get("required", []), "realisations"],
+    }
+
+
+def _comparison(common: dict[str, Any], studies: list[str]) -> dict[str, Any]:
+    """A config that includes others."""
+    return {
+        "title": "include",
+        "description": "Several configs compared in one run.",
+        "type": "object",
+        "properties": {**common, "study": {"enum": studies, "description": common["study"]["description"]}},
+        "required": ["include"],
+        "additionalProperties": False,
+    }
+
+
+def _scenario(models: dict[str, type[Study]], kinds: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """A file in scenarios/: whatever may stand inline where a config names one."""
+    inline: list[dict[str, Any]] = []
+    for name, model in models.items():
+        for field, info in model.model_fields.items():
+            if any(isinstance(mark, Scenario) for mark in info.metadata):
+                inline += kinds[name]["properties"][field]["anyOf"][1:]
+    return {"title": "scenario", "description": "What is observed.", "anyOf": inline}
+
+
+def tidy(part: Any) -> Any:
+    """A schema without what carries no information: names of classes, and null, which stands for an absent key."""
+    if isinstance(part, list):
+        return [tidy(item) for item in part]
+    if not isinstance(part, dict):
+        return part
+    kept = {key: tidy(value) for key, value in part.items() if not _idle(key, value, part)}
+    choices = [choice for choice in kept.get("anyOf", ()) if choice != {"type": "null"}]
+    if len(choices) == 1:
+        del kept["anyOf"]
+        kept = choices[0] | kept
+    elif choices:
+        kept["anyOf"] = choices
+    return kept
+
+
+def _idle(key: str, value: object, part: dict[str, Any]) -> bool:
+    """Whether a keyword (and no property that happens to have its name) carries no information."""
+    if key == "title":
+        return isinstance(value, str) and "properties" in part
+    return key == "discriminator" or (key == "default" and value in (None, {}))
+
+
+def schema_json(studies: Studies) -> str:
+    """The schema as text; docs/schema.json holds it."""
+    return json.dumps(schema(studies), indent=1, ensure_ascii=False)

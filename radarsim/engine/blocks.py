@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from radarsim.engine.moments import Sums
+from radarsim.engine.results import Sums
 from radarsim.errors import NonFiniteError
 
 QUESTION = 32  # digits of an identity that tell what is asked; those after them tell which sources answer it

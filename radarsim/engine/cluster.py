@@ -1,4 +1,6 @@
-"""Tasks on a Dask cluster: processes of this machine, or the workers of a scheduler. The only file that knows Dask.
+"""A key and its certificate for the processes of one run, by the package `cryptography`.
+
+Tasks on a Dask cluster: processes of this machine, or the workers of a scheduler. The only file that knows Dask.
 
 A task travels as the pickled work (a case: a few kilobytes) and the piece; the worker prepares a work once and keeps
 it. Workers may come and go: Dask hands the tasks of a dead one to another. They must have the same sources, which the
@@ -14,6 +16,7 @@ import subprocess
 import sys
 import threading
 import time
+from datetime import UTC, datetime
 from functools import lru_cache
 from itertools import count
 from queue import Empty, SimpleQueue
@@ -21,13 +24,51 @@ from types import ModuleType, TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from radarsim.engine.blocks import Node, Partial, Work
-from radarsim.engine.certificate import self_signed
 from radarsim.engine.executors import Outcome, attempted
 from radarsim.errors import ClusterError, ConfigError, Interrupted
 
 if TYPE_CHECKING:
     from distributed import Future, LocalCluster, Security
 
+
+# ---- certificate -----------------------------------------------------------------------------------------------------
+# The certificate dies with the run, which holds the only key; no date ends it. So a clock that is set under the run, or
+# that is wrong from the start (1970 where a battery is flat), locks nobody out.
+FIRST = datetime(1970, 1, 1, tzinfo=UTC)
+LAST = datetime(9999, 12, 31, 23, 59, 59, tzinfo=UTC)  # RFC 5280, 4.1.2.5: of no well-defined end
+NAME = "radarsim"
+
+
+def self_signed() -> tuple[str, str]:
+    """A new private key and a certificate for it that is its own authority, both as PEM text.
+
+    Raises ImportError without `cryptography`.
+    """
+    from cryptography import x509
+    from cryptography.hazmat.primitives import hashes, serialization
+    from cryptography.hazmat.primitives.asymmetric import ec
+    from cryptography.x509.oid import NameOID
+
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, NAME)])
+    certificate = (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(name)
+        .add_extension(x509.SubjectAlternativeName([x509.DNSName(NAME)]), critical=False)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(FIRST)
+        .not_valid_after(LAST)
+        .sign(key, hashes.SHA256())
+    )
+    plain = serialization.NoEncryption()
+    pem = serialization.Encoding.PEM
+    text = key.private_bytes(pem, serialization.PrivateFormat.PKCS8, plain).decode()
+    return text, certificate.public_bytes(pem).decode()
+
+
+# ---- cluster ---------------------------------------------------------------------------------------------------------
 CONNECT_S = 10
 WORKERS_S = 30  # how long a scheduler may be without a worker
 DEATHS = 20  # of workers under one task, after which it is taken for their cause

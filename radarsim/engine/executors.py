@@ -8,8 +8,8 @@ from queue import Empty, SimpleQueue
 from typing import Protocol
 
 from radarsim.engine.blocks import Node, Partial, Work, simulated
-from radarsim.engine.machine import available_cores, platform_name
-from radarsim.engine.moments import Sums
+from radarsim.engine.results import Sums
+from radarsim.engine.store import available_cores, platform_name
 
 
 @dataclass(frozen=True)

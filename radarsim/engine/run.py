@@ -1,18 +1,138 @@
-"""One run: what is stored, what is missing, tasks dispatched, outcomes collected, and the resulting sums."""
+"""Reasons to stop a run: a stop condition is called between tasks and gives None or the reason as text.
+
+One run: what is stored, what is missing, tasks dispatched, outcomes collected, and the resulting sums.
+
+The engine's front: collect the sums of a work, read what is stored, compute a share of the blocks.
+"""
 
 import math
 import os
+import select
+import signal
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, Work, added, gaps, share_of, widest
-from radarsim.engine.executors import Executor, Outcome
-from radarsim.engine.keeper import Keeper
-from radarsim.engine.moments import Sums
-from radarsim.engine.stopping import Stop
-from radarsim.engine.store import Store, mixture
+from radarsim.engine.executors import Executor, Outcome, Serial, Threads
+from radarsim.engine.results import Sums
+from radarsim.engine.store import Keeper, Store, mixture
+from radarsim.errors import Interrupted, StoreError
 
+# ---- stopping --------------------------------------------------------------------------------------------------------
+Stop = Callable[[], str | None]
+
+
+class TimeLimit:
+    """Stop when that many seconds have passed from `begun`, by default now; `less` earlier, for what comes after."""
+
+    def __init__(self, seconds: float, begun: float | None = None, less: float = 0.0) -> None:
+        self.seconds = seconds
+        self.begun = time.monotonic() if begun is None else begun
+        self._end = self.begun + seconds - less
+
+    def __call__(self) -> str | None:
+        return f"time limit of {self.seconds:g} s" if time.monotonic() >= self._end else None
+
+    @property
+    def left(self) -> float:
+        """Seconds until then, none after it."""
+        return max(0.0, self._end - time.monotonic())
+
+    def reserving(self, seconds: float) -> "TimeLimit":
+        """The limit that leaves so many seconds of its time over, at most half of what is left of it."""
+        return TimeLimit(self.seconds, self.begun, min(seconds, 0.5 * self.left))
+
+
+def time_limit(seconds: float) -> TimeLimit:
+    """Stop when that many seconds have passed from now."""
+    return TimeLimit(seconds)
+
+
+class Either:
+    """Whichever of several conditions gives a reason first; `grace_s` is then that one's."""
+
+    def __init__(self, *conditions: Stop | None) -> None:
+        self._conditions = [condition for condition in conditions if condition is not None]
+        self.grace_s = math.inf
+
+    def __call__(self) -> str | None:
+        for condition in self._conditions:
+            if (reason := condition()) is not None:
+                self.grace_s = getattr(condition, "grace_s", math.inf)
+                return reason
+        return None
+
+
+class Signals:
+    """While entered, SIGINT and SIGTERM ask for a stop; calling it says whether one came.
+
+    The main thread of a process may enter it. A run that asks it between tasks ends by itself. If the process is still
+    there 1.5 s after the signal, whatever it is doing, or if a second signal comes, it exits on the spot with status
+    128 + signal: files appear by renaming only, so none is ever half written.
+
+    Python runs handlers between two bytecodes of the main thread, which may be far away inside compiled code. So
+    handlers do nothing here, and a thread of its own waits for the numbers that the interpreter writes to a pipe.
+    """
+
+    grace_s = 1.0
+    limit_s = 1.5
+    numbers = (signal.SIGINT, signal.SIGTERM)
+
+    def __init__(self) -> None:
+        self.received: int | None = None
+
+    def __call__(self) -> str | None:
+        return None if self.received is None else f"signal {self.received}"
+
+    def raise_if_received(self) -> None:
+        """Interrupted, if a signal came."""
+        if self.received is not None:
+            raise Interrupted(self.received)
+
+    def __enter__(self) -> "Signals":
+        self._pipe, self._write_end = os.pipe()
+        os.set_blocking(self._write_end, False)
+        self._wakeup_before = signal.set_wakeup_fd(self._write_end, warn_on_full_buffer=False)
+        self._before = {number: signal.signal(number, _noted) for number in self.numbers}
+        self._watcher = threading.Thread(target=self._watch, name="signals", daemon=True)
+        self._watcher.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        signal.set_wakeup_fd(self._wakeup_before)
+        os.close(self._write_end)
+        self._watcher.join()
+        os.close(self._pipe)
+
+    def _watch(self) -> None:
+        self.received = self._next(None)
+        if self.received is not None and (second := self._next(self.limit_s)) is not None:
+            os.write(2, f"{Interrupted(self.received)}\n".encode())
+            os._exit(128 + (second or self.received))
+
+    def _next(self, patience_s: float | None) -> int | None:
+        """The next of our signals, 0 when patience runs out first, None when the context is left."""
+        end = None if patience_s is None else time.monotonic() + patience_s
+        while True:
+            left = None if end is None else max(0.0, end - time.monotonic())
+            if not select.select([self._pipe], [], [], left)[0]:
+                return 0
+            number = os.read(self._pipe, 1)
+            if not number:
+                return None
+            if number[0] in self.numbers:
+                return number[0]
+
+
+def _noted(number: int, frame: object) -> None:
+    """The pipe has it already."""
+
+
+# ---- run -------------------------------------------------------------------------------------------------------------
 SHARES = 4
 POLL_S = 0.05
 PROGRESS_S = 0.1
@@ -278,3 +398,73 @@ class Share(Dispatch):
             stopped=stopped if done < self.asked else None,
             warnings=self._warnings(),
         )
+
+
+# ---- collect ---------------------------------------------------------------------------------------------------------
+def collect(
+    work: Work,
+    realisations: int,
+    *,
+    store: str | os.PathLike | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
+    stop: Stop | None = None,
+    executor: Executor | None = None,
+) -> Collected:
+    """Sums over realisations 0 … realisations-1 of the work; the same bytes however they are obtained.
+
+    store is the results directory: what it holds of this work is used, what is computed is kept there. threads defaults
+    to all cores; 0 runs everything in the calling thread. progress(done, total, from_store) is called at most ten times
+    a second, and at the end. stop() is asked between tasks; once it gives a reason, no task starts, those that run are
+    finished (for at most stop.grace_s, if it has that), and the result is of the blocks done without a gap.
+
+    Whatever ends a run, what it has done is stored. NonFiniteError names the first realisations whose sums are
+    not finite, which are not stored; StoreError the file that cannot be written.
+    """
+    run = Run(work, realisations, store, progress)
+    return run.finished(None if run.restored() else _computed(run, threads, stop, executor))
+
+
+def share(
+    work: Work,
+    realisations: int,
+    part: tuple[int, int],
+    *,
+    store: str | os.PathLike,
+    threads: int | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
+    stop: Stop | None = None,
+    executor: Executor | None = None,
+) -> Shared:
+    """Put a part of the blocks of N realisations into the store, and nothing else: (2, 3) is the second of three.
+
+    Shares are runs of blocks, as equal as blocks can be cut; the last holds the cut block. Stores in which all shares
+    are done are united by copying: `collect` then finds every block. The other arguments are those of `collect`.
+    """
+    run = Share(work, realisations, part, store, progress)
+    return run.finished(None if run.restored() else _computed(run, threads, stop, executor))
+
+
+def _computed(run: Dispatch, threads: int | None, stop: Stop | None, executor: Executor | None) -> str | None:
+    """Compute what a run lacks; the reason, if it was stopped. Whatever ends it, what is done is stored."""
+    pool = executor or (Serial() if threads == 0 else Threads(threads))
+    try:
+        return run.compute(pool, stop)
+    except StoreError:
+        raise
+    except BaseException:
+        run.keep(run.pieces())
+        raise
+    finally:
+        pool.forget()
+        if executor is None:
+            pool.close()
+
+
+def stored(work: Work, realisations: int, store: str | os.PathLike) -> Collected | None:
+    """What collect would give, if all of it is stored; else None. Computes and writes nothing, but sets damage aside.
+
+    Every N that collect has returned, in whatever way it ended, is there to be read, also after larger runs.
+    """
+    run = Run(work, realisations, store, None)
+    return run.result(None) if run.restored() else None

@@ -1,4 +1,6 @@
-"""Finished sums on disk: DIR/.blocks/<identity>/, a file for each piece, so that a killed run loses about a second.
+"""What made the sums: the platform that decides their last bits, and versions for the record.
+
+Finished sums on disk: DIR/.blocks/<identity>/, a file for each piece, so that a killed run loses about a second.
 
     L05-3.sums      node of level 5, index 3: blocks 96 … 127
     P24-1696.sums   the first 1696 realisations of block 24
@@ -19,27 +21,151 @@ taken over. What was found lies there, so that nobody looks a second time:
 
     <sources>.same              these sources give the bytes of this folder
     <sources>-<platform>.other  on this platform they do not
+
+Puts finished sums into the store about once a second, in a thread of its own, so that no worker waits for a disk.
+
+What of a run or a share is stored, by the names of files alone; only what other sources made is computed again.
+
+An audit of stored blocks, without the work that made them: is each file what its name says, are all the blocks there
+that a total was added from, do they add up to it? Nothing is changed.
 """
 
+import functools
 import hashlib
 import json
 import os
+import platform as system
 import re
 import stat
+import sys
+import threading
 import time
 import uuid
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 
-from radarsim.engine.blocks import QUESTION, Forest, Node, Partial, Piece, Total, Work, maximal, simulated
-from radarsim.engine.machine import platform_name, versions
-from radarsim.engine.moments import Sums
+from radarsim.engine.blocks import (
+    QUESTION,
+    Forest,
+    Node,
+    Partial,
+    Piece,
+    Total,
+    Work,
+    added,
+    gaps,
+    maximal,
+    share_bound,
+    share_of,
+    simulated,
+    widest,
+)
+from radarsim.engine.results import Sums
 from radarsim.errors import StoreError
 
+# ---- machine ---------------------------------------------------------------------------------------------------------
+# Those that change which fused or vector instructions a compiler chooses, from the widest.
+_DECIDING = ("avx512f", "avx2", "fma", "avx", "sse4_2", "asimd")
+
+
+@functools.cache
+def instruction_set() -> str:
+    """The instruction set, like `x86_64 avx512f avx2 fma`; sums from equal ones are equal to the last bit.
+
+    If the compiler targets another processor (NUMBA_CPU_NAME), that is named, since it decides instead; so are features
+    that NumPy is told to leave alone (NPY_DISABLE_CPU_FEATURES).
+    """
+    aimed_at, disabled = os.environ.get("NUMBA_CPU_NAME"), os.environ.get("NPY_DISABLE_CPU_FEATURES")
+    found = set(_flags())
+    parts = [system.machine(), *(flag for flag in _DECIDING if flag in found)]
+    parts += [f"aiming at {aimed_at}"] if aimed_at else []
+    return " ".join([*parts, f"NumPy without {disabled}"] if disabled else parts)
+
+
+def _cpuinfo() -> list[str]:
+    """The lines in which Linux describes the first processor; none elsewhere."""
+    try:
+        with open("/proc/cpuinfo", encoding="ascii", errors="replace") as file:
+            return file.read(8192).splitlines()
+    except OSError:
+        return []
+
+
+def _flags() -> list[str]:
+    """Features of the first processor, as Linux lists them; none elsewhere."""
+    return next((line.split() for line in _cpuinfo() if line.startswith(("flags", "Features"))), [])
+
+
+@functools.cache
+def processor() -> str:
+    """The processor's name; empty where the system does not say."""
+    names = [line.partition(":")[2].strip() for line in _cpuinfo() if "model name" in line]
+    return names[0] if names else system.processor()
+
+
+def available_cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@functools.cache
+def described() -> dict[str, object]:
+    """The machine for a reader: system, processor, cores."""
+    return {
+        "system": system.platform(),
+        "processor": processor(),
+        "architecture": system.machine(),
+        "cores": available_cores(),
+        "byteorder": sys.byteorder,
+    }
+
+
+@functools.cache
+def linear_algebra() -> str:
+    """The BLAS library NumPy has loaded, and the processor that its kernels are made for, like `openblas SkylakeX`.
+
+    The processor, or OPENBLAS_CORETYPE, chooses the kernels; the order of sums differs between them.
+    """
+    import numpy  # noqa: F401  (loads the library)
+    from threadpoolctl import threadpool_info
+
+    found = {
+        f"{library['internal_api']} {library.get('architecture', '')}".strip()
+        for library in threadpool_info()
+        if library["user_api"] == "blas"
+    }
+    return ", ".join(sorted(found))
+
+
+LIBRARIES = ("numba", "llvmlite", "numpy", "scipy")  # what compiles and computes
+
+
+@functools.cache
+def platform() -> dict[str, str]:
+    """What decides the last bits: processor, instruction set, BLAS, and the versions of what compiles and computes."""
+    here = {"processor": processor(), "instruction_set": instruction_set(), "linear_algebra": linear_algebra()}
+    return here | {name: metadata.version(name) for name in LIBRARIES}
+
+
+@functools.cache
+def platform_name() -> str:
+    """The platform in one line, as it stands in the header of stored sums: equal lines, equal bytes."""
+    libraries = ", ".join(f"{name} {platform()[name]}" for name in LIBRARIES)
+    return f"{processor() or 'unknown processor'}: {instruction_set()}; {linear_algebra()}; {libraries}"
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the libraries that compute, as far as they are loaded."""
+    libraries = {name: sys.modules[name].__version__ for name in ("numpy", "numba") if name in sys.modules}
+    return {"python": system.python_version()} | libraries
+
+
+# ---- store -----------------------------------------------------------------------------------------------------------
 MAGIC = b"radarsim sums 1\n"  # another number if the same realisations are ever added in another order
 SUFFIX = ".sums"
 DIGEST = 32
@@ -379,3 +505,278 @@ def decoded(raw: bytes) -> tuple[dict, np.ndarray]:
     if not isinstance(platforms, list) or not all(isinstance(name, str) for name in platforms):
         raise Damage("not as this program writes: no platforms")
     return header, values
+
+
+# ---- keeper ----------------------------------------------------------------------------------------------------------
+PERIOD_S = 1.0
+SMALLEST = 64
+
+
+class Keeper:
+    """Remembers which nodes are on disk, and writes those that are not."""
+
+    def __init__(self, store: Store):
+        self.store = store
+        self._durable: set[Node] = set()
+        self._thread: threading.Thread | None = None
+        self._error: Exception | None = None
+        self._due = time.monotonic() + PERIOD_S
+
+    def found(self, nodes: Mapping[Node, Sums]) -> None:
+        """These were read; a merger of several is not among the files, and is written like any other."""
+        stored = self.store.pieces()
+        self._durable.update(node for node in nodes if node in stored)
+
+    def offer(self, nodes: Mapping[Node, Sums]) -> None:
+        """Start to write those that are new, if a second has passed. Raises the error of the writing before.
+
+        A node of less than 1/64 of the largest new one is left out: it will soon be part of another, and would cost as
+        much to write. All of them together are a thirtieth of what a kill would lose anyway.
+        """
+        if time.monotonic() < self._due or (self._thread is not None and self._thread.is_alive()):
+            return
+        self._raise()
+        self._durable &= nodes.keys()
+        fresh = {node: sums for node, sums in nodes.items() if node not in self._durable}
+        largest = max((sums.count for sums in fresh.values()), default=0)
+        fresh = {node: sums for node, sums in fresh.items() if sums.count * SMALLEST >= largest}
+        self._thread = threading.Thread(target=self._put, args=(fresh,), name="keeper", daemon=True)
+        self._thread.start()
+        self._due = time.monotonic() + PERIOD_S
+
+    def finish(self, pieces: Mapping[Piece, Sums]) -> None:
+        """Write all that is not yet on disk, and wait until it is."""
+        if self._thread is not None:
+            self._thread.join()
+        self._raise()
+        self._durable &= pieces.keys()
+        for _ in range(LOOKS):
+            self._put({piece: sums for piece, sums in pieces.items() if piece not in self._durable})
+            self._raise()
+            # `radarsim clean` may have removed what this run wrote before.
+            stored = self.store.pieces()
+            if all(piece in stored or any(node in stored for node in piece.above(64)) for piece in pieces):
+                return
+            self._durable.clear()
+
+    def _put(self, pieces: Mapping[Piece, Sums]) -> None:
+        try:
+            if pieces:
+                self.store.write(pieces)
+                self._durable.update(piece for piece in pieces if isinstance(piece, Node))
+                self.store.sweep(self._durable)
+        except Exception as error:
+            self._error = error
+
+    def _raise(self) -> None:
+        if self._error is not None:
+            raise self._error
+
+
+# ---- stock -----------------------------------------------------------------------------------------------------------
+BY_CHANCE = 0.2  # that what is missing ends where shares do, without being shares
+
+
+@dataclass(frozen=True)
+class Stock:
+    """What is stored of `asked` realisations.
+
+    missing are runs (first, last) of realisations that are not. loose: whether there are blocks beyond a gap, or none
+    that a run reported, as shares leave them, or a run that was killed; shares then says which shares of how many are
+    missing, as far as the ends tell.
+    """
+
+    asked: int
+    stored: int
+    missing: tuple[tuple[int, int], ...]
+    shares: tuple[tuple[int, ...], int] | None
+    loose: bool
+
+
+def stock(work: Work, realisations: int, store: str | os.PathLike[str] | None, part: tuple[int, int] = (1, 1)) -> Stock:
+    """What a results directory holds of N realisations of a work, or of a share of them, as (2, 3) the second of three;
+    nothing where no directory is given."""
+    pieces, block = set() if store is None else Store(store, work).pieces(), work.block
+    first, stop, rest = share_of(realisations, block, part)
+    asked, full = (stop - first) * block + rest, realisations // block
+    if Total(realisations) in pieces:
+        return Stock(asked, asked, (), None, loose=False)
+    nodes = maximal([piece for piece in pieces if isinstance(piece, Node)], full)
+    runs, blocks = gaps(nodes, stop, first), full + (realisations % block > 0)
+    if rest and Partial(full, rest) not in pieces:
+        runs.append((runs.pop()[0] if runs and runs[-1][1] == full else full, blocks))
+    missing = tuple((begin * block, min(end * block, realisations) - 1) for begin, end in runs)
+    stored = asked - sum(last + 1 - begin for begin, last in missing)
+    beyond = bool(runs) and any(node.first >= runs[0][1] for node in nodes)
+    loose = beyond or (stored > 0 and not any(isinstance(piece, Total) for piece in pieces))
+    return Stock(asked, stored, missing, as_shares(runs, blocks) if loose else None, loose)
+
+
+def as_shares(missing: Collection[tuple[int, int]], blocks: int) -> tuple[tuple[int, ...], int] | None:
+    """Which shares of how many the missing runs (first, stop) of `blocks` blocks are, as ((2,), 3); None for none.
+
+    The fewest shares that fit, as long as it is no more than likely by chance: each end within lies by chance on one of
+    the n − 1 bounds of n shares.
+    """
+    ends = [end for run in missing for end in run if 0 < end < blocks]
+    chance, of = 0.0, 1
+    while ends and chance <= BY_CHANCE and of < blocks:
+        of += 1
+        chance += ((of - 1) / blocks) ** len(ends)
+        numbers = {share_bound(blocks, number, of): number for number in range(of + 1)}
+        if chance <= BY_CHANCE and all(end in numbers for run in missing for end in run):
+            return tuple(n for first, stop in missing for n in range(numbers[first] + 1, numbers[stop] + 1)), of
+    return None
+
+
+# ---- audit -----------------------------------------------------------------------------------------------------------
+BESIDE = re.compile(r"[0-9a-f]+(-[0-9a-f]+)?\.(same|other)")  # of other sources
+LEFT = re.compile(r"\.[\w-]+\.(sums|same|other)\.[0-9a-f]+\.tmp")  # by a run that was killed while it wrote
+ACROSS = 1e-9  # of sums made on several platforms
+
+
+@dataclass
+class Audit:
+    """Of one identity: the pieces that are whole, with their headers and sums; faults, each naming its file; notes."""
+
+    path: Path
+    pieces: dict[Piece, tuple[dict, np.ndarray]] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def audited(path: Path, reported: int | None = None) -> Audit:
+    """Check the blocks of one identity, and that the total of `reported` realisations is among them."""
+    found = Audit(path)
+    for name in _names(path):
+        piece = piece_named(name)
+        if piece is not None:
+            _read(found, piece)
+        elif name.endswith(".damaged"):
+            found.notes.append(f"{path / name}: set aside as damaged by an earlier run")
+    shapes = {(header["block"], values.size) for header, values in found.pieces.values()}
+    if len(shapes) > 1:
+        found.faults.append(f"{path}: blocks of several sizes")
+        return found
+    platforms = {name for header, _ in found.pieces.values() for name in header["platforms"]}
+    if len(platforms) > 1:
+        found.notes.append(f"{path}: {mixture(platforms)}")
+    if reported is not None and Total(reported) not in found.pieces:
+        _missing(found, Total(reported))
+    _gaps(found)
+    for total in sorted((piece for piece in found.pieces if isinstance(piece, Total)), key=lambda piece: piece.count):
+        _added_up(found, total)
+    return found
+
+
+def _names(path: Path) -> list[str]:
+    try:
+        return sorted(os.listdir(path))
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be listed: {error.strerror}") from error
+
+
+def _read(found: Audit, piece: Piece) -> None:
+    path = found.path / (piece.name + SUFFIX)
+    try:
+        header, values = decoded(content(path))
+        _check(header, values, piece, found.path.name)
+    except OSError as error:
+        found.faults.append(f"{path}: cannot be read: {error.strerror}")
+    except Damage as damage:
+        found.faults.append(f"{path}: damaged: {damage}")
+    else:
+        found.pieces[piece] = header, values
+
+
+def _check(header: dict, values: np.ndarray, piece: Piece, identity: str) -> None:
+    block = header.get("block")
+    if not isinstance(block, int) or block < 1:
+        raise Damage(f"block: expected a number, got {block}")
+    first, count = piece.realisations(block)
+    expected = {"identity": identity, "piece": piece.name, "first": first, "count": count, "size": values.size}
+    for key, value in expected.items():
+        if header.get(key) != value:
+            raise Damage(f"{key}: expected {value}, got {header.get(key)}")
+    check_platforms(header)
+    if not np.isfinite(values).all():
+        raise Damage("not all numbers are finite")
+
+
+def _gaps(found: Audit) -> None:
+    """A note on realisations that are not stored before others that are, as where a share was not copied."""
+    nodes = [piece for piece in found.pieces if isinstance(piece, Node)]
+    end = max((node.stop for node in nodes), default=0)
+    for first, stop in gaps(maximal(nodes, end), end):
+        block = found.pieces[nodes[0]][0]["block"]
+        span = f"realisations {first * block:,} to {stop * block - 1:,}"
+        found.notes.append(f"{found.path}: {span} are not stored, but later ones are")
+
+
+def _missing(found: Audit, piece: Piece) -> None:
+    fault = f"{found.path / (piece.name + SUFFIX)}: missing"
+    if not any(known.startswith(fault.removesuffix("missing")) for known in found.faults):
+        found.faults.append(fault)
+
+
+def _added_up(found: Audit, total: Total) -> None:
+    """Whether the pieces that a total was added from are there, and are its sum."""
+    header, values = found.pieces[total]
+    block = header["block"]
+    full, rest = divmod(total.count, block)
+    nodes = [piece for piece in found.pieces if isinstance(piece, Node)]
+    forest = Forest(block, values.size)
+    inner = maximal(nodes, full)
+    for node in inner:
+        forest.add(node, Sums(*_sums(found, node)))
+    for first, stop in forest.gaps(full):
+        if any(_covers(node, (first, stop)) for node in nodes):
+            continue
+        for node in _widest(first, stop):
+            _missing(found, node)
+    cut = Partial(full, rest)
+    inside = any(node in found.pieces for node in cut.above(64))
+    if rest and cut not in found.pieces and not inside:
+        _missing(found, cut)
+    if forest.gaps(full) or (rest and cut not in found.pieces):
+        return  # nothing to add up: a larger run has merged them
+    sums = forest.total()
+    if rest:
+        end = Sums(*_sums(found, cut))
+        sums = added(sums, end, 0) if full else end
+    used: list[Piece] = [total, *inner, *([cut] if rest else [])]
+    if not agree(sums.values, values, {name for piece in used for name in found.pieces[piece][0]["platforms"]}):
+        found.faults.append(f"{found.path / (total.name + SUFFIX)}: is not the sum of the blocks beside it")
+
+
+def agree(one: np.ndarray, other: np.ndarray, platforms: set[str]) -> bool:
+    """Whether two vectors of the same sums are equal: to the last bit, if all came from one platform."""
+    if len(platforms) < 2:
+        return one.tobytes() == other.tobytes()
+    return bool(np.allclose(one, other, rtol=ACROSS, atol=ACROSS * float(np.abs(other).max(initial=0.0))))
+
+
+def _covers(node: Node, gap: tuple[int, int]) -> bool:
+    return node.first <= gap[0] and gap[1] <= node.stop
+
+
+def _widest(first: int, stop: int) -> Iterator[Node]:
+    while first < stop:
+        yield (node := widest(first, stop, 62))
+        first = node.stop
+
+
+def _sums(found: Audit, piece: Piece) -> tuple[int, np.ndarray]:
+    header, values = found.pieces[piece]
+    return header["count"], values
+
+
+def removable(path: Path) -> list[tuple[Path, int]]:
+    """The files of one identity that a store makes, and their bytes; nothing that is a link or somebody else's."""
+    found = []
+    for name in _names(path):
+        if piece_named(name.removesuffix(".damaged")) is not None or BESIDE.fullmatch(name) or LEFT.fullmatch(name):
+            status = (path / name).lstat()
+            if stat.S_ISREG(status.st_mode):
+                found.append((path / name, status.st_size))
+    return found

@@ -15,9 +15,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.recorded.along import Along, Counted, Progress, best, climbed, silent, value
-from radarsim.recorded.doppler import Folding, folded
-from radarsim.recorded.fit import HALF_CHI2_95, LEAST_ROWS, polished
+from radarsim.recorded.fit import (
+    HALF_CHI2_95,
+    LEAST_ROWS,
+    Along,
+    Counted,
+    Folding,
+    Progress,
+    best,
+    climbed,
+    folded,
+    polished,
+    silent,
+    value,
+)
 from radarsim.recorded.follow import Followed, borrowed, recorded_of
 from radarsim.studies.interface import Likelihood, Turning
 

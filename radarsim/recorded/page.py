@@ -1,14 +1,227 @@
-"""The report of tracks over recorded plots: one self-contained page, and its figures as files."""
+"""What is said of tracks over recorded plots: rows, gaps, errors, how well the stated accuracies fit, advice.
 
+The report of tracks over recorded plots: one self-contained page, and its figures as files.
+"""
+
+import math
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from radarsim.config.experiment import Experiment
-from radarsim.recorded import accuracy, words
-from radarsim.recorded.advice import Advice
+from radarsim.language import numeral, plural, term, tr
+from radarsim.recorded import figures, fit
+from radarsim.recorded import figures as accuracy
+from radarsim.recorded.advice import Advice, Asked, Finding
 from radarsim.recorded.follow import Followed, drawn, put
+from radarsim.report.tables import labelled, number, power_of_ten, significant_digits, unit
+from radarsim.studies.interface import BIAS, CORRELATION, OUTLIERS
 
+# ---- words -----------------------------------------------------------------------------------------------------------
+CLEAR = 3.0  # of the logarithm of a likelihood, twenty times: from there on one filter is clearly the best
+
+
+def sentences(followed: Followed, judged: Sequence[figures.Judged], advised: Advice | None) -> list[str]:
+    """All that is said, a line each; advised: where a likelihood is known."""
+    lines = [tested(one, advised is None) for one in judged if one.tests]
+    return [*rows(followed), *errors(followed), *lines, *verdict(followed, judged, advised)]
+
+
+def verdict(followed: Followed, judged: Sequence[figures.Judged], advised: Advice | None) -> list[str]:
+    """Which filter is best, and what is to be changed: by the likelihood where it is known."""
+    return nearest(judged) if advised is None else likely(followed, advised)
+
+
+def rows(followed: Followed) -> list[str]:
+    """How many rows and tracks there are, over what time, what is missing, and the gaps."""
+    span = followed.last_s - followed.first_s
+    told = {"rows": counted(followed.rows), "span": span, "first": followed.first_s}
+    lines = [labelled("plots", tr("{rows} over {span:g} s, from {first:g} s", **told))]
+    if followed.tracks:
+        longest = counted(max(one.rows for one in followed.tracks.values()))
+        lines.append(labelled("tracks", tr("{count}, the longest of {rows}", count=len(followed.tracks), rows=longest)))
+    if followed.passed_over:
+        lines.append(labelled("passed", tr("{rows} of no track", rows=counted(followed.passed_over))))
+    missing = [tr("{count} of {name}", count=count, name=name) for name, count in followed.missing.items() if count]
+    if missing:
+        lines.append(labelled("missing", ", ".join(missing)))
+    if followed.silent:
+        names = ", ".join(followed.silent)
+        lines.append(labelled("no rows", tr("{names}: never an estimate from these plots", names=names)))
+    if followed.gaps:
+        words = tr(
+            "{count} of over three times the usual interval, {usual:g} s; the longest {longest:g} s, after {at:g} s",
+            count=followed.gaps,
+            usual=followed.median_s,
+            longest=followed.longest_gap_s,
+            at=followed.longest_gap_at_s,
+        )
+        lines.append(labelled("gaps", words))
+    return lines
+
+
+def counted(rows: int) -> str:
+    """1 row, 2 rows."""
+    return plural("{count} row", "{count} rows", rows)
+
+
+def errors(followed: Followed) -> list[str]:
+    """What the filters missed the truth by, where the file has it."""
+    return [
+        plural(
+            "{filter}, {component}: error against the truth {rms} {unit} RMS, {ratio} of what the filter believes "
+            "({count} estimate)",
+            "{filter}, {component}: error against the truth {rms} {unit} RMS, {ratio} of what the filter believes "
+            "({count} estimates)",
+            one.count,
+            filter=one.filter,
+            component=one.component,
+            rms=significant_digits(one.rms),
+            unit=tr(unit(one.unit)),
+            ratio=significant_digits(one.ratio, "#.3g"),
+        )
+        for one in followed.errors.values()
+        if one.count
+    ]
+
+
+FINDINGS = {
+    figures.FITS: term("the stated σ fits"),
+    figures.SMALL: term("the plots err more than stated, or the target manoeuvres harder than the filter allows"),
+    figures.LARGE: term("the plots err less than stated, or the filter allows for harder manoeuvres than there are"),
+    figures.UNKNOWN: term("too few plots to decide"),
+}
+
+
+def tested(one: figures.Judged, cured: bool) -> str:
+    """One test; cured: with the σ under which it would be passed, where it is not."""
+    bounds = tr(
+        "NIS {nis:.3g} of {plots}, 95 % of right filters [{lo:.3g}, {hi:.3g}]",
+        nis=one.nis,
+        plots=plural("{count} plot", "{count} plots", one.tests),
+        lo=one.lo,
+        hi=one.hi,
+    )
+    better = ", ".join(f"{key} {numeral(f'{value:.4g}')}" for key, value in one.better.items())
+    cure = tr("; {better} would", better=better) if better and cured else ""
+    return f"{one.filter}, {one.name}: {bounds}: {tr(FINDINGS[one.verdict])}{cure}"
+
+
+def nearest(judged: Sequence[figures.Judged]) -> list[str]:
+    """What to write into the config: of the filter whose tests are most nearly right."""
+    verdicts: dict[str, set[str]] = {}
+    for one in judged:
+        verdicts.setdefault(one.filter, set()).add(one.verdict)
+    if fitting := [name for name, found in verdicts.items() if found == {figures.FITS}]:
+        words = tr("{names}: all tests fit", names=", ".join(fitting))
+        return [labelled("", words)] if len(fitting) < len(verdicts) else []
+    wrong = [one for one in judged if one.better]
+    if not wrong or len({one.filter for one in wrong}) < 2:
+        return []
+    best = min((one for one in wrong), key=lambda one: abs(one.nis - 1))
+    own = {key: value for one in wrong if one.filter == best.filter for key, value in one.better.items()}
+    settings = " ".join(f"--set {key}={value:.4g}" for key, value in own.items())
+    words = tr("nearest is {filter}; with its better values: {settings}", filter=best.filter, settings=settings)
+    return [labelled("", words)]
+
+
+def likely(followed: Followed, advised: Advice) -> list[str]:
+    """Which filter predicts the plots best, and what is wrong with the numbers of the one that takes most of a plot."""
+    compared, lines = advised.compared, []
+    if len(compared.behind) > 1 and advised.folding is None:
+        behind = sorted((name, gap) for name, gap in compared.behind.items() if name != compared.best)
+        others = ", ".join(tr("{times} times under {name}", times=times(gap), name=name) for name, gap in behind)
+        best = compared.best
+        if min(gap for _, gap in behind) <= CLEAR:
+            best = tr("{name} (not clearly)", name=best)
+        lines.append(
+            labelled(
+                "best", tr("{best}; the plots are less likely under the others: {others}", best=best, others=others)
+            )
+        )
+    if advised.folding is not None:
+        lines.append(labelled("advice", fit.said(advised.folding, followed.source, followed.case)))
+    elif not advised.findings:
+        words = plural(
+            "nothing is wrong with the stated numbers of {filter}, as far as {count} row tell",
+            "nothing is wrong with the stated numbers of {filter}, as far as {count} rows tell",
+            advised.asked.rows,
+            filter=compared.fullest,
+        )
+        lines.append(labelled("advice", words))
+    found = [explained(one, compared.fullest) for one in advised.findings]
+    return [*lines, *(labelled("advice", one) for one in found), *_partly(followed, advised.asked)]
+
+
+def _partly(followed: Followed, asked: Asked) -> list[str]:
+    """Of which rows best filter and advice are, where not of all."""
+    if asked.rows >= followed.rows:
+        return []
+    if asked.tracks is None:
+        words = tr("this is of the first {rows}, of {all}", rows=counted(asked.rows), all=followed.rows)
+    else:
+        words = tr(
+            "this is of {rows}, of {all}: the first {each} of each of {tracks} tracks, of {count}",
+            rows=counted(asked.rows),
+            all=followed.rows,
+            each=asked.each,
+            tracks=asked.tracks,
+            count=len(followed.tracks),
+        )
+    return [labelled("", words)]
+
+
+def times(gain: float) -> str:
+    """How many times as likely something is, from the difference of the logarithms: 12, 10¹⁶."""
+    power = round(gain / math.log(10))
+    return (
+        significant_digits(math.exp(gain), "#.2g" if gain < math.log(99) else ".0f")
+        if power < 4
+        else power_of_ten(power)
+    )
+
+
+def explained(one: Finding, filter_name: str) -> str:
+    """What is wrong, in words, and what it is worth."""
+    told = {"what": what(one.what, one.value), "times": times(one.gain)}
+    if not one.from_zero:
+        told["key"] = one.what
+        words = tr("{key}: the plots do not tell it from zero, which is no reason to lower it", **told)
+    else:
+        words = tr("{what}; the plots are then {times} times as likely", **told)
+    turn = one.turning
+    if turn is None:
+        return words
+    cost = tr(
+        "in a turn of {load:g} g without missed plots the largest error of {filter} in {component} would be {changed}, "
+        "not {stated} {unit}",
+        load=turn.acceleration_g,
+        filter=filter_name,
+        component=turn.component,
+        changed=number(turn.changed, 3),
+        stated=number(turn.stated, 3),
+        unit=tr(unit(turn.unit)),
+    )
+    if not one.from_zero:
+        cost = tr("at {value} {cost}", value=number(one.value, 2), cost=cost)
+    return f"{words}; {cost}"
+
+
+def what(name: str, value: float) -> str:
+    """What is wrong, in words: a key, or one of EXPLANATIONS, and its value."""
+    if name == OUTLIERS:
+        share = significant_digits(100 * value, "#.2g")
+        return tr("outliers: {share} % of the plots err by ten times their σ", share=share)
+    if name == BIAS:
+        size = significant_digits(value, "#.3g")
+        return tr("the measured velocities are off by {size} of their σ, all alike", size=size)
+    if name == CORRELATION:
+        size = significant_digits(value, "#.2g")
+        return tr("errors last from plot to plot: those of neighbours are correlated by {size}", size=size)
+    return f"--set {name}={value:.3g}"
+
+
+# ---- page ------------------------------------------------------------------------------------------------------------
 NAME = "report.html"
 
 
@@ -28,8 +241,8 @@ def write(
     page = html.followed(
         experiment.stem,
         os.path.basename(os.fspath(source)),
-        _said(words.verdict(followed, judged, advised)) or ["Too few plots to judge the filters by."],
-        _said(words.rows(followed)),
+        _said(verdict(followed, judged, advised)) or ["Too few plots to judge the filters by."],
+        _said(rows(followed)),
         list(made.values()),
         {"Errors against the truth": _errors(followed), "Innovations": _tests(judged), "Tracks": _tracks(followed)},
         html.yaml_of(experiment.resolved),

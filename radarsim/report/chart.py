@@ -1,4 +1,14 @@
-"""Draws report/drawing.py's figures for the page: small SVGs, one a panel, and the numbers that a pointer reads off.
+"""Words of figures, with the little mathematical text that they use, for a page: marked up, and plain.
+
+Colours, dashes and markers of a page's charts, for a light and for a dark page.
+
+Every colour stands out from its page by 3 : 1 at least (WCAG 2.2, 1.4.11); dash and marker tell curves apart in grey.
+
+Axes of a page's charts: from values to places, limits and ticks.
+
+Pieces of a page's charts: paths, samples of lines, text; how far a mark reaches, and what of it is drawn.
+
+Draws report/drawing.py's figures for the page: small SVGs, one a panel, and the numbers that a pointer reads off.
 
 Panels stand apart so that a narrow screen can set them one below the other. Colours come from the page's style sheet
 in a light and a dark form. Text is escaped here; nothing else from outside gets into the markup. A panel of lines is
@@ -6,20 +16,370 @@ drawn again by the page's script where a reader looks closer: what that needs be
 references and notes stand at) is kept with them and in attributes.
 """
 
-from dataclasses import dataclass
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
+from markupsafe import Markup, escape
+from numpy.typing import ArrayLike
 
-from radarsim.language import tr
-from radarsim.report import chart_look as look
-from radarsim.report import chart_pieces as pieces
-from radarsim.report.chart_pieces import SIZE
-from radarsim.report.chart_scale import Scale, equal, heat_scale, scale, tick_text
-from radarsim.report.chart_text import html, spoken
-from radarsim.report.drawing import Bars, Figure, Heat, Line, Mark, Note, Panel, Reference, Style
+from radarsim.language import power_of_ten, tr
+from radarsim.report.drawing import GREY, Axis, Bars, Figure, Heat, Line, Mark, Note, Panel, Reference, Style
+from radarsim.report.tables import number
 
+# ---- chart text ------------------------------------------------------------------------------------------------------
+LETTERS = {
+    **{"sigma": "σ", "beta": "β", "rho": "ρ", "varphi": "φ", "varepsilon": "ε", "theta": "θ", "lambda": "λ"},
+    **{"Delta": "Δ", "times": "×", "cdot": "·", "mu": "μ", "chi": "χ", "nu": "ν"},
+}
+DOT_ABOVE, HAT_ABOVE = "\u0307", "\u0302"
+PARTS = re.compile(r"\\(dot|hat)\s*(\w)|\\([A-Za-z]+)\s?|([_^])(\{[^}]*\}|\\[A-Za-z]+|.)|([^\W\d_]+)|(.)", re.DOTALL)
+RISE = {"sub": (0.25, 0.75), "sup": (-0.4, 0.75)}  # of the size: how far down, how large
+
+
+def subscripts(text: str) -> Iterator[tuple[str, str]]:
+    """Pieces of a text with their kind: "" upright, "i" a letter of a formula, "sub", "sup"."""
+    pieces = text.replace(r"\$", "\0").split("$")
+    for n, piece in enumerate(pieces):
+        piece = piece.replace("\0", "$")
+        if n % 2 == 0:
+            yield piece, ""
+            continue
+        for accent, under, command, shift, shifted, letters, other in PARTS.findall(piece):
+            if accent:
+                yield under + {"dot": DOT_ABOVE, "hat": HAT_ABOVE}[accent], "i"
+            elif command:
+                yield LETTERS.get(command, command), "i"
+            elif shift:
+                inside = re.sub(r"\\([A-Za-z]+)", lambda m: LETTERS.get(m[1], m[1]), shifted.strip("{}"))
+                yield inside, {"_": "sub", "^": "sup"}[shift]
+            else:
+                yield letters or other, "i" if letters else ""
+
+
+def spoken(text: str) -> str:
+    """The text without marks, in one line: "σ of D_M"."""
+    return " ".join("".join({"sub": "_", "sup": "^"}.get(kind, "") + part for part, kind in subscripts(text)).split())
+
+
+def html(text: str) -> Markup:
+    """The text for a page: <i>, <sub>, <sup>; everything else escaped."""
+    return Markup("").join(
+        Markup("<{0}>{1}</{0}>").format(Markup(kind), part) if kind else escape(part) for part, kind in subscripts(text)
+    )
+
+
+def tspans(text: str, size: float) -> Markup:
+    """The text for an SVG, of one line: subscripts lowered, letters of formulas slanted; everything else escaped."""
+    made, low = Markup(""), 0.0
+    for part, kind in subscripts(text.replace("\n", " ")):
+        down, scale = RISE.get(kind, (0.0, 1.0))
+        shift = down * size - low
+        low = down * size
+        look = Markup(' dy="{:.1f}"').format(shift) if shift else Markup("")
+        look += Markup(' font-size="{:.1f}"').format(scale * size) if scale != 1 else Markup("")
+        look += Markup(' font-style="italic"') if kind == "i" else Markup("")
+        made += Markup("<tspan{}>{}</tspan>").format(look, part) if look else escape(part)
+    return made
+
+
+# ---- chart look ------------------------------------------------------------------------------------------------------
+# Ten even steps of lightness, on a light page and on a dark one, with hues found by search so that every two are told
+# apart in grey and under protanopia, deuteranopia and tritanopia (CIEDE2000; tests/report/test_colours.py).
+LADDER = (
+    *(("#2d0257", "#fefa41"), ("#5c0126", "#beefad"), ("#0810ba", "#6de1fd"), ("#881800", "#cebeca")),
+    *(("#074dae", "#27cba1"), ("#7d0af9", "#c4a50d"), ("#437a04", "#829bc7"), ("#756cd8", "#a78662")),
+    *(("#109b4d", "#598783"), ("#fe5292", "#6c753e")),
+)
+COLOURS = tuple(LADDER[i] for i in (0, 6, 3, 9, 4, 8, 1, 7, 2, 5))  # in the order of use: few curves lie far apart
+NEUTRAL = ("#6b6b6b", "#a9a9a9")  # of what is no curve of its own
+SHADES = (  # of an ordered scale, least to most
+    ("#440154", "#3b528b", "#2a788e", "#1f9a6e", "#4f8a10"),
+    ("#8c8cf0", "#4fa3e0", "#35b7a0", "#7ad151", "#fde725"),
+)
+HEAT = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")
+DASHES = ("", "6 2.5", "1.8 2", "7 2.5 1.8 2.5", "11 3.5", "4 2 1.5 2 1.5 2")
+MARKERS = (  # paths about a point, moved to by "M x y" before
+    "m-2.6 0a2.6 2.6 0 1 0 5.2 0a2.6 2.6 0 1 0-5.2 0",
+    "m-2.4-2.4h4.8v4.8h-4.8z",
+    "m0-3.1l3 5.4h-6z",
+    "m0-3.4l3 3.4l-3 3.4l-3-3.4z",
+    "m0 3.1l3-5.4h-6z",
+    "m-1-3h2v2h2v2h-2v2h-2v-2h-2v-2h2z",
+    "m-2.9-1.5l1.4-1.4l1.5 1.5l1.5-1.5l1.4 1.4l-1.5 1.5l1.5 1.5l-1.4 1.4l-1.5-1.5l-1.5 1.5l-1.4-1.4l1.5-1.5z",
+    "m0-4.4l1.1 3h3.2l-2.6 1.9l1 3.1l-2.7-1.9l-2.7 1.9l1-3.1l-2.6-1.9h3.2z",
+    "m-3.1 0l5.4-3v6z",
+    "m0-3l2.6 1.5v3l-2.6 1.5l-2.6-1.5v-3z",
+    "m3.1 0l-5.4-3v6z",
+    "m0-3.6l1.8 3.6l-1.8 3.6l-1.8-3.6z",
+    "m0-3l2.9 2.1l-1.1 3.4h-3.6l-1.1-3.4z",
+)
+CROSS = "m-3 0h6m-3-3v6"
+
+
+def ink_colours(style: Style) -> tuple[str, str]:
+    """The colour of a style on a light and on a dark page."""
+    if isinstance(style.colour, float):
+        return mixed(SHADES[0], style.colour), mixed(SHADES[1], style.colour)
+    if style.colour == GREY:
+        return NEUTRAL
+    return COLOURS[style.colour % len(COLOURS)]
+
+
+def mixed(stops: tuple[str, ...], share: float) -> str:
+    """A colour between stops at equal distances, share from 0 to 1."""
+    at = np.clip(share, 0.0, 1.0) * (len(stops) - 1)
+    low = min(int(at), len(stops) - 2)
+    a, b = ([int(stop[i : i + 2], 16) for i in (1, 3, 5)] for stop in stops[low : low + 2])
+    return "#" + "".join(f"{round(x + (at - low) * (y - x)):02x}" for x, y in zip(a, b, strict=True))
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of #rrggbb (WCAG 2.2)."""
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts)
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b
+
+
+def contrast(one: str, other: str) -> float:
+    """Contrast of two colours, 1 to 21 (WCAG 2.2)."""
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+# ---- chart scale -----------------------------------------------------------------------------------------------------
+MARGIN = {"x": 0.02, "y": 0.06}  # of the span of the data, on either side
+STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
+TICK_DIGITS = 6
+WIDE = 20.0  # largest over least value of maps from which their colours go by the logarithm
+FURTHER = 3  # ticks more than wanted that a logarithmic axis may have
+MOST_DECADES = 7  # labelled on a logarithmic axis
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A linear or logarithmic axis from `low` to `high` over the places `start` to `end`."""
+
+    log: bool
+    low: float
+    high: float
+    start: float
+    end: float
+
+    def place(self, values: ArrayLike) -> np.ndarray:
+        """Places of values; not-a-number where a value has none."""
+        v = np.asarray(values, dtype=float)
+        low, high = self.low, self.high
+        if self.log:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                v = np.log10(np.where(v > 0, v, np.nan))
+            low, high = math.log10(low), math.log10(high)
+        return self.start + (self.end - self.start) * (v - low) / (high - low)
+
+    def ticks(self, wanted: int) -> list[tuple[float, str]]:
+        """About `wanted` round values inside the axis, with their text."""
+        if self.log and self.high / self.low >= 10:
+            return decades(self.low, self.high, wanted)
+        return [(v, tick_text(v)) for v in steps(self.low, self.high, wanted)]
+
+
+def scale(axis: Axis, values: Sequence[np.ndarray], which: str, start: float, end: float) -> Scale:
+    """The scale of an axis for the data of its panel: limits where given, else the data with a margin."""
+    log = axis.scale == "log"
+    parts = [np.ravel(np.asarray(v, dtype=float)) for v in values]
+    v = np.concatenate(parts) if parts else np.zeros(0)
+    v = v[np.isfinite(v) & ((v > 0) | (not log))]
+    low, high = (float(v.min()), float(v.max())) if v.size else ((1.0, 10.0) if log else (0.0, 1.0))
+    a, b = (math.log10(low), math.log10(high)) if log else (low, high)
+    pad = MARGIN[which] * (b - a)
+    if pad == 0:
+        pad = 0.5 if log else 0.5 * abs(a) or 0.5
+    a, b = a - pad, b + pad
+    low, high = (10.0**a, 10.0**b) if log else (a, b)
+    given = axis.limits
+    low, high = low if given[0] is None else given[0], high if given[1] is None else given[1]
+    if not low < high:
+        high = low + 1.0 if not log else 10.0 * low
+    return Scale(log, low, high, start, end)
+
+
+def steps(low: float, high: float, wanted: int) -> list[float]:
+    """Multiples of a round step between low and high."""
+    rough = (high - low) / max(wanted, 1)
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(s for s in STEPS if s * power >= rough * (1 - 1e-9)) * power
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [n * step for n in range(first, last + 1)]
+
+
+def decades(low: float, high: float, wanted: int) -> list[tuple[float, str]]:
+    """Powers of ten, and 2 and 5 times as well where these are not many more than wanted."""
+    first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
+    stride = max(1, -(-(last - first + 1) // MOST_DECADES))
+    ticks = list(
+        zip((10.0**n for n in range(first, last + 1, stride)), powers(range(first, last + 1, stride)), strict=True)
+    )
+    fine = [m * 10.0**n for n in range(first - 1, last + 1) for m in (2, 5) if low <= m * 10.0**n <= high]
+    if stride > 1 or len(ticks) + len(fine) > wanted + FURTHER:
+        return ticks
+    return sorted([*ticks, *((v, tick_text(v)) for v in fine)])
+
+
+def powers(exponents: Sequence[int]) -> list[str]:
+    """Powers of ten, all in figures where each is short, else all raised but 1 and 10."""
+    short = all(-4 <= n <= 4 for n in exponents)
+    return [tick_text(10.0**n) if short or n in (0, 1) else power_of_ten(n) for n in exponents]
+
+
+def tick_text(value: float) -> str:
+    """A tick's number: at most six digits, a true minus, powers of ten raised."""
+    return number(value, TICK_DIGITS)
+
+
+def heat_scale(parts: Sequence[np.ndarray]) -> tuple[float, float, bool]:
+    """Least and largest of the values of maps side by side, and whether their colours go by the logarithm."""
+    values = np.concatenate([np.zeros(0), *map(np.ravel, parts)])
+    values = values[np.isfinite(values)]
+    low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
+    return low, high, bool(low > 0 and high > WIDE * low)
+
+
+def equal(x: Scale, y: Scale) -> tuple[Scale, Scale]:
+    """Two linear scales with as many units to a place each: the one with the smaller span sees more, to both sides."""
+    per_place = max((one.high - one.low) / abs(one.end - one.start) for one in (x, y))
+
+    def widened(one: Scale) -> Scale:
+        more = (per_place * abs(one.end - one.start) - (one.high - one.low)) / 2
+        return replace(one, low=one.low - more, high=one.high + more)
+
+    return widened(x), widened(y)
+
+
+# ---- chart pieces ----------------------------------------------------------------------------------------------------
+SIZE = 12.0  # of the letters, in units of the SVG
+DIGITS = ".5g"  # of the numbers that a pointer reads off
+
+
+def sample(style: Style) -> Markup:
+    """A short piece of a line for the legend."""
+    parts = Markup('<path class="l" d="M1 7h28"{}/>').format(dashed(style)) if style.dash is not None else Markup("")
+    if style.marker is not None:
+        parts += markers([(15.0, 7.0)], style)
+    return Markup('<svg class="k" viewBox="0 0 30 14" aria-hidden="true"{}>{}</svg>').format(ink(style), parts)
+
+
+def ink(style: Style) -> Markup:
+    """The colours of a light and of a dark page, as an attribute."""
+    return Markup(' style="--c:{};--d:{}"').format(*ink_colours(style))
+
+
+def dashed(style: Style) -> Markup:
+    """The dash, as an attribute; nothing for a whole line and for none."""
+    if style.dash is None:
+        return Markup("")
+    dash = DASHES[style.dash % len(DASHES)]
+    return Markup(' stroke-dasharray="{}"').format(dash) if dash else Markup("")
+
+
+def markers(places: Sequence[tuple[float, float]], style: Style) -> Markup:
+    """A style's marker at each place, all as one path; nothing where it has none."""
+    if style.marker is None:
+        return Markup("")
+    shape = MARKERS[style.marker % len(MARKERS)]
+    full = "f" if style.dash is None else "m"
+    path = "".join(f"M{x:.1f} {y:.1f}{shape}" for x, y in places)
+    return Markup('<path class="{}" d="{}"/>').format(full, path)
+
+
+def extent_of(mark: Mark) -> tuple[np.ndarray, np.ndarray]:
+    """What a mark adds to the limits of x and of y."""
+    none = np.zeros(0)
+    match mark:
+        case Line():
+            ends = [part for part in (mark.lo, mark.hi) if part is not None]
+            return np.asarray(mark.x, float), np.concatenate([np.asarray(part, float) for part in (mark.y, *ends)])
+        case Reference():
+            return (none, np.array([mark.value])) if mark.across == "y" else (np.array([mark.value]), none)
+        case Bars():
+            ends = [part for part in (mark.lo, mark.hi) if part is not None]
+            return np.array([-0.5, len(mark.names) - 0.5]), np.concatenate([[0.0], mark.values, *ends])
+        case Heat():
+            return np.array([-0.5, len(mark.x) - 0.5]), np.array([-0.5, len(mark.y) - 0.5])
+    return none, none
+
+
+def by_number(panel: Panel) -> Panel:
+    """A panel of bars or of a map: its places are numbers of columns and rows, whatever their values."""
+    mark = next(mark for mark in panel.marks if isinstance(mark, Heat | Bars))
+    if isinstance(mark, Bars):
+        return replace(panel, x=replace(panel.x, scale="linear", ticks=tuple(enumerate(mark.names))))
+    axes = {}
+    for which, values in (("x", mark.x), ("y", mark.y)):
+        axis = getattr(panel, which)
+        named = axis.ticks or tuple((i, tick_text(float(v))) for i, v in enumerate(values))
+        axes[which] = replace(axis, scale="linear", limits=(-0.5, len(values) - 0.5), ticks=named)
+    return replace(panel, **axes)
+
+
+def thinned(line: Line, points: int) -> dict[str, np.ndarray]:
+    """The line's columns, every n-th point of a long one, its last point always."""
+    parts = {name: getattr(line, name) for name in ("x", "y", "lo", "hi", "exact")}
+    kept = np.arange(len(line.x))
+    if len(kept) > points:
+        kept = np.unique(np.append(kept[:: -(-len(kept) // points)], len(kept) - 1))
+    return {name: np.asarray(part, dtype=float)[kept] for name, part in parts.items() if part is not None}
+
+
+def places(x: np.ndarray, y: np.ndarray) -> list[tuple[float, float]]:
+    """The finite points."""
+    return [(a, b) for a, b in zip(x.tolist(), y.tolist(), strict=True) if np.isfinite(a) and np.isfinite(b)]
+
+
+def path(x: np.ndarray, y: np.ndarray) -> str:
+    """A polyline through the finite points, in tenths of a unit, started again after a gap."""
+    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    there = np.isfinite(x) & np.isfinite(y)
+    tenths = np.stack([np.where(there, np.round(10 * v), 0) for v in (x, np.clip(y, -1e5, 1e5))]).astype(np.int64)
+    parts, before = [], None
+    for a, b, here in zip(*tenths.tolist(), there.tolist(), strict=True):
+        if not here:
+            before = None
+        elif before is None:
+            parts.append(f"M{a / 10:g} {b / 10:g}")
+            before = a, b
+        else:
+            parts.append(f"l{(a - before[0]) / 10:g} {(b - before[1]) / 10:g}")
+            before = a, b
+    return "".join(parts)
+
+
+def unbroken(there: np.ndarray) -> list[np.ndarray]:
+    """The places of each unbroken run of true values."""
+    places = np.flatnonzero(there)
+    return [part for part in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if part.size]
+
+
+def short(values: np.ndarray) -> list[float | None]:
+    """Numbers for the pointer: five digits, nothing where not finite."""
+    return [float(format(v, DIGITS)) if np.isfinite(v) else None for v in np.asarray(values, dtype=float).tolist()]
+
+
+def text_at(x: float, y: float, text: str, anchor: str, css: str = "", data: tuple[str, float] | None = None) -> Markup:
+    """Text at a place, a line below the other; data: the axis and the value that it is the tick of."""
+    named = Markup(' class="{}"').format(css) if css else Markup("")
+    named += Markup(' data-{}="{:.9g}"').format(Markup(data[0]), data[1]) if data else Markup("")
+    return Markup("").join(
+        Markup('<text x="{:.1f}" y="{:.1f}" text-anchor="{}"{}>{}</text>').format(
+            x, y + 1.15 * n * SIZE, anchor, named, tspans(line, SIZE)
+        )
+        for n, line in enumerate(text.split("\n"))
+    )
+
+
+# ---- chart -----------------------------------------------------------------------------------------------------------
 WIDTH, HEIGHT = 440.0, 280.0  # of a panel, in units of the SVG
 LETTER = 0.62 * SIZE  # mean width of one
 RIGHT, BOTTOM = 12.0, 44.0
@@ -68,7 +428,7 @@ def chart(figure: Figure, points: int = POINTS) -> Chart:
     maps = [mark for panel in shown for mark in panel.marks if isinstance(mark, Heat)]
     heats = {one.label: heat_scale([m.values for m in maps if m.label == one.label]) for one in maps}
     panels = tuple(_panel(figure, panel, numbers, points, heats) for panel in shown)
-    switches = tuple(Switch(n, html(name), pieces.sample(groups[name])) for name, n in numbers.items())
+    switches = tuple(Switch(n, html(name), sample(groups[name])) for name, n in numbers.items())
     return Chart(panels, switches, len(panels) > 1)
 
 
@@ -96,9 +456,9 @@ class _Frame:
 
     def __init__(self, panel: Panel, heats: Heats):
         self.heats = heats
-        self.panel, extent = panel, [pieces.extent(mark) for mark in panel.marks]
+        self.panel, extent = panel, [extent_of(mark) for mark in panel.marks]
         if any(isinstance(mark, Heat | Bars) for mark in panel.marks):
-            panel = self.panel = pieces.by_number(panel)
+            panel = self.panel = by_number(panel)
         above = len(panel.y.label.split("\n"))
         self.top = 8.0 + 1.3 * SIZE * above
         ys = scale(panel.y, [y for _, y in extent], "y", HEIGHT - BOTTOM, self.top)
@@ -141,14 +501,12 @@ class _Frame:
         made = Markup('<path class="grid" d="{}"/>').format(grid)
         made += Markup('<path class="axis" d="M{:.1f} {:.1f}V{:.1f}H{:.1f}"/>').format(left, top, bottom, right)
         for x, text, v in xs:
-            made += pieces.text(x, bottom + 1.25 * SIZE, text, "middle", data=("x", v))
+            made += text_at(x, bottom + 1.25 * SIZE, text, "middle", data=("x", v))
         for y, text, v in ys:
-            made += pieces.text(left - 5, y + 0.35 * SIZE, text, "end", data=("y", v))
+            made += text_at(left - 5, y + 0.35 * SIZE, text, "end", data=("y", v))
         deep = max((len(text.split("\n")) for _, text, _ in xs), default=1)
-        made += pieces.text(
-            (left + right) / 2, bottom + (1.4 + 1.05 * deep) * SIZE, self.panel.x.label, "middle", "lab"
-        )
-        return made + pieces.text(2, SIZE + 1, self.panel.y.label, "start", "lab")
+        made += text_at((left + right) / 2, bottom + (1.4 + 1.05 * deep) * SIZE, self.panel.x.label, "middle", "lab")
+        return made + text_at(2, SIZE + 1, self.panel.y.label, "start", "lab")
 
     def draw(self, mark: Mark, numbers: dict[str, int], points: int) -> Markup:
         """The markup of a mark; the numbers of curves, bars and maps are kept for the pointer."""
@@ -166,7 +524,7 @@ class _Frame:
         raise TypeError(f"no such mark: {mark!r}")
 
     def _line(self, line: Line, numbers: dict[str, int], points: int) -> Markup:
-        whole = pieces.thinned(line, points)
+        whole = thinned(line, points)
         group = numbers.get(named(line), -1)
         self._keep(spoken(named(line)), whole, group, line.style)
         x, y = self.x.place(whole["x"]), self.y.place(whole["y"])
@@ -174,17 +532,15 @@ class _Frame:
         if "lo" in whole and "hi" in whole:
             made += self._interval(x, y, whole, line.style)
         if line.style.dash is not None:
-            made += Markup('<path class="l" d="{}"{}/>').format(pieces.path(x, y), pieces.dashed(line.style))
+            made += Markup('<path class="l" d="{}"{}/>').format(path(x, y), dashed(line.style))
         step = 1 if line.style.dash is None else max(1, -(-len(x) // min(MARKED, max(1, points // FEWER))))
         if line.style.marker is not None:
-            made += pieces.markers(pieces.places(x[::step], y[::step]), line.style)
+            made += markers(places(x[::step], y[::step]), line.style)
         if "exact" in whole:
             first = 0 if step == 1 else step // 2  # of many, markers and crosses by turns
-            known = pieces.places(x[first::step], self.y.place(whole["exact"])[first::step])
-            made += Markup('<path class="x" d="{}"/>').format(
-                "".join(f"M{a:.1f} {b:.1f}{look.CROSS}" for a, b in known)
-            )
-        return Markup('<g data-g="{}"{}>{}</g>').format(group, pieces.ink(line.style), made)
+            known = places(x[first::step], self.y.place(whole["exact"])[first::step])
+            made += Markup('<path class="x" d="{}"/>').format("".join(f"M{a:.1f} {b:.1f}{CROSS}" for a, b in known))
+        return Markup('<g data-g="{}"{}>{}</g>').format(group, ink(line.style), made)
 
     def _interval(self, x: np.ndarray, y: np.ndarray, whole: dict[str, np.ndarray], style: Style) -> Markup:
         """A band where it can be seen, whiskers of single points; nothing where neither end is known."""
@@ -200,22 +556,22 @@ class _Frame:
         if not there.any() or np.max(lo[there] - hi[there]) < 2 * SEEN:
             return Markup("")
         d = ""
-        for run in pieces.runs(there):
+        for run in unbroken(there):
             outline = np.concatenate([hi[run], lo[run][::-1]])
-            d += pieces.path(np.concatenate([x[run], x[run][::-1]]), outline) + "z"
+            d += path(np.concatenate([x[run], x[run][::-1]]), outline) + "z"
         return Markup('<path class="b" d="{}"/>').format(d)
 
     def _keep(self, name: str, whole: dict[str, np.ndarray], group: int, style: Style) -> None:
         """Numbers for the pointer; times that curves share are kept once."""
-        x = pieces.short(whole["x"])
+        x = short(whole["x"])
         if x not in self.data["xs"]:
             self.data["xs"].append(x)
-        kept = {"n": name, "g": group, "c": look.ink(style), "x": self.data["xs"].index(x)}
+        kept = {"n": name, "g": group, "c": ink_colours(style), "x": self.data["xs"].index(x)}
         if style.dash is None:
             kept["p"] = 1
         for key, column in (("y", "y"), ("l", "lo"), ("h", "hi"), ("e", "exact")):
             if column in whole:
-                kept[key] = pieces.short(whole[column])
+                kept[key] = short(whole[column])
         self.data["lines"].append(kept)
 
     def _reference(self, mark: Reference) -> Markup:
@@ -223,27 +579,25 @@ class _Frame:
         if mark.across == "y":
             y = float(self.y.place(mark.value))
             made = Markup('<path class="ref" d="M{:.1f} {:.1f}H{:.1f}"/>').format(left, y, right)
-            made += pieces.text(right - 3, y - 3, mark.label, "end", "soft") if mark.label else Markup("")
+            made += text_at(right - 3, y - 3, mark.label, "end", "soft") if mark.label else Markup("")
         else:
             x = float(self.x.place(mark.value))
             made = Markup('<path class="ref" d="M{:.1f} {:.1f}V{:.1f}"/>').format(x, bottom, top)
-            made += pieces.text(x - 3, bottom - 4, mark.label, "end", "soft") if mark.label else Markup("")
+            made += text_at(x - 3, bottom - 4, mark.label, "end", "soft") if mark.label else Markup("")
         return Markup('<g data-{}="{:.9g}">{}</g>').format(Markup(mark.across), mark.value, made)
 
     def _bars(self, bars: Bars) -> Markup:
         where, zero = np.arange(float(len(bars.names))), float(self.y.place(0.0))
         made, x, y = Markup(""), self.x.place(where), self.y.place(bars.values)
         half = 0.33 * float(self.x.place(1.0) - self.x.place(0.0))
-        boxes = "".join(
-            f"M{a - half:.1f} {zero:.1f}V{b:.1f}h{2 * half:.1f}V{zero:.1f}z" for a, b in pieces.places(x, y)
-        )
+        boxes = "".join(f"M{a - half:.1f} {zero:.1f}V{b:.1f}h{2 * half:.1f}V{zero:.1f}z" for a, b in places(x, y))
         made += Markup('<path class="f" d="{}"/>').format(boxes)
         whole = {"x": where, "y": bars.values}
         if bars.lo is not None and bars.hi is not None:
             whole |= {"lo": bars.lo, "hi": bars.hi}
             made += self._interval(x, y, whole, Style(dash=None))
         self._keep("", whole, -1, Style(bars.style.colour, None))
-        return Markup("<g{}>{}</g>").format(pieces.ink(bars.style), made)
+        return Markup("<g{}>{}</g>").format(ink(bars.style), made)
 
     def _heat(self, heat: Heat) -> Markup:
         low, high, log = self.heats[heat.label]
@@ -253,17 +607,17 @@ class _Frame:
         for (i, j), value in np.ndenumerate(heat.values):
             if not np.isfinite(value):
                 continue
-            colour = look.mixed(look.HEAT, float(shades[i, j]))
+            colour = mixed(HEAT, float(shades[i, j]))
             x, y = float(self.x.place(j)), float(self.y.place(i))
             made += Markup('<path fill="{}" d="M{:.1f} {:.1f}h{:.1f}v{:.1f}h{:.1f}z"/>').format(
                 colour, x - wide / 2, y - deep / 2, wide, deep, -wide
             )
             if few:
-                on = "#ffffff" if look.contrast(colour, "#ffffff") > look.contrast(colour, "#000000") else "#000000"
+                on = "#ffffff" if contrast(colour, "#ffffff") > contrast(colour, "#000000") else "#000000"
                 made += Markup('<text x="{:.1f}" y="{:.1f}" text-anchor="middle" style="fill:{}">{}</text>').format(
                     x, y + 0.35 * SIZE, on, tick_text(float(f"{value:.3g}"))
                 )
-        values = [pieces.short(row) for row in heat.values]
+        values = [short(row) for row in heat.values]
         ticks = ([text for _, text in self.x_ticks], [text for _, text in self.y_ticks])
         self.data["heat"] = {"v": values, "l": spoken(heat.label), "x": ticks[0], "y": ticks[1]}
         return made
@@ -272,5 +626,5 @@ class _Frame:
         x, y = float(self.x.place(note.x)), float(self.y.place(note.y))
         right = "e" in note.place
         place = (x + (5 if right else -5), y - 5 if "n" in note.place else y + SIZE)
-        text = pieces.text(*place, note.text, "start" if right else "end")
+        text = text_at(*place, note.text, "start" if right else "end")
         return Markup('<g data-x="{:.9g}" data-y="{:.9g}">{}</g>').format(note.x, note.y, text)

@@ -1,4 +1,8 @@
-"""Draws report/drawing.py's figures in the one style of this project. The only file that knows Matplotlib.
+"""Where the lines of a figure are named: at their ends where names fit, else once a figure, below the panels.
+
+A legend never lies on curves. Panels that name different things alike keep legends of their own.
+
+Draws report/drawing.py's figures in the one style of this project. The only file that knows Matplotlib.
 
 Legible in grey: the colours are steps of lightness, and dash and marker tell the same apart. The bytes of an SVG depend
 on the data and on the versions of Matplotlib and its fonts alone.
@@ -9,9 +13,9 @@ import io
 import math
 import re
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -28,18 +32,128 @@ from matplotlib.text import Annotation
 from matplotlib.ticker import FuncFormatter, Locator, NullFormatter
 from matplotlib.transforms import ScaledTranslation
 
-from radarsim.report import chart_look, legends
-from radarsim.report.chart_look import contrast
-from radarsim.report.chart_scale import Scale, heat_scale, tick_text
-from radarsim.report.chart_text import spoken
+from radarsim.language import tr
+from radarsim.report import chart
+from radarsim.report.chart import Scale, contrast, heat_scale, spoken, tick_text
 from radarsim.report.drawing import Axis as Ends
 from radarsim.report.drawing import Bars, Figure, Heat, Line, Note, Panel, Reference, Style
-from radarsim.report.text import number
+from radarsim.report.tables import number
 
+# ---- legends ---------------------------------------------------------------------------------------------------------
+LONGEST_AT_END = 28  # letters of a name that may stand at a line's end
+NAMES_SHARE = 0.3  # of a panel's cell that names at the ends of its lines may take
+AT_ENDS_MM = 4.4  # of a panel's height for each name at a line's end
+ROW_MM, LETTER_MM, SAMPLE_MM = 3.5, 1.45, 12.0  # of a legend: a row, a letter, the sample of a line with its gaps
+LEAST_PANEL_MM = 55.0  # wide, of a figure whose width is chosen
+WIDTHS_MM = (85, 120, 175)  # of a journal's page: one column, one and a half, two
+MOST_BESIDE = 16  # names in one column beside a panel
+
+Keys = Mapping[str, Style | None]  # words and the look that they explain; None for the crosses of exact values
+
+
+@dataclass(frozen=True)
+class Legend:
+    """Names and the looks that they explain, with a title."""
+
+    keys: Keys
+    title: str = ""
+
+    def columns(self, width_mm: float) -> int:
+        """How many columns of names fit into a width."""
+        longest = max(len(spoken(words)) for words in self.keys)
+        return max(1, min(len(self.keys), int(width_mm / (LETTER_MM * longest + SAMPLE_MM))))
+
+    def height_mm(self, width_mm: float) -> float:
+        """How tall it is at a width."""
+        rows = -(-len(self.keys) // self.columns(width_mm)) + bool(self.title)
+        return ROW_MM * rows + 2.0
+
+
+@dataclass(frozen=True)
+class Named:
+    """The panels that have marks; which of them name lines at their ends; the legends of panels, and the figure's."""
+
+    panels: tuple[Panel, ...]
+    at_ends: tuple[bool, ...]
+    own: tuple[Legend | None, ...]
+    common: Legend | None
+    beside: bool
+
+
+def named(figure: Figure) -> Named:
+    """How the lines of a figure are named."""
+    panels = tuple(panel for panel in figure.panels if panel.marks)
+    cell = figure.width_mm / min(figure.columns, max(1, len(panels)))
+    narrow = any(LETTER_MM * _longest(panel) > NAMES_SHARE * cell for panel in panels if panel.direct)
+    at_ends = tuple(not narrow and _fits(panel, figure.panel_height_mm) for panel in panels)
+    crossed: set[str] = set()
+    keys = [_keys(panel, ends, crossed) for panel, ends in zip(panels, at_ends, strict=True)]
+    apart = [dict(panel.keys) for panel in figure.panels if not panel.marks]
+    titles = {panel.key_title for panel in figure.panels if panel.key_title}
+    merged: dict[str, Style | None] = {}
+    clash = len(titles) > 1
+    for one in (*keys, *apart):
+        clash |= any(not _alike(merged.get(words, look), look) for words, look in one.items())
+        clash |= any(
+            _alike(look, other) and words not in one for words, other in merged.items() for look in one.values()
+        )
+        merged |= one
+    none: tuple[Legend | None, ...] = (None,) * len(panels)
+    if clash:
+        own = [Legend(one, panel.key_title) if one else None for one, panel in zip(keys, panels, strict=True)]
+        return Named(panels, at_ends, tuple(own), None, False)
+    beside = len(panels) == 1 and panels[0].legend == "right" and len(merged) <= MOST_BESIDE
+    return Named(panels, at_ends, none, Legend(merged, next(iter(titles), "")) if merged else None, beside)
+
+
+def _alike(one: Style | None, other: Style | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return replace(one, width_pt=0, size_pt=0) == replace(other, width_pt=0, size_pt=0)
+
+
+def lines(panel: Panel) -> list[Line]:
+    """The lines of a panel that have a name and a point."""
+    return [m for m in panel.marks if isinstance(m, Line) and m.label and np.isfinite(m.y).any()]
+
+
+def _longest(panel: Panel) -> int:
+    return max((len(spoken(line.label)) for line in lines(panel)), default=0)
+
+
+def _fits(panel: Panel, height_mm: float) -> bool:
+    """Whether a panel's lines are named at their ends."""
+    own = lines(panel)
+    short = all(len(m.label) <= LONGEST_AT_END for m in own)
+    return panel.direct and short and all(m.style.dash is not None for m in own) and len(own) <= height_mm / AT_ENDS_MM
+
+
+def _keys(panel: Panel, at_ends: bool, crossed: set[str]) -> Keys:
+    """What of a panel a legend explains; exact crosses of each kind once a figure."""
+    found: dict[str, Style | None] = {}
+    if panel.legend != "none":
+        found |= {m.label: m.style for m in lines(panel) if not at_ends}
+        found |= dict(panel.keys)
+    exact = any(isinstance(m, Line) and m.exact is not None and np.isfinite(m.exact).any() for m in panel.marks)
+    called = panel.crosses or tr("exact")
+    if exact and called not in crossed:
+        crossed.add(called)
+        found[called] = None
+    return found
+
+
+def at_width(figure: Figure, width_mm: float | None) -> Figure:
+    """The figure at a width: as many columns as leave a panel its room. Without a width as it is."""
+    if width_mm is None or width_mm == figure.width_mm:
+        return figure
+    return replace(figure, width_mm=width_mm, columns=max(1, min(figure.columns, int(width_mm // LEAST_PANEL_MM))))
+
+
+# ---- figures ---------------------------------------------------------------------------------------------------------
 Colours = dict[str, Normalize]  # of maps, by the words of their bars
 MM = 1 / 25.4
 PNG_DPI = 200
-COLOURS = tuple(light for light, _ in chart_look.COLOURS)
+COLOURS = tuple(light for light, _ in chart.COLOURS)
 DASHES = ("-", (0, (5, 1.8)), (0, (1.3, 1.3)), (0, (6, 1.6, 1.3, 1.6)), (0, (9, 2.5)), (0, (3, 1.2, 1, 1.2, 1, 1.2)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", "h", ">", "d", "p")  # no multiple of the colours
 POINTS = 2000  # of a line; longer ones are drawn at every n-th scan
@@ -105,7 +219,7 @@ def _unknown_letters_pass() -> Iterator[None]:
 
 
 def _laid_out(figure: Figure) -> Canvas:
-    plan = legends.named(figure)
+    plan = named(figure)
     columns = min(figure.columns, len(plan.panels))
     rows = -(-len(plan.panels) // columns)
     height = rows * figure.panel_height_mm
@@ -227,7 +341,7 @@ def save(
     with what) stand in each file's metadata.
     """
     with _without_collection():
-        canvas = render(legends.at_width(figure, width_mm))
+        canvas = render(at_width(figure, width_mm))
         with _measured_once(canvas):
             return {kind: _bytes(canvas, kind, figure, made_by) for kind in formats}
 
@@ -349,7 +463,7 @@ def _colour(style: Style) -> str | tuple[float, float, float, float]:
     if isinstance(style.colour, float):
         red, green, blue, alpha = matplotlib.colormaps["viridis"](0.72 * style.colour)
         return red, green, blue, alpha
-    return chart_look.ink(style)[0]
+    return chart.ink_colours(style)[0]
 
 
 def _look(style: Style) -> dict[str, Any]:
@@ -459,7 +573,7 @@ def _note(axes: Axes, note: Note) -> None:
 def _at_ends(axes: Axes, panel: Panel) -> list[Annotation]:
     """The names of a panel's lines, written at their ends; to be moved apart once the layout stands."""
     texts = []
-    for m in legends.lines(panel):
+    for m in lines(panel):
         last = np.flatnonzero(np.isfinite(m.y))[-1]
         low, high = sorted(axes.get_ylim())
         y = float(np.clip(m.y[last], low, high))  # a line may end beyond an axis that is cut
@@ -477,7 +591,7 @@ def _at_ends(axes: Axes, panel: Panel) -> list[Annotation]:
     return texts
 
 
-def _legend(where: Axes | Canvas, legend: legends.Legend | None, columns: int, **place: Any) -> None:
+def _legend(where: Axes | Canvas, legend: Legend | None, columns: int, **place: Any) -> None:
     """Names and styles, the exact crosses among them, in so many columns."""
     if legend is None:
         return
@@ -488,7 +602,7 @@ def _legend(where: Axes | Canvas, legend: legends.Legend | None, columns: int, *
     drawn.set_in_layout(isinstance(where, Canvas) or "bbox_to_anchor" in place)
 
 
-def _legend_below(axes: Axes, legend: legends.Legend | None, width_mm: float) -> None:
+def _legend_below(axes: Axes, legend: Legend | None, width_mm: float) -> None:
     """A legend of a panel's own, below its axis, no wider than its cell."""
     if legend is None:
         return

@@ -1,33 +1,175 @@
-"""report.html: one self-contained page of an experiment; the template escapes all text from configs and tables."""
+"""What belongs to what in a report: the tables that a figure is drawn from, and of a claim its figures and tables.
+
+What was asked: every key of the cases with its value and the schema's description.
+
+report.html: one self-contained page of an experiment; the template escapes all text from configs and tables.
+
+results/index.html: all runs of a folder, newest first, each with its answer in one line.
+"""
 
 import base64
+import csv
 import hashlib
+import io
 import json
 import math
 import re
 import shlex
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from datetime import UTC, datetime
 from functools import cache
 from importlib import resources
+from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
+from urllib.parse import quote
 
-from radarsim.config.experiment import Experiment
+from radarsim.config.experiment import Case, Experiment
+from radarsim.config.fields import Model
 from radarsim.config.load import as_yaml
 from radarsim.language import current, numeral, plural, term, tr
-from radarsim.report import asked, chart, links, provenance, text
-from radarsim.report.chart_text import spoken
+from radarsim.report import chart, files, tables
+from radarsim.report import tables as text
+from radarsim.report.chart import spoken
+from radarsim.report.claims import page, rule
 from radarsim.report.claims import page as claims_page
-from radarsim.report.claims import reasons
 from radarsim.report.claims.judge import LOOKED
 from radarsim.report.drawing import Figure, Line
+from radarsim.report.tables import number
 
 if TYPE_CHECKING:
     import pandas as pd
     from jinja2 import Template
     from markupsafe import Markup
 
+
+# ---- links -----------------------------------------------------------------------------------------------------------
+COMMON = {"sigma": ("curves",), "sweep": ("curves",), "dynamic": ("curves",), "gain": ("gains",)}
+MOST = 3  # figures that one claim leads to
+
+Looked = Sequence[tuple[str, str]]  # tables, with the component that was looked at or nothing
+
+
+def tables_of(figure: str, declared: Mapping[str, Sequence[str]], made: Collection[str]) -> tuple[str, ...]:
+    """The tables, of those made, that a figure is drawn from: as its study declares, by its own name, by its kind."""
+    begins = sorted((name for name in declared if figure.startswith(name)), key=len)
+    if begins and figure not in made:
+        found: Sequence[str] = declared[begins[-1]]
+    elif figure in made:
+        found = declared.get(figure, (figure,))
+    else:
+        found = COMMON.get(figure.partition("_")[0], ())
+    return tuple(name for name in found if name in made)
+
+
+def figures_of(looked: Looked, drawn_from: Mapping[str, Sequence[str]]) -> list[str]:
+    """The figures that show what was looked at: of the table, and of these its component's own where there is one."""
+    found: list[str] = []
+    for table, component in looked:
+        own = [name for name, tables in drawn_from.items() if table in tables]
+        exact = [name for name in own if component and name.endswith(f"_{component}")]
+        found += exact or own
+    return list(dict.fromkeys(found))[:MOST]
+
+
+# ---- asked -----------------------------------------------------------------------------------------------------------
+COLUMNS = ("key", "value", "meaning")
+MOST_ENTRIES = 12  # of a list shown one by one
+MOST_ROWS = 40  # shown row by row
+
+
+def asked(cases: Sequence[Case]) -> "dict[str, pd.DataFrame]":
+    """Tables of text by their title: what all cases share, and where there are several, in what they differ."""
+    keys_of = {case.name: {key: (value, about) for key, value, about in described(case.spec)} for case in cases}
+    first = keys_of[cases[0].name]
+    shared = [
+        (key, value, about)
+        for key, (value, about) in first.items()
+        if all(key in other and other[key][0] == value for other in keys_of.values())
+    ]
+    counts, seeds = (sorted({value(case) for case in cases}) for value in (_realisations, _seed))
+    counted = [("realisations", numeral(f"{n:,}"), tr("independent runs")) for n in counts]
+    counted += [("seed", str(s), tr("of the noise")) for s in seeds]
+    title = plural("Every key with its value and meaning", "What all {count} cases share", len(cases))
+    made = {title: _frame(COLUMNS, [*shared, *(counted if len(counted) == 2 else [])])}
+    if len(cases) > 1:
+        same = {key for key, _, _ in shared}
+        keys = list(dict.fromkeys(key for of in keys_of.values() for key in of if key not in same))
+        rows: list[tuple[object, ...]] = []
+        for case in cases[:MOST_ROWS]:
+            values = (keys_of[case.name].get(key, ("–", ""))[0] for key in keys)
+            rows.append((case.name, *values, numeral(f"{case.realisations:,}"), case.seed))
+        left = len(cases) - len(rows)
+        title = tr("In what the cases differ")
+        if left:
+            title = tr("In what the cases differ (first {shown}; {left} more in run.json)", shown=len(rows), left=left)
+        made[title] = _frame(("case", *keys, "realisations", "seed"), rows)
+    return made
+
+
+def _realisations(case: Case) -> int:
+    return case.realisations
+
+
+def _seed(case: Case) -> int:
+    return case.seed
+
+
+def _frame(columns: Sequence[str], rows: Sequence[tuple[object, ...]]) -> "pd.DataFrame":
+    return tables.frame({name: [row[i] for row in rows] for i, name in enumerate(columns)})
+
+
+def described(model: Model, before: str = "") -> Iterator[tuple[str, str, str]]:
+    """Key, value and meaning of every field that a checked model holds, in the order of its schema."""
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        about = tr(" ".join((field.description or "").split()))
+        if isinstance(value, Model):
+            yield from described(value, f"{before}{name}.")
+        elif _models(value):
+            for i, one in enumerate(value[:MOST_ENTRIES]):
+                yield f"{before}{name}.{i}", "; ".join(_pairs(one)), about if i == 0 else ""
+            if len(value) > MOST_ENTRIES:
+                yield f"{before}{name}", tr("{count} more", count=len(value) - MOST_ENTRIES), ""
+        elif value is not None and value != ():
+            yield f"{before}{name}", as_text(name, value), about
+
+
+def _models(value: object) -> TypeGuard[Sequence[Model]]:
+    return isinstance(value, tuple | list) and bool(value) and all(isinstance(one, Model) for one in value)
+
+
+def _pairs(model: Model) -> Iterator[str]:
+    """A short "key value" for each field that is set."""
+    for name in type(model).model_fields:
+        value = getattr(model, name)
+        if isinstance(value, Model):
+            yield f"{name}: {', '.join(_pairs(value))}"
+        elif _models(value):
+            yield f"{name}: {' | '.join(', '.join(_pairs(one)) for one in value)}"
+        elif value is not None and value != ():
+            yield f"{name} {as_text(name, value)}"
+
+
+def as_text(name: str, value: object) -> str:
+    """A value as text: angles in degrees too, lists with commas."""
+    if isinstance(value, bool):
+        return tr("yes") if value else tr("no")
+    if isinstance(value, float):
+        text = number(value, 6)
+        degrees = {"_rad": "°", "_radps": "°/s"}.get(name[name.rfind("_") :]) if "_" in name else None
+        return f"{text} ({number(math.degrees(value), 6)}{degrees})" if degrees and value else text
+    if isinstance(value, tuple | list):
+        return ", ".join(
+            as_text(name, one) if not isinstance(one, tuple | list) else f"[{as_text(name, one)}]" for one in value
+        )
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key}: {as_text(str(key), one)}" for key, one in value.items())
+    return str(value)
+
+
+# ---- html ------------------------------------------------------------------------------------------------------------
 NOT_SETTLED = term("not settled in the run")
 SCRIPT = (
     *(term("Light page"), term("Dark page"), term("exact"), term("Copied"), term("Not allowed here")),
@@ -43,7 +185,7 @@ MOST_CASES = 12  # written out as YAML
 SHOWN_FACTS = ("threads", "seconds", "kernel_seconds", "realisations_computed", "realisations_from_store")
 
 
-def page(
+def report_page(
     experiment: Experiment,
     made: "Mapping[str, pd.DataFrame]",
     figures: Sequence[Figure],
@@ -62,7 +204,7 @@ def page(
     accuracy) are tables, or None. drawn_from: of the study, see `Study.drawn_from`.
     """
     written = {name for name, table in made.items() if f"{name}.csv" in record["outputs"] and len(table)}
-    sources = {one.name: links.tables_of(one.name, drawn_from, written) for one in figures}
+    sources = {one.name: tables_of(one.name, drawn_from, written) for one in figures}
     claims = _claims(made["claims"], sources, written)
     answer = in_clauses(answer)
     return whole(
@@ -72,12 +214,12 @@ def page(
         answer=answer,
         shown=seen_at_once(answer),
         inputs=None if inputs is None else table_in_words(tr("inputs"), inputs),
-        asked=[table_in_words(title, table) for title, table in asked.asked(experiment.cases).items()],
+        asked=[table_in_words(title, table) for title, table in asked(experiment.cases).items()],
         agreement=None if agreement is None else table_in_words(tr("exact against Monte-Carlo"), agreement),
         cost=None if cost is None else table_in_words(tr("cost against accuracy"), cost),
         yaml=yaml_of(record["resolved"]),
         record=record,
-        extent=provenance.extent(record),
+        extent=files.extent(record),
         claims=claims,
         verdicts=claims_page.counted(made["claims"].to_dict("records")),
         figures=_figures(figures),
@@ -86,7 +228,7 @@ def page(
         titles={one.name: spoken(one.title) for one in figures},
         judged={name: [one["id"] for one in claims if name in one["figures"]] for name in sources},
         tables=_tables({name: table for name, table in made.items() if name != "claims" and len(table)}),
-        facts=[(name.replace("_", " "), number(record[name])) for name in SHOWN_FACTS if name in record],
+        facts=[(name.replace("_", " "), cell(record[name])) for name in SHOWN_FACTS if name in record],
         command=command(experiment, record),
     )
 
@@ -128,7 +270,7 @@ def comparison(
         files=_files(figures, outputs),
         asked=[table_in_words(title, table) for title, table in differing.items()],
         table=_table("comparison", made.drop(columns=["label", "against_label"])),
-        version=provenance.versions()["radarsim"],
+        version=files.versions()["radarsim"],
     )
 
 
@@ -153,7 +295,7 @@ def followed(
         tables=[_grid(name, rows) for name, rows in tables.items() if rows],
         yaml=yaml,
         command=command,
-        version=provenance.versions()["radarsim"],
+        version=files.versions()["radarsim"],
     )
 
 
@@ -161,7 +303,7 @@ def _grid(name: str, rows: Sequence[Mapping[str, object]]) -> dict[str, Any]:
     """A table of rows by column, as far as it is shown."""
     shown = rows[:ROWS]
     columns = [{"name": key, "numeric": isinstance(value, int | float)} for key, value in rows[0].items()]
-    cells = [[number(value) for value in row.values()] for row in shown]
+    cells = [[cell(value) for value in row.values()] for row in shown]
     return {"name": name, "columns": columns, "rows": cells, "count": len(rows), "cut": len(rows) > len(shown)}
 
 
@@ -184,7 +326,7 @@ def command(experiment: Experiment, record: Mapping[str, Any]) -> str:
     return " ".join(parts)
 
 
-def number(value: object) -> str:
+def cell(value: object) -> str:
     """A number for people, whole ones in full, others at four digits; text as it is, nothing for not-a-number."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return str(value)
@@ -198,12 +340,12 @@ def _template(name: str) -> "Template":
     loader = PackageLoader("radarsim.report")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     own: dict[str, Callable[..., str]] = {
-        "number": number,
+        "number": cell,
         "unit": lambda name: tr(text.unit(name)),
         "expected": claims_page.expected,
         "css": _css,
         "kept": kept,
-        "reason": reasons.said,
+        "reason": rule.said,
         "measured": _measured,
         "bounds": _bounds,
     }
@@ -221,13 +363,13 @@ def _measured(part: Mapping[str, Any]) -> str:
     """What a part of a claim measured; an infinite settling time as text."""
     if math.isinf(part["measured"]) and "settling" in part["what"]:
         return tr(NOT_SETTLED)
-    return number(part["measured"])
+    return cell(part["measured"])
 
 
 def _bounds(part: Mapping[str, Any]) -> str:
     """The interval of a part of a claim; a dash where chance has no part in it."""
     lo, hi = claims_page.bounds(part)
-    return "–" if lo == hi else f"{number(lo)} … {number(hi)}"
+    return "–" if lo == hi else f"{cell(lo)} … {cell(hi)}"
 
 
 def _css(verdict: str) -> str:
@@ -252,14 +394,14 @@ def _claims(
         found.append({"id": parts[0]["claim"], **same, "said": claims_page.verdict_of(parts), "parts": parts})
         found[-1]["said"] = str(found[-1]["said"]).replace("*", "")
         own = list(dict.fromkeys(one for part in parts for one in part[LOOKED]))
-        found[-1]["figures"] = links.figures_of(own, sources)
+        found[-1]["figures"] = figures_of(own, sources)
         found[-1]["tables"] = list(dict.fromkeys(name for name, _ in own if name in written))
     return found
 
 
 def _cell(column: str, value: object) -> str:
     endless = column.startswith("settling") and isinstance(value, float) and math.isinf(value)
-    return tr(NOT_SETTLED) if endless else number(value)
+    return tr(NOT_SETTLED) if endless else cell(value)
 
 
 def _tables(made: "Mapping[str, pd.DataFrame]") -> list[dict[str, Any]]:
@@ -410,3 +552,54 @@ def whole(template: str, **content: object) -> str:
     return _template(template).render(
         style=Markup(_file("style.css")), script=Markup(code), script_hash=digest, **content
     )
+
+
+# ---- index -----------------------------------------------------------------------------------------------------------
+NAME = "index.html"
+
+
+def write(out: Path) -> None:
+    """Write the index of the runs under out; raises StoreError. Runs whose run.json cannot be read are left out.
+
+    Under a lock from the first look to the writing: of two runs that end at once, the last one sees both.
+    """
+    out = Path(out)
+    with files.locked(out):
+        found = filter(None, map(_run, out.glob("*/run.json")))
+        runs = sorted(found, key=lambda run: run["finished"], reverse=True)
+        page = whole("index.html.j2", runs=runs, version=files.versions()["radarsim"])
+        files.replace_all(out, {NAME: page.encode()})
+
+
+def _run(path: Path) -> dict | None:
+    """A row of the index, from a run.json and the claims.csv beside it."""
+    try:
+        record = json.loads(files.read(path))
+        answer = [str(line) for line in record["answer"]]
+        made = {
+            "name": path.parent.name,
+            "address": f"{quote(path.parent.name)}/report.html",
+            "answer": answer[0] if answer else "",
+            "study": str(record["study"]),
+            "realisations": files.span(sorted({int(case["done"]) for case in record["cases"].values()})),
+            "finished": _finished(record, path),
+        }
+    except (OSError, ArithmeticError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+    return made | {"claims": _claims_of(path.parent / "claims.csv")}
+
+
+def _finished(record: Mapping, path: Path) -> str:
+    """When the run ended, UTC, to the second: as run.json says, else when that was written."""
+    finished = record.get("finished")
+    when = datetime.fromisoformat(finished) if finished else datetime.fromtimestamp(path.stat().st_mtime, UTC)
+    return when.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+
+
+def _claims_of(path: Path) -> str:
+    """How many claims of a table are of which class; nothing where there is none."""
+    try:
+        text = files.read(path).decode("utf-8")
+        return page.counted(list(csv.DictReader(io.StringIO(text, newline=""))))
+    except (OSError, ValueError, LookupError, csv.Error):
+        return ""

@@ -1,4 +1,25 @@
-"""Where a table's interval covers less than its 95 %: a last column `note`, there only where a row has one.
+"""Exact values against measured ones, in every table and every run.
+
+A column `exact_NAME` of a table holds the exact value of its column NAME, or gain_NAME; `exact` alone that of the
+column whose ends are `lo` and `hi`. The two columns after the measured one are the ends of its 95 %
+interval; of a mean the one after it, `…_se`, is its standard error. So a study that names its columns like this is held
+against its own exact values without a word more. Each of them is to lie within `statistics.ERROR_OF_PROGRAM` standard
+errors, within more where there are so many that chance would take one further.
+
+Whose standard errors: the sample's own, where a filter's errors are Gaussian at every scan, by their κ. Where they are
+not, as where plots are missed, something rare may make much of a mean of squares and be missing in a sample, and in its
+standard error with it. Such a σ is held against being too large alone, which no sample is for what it lacks; of a bias
+so much may be missing as `UNSEEN` of n realisations can make, σ √(UNSEEN/n) (Cauchy and Schwarz); a gain is not held.
+
+What a filter believes of its errors against what they are, with the same columns and words in every study.
+
+`believed.csv` compares standard deviations, component by component: `ratio` is the true σ over the believed one.
+`consistency.csv` compares whole states and residuals by normalised squares, per degree of freedom: NEES eᵀP⁻¹e of the
+error e, NIS νᵀS⁻¹ν of the innovation ν, P and S the covariances that the filter believes. Both are 1 for a filter that
+is right about itself. Over 1 the filter is optimistic, its errors are larger than it believes; under 1 it is
+pessimistic. (Bar-Shalom, Li & Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, 5.4.)
+
+Where a table's interval covers less than its 95 %: a last column `note`, there only where a row has one.
 
 There is one rule. An interval of σ takes the spread of e² from the sample; where few of the realisations make that
 spread, it is too narrow, and more so in the sample that happens to lack them. How many make it is n/(κ − 1), the
@@ -10,16 +31,223 @@ A row beside which the exact value stands has none: that value is the better one
 measured of marked and of unmarked rows stands in docs/trust.md.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
+from radarsim.language import tr
+from radarsim.report import statistics, tables
+from radarsim.report.statistics import ERROR_OF_PROGRAM, FEW, Z95, Estimate, Values, furthest, standard_errors
 
 if TYPE_CHECKING:
     import pandas as pd
 
+
+# ---- agreement -------------------------------------------------------------------------------------------------------
+COLUMNS = ("case", "filter", "component", "unit", "scans", "inside_percent", "largest_difference_percent", "at_k")
+ALMOST = 2e-4  # of a value that `Study.exact_but_for` says something of
+ROUNDING = 1e-9  # of a value
+UNSEEN = 18.0  # realisations of n that are all missing in one sample of 6·10⁷
+STRAYS = 5.0  # standard errors by which κ of Gaussian errors may lie off theirs
+PLACE = ("case", "filter", "component")
+SQUARES = ("sigma", "nees", "nis")  # measured columns of means of squares
+
+
+class Beside(NamedTuple):
+    """A measured column, its ends, and its exact value; lo and hi are one column where it is the standard error."""
+
+    value: str
+    lo: str
+    hi: str
+    exact: str
+
+
+def beside(table: "pd.DataFrame") -> Iterator[Beside]:
+    """The measured columns of a table that have an exact one."""
+    columns = [str(name) for name in table.columns]
+    for exact in (name for name in columns if name == "exact" or name.startswith("exact_")):
+        own = exact.removeprefix("exact").removeprefix("_")
+        for value, lo, hi in zip(columns, columns[1:], columns[2:], strict=False):
+            named = value in (own, f"gain_{own}") if own else (lo, hi) == ("lo", "hi")
+            if named and lo == f"{value}_se":
+                yield Beside(value, lo, lo, exact)
+            elif named and lo.endswith("lo") and hi.endswith("hi"):
+                yield Beside(value, lo, hi, exact)
+
+
+def measured(table: "pd.DataFrame", of: Beside) -> Estimate:
+    """The measured values (rows,) of a column with their 95 % intervals."""
+    value, lo, hi = (table[name].to_numpy(dtype=float) for name in of[:3])
+    return Estimate(value, value - Z95 * lo, value + Z95 * hi) if of.lo == of.hi else Estimate(value, lo, hi)
+
+
+def distances(made: "Mapping[str, pd.DataFrame]", name: str, of: Beside, nearly: Collection[str] = ()) -> np.ndarray:
+    """Standard errors (rows,) by which the measured values of a column lie off the exact ones.
+
+    made: all tables; nearly: the cases of which exact values are right to `ALMOST`. 0 where the sample may lack as
+    much, see above. Not-a-number where no exact value is known, or under `FEW` realisations measured it.
+    """
+    table = made[name]
+    (value, lo, hi), exact = measured(table, of), table[of.exact].to_numpy(dtype=float)
+    size, lacking, squares = np.abs(exact), np.zeros(len(table)), of.value in SQUARES
+    if of.value == "bias":
+        size = np.fmax(size, table["sigma"].to_numpy(dtype=float))
+        lacking = size * np.sqrt(UNSEEN / np.fmax(table["n"].to_numpy(dtype=float), 1.0))  # n = 0: no row is judged
+    elif of.value.endswith("_percent"):  # of a ratio of two σ
+        size = np.abs(100 - exact)
+        lacking[:] = np.inf
+    elif squares:
+        lacking[value < exact] = np.inf
+    room = size * np.where(table["case"].isin(list(nearly)), ALMOST, ROUNDING)
+    room = room + np.where(_gaussian(made, table), 0.0, lacking)
+    near = np.abs(exact - value) <= room
+    nearest = np.where(near, value, exact - np.sign(exact - value) * np.where(near, 0.0, room))
+    n = table["n"] if "n" in table else table["case"].map(made["curves"].groupby("case")["n"].min())
+    enough = (n.to_numpy(dtype=float) >= FEW) & ~np.isnan(exact)
+    return np.where(enough, standard_errors(Estimate(value, lo, hi), nearest), np.nan)
+
+
+def _gaussian(made: "Mapping[str, pd.DataFrame]", table: "pd.DataFrame") -> np.ndarray:
+    """Whether errors are Gaussian, (rows,), of the filter of each row, and of that which it is compared with."""
+    curves = made.get("curves")
+    if curves is None or not len(curves):
+        return np.zeros(len(table), dtype=bool)
+    n, n_eff, square, bias, spread = (
+        curves[column].to_numpy(dtype=float) for column in ("n", "n_eff", "sigma", "bias", "spread")
+    )
+    square, variance = square**2, spread**2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        kurtosis = 1 + n / n_eff
+        theirs = (bias**4 + 6 * bias**2 * variance + 3 * variance**2) / square**2
+        error = np.sqrt((96 * bias**2 * variance**3 + 24 * variance**4) / n) / square**2
+        strays = np.abs(kurtosis - theirs) > STRAYS * error + ROUNDING
+    others = set(zip(curves["case"][strays], curves["filter"][strays], strict=True))
+    pairs = [zip(table["case"], table[who], strict=True) for who in {"filter", "baseline"} & set(table)]
+    return (
+        np.all([[pair not in others for pair in own] for own in pairs], axis=0) if pairs else np.ones(len(table), bool)
+    )
+
+
+def faults(
+    made: "Mapping[str, pd.DataFrame]", nearly: Collection[str] = (), bounds: Collection[str] = ("claims",)
+) -> list[str]:
+    """A line for each column that lies further off its exact values than chance takes any: the furthest row of it.
+
+    made, nearly: as for `distances`; bounds: tables that hold no exact values of what was measured, whatever they say.
+    """
+    found = {
+        (name, of): distances(made, name, of, nearly)
+        for name, table in made.items()
+        if name not in bounds and "case" in table and len(table)
+        for of in beside(table)
+    }
+    many = sum(int((~np.isnan(apart)).sum()) for apart in found.values())
+    bound = max(ERROR_OF_PROGRAM, furthest(many))
+    said = []
+    for (name, of), apart in found.items():
+        if (apart > bound).any():
+            at = int(np.nanargmax(apart))
+            row = made[name].iloc[at]
+            scan = f"k = {row['k']:g}" + (f" ({row['t_s']:g} s)" if "t_s" in row else "") if "k" in row else ""
+            place = ", ".join(filter(None, (*(str(row[key]) for key in PLACE if key in row), scan)))
+            said.append(
+                tr(
+                    "{table}.csv: {place}: {column} measured {measured:.6g}, exactly {exact:.6g}: {apart:.3g} standard "
+                    "errors apart; {count:,} of {rows:,} rows of this column are over {bound:.3g}, the most that "
+                    "chance makes of {many:,}: the simulation or the exact value is computed wrongly",
+                    table=name,
+                    place=place,
+                    column=of.value,
+                    measured=float(row[of.value]),
+                    exact=float(row[of.exact]),
+                    apart=float(apart[at]),
+                    bound=bound,
+                    many=many,
+                    count=int((apart > bound).sum()),
+                    rows=int((~np.isnan(apart)).sum()),
+                )
+            )
+    return said
+
+
+def agreement(curves: "pd.DataFrame") -> "pd.DataFrame | None":
+    """A row for each case, filter and component of curves.csv whose exact σ is known; None where none is."""
+    known = curves[np.isfinite(curves["exact_sigma"]) & (curves["exact_sigma"] > 0) & np.isfinite(curves["sigma_lo"])]
+    if not len(known):
+        return None
+    exact, sigma = known["exact_sigma"], known["sigma"]
+    marked = known.assign(
+        inside=(known["sigma_lo"] <= exact) & (exact <= known["sigma_hi"]), off=100 * (sigma / exact - 1)
+    )
+    rows = []
+    for keys, own in marked.groupby(["case", "filter", "component"], sort=False):
+        worst = own.loc[own["off"].abs().idxmax()]
+        share = 100 * float(own["inside"].mean())
+        rows.append((*keys, worst["unit"], len(own), round(share, 1), float(worst["off"]), int(worst["k"])))
+    return tables.frame({name: [row[i] for row in rows] for i, name in enumerate(COLUMNS)})
+
+
+# ---- consistency -----------------------------------------------------------------------------------------------------
+OPTIMISTIC, CONSISTENT, PESSIMISTIC = "optimistic", "consistent", "pessimistic"
+
+
+def believed(result: CaseResult, sigma: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of one case: the measured σ beside sigma (F, K, C), the σ that the filters believe.
+
+    Rows stand where a filter has an estimate, as in `tables.curves`. The interval of the ratio is that of the measured
+    σ alone. Where the believed one hangs on the plots (missed ones, filters that adapt) its mean has a chance of its
+    own, which is small beside: rows of `sonar_manoeuvre` and of a radar that misses plots cover 94 … 95 %.
+    """
+    at = f, k, c = tables.shown(result)
+    n = tables.realisations(result)[at]
+    true, claimed = statistics.errors(np.asarray(result.sums["error"])[at], n).sigma, sigma[at]
+    return {
+        **tables.leading(result, f, k, **tables.components(result, c)),
+        "n": n.astype(np.int64),
+        **ratio_columns(true, claimed),
+    }
+
+
+def ratio_columns(true: Estimate, claimed: np.ndarray) -> dict[str, np.ndarray]:
+    """`sigma`, `believed_sigma` and their `ratio` with its interval, of estimates (n,) of σ and believed ones (n,)."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = Estimate(*(end / claimed for end in true))
+    return {"sigma": true.value, "believed_sigma": claimed, **tables.interval_columns("ratio", ratio)}
+
+
+def normalised(
+    quantity: str, mean: Estimate, bounds: tuple[np.ndarray, np.ndarray], exact: np.ndarray | None = None
+) -> tables.Columns:
+    """Columns of `nees` or `nis`, arrays of one shape: the mean with its interval, the bounds, and the verdict.
+
+    In 95 % of runs all means of a filter that is right about itself lie between their bounds. Where the expectation is
+    known, it is judged by them in place of the mean.
+    """
+    known = {} if exact is None else {f"exact_{quantity}": exact}
+    decides = mean.value if exact is None else np.where(np.isnan(exact), mean.value, exact)
+    ends = dict(zip((f"{quantity}_bound_lo", f"{quantity}_bound_hi"), bounds, strict=True))
+    return {quantity: mean, **known, **ends, f"{quantity}_verdict": verdict(decides, *bounds)}
+
+
+def verdict(mean: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> np.ndarray:
+    """What a mean NEES or NIS says of a filter's covariance, by the bounds of a filter that is right about itself."""
+    return np.select([mean < lo, mean > hi], [PESSIMISTIC, OPTIMISTIC], CONSISTENT).astype(object)
+
+
+def bounds_from_spread(total: Values, square: Values, n: Values, looks: int) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of a mean NEES or NIS of unknown law, from Σq and Σq² over n realisations.
+
+    They stand about 1 as the interval of the mean, widened so that `looks` of them hold at once in 95 % of runs, stands
+    about the mean: 1 leaves that interval where the mean leaves these bounds.
+    """
+    mean = statistics.mean_square(total, square, n, looks)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return mean.value / mean.hi, mean.value / mean.lo
+
+
+# ---- notes -----------------------------------------------------------------------------------------------------------
 # Of 14 configs, rows whose n/(κ − 1) over all samples together is 100 … 200 cover 93.6 % on the mean, over that 94.4 …
 # 95.2, 50 … 100 91, under 10 65 %.
 EFFECTIVE = 100
@@ -39,7 +267,6 @@ INDEPENDENT = 0.1
 # Of every row of a table: what its interval is of, not that it rests on too little. What is computed at an estimate has
 # a spread of its own: ratios of `sonar_manoeuvre` cover 93 %, one in twenty 31.
 VARIES = "interval of sigma alone: the believed one varies from one realisation to the next"
-ROUNDING = 1e-9  # of a σ: filters that differ by no more are the same
 PAIRED = {"gain": -1, "above_oracle": 1}  # columns NAME_percent, and the sign with which it adds to the baseline's σ
 # Tables that bring all their notes, and one whose mean squares are of several components and bounded: unmarked or
 # marked by these rules, rows of NEES and NIS cover 95 … 97 %.

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from radarsim.config.check import Label
+from radarsim.config.check import label as label_of
 from radarsim.config.experiment import Experiment
-from radarsim.config.labels import Label
-from radarsim.config.labels import label as label_of
 from radarsim.engine.results import CaseResult
 from radarsim.language import plural, power_of_ten, term, tr
-from radarsim.report import seen, text
+from radarsim.report import seen
 from radarsim.report import tables as common
+from radarsim.report import tables as text
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.report.statistics import Z95
 

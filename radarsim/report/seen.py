@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.language import few, listed, plural, term, tr
-from radarsim.report import text
-from radarsim.report.chart_text import spoken
+from radarsim.report import tables
+from radarsim.report.chart import spoken
 from radarsim.report.drawing import Figure, Heat, Line, Panel
 
 DIGITS = 3
@@ -293,4 +293,4 @@ def _ending(lines: Sequence[Seen], sign: int, unit: str) -> str:
 
 
 def _valued(value: float, unit: str) -> str:
-    return " ".join(filter(None, (text.number(float(value), DIGITS), unit)))
+    return " ".join(filter(None, (tables.number(float(value), DIGITS), unit)))

@@ -120,7 +120,7 @@ class StudyFolder(Study):
         if self.paper is None:
             return None
         from radarsim.report.claims import PaperClaims
-        from radarsim.report.claims.written import claims_of
+        from radarsim.report.claims.over import claims_of
 
         return PaperClaims(claims_of(self.file), self.file("measures").Evidence, *self.paper)
 

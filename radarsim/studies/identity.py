@@ -17,8 +17,7 @@ from importlib.metadata import distributions
 from importlib.util import find_spec
 from pathlib import Path
 
-from radarsim.config.experiment import Case
-from radarsim.config.identity import canonical, digest, world
+from radarsim.config.experiment import Case, canonical, digest, world
 from radarsim.engine.blocks import QUESTION
 from radarsim.studies.registry import SHIPPED, module, study
 

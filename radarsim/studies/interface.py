@@ -23,10 +23,9 @@ if TYPE_CHECKING:
 
     from radarsim.config.experiment import Case, Experiment
     from radarsim.config.fields import Study as Keys
-    from radarsim.engine.moments import Layout
-    from radarsim.engine.results import Axes, CaseResult, Track
+    from radarsim.engine.results import Axes, CaseResult, Layout, Track
     from radarsim.report.claims import PaperClaims
-    from radarsim.report.claims.readings import PaperReadings
+    from radarsim.report.claims.over import PaperReadings
     from radarsim.report.drawing import Chart, Figure
 
 

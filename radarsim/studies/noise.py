@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from radarsim.config.experiment import Case
-from radarsim.config.identity import digest, world
+from radarsim.config.experiment import Case, digest, world
 from radarsim.kernels.random import stream
 
 

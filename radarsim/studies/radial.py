@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from radarsim import physics
 from radarsim.errors import ConfigError
-from radarsim.physics import recorded, targets
-from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
+from radarsim.physics import STANDARD_GRAVITY_MPS2
 
 
 def truth(target: Any, t: np.ndarray) -> np.ndarray:
@@ -16,20 +16,20 @@ def truth(target: Any, t: np.ndarray) -> np.ndarray:
     """
     match target.kind:
         case "polynomial":
-            return targets.polynomial(target.coefficients, t)
+            return physics.polynomial(target.coefficients, t)
         case "acceleration_start":
-            return targets.acceleration_start(target.coefficients, target.acceleration_mps2, target.start_s, t)
+            return physics.acceleration_start(target.coefficients, target.acceleration_mps2, target.start_s, t)
         case "acceleration_pulse":
             size = target.acceleration_g * STANDARD_GRAVITY_MPS2
-            return targets.acceleration_pulse(target.coefficients, size, target.start_s, target.duration_s, t)
+            return physics.acceleration_pulse(target.coefficients, size, target.start_s, target.duration_s, t)
         case "jerk_pulse":
             start = target.start_s
-            return targets.jerk_pulse(target.coefficients, target.jerk_mps3, start, target.duration_s, t)
+            return physics.jerk_pulse(target.coefficients, target.jerk_mps3, start, target.duration_s, t)
         case "turn":
             leg = target.range_m, target.speed_mps, target.aspect_rad
-            return targets.turn(*leg, target.acceleration_g, target.start_s, target.duration_s, t)
+            return physics.turn(*leg, target.acceleration_g, target.start_s, target.duration_s, t)
         case "fly_by":
-            return targets.fly_by(target.distance_m, target.speed_mps, target.start_range_m, t)
+            return physics.fly_by(target.distance_m, target.speed_mps, target.start_range_m, t)
         case "recorded":
             return recorded_flight(target.file, t)
     raise ValueError(f"no such target: {target.kind}")
@@ -37,19 +37,19 @@ def truth(target: Any, t: np.ndarray) -> np.ndarray:
 
 def recorded_flight(file: str, t: np.ndarray) -> np.ndarray:
     """The radial motion (K, 3) of a recorded flight at times t (K,); raises ValueError where it is too short."""
-    times, positions = recorded.points(file)
+    times, positions = physics.points(file)
     lasts = float(times[-1] - times[0])
     if t[-1] > lasts:
         enough = int(np.searchsorted(t, lasts, side="right"))
         raise ValueError(f"the flight lasts {lasts:g} s, the last of {len(t)} scans is at {t[-1]:g} s; {enough} fit in")
-    return recorded.radial(recorded.smoothed(times, positions, t))
+    return physics.radial(physics.smoothed(times, positions, t))
 
 
 def checked_truth(target: Any, t: np.ndarray, case: str) -> np.ndarray:
     """As `truth`, (K, 3) at times t (K,); raises ConfigError, naming the case, for a target that cannot be."""
     try:
         x = truth(target, t)
-    except recorded.Unreadable as error:
+    except physics.Unreadable as error:
         raise ConfigError(*error.faults) from None
     except ValueError as error:
         raise ConfigError(f"{case}: target: {error}") from None

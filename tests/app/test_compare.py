@@ -7,8 +7,8 @@ import shutil
 import pytest
 from click.testing import CliRunner
 
-from radarsim.app import run as experiment
-from radarsim.app.records import recorded_case
+from radarsim.app import run
+from radarsim.app.result import recorded_case
 from radarsim.cli import main
 from radarsim.report import tables
 
@@ -25,7 +25,7 @@ def out(tmp_path_factory):
     """A folder with two radars."""
     made = tmp_path_factory.mktemp("results")
     for name in ("rls2", "rls4"):
-        experiment.run(name, realisations=4000, out=made, figures=False)
+        run.run(name, realisations=4000, out=made, figures=False)
     return made
 
 
@@ -48,7 +48,7 @@ def test_two_radars_side_by_side(out):
 
 
 def test_two_versions_of_one_differ_by_nothing(out, tmp_path):
-    experiment.run("rls2", realisations=4000, out=tmp_path, figures=False)
+    run.run("rls2", realisations=4000, out=tmp_path, figures=False)
     done = radarsim("compare", out / "rls2", tmp_path / "rls2", "--out", tmp_path, "--no-figures", "--json")
     found = json.loads(done.stdout)
     assert {row["difference"] for row in found["rows"]} == {0.0}
@@ -65,7 +65,7 @@ def test_what_is_missing_is_said_with_the_command_for_it(out, tmp_path):
 
 
 def test_a_table_that_was_altered_is_no_result(out, tmp_path):
-    experiment.run("rls2", realisations=4000, out=tmp_path, figures=False)
+    run.run("rls2", realisations=4000, out=tmp_path, figures=False)
     with (tmp_path / "rls2" / "curves.csv").open("a") as file:
         file.write("\n")
     assert "altered" in radarsim("compare", "rls4", tmp_path / "rls2", "--out", out, code=4).stderr

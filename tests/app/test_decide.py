@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 import radarsim
-from radarsim.app import decide
+from radarsim.app import readings
 from radarsim.cli import main
 from radarsim.report import claims
 from radarsim.report.claims.rule import CONFIRMED, UNDECIDED
@@ -22,11 +22,11 @@ def test_what_is_known_exactly_is_decided_at_the_first_look(tmp_path):
 
 def test_what_is_left_says_what_it_would_take():
     row = {"paper": "p", "claim": "P9.1", "as_shipped": UNDECIDED, "extension": False, "n": 4000, "needed": 12345.0}
-    assert decide.undecided([row]) == ["P9.1 not yet decided at 4,000 realisations; about 13,000 would"]
-    assert "no number would" in decide.undecided([row | {"needed": math.nan}])[0]
-    assert decide.undecided([row | {"as_shipped": CONFIRMED}]) == []
-    assert decide.undecided([row | {"extension": True}]) == []
-    assert decide.undecided([row | {"class": CONFIRMED}])  # over all readings, by other runs than this
+    assert readings.undecided([row]) == ["P9.1 not yet decided at 4,000 realisations; about 13,000 would"]
+    assert "no number would" in readings.undecided([row | {"needed": math.nan}])[0]
+    assert readings.undecided([row | {"as_shipped": CONFIRMED}]) == []
+    assert readings.undecided([row | {"extension": True}]) == []
+    assert readings.undecided([row | {"class": CONFIRMED}])  # over all readings, by other runs than this
 
 
 def test_a_time_limit_before_all_cases_names_the_claims_that_wait(tmp_path):

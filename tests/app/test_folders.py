@@ -12,13 +12,12 @@ import pytest
 from click.testing import CliRunner
 
 import radarsim
-from radarsim.app import doctor, repeat
-from radarsim.app import run as experiment
+from radarsim.app import configs, doctor, run
 from radarsim.app.configs import load, new
 from radarsim.cli import main
-from radarsim.config.lookup import SHIPPED
+from radarsim.config.document import SHIPPED
 from radarsim.errors import ConfigError, StoreError
-from radarsim.report import files, index
+from radarsim.report import files, html
 
 TEXT = (SHIPPED / "configs" / "rls2.yaml").read_text()
 
@@ -38,9 +37,9 @@ def record(out, stem):
 def test_two_configs_of_one_name_are_refused_together(tmp_path, second):
     one, other = config(tmp_path / "a"), config(tmp_path / "b", second)
     with pytest.raises(ConfigError, match="its results would overwrite those of") as caught:
-        experiment.load_all([one, other])
+        run.load_all([one, other])
     assert str(other) in str(caught.value)
-    assert len(experiment.load_all([one, one])) == 2
+    assert len(run.load_all([one, one])) == 2
 
 
 def test_a_folder_of_another_configs_results_is_told(tmp_path):
@@ -100,16 +99,16 @@ def test_the_command_of_a_result_repeats_it(tmp_path, monkeypatch, options, endi
 
 def test_the_command_of_a_report_is_of_what_is_reported(tmp_path):
     radarsim.run("rls2", realisations=2000, out=tmp_path, figures=False)
-    experiment.report(load("rls2"), out=tmp_path, figures=False)
+    run.report(load("rls2"), out=tmp_path, figures=False)
     assert record(tmp_path, "rls2")["command"] == "radarsim run rls2 -n 2000"
 
 
 def test_cases_that_a_precision_ends_at_several_numbers_are_repeated_with_it():
     asked = load("rls2_manoeuvres", ["realisations=64000"])
     done = {case.name: 2000 * (1 + i) for i, case in enumerate(asked.cases)}
-    told = repeat.repeated(asked, done, ["realisations=64000"], (1.3, "sigma"))
+    told = configs.repeated(asked, done, ["realisations=64000"], (1.3, "sigma"))
     assert told == "radarsim run rls2_manoeuvres -n 64000 --precision 1.3"
-    assert repeat.repeated(asked, dict.fromkeys(done, 64_000), ["realisations=64000"], (1.3, "sigma")).endswith(
+    assert configs.repeated(asked, dict.fromkeys(done, 64_000), ["realisations=64000"], (1.3, "sigma")).endswith(
         "-n 64000"
     )
 
@@ -144,7 +143,7 @@ def test_one_name_written_in_two_ways_is_one(tmp_path):
     one, other = config(tmp_path / "a", f"{composed}.yaml"), config(tmp_path / "b", f"{apart}.yaml")
     assert load(other).stem == load(one).stem == composed
     with pytest.raises(ConfigError, match="would overwrite"):
-        experiment.load_all([one, other])
+        run.load_all([one, other])
 
 
 def test_a_plain_file_does_not_hide_a_config(tmp_path, monkeypatch):
@@ -171,7 +170,7 @@ def test_records_of_strangers_neither_end_nor_hold_up_the_index(tmp_path):
     (tmp_path / "year" / "run.json").write_text(json.dumps(strange))
     os.mkfifo(tmp_path / "pipe" / "run.json")
     os.mkfifo(tmp_path / "year" / "claims.csv")
-    index.write(tmp_path)
+    html.write(tmp_path)
     assert "rls2/report.html" in (tmp_path / "index.html").read_text()
     with pytest.raises(StoreError, match="is no regular file"):
         doctor.inspected(tmp_path / "pipe")

@@ -6,7 +6,7 @@ That the package works is tested by tests/studies/test_outside.py.
 import pytest
 from click.testing import CliRunner
 
-from radarsim.app import new_study
+from radarsim.app import reproduce
 from radarsim.cli import main
 from radarsim.errors import ConfigError, StoreError
 
@@ -17,7 +17,7 @@ def test_the_command_writes_a_package_under_its_name(tmp_path, monkeypatch):
     assert done.exit_code == 0, done.output
     assert "pip install -e my_paper" in done.output
     written = [file for file in sorted((tmp_path / "my_paper").rglob("*")) if file.is_file()]
-    assert len(written) == len(new_study.files())
+    assert len(written) == len(reproduce.files())
     assert (tmp_path / "my_paper/src/my_paper/shipped/configs/my_paper.yaml").is_file()
     text = "".join(file.read_text(encoding="utf-8") for file in written)
     assert "random_walk" not in text
@@ -25,7 +25,7 @@ def test_the_command_writes_a_package_under_its_name(tmp_path, monkeypatch):
 
 
 def test_every_file_says_what_goes_there():
-    silent = [file.name for file in new_study.files() if "Yours:" not in file.read_text(encoding="utf-8")]
+    silent = [file.name for file in reproduce.files() if "Yours:" not in file.read_text(encoding="utf-8")]
     assert silent == ["__init__.py", "random_walk_step.yaml"]
 
 
@@ -34,7 +34,7 @@ def test_every_file_says_what_goes_there():
 )
 def test_a_name_that_is_no_modules_is_refused(name, tmp_path):
     with pytest.raises(ConfigError, match="must be a module's name"):
-        new_study.new_study(name, tmp_path)
+        reproduce.new_study(name, tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -44,16 +44,16 @@ def test_a_name_that_is_no_modules_is_refused(name, tmp_path):
 )
 def test_a_name_that_is_taken_is_refused(name, taken, tmp_path):
     with pytest.raises(ConfigError, match=f"{name}: there is a .*{taken}"):
-        new_study.new_study(name, tmp_path)
+        reproduce.new_study(name, tmp_path)
 
 
 def test_nothing_is_overwritten(tmp_path):
     (tmp_path / "mine").write_text("mine")
     with pytest.raises(ConfigError, match="never overwritten"):
-        new_study.new_study("mine", tmp_path)
+        reproduce.new_study("mine", tmp_path)
     assert (tmp_path / "mine").read_text() == "mine"
 
 
 def test_a_folder_that_cannot_be_written_is_told(tmp_path):
     with pytest.raises(StoreError, match="cannot be written"):
-        new_study.new_study("mine", tmp_path / "nowhere")
+        reproduce.new_study("mine", tmp_path / "nowhere")

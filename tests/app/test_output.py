@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 from markupsafe import escape
 
-from radarsim.app import output
-from radarsim.app import run as running
+from radarsim.app import result as output
+from radarsim.app import run
 from radarsim.app.configs import load
 from radarsim.errors import StoreError
-from radarsim.report import files, html, provenance
+from radarsim.report import files, html
 
 TABLES = {"curves.csv", "gains.csv", "steady.csv", "believed.csv", "consistency.csv", "radar.csv"}
 TABLES |= {"claims.csv"}
@@ -41,7 +41,7 @@ def results(experiment, expected_case):
 @pytest.fixture(scope="module")
 def written(experiment, results, tmp_path_factory):
     """All outputs, figures too, of an experiment whose names are hostile."""
-    return output.write(experiment, results, tmp_path_factory.mktemp("out") / "rls2", RUN)
+    return output.write_files(experiment, results, tmp_path_factory.mktemp("out") / "rls2", RUN)
 
 
 class Page(HTMLParser):
@@ -87,7 +87,7 @@ def test_everything_is_written(written):
 
 def test_tables_are_the_same_bytes_each_time(experiment, results, tmp_path):
     for name in ("a", "b"):
-        output.write(experiment, results, tmp_path / name, RUN, draw=False)
+        output.write_files(experiment, results, tmp_path / name, RUN, draw=False)
     for path in TABLES | {"report.html"}:
         assert (tmp_path / "a" / path).read_bytes() == (tmp_path / "b" / path).read_bytes()
 
@@ -99,7 +99,7 @@ def test_without_figures_old_ones_go_and_nothing_else(experiment, results, tmp_p
         (folder / name).write_text("old")
     named = {"figures/sigma_r.svg": "", "../outside.csv": "", str(tmp_path / "outside.csv"): ""}
     (folder / "run.json").write_text(json.dumps({"outputs": named}))
-    written = output.write(experiment, results, folder, RUN, draw=False)
+    written = output.write_files(experiment, results, folder, RUN, draw=False)
     assert set(written.files) == TABLES | {"run.json", "report.html"}
     assert not (folder / "figures/sigma_r.svg").exists()
     for name in ("track.csv", "figures/mine.svg", "../outside.csv"):
@@ -112,12 +112,14 @@ def test_without_figures_old_ones_go_and_nothing_else(experiment, results, tmp_p
 @pytest.mark.parametrize("damaged", [b"", b"[]", b'{"outputs": [1]}', b"\xff", b'{"outputs": null}'])
 def test_a_damaged_record_is_replaced(damaged, tmp_path):
     (tmp_path / "run.json").write_bytes(damaged)
-    assert provenance.outputs(tmp_path) == []
+    assert files.outputs(tmp_path) == []
 
 
 def test_no_claims_no_file(radar_config, expected_case, tmp_path):
     experiment = load(radar_config("rls2", radar={"sigma_range_m": 251}))
-    written = output.write(experiment, [expected_case(case) for case in experiment.cases], tmp_path, RUN, draw=False)
+    written = output.write_files(
+        experiment, [expected_case(case) for case in experiment.cases], tmp_path, RUN, draw=False
+    )
     assert "claims.csv" not in written.files
     assert "Claims of the paper" not in (tmp_path / "report.html").read_text()
 
@@ -151,7 +153,7 @@ def test_names_are_escaped(written):
 
 
 def test_few_realisations_are_warned_of(experiment, expected_case, tmp_path):
-    output.write(experiment, [expected_case(experiment.cases[0], count=10)], tmp_path, RUN, draw=False)
+    output.write_files(experiment, [expected_case(experiment.cases[0], count=10)], tmp_path, RUN, draw=False)
     record = json.loads((tmp_path / "run.json").read_bytes())
     assert "intervals of 10 realisations are rough" in record["warnings"][-1]
     assert record["realisations_done"] == 10
@@ -162,11 +164,11 @@ def of_cases(*cases):
 
 
 def test_extent_in_words():
-    assert provenance.extent(of_cases((10_000, 10_000, 7))) == "10,000 realisations, seed 7"
+    assert files.extent(of_cases((10_000, 10_000, 7))) == "10,000 realisations, seed 7"
     differing = of_cases((100_000, 100_000, 2017), (200_000, 200_000, 1))
-    assert provenance.extent(differing) == "100,000 to 200,000 realisations a case, seeds 1, 2017"
+    assert files.extent(differing) == "100,000 to 200,000 realisations a case, seeds 1, 2017"
     short = of_cases((200_000, 100_000, 1), (200_000, 200_000, 1))
-    assert provenance.extent(short) == "100,000 to 200,000 realisations a case of 200,000 asked, seed 1"
+    assert files.extent(short) == "100,000 to 200,000 realisations a case of 200,000 asked, seed 1"
 
 
 def test_a_file_is_replaced_whole(tmp_path):
@@ -192,7 +194,7 @@ def test_many_long_tables_share_the_room_of_a_page():
 
 
 def test_figures_have_the_width_asked_for_their_captions_and_what_they_were_made_of(tmp_path):
-    first = running.run("rls2", realisations=2000, out=tmp_path)
+    first = run.run("rls2", realisations=2000, out=tmp_path)
     folder = tmp_path / "rls2"
     names = {path.name for path in (folder / "figures").iterdir()}
     assert "captions.md" in names
@@ -204,12 +206,12 @@ def test_figures_have_the_width_asked_for_their_captions_and_what_they_were_made
     assert f"rls2, config {record['resolved_sha256']}" in svg
     assert "Root-mean-square error of the range" in svg
     for width in (85, 175):
-        result = running.report(first.experiment, out=tmp_path, figures=("svg",), width_mm=width)
+        result = run.report(first.experiment, out=tmp_path, figures=("svg",), width_mm=width)
         svg = (folder / "figures" / "sigma_r.svg").read_text()
         points = float(re.search(r'<svg[^>]* width="([\d.]+)pt"', svg)[1])
         assert points / 72 * 25.4 == pytest.approx(width, abs=0.05)
         assert "7.5px" in svg  # as large as at any other width
     assert result.written.removed == ()
-    kept = running.report(first.experiment, out=tmp_path, figures=("pdf",)).written
+    kept = run.report(first.experiment, out=tmp_path, figures=("pdf",)).written
     assert "figures/sigma_r.svg" in kept.removed
     assert not (folder / "figures" / "sigma_r.svg").exists()

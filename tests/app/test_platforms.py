@@ -7,8 +7,7 @@ import pytest
 import radarsim
 from radarsim.app import doctor
 from radarsim.engine import executors
-from radarsim.engine.machine import LIBRARIES, linear_algebra, platform_name, processor
-from radarsim.engine.store import decoded
+from radarsim.engine.store import LIBRARIES, decoded, linear_algebra, platform_name, processor
 from tests.engine.test_damage import reforged
 
 BLOCK = 4096
@@ -46,10 +45,10 @@ def test_a_header_names_what_decides_the_last_bits(out):
 
 @pytest.mark.parametrize("library", ["numpy", "numba"])
 def test_another_version_is_another_platform(monkeypatch, library):
-    from radarsim.engine import machine
+    from radarsim.engine import store
 
     here = platform_name()
-    monkeypatch.setattr(machine, "platform", lambda: {name: "9.9" if name == library else "1" for name in LIBRARIES})
+    monkeypatch.setattr(store, "platform", lambda: {name: "9.9" if name == library else "1" for name in LIBRARIES})
     assert platform_name.__wrapped__() != here
     assert f"{library} 9.9" in platform_name.__wrapped__()
 

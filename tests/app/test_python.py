@@ -63,8 +63,7 @@ def test_a_wrong_config_raises_the_lines_of_the_command():
 
 def test_realisation_i_is_the_same_in_any_run():
     """Sums over the first 5000 of 5000 and of 9000 agree: the difference is the sum over the others."""
-    from radarsim.app.configs import load
-    from radarsim.app.work import CaseWork
+    from radarsim.app.configs import CaseWork, load
 
     work = CaseWork(load(CONFIG).cases[0])
     whole, parts = work.simulate(0, 9000), work.simulate(0, 5000) + work.simulate(5000, 4000)

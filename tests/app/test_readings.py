@@ -11,13 +11,13 @@ import pytest
 from click.testing import CliRunner
 
 from radarsim.app import readings as app
-from radarsim.app.reading_runs import Plan
-from radarsim.app.simulation import RunOptions
-from radarsim.app.stored_readings import shipped_classes, stored_classes
+from radarsim.app.readings import Plan
+from radarsim.app.run import RunOptions
+from radarsim.app.stored import shipped_classes, stored_classes
 from radarsim.cli import main
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.report.claims import rule
-from radarsim.report.claims.readings import Alternative, Choice, PaperReadings, Unreadable
+from radarsim.report.claims.over import Alternative, Choice, PaperReadings, Unreadable
 from radarsim.studies import registry
 
 COLUMNS = "measured,lo,hi,exact,expected_lo,expected_hi,margin,verdict"

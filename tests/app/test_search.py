@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from radarsim.app import search
+from radarsim.app import quantities
 
-RANGE = search.searched(0.01, 100.0)
+RANGE = quantities.searched(0.01, 100.0)
 
 
 @pytest.mark.parametrize(
@@ -23,13 +23,13 @@ RANGE = search.searched(0.01, 100.0)
     ],
 )
 def test_all_roots_are_found_to_rounding(function, expected):
-    assert search.roots(function, RANGE).roots == pytest.approx(expected, rel=1e-12)
+    assert quantities.roots_of(function, RANGE).roots == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("off", [0.9, 0.99, 0.999999, 1.0, 1.001, 1.1])
 @pytest.mark.parametrize("function", [lambda x: math.log(x / 5), lambda x: 1 / x - 0.2, lambda x: x**3 - 125])
 def test_a_root_is_found_near_one_that_is_a_little_off(function, off):
-    assert search.near(function, RANGE, 5 * off, 0.0) == pytest.approx(5, rel=1e-9)
+    assert quantities.near(function, RANGE, 5 * off, 0.0) == pytest.approx(5, rel=1e-9)
 
 
 @pytest.mark.parametrize("off", [0.999, 0.999999, 1.0, 1.001])
@@ -45,24 +45,24 @@ def test_secants_end_at_the_root_in_few_steps(function, rising, off):
         looks.append(x)
         return function(x)
 
-    assert search.polished(seen, RANGE, 5 * off, rising, 0.0) == pytest.approx(5, rel=1e-9)
+    assert quantities.polished(seen, RANGE, 5 * off, rising, 0.0) == pytest.approx(5, rel=1e-9)
     assert len(looks) <= 4
 
 
 def test_secants_give_up_where_a_step_brings_no_nearer():
-    assert search.polished(lambda x: 1 + x, RANGE, 5.0, 0.0, 0.0) is None
-    assert search.polished(lambda x: 1 + (x - 5) ** 2, RANGE, 5.001, 0.05, 0.0) is None
-    assert search.polished(lambda x: math.copysign(1, x - 5), RANGE, 5.1, 5.0, 0.0) is None
-    assert search.polished(lambda x: 1e-3 if x < 5 else 1.5e-3, RANGE, 5.1, 5.0, 0.01) is not None
+    assert quantities.polished(lambda x: 1 + x, RANGE, 5.0, 0.0, 0.0) is None
+    assert quantities.polished(lambda x: 1 + (x - 5) ** 2, RANGE, 5.001, 0.05, 0.0) is None
+    assert quantities.polished(lambda x: math.copysign(1, x - 5), RANGE, 5.1, 5.0, 0.0) is None
+    assert quantities.polished(lambda x: 1e-3 if x < 5 else 1.5e-3, RANGE, 5.1, 5.0, 0.01) is not None
 
 
 def test_a_function_that_keeps_its_sign_has_no_root_near():
-    assert search.near(lambda x: 1 + x, RANGE, 5.0, 0.0) is None
-    assert search.near(lambda x: (x - 5) ** 2 + 1e-3, RANGE, 5.0, 0.0) is None
+    assert quantities.near(lambda x: 1 + x, RANGE, 5.0, 0.0) is None
+    assert quantities.near(lambda x: (x - 5) ** 2 + 1e-3, RANGE, 5.0, 0.0) is None
 
 
 def test_many_roots_on_a_linear_scale():
-    found = search.roots(math.sin, search.searched(1.0, 19.5)).roots
+    found = quantities.roots_of(math.sin, quantities.searched(1.0, 19.5)).roots
     assert found == pytest.approx([math.pi * n for n in range(1, 7)], rel=1e-12)
 
 
@@ -76,7 +76,7 @@ def test_random_cubics_against_their_roots():
         def function(x, logs=logs, sign=sign):
             return sign * float(np.prod(math.log(x) - logs))
 
-        found = np.log(search.roots(function, RANGE).roots)
+        found = np.log(quantities.roots_of(function, RANGE).roots)
         if np.diff(logs).min() > step:
             assert found == pytest.approx(logs, rel=1e-9)
         assert len(found) in (1, 3)
@@ -85,46 +85,46 @@ def test_random_cubics_against_their_roots():
 
 @pytest.mark.parametrize(("turn", "sign"), [(0.37, 1), (2.0, -1), (61.0, 1)])
 def test_where_there_is_no_root_the_limit_is_the_turn(turn, sign):
-    found = search.roots(lambda x: sign * (math.log(x / turn) ** 2 + 0.25), RANGE)
+    found = quantities.roots_of(lambda x: sign * (math.log(x / turn) ** 2 + 0.25), RANGE)
     assert found.roots == ()
     assert found.nearest == pytest.approx(turn, rel=1e-6)
     assert found.at_nearest == pytest.approx(sign * 0.25, rel=1e-9)
 
 
 def test_where_there_is_no_root_the_limit_may_be_an_end():
-    found = search.roots(lambda x: x + 1, RANGE)
+    found = quantities.roots_of(lambda x: x + 1, RANGE)
     assert (found.roots, found.nearest) == ((), 0.01)
 
 
 def test_a_root_in_the_last_defined_step_is_found():
-    found = search.roots(lambda x: math.nan if x > 3.2 else x - 3.15, RANGE)
+    found = quantities.roots_of(lambda x: math.nan if x > 3.2 else x - 3.15, RANGE)
     assert found.roots == pytest.approx([3.15], rel=1e-12)
-    beyond = search.roots(lambda x: math.nan if x > 3.2 else x - 3.3, RANGE)
+    beyond = quantities.roots_of(lambda x: math.nan if x > 3.2 else x - 3.3, RANGE)
     assert beyond.roots == ()
     assert beyond.nearest == pytest.approx(3.2, rel=1e-3)
 
 
 def test_a_function_that_is_defined_nowhere_is_refused():
     with pytest.raises(ValueError, match="not defined"):
-        search.roots(lambda x: math.nan, RANGE)
+        quantities.roots_of(lambda x: math.nan, RANGE)
 
 
 def test_a_jump_over_zero_is_closed_to_the_jump():
-    (root,) = search.roots(lambda x: -1.0 if x < 7.3 else 1.0, RANGE).roots
+    (root,) = quantities.roots_of(lambda x: -1.0 if x < 7.3 else 1.0, RANGE).roots
     assert root == pytest.approx(7.3, rel=1e-12)
 
 
 @pytest.mark.parametrize(("low", "high"), [(2, 30), (2, 100_000)])
 @pytest.mark.parametrize("edge", [5, 17, 29])
 def test_of_whole_numbers_one_beside_the_change(low, high, edge):
-    over = search.searched(low, high, whole=True)
+    over = quantities.searched(low, high, whole=True)
     seen = []
 
     def function(n):
         seen.append(n)
         return n - edge + 0.5
 
-    (root,) = search.roots(function, over).roots
+    (root,) = quantities.roots_of(function, over).roots
     assert root in (edge - 1, edge)
     assert all(float(n).is_integer() for n in seen)
 
@@ -137,17 +137,17 @@ def test_the_search_takes_few_values():
         count += 1
         return math.log(x) - 1
 
-    search.roots(function, search.searched(1e-3, 1e3))
+    quantities.roots_of(function, quantities.searched(1e-3, 1e3))
     assert count <= 45
 
 
 def test_a_change_of_sign_across_a_gap_is_no_root():
-    over = search.searched(-1.0, 2.0)
-    found = search.roots(lambda x: math.nan if -0.001 < x < 0.001 else x / abs(x) * (1 + x * x), over)
+    over = quantities.searched(-1.0, 2.0)
+    found = quantities.roots_of(lambda x: math.nan if -0.001 < x < 0.001 else x / abs(x) * (1 + x * x), over)
     assert found.roots == ()
     assert abs(found.at_nearest) == pytest.approx(1, abs=0.01)
 
 
 def test_a_jump_over_zero_is_where_it_jumps():
-    found = search.roots(lambda x: 1.0 if x > 0.3 else -1.0, search.searched(-1.0, 2.0))
+    found = quantities.roots_of(lambda x: 1.0 if x > 0.3 else -1.0, quantities.searched(-1.0, 2.0))
     assert found.roots == (pytest.approx(0.3, abs=1e-12),)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from radarsim.app import run as experiment
+from radarsim.app import run
 from tests.browser.chromium import Chromium, found
 
 
@@ -11,7 +11,7 @@ def results(tmp_path_factory):
     """A folder with runs: one radar, and the first paper's comparison."""
     out = tmp_path_factory.mktemp("results")
     for name in ("rls2", "range_doppler"):
-        experiment.run(name, realisations=4000, out=out)
+        run.run(name, realisations=4000, out=out)
     return out
 
 

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from radarsim.app.chart import chart
-from radarsim.studies.range_doppler import closed_form, exact, filters
-from radarsim.studies.range_doppler.propagation import Plots
+from radarsim.app.compare import chart
+from radarsim.studies.range_doppler import filters
+from radarsim.studies.range_doppler.filters import Plots
 from tests.browser.test_report import CONTRAST, NAMES
 
 pytestmark = pytest.mark.slow
@@ -24,7 +24,7 @@ def sigmas(observes, start, r, v, dt, dm, k):
     """σ (k, 3) by the package, not-a-number where there is no estimate."""
     sigma = np.array([r, v])
     design = filters.design(observes, start, dm, sigma, dt, k)
-    _, S = exact.error_recursion(design, Plots(sigma), np.zeros((k, 3)), dt)
+    _, S = filters.error_recursion(design, Plots(sigma), np.zeros((k, 3)), dt)
     return np.where(design.available, np.sqrt(np.diagonal(S, axis1=1, axis2=2)), np.nan)
 
 
@@ -52,8 +52,8 @@ def test_two_hundred_random_radars_are_those_of_python(page, live):
         np.testing.assert_allclose(two, expected[1], rtol=1e-9)
         np.testing.assert_allclose(gain, 100 * (1 - expected[1] / expected[0]), atol=2e-7)
         numbers = page.evaluate(f"radar.numbers({json.dumps(asked)})")
-        assert numbers["c"] == pytest.approx(closed_form.groups(r, v, dt, dm).c, rel=1e-12)
-        assert numbers["limit"] == pytest.approx(closed_form.steady_gains(numbers["c"]), abs=1e-8)
+        assert numbers["c"] == pytest.approx(filters.groups(r, v, dt, dm).c, rel=1e-12)
+        assert numbers["limit"] == pytest.approx(filters.steady_gains(numbers["c"]), abs=1e-8)
 
 
 def test_it_loads_offline_without_a_word_in_the_console(page, live):

@@ -8,8 +8,8 @@ import re
 import numpy as np
 import pytest
 
-from radarsim.app import run as experiment
-from radarsim.report import figures as drawing
+from radarsim.app import run
+from radarsim.report import figures
 
 pytestmark = pytest.mark.slow
 LARGEST = 1_500_000  # bytes
@@ -264,9 +264,9 @@ def every(tmp_path_factory):
     """A page of each study, of few realisations; no figure is written to a file."""
     out = tmp_path_factory.mktemp("every")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(drawing, "save", lambda *_, **__: {})
+        patch.setattr(figures, "save", lambda *_, **__: {})
         for name in STUDIES:
-            experiment.run(name, realisations=200, out=out)
+            run.run(name, realisations=200, out=out)
     return out
 
 

@@ -6,11 +6,10 @@ import signal
 import pytest
 from click.testing import CliRunner
 
-from radarsim.app.configs import load
-from radarsim.app.simulation import result_of
-from radarsim.app.work import CaseWork
+from radarsim.app.configs import CaseWork, load
+from radarsim.app.run import case_result
 from radarsim.cli import main
-from radarsim.engine.collect import collect
+from radarsim.engine.run import collect
 from radarsim.studies import registry
 from tests.cli.test_stopped import ended_by
 
@@ -106,7 +105,7 @@ def test_a_wrong_name_is_refused_before_anything_is_prepared(study, monkeypatch)
 def test_studies_say_truly_which_rates_they_make(study):
     case = load(CONFIGS[study][0]).cases[-1]
     work = CaseWork(case)
-    tables = registry.study(case.study).tables([result_of(case, work, collect(work, 2, threads=1))])
+    tables = registry.study(case.study).tables([case_result(case, work, collect(work, 2, threads=1))])
     rates = registry.study(case.study).rates(case.spec)
     assert rates is not None
     assert set(rates) == set(tables) & {"locks", "folds", "tracking"}

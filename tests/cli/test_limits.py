@@ -10,12 +10,12 @@ import pytest
 
 import radarsim
 from radarsim.app import outlook as overview
-from radarsim.app import output, writing
-from radarsim.app.configs import load
-from radarsim.app.simulation import result_of
-from radarsim.app.work import CaseWork
-from radarsim.engine import stopping
-from radarsim.engine.collect import collect
+from radarsim.app import result as output
+from radarsim.app import run as writing
+from radarsim.app.configs import CaseWork, load
+from radarsim.app.run import case_result
+from radarsim.engine import run as stopping
+from radarsim.engine.run import collect
 from radarsim.errors import ConfigError, TargetUnmet
 from tests.cli.test_run import csv_bytes
 from tests.cli.test_run import radarsim as command
@@ -32,8 +32,8 @@ def few(case):
     """A result of a case from few realisations, its tables, and the experiment of it alone."""
     one = load("range_doppler", ["realisations=2000"])
     work = CaseWork(case)
-    result = result_of(case, work, collect(work, 2))
-    return [result], output.tables([result], stem=one.stem), one
+    result = case_result(case, work, collect(work, 2))
+    return [result], output.case_tables([result], stem=one.stem), one
 
 
 def half_widths(folder):
@@ -177,7 +177,7 @@ def test_what_writing_takes_is_measured_by_case_and_figure(monkeypatch, figures)
     experiment = load("range_doppler", ["realisations=2000"])
     found = writing.seconds(experiment, figures, None)
     assert len(saved) == 2 * figures
-    names = len(output.figures(*few(experiment.cases[0])))
+    names = len(output.case_figures(*few(experiment.cases[0])))
     assert found == pytest.approx(1.25 * (len(experiment.cases) + (0.5 * names if figures else 0)))
 
 

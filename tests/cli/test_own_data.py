@@ -13,15 +13,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from radarsim.app import configs
-from radarsim.app import run as experiment
-from radarsim.app.work import CaseWork
+from radarsim.app import configs, run
+from radarsim.app.configs import CaseWork
 from radarsim.cli import group, main
-from radarsim.config import lookup
-from radarsim.config.identity import canonical
+from radarsim.config import document
+from radarsim.config.experiment import canonical
 from radarsim.errors import ConfigError
-from radarsim.recorded import accuracy, plots
-from radarsim.recorded import follow as recorded
+from radarsim.recorded import figures as accuracy
+from radarsim.recorded import follow, plots
 from radarsim.studies.range_doppler import track as range_doppler_plots
 
 RUNS = {  # config, overrides, filters' tolerance in their own σ: rules that choose among models amplify a rounding
@@ -42,7 +41,7 @@ def radarsim(*arguments, code=0):
 
 
 def loaded(config, overrides=()):
-    return experiment.load_all([config], overrides)[0]
+    return run.load_all([config], overrides)[0]
 
 
 def table_of(path):
@@ -60,10 +59,10 @@ def truth_of(columns, components):
 def test_track_over_a_simulated_file_makes_the_errors_of_the_study(tmp_path, config, realisation):
     overrides, tolerance = RUNS[config]
     one = loaded(config, overrides)
-    columns = recorded.simulated(one, realisation)
+    columns = follow.simulated(one, realisation)
     path = tmp_path / "plots.csv"
     plots.write_columns(columns, path)
-    case, track = recorded.track(one, path)
+    case, track = follow.track(one, path)
     work = CaseWork(case)
     sums = work.plan.layout.unpack(work.simulate(realisation, 1))
     at = np.asarray(work.plan.axes.k) - 1
@@ -77,12 +76,12 @@ def test_track_over_a_simulated_file_makes_the_errors_of_the_study(tmp_path, con
 @pytest.mark.parametrize("config", ["rls2", "multimodel"])
 def test_a_file_in_pieces_gives_the_same_track(tmp_path, config):
     one = loaded(config, ("scans=300",))
-    columns = recorded.simulated(one)
+    columns = follow.simulated(one)
     rng = np.random.default_rng(5)
     measured = [name for name in columns if not name.startswith("true_")][1:]
     for name in measured:
         columns[name] = np.where(rng.random(300) < 0.2, np.nan, columns[name])
-    study = recorded.recorded_of(one.cases[0])
+    study = follow.recorded_of(one.cases[0])
     wanted = {name: columns[name] for name in ("t_s", *measured)}
     whole = study.tracker(one.cases[0]).feed(wanted)
     for size in (1, 7, 299):
@@ -90,7 +89,7 @@ def test_a_file_in_pieces_gives_the_same_track(tmp_path, config):
         pieces = [
             tracker.feed({name: column[i : i + size] for name, column in wanted.items()}) for i in range(0, 300, size)
         ]
-        parts = recorded.joined(pieces)
+        parts = follow.joined(pieces)
         scale = np.where(whole.sigma > 0, whole.sigma, 1.0)
         assert np.array_equal(np.isfinite(parts.estimate), np.isfinite(whole.estimate))
         assert np.nanmax(np.abs(parts.estimate - whole.estimate) / scale) < 1e-5
@@ -105,7 +104,7 @@ def test_uneven_times_and_missing_values_are_least_squares_without_a_manoeuvre()
     z[rng.random(z.shape) < 0.3] = np.nan
     z[0] = 1e5, -250
     columns = {"t_s": t, "range_m": z[:, 0], "velocity_mps": z[:, 1]}
-    track = recorded.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(columns)
+    track = follow.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(columns)
     s = t - t[-1]
     rows = [np.stack([np.ones(60), s, s**2 / 2], axis=1) / 250, np.stack([np.zeros(60), np.ones(60), s], axis=1) / 15]
     for f, observed in enumerate((1, 2)):
@@ -121,7 +120,7 @@ def test_a_row_without_a_value_is_extrapolated():
     one = loaded("rls2")
     columns = {"t_s": np.array([0.0, 10, 20, 30, 47]), "range_m": np.array([1e5, 9.7e4, 9.4e4, 9.1e4, np.nan])}
     columns["velocity_mps"] = np.array([-300.0, -300, -300, -300, np.nan])
-    track = recorded.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(columns)
+    track = follow.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(columns)
     for f in range(2):
         r, v, a = track.estimate[f, 3]
         expected = [r + 17 * v + 17**2 / 2 * a, v + 17 * a, a]
@@ -135,7 +134,7 @@ def test_velocities_alone_never_start_a_track_of_ranges(monkeypatch):
     monkeypatch.setattr(range_doppler_plots, "LONGEST_START", 40)
     t = np.arange(150.0)  # more than a start looks back
     columns = {"t_s": t, "range_m": np.full(150, np.nan), "velocity_mps": np.full(150, 7.0)}
-    track = recorded.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(columns)
+    track = follow.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(columns)
     assert np.isnan(track.estimate[0]).all()
     assert np.array_equal(np.isfinite(track.estimate[1]), np.tile([False, True, False], (150, 1)))
 
@@ -143,8 +142,8 @@ def test_velocities_alone_never_start_a_track_of_ranges(monkeypatch):
 def followed(tmp_path, config, overrides, stated=()):
     one = loaded(config, overrides)
     path = tmp_path / "plots.csv"
-    plots.write_columns(recorded.simulated(one), path)
-    return recorded.follow(loaded(config, (*overrides, *stated)), path)
+    plots.write_columns(follow.simulated(one), path)
+    return follow.follow(loaded(config, (*overrides, *stated)), path)
 
 
 @pytest.mark.parametrize(
@@ -363,7 +362,7 @@ def test_the_page_names_a_config_for_every_example_file(tmp_path):
         radarsim("track", first, Path("docs/examples") / name, *options, "-o", tmp_path / "track.csv")
 
 
-@pytest.mark.parametrize("like", lookup.stems("configs"))
+@pytest.mark.parametrize("like", document.stems("configs"))
 def test_a_config_of_ones_own_is_the_same_experiment(tmp_path, like):
     path = configs.new("mine", like, tmp_path)
     mine, theirs = configs.load(str(path)), configs.load(like)

@@ -97,10 +97,10 @@ def test_same_bytes_when_extended(tmp_path):
 
 def test_the_command_that_a_run_names_shows_the_claims_of_that_run(tmp_path):
     """Of any directory of results and a config of one's own, as of the shipped ones."""
-    from radarsim.config import lookup
+    from radarsim.config import document
 
     mine, out = tmp_path / "mine.yaml", tmp_path / "my results"
-    mine.write_text((lookup.SHIPPED / "configs/rls2.yaml").read_text())
+    mine.write_text((document.SHIPPED / "configs/rls2.yaml").read_text())
     for config in ("rls2", mine):
         said = radarsim("run", config, "-n", 300, "--out", out, "--no-figures").output
         for _ in range(2):  # the command that it names, and that which this one names

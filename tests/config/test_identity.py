@@ -9,9 +9,9 @@ import pytest
 from pydantic import Field
 
 from radarsim.app.configs import load
+from radarsim.config.document import SHIPPED
+from radarsim.config.experiment import canonical, world
 from radarsim.config.fields import DataFile, Model, Study
-from radarsim.config.identity import canonical, world
-from radarsim.config.lookup import SHIPPED
 from radarsim.studies import registry
 
 LABELS = ["radar.name=Something", "radar.band=metre", "filters.0.name=range alone"]

@@ -4,9 +4,8 @@ import pytest
 from pydantic import Field
 
 from radarsim.app.configs import load
-from radarsim.config.check import models_in
+from radarsim.config.check import Label, label, models_in
 from radarsim.config.fields import Model, Positive, Study
-from radarsim.config.labels import Label, label
 from radarsim.config.schema import Common
 from radarsim.studies import registry
 

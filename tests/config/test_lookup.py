@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from radarsim.app.configs import load
-from radarsim.config import lookup
+from radarsim.config import document
 
-SHIPPED = sorted(file.stem for file in (lookup.SHIPPED / "configs").glob("*.yaml"))
-OWN = (lookup.SHIPPED / "configs/rls2.yaml").read_text()
+SHIPPED = sorted(file.stem for file in (document.SHIPPED / "configs").glob("*.yaml"))
+OWN = (document.SHIPPED / "configs/rls2.yaml").read_text()
 
 
 def coefficients(source):
@@ -21,7 +21,7 @@ def coefficients(source):
 def test_shipped_configs_run_by_stem_from_anywhere(house, stem):
     experiment = load(stem)
     assert experiment.stem == stem
-    assert experiment.path == str(lookup.SHIPPED / f"configs/{stem}.yaml")
+    assert experiment.path == str(document.SHIPPED / f"configs/{stem}.yaml")
 
 
 def test_a_config_here_comes_before_one_in_configs_before_the_shipped(house):
@@ -144,20 +144,20 @@ def test_a_file_that_may_not_be_read(house, said):
 
 @pytest.mark.parametrize("name", ["a", "rls2_manoeuvre_variance", "multimodel_1hz", "a-b+c=1.5", "рлс2", "2"])
 def test_stems(name):
-    assert lookup.is_stem(name)
+    assert document.is_stem(name)
 
 
 @pytest.mark.parametrize(
     "name", ["", ".", "..", ".a", "a/b", "/a", "a\\b", "C:a", "a b", "a\n", "a..b", "a.", "-a", "x" * 101, "~"]
 )
 def test_no_stems(name):
-    assert not lookup.is_stem(name)
+    assert not document.is_stem(name)
 
 
 def test_the_shipped_folders_are_those_of_the_checkout():
     root = Path(__file__).parents[2]
     for kind in ("configs", "scenarios"):
-        assert (lookup.SHIPPED / kind).resolve() == root / kind
+        assert (document.SHIPPED / kind).resolve() == root / kind
 
 
 def test_a_wheel_holds_every_shipped_file():

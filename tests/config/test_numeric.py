@@ -5,7 +5,7 @@ import math
 import pytest
 
 from radarsim.app.configs import load
-from radarsim.config import numeric
+from radarsim.config import fields
 from radarsim.errors import ConfigError
 
 STEMS = ("rls2", "multimodel", "sonar_clutter", "sonar_manoeuvre", "discriminator")
@@ -17,7 +17,7 @@ def test_keys_can_be_set_to_their_own_values(stem):
     all, has no place there."""
     case = load(stem).cases[0]
     swept = {key for key, _ in case.swept}
-    given = [key for key in numeric.keys(case.spec) if key.value is not None and key.path not in swept]
+    given = [key for key in fields.keys(case.spec) if key.value is not None and key.path not in swept]
     places, refused = [], []
     for key in given:
         try:
@@ -31,15 +31,15 @@ def test_keys_can_be_set_to_their_own_values(stem):
 
 
 def test_the_keys_of_a_radar():
-    keys = {key.path: key for key in numeric.keys(load("rls2").cases[0].spec)}
-    assert keys["radar.sigma_range_m"] == numeric.NumericKey("radar.sigma_range_m", 250.0, 0, math.inf, False)
+    keys = {key.path: key for key in fields.keys(load("rls2").cases[0].spec)}
+    assert keys["radar.sigma_range_m"] == fields.NumericKey("radar.sigma_range_m", 250.0, 0, math.inf, False)
     assert keys["target.coefficients.2"].value == 4.0
     assert (keys["filters.1.initial_scans"].low, keys["filters.1.initial_scans"].whole) == (2, True)
     assert not any(path.startswith("radar.band") for path in keys)
 
 
 def test_bounds_of_both_ends_and_optional_keys():
-    keys = {key.path: key for key in numeric.keys(load("sonar_clutter").cases[0].spec)}
+    keys = {key.path: key for key in fields.keys(load("sonar_clutter").cases[0].spec)}
     probability = keys["sensor.detection_probability"]
     assert (probability.low, probability.high) == (0, 1)
     assert (keys["filters.0.gate_probability"].value, keys["filters.0.plots"].value) == (0.99, None)
@@ -48,9 +48,9 @@ def test_bounds_of_both_ends_and_optional_keys():
 
 def test_a_bare_filter_key_means_every_filter_and_degrees_are_understood():
     spec = load("rls2").cases[0].spec
-    both = numeric.find(spec, "manoeuvre_variance")
+    both = fields.find(spec, "manoeuvre_variance")
     assert [key.path for key in both] == ["filters.0.manoeuvre_variance", "filters.1.manoeuvre_variance"]
-    (one,) = numeric.find(load("sonar_clutter").cases[0].spec, "sensor.sigma_bearing_deg")
+    (one,) = fields.find(load("sonar_clutter").cases[0].spec, "sensor.sigma_bearing_deg")
     assert one.path == "sensor.sigma_bearing_deg"
     assert one.value == pytest.approx(1)
     assert one.high == pytest.approx(math.degrees(0.5))
@@ -72,5 +72,5 @@ def test_a_bare_filter_key_means_every_filter_and_degrees_are_understood():
 )
 def test_what_is_no_numeric_key(name, words):
     with pytest.raises(ConfigError) as refused:
-        numeric.find(load("rls2").cases[0].spec, name)
+        fields.find(load("rls2").cases[0].spec, name)
     assert words in str(refused.value)

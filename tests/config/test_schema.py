@@ -14,10 +14,9 @@ from pydantic import BaseModel, Field
 from radarsim.app.configs import load, schema_json
 from radarsim.config import schema
 from radarsim.config.check import check, models_in
-from radarsim.config.document import Document
-from radarsim.config.faults import Faults, Origin
+from radarsim.config.document import Document, Faults, Origin
 from radarsim.config.fields import Model, Number, Positive, Study
-from radarsim.config.json_schema import schema as json_schema
+from radarsim.config.schema import schema as json_schema
 from radarsim.errors import ConfigError
 from radarsim.studies import registry
 

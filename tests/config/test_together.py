@@ -5,7 +5,7 @@ import copy
 import pytest
 
 from radarsim.app.configs import load
-from radarsim.config.identity import complete
+from radarsim.config.experiment import complete
 from radarsim.report.panels import RADIAL
 from radarsim.studies.range_doppler.config import Keys
 

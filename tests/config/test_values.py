@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from radarsim.config.faults import Faults, Origin, short, shown
-from radarsim.config.values import NotFinite, from_python, from_text
+from radarsim.config.document import Faults, Origin, short, shown
+from radarsim.config.fields import NotFinite, from_python, from_text
 from radarsim.errors import ConfigError
 
 NUMBERS = {

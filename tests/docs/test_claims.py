@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from radarsim.app.run import papers
-from radarsim.app.stored_readings import shipped_classes
+from radarsim.app.stored import shipped_classes
 from radarsim.report import claims
 from radarsim.report.claims import page, rule
 

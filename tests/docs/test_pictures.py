@@ -80,11 +80,11 @@ def test_marks_are_filled_with_pictures_and_captions(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("config", [config for config in pictures.every() if config != pictures.CHART])
 def test_every_figure_that_a_page_shows_is_one_of_its_config(config):
-    from radarsim.app import output
+    from radarsim.app import result as output
     from radarsim.app.run import run
 
     result = run(config, realisations=64)
-    drawn = output.figures(result.cases, result.tables, result.experiment)
+    drawn = output.case_figures(result.cases, result.tables, result.experiment)
     assert {name for name, _ in pictures.every()[config]} <= set(drawn)
 
 

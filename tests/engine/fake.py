@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from radarsim.engine import keeper
-from radarsim.engine.collect import collect
-from radarsim.engine.moments import Sums
-from radarsim.engine.stopping import Signals
+from radarsim.engine import store
+from radarsim.engine.results import Sums
+from radarsim.engine.run import Signals, collect
 
 
 @dataclass(frozen=True)
@@ -93,10 +92,10 @@ def main() -> None:
     parser.add_argument("realisations", type=int)
     parser.add_argument("--pause", type=float, default=0.0)
     parser.add_argument("--stuck-at", type=int, default=-1)
-    parser.add_argument("--period", type=float, default=keeper.PERIOD_S)
+    parser.add_argument("--period", type=float, default=store.PERIOD_S)
     parser.add_argument("--linger", action="store_true")
     asked = parser.parse_args()
-    keeper.PERIOD_S = asked.period
+    store.PERIOD_S = asked.period
     said = []
 
     def progress(done: int, total: int, from_store: int) -> None:

@@ -5,8 +5,8 @@ import random
 import numpy as np
 import pytest
 
-from radarsim.engine.audit import agree, audited, removable
-from radarsim.engine.collect import collect, share
+from radarsim.engine.run import collect, share
+from radarsim.engine.store import agree, audited, removable
 from tests.engine.fake import NAMES, WORK, Fake, N, contents
 from tests.engine.test_damage import DAMAGE, reforged
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from radarsim.engine.blocks import Forest, Node, Partial, Total, maximal, simulated, widest
-from radarsim.engine.moments import Sums
+from radarsim.engine.results import Sums
 from radarsim.errors import NonFiniteError
 from tests.engine.fake import Fake, textbook
 from tests.engine.tree import decomposition

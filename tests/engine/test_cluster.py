@@ -21,7 +21,7 @@ import pytest
 from radarsim.engine import cluster
 from radarsim.engine.blocks import Node
 from radarsim.engine.cluster import Cluster
-from radarsim.engine.collect import collect
+from radarsim.engine.run import collect
 from radarsim.errors import ClusterError, ConfigError, NonFiniteError
 from tests.engine.fake import WORK, Fake, N, same, textbook
 

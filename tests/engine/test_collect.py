@@ -13,11 +13,9 @@ from queue import Empty, SimpleQueue
 import numpy as np
 import pytest
 
-from radarsim.engine.collect import collect
 from radarsim.engine.executors import Serial, Threads, attempted
-from radarsim.engine.machine import available_cores
-from radarsim.engine.run import Pace
-from radarsim.engine.stopping import time_limit
+from radarsim.engine.run import Pace, collect, time_limit
+from radarsim.engine.store import available_cores
 from radarsim.errors import NonFiniteError
 from tests.engine.fake import Fake, textbook
 
@@ -234,7 +232,7 @@ def test_memory_is_flat_up_to_a_thousand_million_realisations():
     program = """if True:
         import resource
         import numpy as np
-        from radarsim.engine.collect import collect
+        from radarsim.engine.run import collect
 
         class Light:
             identity, block, size = "ab", 4096, 500

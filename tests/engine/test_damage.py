@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarsim.engine import keeper, store
+from radarsim.engine import store
 from radarsim.engine.blocks import Node
-from radarsim.engine.collect import collect, stored
-from radarsim.engine.moments import Sums
+from radarsim.engine.results import Sums
+from radarsim.engine.run import collect, stored
 from radarsim.engine.store import Store, decoded, encoded
 from radarsim.errors import StoreError
 from tests.engine.fake import NAMES, WORK, Fake, N, contents, names, same
@@ -123,7 +123,7 @@ def test_a_file_appears_whole_and_safe_before_what_it_replaces_goes(tmp_path, bl
     recorded(os, "fsync", lambda fd: "sync directory" if stat.S_ISDIR(os.fstat(fd).st_mode) else "sync file")
     recorded(os, "replace", replaced)
     recorded(Path, "unlink", lambda path: f"remove {path.name}")
-    writer = keeper.Keeper(Store(tmp_path, WORK))
+    writer = store.Keeper(Store(tmp_path, WORK))
     writer.finish({Node(2, 0): Sums(64, np.ones(5))})
     assert events == ["sync file", "rename L02-0.sums", "sync directory", "remove L01-0.sums"]
 
@@ -160,7 +160,7 @@ def test_a_full_disk_names_the_file_and_leaves_the_old_ones(tmp_path, blocks, mo
 
 
 def test_a_disk_that_fills_up_while_running_ends_the_run_at_once(tmp_path, blocks, monkeypatch):
-    monkeypatch.setattr(keeper, "PERIOD_S", 0.05)
+    monkeypatch.setattr(store, "PERIOD_S", 0.05)
     full_disk(monkeypatch, 3)
     done = []
     with pytest.raises(StoreError, match="No space left"):
@@ -173,7 +173,7 @@ def test_a_disk_that_fills_up_while_running_ends_the_run_at_once(tmp_path, block
 
 LIMITED = """if True:
     import resource, signal
-    from radarsim.engine.collect import collect
+    from radarsim.engine.run import collect
     from radarsim.errors import StoreError
     from tests.engine.fake import Fake
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from radarsim.engine import store
-from radarsim.engine.audit import audited, removable
 from radarsim.engine.blocks import Total
-from radarsim.engine.collect import collect, share, stored
-from radarsim.engine.store import Store, decoded
+from radarsim.engine.run import collect, share, stored
+from radarsim.engine.store import Store, audited, decoded, removable
 from tests.engine.fake import Fake, N, contents, same
 from tests.engine.test_damage import reforged
 
@@ -153,7 +152,7 @@ def test_two_at_once_come_to_the_same(tmp_path, moved):
 KILLED = """
 import os, sys
 from radarsim.engine import store
-from radarsim.engine.collect import collect
+from radarsim.engine.run import collect
 from tests.engine.test_proof import of, N
 
 def dying(*arguments):

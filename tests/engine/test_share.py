@@ -8,10 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from radarsim.engine.blocks import Node, Total
-from radarsim.engine.collect import collect, share, stored
-from radarsim.engine.run import Share
-from radarsim.engine.stock import BY_CHANCE, Stock, as_shares, stock
-from radarsim.engine.store import Store
+from radarsim.engine.run import Share, collect, share, stored
+from radarsim.engine.store import BY_CHANCE, Stock, Store, as_shares, stock
 from tests.engine.fake import WORK, Fake, N, same
 
 

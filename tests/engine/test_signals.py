@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 
 from radarsim.engine.blocks import Node
-from radarsim.engine.collect import collect, stored
-from radarsim.engine.stopping import Signals
+from radarsim.engine.run import Signals, collect, stored
 from radarsim.engine.store import Store
 from radarsim.errors import Interrupted
 from tests.engine.fake import Fake, textbook

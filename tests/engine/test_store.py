@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarsim.engine import executors, keeper
+from radarsim.engine import executors
+from radarsim.engine import store as keeper
 from radarsim.engine.blocks import Node, Partial, Total
-from radarsim.engine.collect import collect, stored
-from radarsim.engine.moments import Sums
+from radarsim.engine.results import Sums
+from radarsim.engine.run import collect, stored
 from radarsim.engine.store import Store, decoded, is_directory, piece_named
 from radarsim.errors import NonFiniteError
 from tests.engine.fake import NAMES, WORK, Fake, N, contents, names, same

@@ -6,7 +6,7 @@ import pytest
 from radarsim.kernels import algebra, lanes
 from radarsim.kernels.compile import kernel
 from radarsim.kernels.lanes import WIDTH, address, full, get3, get6, put3, put6
-from radarsim.physics.motion import transition
+from radarsim.physics import transition
 
 COUNT = 8
 R = 0.7

@@ -16,7 +16,7 @@ from numba import njit
 from numba.core.registry import cpu_target
 
 from radarsim.app import selftest
-from radarsim.kernels import cache
+from radarsim.kernels import compile
 from radarsim.kernels.compile import COMMON
 
 
@@ -28,13 +28,13 @@ def twice(x):
 def troubles(monkeypatch):
     """The lines for the user, none at first."""
     found = {}
-    monkeypatch.setattr(cache, "troubles", found)
+    monkeypatch.setattr(compile, "troubles", found)
     return found
 
 
 def kept_in(function, path):
     """A cache in a directory of its own."""
-    found = cache.KernelCache(function)
+    found = compile.KernelCache(function)
     found._path = path
     return found
 
@@ -76,7 +76,7 @@ def altered(raw):
 
 
 def signed(body):
-    return cache.hashlib.sha256(body).digest() + body
+    return compile.hashlib.sha256(body).digest() + body
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def signed(body):
         lambda raw: b"\x80" * 500,
         lambda raw: signed(b"no pickle"),
         lambda raw: signed(pickle.dumps(3)),
-        lambda raw: signed(pickle.dumps((pickle.loads(raw[cache.DIGEST :])[0], ()))),
+        lambda raw: signed(pickle.dumps((pickle.loads(raw[compile.DIGEST :])[0], ()))),
         lambda raw: signed(b"cno_such_module\nname\n."),
     ],
 )
@@ -159,8 +159,8 @@ def test_nowhere_to_keep_anything(monkeypatch, tmp_path, troubles):
     blocked.write_text("not a directory")
     monkeypatch.setenv("RADARSIM_CACHE_DIR", str(blocked))
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
-    monkeypatch.setattr(cache.tempfile, "tempdir", str(blocked))
-    assert cache.cache_root() == blocked
+    monkeypatch.setattr(compile.tempfile, "tempdir", str(blocked))
+    assert compile.cache_root() == blocked
     assert "each run compiles again" in troubles["write"]
 
 
@@ -169,7 +169,7 @@ def test_a_function_of_no_file_is_not_kept():
     sys.modules["no_file"] = module = ModuleType("no_file")
     try:
         exec("def thrice(x):\n    return 3 * x\n", names)
-        assert not isinstance(cache.kept(njit(names["thrice"]))._cache, cache.KernelCache)
+        assert not isinstance(compile.kept(njit(names["thrice"]))._cache, compile.KernelCache)
     finally:
         del sys.modules[module.__name__]
 

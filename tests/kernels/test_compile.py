@@ -16,11 +16,10 @@ import pytest
 from numba.core.registry import cpu_target
 from numba.core.typing import Context
 
-from radarsim.kernels import cache
-from radarsim.kernels import compile as compiling
-from radarsim.kernels.resolving import resolving
+from radarsim.kernels import compile
+from radarsim.kernels.compile import resolving
 
-SOURCES = Path(compiling.__file__).parent
+SOURCES = Path(compile.__file__).parent
 
 
 def python(code, **environment):
@@ -102,14 +101,14 @@ def test_the_first_writable_place(monkeypatch, tmp_path):
     blocked.write_text("not a directory")
     monkeypatch.setenv("RADARSIM_CACHE_DIR", str(tmp_path / "own"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
-    assert cache.cache_root() == tmp_path / "own"
+    assert compile.cache_root() == tmp_path / "own"
     monkeypatch.setenv("RADARSIM_CACHE_DIR", str(blocked))
-    assert cache.cache_root() == tmp_path / "home" / "radarsim"
+    assert compile.cache_root() == tmp_path / "home" / "radarsim"
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
-    monkeypatch.setattr(cache.tempfile, "tempdir", str(tmp_path))
-    shared = cache.cache_root()
+    monkeypatch.setattr(compile.tempfile, "tempdir", str(tmp_path))
+    shared = compile.cache_root()
     assert shared.parent == tmp_path
-    assert cache.cache_root() == shared
+    assert compile.cache_root() == shared
     if hasattr(os, "getuid"):
         assert shared.stat().st_mode & 0o777 == 0o700
 
@@ -121,16 +120,16 @@ def test_a_shared_place_that_others_can_write_is_not_trusted(monkeypatch, tmp_pa
     blocked.write_text("not a directory")
     monkeypatch.setenv("RADARSIM_CACHE_DIR", str(blocked))
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
-    monkeypatch.setattr(cache.tempfile, "tempdir", str(tmp_path))
-    planted = cache.cache_root()
+    monkeypatch.setattr(compile.tempfile, "tempdir", str(tmp_path))
+    planted = compile.cache_root()
     planted.chmod(0o777)
-    assert cache.cache_root() != planted
+    assert compile.cache_root() != planted
 
 
 def test_other_users_of_numba_keep_their_cache():
     before = numba.config.CACHE_DIR
 
-    @compiling.kernel
+    @compile.kernel
     def twice(x):
         return 2 * x
 
@@ -146,7 +145,7 @@ def test_loops_use_wide_registers():
         for i in range(x.size):
             x[i] = 1.5 * x[i]
 
-    options = {"fastmath": set(compiling.FLAGS), **compiling.COMMON}
+    options = {"fastmath": set(compile.FLAGS), **compile.COMMON}
     function = numba.njit(**options)(scaled)
     function(np.ones(8))
     (assembly,) = function.inspect_asm().values()
@@ -156,42 +155,42 @@ def test_loops_use_wide_registers():
 def test_functions_without_an_entry_refuse_python():
     """They stay untranslated until a kernel needs them; Python gets an error, no crash; a formula it calls as it is."""
 
-    @compiling.part
+    @compile.part
     def halved(x):
         return x / 2
 
-    @compiling.inline
+    @compile.inline
     def grown(x):
         return halved(x) + 1
 
-    @compiling.inline
+    @compile.inline
     def doubled(x):
         return 2 * x
 
-    @compiling.inline
+    @compile.inline
     def squared(x):
         return doubled(x) * x / 2
 
     for function in (halved, grown):
         with pytest.raises(TypeError, match="not callable"):
             function(4.0)
-    assert compiling.kernel(lambda x: grown(x))(4.0) == 3.0
-    assert compiling.kernel(lambda x: squared(x))(4.0) == squared(4.0) == 16.0
+    assert compile.kernel(lambda x: grown(x))(4.0) == 3.0
+    assert compile.kernel(lambda x: squared(x))(4.0) == squared(4.0) == 16.0
     assert (squared(np.array([1.0, 2.0])) == [1.0, 4.0]).all()
 
 
 def test_a_kernel_that_another_calls_is_compiled_for_it_apart(monkeypatch):
     """Without an entry and machine code of its own, until Python calls it; it gives both the same bytes."""
-    monkeypatch.setattr(cache, "kept", lambda function: function)
+    monkeypatch.setattr(compile, "kept", lambda function: function)
 
-    @compiling.kernel
+    @compile.kernel
     def total(x):
         out = 0.0
         for i in range(x.size):
             out += x[i] * 0.1
         return out
 
-    @compiling.kernel
+    @compile.kernel
     def twice(x):
         return 2.0 * total(x)
 
@@ -206,7 +205,7 @@ def test_a_kernel_that_another_calls_is_compiled_for_it_apart(monkeypatch):
 def test_the_type_of_an_operation_is_found_once(monkeypatch):
     """However often it stands in kernels; what Numba compiles on the way is asked for each time, as it was."""
     asked = []
-    monkeypatch.setattr(cache, "kept", lambda function: function)
+    monkeypatch.setattr(compile, "kept", lambda function: function)
     monkeypatch.setattr(resolving(cpu_target.typing_context), "_known", {})
     numba_finds = Context.resolve_function_type
 
@@ -222,7 +221,7 @@ def test_the_type_of_an_operation_is_found_once(monkeypatch):
         return y if np.any(flags) or np.any(flags) else x
 
     for _ in range(2):  # a second kernel finds what the first has found
-        assert compiling.kernel(types.FunctionType(powers.__code__, globals()))(5.0, np.ones(2, bool)) == 1.5
+        assert compile.kernel(types.FunctionType(powers.__code__, globals()))(5.0, np.ones(2, bool)) == 1.5
     assert asked.count(operator.mod) == 1
     assert asked.count(np.any) > 2
 
@@ -254,7 +253,7 @@ def chosen(pair, more):
 def test_references_to_a_kernels_arguments_are_not_counted():
     sums = types.FunctionType(chosen.__code__, {"__name__": "nowhere"})  # of no file, so not from a cache
     second, counted = np.arange(3.0), []
-    for compiled in (numba.njit(sums), compiling.kernel(sums)):
+    for compiled in (numba.njit(sums), compile.kernel(sums)):
         assert compiled(Pair(np.ones(3), second), (second, 1.0)) == 3.0
         [made] = compiled.overloads.values()
         [inner] = (one for one in made.library._final_module.functions if one.name == made.fndesc.mangled_name)
@@ -266,7 +265,7 @@ def test_references_to_a_kernels_arguments_are_not_counted():
 def test_what_a_kernel_returns_is_counted():
     passed = types.FunctionType((lambda pair, x: (pair.first[1:], x)).__code__, {"__name__": "nowhere"})
     first = np.arange(1e6)
-    rest, _ = compiling.kernel(passed)(Pair(first, first), 1.0)
+    rest, _ = compile.kernel(passed)(Pair(first, first), 1.0)
     held = weakref.ref(first)
     del first
     assert held() is not None

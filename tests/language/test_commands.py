@@ -7,14 +7,15 @@ import pytest
 from click.testing import CliRunner
 from making import messages
 
-from radarsim.app import inventory, question, readings
-from radarsim.app.chart import chart, described
+from radarsim.app import question, readings, stored
+from radarsim.app.compare import chart, described
 from radarsim.app.configs import load
 from radarsim.app.quantities import Quantity
 from radarsim.cli import main
 from radarsim.language import speaking, tr
-from radarsim.report.claims import curve, reasons
-from radarsim.report.claims.paper import differences
+from radarsim.report.claims import page as curve
+from radarsim.report.claims import rule
+from radarsim.report.claims.declared import differences
 from radarsim.studies.range_doppler.chart import SAID
 from radarsim.studies.range_doppler.study import exact_but_for
 from tests.language.test_russian import NAMES, shown, untranslated
@@ -66,7 +67,7 @@ def test_the_chart_table_is_the_same(tmp_path):
 def test_the_list_says_what_things_are_and_leaves_their_names():
     with speaking("ru"):
         ended = CliRunner().invoke(main, ["list"])
-    for _, _, rows in inventory.inventory():
+    for _, _, rows in stored.inventory():
         for row in rows:
             assert row[0] in ended.stdout
             assert tr(row[-1]) == row[-1]
@@ -104,9 +105,9 @@ REASONS = (
 
 @pytest.mark.parametrize("why", REASONS)
 def test_reasons_of_claims_that_are_not_judged(why):
-    assert reasons.said(why) == why
+    assert rule.said(why) == why
     with speaking("ru"):
-        said = reasons.said(why)
+        said = rule.said(why)
     assert untranslated(said, {"rls", "seed", "filters", "target", "radar"}) == []
     assert re.findall(r"\d+", said.replace(",", ".")) == re.findall(r"\d+", why)
 

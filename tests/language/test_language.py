@@ -12,7 +12,7 @@ from radarsim import language
 from radarsim.cli import main
 from radarsim.errors import ConfigError
 from radarsim.language import listed, numeral, plural, speaking, term, tr
-from radarsim.report import text
+from radarsim.report import tables
 
 CODES = [code for code in language.known() if code != language.ENGLISH]
 
@@ -31,8 +31,8 @@ def test_numbers_are_written_as_the_language_writes_them():
         assert numeral("1.72e-05") == "1,72·10⁻⁵"
         assert tr("a span of {span:.4g} m/s", span=-1.5) == "интервал однозначности −1,5 м/с"
         assert numeral("-1,234.5") == "−1\N{NARROW NO-BREAK SPACE}234,5"
-        assert text.number(2.5e-7) == "2,5·10⁻⁷"
-        assert text.estimate((12.3, 12.0, 12.6), "м") == "12,3 м [12; 12,6]"
+        assert tables.number(2.5e-7) == "2,5·10⁻⁷"
+        assert tables.estimate((12.3, 12.0, 12.6), "м") == "12,3 м [12; 12,6]"
         assert tr("{name}: bias", name="1.5") == "1.5: смещение"  # a name of the user's stays as it is
 
 
@@ -149,11 +149,11 @@ def forms(message):
 
 def test_names_with_commas_stay_one_name_in_a_row():
     """`cured, gated` is one filter, not two: in questions, captions and warnings."""
-    from radarsim.report import provenance, seen
+    from radarsim.report import files, seen
 
     names = ["sequence", "cured", "cured, gated", "dense"]
     assert language.few(names) == seen.named(names) == "sequence, cured, “cured, gated” and dense"
-    assert provenance.few([SimpleNamespace(name=one, count=9) for one in names]) == [
+    assert files.few([SimpleNamespace(name=one, count=9) for one in names]) == [
         "sequence, cured, “cured, gated” and dense: intervals of 9 realisations are rough, use at least 200"
     ]
     assert language.few(["cured, gated"]) == "cured, gated"

@@ -5,9 +5,9 @@ import re
 
 import pytest
 
-from radarsim.app import output
+from radarsim.app import result as output
 from radarsim.app.run import run
-from radarsim.config.lookup import SHIPPED
+from radarsim.config.document import SHIPPED
 from radarsim.language import speaking
 from radarsim.report.drawing import Figure
 from radarsim.report.tables import to_csv
@@ -82,12 +82,12 @@ def check(stem: str, realisations: int, folder) -> None:
         names |= {word for choice in readings.choices for word in re.findall("[A-Za-z]+", choice.key)}  # as typed
     config = (SHIPPED / "configs" / f"{stem}.yaml").read_text(encoding="utf-8")
     names |= {path.stem for path in (SHIPPED / "scenarios").glob("*.yaml") if f"target: {path.stem}" in config}
-    before = {name: to_csv(table) for name, table in output.tables(result.cases, stem=stem).items()}
+    before = {name: to_csv(table) for name, table in output.case_tables(result.cases, stem=stem).items()}
     with speaking("ru"):
-        made = output.tables(result.cases, stem=stem)
+        made = output.case_tables(result.cases, stem=stem)
         assert {name: to_csv(table) for name, table in made.items()} == before
-        figures = output.figures(result.cases, made, result.experiment)
-        written = output.write(result.experiment, result.cases, folder / "ru", {}, draw=False, made=made)
+        figures = output.case_figures(result.cases, made, result.experiment)
+        written = output.write_files(result.experiment, result.cases, folder / "ru", {}, draw=False, made=made)
         page = (written.folder / "report.html").read_text(encoding="utf-8")
         texts = [words for figure in figures.values() for words in shown(figure)]
     left = {words: found for words in [*texts, *told(page)] if (found := untranslated(words, names))}

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from radarsim.physics import frames
+from radarsim import physics
 from tests.physics.antenna import to_biconical
 
 ANGLE = st.floats(-3.1, 3.1)
@@ -22,7 +22,7 @@ def points(n=500, seed=1, edge=0.97):
 
 @given(ANGLE, st.floats(-1.5, 1.5))
 def test_rotation_is_a_right_hand_turn(azimuth, elevation):
-    R = frames.rotation(azimuth, elevation)
+    R = physics.rotation(azimuth, elevation)
     assert np.allclose(R @ R.T, np.eye(3), atol=1e-14)
     assert np.isclose(np.linalg.det(R), 1)
     assert np.allclose(
@@ -31,27 +31,27 @@ def test_rotation_is_a_right_hand_turn(azimuth, elevation):
 
 
 def test_the_normal_turns_from_north_to_east_and_up():
-    assert np.allclose(frames.rotation(np.pi / 2, 0) @ [1, 0, 0], [0, 0, 1], atol=1e-15)
-    assert np.allclose(frames.rotation(0, np.pi / 2) @ [1, 0, 0], [0, 1, 0], atol=1e-15)
-    assert np.allclose(frames.rotation(0, 0) @ [0, 0, 1], [0, 0, 1])  # right of an antenna that looks north is east
+    assert np.allclose(physics.rotation(np.pi / 2, 0) @ [1, 0, 0], [0, 0, 1], atol=1e-15)
+    assert np.allclose(physics.rotation(0, np.pi / 2) @ [1, 0, 0], [0, 1, 0], atol=1e-15)
+    assert np.allclose(physics.rotation(0, 0) @ [0, 0, 1], [0, 0, 1])  # right of an antenna that looks north is east
 
 
 @given(ANGLE, st.floats(-1.5, 1.5), st.floats(-50, 500))
 def test_round_trips(azimuth, elevation, height):
-    R, biconical = frames.rotation(azimuth, elevation), points()
-    local = frames.to_local(frames.from_biconical(biconical), R, height)
-    back = to_biconical(frames.to_antenna(local, R, height))
+    R, biconical = physics.rotation(azimuth, elevation), points()
+    local = physics.to_local(physics.from_biconical(biconical), R, height)
+    back = to_biconical(physics.to_antenna(local, R, height))
     assert np.allclose(back, biconical, rtol=1e-8, atol=1e-9)
-    assert np.allclose(frames.to_local(frames.to_antenna(local, R, height), R, height), local, rtol=1e-12, atol=1e-9)
+    assert np.allclose(physics.to_local(physics.to_antenna(local, R, height), R, height), local, rtol=1e-12, atol=1e-9)
 
 
 def test_jacobian_equals_central_differences():
     biconical = points(edge=0.9)
-    J = frames.jacobian(biconical)
+    J = physics.jacobian(biconical)
     for i, step in enumerate((1e-2, 1e-6, 1e-6)):
         d = np.zeros(3)
         d[i] = step
-        numerical = (frames.from_biconical(biconical + d) - frames.from_biconical(biconical - d)) / (2 * step)
+        numerical = (physics.from_biconical(biconical + d) - physics.from_biconical(biconical - d)) / (2 * step)
         scale = np.abs(J[:, :, i]).max(axis=1, keepdims=True)
         assert np.max(np.abs(numerical - J[:, :, i]) / scale) < 1e-5
 
@@ -60,16 +60,16 @@ def test_jacobian_equals_central_differences():
     "point", [(1e5, np.pi / 4, np.pi / 4), (1e5, np.pi / 2, 0.0), (1e5, 0.9, -0.9), (1e5, 2.0, 2.0), (1e5, 0.1, 3.0)]
 )
 def test_the_edge_of_the_sector_is_an_error_not_a_nan(point):
-    for function in (frames.from_biconical, frames.jacobian, frames.normal_cosine):
-        with pytest.raises(frames.OutsideSector, match="90 degrees"):
+    for function in (physics.from_biconical, physics.jacobian, physics.normal_cosine):
+        with pytest.raises(physics.OutsideSector, match="90 degrees"):
             function(np.array(point))
 
 
 def test_plot_covariance_is_that_of_small_errors():
-    rng, R = np.random.default_rng(5), frames.rotation(0.4, 0.5)
+    rng, R = np.random.default_rng(5), physics.rotation(0.4, 0.5)
     biconical = np.array([8e4, 0.2, -0.3])
-    noisy = frames.from_biconical(biconical + SIGMA * rng.standard_normal((200_000, 3))) @ R.T
-    C = frames.plot_covariance(biconical, SIGMA, R)
+    noisy = physics.from_biconical(biconical + SIGMA * rng.standard_normal((200_000, 3))) @ R.T
+    C = physics.plot_covariance(biconical, SIGMA, R)
     assert np.allclose(np.cov(noisy.T), C, atol=0.01 * np.trace(C))
     assert np.allclose(C, C.T)
 
@@ -79,8 +79,8 @@ def test_unbiased_conversion_takes_the_mean_error_off():
     sigma, biconical = np.array([2.5, 0.05, 0.05]), np.array([1e5, 0.5, -0.4])
     noise = sigma * rng.standard_normal((400_000, 3))
     noisy = biconical + np.concatenate([noise, -noise])  # antithetic: the odd terms cancel
-    true = frames.from_biconical(biconical)
-    plain = frames.from_biconical(noisy).mean(axis=0) - true
-    mended = frames.unbiased_from_biconical(noisy, sigma).mean(axis=0) - true
+    true = physics.from_biconical(biconical)
+    plain = physics.from_biconical(noisy).mean(axis=0) - true
+    mended = physics.unbiased_from_biconical(noisy, sigma).mean(axis=0) - true
     assert np.all(np.abs(mended) < 0.05 * np.abs(plain) + 5)
     assert np.abs(plain).max() > 200

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from radarsim.physics import targets
-from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim import physics
+from radarsim.physics import manoeuvre_covariance, transition
 
 T = np.linspace(0.0, 60.0, 60001)
 TRUTHS = {
-    "polynomial": (targets.polynomial([1e5, -250.0, 4.0, 0.01], T), []),
-    "acceleration_start": (targets.acceleration_start([1e5, -250.0], 12.0, 20.0, T), [20.0]),
-    "jerk_pulse": (targets.jerk_pulse([1e5, -250.0, 4.0], 3.0, 20.0, 10.0, T), [20.0, 30.0]),
-    "turn": (targets.turn(1e5, 300.0, 2.5, 3.0, 20.0, 10.0, T), [20.0, 30.0]),
-    "fly_by": (targets.fly_by(3e3, 250.0, 9e3, T), []),
-    "turn of more than a circle": (targets.turn(4e4, 250.0, 3.0, -5.0, 5.0, 45.0, T), [5.0, 50.0]),
+    "polynomial": (physics.polynomial([1e5, -250.0, 4.0, 0.01], T), []),
+    "acceleration_start": (physics.acceleration_start([1e5, -250.0], 12.0, 20.0, T), [20.0]),
+    "jerk_pulse": (physics.jerk_pulse([1e5, -250.0, 4.0], 3.0, 20.0, 10.0, T), [20.0, 30.0]),
+    "turn": (physics.turn(1e5, 300.0, 2.5, 3.0, 20.0, 10.0, T), [20.0, 30.0]),
+    "fly_by": (physics.fly_by(3e3, 250.0, 9e3, T), []),
+    "turn of more than a circle": (physics.turn(4e4, 250.0, 3.0, -5.0, 5.0, 45.0, T), [5.0, 50.0]),
 }
 
 
@@ -36,9 +36,9 @@ def test_velocity_and_acceleration_are_the_derivatives(name):
 def test_a_turn_keeps_its_speed_and_its_radius():
     """A full circle from and back to a point gives the range it began with."""
     speed, g = 300.0, 3.0
-    period = 2 * np.pi * speed / (g * targets.STANDARD_GRAVITY_MPS2)
+    period = 2 * np.pi * speed / (g * physics.STANDARD_GRAVITY_MPS2)
     t = np.array([0.0, 10.0, 10.0 + period])
-    x = targets.turn(1e5, speed, np.pi, g, 10.0, 2 * period, t)
+    x = physics.turn(1e5, speed, np.pi, g, 10.0, 2 * period, t)
     assert x[1] == pytest.approx([97000.0, -300.0, x[1, 2]])
     assert x[2, :2] == pytest.approx(x[1, :2], rel=1e-12)
 
@@ -46,7 +46,7 @@ def test_a_turn_keeps_its_speed_and_its_radius():
 def test_turning_starts_at_the_start():
     """Before the turn a straight line; at aspect pi it is radial and without acceleration."""
     t = np.array([0.0, 5.0, 9.999, 10.0])
-    x = targets.turn(1e5, 200.0, np.pi, 2.0, 10.0, 5.0, t)
+    x = physics.turn(1e5, 200.0, np.pi, 2.0, 10.0, 5.0, t)
     np.testing.assert_allclose(x[:3, 2], 0.0, atol=1e-12)
     # Across the line of sight the lateral acceleration is not radial: only its change of direction is.
     assert x[3, 2] == pytest.approx(0.0, abs=1e-9)
@@ -67,7 +67,7 @@ def test_manoeuvre_covariance_is_the_papers_matrix():
 
 def test_a_fly_by_is_closest_when_it_has_flown_the_leg():
     t = np.array([0.0, 4000.0 / 250.0, 8000.0 / 250.0])
-    x = targets.fly_by(3000.0, 250.0, 5000.0, t)
+    x = physics.fly_by(3000.0, 250.0, 5000.0, t)
     np.testing.assert_allclose(x[:, 0], [5000, 3000, 5000], rtol=1e-14)
     np.testing.assert_allclose(x[:, 1], [-200, 0, 200], rtol=1e-14, atol=1e-12)
     assert x[1, 2] == pytest.approx(250.0**2 / 3000.0, rel=1e-14)
@@ -91,7 +91,7 @@ def numbers_of(kind, dt, steps=20000):
 
 @pytest.mark.parametrize("kind", ["random_jerk", "white_jerk", "white_acceleration"])
 def test_process_noise_is_what_the_manoeuvre_leads_to(kind):
-    from radarsim.physics.motion import process_noise
+    from radarsim.physics import process_noise
 
     dt = 3.0
     np.testing.assert_allclose(process_noise(kind, 2.0, dt), 2.0 * numbers_of(kind, dt), rtol=1e-7)

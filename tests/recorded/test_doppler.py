@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from radarsim.app.run import load_all
 from radarsim.cli import main
 from radarsim.recorded import follow, plots
-from radarsim.recorded.doppler import folding
+from radarsim.recorded.fit import folding
 
 SPAN = 60.0  # m/s: 0.1 m at 1.2 kHz
 RADAR = {"sigma_range_m": 60, "sigma_velocity_mps": 3, "scan_period_s": 4, "detection_probability": 0.9}

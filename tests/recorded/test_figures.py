@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from radarsim.app.run import load_all
 from radarsim.cli import main
 from radarsim.recorded import figures, follow
-from radarsim.recorded.places import MOST, Path, in_plane
+from radarsim.recorded.plots import MOST, Path, in_plane
 from radarsim.report.drawing import Line, Note
 
 

@@ -7,9 +7,9 @@ import pytest
 
 from radarsim.app.run import load_all
 from radarsim.errors import ConfigError
-from radarsim.physics.motion import transition
-from radarsim.recorded import advice, fit, follow, plots, words
-from radarsim.recorded.along import silent
+from radarsim.physics import transition
+from radarsim.recorded import advice, fit, follow, page, plots
+from radarsim.recorded.fit import silent
 from radarsim.studies.interface import BIAS, CORRELATION, EXPLANATIONS, OUTLIERS
 from radarsim.studies.range_doppler.track import PlotLikelihood
 from radarsim.studies.registry import study
@@ -265,7 +265,7 @@ def test_the_wrong_number_is_named_in_95_of_100(tmp_path, options, expected):
 
 def test_an_all_clear_says_whose_numbers_it_clears(tmp_path):
     found, followed = advised(tmp_path, recording(np.random.default_rng(4)))
-    (line,) = (line for line in words.likely(followed, found) if line.startswith("advice"))
+    (line,) = (line for line in page.likely(followed, found) if line.startswith("advice"))
     assert "nothing is wrong with the stated numbers of r+Vr, as far as 60 rows tell" in line
 
 
@@ -276,7 +276,7 @@ def test_a_quiet_recording_is_no_reason_to_lower_the_manoeuvre_variance(tmp_path
     found, followed = advised(tmp_path, columns, config)
     (one,) = found.findings
     assert (one.what, one.from_zero) == ("manoeuvre_variance", False)
-    text = "\n".join(words.likely(followed, found))
+    text = "\n".join(page.likely(followed, found))
     assert "--set" not in text
     assert "the plots do not tell it from zero" in text
     assert "in a turn of 3 g without missed plots the largest error of r+Vr in r would be" in text
@@ -314,13 +314,13 @@ def test_what_a_turn_costs_is_the_exact_error_in_it():
 def test_advice_of_part_of_the_rows_says_of_which(tmp_path, monkeypatch):
     monkeypatch.setattr(type(follow.recorded_of(loaded().cases[0])), "rows_asked", 40)
     found, followed = advised(tmp_path, recording(np.random.default_rng(5)))
-    assert "this is of the first 40 rows, of 60" in words.likely(followed, found)[-1]
+    assert "this is of the first 40 rows, of 60" in page.likely(followed, found)[-1]
     rows = [row + (f",{name}" if i else ",track")
             for name in "abc" for i, row in enumerate((tmp_path / "advised.csv").read_text().splitlines())
             if i or name == "a"]  # fmt: skip
     (tmp_path / "several.csv").write_text("\n".join(rows))
     followed = follow.follow(loaded(), tmp_path / "several.csv", threads=1)
-    said = words.likely(followed, advice.advised(followed))[-1]
+    said = page.likely(followed, advice.advised(followed))[-1]
     assert "this is of 39 rows, of 180: the first 13 of each of 3 tracks, of 3" in said
 
 

@@ -5,13 +5,13 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal as normal
 
+from radarsim import physics
 from radarsim.app.run import load_all
-from radarsim.kernels.innovations import FACTOR, lasting, log_likelihood
-from radarsim.physics import frames
-from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.kernels.hypotheses import FACTOR, lasting, log_likelihood
+from radarsim.physics import manoeuvre_covariance, transition
 from radarsim.recorded import advice, fit, follow
 from radarsim.recorded.follow import recorded_of
-from radarsim.studies.multimodel.filters import start_weights
+from radarsim.studies.multimodel.world import start_weights
 from radarsim.studies.sonar import world
 
 
@@ -224,9 +224,9 @@ def interacting(case, options, columns, T, share=0.0):
     """IMM of the book over a track (one model: a Kalman filter), with outliers merged by moments; T: over the scan."""
     spec, t = case.spec, columns["t_s"]
     seen = np.stack([columns[name] for name in ("range_m", "elevation_rad", "azimuth_rad")], axis=1)
-    turn = frames.rotation(spec.sensor.antenna_azimuth_rad, spec.sensor.antenna_elevation_rad)
-    z = frames.to_local(frames.from_biconical(seen), turn, spec.sensor.antenna_height_m)
-    R = frames.plot_covariance(seen, np.array(spec.sensor.sigma), turn)
+    turn = physics.rotation(spec.sensor.antenna_azimuth_rad, spec.sensor.antenna_elevation_rad)
+    z = physics.to_local(physics.from_biconical(seen), turn, spec.sensor.antenna_height_m)
+    R = physics.plot_covariance(seen, np.array(spec.sensor.sigma), turn)
     a, b, g = start_weights(t[:3], spec.start_acceleration_mps2).reshape(3, 3)
     x = np.concatenate([[a @ z[:3, i], b @ z[:3, i], 0.0] for i in range(3)])
     lifts = [np.kron(np.eye(3), np.array([[a[k]], [b[k]], [0.0]])) for k in range(3)]

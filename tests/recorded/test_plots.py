@@ -109,14 +109,14 @@ def test_an_unwritable_place(tmp_path):
 
 
 def test_intervals_that_no_filter_can_take_are_a_fault_of_the_file(tmp_path):
-    from radarsim.app import run as experiment
-    from radarsim.recorded import follow as recorded
+    from radarsim.app import run
+    from radarsim.recorded import follow
 
     path = tmp_path / "plots.csv"
     path.write_text("t_s,range_m,bearing_rad\n0,9000,1\n1e-6,9000,1\n1e7,9000,1\n")
-    (config,) = experiment.load_all(["sonar_smoothing"])
+    (config,) = run.load_all(["sonar_smoothing"])
     with pytest.raises(ConfigError, match="t_s: intervals so different"):
-        recorded.track(config, path)
+        follow.track(config, path)
 
 
 def test_an_existing_file_keeps_its_mode_and_a_new_one_heeds_the_umask(tmp_path):

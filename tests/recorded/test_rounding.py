@@ -7,9 +7,8 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.errors import ConfigError
-from radarsim.recorded import follow as recorded
-from radarsim.recorded import plots
-from radarsim.recorded.rounding import Twin, unlike
+from radarsim.recorded import follow, plots
+from radarsim.recorded.follow import Twin, unlike
 
 SCANS = 14
 RANGE, VELOCITY, JERK = Fraction(250) ** 2, Fraction(15) ** 2, Fraction(1, 1000)  # variances of rls2
@@ -62,7 +61,7 @@ def file_with(tmp_path, steps):
 @pytest.mark.parametrize("gap", [10, 100, 1000, 5000, 10_000])
 def test_sigma_after_a_gap_is_that_of_exact_arithmetic(tmp_path, gap):
     one = load("rls2")
-    _, track = recorded.track(one, file_with(tmp_path, [gap, 10, 10]))
+    _, track = follow.track(one, file_with(tmp_path, [gap, 10, 10]))
     for f, options in enumerate(one.cases[0].spec.filters):
         expected = exact(len(options.observes), options.initial_scans, [gap, 10, 10])
         np.testing.assert_allclose(track.sigma[f, -3:], expected, rtol=1e-4)
@@ -72,7 +71,7 @@ def test_sigma_after_a_gap_is_that_of_exact_arithmetic(tmp_path, gap):
 @pytest.mark.parametrize("gap", [1e6, 1e7, 1e8, 1e9, 1e10, 1e12])
 def test_a_gap_that_leaves_no_digits_ends_the_track_with_its_place(tmp_path, gap, after):
     with pytest.raises(ConfigError, match=rf"plots\.csv:{SCANS + 2}: t_s: after a gap of .* s .*split the file here"):
-        recorded.track(load("rls2"), file_with(tmp_path, [gap] + [10] * after))
+        follow.track(load("rls2"), file_with(tmp_path, [gap] + [10] * after))
 
 
 def test_the_gap_of_one_number_among_rows_of_the_other(tmp_path):
@@ -80,7 +79,7 @@ def test_the_gap_of_one_number_among_rows_of_the_other(tmp_path):
     columns = plots.read(file_with(tmp_path, [1000] * 100 + [10]), (("t_s", "range_m", "velocity_mps"),))
     columns["range_m"][SCANS:-1] = np.nan
     (case,) = load("rls2").cases
-    study = recorded.recorded_of(case)
+    study = follow.recorded_of(case)
     twin, track = Twin(study.tracker(case), 10.0), study.tracker(case).feed(columns)
     assert not twin.lost(columns, track)
     assert (twin.gap_s, twin.gap_row) == (100_010, SCANS + 100)
@@ -101,15 +100,15 @@ def test_the_gap_of_one_number_among_rows_of_the_other(tmp_path):
 )
 def test_other_studies_print_nothing_that_is_lost(tmp_path, config, overrides, gap, lost):
     one = load(config, overrides)
-    columns = recorded.simulated(one)
+    columns = follow.simulated(one)
     middle = len(columns["t_s"]) // 2
     columns["t_s"][middle:] += gap
     plots.write_columns({n: c for n, c in columns.items() if not n.startswith("true_")}, tmp_path / "plots.csv")
     if lost:
         with pytest.raises(ConfigError, match=r"plots\.csv:.* t_s: "):
-            recorded.track(one, tmp_path / "plots.csv")
+            follow.track(one, tmp_path / "plots.csv")
     else:
-        _, track = recorded.track(one, tmp_path / "plots.csv")
+        _, track = follow.track(one, tmp_path / "plots.csv")
         known = np.isfinite(track.estimate)
         assert (track.sigma[known] >= 0).all()
         assert (track.sigma[..., 0][known[..., 0]] > 0).all()
@@ -119,7 +118,7 @@ def test_pieces_of_a_file_lose_their_digits_where_the_whole_does(tmp_path):
     one = load("rls2")
     columns = plots.read(file_with(tmp_path, [1e7, 10, 10]), (("t_s", "range_m", "velocity_mps"),))
     (case,) = one.cases
-    study = recorded.recorded_of(case)
+    study = follow.recorded_of(case)
     for size in (1, 5, 14, 100):
         tracker, twin, lost = study.tracker(case), Twin(study.tracker(case), 10.0), []
         for i in range(0, SCANS + 3, size):
@@ -132,9 +131,9 @@ def test_pieces_of_a_file_lose_their_digits_where_the_whole_does(tmp_path):
 
 
 def test_tracks_differ_by_sigma_estimate_or_an_impossible_sigma(tmp_path):
-    _, track = recorded.track(load("rls2"), file_with(tmp_path, [10]))
+    _, track = follow.track(load("rls2"), file_with(tmp_path, [10]))
     assert not unlike(track, track).any()
     for name, value in (("sigma", np.nan), ("sigma", 0.0), ("estimate", np.nan), ("estimate", 7.0)):
-        other = recorded.rows_of(track, np.arange(SCANS + 1))
+        other = follow.rows_of(track, np.arange(SCANS + 1))
         getattr(other, name)[1, 9, 0] = value
         assert unlike(other, track).nonzero()[0].tolist() == [9]

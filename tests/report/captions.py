@@ -11,7 +11,7 @@ import numpy as np
 
 from radarsim.language import tr
 from radarsim.report import panels, seen
-from radarsim.report.chart_text import spoken
+from radarsim.report.chart import spoken
 from radarsim.report.drawing import Line
 
 RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"
@@ -275,10 +275,10 @@ def sweep(result, figure, caption):
 
 def checked(result):
     """Faults of all captions of σ, gains and rates of a result in the language spoken, and how many were judged."""
-    from radarsim.app import output
+    from radarsim.app import result as output
 
     faults, told = [], 0
-    for name, figure in output.figures(result.cases, result.tables, result.experiment).items():
+    for name, figure in output.case_figures(result.cases, result.tables, result.experiment).items():
         kind = name.partition("_")[0]
         if kind in ("locks", "lock") or (name == "right" and "rare" in result.tables):
             if len(figure.panels) == 1 and any(isinstance(mark, Line) for mark in figure.panels[0].marks):

@@ -12,11 +12,10 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binom
 
-from radarsim.app import output
-from radarsim.app.configs import load
-from radarsim.app.work import CaseWork
+from radarsim.app import result
+from radarsim.app.configs import CaseWork, load
+from radarsim.config.document import SHIPPED
 from radarsim.config.experiment import Experiment
-from radarsim.config.lookup import SHIPPED
 from radarsim.engine.results import CaseResult
 from radarsim.report import notes
 from radarsim.report.statistics import Z95
@@ -200,7 +199,7 @@ def _tables(experiment: Experiment, works: list[CaseWork], sums: list[np.ndarray
         CaseResult(case.name, case.study, case.spec, case.swept, n, work.plan.layout.unpack(own), work.plan.axes)
         for case, work, own in zip(experiment.cases, works, sums, strict=True)
     ]
-    return notes.noted(output.measured(results), results, exact=False)
+    return notes.noted(result.measured(results), results, exact=False)
 
 
 def _index(name: str, table: pd.DataFrame) -> pd.MultiIndex:

@@ -11,9 +11,9 @@ from click.testing import CliRunner
 import radarsim
 from radarsim.app.result import Result
 from radarsim.cli import main
-from radarsim.config import lookup
+from radarsim.config import document
 from radarsim.errors import DisagreementError
-from radarsim.report import agreement, tables
+from radarsim.report import notes, tables
 from radarsim.report.statistics import ERROR_OF_PROGRAM, Z95, Estimate, rate, root_mean_square, standard_errors
 
 
@@ -56,40 +56,40 @@ def made(*results):
 def test_each_row_of_each_table_counts(expected_radar):
     """Sums as they are expected agree; one σ of 85 that is 3 % off, one bias, one gain are told with their place."""
     radar = expected_radar("rls2", count=100_000)
-    assert agreement.faults(made(radar)) == []
+    assert notes.faults(made(radar)) == []
     one = np.ones(radar.axes.exact_sigma.shape)
     one[1, 7, 1] = 1.03
     wrong = changed(radar, exact_sigma=radar.axes.exact_sigma * one)
-    (line,) = agreement.faults(made(wrong))
+    (line,) = notes.faults(made(wrong))
     assert line.startswith("curves.csv: rls2, r+Vr, Vr, k = 8 (70 s): sigma measured ")
     assert "1 of 85 rows of this column are over 5.85" in line
     moved = changed(radar, exact_bias=radar.axes.exact_bias + 0.05 * radar.axes.exact_sigma * (one > 1))
-    (line,) = agreement.faults(made(moved))
+    (line,) = notes.faults(made(moved))
     assert line.startswith("curves.csv: rls2, r+Vr, Vr, k = 8 (70 s): bias measured ")
-    (line,) = agreement.faults(made(changed(radar, exact_gain=radar.axes.exact_gains + (one > 1))))
+    (line,) = notes.faults(made(changed(radar, exact_gain=radar.axes.exact_gains + (one > 1))))
     assert line.startswith("gains.csv: rls2, r+Vr, Vr, k = 8 (70 s): gain_percent measured ")
 
 
 def test_a_bias_taken_for_none_is_told(expected_radar):
     """A target that jerks: the filters lag, and an exact bias of zero is as wrong as the σ that is right beside it."""
     radar = expected_radar("rls2", target={"kind": "polynomial", "coefficients": [100e3, -250, 4, 0.3]})
-    assert agreement.faults(made(radar)) == []
-    (line,) = agreement.faults(made(changed(radar, exact_bias=0 * radar.axes.exact_bias)))
+    assert notes.faults(made(radar)) == []
+    (line,) = notes.faults(made(changed(radar, exact_bias=0 * radar.axes.exact_bias)))
     assert "bias measured" in line
 
 
 def test_few_realisations_say_nothing(expected_radar):
     few = expected_radar("rls2", count=150)
     wrong = changed(few, exact_sigma=2 * few.axes.exact_sigma, exact_gain=few.axes.exact_gains - 90)
-    assert agreement.faults(made(wrong)) == []
+    assert notes.faults(made(wrong)) == []
 
 
 def test_what_is_nearly_exact_may_differ_by_as_much(expected_radar):
     """At 10¹⁰ realisations a ten-thousandth is 14 standard errors."""
     radar = expected_radar("rls2", count=10**10)
     near = made(changed(radar, exact_sigma=radar.axes.exact_sigma * 1.0001))
-    assert len(agreement.faults(near)) == 1
-    assert agreement.faults(near, ["rls2"]) == []
+    assert len(notes.faults(near)) == 1
+    assert notes.faults(near, ["rls2"]) == []
 
 
 def curves(sigma, exact, kurtosis, bias=(0.0, 0.0), exact_bias=(0.0, 0.0), n=100_000):
@@ -100,11 +100,13 @@ def curves(sigma, exact, kurtosis, bias=(0.0, 0.0), exact_bias=(0.0, 0.0), n=100
     labels = {"case": "one", "filter": "f", "component": "r", "unit": "m", "k": [1, 2], "t_s": [0.0, 1.0], "n": n}
     biased = {"bias": bias, "bias_se": spread / n**0.5, "spread": spread}
     exactly = {"exact_sigma": np.array(exact, dtype=float), "exact_bias": np.array(exact_bias, dtype=float)}
-    return pd.DataFrame(labels | tables.interval("sigma", of) | biased | exactly | {"n_eff": n / (kurtosis - 1)})
+    return pd.DataFrame(
+        labels | tables.interval_columns("sigma", of) | biased | exactly | {"n_eff": n / (kurtosis - 1)}
+    )
 
 
 def told(table):
-    return [line.partition(" measured")[0] for line in agreement.faults({"curves": table})]
+    return [line.partition(" measured")[0] for line in notes.faults({"curves": table})]
 
 
 SECOND = "curves.csv: one, f, r, k = 2 (1 s): "
@@ -138,8 +140,8 @@ def test_a_bias_makes_errors_no_less_gaussian():
 
 def test_columns_by_their_names():
     names = ["case", "rate", "rate_lo", "rate_hi", "bias", "bias_se", "exact_bias", "exact_rate", "exact_other"]
-    assert [one.value for one in agreement.beside(pd.DataFrame(columns=names))] == ["bias", "rate"]
-    (one,) = agreement.beside(pd.DataFrame(columns=["case", "error_probability", "lo", "hi", "exact"]))
+    assert [one.value for one in notes.beside(pd.DataFrame(columns=names))] == ["bias", "rate"]
+    (one,) = notes.beside(pd.DataFrame(columns=["case", "error_probability", "lo", "hi", "exact"]))
     assert one == ("error_probability", "lo", "hi", "exact")
 
 
@@ -180,11 +182,11 @@ def test_one_config_that_disagrees_does_not_stop_the_others(tmp_path, monkeypatc
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stem", sorted(path.stem for path in (lookup.SHIPPED / "configs").glob("*.yaml")))
+@pytest.mark.parametrize("stem", sorted(path.stem for path in (document.SHIPPED / "configs").glob("*.yaml")))
 def test_no_alarm_over_the_shipped_configs(stem):
     """Six seeds of 300 realisations, two of 2000: no exact value is further off than chance puts it."""
     for n, seed in (*((300, 1000 + i) for i in range(6)), (2000, 1), (2000, 2)):
         result = radarsim.run(stem, realisations=n, seed=seed)
         assert result.faults == ()
-        if not any(set(agreement.beside(table)) for table in result.tables.values()):
+        if not any(set(notes.beside(table)) for table in result.tables.values()):
             break

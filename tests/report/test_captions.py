@@ -6,7 +6,7 @@ import pytest
 
 from radarsim import language
 from radarsim.app.run import run
-from radarsim.config.lookup import SHIPPED
+from radarsim.config.document import SHIPPED
 from radarsim.report import html
 from tests.report import captions
 
@@ -51,9 +51,9 @@ def test_captions_and_answers_of_every_config_are_as_the_tables(config):
 )
 def test_a_wrong_caption_is_noticed(words, others):
     result = run("rls2", realisations=20000)
-    from radarsim.app import output
+    from radarsim.app import result as output
 
-    drawn = output.figures(result.cases, result.tables, result.experiment)
+    drawn = output.case_figures(result.cases, result.tables, result.experiment)
     name, caption = next((name, one.caption) for name, one in drawn.items() if words in one.caption)
     assert captions.judged(result, name, caption)[0] == []
     assert captions.judged(result, name, caption.replace(words, others))[0]

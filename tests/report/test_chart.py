@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from radarsim.report import chart, chart_look, chart_pieces, chart_scale, chart_text
+from radarsim.report import chart
 from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 
 PAGES = ("#ffffff", "#0f1419")
@@ -35,7 +35,7 @@ def test_the_curve_lies_where_the_data_says_and_the_pointer_reads_the_data():
     mark = line()
     panel = one(mark).panels[0]
     data = panel.data
-    x, y = (chart_scale.Scale(bool(a[0]), *a[1:]) for a in (data["x"], data["y"]))
+    x, y = (chart.Scale(bool(a[0]), *a[1:]) for a in (data["x"], data["y"]))
     drawn = points(panel.svg, "l")
     np.testing.assert_allclose(drawn[:, 0], x.place(mark.x), atol=0.051)
     np.testing.assert_allclose(drawn[:, 1], y.place(mark.y), atol=0.051)
@@ -113,10 +113,10 @@ def test_text_is_escaped_everywhere():
 
 
 def test_mathematical_text():
-    assert chart_text.spoken("$\\sigma$ of $V_r$, $\\dot y$, 5 \\$, $10^{-3}$") == "σ of V_r, y\u0307, 5 $, 10^-3"
-    assert chart_text.html("$v_\\beta$") == "<i>v</i><sub>β</sub>"
-    assert chart_text.html("$D_M$ & co") == "<i>D</i><sub>M</sub> &amp; co"
-    assert chart_text.tspans("a $b_c$ d", 10) == (
+    assert chart.spoken("$\\sigma$ of $V_r$, $\\dot y$, 5 \\$, $10^{-3}$") == "σ of V_r, y\u0307, 5 $, 10^-3"
+    assert chart.html("$v_\\beta$") == "<i>v</i><sub>β</sub>"
+    assert chart.html("$D_M$ & co") == "<i>D</i><sub>M</sub> &amp; co"
+    assert chart.tspans("a $b_c$ d", 10) == (
         'a <tspan font-style="italic">b</tspan><tspan dy="2.5" font-size="7.5">c</tspan><tspan dy="-2.5"> d</tspan>'
     )
 
@@ -131,29 +131,22 @@ def test_mathematical_text():
     ],
 )
 def test_linear_ticks_are_round(low, high, expected):
-    assert [text for _, text in chart_scale.Scale(False, low, high, 0, 100).ticks(4)] == expected
+    assert [text for _, text in chart.Scale(False, low, high, 0, 100).ticks(4)] == expected
 
 
 def test_logarithmic_ticks():
-    texts = [text for _, text in chart_scale.Scale(True, 0.009, 120, 0, 100).ticks(5)]
+    texts = [text for _, text in chart.Scale(True, 0.009, 120, 0, 100).ticks(5)]
     assert texts == ["0.01", "0.1", "1", "10", "100"]
-    assert [text for _, text in chart_scale.Scale(True, 8, 600, 0, 100).ticks(5)] == [
-        "10",
-        "20",
-        "50",
-        "100",
-        "200",
-        "500",
-    ]
-    assert len(chart_scale.Scale(True, 1e-12, 1e12, 0, 100).ticks(5)) <= 8
-    inside = [v for v, _ in chart_scale.Scale(True, 20, 90, 0, 100).ticks(5)]
+    assert [text for _, text in chart.Scale(True, 8, 600, 0, 100).ticks(5)] == ["10", "20", "50", "100", "200", "500"]
+    assert len(chart.Scale(True, 1e-12, 1e12, 0, 100).ticks(5)) <= 8
+    inside = [v for v, _ in chart.Scale(True, 20, 90, 0, 100).ticks(5)]
     assert all(20 <= v <= 90 for v in inside)
 
 
 @pytest.mark.parametrize("values", [[], [np.nan], [5.0], [0.0], [-3.0, -3.0]])
 def test_a_scale_for_any_data(values):
     for kind in ("linear", "log"):
-        made = chart_scale.scale(Axis("x", kind), [np.array(values, dtype=float)], "y", 0, 100)
+        made = chart.scale(Axis("x", kind), [np.array(values, dtype=float)], "y", 0, 100)
         assert made.low < made.high
         assert made.ticks(5)
 
@@ -161,20 +154,20 @@ def test_a_scale_for_any_data(values):
 def test_curves_stand_out_from_both_pages_and_from_each_other_in_grey():
     styles = [Style(n) for n in range(8)] + [Style(share) for share in np.linspace(0, 1, 9).tolist()]
     for style in styles:
-        for colour, page in zip(chart_look.ink(style), PAGES, strict=True):
-            assert chart_look.contrast(colour, page) >= 3, (style, colour, page)
-    assert len(set(chart_look.DASHES)) == len(chart_look.DASHES)
-    assert len(set(chart_look.MARKERS)) == len(chart_look.MARKERS)
+        for colour, page in zip(chart.ink_colours(style), PAGES, strict=True):
+            assert chart.contrast(colour, page) >= 3, (style, colour, page)
+    assert len(set(chart.DASHES)) == len(chart.DASHES)
+    assert len(set(chart.MARKERS)) == len(chart.MARKERS)
 
 
 def test_contrast_is_that_of_the_standard():
-    assert chart_look.contrast("#ffffff", "#000000") == pytest.approx(21)
-    assert chart_look.contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.01)
+    assert chart.contrast("#ffffff", "#000000") == pytest.approx(21)
+    assert chart.contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.01)
 
 
 def test_paths_are_short():
     x = np.arange(100.0)
-    assert len(chart_pieces.path(x, np.sin(x) * 50 + 100)) < 12 * len(x)
+    assert len(chart.path(x, np.sin(x) * 50 + 100)) < 12 * len(x)
 
 
 def test_where_neither_end_is_known_there_is_no_band():

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from radarsim.report.claims import forest, page
+from radarsim.report.claims import page
 from radarsim.report.claims.judge import NOT_RUN
 from radarsim.report.claims.rule import CONFIRMED, DEPENDS, REFUTED, UNDECIDED
 
@@ -52,18 +52,18 @@ def test_a_claim_says_how_far_it_stands():
 
 
 def test_forest_stands_in_margins():
-    assert forest.depth(3.0, row()) == 2.0
-    assert forest.depth(6.5, row()) == -1.5
-    assert forest.depth(-100.0, row()) == forest.FURTHEST
+    assert page.depth_in_forest(3.0, row()) == 2.0
+    assert page.depth_in_forest(6.5, row()) == -1.5
+    assert page.depth_in_forest(-100.0, row()) == page.FURTHEST_IN_FOREST
     between = row(expected_hi=7.0)
-    assert forest.depth(6.5, between) == -0.5
-    figure = forest.figure([row(), row("P9.2", CONFIRMED, measured=6.0, lo=5.5, hi=6.5, exact=6.25)])
+    assert page.depth_in_forest(6.5, between) == -0.5
+    figure = page.figure([row(), row("P9.2", CONFIRMED, measured=6.0, lo=5.5, hi=6.5, exact=6.25)])
     marks = {mark.label: mark for mark in figure.panels[0].marks if mark.label in (CONFIRMED, REFUTED)}
     refuted, confirmed = marks[REFUTED], marks[CONFIRMED]
     np.testing.assert_allclose((refuted.lo, refuted.y, refuted.hi), ([1.0], [2.0], [3.0]))
     np.testing.assert_allclose((confirmed.lo, confirmed.y, confirmed.exact), ([-1.5], [-1.0], [-1.25]))
-    assert forest.figure([row(kind=NOT_RUN)]) is None
-    (wide,) = forest.figure([row(judged_lo="", judged_hi="")]).panels[0].marks[:1]  # few realisations have no interval
+    assert page.figure([row(kind=NOT_RUN)]) is None
+    (wide,) = page.figure([row(judged_lo="", judged_hi="")]).panels[0].marks[:1]  # few realisations have no interval
     assert np.isnan(wide.lo).all()
     assert page.measured(row(judged_lo="", judged_hi="")) == "3 m"
 

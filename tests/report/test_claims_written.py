@@ -8,8 +8,8 @@ import pytest
 
 from radarsim.app.run import papers
 from radarsim.errors import ConfigError
-from radarsim.report.claims import above, evidence, printed
-from radarsim.report.claims.written import choices_in, claims_in, of_other_cases, with_arguments
+from radarsim.report.claims import above, declared, printed
+from radarsim.report.claims.over import choices_in, claims_in, of_other_cases, with_arguments
 from radarsim.report.statistics import Estimate
 from radarsim.studies import registry
 from radarsim.studies.sonar.measures import FOUND
@@ -19,7 +19,7 @@ CLAIM = "- id: 1\n  place: section 1\n  statement: It gains\n  parts:\n"
 PART = "  - {of: [1], what: gain, measure: {gain: {pick: first}}, expected: {above: 0}}\n"
 
 
-class Evidence(evidence.Evidence):
+class Evidence(declared.Evidence):
     """One that knows a number of a case."""
 
     def known(self, key: int, times: float = 1.0) -> float:
@@ -70,7 +70,7 @@ def test_each_makes_a_part_of_every_combination_in_order(claims):
     assert claim.parts[1].expected == printed("2.50")
     seen = Evidence((), {}, {})
     assert [one.measure(seen).value for one in claim.parts] == [21, 28, 42, 56]
-    assert isinstance(claim.parts[0].measure(seen), evidence.Certain)
+    assert isinstance(claim.parts[0].measure(seen), declared.Certain)
 
 
 def test_a_method_is_that_of_the_evidence_at_hand(claims):
@@ -140,7 +140,7 @@ def test_a_list_reads_no_claims():
     program = (
         "import sys; from radarsim.cli import entry\n"
         "try: entry()\n"
-        "finally: assert 'radarsim.report.claims.written' not in sys.modules"
+        "finally: assert 'radarsim.report.claims.over' not in sys.modules"
     )
     for argument in ("list", "--help"):
         subprocess.run([sys.executable, "-c", program, argument], check=True, capture_output=True)

@@ -10,16 +10,16 @@ import pytest
 from click.testing import CliRunner
 
 import radarsim
-from radarsim.app import readings, reproduce, stored_readings
-from radarsim.app import run as experiment
-from radarsim.app.stored_readings import CLASSES, classes_of, shipped_classes, stored_classes
+from radarsim.app import readings, reproduce, run
+from radarsim.app import stored as stored_readings
+from radarsim.app.stored import CLASSES, classes_of, shipped_classes, stored_classes
 from radarsim.cli import main
-from radarsim.config import lookup
+from radarsim.config import document as lookup
 from radarsim.errors import StoreError
-from radarsim.report import index
-from radarsim.report.claims import CLAIMED, NOT_JUDGED, classes, forest, judge, page, rule
+from radarsim.report import html
+from radarsim.report.claims import CLAIMED, NOT_JUDGED, judge, page, rule
 
-PAPERS = {claim.id: (of, claim) for of in experiment.papers() for claim in of.claims}
+PAPERS = {claim.id: (of, claim) for of in run.papers() for claim in of.claims}
 OPEN = [(paper.readings, paper.claims) for paper in readings.papers().values()]
 
 
@@ -43,13 +43,13 @@ def as_runs_would_store(out, own):
         with (out / config / "claims.csv").open("w", encoding="utf-8", newline="") as file:
             table = csv.DictWriter(file, CLAIMED, extrasaction="ignore")
             table.writeheader()
-            for row in classes.with_classes(rows, known):
+            for row in page.with_classes(rows, known):
                 table.writerow({key: "" if value != value else value for key, value in row.items()})
 
 
 def told(row):
     """What every rendering has to say of a claim: its class, and the phrase that tells how far it stands."""
-    return row["class"], classes.words(row["class"], row["as_shipped"], row["depends_on"])
+    return row["class"], page.words(row["class"], row["as_shipped"], row["depends_on"])
 
 
 def agree(out):
@@ -58,7 +58,7 @@ def agree(out):
     rows = {parts[0]["claim"]: parts[0] for parts in page.grouped(every)}
     lines = {line.split()[0]: line for line in command("claims", "--out", out).splitlines() if line[:1] == "P"}
     made = command("claims", "--markdown", "--out", out)
-    marks = drawn(experiment.claims((), out))
+    marks = drawn(run.claims((), out))
     stands = dict(re.findall(r"^\| (P\d\.\w+) \| .* \| ([^|]*) \| `\w+` \|$", made, re.MULTILINE))
     assert rows.keys() == lines.keys() == stands.keys() == PAPERS.keys()
     for claim, row in rows.items():
@@ -88,7 +88,7 @@ def drawn(rows):
     """The class that the figure's mark of each claim stands for."""
     return {
         f"{panel.title.split()[0]}.{dict(panel.x.ticks)[x]}": mark.label
-        for panel in forest.figure(rows).panels
+        for panel in page.figure(rows).panels
         for mark in panel.marks
         if getattr(mark, "label", "") in rule.CLASSES
         for x in mark.x
@@ -109,7 +109,7 @@ def test_every_claim_has_one_class_wherever_it_is_said(tmp_path, own):
     shipped = {one.claim: one.kind for one in shipped_classes()}
     assert kinds == {claim: shipped.get(claim, own) for claim in PAPERS}
     assert len(shipped) > 50
-    assert len(drawn(experiment.claims((), tmp_path))) == len(PAPERS)
+    assert len(drawn(run.claims((), tmp_path))) == len(PAPERS)
 
 
 def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
@@ -123,11 +123,11 @@ def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
     phrase = "refuted as shipped; depends on shown_variance, start (true under 1 of 15 readings)"
     assert reported(tmp_path / "rls2")["P1.18"] == phrase
     assert f"P1.18  {phrase}: RLS 2" in command("claims", "rls2", "--out", tmp_path)
-    index.write(tmp_path)
+    html.write(tmp_path)
     assert "1 confirmed, 2 depend on what the paper leaves open" in (tmp_path / "index.html").read_text()
-    rows = experiment.claims(("rls2",), tmp_path)
+    rows = run.claims(("rls2",), tmp_path)
     assert drawn(rows)["P1.18"] == rule.DEPENDS
-    assert "1 confirmed, 2 depend on what the paper leaves open" in forest.figure(rows).caption
+    assert "1 confirmed, 2 depend on what the paper leaves open" in page.figure(rows).caption
 
 
 def test_a_result_that_is_not_written_has_the_class_and_a_radar_of_ones_own_none():
@@ -151,10 +151,10 @@ def test_what_was_judged_of_other_words_is_no_class():
     known = classes_of([(of, dataclasses.replace(claims, claims=[changed]))], None)
     assert known == {claim.id: None}
     row = {"claim": claim.id, "class": rule.REFUTED, "as_shipped": rule.REFUTED, "depends_on": ""}
-    (alone,) = classes.with_classes([row], known)
+    (alone,) = page.with_classes([row], known)
     assert (alone["class"], alone["overall"]) == (rule.REFUTED, "refuted as shipped; other readings not judged")
-    assert classes.said(alone) == alone["overall"]
-    (torn,) = classes.with_classes([row | {"as_shipped": rule.CONTRADICTORY}], known)  # no reading mends it
+    assert page.verdict_words(alone) == alone["overall"]
+    (torn,) = page.with_classes([row | {"as_shipped": rule.CONTRADICTORY}], known)  # no reading mends it
     assert torn["overall"] == rule.CONTRADICTORY
 
 

@@ -9,8 +9,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from radarsim.report import chart_look as look
-from radarsim.report import figures
+from radarsim.report import chart, figures
 
 TO_XYZ = np.array(
     [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
@@ -73,7 +72,7 @@ def test_the_difference_is_that_of_the_published_table(one, other, difference):
 @pytest.mark.parametrize("page", PAGES)
 @pytest.mark.parametrize("sight", SEEN)
 def test_every_two_colours_are_told_apart(page, sight):
-    colours = [pair[PAGES[page][0]] for pair in look.COLOURS]
+    colours = [pair[PAGES[page][0]] for pair in chart.COLOURS]
     assert len(set(colours)) == 10
     least = min(ciede2000(lab(a, sight), lab(b, sight)) for a, b in combinations(colours, 2))
     assert least > APART[sight]
@@ -81,7 +80,7 @@ def test_every_two_colours_are_told_apart(page, sight):
 
 @pytest.mark.parametrize("page", PAGES)
 def test_colours_fall_in_lightness_by_even_steps(page):
-    lightness = np.array([lab(pair[PAGES[page][0]], "all")[0] for pair in look.LADDER])
+    lightness = np.array([lab(pair[PAGES[page][0]], "all")[0] for pair in chart.LADDER])
     steps = np.diff(lightness) * (1 if page == "light" else -1)
     assert steps.min() > 3.5
     assert steps.max() < 8
@@ -89,16 +88,16 @@ def test_colours_fall_in_lightness_by_even_steps(page):
 
 def test_few_curves_lie_far_apart_in_grey():
     """The first colours in the order of use."""
-    lightness = [lab(light, "all")[0] for light, _ in look.COLOURS[:4]]
+    lightness = [lab(light, "all")[0] for light, _ in chart.COLOURS[:4]]
     assert min(abs(a - b) for a, b in combinations(lightness, 2)) > 14
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_curves_stand_out_from_their_page(page):
     place, paper = PAGES[page]
-    assert min(look.contrast(pair[place], paper) for pair in (*look.COLOURS, look.NEUTRAL)) >= 3
+    assert min(chart.contrast(pair[place], paper) for pair in (*chart.COLOURS, chart.NEUTRAL)) >= 3
 
 
 def test_letters_in_colours_can_be_read():
-    for light, _ in look.COLOURS:
-        assert look.contrast(figures.readable(light), "#ffffff") >= 4.5
+    for light, _ in chart.COLOURS:
+        assert chart.contrast(figures.readable(light), "#ffffff") >= 4.5

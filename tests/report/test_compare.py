@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from radarsim.report import statistics, tables
-from radarsim.report.compare import figures, sides, table, words
-from radarsim.report.compare.sides import Side
+from radarsim.report import compare, statistics, tables
+from radarsim.report.compare import Side
 from radarsim.report.drawing import Line
 
 TIMES = 3000  # each is an experiment of its own
@@ -32,11 +31,11 @@ def side(label, errors, filters, noise="n", count=COUNT):
         e = errors[f]
         sigma = statistics.root_mean_square((e**2).sum(1), (e**4).sum(1), COUNT)
         labels = {"case": label, "filter": f, "component": "r", "unit": "m", "t_s": t}
-        curves.append(labels | tables.interval("sigma", sigma) | {"exact_sigma": np.full(TIMES, RATIOS[f])})
+        curves.append(labels | tables.interval_columns("sigma", sigma) | {"exact_sigma": np.full(TIMES, RATIOS[f])})
         if f != filters[0]:
             cross = (e**2 * base**2).sum(1)
             sums = ((e**2).sum(1), (e**4).sum(1), (base**2).sum(1), (base**4).sum(1), cross)
-            gain = tables.interval("gain_percent", statistics.gain(*sums, COUNT), "gain")
+            gain = tables.interval_columns("gain_percent", statistics.gain(*sums, COUNT), "gain")
             gains.append(labels | gain | {"baseline": filters[0], "exact_percent": np.nan})
     made = {"curves": frame(curves)} | ({"gains": frame(gains)} if gains else {})
     return Side(label, label, label, noise, count, made)
@@ -58,15 +57,15 @@ def held(rows):
 def test_intervals_cover_and_a_common_baseline_makes_them_narrower(errors):
     own, other = side("a", errors, ["base", "one"]), side("b", errors, ["base", "other"])
     renamed = {key: rows.assign(filter=rows["filter"].replace("other", "one")) for key, rows in other.tables.items()}
-    linked = table.compared([sides.Pair(own, Side("b", "b", "b", "n", COUNT, renamed))])
+    linked = compare.compared([compare.Pair(own, Side("b", "b", "b", "n", COUNT, renamed))])
     linked = linked[(linked["filter"] == "one") & (linked["quantity"] == "sigma")]
     linked = linked.assign(against_exact=RATIOS["other"])
-    assert set(linked["pairing"]) == {table.LINKED}
+    assert set(linked["pairing"]) == {compare.LINKED}
     share, width = held(linked)
     assert share > 0.95 - 5.85 * np.sqrt(0.95 * 0.05 / TIMES)
-    loose = table.compared([sides.Pair(own, Side("b", "b", "b", "n", COUNT + 1, renamed))])
+    loose = compare.compared([compare.Pair(own, Side("b", "b", "b", "n", COUNT + 1, renamed))])
     loose = loose[(loose["filter"] == "one") & (loose["quantity"] == "sigma")].assign(against_exact=RATIOS["other"])
-    assert set(loose["pairing"]) == {table.UNLINKED}
+    assert set(loose["pairing"]) == {compare.UNLINKED}
     assert held(loose)[0] > share
     assert held(loose)[1] > 1.3 * width
 
@@ -74,16 +73,16 @@ def test_intervals_cover_and_a_common_baseline_makes_them_narrower(errors):
 def test_independent_intervals_cover_95_per_cent(errors):
     rng = np.random.default_rng(8)
     apart = {f: RATIOS[f] * rng.standard_normal((TIMES, COUNT)) for f in RATIOS}
-    rows = table.compared([sides.Pair(side("a", errors, ["one"]), side("b", apart, ["other"], noise="m"))])
+    rows = compare.compared([compare.Pair(side("a", errors, ["one"]), side("b", apart, ["other"], noise="m"))])
     rows = rows[rows["quantity"] == "sigma"]
-    assert set(rows["pairing"]) == {table.INDEPENDENT}
+    assert set(rows["pairing"]) == {compare.INDEPENDENT}
     assert set(rows["against_filter"]) == {"other"}
     assert abs(held(rows)[0] - 0.95) < 5.85 * np.sqrt(0.95 * 0.05 / TIMES)
 
 
 def test_the_same_numbers_differ_by_nothing(errors):
-    rows = table.compared([sides.Pair(side("a", errors, ["base", "one"]), side("b", errors, ["base", "one"]))])
-    assert set(rows["pairing"]) == {table.SAME}
+    rows = compare.compared([compare.Pair(side("a", errors, ["base", "one"]), side("b", errors, ["base", "one"]))])
+    assert set(rows["pairing"]) == {compare.SAME}
     for column in ("difference", "difference_lo", "difference_hi"):
         assert (rows[column] == 0).all()
 
@@ -93,10 +92,10 @@ def test_the_baseline_against_another_filter_is_paired_like_a_gain(errors):
     lone = {key: rows[rows["filter"] == "base"].assign(filter="one") for key, rows in both.tables.items()}
     # The baseline of `b` has the name of the filter that it answers to.
     base = Side("b", "b", "b", "n", COUNT, lone | {"gains": both.tables["gains"].assign(baseline="one").head(1)})
-    rows = table.compared([sides.Pair(both, base)])
+    rows = compare.compared([compare.Pair(both, base)])
     rows = rows[(rows["quantity"] == "sigma") & (rows["filter"] == "one")]
     gains = both.tables["gains"]
-    assert set(rows["pairing"]) == {table.LINKED}
+    assert set(rows["pairing"]) == {compare.LINKED}
     # Equal to the first order in 1/n; a gain's interval lacks the skewness of the single ones.
     for end, of in (("percent_lo", "gain_hi"), ("percent_hi", "gain_lo")):
         apart = rows[end].to_numpy() + gains[of].to_numpy()
@@ -108,25 +107,25 @@ def test_cases_answer_to_one_another_by_their_swept_values():
         return [Side(run, case, case, None, 1, {}) for case in cases]
 
     first, second = of("a", "a q=1", "a q=2"), of("b", "b q=2", "b q=3")
-    found, alone = sides.pairs([first, second])
+    found, alone = compare.pairs([first, second])
     assert [(pair.side.case, pair.against.case) for pair in found] == [("b q=2", "a q=2")]
     assert alone == ["b q=3: no such case in a"]
-    found, alone = sides.pairs([of("mine", "mine"), first])
+    found, alone = compare.pairs([of("mine", "mine"), first])
     assert [pair.against.case for pair in found] == ["mine", "mine"]
     assert not alone
 
 
 def test_figures_have_all_sides_on_common_axes_and_sentences_the_exact_change(errors):
-    pair = sides.Pair(side("b", errors, ["base", "one"], noise="m"), side("a", errors, ["base", "one"]))
-    made = table.compared([pair])
-    drawn = figures.figures([pair.against, pair.side], made)
+    pair = compare.Pair(side("b", errors, ["base", "one"], noise="m"), side("a", errors, ["base", "one"]))
+    made = compare.compared([pair])
+    drawn = compare.figures([pair.against, pair.side], made)
     values, apart = drawn["sigma_r"].panels
     assert [mark.name for mark in values.marks] == ["a, base", "a, one", "b, base", "b, one"]
     assert len([mark for mark in apart.marks if isinstance(mark, Line)]) == 2
     looks = {(m.style.colour, m.style.dash) for m in values.marks}
     assert len(looks) == 4
-    assert words.sentences(made)[1].endswith("], exactly 0 %.")
-    assert words.percent(2886.76) == "29.9 times"
+    assert compare.sentences(made)[1].endswith("], exactly 0 %.")
+    assert compare.percent(2886.76) == "29.9 times"
 
 
 def test_tables_read_back_as_they_were_written():

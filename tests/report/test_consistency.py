@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.report import consistency, statistics
+from radarsim.report import notes, statistics
 
 
 def test_verdicts():
     mean = np.array([0.8, 1.0, 1.3])
-    assert list(consistency.verdict(mean, np.full(3, 0.9), np.full(3, 1.1))) == [
-        consistency.PESSIMISTIC,
-        consistency.CONSISTENT,
-        consistency.OPTIMISTIC,
+    assert list(notes.verdict(mean, np.full(3, 0.9), np.full(3, 1.1))) == [
+        notes.PESSIMISTIC,
+        notes.CONSISTENT,
+        notes.OPTIMISTIC,
     ]
 
 
 def test_a_ratio_over_one_is_optimistic():
-    of = consistency.ratio_columns(statistics.Estimate(*np.array([[30.0], [28.0], [33.0]])), np.array([20.0]))
+    of = notes.ratio_columns(statistics.Estimate(*np.array([[30.0], [28.0], [33.0]])), np.array([20.0]))
     assert [of[name].item() for name in ("ratio", "ratio_lo", "ratio_hi")] == [1.5, 1.4, 1.65]
 
 
@@ -26,11 +26,11 @@ def test_bounds_from_the_spread_judge_as_the_interval_does(looks):
     rng, n = np.random.default_rng(3), 400
     q = np.linspace(0.8, 1.2, 101)[:, None] * rng.chisquare(3, size=(101, n)) / 3
     sums = q.sum(axis=1), np.square(q).sum(axis=1), n
-    verdicts = consistency.verdict(q.mean(axis=1), *consistency.bounds_from_spread(*sums, looks))
+    verdicts = notes.verdict(q.mean(axis=1), *notes.bounds_from_spread(*sums, looks))
     wide = statistics.mean_square(*sums, looks)
-    assert list(verdicts == consistency.OPTIMISTIC) == list(wide.lo > 1)
-    assert list(verdicts == consistency.PESSIMISTIC) == list(wide.hi < 1)
-    assert set(verdicts) == {consistency.PESSIMISTIC, consistency.CONSISTENT, consistency.OPTIMISTIC}
+    assert list(verdicts == notes.OPTIMISTIC) == list(wide.lo > 1)
+    assert list(verdicts == notes.PESSIMISTIC) == list(wide.hi < 1)
+    assert set(verdicts) == {notes.PESSIMISTIC, notes.CONSISTENT, notes.OPTIMISTIC}
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_every_study_has_the_same_columns(config, quantities, exact, sigma):
         ends = [f"{quantity}_{end}" for end in ("bound_lo", "bound_hi", "verdict")]
         wanted = [quantity, f"{quantity}_lo", f"{quantity}_hi", *known, *ends]
         assert columns[first : first + len(wanted)] == wanted
-        known = {consistency.OPTIMISTIC, consistency.CONSISTENT, consistency.PESSIMISTIC}
+        known = {notes.OPTIMISTIC, notes.CONSISTENT, notes.PESSIMISTIC}
         assert set(made["consistency"][f"{quantity}_verdict"]) <= known
     assert ("believed" in made) == sigma
     if sigma:
@@ -62,5 +62,5 @@ def test_every_study_has_the_same_columns(config, quantities, exact, sigma):
 def test_a_known_expectation_is_judged_in_place_of_the_mean():
     mean = statistics.Estimate(*(np.array([value] * 3) for value in (1.2, 1.15, 1.25)))
     bounds = np.full(3, 0.9), np.full(3, 1.1)
-    made = consistency.normalised("nees", mean, bounds, np.array([1.0, 0.8, np.nan]))
+    made = notes.normalised("nees", mean, bounds, np.array([1.0, 0.8, np.nan]))
     assert made["nees_verdict"].tolist() == ["consistent", "pessimistic", "optimistic"]

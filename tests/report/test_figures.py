@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radarsim.report import chart, chart_look, figures, panels, sweeps, tables
+from radarsim.report import chart, figures, panels, rare, tables
 from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.studies.range_doppler import figures as range_doppler_figures
 from radarsim.studies.range_doppler import tables as range_doppler
@@ -312,7 +312,7 @@ def test_angles_given_in_radians_are_shown_in_degrees():
     result = SimpleNamespace(spec=None, swept=(("target.turn.rate_radps", 0.00873),))
     assert panels.swept(result).endswith("= 0.5°/s")
     assert panels.axis_of(result, "target.turn.rate_radps").endswith(", °/s")
-    x, axis = sweeps.places(result, "target.turn.rate_radps", [0.0, 0.01745])
+    x, axis = rare.places(result, "target.turn.rate_radps", [0.0, 0.01745])
     assert axis.label.endswith(", °/s")
     np.testing.assert_allclose(x, [0, 0.01745 * 180 / np.pi])
     assert panels.in_degrees("rad/s2")[1] == "°/s2"
@@ -451,8 +451,8 @@ def test_titles_are_broken_after_commas_and_long_parts_between_words():
 def test_no_two_of_many_scattered_series_look_alike():
     looks = [figures._look(Style(n, None, n)) for n in range(40)]
     assert len({(look["color"], look["marker"]) for look in looks}) == 40
-    assert len({look["marker"] for look in looks}) == len(figures.MARKERS) == len(chart_look.MARKERS)
-    assert len(set(chart_look.MARKERS)) == len(chart_look.MARKERS)
+    assert len({look["marker"] for look in looks}) == len(figures.MARKERS) == len(chart.MARKERS)
+    assert len(set(chart.MARKERS)) == len(chart.MARKERS)
 
 
 def test_a_gain_that_is_nowhere_known_is_drawn_as_nothing_and_cuts_no_axis():

@@ -3,7 +3,7 @@
 import pytest
 
 from radarsim import language
-from radarsim.report import html, links, text
+from radarsim.report import html, tables
 
 MADE = ("curves", "gains", "locks", "detections", "consistency")
 
@@ -11,7 +11,7 @@ MADE = ("curves", "gains", "locks", "detections", "consistency")
 def test_a_figure_has_the_tables_that_its_study_declares_or_those_of_its_name():
     declared = {"lock": ("locks",), "detection": ("detections",), "accuracy": ("curves",), "cost": ("stages",)}
     found = {
-        name: links.tables_of(name, declared, MADE)
+        name: html.tables_of(name, declared, MADE)
         for name in ("sigma_r", "gain_Vr", "sweep_dt", "dynamic_r", "locks", "lock_noise", "detection", "cost", "map")
     }
     assert found == {
@@ -28,11 +28,11 @@ def test_a_claim_leads_to_the_figure_of_its_component():
         "missed": ("curves",),
         "locks": ("locks",),
     }
-    assert links.figures_of([("gains", "Vr")], drawn) == ["gain_Vr"]
-    assert links.figures_of([("curves", "r"), ("gains", "r")], drawn) == ["sigma_r", "gain_r"]
-    assert links.figures_of([("curves", "ar")], drawn) == ["sigma_r", "missed"]  # its own is not drawn
-    assert links.figures_of([("locks", ""), ("none", "")], drawn) == ["locks"]
-    assert links.figures_of([], drawn) == []
+    assert html.figures_of([("gains", "Vr")], drawn) == ["gain_Vr"]
+    assert html.figures_of([("curves", "r"), ("gains", "r")], drawn) == ["sigma_r", "gain_r"]
+    assert html.figures_of([("curves", "ar")], drawn) == ["sigma_r", "missed"]  # its own is not drawn
+    assert html.figures_of([("locks", ""), ("none", "")], drawn) == ["locks"]
+    assert html.figures_of([], drawn) == []
 
 
 def test_of_an_answer_so_much_stands_above_its_figure_that_both_are_seen():
@@ -46,7 +46,8 @@ def test_of_an_answer_so_much_stands_above_its_figure_that_both_are_seen():
 def test_no_interval_of_an_answer_is_cut(code):
     """A decimal comma leaves intervals and rows of numbers a semicolon of their own."""
     with language.speaking(code):
-        one = f"{text.estimate((98.74, 97.5, 100.0), '%')} ({text.in_a_row(['0.5', '1.5'])}; {text.interval('1', '2')})"
-        row = text.in_a_row(map(text.number, (700.5, 800.5)))
+        value, in_row = tables.estimate((98.74, 97.5, 100.0), "%"), tables.in_a_row(["0.5", "1.5"])
+        one = f"{value} ({in_row}; {tables.interval('1', '2')})"
+        row = tables.in_a_row(map(tables.number, (700.5, 800.5)))
         parts = html.in_clauses(["; ".join([one, row] * 9)])
     assert [part.removesuffix(";") for part in parts] == [one, row] * 9

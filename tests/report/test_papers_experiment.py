@@ -6,12 +6,13 @@ from itertools import islice
 import pytest
 
 import radarsim
-from radarsim.app import configs, output
+from radarsim.app import configs
+from radarsim.app import result as output
 from radarsim.app.run import papers
 from radarsim.config.check import models_in
 from radarsim.config.fields import Display, Model
 from radarsim.report import claims
-from radarsim.report.claims.paper import described, own_members
+from radarsim.report.claims.declared import described, own_members
 from radarsim.studies import registry
 
 CONFIGS = sorted({claim.config for of in papers() for claim in of.claims})
@@ -163,7 +164,7 @@ def test_a_file_of_the_users_is_no_measure_of_the_paper(tmp_path, monkeypatch):
     why = "not the paper's experiment: rls1: radar.sigma_range_m is 30, the paper's 25"
     assert found["why"].str.startswith(why).all()
     unchanged = radarsim.run(configs.lookup.SHIPPED / "configs" / "rls1.yaml", realisations=50).cases
-    assert not output.tables(unchanged)["claims"].empty
+    assert not output.case_tables(unchanged)["claims"].empty
 
 
 HELD_TOO = {stem: ids for of in papers() for stem, ids in of.held_too.items()}

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app import output
+from radarsim.app import result
 from radarsim.app.configs import load
 from radarsim.app.selftest import KNOWN
 from radarsim.config.schema import LARGEST_REALISATIONS
@@ -28,7 +28,7 @@ def results():
 @pytest.mark.parametrize("study", ["range_doppler", "multimodel", "sonar", "discriminator"])
 def test_curves_alone_are_those_among_all_tables(results, study):
     cases = results[study]
-    alone, among = registry.study(study).curves(cases), output.tables(cases)["curves"]
+    alone, among = registry.study(study).curves(cases), result.case_tables(cases)["curves"]
     columns = [name for name in alone.columns if name != "note"]
     assert alone[columns].equals(among[columns])
     if "note" in alone:  # a study's own; what every study's rows may bear comes to it among all tables

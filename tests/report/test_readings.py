@@ -7,14 +7,24 @@ import numpy as np
 import pytest
 
 from radarsim.report.claims import Claim, Part, about, certain, printed, rule
-from radarsim.report.claims import readings as data
-from radarsim.report.claims.evidence import Missing
-from radarsim.report.claims.joint import joint
-from radarsim.report.claims.over import Over, columns, depth, rows, under
-from radarsim.report.claims.readings import Alternative, Choice, PaperReadings
+from radarsim.report.claims import over as data
+from radarsim.report.claims.declared import Missing
+from radarsim.report.claims.over import (
+    Alternative,
+    Choice,
+    Fine,
+    Over,
+    PaperReadings,
+    Printed,
+    Search,
+    columns,
+    depth,
+    joint,
+    rows,
+    under,
+)
 from radarsim.report.claims.readings_page import page
 from radarsim.report.claims.rule import AGAINST, CONFIRMED, DEPENDS, EQUIVALENT, REFUTED, UNDECIDED, UNSTATED
-from radarsim.report.claims.search import Fine, Printed, Search
 from radarsim.report.statistics import Estimate
 
 

@@ -153,12 +153,12 @@ def test_crosses_are_told_of_where_there_are_any():
 
 
 def test_every_figure_of_a_run_tells_of_its_crosses_and_of_nothing_else(tmp_path):
-    from radarsim.app import output
+    from radarsim.app import result as output
     from radarsim.app.run import run
 
     for config in ("rls2", "sonar_asynchronous"):
         result = run(config, realisations=400)
-        for name, one in output.figures(result.cases, result.tables, result.experiment).items():
+        for name, one in output.case_figures(result.cases, result.tables, result.experiment).items():
             lines = [m for panel in one.panels for m in panel.marks if isinstance(m, Line) and m.exact is not None]
             crossed = any(np.isfinite(m.exact).any() for m in lines)
             assert ("Crosses" in one.caption) is crossed, name

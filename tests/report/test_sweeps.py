@@ -6,18 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from radarsim.app import output
-from radarsim.app import run as experiment
-from radarsim.report import chart_text, figures, legends, panels, sweeps
-from radarsim.report import tables as common
+from radarsim.app import result as output
+from radarsim.app import run
+from radarsim.report import chart, figures, panels, rare, tables
 from radarsim.report.claims import page
 from radarsim.report.claims.judge import SAID
 from radarsim.report.drawing import Line
 
 
 def swept(config, *overrides, n=200):
-    result = experiment.run(config, realisations=n, overrides=overrides)
-    return result, output.figures(result.cases, result.tables, result.experiment)
+    result = run.run(config, realisations=n, overrides=overrides)
+    return result, output.case_figures(result.cases, result.tables, result.experiment)
 
 
 def test_one_key_is_a_family_of_curves():
@@ -25,7 +24,7 @@ def test_one_key_is_a_family_of_curves():
     result, drawn = swept("rls2", f"sweep.{key}=[1,40,5,15]")
     figure = drawn["sweep_sigma_velocity_mps"]
     assert [panel.x.scale for panel in figure.panels] == ["log"] * 3
-    rows = common.groups(result.curves, "case", "filter", "component")
+    rows = tables.groups(result.curves, "case", "filter", "component")
     for panel, component in zip(figure.panels, ("r", "Vr", "ar"), strict=True):
         for mark, name in zip(panel.marks, ("r", "r+Vr"), strict=True):
             np.testing.assert_array_equal(mark.x, [1, 5, 15, 40])
@@ -40,14 +39,14 @@ def test_one_key_is_a_family_of_curves():
     [("r", "r"), ("Vr", "V_r"), ("b", "β"), ("vb", "v_β"), ("ab", "a_β"), ("ve", "v_ε"), ("speed", "speed")],
 )
 def test_axes_name_components_by_their_letters(component, words):
-    assert chart_text.spoken(panels.letter(component)) == words
+    assert chart.spoken(panels.letter(component)) == words
 
 
 def test_two_keys_are_a_map():
     result, drawn = swept("rls2", "sweep.scans=[15,10]", "sweep.radar.sigma_range_m=[50,100,250]")
     figure = drawn["sweep_scans_sigma_range_m"]
     assert [panel.title for panel in figure.panels] == ["r", "r+Vr"]
-    rows = common.groups(result.curves, "case", "filter", "component")
+    rows = tables.groups(result.curves, "case", "filter", "component")
     heat = figure.panels[1].marks[0]
     for i, r in enumerate((50, 100, 250)):
         for j, k in enumerate((10, 15)):
@@ -70,7 +69,7 @@ def test_every_study_of_tracks_draws_its_sweeps(config, overrides, name):
 
 
 def test_no_sweep_no_figure(expected_radar):
-    assert sweeps.figures([expected_radar("rls2")], {}) == {}
+    assert rare.figures([expected_radar("rls2")], {}) == {}
 
 
 ROW = {
@@ -141,9 +140,9 @@ def test_two_keys_make_a_panel_a_value_and_a_map_and_leave_nothing_out():
         assert [panel.title for panel in described[name].panels] == [f"$σ_V$ = {v} m/s" for v in (1, 5, 15)], name
         lines = [[mark for mark in panel.marks if isinstance(mark, Line)] for panel in described[name].panels]
         assert {len(own) for own in lines} == {3 if name == "gain_r" else 6}
-    plan = legends.named(described["sigma_r"])
+    plan = figures.named(described["sigma_r"])
     assert plan.at_ends == (True,) * 3
-    assert {line.label for line in legends.lines(plan.panels[0])} == {"10⁻⁴", "10⁻³", "10⁻²"}
+    assert {line.label for line in figures.lines(plan.panels[0])} == {"10⁻⁴", "10⁻³", "10⁻²"}
     assert list(plan.common.keys) == ["r", "r+Vr", "exact"]
     assert plan.common.title == "at the lines: $D_M$, (m/s³)²"
     assert described["sweep_sigma_velocity_mps_manoeuvre_variance"].panels[0].marks[0].values.shape == (3, 3)
@@ -166,13 +165,13 @@ def test_of_very_many_cases_the_caption_says_how_many_are_left_out():
 
 def test_lists_and_long_names_at_an_axis_and_in_titles():
     assert panels.number((1000.0, 1200.0)) == "1000, 1200"
-    result = experiment.run("ambiguous_turns", realisations=8, figures=False)
+    result = run.run("ambiguous_turns", realisations=8, figures=False)
     first, second = result.cases[:2]
     key = first.swept[0][0]
     assert panels.swept(first) == "$F_r$ = 1000, 1200 Hz"
-    _, axis = sweeps.places(first, key, [dict(one.swept)[key] for one in (first, second)])
+    _, axis = rare.places(first, key, [dict(one.swept)[key] for one in (first, second)])
     assert [words for _, words in axis.ticks] == ["1000, 1200", "1000, 1200,\n1400"]
-    _, axis = sweeps.places(first, key, ["aeroballistic_gentle", "weaving"])
+    _, axis = rare.places(first, key, ["aeroballistic_gentle", "weaving"])
     assert [words for _, words in axis.ticks] == ["aeroballistic\ngentle", "weaving"]
 
 
@@ -182,13 +181,13 @@ def test_targets_that_are_swept_are_named_by_their_kind_and_what_sets_them_apart
     targets = [past, past | {"speed_mps": 100.0, "sigma_position_m": 800.0}, {"kind": "recorded", "file": "flight.csv"}]
     words = ["fly by, speed mps 280", "fly by, speed mps 100, sigma position m 800", "recorded"]
     assert [panels.number(panels.in_short(one, targets)) for one in targets] == words
-    result = experiment.run("rls2", realisations=8, figures=False, overrides=["scans=4"]).cases[0]
-    x, axis = sweeps.places(result, "target", targets)
+    result = run.run("rls2", realisations=8, figures=False, overrides=["scans=4"]).cases[0]
+    x, axis = rare.places(result, "target", targets)
     assert x.tolist() == [0, 1, 2]
     assert [" ".join(shown.split()) for _, shown in axis.ticks] == words
     lines = panels.lines_of(
         [replace(result, name=f"rls2 {n}", swept=(("target", one),)) for n, one in enumerate(targets)],
-        {(f"rls2 {n}", "r", "r"): common.frame({"x": [n], "y": [n]}) for n in range(3)},
+        {(f"rls2 {n}", "r", "r"): tables.frame({"x": [n], "y": [n]}) for n in range(3)},
         "r",
         ("x", "y"),
     )
@@ -196,7 +195,7 @@ def test_targets_that_are_swept_are_named_by_their_kind_and_what_sets_them_apart
 
 
 def test_panels_of_several_configs_that_would_be_called_the_same_are_told_by_their_config():
-    result = experiment.run("ambiguous_stagger", realisations=8, figures=False)
+    result = run.run("ambiguous_stagger", realisations=8, figures=False)
     assert list(panels.by_panel(result.cases)) == [
         *("ambiguous_rls4, RLS 4", "RLS 4, $F_r$ = 1000, 1200 Hz", "RLS 4, $F_r$ = 1000, 1200, 1400 Hz")
     ]

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.app import output
-from radarsim.app.work import CaseWork
+from radarsim.app import result as output
+from radarsim.app.configs import CaseWork
 from radarsim.report.drawing import Line
 from radarsim.studies import registry
 from tests.trust.cases import CASES, MORE
@@ -82,7 +82,7 @@ def drawn_of(mark, part, columns):
 def test_lines_of_sigma_and_gains_are_rows_of_their_table(study):
     """Whole: times, values, both ends and exact values of one case, filter and component; angles in degrees."""
     result = radarsim.run(CASES[study].loaded(FEW.get(study, 300)))
-    drawn = output.figures(result.cases, result.tables, result.experiment)
+    drawn = output.case_figures(result.cases, result.tables, result.experiment)
     known = set(registry.study(result.cases[0].study).keys().figure_names)
     assert {name for name in drawn if not name.startswith("sweep_")} <= known
     looked = 0

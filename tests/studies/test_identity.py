@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.app.records import of_other_sources
+from radarsim.app.result import of_other_sources
 from radarsim.engine import store
 from radarsim.studies import identity, registry
 
@@ -26,7 +26,7 @@ CONFIGS = {
 COMPUTED = """
 import json, sys
 from radarsim.app.configs import load
-from radarsim.app.work import CaseWork
+from radarsim.app.configs import CaseWork
 for stem in sys.argv[1:]:
     CaseWork(load(stem).cases[0]).simulate(0, 2)
 print(json.dumps([module.__file__ for name, module in sys.modules.items() if name.startswith("radarsim.")]))

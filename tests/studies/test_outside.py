@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.kernels.cache import ROOT
+from radarsim.kernels.compile import ROOT
 from tests.studies import outside
 
 N = 10_000  # two whole blocks and a partial one

@@ -13,7 +13,7 @@ from unittest import mock
 
 import numpy as np
 
-from radarsim.kernels import compile as compiling
+from radarsim.kernels import compile
 
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 WIDTH = 8
@@ -116,12 +116,12 @@ def uncompiled():
     """Put the plain floats in place of the registers, before any kernel is imported."""
     np.seterr(over="ignore")  # words of random numbers overflow by design
     for name in ("kernel", "part", "summing"):
-        setattr(compiling, name, recorded(getattr(compiling, name)))
+        setattr(compile, name, recorded(getattr(compile, name)))
     from radarsim.kernels import lanes
 
     for name, plain in LANES.items():
         setattr(lanes, name, plain)
-    package = Path(compiling.__file__).parents[1]
+    package = Path(compile.__file__).parents[1]
     for file in sorted(file for file in package.rglob("kernels/[a-z]*.py") if "template" not in file.parts):
         name = ".".join(file.relative_to(package.parent).with_suffix("").parts)
         module = importlib.import_module(name)
@@ -307,9 +307,9 @@ def tracks():
 def alike():
     """Exact means over patterns of plots, of which the alike are merged, or all are followed to the end."""
     from radarsim.kernels.algebra import pack
-    from radarsim.physics.motion import process_noise
+    from radarsim.physics import process_noise
     from radarsim.studies.range_doppler import patterns
-    from radarsim.studies.range_doppler.propagation import Plots
+    from radarsim.studies.range_doppler.filters import Plots
 
     truth, dt = work(*RUNS["linear with misses"][:2]).plan.problem.truth, 5.0
     plots = Plots(np.array([25.0, 5.0]), np.zeros(2), np.array([10.0, 0.0]), 0.7)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.app import run as experiment
+from radarsim.app import run
 from radarsim.engine.cluster import Cluster
 from radarsim.report.tables import to_csv
 from tests.cli.test_run import csv_bytes
@@ -29,7 +29,7 @@ every_study = pytest.mark.parametrize("study", CASES)
 
 def tables(study, realisations=None, **means):
     """The bytes of all tables of a run in this process, by name."""
-    result = experiment.run((CASES | MORE)[study].loaded(realisations), **means)
+    result = run.run((CASES | MORE)[study].loaded(realisations), **means)
     return {name: to_csv(table) for name, table in result.tables.items()}
 
 
@@ -86,9 +86,9 @@ def test_workers(expected, workers):
 def test_shares(expected, study, of, tmp_path):
     loaded = CASES[study].loaded()
     for number in random.Random(of).sample(range(1, of + 1), of):
-        experiment.share(loaded, (number, of), out=tmp_path / str(number), threads=2)
+        run.run_share(loaded, (number, of), out=tmp_path / str(number), threads=2)
         shutil.copytree(tmp_path / str(number), tmp_path / "all", dirs_exist_ok=True)
-    result = experiment.run(loaded, out=tmp_path / "all", figures=False)
+    result = run.run(loaded, out=tmp_path / "all", figures=False)
     assert result.facts["realisations_computed"] == 0
     assert {name: to_csv(table) for name, table in result.tables.items()} == expected(study)
 

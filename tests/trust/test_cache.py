@@ -106,7 +106,7 @@ def test_nothing_of_ours_forks_or_asks_for_it():
 SUMS = """
 import sys
 from radarsim.app.configs import load
-from radarsim.app.work import CaseWork
+from radarsim.app.configs import CaseWork
 for stem in sys.argv[1:]:
     print(CaseWork(load(stem).cases[0]).simulate(0, 72).tobytes().hex())
 """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radarsim.app.configs import load
-from radarsim.engine.moments import Layout
+from radarsim.engine.results import Layout
 from radarsim.studies.noise import noise_key
 from tests.trust import faults
 

@@ -17,8 +17,8 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.cli import main
+from radarsim.config.document import SHIPPED
 from radarsim.config.experiment import Experiment
-from radarsim.config.lookup import SHIPPED
 from radarsim.errors import ConfigError
 
 CASES = int(os.environ.get("FUZZ_CASES", "200"))

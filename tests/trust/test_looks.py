@@ -13,18 +13,15 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app import decide, simulation
+from radarsim.app import readings, run
 from radarsim.app.configs import load
-from radarsim.app.simulation import RunOptions, SimulatedCases
-from radarsim.engine.moments import Layout
-from radarsim.engine.results import Axes
+from radarsim.app.run import RunOptions, SimulatedCases
+from radarsim.engine.results import Axes, Layout
 from radarsim.engine.run import Collected
 from radarsim.report import statistics
 from radarsim.report.claims import rule
-from radarsim.report.claims.declared import Claim, PaperClaims, Part
-from radarsim.report.claims.evidence import Evidence, Missing
-from radarsim.report.claims.ranges import Range
-from radarsim.report.claims.rule import Judged
+from radarsim.report.claims.declared import Claim, Evidence, Missing, PaperClaims, Part
+from radarsim.report.claims.rule import Judged, Range
 from radarsim.report.precision import FIRST, FLOOR, FLOOR_OF_TAILS, MOST, looks
 from radarsim.studies import registry
 
@@ -102,11 +99,11 @@ def test_runs_that_decide_refute_few_claims_that_are_true_at_the_border(monkeypa
             {"paper": "p", "claim": "P9.1", "as_shipped": said.kind, "extension": False, "n": 1.0, "needed": needed}
         ]
 
-    monkeypatch.setattr(decide.simulation, "simulated", simulated)
-    monkeypatch.setattr(decide, "rows_of", rows_of)
+    monkeypatch.setattr(readings.simulation, "simulated", simulated)
+    monkeypatch.setattr(readings, "rows_of", rows_of)
     for _ in range(runs):
         means = walk(rng, most, len(borders))
-        ended = decide.simulated(experiment, RunOptions(out="nowhere"))
+        ended = readings.simulated(experiment, RunOptions(out="nowhere"))
         refuted += outcome(means, ended.done["rls2"], borders).kind == rule.REFUTED
     assert refuted / runs < 0.025 + 3 * math.sqrt(0.025 * 0.975 / runs)
 
@@ -233,11 +230,11 @@ class Synthetic:
             return Collected(n, np.array([0.0, square, 0.0, fourth, fourth]), n, 0, n, 0.0, 0.0, None, ())
 
         study = SimpleNamespace(curves=curves, tables=tables, relabelled=lambda axes, case: axes)
-        monkeypatch.setattr(simulation, "CaseWork", lambda case: self)
-        monkeypatch.setattr(simulation, "collect", collect)
-        monkeypatch.setattr(simulation, "study", lambda name: study)
+        monkeypatch.setattr(run, "CaseWork", lambda case: self)
+        monkeypatch.setattr(run, "collect", collect)
+        monkeypatch.setattr(run, "study", lambda name: study)
         experiment = SimpleNamespace(cases=(self.case,), study="synthetic")
-        found = simulation.simulated(experiment, RunOptions(out="nowhere"), precision=percent, of=of)
+        found = run.simulate(experiment, RunOptions(out="nowhere"), precision=percent, of=of)
         ((_, _, done),) = found.cases
         sigma = statistics.root_mean_square(done.values[1], done.values[3], done.count)
         return sigma, done.count, done.values
@@ -334,7 +331,7 @@ def test_where_a_run_ends_is_foretold(monkeypatch):
         synthetic = Synthetic(draw, False, MOST)
         square, fourth = draw(np.random.default_rng(2), 16_000)
         values = np.array([0.0, square, 0.0, fourth, fourth])
-        pilot = simulation.CaseResult(
+        pilot = run.CaseResult(
             "case", "synthetic", None, {}, 16_000, synthetic.plan.layout.unpack(values), synthetic.plan.axes, 0.0
         )
         told = [needed(pilot, percent, curves, "sigma", MOST, curves) for percent in (30.0, 3.0, 0.3)]

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from radarsim.app import selftest
-from radarsim.bursts.kernels.data import triangular_root
-from radarsim.engine.machine import _flags
+from radarsim.bursts.kernels.scoring import triangular_root
+from radarsim.engine.store import _flags
 
 # What this NumPy has further loops for, and this processor runs; it knows no other names.
 FOUND = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])

@@ -11,10 +11,10 @@ from scipy.stats import chi2
 
 from radarsim.app.configs import load
 from radarsim.kernels import linear as kernels
-from radarsim.physics.motion import transition
-from radarsim.studies.discriminator import study as discriminator
+from radarsim.physics import transition
+from radarsim.studies.discriminator import study
 from radarsim.studies.range_doppler import filters
-from radarsim.studies.sonar import banks
+from radarsim.studies.sonar import filters as banks
 from radarsim.studies.sonar import filters as sonar_filters
 from radarsim.studies.sonar.world import step_correlations
 from tests.studies.multimodel.test_kernels import DT, run_kernel
@@ -186,8 +186,8 @@ BURSTS = {
 
 def test_the_discriminator_where_it_is_locked():
     """Forecasts are drawn, so the posterior of the last window must hold the truth as often as it says."""
-    plan = discriminator.prepare(load(BURSTS).cases[0])
-    errors, _ = discriminator.estimate(plan, 0, TRACKS)
+    plan = study.prepare(load(BURSTS).cases[0])
+    errors, _ = study.estimate(plan, 0, TRACKS)
     last = plan.options["windows"][0] - 1
     ratio = errors[:, 0, last] / plan.posterior[0, last]
     size = plan.layout.shapes["error"][2]

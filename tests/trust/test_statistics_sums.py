@@ -6,9 +6,9 @@ import random
 import numpy as np
 import pytest
 
-from radarsim.app.work import CaseWork
+from radarsim.app.configs import CaseWork
 from radarsim.engine.blocks import Forest, Node
-from radarsim.engine.moments import Sums
+from radarsim.engine.results import Sums
 from tests.trust.cases import CASES
 
 BLOCKS, SIZE = 2**13, 4

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.app.work import CaseWork
+from radarsim.app.configs import CaseWork, load
 from radarsim.engine.blocks import Node
 from radarsim.engine.store import Store
 

@@ -10,12 +10,15 @@ import math
 import numpy as np
 
 from radarsim.bursts.kernels import lanes as at
-from radarsim.bursts.kernels.data import DEMODULATED, SAMPLES, demodulate, draw_samples
 from radarsim.bursts.kernels.lanes import copy, lane, log_posterior, step
 from radarsim.bursts.kernels.scoring import (
+    DEMODULATED,
+    SAMPLES,
     SIZE,
     STATE,
     TURN,
+    demodulate,
+    draw_samples,
     score_blocks,
     score_complex_samples,
     score_image,

@@ -16,7 +16,7 @@ from types import ModuleType
 from typing import Any, BinaryIO, NamedTuple
 
 from radarsim.errors import ConfigError
-from radarsim.recorded.formats import records
+from radarsim.recorded.formats import sites
 
 NAUTICAL_MILE_M, FOOT_M = 1852.0, 0.3048
 FLIGHT_LEVEL_M = 100 * FOOT_M
@@ -58,7 +58,7 @@ def _library() -> tuple[ModuleType, ModuleType]:
     try:
         from asterix import base, generated
     except ImportError as error:
-        raise records.needs("libasterix", "asterix") from error
+        raise sites.needs("libasterix", "asterix") from error
     return base, generated
 
 
@@ -318,7 +318,7 @@ class _Plots001:
         self.level, self.invalid = field(spec, "090", "HGT"), field(spec, "090", "V")
         self.number = field(spec, "161")
         self.full: float | None = None  # time of day of the last sector message of category 002
-        self.unrolled = records.Unrolled(WRAP_001_S)
+        self.unrolled = sites.Unrolled(WRAP_001_S)
 
     def row(self, data: bytes, at: int) -> tuple[str, str, tuple[float, ...] | None, int]:
         """As of category 048; the profile depends on the first bit of item 020, the second item of both."""
@@ -395,15 +395,15 @@ class Asterix:
         self.decoders: dict[int, Any] = {48: _Plots048(), 1: _Plots001(), 62: _Tracks062()}
         self.sectors = _Profile(2, ("030",))
         self.sector_time = field(self.sectors.spec, "030")
-        self.clock = records.Unrolled(records.DAY_S)
+        self.clock = sites.Unrolled(sites.DAY_S)
         self.sources: dict[str, str] = {}  # the first sensor of plots and the first of positions, SAC/SIC
         self.plots = False  # whether there are plots beside the truth
 
-    def batches(self) -> Iterator[records.Batch]:
+    def batches(self) -> Iterator[sites.Batch]:
         """The records, some at a time; raises ConfigError where a block or record is not as the specification says."""
         plots, positions = (
-            records.Gathered(records.PLOTS, records.PLOT_COLUMNS),
-            records.Gathered(records.POSITIONS, records.POSITION_COLUMNS),
+            sites.Gathered(sites.PLOTS, sites.PLOT_COLUMNS),
+            sites.Gathered(sites.POSITIONS, sites.POSITION_COLUMNS),
         )
         for category, begin, data in self._blocks():
             gathered = positions if category == 62 else plots
@@ -413,7 +413,7 @@ class Asterix:
                 place = f"{self.path}: byte {begin + fault.at}, record {self.records + 1}"
                 raise ConfigError(f"{place}: not ASTERIX of category {category:03d}: {fault.what}; "
                                   f"{self.records} records were read before") from fault  # fmt: skip
-            if len(gathered) >= records.BATCH:
+            if len(gathered) >= sites.BATCH:
                 yield gathered.taken()
         for gathered in (positions, plots):
             if len(gathered):
@@ -437,7 +437,7 @@ class Asterix:
             yield head[0], at, data
             at += length
 
-    def _block(self, category: int, data: bytes, gathered: records.Gathered) -> None:
+    def _block(self, category: int, data: bytes, gathered: sites.Gathered) -> None:
         if self.truth and category != 62:
             self.plots |= category in (1, 48)
             return

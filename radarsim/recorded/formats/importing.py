@@ -17,12 +17,24 @@ from typing import Literal
 import numpy as np
 
 from radarsim.errors import ConfigError
-from radarsim.recorded import doppler
-from radarsim.recorded.formats import ais, asterix
-from radarsim.recorded.formats.ais import Ais
+from radarsim.recorded import fit
+from radarsim.recorded.formats import asterix
+from radarsim.recorded.formats import sites as ais
 from radarsim.recorded.formats.asterix import Asterix
-from radarsim.recorded.formats.records import DAY_S, PLOTS, POSITIONS, Batch, Reader, counted, utc_s
-from radarsim.recorded.formats.site import Antenna, Site, biconical, described
+from radarsim.recorded.formats.sites import (
+    DAY_S,
+    PLOTS,
+    POSITIONS,
+    Ais,
+    Antenna,
+    Batch,
+    Reader,
+    Site,
+    biconical,
+    counted,
+    described,
+    utc_s,
+)
 from radarsim.recorded.formats.text import Table
 from radarsim.recorded.plots import grouped
 from radarsim.report.files import Writer
@@ -338,8 +350,8 @@ class _Import:
             done.notes.append(f"{unnamed} of {done.rows} plots belong to no track; `radarsim track` passes them over")
         if note := self.sign.note(self.options.towards):
             done.notes.append(note)
-        if (folded := doppler.folding(self.folds.tracks())) is not None:
-            done.notes.append(doppler.said(folded, self.output))
+        if (folded := fit.folding(self.folds.tracks())) is not None:
+            done.notes.append(fit.said(folded, self.output))
         return done
 
 

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TextIO
 
 from radarsim.errors import ConfigError
-from radarsim.recorded.formats import records
+from radarsim.recorded.formats import sites
 
 MOST_FAULTS = 20
 LARGEST = 1e15
@@ -98,10 +98,10 @@ class Table:
         names = {split(name) for name in header}
         self.aviation = any((name, "") in names for name in AVIATION)
         self.maritime = any(name in MARITIME for name, _ in names)
-        self.clock = records.Unrolled(records.DAY_S, near_s=MIDNIGHT_S)
+        self.clock = sites.Unrolled(sites.DAY_S, near_s=MIDNIGHT_S)
         self.before_it: dict[str, tuple[float, ...]] = {}  # the last position of each track
         self.columns = self._found(header, given or {})
-        self.kind = records.POSITIONS if set(ON_EARTH) <= set(self.columns) else records.PLOTS
+        self.kind = sites.POSITIONS if set(ON_EARTH) <= set(self.columns) else sites.PLOTS
         self._complete(header)
         taken = {column.place for column in self.columns.values()}
         free = [] if "track" in self.columns else [i for i in range(self.width) if i not in taken]
@@ -191,23 +191,23 @@ class Table:
         return Column(place, header[place].strip(), factor, taken)
 
     def _complete(self, header: list[str]) -> None:
-        wanted = ("t_s", *ON_EARTH) if self.kind == records.POSITIONS else ("t_s", "range_m")
+        wanted = ("t_s", *ON_EARTH) if self.kind == sites.POSITIONS else ("t_s", "range_m")
         if missing := [name for name in wanted if name not in self.columns]:
             hints = "; ".join(f"{name}: {', '.join(NAMES[name])}" for name in missing)
             got = ", ".join(name.strip() for name in header)[:200] or "nothing"
             what = "columns of time, and of latitude and longitude or of range"
             raise ConfigError(f"{self.path}:1: must have {what}; missing ({hints}); got {got}")
 
-    def batches(self) -> Iterator[records.Batch]:
+    def batches(self) -> Iterator[sites.Batch]:
         """The rows, some at a time; raises ConfigError with all faults, each with its line and column."""
-        names = records.POSITION_COLUMNS if self.kind == records.POSITIONS else records.PLOT_COLUMNS
-        row_of: RowOf = self._position if self.kind == records.POSITIONS else self._plot
-        gathered = records.Gathered(self.kind, names)
+        names = sites.POSITION_COLUMNS if self.kind == sites.POSITIONS else sites.PLOT_COLUMNS
+        row_of: RowOf = self._position if self.kind == sites.POSITIONS else self._plot
+        gathered = sites.Gathered(self.kind, names)
         try:
             for cells in self.rows:
                 if cells:
                     self._take(cells, gathered, row_of)
-                if len(gathered) >= records.BATCH and not self.faults:
+                if len(gathered) >= sites.BATCH and not self.faults:
                     yield gathered.taken()
         except csv.Error as error:
             self.faults.append(f"{self.path}:{self.line}: not a CSV row: {error}")
@@ -216,7 +216,7 @@ class Table:
         if len(gathered):
             yield gathered.taken()
 
-    def _take(self, cells: list[str], gathered: records.Gathered, row_of: RowOf) -> None:
+    def _take(self, cells: list[str], gathered: sites.Gathered, row_of: RowOf) -> None:
         if len(self.faults) >= MOST_FAULTS:
             raise ConfigError(*self.faults, f"{self.path}: more faults may follow")
         self.records += 1
@@ -224,14 +224,14 @@ class Table:
             self.faults.append(f"{self.path}:{self.line}: must have {self.width} cells as the header, got {len(cells)}")
             return
         row = row_of(cells)
-        if any(math.isnan(row[i]) for i in ((0, 1, 2) if self.kind == records.POSITIONS else (0, 1))):
+        if any(math.isnan(row[i]) for i in ((0, 1, 2) if self.kind == sites.POSITIONS else (0, 1))):
             self.skipped["records without time or position"] += 1
             return
         for place, seen in self.cells.items():
             if len(seen) < NAMES_AT_MOST:
                 seen.add(cells[place].strip())
         name = cells[self.columns["track"].place].strip() if "track" in self.columns else "1"
-        if self.kind == records.POSITIONS:
+        if self.kind == sites.POSITIONS:
             stands = math.hypot(row[4], row[5]) <= STILL_MPS
             if self.before_it.get(name) == row[1:3] and not stands:
                 self.skipped["rows that repeat the position before them"] += 1
@@ -263,11 +263,11 @@ class Table:
         text = cells[column.place].strip()
         try:
             t = float(self._pointed(text)) * column.factor if text else math.nan
-            return self.clock(t) if 0 <= t < records.DAY_S else t
+            return self.clock(t) if 0 <= t < sites.DAY_S else t
         except ValueError:
             pass
         try:
-            return records.utc_s(text)
+            return sites.utc_s(text)
         except ValueError:
             self._fault("t_s", f"must be a time in s or ISO 8601, got {text[:60]!r}")
             return math.nan

@@ -6,8 +6,18 @@ rule by which they are judged: docs/verdicts.md and `radarsim.report.claims.rule
 """
 
 # ruff: noqa: F401  (this is what others take from here)
-from radarsim.report.claims.declared import Claim, PaperClaims, Part
-from radarsim.report.claims.evidence import Evidence, Missing, Series, certain, common_times, minus, ratio
+from radarsim.report.claims.declared import (
+    Claim,
+    Evidence,
+    Missing,
+    PaperClaims,
+    Part,
+    Series,
+    certain,
+    common_times,
+    minus,
+    ratio,
+)
 from radarsim.report.claims.judge import (
     CLAIMED,
     NOT_JUDGED,
@@ -20,7 +30,9 @@ from radarsim.report.claims.judge import (
     listed,
     verdict,
 )
-from radarsim.report.claims.ranges import (
+from radarsim.report.claims.rule import (
+    CONFIRMED,
+    REFUTED,
     Range,
     about,
     above,
@@ -36,4 +48,3 @@ from radarsim.report.claims.ranges import (
     same,
     within,
 )
-from radarsim.report.claims.rule import CONFIRMED, REFUTED

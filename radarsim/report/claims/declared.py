@@ -1,13 +1,354 @@
-"""The papers' claims as data: what a study declares."""
+"""What an experiment measured, as claims ask for it: curves as series, points of them with their intervals.
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+Whether a case is the paper's own experiment, of which alone its claims may be judged.
+
+A claim names the shipped config that holds its experiment. A case is the paper's when its checked keys equal those of
+a case of that config. What may differ: the number of realisations, the seed and the options of a run, which are no
+keys of a study; names that are only displayed (`config.fields.Display`); and members that are added to a list which
+the study declares in `PaperClaims.may_grow`.
+
+The papers' claims as data: what a study declares.
+"""
+
+import copy
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from radarsim.report.claims.evidence import Evidence
-from radarsim.report.claims.ranges import Range
-from radarsim.report.statistics import Estimate
+import numpy as np
 
+from radarsim.config.experiment import canonical
+from radarsim.config.fields import Model, NameIn
+from radarsim.engine.results import CaseResult
+from radarsim.report import tables
+from radarsim.report.claims.rule import Range
+from radarsim.report.statistics import Estimate, difference
+
+
+# ---- evidence --------------------------------------------------------------------------------------------------------
+class Missing(KeyError):
+    """The experiment does not hold what a part of a claim needs; that part is then not judged by it.
+
+    A text says why; anything else is the key of a case that is not there.
+    """
+
+    @property
+    def why(self) -> str:
+        """The reason, where one was given."""
+        return next((arg for arg in self.args if isinstance(arg, str)), "")
+
+
+class Hidden(dict):
+    """In place of sums and tables where none may be looked at: everything is missing."""
+
+    def __missing__(self, key: str) -> Any:
+        raise Missing(key)
+
+
+class Certain(Estimate):
+    """A number without noise: algebra, a count."""
+
+    __slots__ = ()
+
+
+@dataclass(frozen=True)
+class Series:
+    """A measured curve: scans k, times t, values and the ends of their intervals, arrays of one length.
+
+    short says why it ends before the paper's does; what depends on its end is then missing.
+    """
+
+    k: np.ndarray
+    t: np.ndarray
+    value: np.ndarray
+    lo: np.ndarray
+    hi: np.ndarray
+    short: str = ""
+
+    def point(self, i: int) -> Estimate:
+        """The i-th point."""
+        return Estimate(float(self.value[i]), float(self.lo[i]), float(self.hi[i]))
+
+    def where(self, mask: np.ndarray | slice) -> "Series":
+        """The points that a mask or indices pick; raises Missing where there is none."""
+        if not np.asarray(self.k)[mask].size:
+            raise Missing("no such scans")
+        k, t, value, lo, hi = (np.asarray(part)[mask] for part in (self.k, self.t, self.value, self.lo, self.hi))
+        return Series(k, t, value, lo, hi, self.short)
+
+    def upto(self, k: int) -> "Series":
+        """To scan k; whole if it goes so far."""
+        part = self.where(self.k <= k)
+        return replace(part, short="") if self.k[-1] >= k else part
+
+    def _whole(self) -> None:
+        if self.short:
+            raise Missing(self.short)
+
+    def since(self, k: int) -> "Series":
+        """From scan k on."""
+        return self.where(self.k >= k)
+
+    def at(self, k: int) -> Estimate:
+        """The point at scan k."""
+        return self.where(self.k == k).point(0)
+
+    def first(self) -> Estimate:
+        """The first point."""
+        return self.point(0)
+
+    def last(self) -> Estimate:
+        """The last point."""
+        self._whole()
+        return self.point(-1)
+
+    def largest(self) -> Estimate:
+        """The largest value, with the interval of its own scan."""
+        self._whole()
+        return self.point(int(np.nanargmax(self.value)))
+
+    def least(self) -> Estimate:
+        """The least value, with the interval of its own scan."""
+        self._whole()
+        return self.point(int(np.nanargmin(self.value)))
+
+    def when_largest(self, of: str = "t") -> Estimate:
+        """Time (or scan, of="k") of the largest value; the interval spans all that cannot be told from it."""
+        self._whole()
+        axis = getattr(self, of)
+        top = int(np.nanargmax(self.value))
+        near = axis[self.hi >= self.lo[top]]
+        return Estimate(float(axis[top]), float(near.min()), float(near.max()))
+
+
+def common_times(a: Series, b: Series) -> tuple[Series, Series]:
+    """The points of both at the times that both have."""
+    _, i, j = np.intersect1d(np.round(a.t, 6), np.round(b.t, 6), return_indices=True)
+    return a.where(i), b.where(j)
+
+
+def minus(a: Series, b: Series) -> Series:
+    """a − b, point by point, of independent noise: half-widths add in squares."""
+    of = difference(Estimate(a.value, a.lo, a.hi), Estimate(b.value, b.lo, b.hi))
+    return Series(a.k, a.t, *of, short=a.short or b.short)
+
+
+def ratio(a: Estimate, b: Estimate, scale: float = 1.0) -> Estimate:
+    """scale · a / b of independent positive estimates: relative half-widths add in squares."""
+    value = scale * a.value / b.value
+    down = np.hypot(1 - a.lo / a.value, b.hi / b.value - 1)
+    up = np.hypot(a.hi / a.value - 1, 1 - b.lo / b.value)
+    return Estimate(value, value * (1 - down), value * (1 + up))
+
+
+def certain(value: float) -> Certain:
+    """A number without noise: algebra, a count."""
+    return Certain(float(value), float(value), float(value))
+
+
+class _Watched(dict):
+    """Tables that note which of them is looked at."""
+
+    def __init__(self, made: Mapping, looked: set[tuple[str, str]]):
+        super().__init__(made)
+        self._looked = looked
+
+    def __getitem__(self, name: str) -> Any:
+        self._looked.add((name, ""))
+        return super().__getitem__(name)
+
+
+class Evidence:
+    """What an experiment measured, as the claims of its study ask for it. Studies say in `case` what a key means.
+
+    results are the cases that are the paper's, no others; of their lists that may grow, `members` gives the paper's.
+    """
+
+    def __init__(self, results: Sequence[CaseResult], made: Mapping, places: Mapping[str, Mapping[str, set[int]]]):
+        """places: by the name of a case and the key of a list, which of its members are the paper's."""
+        self.results: list[CaseResult] = list(results)
+        self.looked: set[tuple[str, str]] = set()  # tables, with or without a component, since it was last emptied
+        self.tables: Mapping = _Watched(made, self.looked)
+        self._places = places
+        self._exact = False
+        self._groups: dict[str, Mapping] = {}
+
+    def exactly(self) -> "Evidence":
+        """The same with exact values in place of measured ones; what is not known exactly is missing.
+
+        Curves and gains are those of their exact columns; no other table, and no sums, can be seen.
+        """
+        for name in ("curves", "gains"):
+            self._grouped(name)
+        other = copy.copy(self)
+        other._exact, other.tables = True, Hidden()
+        other.results = [replace(result, sums=Hidden()) for result in self.results]
+        return other
+
+    def _grouped(self, table: str) -> Mapping:
+        """The rows of curves or gains by case, filter and component."""
+        if table not in self._groups:
+            self._groups[table] = tables.groups(self.tables[table], "case", "filter", "component")
+        return self._groups[table]
+
+    def members(self, result: CaseResult, key: str = "filters") -> list[tuple[int, Any]]:
+        """The members of a list of a case that are the paper's, each with its number; not those that were added."""
+        return [(i, one) for i, one in enumerate(getattr(result.spec, key)) if i in self._places[result.name][key]]
+
+    def case(self, key: Any) -> CaseResult:
+        """The case that a key means; raises Missing where the experiment does not hold it. Here: by name."""
+        for result in self.results:
+            if result.name == key:
+                return result
+        raise Missing(key)
+
+    def curve(self, key: Any, filter_name: str, component: str) -> Series:
+        """σ(k) of a filter of a case."""
+        return self._series("curves", key, filter_name, component, ("sigma", "sigma_lo", "sigma_hi", "exact_sigma"))
+
+    def gain(self, key: Any, filter_name: str, component: str) -> Series:
+        """Relative gain of a filter of a case against its baseline, %."""
+        names = ("gain_percent", "gain_lo", "gain_hi", "exact_percent")
+        return self._series("gains", key, filter_name, component, names)
+
+    def _series(self, table: str, key: Any, filter_name: str, component: str, names: tuple[str, ...]) -> Series:
+        rows = self._grouped(table).get((self.case(key).name, filter_name, component))
+        self.looked.add((table, component))
+        if rows is None:
+            raise Missing(key)
+        value, lo, hi, exact = (rows[name].to_numpy(dtype=float) for name in names)
+        if self._exact:
+            if np.isnan(exact).any():
+                raise Missing("not known exactly")
+            value = lo = hi = exact
+        return Series(rows["k"].to_numpy(), rows["t_s"].to_numpy(), value, lo, hi)
+
+    def row(self, table: str, **equal: object) -> Mapping[str, Any]:
+        """The one row of a table with these values; raises Missing."""
+        rows = self.tables[table]
+        self.looked.add((table, str(equal.get("component", ""))))
+        for name, value in equal.items():
+            rows = rows[rows[name] == value]
+        if not len(rows):
+            raise Missing(equal)
+        first: Any = rows.iloc[0]  # a Series, read as a mapping
+        return first
+
+
+# ---- paper -----------------------------------------------------------------------------------------------------------
+CLOSE = 1e-12  # relative: one number in radians and in degrees
+Shipped = Callable[[str], Sequence[Model] | None]  # config → the checked keys of its cases; None: not shipped
+
+
+@dataclass(frozen=True)
+class Described:
+    """A case's keys, as plain data: those of its lists that may grow apart from the rest.
+
+    named holds, for each key that names a member of such a list, that member.
+    """
+
+    fixed: dict
+    members: dict[str, list]
+    named: dict[str, object]
+
+
+def described(spec: Model, may_grow: Sequence[str], may_shorten: Sequence[str] = ()) -> Described:
+    """The keys of a case that are compared: all but may_shorten."""
+    plain = {key: value for key, value in canonical(spec).items() if key not in may_shorten}
+    members = {key: plain.pop(key) for key in may_grow}
+    named = {}
+    for name, info in type(spec).model_fields.items():
+        for mark in info.metadata:
+            if isinstance(mark, NameIn) and mark.field in members:
+                named[name] = members[mark.field][plain.pop(name)]
+    return Described(plain, members, named)
+
+
+def own_members(mine: Described, shipped: Iterable[Described], may_grow: Sequence[str]) -> dict[str, set[int]] | None:
+    """Of a case that is the paper's: which members of its lists, by number, are the paper's; None for any other case.
+
+    shipped are the cases of the claim's config.
+    """
+    found: dict[str, set[int]] | None = None
+    for papers in shipped:
+        if not (equal(mine.fixed, papers.fixed) and equal(mine.named, papers.named)):
+            continue
+        places = {key: _places(papers.members[key], mine.members[key]) for key in may_grow}
+        if all(len(places[key]) == len(papers.members[key]) for key in may_grow):
+            found = {key: places[key] | (found or {}).get(key, set()) for key in may_grow}
+    return found
+
+
+def differences(mine: Described, shipped: Iterable[Described], may_grow: Sequence[str]) -> list[str]:
+    """The keys in which a case differs from the nearest of these, "key is x, the paper's y"; empty where in none."""
+    shipped = list(shipped)
+    if own_members(mine, shipped, may_grow) is not None:
+        return []
+    every = [_differing(mine.fixed, papers.fixed) + _lacking(mine, papers, may_grow) for papers in shipped]
+    return min(every, key=len, default=["no such experiment is shipped"])
+
+
+def _lacking(mine: Described, papers: Described, may_grow: Sequence[str]) -> list[str]:
+    said = []
+    for key in may_grow:
+        missing = len(papers.members[key]) - len(_places(papers.members[key], mine.members[key]))
+        if missing:
+            said.append(f"{missing} of the paper's {len(papers.members[key])} {key} changed or not there")
+    if not equal(mine.named, papers.named):
+        said.append(f"{', '.join(papers.named)} another one than the paper's")
+    return said
+
+
+def _differing(mine: object, papers: object, path: str = "") -> list[str]:
+    """The keys of plain data in which two differ, by dotted path."""
+    if equal(mine, papers):
+        return []
+    if isinstance(mine, dict) and isinstance(papers, dict):
+        if mine.get("kind") != papers.get("kind"):  # the keys of one kind say nothing to those of another
+            return _differing(mine.get("kind"), papers.get("kind"), f"{path}.kind".strip("."))
+        keys = dict.fromkeys((*mine, *papers))
+        return [line for key in keys for line in _differing(mine.get(key), papers.get(key), f"{path}.{key}".strip("."))]
+    if isinstance(mine, list) and isinstance(papers, list) and len(mine) == len(papers):
+        pairs = enumerate(zip(mine, papers, strict=True))
+        return [line for i, (own, other) in pairs for line in _differing(own, other, f"{path}.{i}")]
+    return [f"{path} is {_short(mine)}, the paper's {_short(papers)}"]
+
+
+def _short(value: object) -> str:
+    if value is None:
+        return "none"
+    text = f"{value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
+    return text if len(text) <= LONGEST else text[:LONGEST] + "…"
+
+
+LONGEST = 40  # characters of a value that a reason quotes
+
+
+def _places(wanted: Sequence, given: Sequence) -> set[int]:
+    """Where the wanted members stand among the given ones, each at a place of its own."""
+    places: set[int] = set()
+    for one in wanted:
+        place = next((i for i, other in enumerate(given) if i not in places and equal(one, other)), None)
+        if place is not None:
+            places.add(place)
+    return places
+
+
+def equal(one: object, other: object) -> bool:
+    """Whether plain data are equal, numbers to 10⁻¹² of their size."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(equal(value, other[key]) for key, value in one.items())
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(equal, one, other))
+    if isinstance(one, bool) or isinstance(other, bool):
+        return one is other
+    if isinstance(one, int | float) and isinstance(other, int | float):
+        return math.isclose(one, other, rel_tol=CLOSE)
+    return one == other
+
+
+# ---- declared --------------------------------------------------------------------------------------------------------
 Measured = Callable[[Any], Estimate]  # of the evidence of the study, a subclass of Evidence
 Number = Callable[[Any], float]
 
@@ -82,7 +423,7 @@ class PaperClaims:
     paper is how tables cite it: authors and year. page is the stem of the study's page in docs/, where there is one.
     may_shorten names keys that only cut a run short, or let it go on: what does not depend on its end is judged still.
     may_grow names the study's lists to which members may be added without its being another experiment than the
-    paper's; every other key must be as in the claim's config, see `radarsim.report.claims.paper`.
+    paper's; every other key must be as in the claim's config, see `radarsim.report.claims.declared`.
     held_too names, by the stem of a shipped config, the claims of other configs of which it holds every part: when it
     is changed so that it no longer judges them, it says so.
     """

@@ -6,11 +6,21 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import tables as common
+from radarsim.report import tables
 from radarsim.report.claims import rule
-from radarsim.report.claims.declared import Claim, PaperClaims, Part
-from radarsim.report.claims.evidence import Certain, Evidence, Missing
-from radarsim.report.claims.paper import Described, Shipped, described, differences, own_members
+from radarsim.report.claims.declared import (
+    Certain,
+    Claim,
+    Described,
+    Evidence,
+    Missing,
+    PaperClaims,
+    Part,
+    Shipped,
+    described,
+    differences,
+    own_members,
+)
 from radarsim.report.claims.rule import CONFIRMED, REFUTED, Judged, Outcome
 from radarsim.report.statistics import ERROR_OF_PROGRAM, FEW, Estimate, standard_errors
 
@@ -68,7 +78,7 @@ def judged(
         papers = _Papers(of, results, made, shipped)
         for claim in of.claims:
             rows += _rows(claim, of.paper, papers, own=of.holds(claim, stem))
-    table = common.frame({name: [row[name] for row in rows] for name in CLAIMED})
+    table = tables.frame({name: [row[name] for row in rows] for name in CLAIMED})
     table.attrs[LOOKED] = [row[LOOKED] for row in rows]
     return table
 

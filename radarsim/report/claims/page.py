@@ -1,13 +1,29 @@
-"""docs/claims.md: all claims of the papers in a table each, and every part of them below, made from stored results."""
+"""Specification curves: a claim under every reading, sorted by how it comes out, and below what each reading takes.
+
+The class of a claim over all readings that its paper allows, beside the one that it has as shipped.
+
+It is worked out in one place, `over.Over.outcome`, when `radarsim readings` judges a claim under each of them, and
+kept as a row of classes.csv. Everything else that shows a class looks it up.
+
+docs/claims.md: all claims of the papers in a table each, and every part of them below, made from stored results.
+
+The forest plot of claims: of each the worst part, its interval and exact value, in margins of what the words say.
+"""
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from radarsim.config.experiment import digest
 from radarsim.language import numeral, plural, term, tr
-from radarsim.report.claims import classes, reasons
+from radarsim.report.claims import rule
+from radarsim.report.claims.declared import Claim
 from radarsim.report.claims.judge import NOT_JUDGED, NOT_RUN
+from radarsim.report.claims.over import Choice, Over, PaperReadings, Under, depth
 from radarsim.report.claims.rule import (
     CLASSES,
     CONFIRMED,
@@ -20,8 +36,206 @@ from radarsim.report.claims.rule import (
     VOID,
     roughly,
 )
-from radarsim.report.text import interval
+from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
+from radarsim.report.tables import interval
 
+# ---- curve -----------------------------------------------------------------------------------------------------------
+FURTHEST = 5.0  # margins: what lies further is drawn there
+LETTERS = 44  # of an alternative beside the panel
+HEADING = 1.5  # lines that the name of a choice takes above its alternatives
+KINDS = {
+    rule.EQUIVALENT: (term("as shipped, or equivalent"), Style(colour=0, dash=None, marker=0)),
+    rule.UNSTATED: (term("the paper does not say"), Style(colour=4, dash=None, marker=1)),
+    rule.AGAINST: (term("against the print"), Style(colour=GREY, dash=None, marker=2)),
+}
+
+
+def specification(of: PaperReadings, over: Over) -> Figure:
+    """The curve of a claim: above its worst part's distance from the paper's words, below the alternatives taken."""
+    judged = [(one, depth(one)) for one in over.under if one.outcome is not None]
+    judged.sort(key=lambda pair: pair[1][0])
+    every = [one for one, _ in judged]
+    where = np.arange(1, len(every) + 1)
+    ends = np.clip(np.array([found for _, found in judged]), -FURTHEST, FURTHEST)
+    varied = [choice for choice in of.choices if len({one.reading[choice.key] for one in every}) > 1]
+    return Figure(
+        name=over.claim.id,
+        title=tr("{claim} under every reading", claim=over.claim.id),
+        caption=tr(
+            "{statement}. {outcome}. Above: how far the worst part of the claim is from what the paper says, in "
+            "margins of that part, cut at ± {furthest:g}; under 0 it holds, over 1 it fails beyond the margin. Below: "
+            "what each reading takes.",
+            statement=tr(over.claim.statement),
+            outcome=over.sentence().capitalize(),
+            furthest=FURTHEST,
+        ),
+        panels=(_above(every, where, ends, over), *([_below(varied, every, where)] if varied else [])),
+        width_mm=PAGE_MM,
+        panel_height_mm=max(62.0, 4.2 * sum(len(choice.alternatives) + HEADING for choice in varied)),
+    )
+
+
+def _above(every: list[Under], where: np.ndarray, ends: np.ndarray, over: Over) -> Panel:
+    marks = []
+    for kind, (label, style) in KINDS.items():
+        of = np.array([one.kind == kind for one in every])
+        if of.any():
+            value, lo, hi = ends[of].T
+            marks.append(Line(where[of], value, tr(label), style, lo, hi))
+    return Panel(
+        Axis(tr("reading, sorted"), limits=(0, len(every) + 1)),
+        Axis(tr("distance of the worst part, margins (cut at ± {furthest:g})", furthest=FURTHEST)),
+        (*marks, Reference(0.0, label=tr("as the paper says")), Reference(1.0, label=tr("beyond the margin"))),
+        title=f"{over.claim.id}: {over.sentence()}",
+        direct=False,
+    )
+
+
+def _below(varied: list[Choice], every: list[Under], where: np.ndarray) -> Panel:
+    ticks, marks, height = [], [], HEADING - 1.0
+    for choice in varied:
+        height -= HEADING
+        ticks.append((float(height), _short(f"{choice.key}:")))
+        for one in choice.alternatives:
+            height -= 1
+            ticks.append((float(height), _short(one.name)))
+            taken = np.array([reading.reading[choice.key] == one.name for reading in every])
+            if taken.any():
+                style = Style(
+                    colour=KINDS[one.kind][1].colour, dash=None, marker=KINDS[one.kind][1].marker, size_pt=2.6
+                )
+                marks.append(Line(where[taken], np.full(taken.sum(), float(height)), "", style))
+    return Panel(
+        Axis(tr("reading, sorted"), limits=(0, len(every) + 1)),
+        Axis("", limits=(height - 1.0, 0.0), ticks=tuple(reversed(ticks))),
+        tuple(marks),
+        legend="none",
+    )
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= LETTERS else text[: LETTERS - 1] + "…"
+
+
+# ---- classes ---------------------------------------------------------------------------------------------------------
+COLUMNS = ("claim", "class", "holds", "of", "depends_on", "needed", "declared")
+OVER = ("class", "overall", "holds", "of", "depends_on", "needed")  # columns of claims.csv
+DEPENDS_ON = term("depends on {keys}")
+BOTH = term("{own} as shipped; {over}")
+OVER_ALL = term("{kind} over all readings")
+ALONE = term("{own} as shipped; other readings not judged")
+
+
+@dataclass(frozen=True)
+class Class:
+    """A claim over all its readings: its class, in how many of how many it is true, what flips it.
+
+    needed: realisations that would decide it where it is not, else not-a-number. declared: of what it was judged.
+    """
+
+    claim: str
+    kind: str
+    holds: int
+    of: int
+    depends_on: str
+    needed: float
+    declared: str
+
+    def as_row(self) -> dict[str, Any]:
+        """The row of classes.csv."""
+        needed = "" if math.isnan(self.needed) else int(self.needed)
+        values = (self.claim, self.kind, self.holds, self.of, self.depends_on, needed, self.declared)
+        return dict(zip(COLUMNS, values, strict=True))
+
+    @classmethod
+    def of_row(cls, row: Mapping[str, Any]) -> "Class":
+        """From a row of classes.csv. Raises ValueError or LookupError for one that is none."""
+        if row["class"] not in rule.CLASSES:
+            raise ValueError(row["class"])
+        needed = float(row["needed"]) if row["needed"] else math.nan
+        holds, of = int(row["holds"]), int(row["of"])
+        return cls(row["claim"], row["class"], holds, of, row["depends_on"], needed, row["declared"])
+
+
+# Of each claim of which its paper leaves something open: its class over all readings, None where it is not known.
+Known = Mapping[str, Class | None]
+
+
+def declared(of: PaperReadings, claim: Claim) -> str:
+    """A mark of what a claim asserts and of what its paper leaves open of it: another one, another claim."""
+    parts = [
+        [
+            *(part.what, part.unit, part.statement, part.number, part.variant, part.against_print, part.asserted),
+            *(repr(end) for end in (part.expected.lo, part.expected.hi, part.expected.margin)),
+            part.expected.kind,
+        ]
+        for part in claim.parts
+    ]
+    choices = [
+        [choice.key, choice.contradicts, *([one.name, one.kind] for one in choice.alternatives)]
+        for choice in of.choices
+        if choice.bears_on(claim.id)
+    ]
+    return digest([parts, claim.how, choices])[:16]
+
+
+def of_over(of: PaperReadings, over: Over) -> Class | None:
+    """The class of a claim that was judged under its readings; None where it could not be."""
+    found = over.outcome
+    if found is None or found.readings is None or found.holds_in is None:
+        return None
+    needed, on = float(found.needed or math.nan), ", ".join(found.depends_on)
+    return Class(over.claim.id, found.kind, found.holds_in, found.readings, on, needed, declared(of, over.claim))
+
+
+def with_classes(rows: Sequence[Mapping[str, Any]], known: Known) -> list[dict[str, Any]]:
+    """Rows of claims.csv with the class over all readings in place of that as shipped, which stands in `as_shipped`.
+
+    What was not judged stays as it is.
+    """
+    return [dict(row) | _over(row, known) for row in rows]
+
+
+def _over(row: Mapping[str, Any], known: Known) -> dict[str, Any]:
+    own = row["as_shipped"]
+    if own in (NOT_RUN, NOT_JUDGED):
+        return {}
+    found = known.get(str(row["claim"]))
+    if found is None:
+        nothing: dict[str, Any] = {"class": own, "holds": math.nan, "of": math.nan, "depends_on": ""}
+        lost = str(row["claim"]) in known and own not in rule.NO_READING_MENDS
+        return nothing | {"overall": ALONE.format(own=own) if lost else own}
+    needed = {} if own == rule.UNDECIDED else {"needed": found.needed}
+    every = {"class": found.kind, "holds": found.holds, "of": found.of, "depends_on": found.depends_on}
+    return every | needed | {"overall": words(found.kind, own, found.depends_on)}
+
+
+def alone(row: Mapping[str, Any]) -> bool:
+    """Whether a claim was judged as shipped alone, though its paper leaves open what may turn it."""
+    return bool(row["overall"] == ALONE.format(own=row["as_shipped"]))
+
+
+def verdict_words(row: Mapping[str, Any]) -> str:
+    """How far a claim of claims.csv stands, in a phrase in the language spoken."""
+    if alone(row):
+        return tr(ALONE, own=term(row["as_shipped"]))
+    return words(row["class"], row["as_shipped"], row["depends_on"], tr)
+
+
+def words(kind: str, own: str, depends_on: str = "", say: Callable[..., str] = str.format) -> str:
+    """How far a claim stands, in a phrase: its class, and the one as shipped where this is another.
+
+    say: puts values into a message, as `language.tr` does; default: in English.
+    """
+    over: str = say(DEPENDS_ON, keys=depends_on) if kind == rule.DEPENDS and depends_on else say(kind)
+    if own == kind:
+        return over
+    if kind not in (rule.DEPENDS, rule.CONTRADICTORY):
+        over = say(OVER_ALL, kind=over)
+    return say(BOTH, own=term(own), over=over)
+
+
+# ---- page ------------------------------------------------------------------------------------------------------------
 HEAD = """# The papers' claims
 
 Made from results by `make claims-page`, never by hand, by [one rule](verdicts.md) that was written down before anything
@@ -140,7 +354,7 @@ def counted(rows: Sequence[Mapping]) -> str:
 def verdict_of(parts: Sequence[Mapping]) -> str:
     """How far a claim stands, with the readings under which it is true, and what would decide one that is not."""
     first, notes = parts[0], []
-    text = classes.said(first)
+    text = verdict_words(first)
     if first["overall"] in MARKS:
         text = f"**{text}**"
     needed = number(first["needed"])
@@ -154,7 +368,7 @@ def verdict_of(parts: Sequence[Mapping]) -> str:
             else tr("true under {holds:.0f} of {of:.0f} readings", holds=holds, of=of)
         )
     if first["class"] in (UNJUDGEABLE, NOT_JUDGED) and first["why"]:
-        notes.append(reasons.said(first["why"]))
+        notes.append(rule.said(first["why"]))
     if extension(parts):
         notes.append(tr(NOT_COUNTED))
     return f"{text} ({'; '.join(notes)})" if notes else text
@@ -195,12 +409,12 @@ def worst(parts: Sequence[Mapping]) -> Mapping | None:
         if number(row["measured"]) is None or row["verdict"] == VOID or ours:
             continue
         key = str(row["number"]) or f"#{i}"
-        if key not in best or depth(_value(row), row) < depth(_value(best[key]), best[key]):
+        if key not in best or depth_of_row(_value(row), row) < depth_of_row(_value(best[key]), best[key]):
             best[key] = row
-    return max(best.values(), key=lambda row: depth(_value(row), row), default=None)
+    return max(best.values(), key=lambda row: depth_of_row(_value(row), row), default=None)
 
 
-def depth(value: float, row: Mapping) -> float:
+def depth_of_row(value: float, row: Mapping) -> float:
     """Distance of a value from what the words say, in margins: 0 at an end of the range, negative inside."""
     lo, hi = number(row["expected_lo"]), number(row["expected_hi"])
     below = -math.inf if lo is None else lo - value
@@ -287,3 +501,78 @@ def _cell(text: str) -> str:
     """Text that neither ends a cell nor is taken for markup."""
     text = text.replace("|", "\\|")
     return text.replace("<", "&lt;").replace("&lt;br>", "<br>")
+
+
+# ---- forest ----------------------------------------------------------------------------------------------------------
+FURTHEST_IN_FOREST = 4.0  # margins: what lies further is drawn there
+COLOURS = (5, 2, 4, GREY, 3, 1, 6)  # of the classes in their order: green, red, blue, grey, …
+STYLES = {
+    kind: Style(colour=colour, dash=None, marker=i, size_pt=4.0)
+    for i, (kind, colour) in enumerate(zip(CLASSES, COLOURS, strict=True))
+}
+
+
+def depth_in_forest(value: float, row: Mapping) -> float:
+    """Distance of a value from what the words say, in margins, cut at 4."""
+    return float(np.clip(depth_of_row(value, row), -FURTHEST_IN_FOREST, FURTHEST_IN_FOREST))
+
+
+def figure(rows: Sequence[Mapping]) -> Figure | None:
+    """All claims of these rows that were judged, a panel a paper; None where there are none."""
+    judged = [own for own in grouped(rows) if own[0]["class"] not in (NOT_RUN, NOT_JUDGED)]
+    found = [(own, row) for own in judged if (row := worst(own)) is not None]
+    papers = list(dict.fromkeys(own[0]["paper"] for own, _ in found))
+    panels = [_panel(paper, [(own, row) for own, row in found if own[0]["paper"] == paper]) for paper in papers]
+    if not panels:
+        return None
+    classes = Counter(own[0]["class"] for own in judged)
+    counted = ", ".join(of_class(kind, classes[kind]) for kind in ORDER if classes[kind])
+    return Figure(
+        name="claims",
+        title=tr("Claims, in margins of what their papers say"),
+        caption=plural("Of {count} claim: {counted}. ", "Of {count} claims: {counted}. ", len(judged), counted=counted)
+        + tr(
+            "Of each claim the part that lies furthest from the paper's words: measured, with the interval that is "
+            "judged, and exactly, in margins of that part, cut at ± {furthest:g}. Under 0 it is as the words say, "
+            "up to 1 within their margin. The mark is the class of the claim, over all readings that its paper allows.",
+            furthest=FURTHEST_IN_FOREST,
+        ),
+        panels=tuple(panels),
+        width_mm=PAGE_MM,
+        panel_height_mm=58.0,
+    )
+
+
+def _panel(paper: str, found: Sequence[tuple[Sequence[Mapping], Mapping]]) -> Panel:
+    ticks, marks = [], []
+    for x, (own, _) in enumerate(found, 1):
+        key, _, number = own[0]["claim"].partition(".")
+        ticks.append((float(x), number))
+    for kind, style in STYLES.items():
+        of = [(x, row) for x, (own, row) in enumerate(found, 1) if own[0]["class"] == kind]
+        if of:
+            marks.append(_forest_line(kind, style, of))
+    return Panel(
+        Axis(tr("claim of {paper}", paper=key), limits=(0, len(found) + 1), ticks=tuple(ticks)),
+        Axis(
+            tr("distance from the words, margins (cut at ± {furthest:g})", furthest=FURTHEST_IN_FOREST),
+            limits=(-FURTHEST_IN_FOREST - 0.3, FURTHEST_IN_FOREST + 0.3),
+        ),
+        (*marks, Reference(0.0), Reference(1.0, label=tr("beyond the margin"))),
+        title=f"{key} {tr(paper)}",
+        direct=False,
+        legend="right",
+    )
+
+
+def _forest_line(kind: str, style: Style, of: Sequence[tuple[int, Mapping]]) -> Line:
+    """The marks of one class: where a value is known exactly, this is what the mark stands at."""
+    rows = [row for _, row in of]
+    ends = np.array([sorted(depth_in_forest(end, row) for end in bounds(row)) for row in rows])
+    value = np.array([depth_in_forest(float(row["measured"]), row) for row in rows])
+    exact = [number(row["exact"]) for row in rows]
+    crosses = np.array(
+        [math.nan if one is None else depth_in_forest(one, row) for one, row in zip(exact, rows, strict=True)]
+    )
+    lo, hi = np.minimum(ends[:, 0], value), np.maximum(ends[:, 1], value)
+    return Line(np.array([float(x) for x, _ in of]), value, tr(kind), style, lo, hi, crosses)

@@ -7,13 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from radarsim.language import Term, current, numeral, plural, term, tr
-from radarsim.report.claims.classes import words
-from radarsim.report.claims.joint import Joint, Key, Together
-from radarsim.report.claims.over import Over
-from radarsim.report.claims.page import expected, plain
-from radarsim.report.claims.readings import PaperReadings
-from radarsim.report.claims.reasons import said
-from radarsim.report.claims.search import Search
+from radarsim.report.claims.over import Joint, Key, Over, PaperReadings, Search, Together
+from radarsim.report.claims.page import expected, plain, words
+from radarsim.report.claims.rule import said
 
 PAPERS = "ru"  # the language of the papers that are quoted
 SHOWN = 12  # readings of the table of claims by reading

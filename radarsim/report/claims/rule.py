@@ -3,14 +3,25 @@
 docs/verdicts.md gives it in words. A judged part holds what was measured, the exact value where one is known, the range
 that the paper's words leave and the margin that these words have. `verdict` judges one part, `claim` all parts of a
 claim, `over_readings` a claim under all readings that its paper allows.
+
+Why a claim is not judged, in the language spoken: claims.csv and readings.csv say it in English.
+
+What a paper's words leave of a number: the values, and how finely the words give them. See docs/verdicts.md.
+
+Every function takes the words alone; none knows what was measured.
 """
 
 import math
+import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import NormalDist
+from typing import NamedTuple
 
+from radarsim.language import numeral, term, tr
+
+# ---- rule ------------------------------------------------------------------------------------------------------------
 CONFIRMED, REFUTED, IMMATERIAL = "confirmed", "refuted", "no material difference"
 CONTRADICTORY, UNJUDGEABLE = "the print contradicts itself", "not judgeable as stated"
 UNDECIDED, DEPENDS = "not yet decided", "depends on"
@@ -400,3 +411,189 @@ def _spread(choice: str, readings: Sequence[Reading], asked: str) -> float:
         shares.setdefault(one.choices.get(choice, ""), []).append(one.outcome == asked)
     held = [sum(own) / len(own) for own in shares.values()]
     return max(held) - min(held)
+
+
+# ---- reasons ---------------------------------------------------------------------------------------------------------
+NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?")
+PLACE = re.compile(r"\{(\w+)\}")
+WHOLE = (  # `changed` is made of differences, case by case
+    term("not the paper's experiment: {changed}"),
+    term("{case} ends at {end} s, the paper's run at {duration} s"),
+    term("the run of RLS {number} ends at {end} s, before {asked} s"),
+    term(
+        "exact value and simulation differ by more than {errors} standard errors: exact {exact}, simulated {simulated} "
+        "[{lo}, {hi}]"
+    ),
+)
+DIFFERENCES = (
+    term("{missing} of the paper's {count} {key} changed or not there"),
+    term("{key} another one than the paper's"),
+    term("{key} is {own}, the paper's {printed}"),
+)
+AND_MORE = term("and {count} more")
+SAID_WHOLE = (
+    *(term("no such experiment is shipped"), term("a case that it needs is not there"), term("there is no gain")),
+    *(term("there is nothing to measure it by"), term("no such scans"), term("not known exactly")),
+    *(term("no Kalman filter with manoeuvre variance"), term("gains against growing memory")),
+    *(term("the run ends before the manoeuvre does"),),
+    term("(15) has no root: with the phase in it, its left side is over c at every length"),
+)
+
+
+def said(why: object) -> str:
+    """A reason in the language spoken; one that is not known here as it stands."""
+    text = str(why)
+    for message in WHOLE:
+        found = _pattern(message).fullmatch(text)
+        if found:
+            places = _said(found)
+            return tr(message, **places | {"changed": "; ".join(_by_case(places.get("changed", "")))})
+    return tr(text)
+
+
+def _by_case(changed: str) -> Iterator[str]:
+    """What differs, by case: `rls2: radar.sigma_range_m is 30, the paper's 25; and 2 more`."""
+    for part in changed.split("; "):
+        case, _, differences = part.rpartition(": ")
+        found = _pattern(AND_MORE).fullmatch(part)
+        if found:
+            yield tr(AND_MORE, **_said(found))
+        else:
+            yield (f"{case}: " if case else "") + ", ".join(map(_difference, _apart(differences)))
+
+
+def _apart(differences: str) -> list[str]:
+    """Differences one by one; the second half of one begins with a comma as well."""
+    return re.split(r", (?!the paper's )(?=\S+ is |\d+ of the paper's |\S+ another one )", differences)
+
+
+def _difference(text: str) -> str:
+    for message in DIFFERENCES:
+        found = _pattern(message).fullmatch(text.removesuffix(" …"))
+        if found:
+            return tr(message, **_said(found)) + (" …" if text.endswith(" …") else "")
+    return tr(text)
+
+
+def _said(found: re.Match[str]) -> dict[str, str]:
+    """What stands in the places, numbers as the language writes them."""
+    return {name: numeral(text) if NUMBER.fullmatch(text) else text for name, text in found.groupdict().items()}
+
+
+def _pattern(message: str) -> re.Pattern[str]:
+    """What a message becomes when its places are filled."""
+    parts = PLACE.split(message)
+    return re.compile("".join(f"(?P<{one}>.+?)" if i % 2 else re.escape(one) for i, one in enumerate(parts)))
+
+
+# ---- ranges ----------------------------------------------------------------------------------------------------------
+class Range(NamedTuple):
+    """The values that the words say, ends included, the words, their margin, and the kind of rule that gives it.
+
+    strict is the range of the rule of version 0.1, for `old_verdict`.
+    """
+
+    lo: float
+    hi: float
+    words: str
+    margin: float
+    kind: str
+    strict: tuple[float, float]
+
+
+def digit(text: str) -> float:
+    """The unit of a printed number's last digit."""
+    return 10.0 ** -len(text.partition(".")[2])
+
+
+def printed(text: str, step: float | None = None) -> Range:
+    """A printed number; step: that of which it is a multiple where numbers are read off a graph. Default: its digit."""
+    return _inclusive(text, text, text, step, PRINT)
+
+
+def between(low: str, high: str, step: float | None = None) -> Range:
+    """A printed range, both its ends as `printed`."""
+    return _inclusive(low, high, f"{low} to {high}", step, PRINT)
+
+
+def _inclusive(low: str, high: str, words: str, step: float | None, kind: str) -> Range:
+    half = max(digit(low), digit(high)) / 2
+    margin = half if step is None else step / 2
+    strict = (float(low) - digit(low) / 2, float(high) + digit(high) / 2)
+    return Range(float(low), float(high), f"{words} ± {margin:g}", margin, kind, strict)
+
+
+def about(low: str, high: str | None = None, margin: float | None = None, kind: str = ABOUT) -> Range:
+    """A positive number or range with "about"; margin where the paper or its grid is coarser than 10 %."""
+    high = high or low
+    words = f"about {low}" + (f" to {high}" if high != low else "")
+    wide = 0.1 * float(high) if margin is None else margin
+    strict = (0.9 * float(low), 1.1 * float(high))
+    return Range(float(low), float(high), f"{words} ± {wide:g}", wide, kind, strict)
+
+
+def _half_digit(value: float) -> float:
+    return digit(f"{value:.12f}".rstrip("0").rstrip(".")) / 2
+
+
+def above(value: float, margin: float | None = None) -> Range:
+    """More than a value. Over zero: better, a difference of at least the margin, 1 % where none is given."""
+    kind, wide = _one_sided(value, margin)
+    return Range(math.nextafter(value, math.inf), math.inf, f"> {value:g}", wide, kind, (value, math.inf))
+
+
+def below(value: float, margin: float | None = None) -> Range:
+    """Less than a value. Under zero: better, as in `above`."""
+    kind, wide = _one_sided(value, margin)
+    return Range(-math.inf, math.nextafter(value, -math.inf), f"< {value:g}", wide, kind, (-math.inf, value))
+
+
+def _one_sided(value: float, margin: float | None) -> tuple[str, float]:
+    if value == 0:
+        return MATERIAL, 1.0 if margin is None else margin
+    return LIMIT, _half_digit(value) if margin is None else margin
+
+
+def at_most(value: float, margin: float | None = None) -> Range:
+    """No more than a value."""
+    wide = _half_digit(value) if margin is None else margin
+    return Range(-math.inf, value, f"≤ {value:g}", wide, LIMIT, (-math.inf, value))
+
+
+def at_least(value: float, margin: float | None = None) -> Range:
+    """No less than a value."""
+    wide = _half_digit(value) if margin is None else margin
+    return Range(value, math.inf, f"≥ {value:g}", wide, LIMIT, (value, math.inf))
+
+
+def greater(margin: float = 0.01) -> Range:
+    """A ratio of two σ over one: the first is the worse."""
+    return above(1.0, margin)._replace(kind=MATERIAL)
+
+
+def less(margin: float = 0.01) -> Range:
+    """A ratio of two σ under one: the first is the better."""
+    return below(1.0, margin)._replace(kind=MATERIAL)
+
+
+def within(low: float, high: float, margin: float = 0.5) -> Range:
+    """From low to high as they stand: counts of scans (half a scan is their margin), shares."""
+    words = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+    return Range(low, high, words, margin, PRINT, (low, high))
+
+
+def same(value: float = 0.0, margin: float = 1.0, strict: float | None = None) -> Range:
+    """What coincides: a value to within a margin, 1 % of σ."""
+    old = margin if strict is None else strict
+    return Range(value, value, f"{value:g} ± {margin:g}", margin, SAME, (value - old, value + old))
+
+
+def kept(margin: float = 1.0, strict: float = 0.5) -> Range:
+    """No loss, in % of σ: a gain, or a loss within the margin."""
+    return Range(0.0, math.inf, f"≥ 0 ± {margin:g}", margin, SAME, (-strict, math.inf))
+
+
+def on_grid(low: float, high: float, step: float, strict: tuple[float, float]) -> Range:
+    """A time, or a ratio of times, no finer than the grid on which it is read."""
+    words = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+    return Range(low, high, f"{words} ± {step:g}", step, GRID, strict)

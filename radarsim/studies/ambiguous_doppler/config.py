@@ -7,41 +7,39 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from radarsim.config import radial, rare
+from radarsim.config import fields
 from radarsim.config.fields import (
+    COEFFICIENTS,
+    FASTEST_MPS,
+    HARDEST_MPS2,
+    AccelerationStart,
     Added,
     At,
     Baseline,
+    Coefficients,
     Design,
     Display,
+    FlyBy,
     Members,
     Model,
     Name,
     NonNegative,
     Number,
+    Polynomial,
     Positive,
     Probability,
+    Recorded,
     Scenario,
     Study,
+    Turn,
     Whole,
     at,
     cross_check,
     key,
     of_each,
-)
-from radarsim.config.radial import (
-    COEFFICIENTS,
-    FASTEST_MPS,
-    HARDEST_MPS2,
-    AccelerationStart,
-    Coefficients,
-    FlyBy,
-    Polynomial,
-    Recorded,
-    Turn,
     polynomial_reach_m,
 )
-from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
+from radarsim.physics import STANDARD_GRAVITY_MPS2
 
 MOST_RARE_SCANS = 64  # sequences of folds are looked for before the run, and each shifts the noise of every scan
 MOST_SCANS = 10_000  # plots and estimates of eight realisations are held for the whole run
@@ -56,7 +54,7 @@ LISTED = {"doppler": "folded", "merge": "never"}  # filters that keep several hy
 Order = Annotated[int, Whole(0, 2)]
 
 
-class Radar(radial.Radar):
+class Radar(fields.Radar):
     """A coherent surveillance radar: accuracies of one plot, period of its scans, pulse repetition rates."""
 
     repetition_rate_hz: Positive | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_RATES)] = key(
@@ -258,7 +256,7 @@ class Filter(Model):
             yield at("combine", "has no doppler: remainder, which unfolds for one order")
 
 
-class RareFolds(rare.RareEvent):
+class RareFolds(fields.RareEvent):
     """Wrong folds that are rare: realisations shifted towards them, and weights that make up for it."""
 
     filter: Name = key("filter", "the filter whose wrong folds at the last scan are sought")
@@ -324,7 +322,7 @@ class Keys(Study):
             few = f"{PROPORTION:g} times the velocity's accuracy a scan period"
             yield at("prior.sigma_acceleration_mps2", f"must be at most {few}")
         if not isinstance(self.target, RandomPolynomial):
-            yield from radial.within_reach(self.target, radar, last)
+            yield from fields.within_reach(self.target, radar, last)
 
     @cross_check
     def _remainders_exist(self) -> Iterator[At]:

@@ -1,22 +1,67 @@
-"""The study's figures: σ and gains between their brackets, right folds, lost tracks, hypotheses as a fan, orders."""
+"""The hypotheses of one realisation, scan by scan, for the figure that shows them.
+
+The study's figures: σ and gains between their brackets, right folds, lost tracks, hypotheses as a fan, orders.
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from radarsim.config.experiment import Case, Experiment
+from radarsim.kernels.hypotheses import COLUMNS
+from radarsim.kernels.lanes import WIDTH
 from radarsim.language import term, tr
-from radarsim.report import panels, seen, sweeps
-from radarsim.report import tables as common
+from radarsim.report import panels, seen, tables
+from radarsim.report import rare as sweeps
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
-from radarsim.studies.ambiguous_doppler.map import Fan, fan
+from radarsim.studies.ambiguous_doppler.kernels import records, sums
+from radarsim.studies.ambiguous_doppler.study import prepare
 from radarsim.studies.ambiguous_doppler.tables import Result
 
 if TYPE_CHECKING:
     import pandas as pd
 
+
+# ---- map -------------------------------------------------------------------------------------------------------------
+LANE = WIDTH - 1  # the realisation of a group whose list the kernel leaves behind
+
+
+@dataclass(frozen=True)
+class Fan:
+    """Of one realisation and filter: times t (K,), true velocities (K,), and by scan the list of hypotheses.
+
+    Each list is (velocity (n,) m/s, acceleration (n,) m/s², probability (n,)), the most probable first.
+    """
+
+    t_s: np.ndarray
+    truth: np.ndarray
+    lists: tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...]
+
+
+def fan(case: Case, number: int, scans: int) -> Fan:
+    """The lists of filter `number` over the first scans, in realisation 7 of the case."""
+    alone = {"filters": (case.spec.filters[number],), "baseline": None, "rare": None}
+    only: Any = case.spec.model_copy(update=alone)
+    plan = prepare(Case(case.name, case.stem, case.study, only, case.swept, case.realisations, case.seed))
+    lists = []
+    for k in range(1, scans + 1):
+        world = plan.world._replace(
+            truth=plan.world.truth[:k].copy(), t=plan.world.t[:k].copy(), spans=plan.world.spans[:k].copy()
+        )
+        plots, out, listed = sums.simulated_lists(world, plan.banks, 0)
+        count = int(out[0, -1, records.COUNT, LANE])
+        which = int(plots[:, records.DETECTED, LANE].sum()) % 2  # each plot is written from one list into the other
+        own = listed.reshape(COLUMNS, -1)[4 * which : 4 * which + 4, :count]
+        weight = np.exp(own[3] - own[3].max(initial=-np.inf))
+        order = np.argsort(-weight, kind="stable")
+        lists.append((own[1][order], own[2][order], weight[order] / weight.sum()))
+        truth = plots[:, records.TRUTH + 1, LANE]
+    return Fan(plan.world.t[:scans], truth, tuple(lists))
+
+
+# ---- figures ---------------------------------------------------------------------------------------------------------
 DRAWN_FROM = {"right": ("folds",), "lost": ("folds",)}
 
 
@@ -60,7 +105,7 @@ def share_figure(
 
     of is a value of SHARES: the column of the table, the axis, the caption.
     """
-    rows = common.groups(table, "case", "filter")
+    rows = tables.groups(table, "case", "filter")
     drawn = [_share_panel(title, members, rows, of[:2]) for title, members in panels.by_panel(results).items()]
     drawn = [panel for panel in drawn if panel.marks]
     if not drawn:
@@ -71,7 +116,7 @@ def share_figure(
 def rare_figure(results: Sequence[Result], table: "pd.DataFrame") -> dict[str, Figure]:
     """Instead of `right`, where all folds are right almost always: how often not at the last scan, over a swept key."""
     drawn: list[Panel] = []
-    rows = common.groups(table, "case", "filter")
+    rows = tables.groups(table, "case", "filter")
     for (_, keys), members in sweeps.families(results).items():
         x, axis = sweeps.places(members[0], keys[0], [dict(one.swept)[keys[0]] for one in members])
         order = np.argsort(x)
@@ -164,7 +209,7 @@ FAN_SPANS = 8  # spans shown to either side of the true velocities
 def orders_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: str) -> dict[str, Figure]:
     """Mean weight of each order in the range against time: a panel for each filter that combines orders."""
     drawn = []
-    for (case, name), own in common.groups(table, "case", "filter").items():
+    for (case, name), own in tables.groups(table, "case", "filter").items():
         result = next((one for one in results if one.name == case), None)
         if result is None:
             continue

@@ -8,9 +8,9 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels, rare, statistics
 from radarsim.report import tables as common
-from radarsim.studies.ambiguous_doppler.axes import FoldedAxes
-from radarsim.studies.ambiguous_doppler.kernels.rare import BEYOND, FULL, WRONG
+from radarsim.studies.ambiguous_doppler.filters import FoldedAxes
 from radarsim.studies.ambiguous_doppler.kernels.records import BEYOND_SUM, BINS, COUNT_SUM, LISTED_SUM, RIGHT_SUM
+from radarsim.studies.ambiguous_doppler.kernels.sums import BEYOND, FULL, WRONG
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,20 +1,439 @@
-"""Plots of the study: those of one realisation, as a run draws them; its filters over recorded ones, and how likely
-these are under a filter."""
+"""Filters over recorded plots, row by row at any times: one order with its hypotheses, and combinations of orders.
 
+Plots of the study: those of one realisation, as a run draws them; its filters over recorded ones, and how likely
+these are under a filter.
+"""
+
+import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from radarsim import physics
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
 from radarsim.errors import PlotFault
+from radarsim.kernels.algebra import (
+    NO_NOISE,
+    TAKE,
+    add_outer,
+    add_scaled,
+    add_spread,
+    pack,
+    pack_transition,
+    predicted,
+    predicted_covariance,
+)
 from radarsim.kernels.lanes import WIDTH
-from radarsim.studies.ambiguous_doppler import followers
+from radarsim.studies.ambiguous_doppler import filters
+from radarsim.studies.ambiguous_doppler.config import joint_span
 from radarsim.studies.ambiguous_doppler.kernels import records, sums
 from radarsim.studies.ambiguous_doppler.study import COMPONENTS, prepare
 from radarsim.studies.interface import BIAS, RecordedPlots, true_column
 
+# ---- followers -------------------------------------------------------------------------------------------------------
+LEAST = 1e-150  # probability of an order: none is ruled out for good
+FARTHEST = 9.0  # standard deviations of the velocity's innovation up to which folds are looked at
+MOST_LOOKED_AT = 10_000_000  # sequences of folds at a row: states of 240 MB, seconds
+CERTAIN = 4.0  # standard deviations of the velocity's innovation that half a span must hold for the fold to be certain
+
+
+class Row(NamedTuple):
+    """What one row made of a filter: estimate and σ (3,), residuals of range and velocity after the update (2,), and
+    the squares of their innovations over their variances (2,); not-a-number where there is none."""
+
+    estimate: np.ndarray
+    sigma: np.ndarray
+    residual: np.ndarray
+    nis: np.ndarray
+
+
+NOTHING = Row(*np.full((2, 3), np.nan), *np.full((2, 2), np.nan))
+
+
+def follower(options: Any, spec: Any) -> "Single | Interacting | Combined":
+    """What follows a filter's options; it has `step(t, z, v, span)`, which gives a `Row`."""
+    if options.combine is None:
+        return single(options, spec)
+    return (Interacting if options.combine == "likelihood" else Combined)(options, spec)
+
+
+def single(options: Any, spec: Any) -> "Single":
+    """Of a filter of one order."""
+    (member,) = filters.members(options)
+    return Single(member, options, spec)
+
+
+def before_plots(one: filters.Member, spec: Any) -> tuple[float, ...]:
+    """The packed covariance before the first plot; the range is not in it."""
+    velocity, acceleration = filters.prior_variances(one.order, spec.prior)
+    return 0.0, 0.0, 0.0, float(velocity), 0.0, float(acceleration)
+
+
+def _kept(w: np.ndarray, options: Any) -> np.ndarray:
+    """Which hypotheses are kept, the best first, by the logarithms of their weights, the best one's 0."""
+    kept = np.flatnonzero(np.exp(w) >= options.prune_below)
+    return kept[np.argsort(-w[kept], kind="stable")[: options.hypotheses]]
+
+
+class Folds:
+    """What a velocity may have been before it was folded: by the span of its row, or by those of two rows."""
+
+    def __init__(self, radar: Any):
+        self.radar = radar
+        self.span = np.nan  # of this row
+        self.before: tuple[float, float] | None = None  # the velocity of the last plot, and its span
+
+    def begin(self, t: float, span: float) -> None:
+        """Begin a row, whose span stands beside it or follows from its time."""
+        spans = self.radar.spans_mps
+        self.span = spans[round(t / self.radar.scan_period_s) % len(spans)] if np.isnan(span) else span
+
+    def folded(self, e: np.ndarray) -> np.ndarray:
+        """Innovations with the nearest folds."""
+        return e - self.span * np.rint(e / self.span)
+
+    def innovations(self, e: np.ndarray, S: np.ndarray) -> np.ndarray:
+        """Innovations e + n D (..., folds) of folds near enough to matter; e (...) as measured, S (...) variances.
+
+        Raises PlotFault where these are too many, or the variances are only rounding errors.
+        """
+        most = float(np.max(S))
+        if not most > 0:
+            raise PlotFault("velocity_mps: a filter's numbers are lost in rounding: split the file here")
+        reach = FARTHEST * math.sqrt(most) / self.span
+        if 2 * reach * e.size > MOST_LOOKED_AT:
+            sigma, few = f"its σ before, {math.sqrt(most):g} m/s", f"{MOST_LOOKED_AT:g} sequences"
+            raise PlotFault(f"velocity_mps: {sigma}, leaves more than {few} of folds by {self.span:g} m/s")
+        farthest = int(reach) + 1
+        return self.folded(e)[..., None] + self.span * np.arange(-farthest, farthest + 1)
+
+    def certain(self, S: float) -> bool:
+        """Whether an innovation of that variance leaves but one fold."""
+        return 2 * CERTAIN * np.sqrt(S) <= self.span
+
+    def remainder(self, v: float) -> float:
+        """The velocity by the Chinese remainder of this row and the last with a plot; not-a-number: there is none."""
+        v = math.remainder(v, self.span)
+        before, self.before = self.before, (v, self.span)
+        joint = joint_span(self.span, before[1]) if before else 0.0
+        if before is None or joint == 0:
+            return np.nan
+        u = np.arange(v + self.span * np.ceil((-joint / 2 - v) / self.span), joint / 2, self.span)
+        off = u - before[0]
+        return u[np.argmin(np.abs(off - before[1] * np.floor(off / before[1] + 0.5)))]
+
+
+class Single:
+    """One filter: states (3, n) of its hypotheses, logarithms of their weights (n,), the common covariance, packed.
+
+    `sure` is the covariance of right folds, which only merging widens; `last_step` what the filter does at the last row
+    with such, None before the first range.
+    """
+
+    def __init__(self, member: filters.Member, options: Any, spec: Any):
+        self.member, self.options, self.radar = member, options, spec.radar
+        self.folds = Folds(spec.radar)
+        self.variances = spec.radar.sigma_range_m**2, spec.radar.sigma_velocity_mps**2
+        self.x, self.w = np.zeros((3, 1)), np.zeros(1)
+        self.P: Any = before_plots(member, spec)
+        self.sure = self.P
+        self.known = np.array(member.components)
+        self.last = np.nan
+        self.began = self.started = False
+        self.last_step: filters.Step | None = None
+        self.nis, self.log_density = np.full(2, np.nan), np.zeros(2)  # of the last row, for range and velocity
+
+    def step(self, t: float, z: float, v: float, span: float = np.nan) -> Row:
+        """The estimate after one row; not-a-number before the first range."""
+        self.folds.begin(t, span)
+        self.nis, self.log_density = np.full(2, np.nan), np.zeros(2)
+        F, gains, known = np.eye(3), [np.zeros(3), np.zeros(3)], self.started
+        if self.began:
+            F, Q = filters.model(self.member.order, self.member.manoeuvre_variance, t - self.last)
+            f, q = pack_transition(F), pack(Q)
+            self.x = np.array(predicted(self.x, f))
+            self.P, self.sure = predicted_covariance(self.P, f, q), predicted_covariance(self.sure, f, q)
+        self.began, self.last = True, t
+        if not np.isnan(z):
+            gains[0] = self._take_range(z)
+        if self.member.doppler == "remainder" and not np.isnan(v) and not np.isnan(z):
+            v = self.folds.remainder(v)
+        if self.started and not np.isnan(v) and self.member.doppler != "none":
+            gains[1] = self._take_velocity(v)
+        if not self.started:
+            return NOTHING
+        self.last_step = filters.Step(F if known else np.eye(3), *gains)
+        p = np.exp(self.w - self.w.max())
+        p /= p.sum()
+        mean = self.x[:, np.argmax(self.w)] if self.options.estimate == "best" else self.x @ p
+        variance = np.array([self.P[0], self.P[3], self.P[5]]) + (self.x - mean[:, None]) ** 2 @ p
+        estimate, sigma = np.where(self.known, mean, np.nan), np.where(self.known, np.sqrt(variance), np.nan)
+        residual = np.array([z, v]) - estimate[:2]
+        if self.member.doppler == "folded":
+            residual[1] = self.folds.folded(residual[1])
+        return Row(estimate, sigma, residual, self.nis)
+
+    def _take_range(self, z: float) -> np.ndarray:
+        """Take a range; gives the gains of right folds."""
+        R = self.variances[0]
+        if not self.started:  # before the first range none is known
+            self.x[0] = z
+            self.P, self.sure = (R, 0.0, 0.0, *self.P[3:]), (R, 0.0, 0.0, *self.sure[3:])
+            self.started = True
+            return np.array([1.0, 0.0, 0.0])
+        e = z - self.x[0]
+        self.P, gain, S = TAKE[0](self.P, R, 1.0)
+        self._judge(0, e[:, None], S)
+        self.w, self.x = self.w - e**2 / (2 * S), np.array(add_scaled(self.x, e, gain))
+        self.sure, gain, _ = TAKE[0](self.sure, R, 1.0)
+        return np.array(gain)
+
+    def _take_velocity(self, v: float) -> np.ndarray:
+        """Take a velocity, folded or not; gives the gains of right folds."""
+        P, gain, S = TAKE[1](self.P, self.variances[1], 1.0)
+        e = (v - self.x[1])[:, None]
+        if self.member.doppler == "folded":
+            e = self.folds.innovations(e[:, 0], S)
+            if self.options.hypotheses == 1:
+                e = e[:, e.shape[1] // 2, None]
+        self._judge(1, e, S)
+        if self.member.doppler == "folded" and not self.folds.certain(float(S)):
+            self.nis[1] = np.nan
+        w = self.w[:, None] - e**2 / (2 * S)
+        self.x = np.array(add_scaled(self.x[:, :, None], e, gain)).reshape(3, -1)
+        self.P, self.w = P, w.ravel() - w.max()
+        if self.member.doppler == "folded" and self.options.merge == "each_scan":
+            p = np.exp(self.w) / np.exp(self.w).sum()
+            mean = (self.x @ p)[:, None]
+            spread = add_outer(NO_NOISE, p, self.x - mean)
+            self.P = tuple(own + more.sum() for own, more in zip(self.P, spread, strict=True))
+            self.x, self.w = mean, np.zeros(1)
+        elif self.member.doppler == "folded":
+            kept = _kept(self.w, self.options)
+            self.x, self.w = self.x[:, kept], self.w[kept]
+        self.sure, gain, _ = TAKE[1](self.sure, self.variances[1], 1.0)
+        return np.array(gain)
+
+    def _judge(self, number: int, e: np.ndarray, S: np.ndarray) -> None:
+        """Note a number's innovations e (n, folds) before they are taken in: the square over the variance S of that of
+        the most probable hypothesis, and the logarithm of the density that all of them give the number."""
+        self.nis[number] = np.min(e[np.argmax(self.w)] ** 2) / S
+        powers = (self.w[:, None] - e**2 / (2 * S)).ravel()
+        most, whole = powers.max(), self.w.max()
+        given = most + np.log(np.exp(powers - most).sum()) - whole - np.log(np.exp(self.w - whole).sum())
+        self.log_density[number] = given - 0.5 * np.log(2 * np.pi * S)
+
+
+class Interacting:
+    """Orders combined by likelihood, with a memory of folds or without.
+
+    Of n hypotheses the states (3, n, M), covariances (6, n, M) and probabilities (n, M) of M orders, and logarithms
+    of weights (n,). Over a gap the orders pass into each other as often as there were scans. Innovations are those of
+    the most probable hypothesis, mean and variance over its orders.
+    """
+
+    def __init__(self, options: Any, spec: Any):
+        self.members, self.options, self.radar = filters.members(options), options, spec.radar
+        self.folds = Folds(spec.radar)
+        many = len(self.members)
+        self.variances = spec.radar.sigma_range_m**2, spec.radar.sigma_velocity_mps**2
+        self.x, self.w = np.zeros((3, 1, many)), np.zeros(1)
+        self.P = np.array([before_plots(one, spec) for one in self.members]).T[:, None]
+        self.mu = np.full((1, many), 1 / many)
+        self.known = np.any([one.components for one in self.members], axis=0)
+        self.last = np.nan
+        self.started = False
+
+    def step(self, t: float, z: float, v: float, span: float = np.nan) -> Row:
+        """As `Single.step`."""
+        self.folds.begin(t, span)
+        self.nis = np.full(2, np.nan)
+        self._mix(1 if np.isnan(self.last) else max(1, round((t - self.last) / self.radar.scan_period_s)))
+        if not np.isnan(self.last):
+            models = [filters.model(one.order, one.manoeuvre_variance, t - self.last) for one in self.members]
+            F, Q = (np.array(part) for part in zip(*models, strict=True))
+            f = pack_transition(F)
+            self.x, self.P = np.array(predicted(self.x, f)), np.array(predicted_covariance(self.P, f, pack(Q)))
+        self.last = t
+        if not np.isnan(z):
+            self._take_range(z)
+        if self.started and not np.isnan(v) and self.options.doppler != "none":
+            self._take_velocity(v)
+        if not self.started:
+            return NOTHING
+        p = np.exp(self.w - self.w.max())
+        p = p[:, None] * self.mu / p.sum()
+        best = np.argmax(self.w)
+        of_best = self.options.estimate == "best"
+        mean = self.x[:, best] @ self.mu[best] if of_best else np.einsum("ni,xni->x", p, self.x)
+        spread = self.P[[0, 3, 5]] + (self.x - mean[:, None, None]) ** 2
+        estimate = np.where(self.known, mean, np.nan)
+        sigma = np.where(self.known, np.sqrt(np.einsum("ni,xni->x", p, spread)), np.nan)
+        residual = np.array([z, v]) - estimate[:2]
+        if self.options.doppler == "folded":
+            residual[1] = self.folds.folded(residual[1])
+        return Row(estimate, sigma, residual, self.nis)
+
+    def _mix(self, scans: int) -> None:
+        """Let the orders pass into each other over so many scans."""
+        many = len(self.members)
+        once = self.options.stay_probability - (1 - self.options.stay_probability) / (many - 1)
+        passes = (1 - once**scans) / many + np.eye(many) * once**scans
+        before = self.mu @ passes
+        share = passes * self.mu[:, :, None] / before[:, None, :]  # (n, from, to)
+        x = np.einsum("nji,xnj->xni", share, self.x)
+        apart = self.x[:, :, :, None] - x[:, :, None]  # (3, n, from, to)
+        self.P = np.array(add_spread(NO_NOISE, share, self.P[:, :, :, None], apart)).sum(axis=2)
+        self.x, self.mu = x, before
+
+    def _take_range(self, z: float) -> None:
+        if not self.started:
+            self.x[0], self.P[0], self.P[1:3], self.started = z, self.variances[0], 0.0, True
+            return
+        e = z - self.x[0]
+        P, gain, S = TAKE[0](self.P, self.variances[0], 1.0)
+        self._judge(0, e, S)
+        self.x, self.P = np.array(add_scaled(self.x, e, gain)), np.array(P)
+        self._weigh(np.log(np.maximum(self.mu, LEAST)) - e**2 / (2 * S) - np.log(S) / 2)
+
+    def _judge(self, number: int, e: np.ndarray, S: np.ndarray) -> None:
+        """Note the innovations (n, M) of a number and their variances before they are taken in."""
+        best = np.argmax(self.w)
+        mean = self.mu[best] @ e[best]
+        variance = self.mu[best] @ (S[best] + (e[best] - mean) ** 2)
+        if number == 1 and self.options.doppler == "folded":
+            if not self.folds.certain(float(variance)):
+                return
+            mean = self.folds.folded(mean)
+        self.nis[number] = mean**2 / variance
+
+    def _weigh(self, logs: np.ndarray) -> None:
+        """Probabilities of orders and weights of hypotheses from logarithms (n, M) of both together."""
+        most = logs.max(axis=1, keepdims=True)
+        self.mu = np.exp(logs - most)
+        self.w = self.w + most[:, 0] + np.log(self.mu.sum(axis=1))
+        self.w -= self.w.max()
+        self.mu /= self.mu.sum(axis=1, keepdims=True)
+
+    def _take_velocity(self, v: float) -> None:
+        P, gain, S = TAKE[1](self.P, self.variances[1], 1.0)
+        e, logs = v - self.x[1], np.log(np.maximum(self.mu, LEAST)) - np.log(S) / 2
+        self._judge(1, e, S)
+        self.P = np.array(P)
+        if self.options.doppler == "unfolded":
+            self.x = np.array(add_scaled(self.x, e, gain))
+            self._weigh(logs - e**2 / (2 * S))
+        elif self.options.merge == "each_scan":
+            folds = self.folds.innovations(e, S)
+            like = -(folds**2) / (2 * S[..., None])
+            most = like.max(axis=-1, keepdims=True)
+            p = np.exp(like - most)
+            logs = logs + most[..., 0] + np.log(p.sum(axis=-1))
+            p /= p.sum(axis=-1, keepdims=True)
+            mean = (p * folds).sum(axis=-1)
+            variance = (p * (folds - mean[..., None]) ** 2).sum(axis=-1)
+            self.x = np.array(add_scaled(self.x, mean, gain))
+            self.P = np.array(add_outer(P, variance, gain))
+            self._weigh(logs)
+        else:
+            self._branch(v, np.array(gain), S, logs)
+
+    def _branch(self, v: float, gain: np.ndarray, S: np.ndarray, logs: np.ndarray) -> None:
+        """Every hypothesis with every fold near any of its orders; those kept that weigh enough."""
+        mean = np.einsum("ni,ni->n", self.mu, self.x[1])
+        reach = np.max(np.sqrt(S) + np.abs(self.x[1] - mean[:, None]) / FARTHEST) ** 2
+        u = mean[:, None] + self.folds.innovations(v - mean, reach)
+        e = u[:, :, None] - self.x[1][:, None]  # (n, folds, M)
+        both = logs[:, None] - e**2 / (2 * S[:, None])
+        w = self.w[:, None] + both.max(axis=2) + np.log(np.exp(both - both.max(axis=2, keepdims=True)).sum(axis=2))
+        kept = _kept(w.ravel() - w.max(), self.options)
+        of, n = np.unravel_index(kept, w.shape)
+        self.x, self.P = np.array(add_scaled(self.x[:, of], e[of, n], gain[:, of])), self.P[:, of]
+        self.w = self.w[of]
+        self._weigh(both[of, n])
+
+
+class Combined:
+    """Orders combined by their expected error, or by intersecting intervals: the members, and their joint errors.
+
+    The errors are those of right folds, by the recursion of `exact`, with the gains that each row had. A manoeuvre may
+    begin at each of the last `scans` rows. A combination predicts nothing, so that there are no innovations.
+    """
+
+    def __init__(self, options: Any, spec: Any):
+        self.options, self.spec = options, spec
+        self.members = filters.members(options)
+        self.singles = [Single(member, options, spec) for member in self.members]
+        self.known = np.array([member.components for member in self.members])
+        self.sigma = np.array([spec.radar.sigma_range_m, spec.radar.sigma_velocity_mps])
+        many = len(self.members)
+        self.bias, self.noise = np.zeros((2, many, 3)), np.zeros((3 * many, 3 * many))
+        self.before = np.zeros((2, 3))
+        self.onsets: list[float] = []
+        self.first = np.nan
+
+    def step(self, t: float, z: float, v: float, span: float = np.nan) -> Row:
+        """As `Single.step`."""
+        self.first = t if np.isnan(self.first) else self.first
+        estimates = np.array([one.step(t, z, v, span).estimate for one in self.singles])
+        now = self._motions(t)
+        steps = [one.last_step for one in self.singles if one.last_step is not None]
+        if not steps:
+            return NOTHING
+        self.bias, self.noise = filters.advanced(self.bias, self.noise, self.before, now, steps, self.sigma)
+        self.before = now
+        many = len(self.members)
+        bias, noise = self.bias[:, :, None], self.noise.reshape(1, many, 3, many, 3)
+        estimates = np.where(self.known, estimates, 0.0)
+        if self.options.combine == "intersection":
+            width = filters.widths(bias, noise, self.members, self.spec.prior)[0]
+            chosen = [_smoothest(estimates[:, c], width[:, c]) for c in range(3)]
+            mean = np.array([estimates[i, c] for c, i in enumerate(chosen)])
+            sigma = np.array([width[i, c] for c, i in enumerate(chosen)]) / filters.INTERVAL_SIGMAS
+        else:
+            weight = np.full(len(bias) - 1, 1 / self.spec.scans)
+            weight[0] = self.spec.prior.sigma_velocity_mps**2
+            E = filters.joint(np.delete(bias, 1, axis=0), noise, weight)
+            share = filters.best_shares(E, self.known)[0]
+            mean = np.einsum("ix,ix->x", share, estimates)
+            sigma = np.sqrt(np.einsum("ix,xij,jx->x", share, E[0], share))
+        known = self.known.any(axis=0)
+        estimate, residual = np.where(known, mean, np.nan), np.array([z, v]) - np.where(known, mean, np.nan)[:2]
+        if self.options.doppler == "folded":
+            residual[1] = self.singles[0].folds.folded(residual[1])
+        return Row(estimate, np.where(known, sigma, np.nan), residual, np.full(2, np.nan))
+
+    def _motions(self, t: float) -> np.ndarray:
+        """What each motion is at a row (M, 3): a drawn velocity and acceleration of one, and the manoeuvres."""
+        drawn = filters.drawn_motions(np.array([t - self.first]))[:, 0]
+        if self.options.combine != "expected_error":
+            return drawn
+        if len(self.onsets) == self.spec.scans:
+            self.onsets.pop(0)
+            self.bias, self.before = np.delete(self.bias, 2, axis=0), np.delete(self.before, 2, axis=0)
+        self.onsets.append(t)
+        self.bias = np.concatenate([self.bias, np.zeros((1, *self.bias.shape[1:]))])
+        self.before = np.concatenate([self.before, np.zeros((1, 3))])
+        of = self.options.manoeuvres
+        size, length = of.acceleration_mps2, of.duration_s
+        flown = [physics.acceleration_pulse((0.0,), size, onset, length, np.array([t]))[0] for onset in self.onsets]
+        return np.concatenate([drawn, flown])
+
+
+def _smoothest(estimates: np.ndarray, widths: np.ndarray) -> int:
+    """The smoothest of estimates (I,) whose interval meets those of all rougher; widths (I,) half, 0: not there."""
+    chosen, low, high = 0, -np.inf, np.inf
+    for i in np.argsort(-widths, kind="stable"):
+        low, high = max(low, estimates[i] - widths[i]), min(high, estimates[i] + widths[i])
+        if widths[i] == 0 or low > high:
+            break
+        chosen = int(i)
+    return chosen
+
+
+# ---- track -----------------------------------------------------------------------------------------------------------
 COLUMNS = ("t_s", "range_m", "velocity_mps")
 SPAN = "span_mps"  # a further column: what each velocity is ambiguous by, where the file says so
 MEASURED = (("range_m", "m"), ("velocity_mps", "m/s"))
@@ -51,7 +470,7 @@ class Tracker:
 
     def __init__(self, case: Case):
         self.names = tuple(one.name for one in case.spec.filters)
-        self.filters = [followers.follower(one, case.spec) for one in case.spec.filters]
+        self.filters = [follower(one, case.spec) for one in case.spec.filters]
         self.errors = np.array([case.spec.radar.sigma_range_m, case.spec.radar.sigma_velocity_mps])
         # A number that was taken in has drawn the estimate to itself; of another the errors add.
         self.drawn = np.array([[-1.0, 1.0 if one.doppler == "none" else -1.0] for one in case.spec.filters])
@@ -63,9 +482,7 @@ class Tracker:
         """
         rows = rows_of(columns)
         made = [stepped(one, rows) for one in self.filters]
-        gathered = {
-            name: np.array([[getattr(row, name) for row in own] for own in made]) for name in followers.Row._fields
-        }
+        gathered = {name: np.array([[getattr(row, name) for row in own] for own in made]) for name in Row._fields}
         spread = self.errors**2 + self.drawn[:, None] * gathered["sigma"][..., :2] ** 2
         finite = np.isfinite(gathered["residual"])
         return Track(
@@ -79,9 +496,9 @@ class Tracker:
         )
 
 
-def stepped(one: Any, rows: Sequence[tuple[float, ...]]) -> list[followers.Row]:
+def stepped(one: Any, rows: Sequence[tuple[float, ...]]) -> list[Row]:
     """What rows made of a filter, one after the other; raises PlotFault with the row."""
-    made: list[followers.Row] = []
+    made: list[Row] = []
     try:
         with np.errstate(invalid="ignore"):  # a variance lost in rounding: not-a-number, which whoever follows refuses
             for row in rows:
@@ -130,7 +547,7 @@ class PlotLikelihood:
         options = self.options.model_copy(update={"manoeuvre_variance": float(values[-1])})
         offset, total = bias * radar.sigma_velocity_mps, np.zeros(2)
         for rows in self.recorded:
-            one = followers.single(options, spec)
+            one = single(options, spec)
             for t, z, v, span in rows:
                 try:
                     one.step(t, z, v - offset, span)

@@ -7,8 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import listed, numeral, tr
-from radarsim.report import panels, rare, text
-from radarsim.report import tables as common
+from radarsim.report import panels, rare, tables
 from radarsim.studies.ambiguous_doppler.tables import Result
 
 if TYPE_CHECKING:
@@ -75,17 +74,17 @@ def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> list
 
     None where no realisation had a plot.
     """
-    curves = common.where(made["curves"], case=result.name, component="r")
+    curves = tables.where(made["curves"], case=result.name, component="r")
     curves = curves[(curves["k"] > 1) & (curves["n"] > 0)]
     if not len(curves):
         return []
-    curves = curves.assign(decides=common.exact_first(curves, "sigma", "exact_sigma"))
+    curves = curves.assign(decides=tables.exact_first(curves, "sigma", "exact_sigma"))
     worst = curves.loc[curves.groupby("filter", sort=False)["decides"].idxmax()]
     said = [
         tr(
             "{filter} {sigma} at scan {k}",
             filter=row["filter"],
-            sigma=text.estimate((row["sigma"], row["sigma_lo"], row["sigma_hi"]), tr("m")),
+            sigma=tables.estimate((row["sigma"], row["sigma_lo"], row["sigma_hi"]), tr("m")),
             k=row["k"],
         )
         for row in worst.to_dict("records")
@@ -110,7 +109,7 @@ def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> list
 
 def _right(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str:
     """How often all folds are right at the last scan; empty where no realisation had a plot."""
-    rows = common.where(made["folds"], case=result.name, filter=name)
+    rows = tables.where(made["folds"], case=result.name, filter=name)
     if not len(rows):
         return ""
     last = rows.iloc[-1]
@@ -120,7 +119,7 @@ def _right(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str
 
 def _wrong(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str:
     """How often a fold is wrong at the last scan, by importance sampling; empty where it was not drawn so."""
-    rows = common.groups(made["rare"], "case", "filter") if result.spec.rare is not None else {}
+    rows = tables.groups(made["rare"], "case", "filter") if result.spec.rare is not None else {}
     if (result.name, name) not in rows:
         return ""
     row = rows[result.name, name].iloc[0]
@@ -134,7 +133,7 @@ def _wrong(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str
 
 def _as_good(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str:
     """From which scan on σ of the velocity is within 5 % of the oracle's, for good; empty where it has none."""
-    gains, folds = (common.where(made[t], case=result.name, filter=name) for t in ("gains", "folds"))
+    gains, folds = (tables.where(made[t], case=result.name, filter=name) for t in ("gains", "folds"))
     rows = gains[gains["component"] == "Vr"].dropna(subset=["above_oracle_percent"])
     if not len(rows):
         return ""
@@ -160,5 +159,5 @@ def _as_good(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> s
 
 def _percent(value: float, low: float, high: float) -> str:
     """A percentage at four digits with the ends of its interval at three."""
-    ends = text.interval(*(numeral(f"{one:.3g}") for one in (low, high)))
+    ends = tables.interval(*(numeral(f"{one:.3g}") for one in (low, high)))
     return f"{numeral(f'{value:.4g}')} % {ends}"

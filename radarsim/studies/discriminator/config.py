@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from radarsim.config import rare
+from radarsim.config import fields
 from radarsim.config.fields import (
     Added,
     At,
@@ -197,7 +197,7 @@ class Estimator(Model):
             yield at("schedule", "window lengths must rise")
 
 
-class Rare(rare.RareEvent):
+class Rare(fields.RareEvent):
     """Losses of lock that are rare: bursts shifted towards them, and weights that make up for it."""
 
     estimator: Name = key("estimator", "the estimator whose losses of lock at its last window are sought")

@@ -1,4 +1,7 @@
-"""P4's figures: residuals against the window (figure 2), locks, accuracy, and the maps of where the sequence locks."""
+"""One burst through the windows of an estimator, for the figure that shows it: the paper's figure 2 is of one.
+
+P4's figures: residuals against the window (figure 2), locks, accuracy, and the maps of where the sequence locks.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -6,18 +9,35 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from radarsim.bursts import burst
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
-from radarsim.report import panels, seen
-from radarsim.report import tables as common
+from radarsim.report import panels, seen, tables
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
-from radarsim.studies.discriminator.map import one_burst
+from radarsim.studies.discriminator.study import estimate, prepare
 from radarsim.studies.discriminator.tables import last_locks
 
 if TYPE_CHECKING:
     import pandas as pd
 
+
+# ---- map -------------------------------------------------------------------------------------------------------------
+BURST = 0  # the realisation that is shown
+
+
+def one_burst(case: Case, number: int) -> np.ndarray:
+    """Absolute errors (K, C) of an estimator at each of its K windows, in the units of the components (rad, Hz, …).
+
+    The burst is the first realisation of the run itself, whether it locks or not.
+    """
+    plan = prepare(case)
+    errors, _ = estimate(plan, BURST, 1)
+    windows, size = len(plan.axes.pulses[number]), len(plan.axes.components)
+    return np.abs(errors[0, number, :windows, :size]) / burst.turns_per_parameter(size, plan.axes.burst_s)
+
+
+# ---- figures ---------------------------------------------------------------------------------------------------------
 SYMBOLS = {
     "phi0": ("$|\\Delta\\varphi_0|$, rad", term("phase")),
     "f0": ("$|\\Delta f_0|$, Hz", term("Doppler frequency")),
@@ -88,8 +108,8 @@ def swept_families(results: Sequence[CaseResult]) -> dict[tuple[str, ...], list[
 def residuals(result: CaseResult, made: Mapping, case: Case) -> Figure:
     """The paper's figure 2, of one burst and over all: window lengths, and |error| of each component against them."""
     name = result.axes.filters[0]
-    rows = common.groups(made["residuals"], "case", "filter", "component")
-    windows = common.groups(made["windows"], "case", "filter")[(result.name, name)]
+    rows = tables.groups(made["residuals"], "case", "filter", "component")
+    windows = tables.groups(made["windows"], "case", "filter")[(result.name, name)]
     k, t = windows["k"].to_numpy(float), windows["t_s"].to_numpy(float)
     drawn = [
         Panel(
@@ -135,7 +155,7 @@ def residuals(result: CaseResult, made: Mapping, case: Case) -> Figure:
 
 def _fall(table: "pd.DataFrame", result: CaseResult, name: str) -> float:
     """How many times less the median error of the Doppler frequency is at the last window than at the first."""
-    own = common.where(table, case=result.name, filter=name)
+    own = tables.where(table, case=result.name, filter=name)
     median = own.loc[own["component"] == result.axes.components[1][0], "median"].to_numpy(float)
     return float(median[0] / median[-1])
 
@@ -148,7 +168,7 @@ def _with_unit(words: str) -> str:
 
 def locks(result: CaseResult, made: Mapping) -> Figure:
     """Share of locked bursts at each window of every estimator."""
-    rows = common.groups(made["locks"], "case", "filter")
+    rows = tables.groups(made["locks"], "case", "filter")
     marks = []
     drawn = result.axes.filters[:MOST_LINES]
     for n, name in enumerate(drawn):
@@ -180,7 +200,7 @@ def _shares(x: Axis, marks: Sequence[Line], least: float | None = None) -> tuple
 
 def accuracy(result: CaseResult, made: Mapping) -> Figure:
     """σ of the locked over the bound with the prior, a panel for each estimator that locks."""
-    rows = common.groups(made["curves"], "case", "filter", "component")
+    rows = tables.groups(made["curves"], "case", "filter", "component")
     drawn: list[Panel] = []
     for name in result.axes.filters:
         marks: list = [Reference(1.0)]

@@ -12,14 +12,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from radarsim.bursts import fisher as exact
-from radarsim.bursts import schedule
+from radarsim.bursts import burst as schedule
+from radarsim.bursts import estimators
 from radarsim.bursts.burst import balanced_inverse
 from radarsim.engine.results import CaseResult
 from radarsim.report import claims
 from radarsim.report.claims import Missing, certain
 from radarsim.report.statistics import Estimate, difference, root_mean_square
-from radarsim.studies.discriminator import ceiling, study
+from radarsim.studies.discriminator import nearest, study
 from radarsim.studies.discriminator.kernels.sums import LOCKS
 
 COMPUTED, PRINTED = "computed", "printed"
@@ -89,7 +89,7 @@ class Evidence(claims.Evidence):
     def potential(self, key: Key, component: str) -> Estimate:
         """Potential spread by the discrete sum over the pulses l = 0 … n − 2, of which the paper's digits are."""
         burst = study.burst_of(self.case(key).spec)
-        found = exact.spreads(exact.fisher_sums(burst, len(COMPONENTS), [burst.pulses - 1])[0])
+        found = estimators.spreads(estimators.fisher_sums(burst, len(COMPONENTS), [burst.pulses - 1])[0])
         return certain(found[COMPONENTS.index(component)])
 
     def as_far(self, key: Key, amplitude: float, power: int = 1) -> float:
@@ -112,9 +112,9 @@ class Evidence(claims.Evidence):
         burst = study.burst_of(self.case(key).spec)
         samples = burst.pulses * burst.samples_per_pulse
         level = burst.amplitude**2 / burst.noise_variance
-        of_sines = exact.fisher_sums(burst, 1, [burst.pulses], np.array([0.0, *DOPPLER]))[0][0, 0]
+        of_sines = estimators.fisher_sums(burst, 1, [burst.pulses], np.array([0.0, *DOPPLER]))[0][0, 0]
         fall = (level * samples - of_sines + level * samples / 2) / 2
-        return certain(fall / (2 * exact.energy_ratio(burst, burst.duration_s)))
+        return certain(fall / (2 * estimators.energy_ratio(burst, burst.duration_s)))
 
     def robust(self, key: Key) -> Estimate:
         """Lock of the sequence over what its design allows: 0.99 of each hand-over, the first window's too."""
@@ -125,7 +125,7 @@ class Evidence(claims.Evidence):
         """What an efficient estimator would score in `always`, over the windows of the sequence."""
         result, i = self.case(key), self.estimator(key, "sequence")
         forecast = tuple(map(float, result.axes.prior_sigma))
-        return ceiling.always_within(study.burst_of(result.spec), tuple(result.axes.pulses[i]), forecast)
+        return nearest.always_within(study.burst_of(result.spec), tuple(result.axes.pulses[i]), forecast)
 
     def worst_handover(self, key: str) -> Estimate:
         """The largest probability over the hand-overs that Z passes c: of the form's own law, not of a Gaussian."""
@@ -138,7 +138,7 @@ class Evidence(claims.Evidence):
         """What designed the sequence, and its windows in s."""
         result, i = self.case(key), self.estimator(key, "sequence")
         burst, condition = study.burst_of(result.spec), schedule.Condition(threshold=READINGS[key][1])
-        fisher = partial(exact.fisher, burst, len(COMPONENTS))
+        fisher = partial(estimators.fisher, burst, len(COMPONENTS))
         times = burst.pulse_period_s * np.array(result.axes.pulses[i])
         return schedule.Designer(burst, result.axes.prior_sigma, fisher, condition), times
 

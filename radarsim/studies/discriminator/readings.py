@@ -13,14 +13,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from radarsim.bursts import schedule
+from radarsim.bursts import burst
 from radarsim.config.experiment import Case
 from radarsim.report.claims import Evidence, certain
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
-from radarsim.report.claims.readings import PaperReadings, Reading, Seen, Unreadable
+from radarsim.report.claims.over import PaperReadings, Reading, Search, Seen, Unreadable, choices_in
 from radarsim.report.claims.rule import AGAINST
-from radarsim.report.claims.search import Search
-from radarsim.report.claims.written import choices_in
 from radarsim.report.statistics import Estimate
 from radarsim.studies.discriminator import measures, versions
 from radarsim.studies.discriminator.measures import COMPONENTS, COMPUTED, PRINTED
@@ -197,7 +195,7 @@ class ExactEvidence(measures.Evidence):
     def worst_handover(self, key: Any) -> Estimate:
         """The largest probability over the hand-overs that Z passes c, by its own law; the last one is cut short."""
         weights = versions.handovers(BURST, self._version, windows(self._version)[:-1])
-        return certain(max(schedule.tail_probability(one, self._lobe) for one in weights))
+        return certain(max(burst.tail_probability(one, self._lobe) for one in weights))
 
     def phase_offsets(self, key: Any) -> np.ndarray:
         return versions.phase_offsets(BURST, self._version, windows(self._version))

@@ -5,7 +5,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from radarsim.report.claims.search import Printed, Search
+from radarsim.report.claims.over import Printed, Search
 from radarsim.studies.discriminator import versions
 from radarsim.studies.discriminator.measures import ESTIMATE, SPREADS
 from radarsim.studies.discriminator.readings import BURST, LEAST_RATIO, PRINTED_PRIOR

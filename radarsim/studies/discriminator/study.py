@@ -1,30 +1,179 @@
-"""P4 (Uss, Baryshev & Djavad 2010): Doppler frequency and its derivatives from one burst, and how often they lock."""
+"""Where rare losses of lock come from, and bursts drawn from there: importance sampling along the hand-overs.
 
+An estimate at the end of a window is, near the truth, linear in the unit normals z of forecast and noise. What a window
+hands over, Δ = e_k − e_{k+1}, is caught when Z = Δᵀ H Δ is small (P4, (16)); Z is nearly λ (uᵀz)², u the unit vector
+that the leading singular vector of its root names. So locks are lost where |uᵀz| is large for one of the hand-overs,
+on either side; and where, with all hand-overs safe, a component of the last window's own error passes five bounds.
+
+P4 (Uss, Baryshev & Djavad 2010): Doppler frequency and its derivatives from one burst, and how often they lock.
+"""
+
+import math
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
+from typing import Protocol
 
 import numpy as np
 
-from radarsim.bursts import blocks as cuts
+from radarsim.bursts import burst as cuts
 from radarsim.bursts import burst as model
-from radarsim.bursts import estimators as plans
-from radarsim.bursts import fisher as exact
-from radarsim.bursts import schedule as schedules
+from radarsim.bursts import burst as schedules
+from radarsim.bursts import estimators
 from radarsim.bursts.kernels import sequence as kernels
 from radarsim.bursts.kernels import strip as strips
-from radarsim.bursts.kernels.data import BLOCK_SUMS, DEMODULATED, SAMPLES
-from radarsim.bursts.kernels.scoring import SIZE
+from radarsim.bursts.kernels.lanes import COLUMNS, END, RATIO, SHIFT, WEIGHTS, M, S
+from radarsim.bursts.kernels.scoring import BLOCK_SUMS, DEMODULATED, SAMPLES, SIZE, TURN
 from radarsim.config.experiment import Case
-from radarsim.config.rare import PLAIN_SHARE
-from radarsim.engine.moments import Layout
-from radarsim.engine.results import Axes
+from radarsim.config.fields import PLAIN_SHARE
+from radarsim.engine.results import Axes, Layout
 from radarsim.errors import ConfigError
-from radarsim.studies.discriminator import rare as rare_losses
+from radarsim.kernels.lanes import WIDTH
+from radarsim.kernels.random import fill_normal_strip
+from radarsim.studies.discriminator import nearest
 from radarsim.studies.discriminator.config import Estimator, Keys
-from radarsim.studies.discriminator.kernels import rare as rare_kernels
+from radarsim.studies.discriminator.kernels import sums
+from radarsim.studies.discriminator.kernels import sums as rare_kernels
 from radarsim.studies.discriminator.kernels import sums as sums_of
 from radarsim.studies.noise import noise_key
 
+# ---- rare ------------------------------------------------------------------------------------------------------------
+LEAST_SHARE = 0.1  # of a direction, over that of the likeliest
+
+
+class RarePlan(nearest.Plan, Protocol):
+    """What of the study's plan is used; see there."""
+
+    @property
+    def keys(self) -> np.ndarray: ...
+    @property
+    def mixture(self) -> sums.Mixture | None: ...
+
+
+class NoLoss(ValueError):
+    """Along no direction is a lock lost."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Errors at each window of an estimator as maps (K, size, 6 + 4B) of unit normals to turns over the burst.
+
+    Columns: those of the forecast, then of each block four.
+    """
+
+    forecast: np.ndarray
+    errors: np.ndarray
+
+
+def linear(plan: RarePlan, f: int) -> Linear:
+    """How the errors of estimator f follow from the normals, to first order about the truth."""
+    size, law = plan.layout.shapes["error"][2], plan.world.factor
+    count, forecast = 4 * len(law), np.zeros((size, SIZE + 4 * len(law)))
+    forecast[:, :size] = np.diag(plan.prior_sigma[:size])
+    weight = TURN * float(plan.world.physics["amplitude"]) / float(plan.world.physics["sigma"]) ** 2
+    errors = np.zeros((int(plan.options[f]["windows"]), size, SIZE + count))
+    table, weights = plan.tables
+    for k, window in enumerate(plan.windows[f, : len(errors)]):
+        begin, blocks = int(window["table"]), int(window["blocks"])
+        row = table.reshape(-1, COLUMNS)[begin : begin + blocks]
+        ends = row[:, END].astype(int)
+        of = np.repeat(np.arange(blocks), np.diff(ends, prepend=0))  # the window's block of each one drawn
+        joining = weights.reshape(-1, WEIGHTS)[int(window["weights"]) : int(window["weights"]) + len(of)]
+        mean, slope = np.ones((size, blocks)), np.zeros((size, blocks))
+        mean[1:], slope[1:] = row[:, M : M + size - 1].T, row[:, S : S + size - 1].T
+        zeroth, first = mean[:, of] + slope[:, of] * joining[:, SHIFT], slope[:, of] * joining[:, RATIO]
+        g = law[: len(of)].T  # the rows of the imaginary parts of Z₀ and Z₁
+        parts = [zeroth * g[1] + first * g[6], zeroth * g[2] + first * g[7], first * g[8], first * g[9]]
+        gradient = np.zeros((size, SIZE + count))
+        gradient[:, SIZE : SIZE + 4 * len(of)] = weight * np.stack(parts, axis=2).reshape(size, -1)
+        powers = window["powers"][:size, None]
+        if not plan.options[f]["from_truth"]:
+            gradient += window["precision"][:size, None] * powers * forecast
+        root = window["root"][:size, :size]
+        errors[k] = root.T @ (root @ gradient) / powers
+    return Linear(forecast, errors)
+
+
+def directions(plan: RarePlan, f: int) -> np.ndarray:
+    """Unit vectors (M, 6 + 4B) along which estimator f loses lock: its hand-overs', then its last window's components.
+
+    Of the first window the start is the forecast, of which the phase is not used.
+    """
+    maps, found = linear(plan, f), []
+    before = [maps.forecast, *maps.errors[:-1]]
+    for k, window in enumerate(plan.windows[f, : len(maps.errors)]):
+        if k == 0 and plan.options[f]["from_truth"]:
+            continue
+        size, drop = len(maps.forecast), int(k == 0)
+        root = window["root"][:size, :size]
+        delta = window["powers"][:size, None] * (before[k] - maps.errors[k])
+        # Σ v vᵀ = (Φ + P)⁻¹ over the root's rows; without the phase the form is a block of Φ + P, not its complement.
+        form = np.linalg.inv(root.T @ root)[drop:, drop:]
+        found.append(leading(np.linalg.cholesky(form).T @ delta[drop:]))
+    last = maps.errors[-1]
+    return np.array([*found, *(last / np.linalg.norm(last, axis=1, keepdims=True))])
+
+
+def leading(matrix: np.ndarray) -> np.ndarray:
+    """The right singular vector (n,) of the largest singular value of a matrix (m, n), m small; its side is fixed."""
+    vectors = np.linalg.eigh(matrix @ matrix.T)[1]
+    found = vectors[:, -1] @ matrix
+    found = found / np.linalg.norm(found)
+    # An eigenvector's sign is LAPACK's choice.
+    return found * np.sign(found[np.argmax(np.abs(found))])
+
+
+def mixture(plan: RarePlan, f: int, plain: float) -> sums.Mixture:
+    """The mixture for the losses of estimator f at its last window, with a share of plain bursts.
+
+    From each direction the nearest losses on both sides are looked for; each is shifted to, and has a share by the
+    probability of what lies beyond it. Raises NoLoss where there is none.
+    """
+    room = nearest.Room(plan)
+    found = [loss for unit in directions(plan, f) for loss in nearest.either_side(room, f, unit)]
+    if not found:
+        raise NoLoss(f"loses no lock within {nearest.FARTHEST:g} σ along any direction: far rarer than 10⁻¹²")
+    units, shift = np.array([loss.unit for loss in found]), np.array([loss.distance for loss in found])
+    chance = np.array([math.erfc(one / math.sqrt(2.0)) for one in shift])
+    return made(plan, units, shift, chance + LEAST_SHARE * chance.max(), plain)
+
+
+def made(plan: RarePlan, units: np.ndarray, shift: np.ndarray, shares: np.ndarray, plain: float) -> sums.Mixture:
+    """A mixture of directions units (M, 6 + 4B), shifts and shares (M,) among those that are not plain."""
+    sigma, noise = plan.prior_sigma, units[:, SIZE:].reshape(len(units), -1, 4)
+    cumulative = np.cumsum([plain, *((1.0 - plain) * shares / shares.sum())])
+    cumulative[-1] = 1.0
+    return sums.Mixture(
+        cumulative=cumulative,
+        shift=np.asarray(shift, dtype=float),
+        forecast=units[:, :SIZE] * sigma,
+        weight=np.where(sigma > 0.0, units[:, :SIZE] / np.where(sigma > 0.0, sigma, 1.0), 0.0),
+        first=np.ascontiguousarray(noise[:, :, [0, 2]].reshape(len(units), -1)),
+        second=np.ascontiguousarray(noise[:, :, [1, 3]].reshape(len(units), -1)),
+    )
+
+
+def weighted_estimates(plan: RarePlan, first: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Errors (count, F, K, 6) and passes (count, F) as `study.estimate`, weights (count,), and whether it is plain."""
+    law, shape = plan.mixture, plan.windows.shape
+    assert law is not None  # a case with `rare` has one
+    errors, passes = np.zeros((count, *shape, SIZE)), np.zeros((count, shape[0]), np.int64)
+    weights, chosen = np.empty(count), np.zeros(-(-count // WIDTH) * WIDTH, np.int64)
+    room = nearest.Room(plan)
+    sums.choose(plan.keys[2], first, law.cumulative, chosen)
+    for start in range(0, count, WIDTH):
+        stop = min(start + WIDTH, count)
+        strips.draw_forecasts(plan.keys[1], first + start, plan.prior_sigma, room.work)
+        fill_normal_strip(plan.keys[0], first + start, 0, room.a, room.b)
+        sums.move(law, chosen[start : start + WIDTH], room.work, room.a, room.b)
+        sums.weigh(law, room.work, room.a, room.b, room.along, weights[start:stop])
+        room.put()
+        for f in range(shape[0]):
+            room.follow(f, errors[start:stop, f])
+            passes[start:stop, f] = room.passes[: stop - start]
+    return errors, passes, weights, chosen[:count] == 0
+
+
+# ---- study -----------------------------------------------------------------------------------------------------------
 COMPONENTS = (("phi0", "rad"), ("f0", "Hz"), ("f1", "Hz/s"), ("f2", "Hz/s2"), ("f3", "Hz/s3"), ("f4", "Hz/s4"))
 BLOCK = 64  # 20 ms with nine estimators on block sums, half a second with two on samples
 MODES = {"block_sums": BLOCK_SUMS, "samples": SAMPLES, "demodulated": DEMODULATED}
@@ -70,7 +219,7 @@ class Plan:
 
     layout: Layout
     axes: DiscriminatorAxes
-    world: plans.World
+    world: estimators.World
     tables: tuple[np.ndarray, np.ndarray]
     windows: np.ndarray
     options: np.ndarray
@@ -126,13 +275,13 @@ def forecast(spec: Keys, burst: model.Burst) -> np.ndarray:
     """Standard deviations (size,) of the forecast as the estimators believe them."""
     given = np.array(spec.prior.given) * spec.prior.scale
     if spec.prior.sigma is None:
-        given = given * exact.spreads(exact.fisher(burst, len(given), burst.duration_s))
+        given = given * estimators.spreads(estimators.fisher(burst, len(given), burst.duration_s))
     return given
 
 
 def designer_of(burst: model.Burst, sigma: np.ndarray, condition: schedules.Condition) -> schedules.Designer:
     """The designer of a burst's windows under a forecast sigma (size,)."""
-    return schedules.Designer(burst, sigma, partial(exact.fisher, burst, len(sigma)), condition)
+    return schedules.Designer(burst, sigma, partial(estimators.fisher, burst, len(sigma)), condition)
 
 
 @lru_cache(maxsize=64)
@@ -183,15 +332,15 @@ def prepared(case: Case) -> Plan:
     designer = designer_of(burst, sigma, schedules.Condition())  # of forms, which no condition enters
     windows = windows_of(spec, burst, sigma)
     every = sorted({w for own in windows for w in own})
-    image = plans.has_image(burst, sigma, every, phase.turns)
+    image = estimators.has_image(burst, sigma, every, phase.turns)
     per_window = (IMAGE_BLOCKS_PER_WINDOW if image else BLOCKS_PER_WINDOW)[mode]
     edges = cuts.block_edges(every, per_window, 8 if mode == DEMODULATED else 1)
-    world = plans.world(burst, mode, edges, image, phase.turns, phase.reference)
+    world = estimators.world(burst, mode, edges, image, phase.turns, phase.reference)
     tables = cuts.Tables(edges, world.mean, per_window)
     blocks = tables.window if mode == BLOCK_SUMS else tables.drawn
     designs = [design_of(e, w) for e, w in zip(spec.estimators, windows, strict=True)]
-    mean_information = dict(zip(every, exact.fisher_sums(burst, size, every), strict=True))
-    records, options = plans.estimators(designs, blocks, burst, sigma, mean_information, designer)
+    mean_information = dict(zip(every, estimators.fisher_sums(burst, size, every), strict=True))
+    records, options = estimators.estimators(designs, blocks, burst, sigma, mean_information, designer)
     whole = np.ones(SIZE)
     whole[:size] = model.turns_per_parameter(size, burst.duration_s)
     potential, posterior = bounds(burst, windows, phase.theta, sigma)
@@ -224,8 +373,8 @@ def prepared(case: Case) -> Plan:
     sought = [e.name for e in spec.estimators].index(spec.rare.estimator)
     keys = np.concatenate([plan.keys, [noise_key(case, "rare")]])
     try:
-        return replace(plan, keys=keys, mixture=rare_losses.mixture(plan, sought, PLAIN_SHARE))
-    except rare_losses.NoLoss as error:
+        return replace(plan, keys=keys, mixture=mixture(plan, sought, PLAIN_SHARE))
+    except NoLoss as error:
         raise ConfigError(f"{case.name}: rare: {spec.rare.estimator} {error}") from None
 
 
@@ -235,9 +384,9 @@ def padded(values: np.ndarray, filling: float = 0.0) -> np.ndarray:
     return np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, missing)], constant_values=filling)
 
 
-def design_of(estimator: Estimator, windows: list[int]) -> plans.Design:
+def design_of(estimator: Estimator, windows: list[int]) -> estimators.Design:
     """An estimator as the kernels' options."""
-    return plans.Design(
+    return estimators.Design(
         windows=tuple(windows),
         phases=estimator.phases,
         steps=estimator.steps,
@@ -260,10 +409,10 @@ def bounds(
     shape = (len(windows), most, size)
     potential, posterior = np.ones(shape), np.ones(shape)
     every = sorted({w for own in windows for w in own})
-    known = np.diag(exact.phase_prior(sigma))
+    known = np.diag(estimators.phase_prior(sigma))
     found = {
-        window: (exact.spreads(information), exact.spreads(information + known))
-        for window, information in zip(every, exact.fisher_sums(burst, size, every, theta), strict=True)
+        window: (estimators.spreads(information), estimators.spreads(information + known))
+        for window, information in zip(every, estimators.fisher_sums(burst, size, every, theta), strict=True)
     }
     for f, own in enumerate(windows):
         for k, window in enumerate(own):
@@ -287,7 +436,7 @@ def axes(
     for f, own in enumerate(windows):
         durations[f, : len(own)] = np.array(own) * burst.pulse_period_s
     available = np.repeat(np.isfinite(durations)[..., None], size, axis=2)
-    whole = exact.fisher(burst, size, burst.duration_s)
+    whole = estimators.fisher(burst, size, burst.duration_s)
     return DiscriminatorAxes(
         filters=names,
         components=COMPONENTS[:size],
@@ -301,11 +450,11 @@ def axes(
         pulses=tuple(tuple(own) for own in windows),
         posterior_sigma=np.where(available, posterior, np.nan),
         prior_sigma=sigma,
-        potential_closed_form=exact.spreads(whole),
+        potential_closed_form=estimators.spreads(whole),
         potential_covariance=model.balanced_inverse(whole),
-        energy_ratio=exact.energy_ratio(burst, 1.0) * durations,
+        energy_ratio=estimators.energy_ratio(burst, 1.0) * durations,
         burst_s=burst.duration_s,
-        shortest_window_s=exact.shortest_window(burst),
+        shortest_window_s=estimators.shortest_window(burst),
         model_error_turns=float(np.sqrt(np.mean((phase.turns - phase.reference) ** 2))),
         model_error_hz=doppler_error(burst, phase),
     )
@@ -325,7 +474,7 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     if plan.mixture is None:
         errors, passes = estimate(plan, first, count)
     else:
-        errors, passes, weights, plain = rare_losses.estimate(plan, first, count)
+        errors, passes, weights, plain = weighted_estimates(plan, first, count)
         bounds = plan.potential, plan.posterior
         sums_of.accumulate_losses(errors, plan.options, *bounds, weights, arrays["losses"])
         arrays["drawn"][:] = plain.sum(), weights.sum(), (weights**2).sum()
@@ -355,7 +504,7 @@ def estimate(plan: Plan, first: int, count: int) -> tuple[np.ndarray, np.ndarray
 
 def _follow_ridges(plan: Plan, f: int, first: int, errors: np.ndarray, passes: np.ndarray) -> None:
     """The classical rival's errors and passes: its start is found outside the kernels, burst by burst."""
-    from radarsim.studies.discriminator.ridge import Ridge
+    from radarsim.studies.discriminator.nearest import Ridge
 
     physics, clean = plan.world.physics.copy(), plan.world.clean
     physics["mode"] = SAMPLES

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from radarsim.bursts.schedule import MOST_WINDOWS
+from radarsim.bursts.burst import MOST_WINDOWS
 
 Phase = Literal["left out of the form", "left out of the problem", "kept"]
 Curvature = Literal["next", "as printed", "before"]

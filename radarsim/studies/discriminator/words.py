@@ -8,8 +8,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, numeral, plural, tr
-from radarsim.report import panels, rare, text
-from radarsim.report import tables as common
+from radarsim.report import panels, rare, tables
 from radarsim.studies.discriminator.kernels.sums import LOCKS
 from radarsim.studies.discriminator.tables import last_locks
 
@@ -89,7 +88,7 @@ def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:
             )
         ]
     if rare_event:
-        words.append(before + _rare(common.groups(made["rare"], "case")[(result.name,)]))
+        words.append(before + _rare(tables.groups(made["rare"], "case")[(result.name,)]))
     if others:
         locks = ", ".join(f"{name} {_lock(last_locks(made, result, name))}" for name in others)
         words.append(before + tr("the others lock in: {locks}.", locks=locks))
@@ -118,8 +117,8 @@ def _lock(row: "pd.Series") -> str:
     """A share of bursts with its interval; of all or none the bound to as many digits as it has."""
     value, low, high = (100 * row[name] for name in ("lock_rate", "lock_lo", "lock_hi"))
     if 0 < value < 100:
-        return text.estimate((value, low, high), "%", ".2f")
-    return f"{value:.0f} % {text.interval(numeral(f'{low:.3f}'), numeral(f'{high:.3f}'))}"
+        return tables.estimate((value, low, high), "%", ".2f")
+    return f"{value:.0f} % {tables.interval(numeral(f'{low:.3f}'), numeral(f'{high:.3f}'))}"
 
 
 def _rare(rows: "pd.DataFrame") -> str:

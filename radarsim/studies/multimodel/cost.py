@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from radarsim.studies.multimodel import filters
+from radarsim.studies.multimodel import world as filters
 from radarsim.studies.multimodel.config import Filter
 from radarsim.studies.multimodel.kernels.records import MODEL_NUMBERS, OUTPUT, PLOT, SIZE, START
 from radarsim.studies.multimodel.study import Plan
@@ -59,7 +59,7 @@ def seconds_per_update(plan: Plan) -> dict[str, float]:
     The least of some passes over the first scans of the flight, in a thread of a pool as kernels run.
     """
     from radarsim.kernels.lanes import WIDTH, rows
-    from radarsim.studies.multimodel.kernels import plots
+    from radarsim.studies.multimodel.kernels import strip as plots
 
     world = plan.world
     count = min(len(world.truth), MOST_SCANS)

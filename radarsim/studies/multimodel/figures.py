@@ -10,8 +10,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
-from radarsim.report import panels, seen, text
-from radarsim.report import tables as common
+from radarsim.report import panels, seen, tables
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
 
 if TYPE_CHECKING:
@@ -180,7 +179,7 @@ def _stage_lines(results: Sequence[CaseResult]) -> tuple[Reference, ...]:
 
 def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str) -> Figure | None:
     """σ of height or climb against time on a logarithmic scale (figures 5 and 6), a panel for each case."""
-    rows = common.groups(curves[curves["component"] == component], "case", "filter")
+    rows = tables.groups(curves[curves["component"] == component], "case", "filter")
     quantity, symbol, unit = SIGMAS[component]
     drawn = []
     for result in results:
@@ -218,7 +217,7 @@ def _of_the_paper(figure: Figure | None, results: Sequence[CaseResult], number: 
 
 def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure | None:
     """Mean probabilities of the models against time (figure 7), a panel for each filter of two or more models."""
-    rows = common.groups(table, "case", "filter", "model")
+    rows = tables.groups(table, "case", "filter", "model")
     drawn: list[Panel] = []
     for result in results:
         for name, options in zip(result.axes.filters, result.spec.filters, strict=True):
@@ -253,7 +252,7 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
 def families(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     """σ of the height by family and merging rule, a map for each stage; needs at least two of each."""
     drawn = []
-    rows = common.groups(common.where(made["stages"], component="y"), "case", "stage")
+    rows = tables.groups(tables.where(made["stages"], component="y"), "case", "stage")
     for result in results:
         found = {
             (options.family, options.merge): name
@@ -286,8 +285,8 @@ def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     if not results:
         return None
     result = results[0]
-    operations = common.groups(made["operations"], "case", "stage", "filter")
-    rows = common.where(made["stages"], case=result.name, component="y")
+    operations = tables.groups(made["operations"], "case", "stage", "filter")
+    rows = tables.where(made["stages"], case=result.name, component="y")
     drawn = []
     most = made["operations"].loc[made["operations"]["case"] == result.name, "operations"].max()
     styles = dict(zip(result.axes.filters, _styles(result), strict=True))
@@ -308,7 +307,7 @@ def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     told = tr(
         "Fewest operations: {cheap} ({count:.0f}); least σ, {stage}: {good} ({sigma} m). ",
         **{"cheap": cheap.label, "count": float(cheap.x[0]), "stage": drawn[-1].title},
-        **{"good": good.label, "sigma": text.number(float(good.y[0]), 3)},
+        **{"good": good.label, "sigma": tables.number(float(good.y[0]), 3)},
     )
     drawn = _beside(drawn, result, dash=None)
     caption = told + tr(
@@ -346,7 +345,7 @@ def consistency(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure 
     if not results:
         return None
     result = results[0]
-    rows = common.groups(table[table["case"] == result.name], "filter")
+    rows = tables.groups(table[table["case"] == result.name], "filter")
     drawn = []
     for key, title in (("nees", tr("NEES of the position")), ("nis", tr("NIS of the plot"))):
         marks: list = [Reference(1.0)]

@@ -13,7 +13,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import claims
 from radarsim.report.statistics import Estimate
-from radarsim.studies.multimodel import cost, filters, tables
+from radarsim.studies.multimodel import cost, tables, world
 
 BANK_122 = ("uniform 0.05", "accelerated 0.05", "accelerated 30")
 BANK_11 = ("uniform 5", "uniform 30")
@@ -51,9 +51,9 @@ class Evidence(claims.Evidence):
         family, rule, bank, *matrix = wanted
         printed = {BANK_122: MATRIX_122, BANK_11: MATRIX_11}.get(bank)
         for f, of in self.members(result):
-            same = of.family == family and filters.labels(of.models) == bank and (not rule or of.merge == rule)
+            same = of.family == family and world.labels(of.models) == bank and (not rule or of.merge == rule)
             expected = matrix[0] if matrix else printed
-            T = filters.transition_matrix(of.transition)
+            T = world.transition_matrix(of.transition)
             fits = expected is None or (np.shape(expected) == T.shape and np.allclose(expected, T, atol=1e-9))
             if same and fits and of.covariance_at == "plot":
                 return f
@@ -109,9 +109,9 @@ def growth_of_change(seen: Evidence, key: tuple) -> float:
     """
     growths = []
     for options in seen.case(key).spec.filters:
-        T = filters.transition_matrix(options.transition)
+        T = world.transition_matrix(options.transition)
         if len(T) > 1:
-            later = filters.transition_powers(T, np.array([20.0]))[0]
+            later = world.transition_powers(T, np.array([20.0]))[0]
             growths.append(np.max(1 - np.diag(later)) / np.max(1 - np.diag(T)))
     return float(min(growths))
 
@@ -120,8 +120,8 @@ def largest_fault_of_powers(seen: Evidence, key: tuple, tenfold: bool) -> float:
     """The largest element, over a case's filters, of T(Δt/10⁶) − I, or of T(10 Δt) − T(Δt)¹⁰ where tenfold."""
     faults = []
     for options in seen.case(key).spec.filters:
-        T = filters.transition_matrix(options.transition)
-        near, ten = filters.transition_powers(T, np.array([1e-6, 10.0]))
+        T = world.transition_matrix(options.transition)
+        near, ten = world.transition_powers(T, np.array([1e-6, 10.0]))
         product = np.linalg.multi_dot([T] * 10) if len(T) > 1 else T
         faults.append(np.abs(ten - product if tenfold else near - np.eye(len(T))).max())
     return float(max(faults))
@@ -133,7 +133,7 @@ def merged_early(seen: Evidence, key: tuple, wanted: tuple) -> float:
     The hypotheses are drawn at random; weights are those of (7), merged by moments (4).
     """
     options = seen.case(key).spec.filters[seen.filter(key, wanted)]
-    T = filters.transition_matrix(options.transition)
+    T = world.transition_matrix(options.transition)
     dt = float(seen.case(key).spec.sensor.scan_period_s)
     rng = np.random.default_rng(1)
     p = rng.dirichlet(np.ones(len(T)))
@@ -141,7 +141,7 @@ def merged_early(seen: Evidence, key: tuple, wanted: tuple) -> float:
     P = root @ np.swapaxes(root, 1, 2)
     faults = []
     for n, model in enumerate(options.models):
-        moves, accelerates = filters.MOTIONS[model.motion]
+        moves, accelerates = world.MOTIONS[model.motion]
         F = np.array([[1, moves * dt, accelerates * dt**2 / 2], [0, 1, accelerates * dt], [0, 0, accelerates]])
         G = np.array([dt**2 / 2, dt, accelerates])
         Q = model.sigma_acceleration_mps2**2 * np.outer(G, G)
@@ -162,7 +162,7 @@ def _moments(weight: np.ndarray, x: np.ndarray, P: np.ndarray) -> tuple[np.ndarr
 def cost_of_merging_early(seen: Evidence, key: tuple, wanted: tuple) -> float:
     """Operations of a scan of a filter that extrapolates what is merged, over one that merges what is extrapolated."""
     options = seen.case(key).spec.filters[seen.filter(key, wanted)]
-    merges = np.count_nonzero(filters.transition_matrix(options.transition))
+    merges = np.count_nonzero(world.transition_matrix(options.transition))
     early, late = (
         fixed + merge * merges + once
         for fixed, merge, once in (cost.operations_of(options, merged_first) for merged_first in (True, False))
@@ -175,7 +175,7 @@ def blocks_over(
 ) -> float:
     """Extrapolations or updates of a family with a filter's bank of N models, over a power of N."""
     options = seen.case(key).spec.filters[seen.filter(key, wanted)]
-    T = filters.transition_matrix(options.transition)
+    T = world.transition_matrix(options.transition)
     counted = cost.blocks(family, T, merged_first=False)[of == "updates"]
     return float(counted.sum() / len(T) ** power)
 

@@ -9,10 +9,9 @@ from typing import Any
 from radarsim.config.experiment import Case
 from radarsim.report.claims import Evidence
 from radarsim.report.claims.declared import Claim, PaperClaims
-from radarsim.report.claims.readings import PaperReadings, Reading, Seen
-from radarsim.report.claims.written import choices_in
+from radarsim.report.claims.over import PaperReadings, Reading, Seen, choices_in
 from radarsim.studies.multimodel import measures, tables
-from radarsim.studies.multimodel.flights import FLIGHTS
+from radarsim.studies.multimodel.world import FLIGHTS
 
 AERODYNAMIC = "P2.4"  # speaks of another target than the lost flight
 

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.engine.moments import Layout
-from radarsim.engine.results import Axes
+from radarsim.engine.results import Axes, Layout
 from radarsim.kernels.lanes import WIDTH, rows
-from radarsim.studies.multimodel import filters
+from radarsim.studies.multimodel import world as filters
 from radarsim.studies.multimodel.config import Keys
-from radarsim.studies.multimodel.kernels import plots, records, sums
+from radarsim.studies.multimodel.kernels import records, strip
 from radarsim.studies.multimodel.world import intervals, plot_truth, sensor_frame, truth
 from radarsim.studies.noise import noise_key
 
@@ -132,8 +131,8 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     values = np.zeros(plan.layout.size)
     arrays = plan.layout.unpack(values)
     plain = records.Sums(*(arrays[name] for name in records.Sums._fields))
-    memory = sums.memory(len(plan.banks.numbers), len(plan.world.lengths))
-    sums.simulate_block(plan.world, plan.banks, memory, plain, plan.axes.baseline, first, count)
+    memory = strip.memory(len(plan.banks.numbers), len(plan.world.lengths))
+    strip.simulate_block(plan.world, plan.banks, memory, plain, plan.axes.baseline, first, count)
     return values
 
 
@@ -145,7 +144,7 @@ def measured(plan: Plan, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
     """
     world, count = plan.world, len(plan.world.truth)
     found = rows(count * records.PLOT)
-    plots.fill_plots(world.keys, world.frame, world.plot_truth, records.START, first, rows(plots.RANDOM), found)
+    strip.fill_plots(world.keys, world.frame, world.plot_truth, records.START, first, rows(strip.RANDOM), found)
     cells = found.reshape(count, records.PLOT, WIDTH)
     covariance = slice(records.COVARIANCE, records.DETECTED)
     return cells[:, : records.COVARIANCE], cells[:, covariance], cells[:, records.DETECTED]

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import consistency, notes, statistics
+from radarsim.report import notes, statistics
 from radarsim.report import tables as common
 from radarsim.studies.multimodel import cost as costs
-from radarsim.studies.multimodel import filters
+from radarsim.studies.multimodel import world
 from radarsim.studies.multimodel.kernels.records import MERGED, MERGES, NEES, NIS
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def tables(results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
 @table("probabilities")
 def _probabilities(result: CaseResult) -> common.Columns:
     """Mean probability of each model by scan, with its interval; models count from 1 (contract: probabilities.csv)."""
-    axes, models = result.axes, [filters.labels(options.models) for options in result.spec.filters]
+    axes, models = result.axes, [world.labels(options.models) for options in result.spec.filters]
     shown = [(f, m) for f, own in enumerate(models) for m in range(len(own)) if len(own) > 1]
     scans = len(axes.k)
     f = np.repeat([f for f, _ in shown], scans).astype(int)
@@ -112,9 +112,9 @@ def _consistency(result: CaseResult) -> common.Columns:
     found: dict[str, np.ndarray] = {}
     for quantity, place in (("nees", NEES), ("nis", NIS)):
         total, square = sums[:, place, 0] / FREEDOM, sums[:, place, 1] / FREEDOM**2
-        bounds = consistency.bounds_from_spread(total, square, n, len(sums))
+        bounds = notes.bounds_from_spread(total, square, n, len(sums))
         means = [statistics.mean_square(*pair, n) for pair in zip(total, square, strict=True)]
-        found |= consistency.normalised(quantity, statistics.Estimate(*np.transpose(means)), bounds)
+        found |= notes.normalised(quantity, statistics.Estimate(*np.transpose(means)), bounds)
     return {
         **common.leading(result, np.repeat(np.arange(filters), s.size), stage=common.names(names, np.tile(s, filters))),
         "n": np.full(len(sums), n),

@@ -11,13 +11,13 @@ from radarsim.engine.results import Track
 from radarsim.kernels import random
 from radarsim.kernels.lanes import WIDTH, rows
 from radarsim.studies.interface import OUTLIERS, RecordedPlots, true_column
-from radarsim.studies.multimodel import filters
+from radarsim.studies.multimodel import world
 from radarsim.studies.multimodel.config import Filter, Keys, Sensor
-from radarsim.studies.multimodel.kernels import likelihood as kernel
 from radarsim.studies.multimodel.kernels import records as rec
+from radarsim.studies.multimodel.kernels import strip as kernel
 from radarsim.studies.multimodel.kernels import strip as strips
 from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
-from radarsim.studies.multimodel.kernels.plots import NORMALS, STRIP
+from radarsim.studies.multimodel.kernels.strip import NORMALS, STRIP
 from radarsim.studies.multimodel.study import COMPONENTS, banks, measured, prepare
 from radarsim.studies.multimodel.world import intervals, local_plots, sensor_frame
 from radarsim.studies.multimodel.world import truth as scan_times
@@ -149,8 +149,8 @@ class Tracker:
     def _started(self, state: _State) -> np.ndarray:
         """Start a filter from the three plots; its outputs (1, OUTPUT) at the third."""
         times, began = np.array([at for at, _ in self.held]), np.stack([plot for _, plot in self.held])
-        weights = filters.start_weights(times, self.spec.start_acceleration_mps2)
-        chances = filters.stationary(filters.transition_matrix(state.options.transition))
+        weights = world.start_weights(times, self.spec.start_acceleration_mps2)
+        chances = world.stationary(world.transition_matrix(state.options.transition))
         strips.start_strip(state.work, state.numbers, _lanes(began), weights, chances)
         out = np.zeros((1, rec.OUTPUT))
         out[0, : rec.STATES], out[0, rec.VARIANCE : rec.VARIANCE + rec.STATES] = _at_start(began, weights)
@@ -242,8 +242,8 @@ def _score(spec: Keys, t: np.ndarray, z: np.ndarray, R: np.ndarray, whole: np.nd
         return 0.0
     first, (options,) = int(began[-1]), spec.filters
     plots = np.concatenate([z, R, whole[:, None]], axis=1)
-    weights = filters.start_weights(t[began], spec.start_acceleration_mps2)
-    chances = filters.stationary(filters.transition_matrix(options.transition))
+    weights = world.start_weights(t[began], spec.start_acceleration_mps2)
+    chances = world.stationary(world.transition_matrix(options.transition))
     work, numbers = work_arrays()
     strips.start_strip(work, numbers, _lanes(plots[began]), weights, chances)
     index, times = intervals(t[first:])

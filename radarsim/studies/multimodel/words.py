@@ -6,8 +6,7 @@ from typing import Any
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, numeral, plural, term, tr
-from radarsim.report import panels, text
-from radarsim.report import tables as common
+from radarsim.report import panels, tables
 
 
 def question(experiment: Experiment) -> str:
@@ -35,13 +34,13 @@ def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
 
 def _least(result: CaseResult, made: Mapping, component: str, quantity: str) -> str:
     """The filter of the least σ in each stage, with the interval."""
-    rows: Any = common.where(made["stages"], case=result.name, component=component)
+    rows: Any = tables.where(made["stages"], case=result.name, component=component)
     parts = []
     for stage, own in rows.groupby("stage", sort=False):
         best = own.loc[own["sigma"].idxmin()]
         value, low, high = (
             numeral(f"{float(f'{best[name]:.3g}'):,.10g}") for name in ("sigma", "sigma_lo", "sigma_hi")
         )
-        ends = text.interval(low, high)
+        ends = tables.interval(low, high)
         parts.append(f"{tr(str(stage))} {best['filter']}, {value} {panels.unit_of(best['unit'])} {ends}")
     return tr("least σ of {quantity} by stage: {stages}.", quantity=quantity, stages="; ".join(parts))

@@ -6,29 +6,36 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from radarsim.config.faults import short
+from radarsim.config.document import short
 from radarsim.config.fields import (
+    NEAREST_M,
+    AccelerationStart,
     At,
     Baseline,
     Design,
     Display,
+    FlyBy,
+    InBand,
+    Lasting,
     Members,
     Model,
     Name,
     NonNegative,
     NotRead,
     Number,
+    Polynomial,
     Positive,
     Probability,
+    Recorded,
     Scenario,
+    Turn,
     Whole,
     at,
     cross_check,
     key,
     of_each,
 )
-from radarsim.config.radial import NEAREST_M, AccelerationStart, FlyBy, InBand, Lasting, Polynomial, Recorded, Turn
-from radarsim.physics.bands import Band
+from radarsim.physics import Band
 
 MOST_SCANS = 1000  # each scan has windows of its own
 FEWEST_PULSES, MOST_PULSES = 4, 4096

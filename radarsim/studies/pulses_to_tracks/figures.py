@@ -8,8 +8,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import term, tr
-from radarsim.report import panels, seen, sweeps
-from radarsim.report import tables as common
+from radarsim.report import panels, rare, seen, tables
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.report.statistics import FEW_EVENTS
 from radarsim.studies.pulses_to_tracks.kernels.records import AGES
@@ -66,8 +65,8 @@ def _title(result: Result) -> str:
 def threshold_figure(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> dict[str, Figure]:
     """Share of bursts that locked, and σ of range at the last scan, against one swept number, for each config."""
     drawn: list[Panel] = []
-    for (_, keys), members in sweeps.families(results).items():
-        x, axis = sweeps.places(members[0], keys[0], [dict(result.swept)[keys[0]] for result in members])
+    for (_, keys), members in rare.families(results).items():
+        x, axis = rare.places(members[0], keys[0], [dict(result.swept)[keys[0]] for result in members])
         if len(keys) == 1 and not axis.ticks:
             drawn += _threshold_panels([members[i] for i in np.argsort(x)], np.sort(x), axis, made)
     if not any(panel.marks for panel in drawn):
@@ -87,10 +86,10 @@ def _threshold_panels(
     """The two panels of cases in the order of their swept values x (n,)."""
     locks: list[Line] = []
     sigmas: list[Line] = []
-    curves = common.groups(made["curves"], "case", "filter", "component")
+    curves = tables.groups(made["curves"], "case", "filter", "component")
     for n, name in enumerate(members[0].axes.filters):
         style, words = panels.look(n, 0, 1), panels.literal(name)
-        found = np.array([sweeps.last(result, name, "r", curves) for result in members])
+        found = np.array([rare.last(result, name, "r", curves) for result in members])
         exact = found[:, 3] if np.isfinite(found[:, 3]).any() else None
         sigmas.append(Line(x, found[:, 0], words, style, found[:, 1], found[:, 2], exact))
         if members[0].axes.ideal[n] >= 0:
@@ -104,7 +103,7 @@ def _threshold_panels(
 
 def _locked(result: Result, locks: "pd.DataFrame", name: str) -> tuple[float, float, float]:
     """The least share of locks over the scans, with its interval."""
-    rows = common.where(locks, case=result.name, filter=name)
+    rows = tables.where(locks, case=result.name, filter=name)
     row = rows.iloc[int(rows["lock_rate"].to_numpy().argmin())]
     return float(row["lock_rate"]), float(row["lock_lo"]), float(row["lock_hi"])
 
@@ -116,7 +115,7 @@ def _line(result: Result, name: str, rows: "pd.DataFrame", columns: Sequence[str
 
 def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     """Share of bursts that locked against time, a line for each estimator."""
-    rows = common.groups(common.where(made["locks"], case=result.name), "filter")
+    rows = tables.groups(tables.where(made["locks"], case=result.name), "filter")
     marks = []
     ideal = {one.name for one in result.spec.filters if one.estimator == "fisher_bound"}
     for (name,), own in rows.items():
@@ -128,14 +127,14 @@ def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
 
 def folds_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     """How often the best hypothesis has no wrong fold against time, a line for each filter that keeps several."""
-    rows = common.groups(common.where(made["folds"], case=result.name), "filter")
+    rows = tables.groups(tables.where(made["folds"], case=result.name), "filter")
     marks = [_line(result, name, own, ("t_s", "right", "right_lo", "right_hi")) for (name,), own in rows.items()]
     return Panel(panels.time_axis(), Axis(tr("P(no wrong fold)"), limits=(0, 1)), tuple(marks), _title(result))
 
 
 def measured_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     """Errors of the measured velocity of all bursts against time, and the Fisher bound."""
-    rows = common.groups(common.where(made["estimates"], case=result.name, component="Vr"), "filter")
+    rows = tables.groups(tables.where(made["estimates"], case=result.name, component="Vr"), "filter")
     columns = ("t_s", "sigma_all", "sigma_all_lo", "sigma_all_hi")
     marks = [_line(result, name, own, columns) for (name,), own in rows.items()]
     if rows:
@@ -146,9 +145,9 @@ def measured_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
 
 def losses_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     """σ of the range at the last scan by the scans since a burst was lost, a line for each filter that lost some."""
-    own = common.where(made["losses"], case=result.name, component="r", k=result.axes.k[-1])
+    own = tables.where(made["losses"], case=result.name, component="r", k=result.axes.k[-1])
     marks = []
-    for (name,), rows in common.groups(own, "filter").items():
+    for (name,), rows in tables.groups(own, "filter").items():
         rows = rows[rows["n"] >= FEW]
         if len(rows) > 1:
             rows = rows.assign(sigma_hi=np.minimum(rows["sigma_hi"], 1e3 * rows["sigma"]))

@@ -1,27 +1,137 @@
-"""From a filter's options to the arrays that the kernels read: menus of windows, gates, noise.
+"""Labels of the study's sums, and the exact values that go with them.
+
+What is observed: the burst of each scan, and what the filters' model misses of the target.
+
+All errors are counted from the truth: of a polynomial of the second degree, which the model follows, nothing else
+matters. Doppler frequency is f = 2V/λ, positive for a target that recedes; over a burst the acceleration is constant.
+
+From a filter's options to the arrays that the kernels read: menus of windows, gates, noise.
 
 A sequence whose forecast is the track's takes its windows from a menu: they are designed for standard deviations of
 velocity and acceleration in geometric progression, and each scan of each realisation takes the least that is no less
 than its own. The menu begins with what the ranges alone leave open and ends where the whole burst is the first window.
+
+What is known without sampling: the errors of range alone, and of every idealisation.
 """
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from radarsim.bursts import estimators, schedule
-from radarsim.bursts.blocks import Tables, block_edges
-from radarsim.bursts.burst import Burst
-from radarsim.bursts.fisher import fisher, fisher_sums
-from radarsim.bursts.kernels.data import BLOCK_SUMS
+from radarsim.bursts import burst as schedule
+from radarsim.bursts import estimators
+from radarsim.bursts.burst import LIGHT_MPS, Burst, Tables, block_edges
+from radarsim.bursts.estimators import energy_ratio, fisher, fisher_sums
+from radarsim.bursts.kernels.scoring import BLOCK_SUMS
 from radarsim.bursts.kernels.sequence import OPTIONS, WINDOW
-from radarsim.physics.motion import process_noise, transition
-from radarsim.studies.pulses_to_tracks import world
+from radarsim.engine.results import Axes
+from radarsim.kernels.algebra import (
+    CORRECT,
+    NO_NOISE,
+    TAKE,
+    add_scaled,
+    constant_acceleration,
+    pack,
+    predicted,
+    predicted_covariance,
+    unpack,
+)
+from radarsim.physics import process_noise, transition
+from radarsim.studies import radial
 from radarsim.studies.pulses_to_tracks.kernels import records
 
+
+# ---- axes ------------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True, kw_only=True)
+class PulsesAxes(Axes):
+    """Labels of the sums, F filters over K scans, components r, Vr, ar.
+
+    bound (F, K, 2) are the Fisher bounds of the burst's velocity (m/s) and acceleration (m/s²), takes (F,) how many of
+    these a filter takes, not-a-number where it takes none. energy_db (K,) is the energy of the burst over the noise's
+    density, dB. ideal (F,) is the number of each filter's idealisation, −1 where the case has none. losses (F, K, 3) is
+    what lost bursts add to the mean squares of the errors if all are lost, most_lost (F,) a bound on how many are.
+    """
+
+    bound: np.ndarray
+    takes: np.ndarray
+    energy_db: np.ndarray
+    ideal: np.ndarray
+    losses: np.ndarray
+    most_lost: np.ndarray
+
+
+# ---- world -----------------------------------------------------------------------------------------------------------
+def truth(target: Any, t: np.ndarray, case: str) -> np.ndarray:
+    """Range, radial velocity and acceleration (K, 3) of a configured target at times t (K,), in m, m/s, m/s².
+
+    Raises ConfigError, with the name of the case, for a target that cannot be.
+    """
+    return radial.checked_truth(target, t, case)
+
+
+def bursts(spec: Any, truth: np.ndarray) -> list[Burst]:
+    """The burst of every scan; truth (K, 3) gives its range, on which the echo's power hangs, and its velocity.
+
+    The amplitude is one, the noise has half the power over the ratio in each part of a complex sample. Ratios are taken
+    to a hundredth of a decibel, so that scans share designs.
+    """
+    given, wavelength = spec.burst, spec.radar.wavelength_m
+    doppler = 2.0 * truth[:, 1] / wavelength
+    power_db = given.snr_db + 20.0 * np.log10(np.abs(np.sinc(given.pulse_length_s * doppler)))
+    if given.snr_range_m is not None:
+        power_db = power_db + 40.0 * np.log10(given.snr_range_m / truth[:, 0])
+    return [
+        Burst(
+            carrier_hz=LIGHT_MPS / wavelength,
+            pulse_period_s=1.0 / given.repetition_rate_hz,
+            pulse_length_s=given.pulse_length_s,
+            sampling_period_s=given.pulse_length_s,
+            pulses=spec.pulses,
+            amplitude=1.0,
+            noise_variance=0.5 * 10.0 ** (-0.1 * float(one)),
+            complex_samples=True,
+        )
+        for one in np.round(power_db, 2)
+    ]
+
+
+def centre(burst: Burst) -> float:
+    """The middle of the samples in bursts from the first: there velocity and acceleration are independent."""
+    return 0.5 * (burst.pulses - 1) / burst.pulses
+
+
+def at_centre(burst: Burst, size: int, order: int) -> np.ndarray:
+    """Row (size,) that makes of θ the velocity (order 1) or the acceleration (2) at the middle, m/s or m/s²."""
+    t = centre(burst) * burst.duration_s
+    powers = [t ** (j - order) / math.factorial(j - order) if j >= order else 0.0 for j in range(size)]
+    return 0.5 * burst.wavelength_m * np.array(powers)
+
+
+def bounds(burst: Burst, size: int) -> tuple[float, float]:
+    """The Fisher bound of a burst's velocity and acceleration at its middle, m/s and m/s²; infinite if not estimated.
+
+    size is the number of parameters: phase, frequency, its derivatives.
+    """
+    (information,) = fisher_sums(burst, size, [burst.pulses])
+    scale = 1.0 / np.sqrt(np.diag(information))
+    inverse = np.linalg.inv(information * np.outer(scale, scale)) * np.outer(scale, scale)
+    rows = [at_centre(burst, size, order) for order in (1, 2)]
+    velocity, acceleration = (float(np.sqrt(row @ inverse @ row)) if row.any() else math.inf for row in rows)
+    return velocity, acceleration
+
+
+def defects(truth: np.ndarray, period_s: float) -> np.ndarray:
+    """What the model's prediction of a scan misses, F x(k − 1) − x(k), (K, 3) from the truth (K, 3); the first zero."""
+    missed = np.zeros_like(truth)
+    missed[1:] = truth[:-1] @ transition(period_s).T - truth[1:]
+    return missed
+
+
+# ---- filters ---------------------------------------------------------------------------------------------------------
 RATIOS = (math.sqrt(2.0), 2.0)  # of neighbouring standard deviations of a menu: velocity, acceleration
 MOST_LEVELS = (40, 16)
 STILL = 0.02  # turns at the ends of the burst, left by an acceleration: below it none is designed for
@@ -61,7 +171,7 @@ def parameters(one: Any) -> int:
 def theta_spreads(burst: Burst, size: int, spreads: tuple[float, float]) -> np.ndarray:
     """Standard deviations (size,) of θ at the burst's beginning, of a forecast of velocity and acceleration."""
     velocity, acceleration = spreads
-    at_start = math.hypot(velocity, acceleration * world.centre(burst) * burst.duration_s)
+    at_start = math.hypot(velocity, acceleration * centre(burst) * burst.duration_s)
     return np.array([UNKNOWN_RAD, *(2.0 / burst.wavelength_m * np.array([at_start, acceleration]))])[:size]
 
 
@@ -179,7 +289,7 @@ def _arrays(spec: Any, bursts: list[Burst], menus: tuple[Menu | None, ...], tabl
                 continue
             known[burst] = k
             if one.takes:
-                sigma[f, k] = world.bounds(burst, parameters(one))
+                sigma[f, k] = bounds(burst, parameters(one))
                 free[f, k] = gathered.add(_records(burst, one, (spec.pulses,), None, tables)[0])
             for entry, windows_ in enumerate(own.windows if own else ()):
                 made, options[f] = _records(burst, one, windows_, own.spreads(entry) if own else None, tables)
@@ -240,3 +350,84 @@ def _filter(spec: Any, one: Any, own: Menu | None) -> np.void:
         made["top"], made["levels"], made["ratio"] = own.top, own.levels, np.log(RATIOS)
         made["fixed"] = own.top if one.forecast != "track" else 0.0
     return made
+
+
+# ---- exact -----------------------------------------------------------------------------------------------------------
+def known(one: Any) -> bool:
+    """Whether a filter's errors are Gaussian, and known: its estimates always lock, or there are none."""
+    return one.takes == 0 or one.estimator == "fisher_bound"
+
+
+def errors(spec: Any, one: Any, sigma: np.ndarray, missed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and covariance (K, 3), (K, 3, 3) of the errors of a filter whose estimates always lock.
+
+    sigma (K, 2) of velocity and acceleration; missed (K, 3) what the model misses, see `world.defects`. The filter's
+    covariance P gives the gains; that of the errors, S, has no manoeuvre noise.
+    """
+    F, S, mean = constant_acceleration(spec.radar.scan_period_s), designation(spec), (0.0, 0.0, 0.0)
+    means, covariances = np.zeros((len(missed), 3)), np.zeros((len(missed), 6))
+    for k, taken in enumerate(gains(spec, one, sigma)):
+        if k > 0:
+            S = predicted_covariance(S, F, NO_NOISE)
+            mean = add_scaled(predicted(mean, F), 1.0, missed[k])
+        for c, gain, variance in taken:
+            S, mean = CORRECT[c](S, variance, gain), add_scaled(mean, -mean[c], gain)
+        means[k], covariances[k] = mean, S
+    return means, unpack(covariances.T)
+
+
+def designation(spec: Any) -> tuple[float, ...]:
+    """The packed covariance after the first range, and what was known of velocity and acceleration before."""
+    variances = spec.radar.sigma_range_m**2, spec.prior.sigma_velocity_mps**2, spec.prior.sigma_acceleration_mps2**2
+    return variances[0], 0.0, 0.0, variances[1], 0.0, variances[2]
+
+
+def gains(spec: Any, one: Any, sigma: np.ndarray) -> Iterator[list[tuple[int, Any, float]]]:
+    """By scan what a filter takes as measured: number of the component, gain (3,), variance. sigma as in `errors`."""
+    dt = spec.radar.scan_period_s
+    F, Q = constant_acceleration(dt), pack(process_noise(one.process_noise, one.manoeuvre_variance, dt))
+    P = designation(spec)
+    for k in range(len(sigma)):
+        if k > 0:
+            P = predicted_covariance(P, F, Q if k >= start_scans(one) else NO_NOISE)
+        taken = []
+        for c in range(0 if k else 1, one.takes + 1):
+            variance = float(spec.radar.sigma_range_m**2 if c == 0 else sigma[k, c - 1] ** 2)
+            P, gain, _ = TAKE[c](P, variance, 1.0)
+            taken.append((c, gain, variance))
+        yield taken
+
+
+def of_losses(spec: Any, one: Any, sigma: np.ndarray) -> np.ndarray:
+    """What lost bursts add to the mean squares (K, 3) of a filter's errors, over the probability that one is lost.
+
+    It is the mean square of the answer to a burst, summed over those up to a scan. A lost estimate is uniform over the
+    span (the acceleration over what sweeps the rate), and taken as measured; one that the next forecast rests on
+    confirms itself from scan to scan. A gate, a mixture or hypotheses answer less.
+    """
+    F, scans = constant_acceleration(spec.radar.scan_period_s), len(sigma)
+    size = np.array([spec.span_mps, spec.span_mps / spec.burst_s]) / math.sqrt(12.0)
+    answers, found = np.zeros((3, scans, 2)), np.zeros((scans, 3))  # of the bursts so far to errors of one
+    for k, taken in enumerate(gains(spec, one, sigma)):
+        answers = np.array(predicted(answers, F))
+        begun = np.arange(scans) <= k if one.forecast == "track" else np.arange(scans) == k
+        for c, gain, _ in taken:
+            answers = np.array(add_scaled(answers, -answers[c], gain))
+            if c:
+                answers[:, begun, c - 1] += np.array(gain)[:, None]
+        found[k] = np.einsum("xjc,c->x", answers**2, size**2)
+    return found
+
+
+def most_lost(bursts: Sequence[Burst], one: Any) -> float:
+    """A bound on the probability that a burst is lost: of a spectrum by its energy, one where none is known.
+
+    A line of noise is higher than the signal's with a probability of exp(−E/2)/2, E the energy over the noise's density
+    (Rife & Boorstyn 1974), for two lines that are orthogonal. Of lines at half their distance the signal's is down to
+    sinc²(1/4) at worst, and a side lobe of it, 0.217 of its height, helps the other one.
+    """
+    if one.estimator != "spectrum":
+        return 1.0
+    least = min(energy_ratio(burst, burst.duration_s) for burst in dict.fromkeys(bursts))
+    energy = np.sinc(0.25) ** 2 * (1.0 - 0.217) * least
+    return float(min(1.0, bursts[0].pulses * math.exp(-0.5 * energy)))

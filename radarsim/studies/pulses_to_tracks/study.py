@@ -6,19 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from radarsim.bursts.burst import Burst
-from radarsim.bursts.fisher import energy_ratio
+from radarsim.bursts.burst import Burst, NoSchedule
+from radarsim.bursts.estimators import energy_ratio
 from radarsim.bursts.kernels.scoring import SIZE
-from radarsim.bursts.schedule import NoSchedule
 from radarsim.config.experiment import Case
-from radarsim.engine.moments import Layout
+from radarsim.engine.results import Layout
 from radarsim.errors import ConfigError
 from radarsim.kernels.linear import plain
-from radarsim.physics.motion import transition
+from radarsim.physics import transition
 from radarsim.studies.noise import noise_key
-from radarsim.studies.pulses_to_tracks import exact, filters, world
-from radarsim.studies.pulses_to_tracks.axes import PulsesAxes
-from radarsim.studies.pulses_to_tracks.filters import Menu
+from radarsim.studies.pulses_to_tracks import filters
+from radarsim.studies.pulses_to_tracks.filters import Menu, PulsesAxes
 from radarsim.studies.pulses_to_tracks.kernels import chain, records
 
 COMPONENTS = (("r", "m"), ("Vr", "m/s"), ("ar", "m/s2"))
@@ -44,13 +42,13 @@ def prepare(case: Case) -> Plan:
     """The bursts of a case, the windows of its estimators, and the exact values of its idealisations."""
     spec = case.spec
     t = np.arange(spec.scans) * spec.radar.scan_period_s
-    truth = world.truth(spec.target, t, case.name)
-    bursts = world.bursts(spec, truth)
+    truth = filters.truth(spec.target, t, case.name)
+    bursts = filters.bursts(spec, truth)
     try:
         made = filters.designed(spec, bursts)
     except NoSchedule as error:
         raise ConfigError(f"{case.name}: filters: no windows lead from the forecast to the burst: {error}") from None
-    missed = world.defects(truth, spec.radar.scan_period_s)
+    missed = filters.defects(truth, spec.radar.scan_period_s)
     return Plan(
         layout=Layout(**records.shapes(len(spec.filters), spec.scans)),
         axes=axes(spec, t, bursts, made.arrays, missed),
@@ -74,7 +72,7 @@ def observed(
     doppler = 2.0 * truth[:, 1] / burst.wavelength_m * burst.pulse_period_s * lines
     middle = np.zeros((2, SIZE))
     for c in range(2):
-        row = world.at_centre(burst, SIZE, c + 1)
+        row = filters.at_centre(burst, SIZE, c + 1)
         middle[c] = row * [math.factorial(j) / burst.duration_s**j for j in range(SIZE)]
     return records.World(
         keys=plain([noise_key(case, what) for what in STREAMS], 4, 2, dtype=np.uint64),
@@ -103,7 +101,7 @@ def spectra(spec: Any) -> bool:
 
 def to_turns(burst: Burst) -> np.ndarray:
     """Matrix (2, 2) from velocity and acceleration at the middle to b₁ and b₂ in turns over the burst."""
-    T, middle = burst.duration_s, world.centre(burst) * burst.duration_s
+    T, middle = burst.duration_s, filters.centre(burst) * burst.duration_s
     return 2.0 / burst.wavelength_m * np.array([[T, -middle * T], [0.0, 0.5 * T**2]])
 
 
@@ -127,13 +125,13 @@ def axes(spec: Any, t: np.ndarray, bursts: list[Burst], made: records.Filters, m
     sigma, bias, bound = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape[:2], 2), np.nan)
     losses, most_lost = np.zeros(shape), np.zeros(len(spec.filters))
     for f, one in enumerate(spec.filters):
-        if not exact.known(one):
-            losses[f] = exact.of_losses(spec, one, made.sigma[f])
-            most_lost[f] = exact.most_lost(bursts, one)
+        if not filters.known(one):
+            losses[f] = filters.of_losses(spec, one, made.sigma[f])
+            most_lost[f] = filters.most_lost(bursts, one)
         if one.takes:
             bound[f, :, : one.takes] = made.sigma[f, :, : one.takes]
-        if exact.known(one):
-            mean, covariance = exact.errors(spec, one, made.sigma[f], missed)
+        if filters.known(one):
+            mean, covariance = filters.errors(spec, one, made.sigma[f], missed)
             sigma[f], bias[f] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2) + mean**2), mean
     return PulsesAxes(
         filters=tuple(one.name for one in spec.filters),

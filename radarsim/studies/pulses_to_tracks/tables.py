@@ -9,7 +9,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import panels, statistics
 from radarsim.report import tables as common
 from radarsim.report.notes import EFFECTIVE, HEAVY
-from radarsim.studies.pulses_to_tracks.axes import PulsesAxes
+from radarsim.studies.pulses_to_tracks.filters import PulsesAxes
 from radarsim.studies.pulses_to_tracks.kernels import records as rec
 
 if TYPE_CHECKING:

@@ -3,12 +3,12 @@
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.engine.moments import Layout
+from radarsim.engine.results import Layout
 from radarsim.kernels import linear
 from radarsim.studies.noise import noise_key
-from radarsim.studies.range_doppler import world
-from radarsim.studies.range_doppler.design import Designed
+from radarsim.studies.range_doppler import filters
 from radarsim.studies.range_doppler.kernels import missed
+from radarsim.studies.range_doppler.tuning import Designed
 
 Problem = linear.Problem | missed.Problem
 
@@ -49,8 +49,8 @@ def own_gains(case: Case, made: Designed, baseline: int) -> missed.Problem:
         sigma=made.plots.sigma,
         bias=made.plots.bias,
         sigma_bias=made.plots.sigma_bias,
-        sigma_flight=world.sigma_flight(made.spec.target),
-        flight=world.flight(made.spec.target, made.t),
+        sigma_flight=filters.sigma_flight(made.spec.target),
+        flight=filters.flight(made.spec.target, made.t),
         detection=made.plots.detection,
         dt=made.dt,
         observes=made.observes,

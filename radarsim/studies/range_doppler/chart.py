@@ -11,12 +11,11 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.language import listed, numeral, term, tr
-from radarsim.report import html, panels
-from radarsim.report import tables as common
+from radarsim.report import html, panels, tables
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Chart, Figure, Line, Mark, Note, Panel, Reference, Style
-from radarsim.report.text import in_a_row, significant_digits
-from radarsim.studies.range_doppler import closed_form, exact, filters, steady
-from radarsim.studies.range_doppler.propagation import Plots
+from radarsim.report.tables import in_a_row, significant_digits
+from radarsim.studies.range_doppler import filters
+from radarsim.studies.range_doppler.filters import Plots
 from radarsim.studies.range_doppler.study import COMPONENTS, RangeDopplerAxes, prepare
 
 if TYPE_CHECKING:
@@ -43,7 +42,7 @@ class Place:
     inputs: tuple[float, float, float, float]
     tau_1_s: float
     tau_2_s: float
-    of: closed_form.Groups
+    of: filters.Groups
     exact: np.ndarray
     limit: np.ndarray
     t_s: np.ndarray
@@ -80,18 +79,18 @@ def placed(case: Case) -> Place | None:
     variance = float(axes.manoeuvre_variance[own])
     sigma_r, sigma_V = map(float, axes.sigma)
     inputs = (sigma_r, sigma_V, axes.scan_period_s, variance)
-    tau_1, tau_2 = sigma_r / sigma_V, closed_form.filter_memory(sigma_r, variance)
-    of = closed_form.groups(*inputs)
+    tau_1, tau_2 = sigma_r / sigma_V, filters.filter_memory(sigma_r, variance)
+    of = filters.groups(*inputs)
     both = np.flatnonzero((axes.available[base] & axes.available[own]).all(axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = axes.exact_sigma[own, both] / axes.exact_sigma[base, both]
     gain = axes.exact_gains[own, both] if base == axes.baseline else 100 * (1 - ratio)
     errors = [
-        exact.steady_state(observes, float(axes.manoeuvre_variance[f]), axes.sigma, axes.scan_period_s)[1]
+        filters.steady_state(observes, float(axes.manoeuvre_variance[f]), axes.sigma, axes.scan_period_s)[1]
         for observes, f in ((1, base), (2, own))
     ]
     exactly = 100 * (1 - np.sqrt(np.diag(errors[1]) / np.diag(errors[0])))
-    limit = closed_form.steady_gains(of.c)
+    limit = filters.steady_gains(of.c)
     return Place(case.name, inputs, tau_1, tau_2, of, exactly, limit, axes.t_s[both], gain)
 
 
@@ -127,7 +126,7 @@ def sentence(place: Place) -> str:
 
 def beyond(place: Place) -> str:
     """That the closed form is not promised where a radar lies, as a further sentence; nothing where it is."""
-    if place.of.c <= closed_form.LARGEST:
+    if place.of.c <= filters.LARGEST:
         return ""
     off = float(np.abs(place.exact - corrected(place)).max())
     away = tr("here it is {away} points off", away=significant_digits(off, ".2g"))
@@ -140,7 +139,7 @@ def beyond(place: Place) -> str:
 
 def corrected(place: Place) -> np.ndarray:
     """The closed form's steady gains (3,) with the first order of the period."""
-    return closed_form.steady_gains(place.of.c, place.inputs[2] / place.tau_2_s)
+    return filters.steady_gains(place.of.c, place.inputs[2] / place.tau_2_s)
 
 
 def aside(case: Case) -> str:
@@ -163,8 +162,8 @@ def table(places: Sequence[Place]) -> "pd.DataFrame":
     }
     columns |= {"tau_1_s": np.repeat([p.tau_1_s for p in places], count)}
     columns |= {"tau_2_s": np.repeat([p.tau_2_s for p in places], count)}
-    columns |= dict(zip(closed_form.Groups._fields, np.repeat([p.of for p in places], count, axis=0).T, strict=True))
-    return common.frame(
+    columns |= dict(zip(filters.Groups._fields, np.repeat([p.of for p in places], count, axis=0).T, strict=True))
+    return tables.frame(
         columns
         | {
             "steady_gain_percent": np.concatenate([p.exact for p in places]),
@@ -187,7 +186,7 @@ def limit_course(c: float) -> tuple[np.ndarray, np.ndarray]:
     errors = []
     for observes, start in ((1, 3), (2, 2)):
         design = filters.design(observes, start, tau_2**-6, sigma, dt, scans)
-        _, S = exact.error_recursion(design, Plots(sigma), x, dt)
+        _, S = filters.error_recursion(design, Plots(sigma), x, dt)
         errors.append(np.sqrt(np.diagonal(S, axis1=1, axis2=2)))
     t, gain = np.arange(3, scans) * dt, 100 * (1 - errors[1][3:] / errors[0][3:])
     shown = np.unique(np.searchsorted(t, np.geomspace(EARLIEST, t[-1], 120)).clip(0, len(t) - 1))
@@ -228,7 +227,7 @@ def in_the_long_run(own: Sequence[Place], known: Sequence[Place]) -> Figure:
     """Steady gains against c: the closed form as lines, radars as markers at their exact gains."""
     c = np.geomspace(0.03, 300.0, 200)
     marks: list[Mark] = [Reference(0.0)]
-    for i, (name, gain) in enumerate(zip(NAMES, closed_form.steady_gains(c), strict=True)):
+    for i, (name, gain) in enumerate(zip(NAMES, filters.steady_gains(c), strict=True)):
         marks.append(Line(c, gain, tr(name), Style(i + 1, i)))
     places = [*own, *known]
     for n, one in enumerate(places):
@@ -239,7 +238,7 @@ def in_the_long_run(own: Sequence[Place], known: Sequence[Place]) -> Figure:
     for group in _together(places):
         top = max(group, key=lambda one: one.exact.max())
         marks.append(Note(top.of.c, float(top.exact.max()), "\n".join(one.name for one in group), "nw"))
-    marks.append(Reference(closed_form.no_acceleration_gain(), "x", f"$c$ = {numeral('0.698')}"))
+    marks.append(Reference(filters.no_acceleration_gain(), "x", f"$c$ = {numeral('0.698')}"))
     caption = tr(
         "Left of c = 0.698 Doppler makes the acceleration of a target that does not manoeuvre worse; right of it "
         "everything gains, the more the larger c. Steady gain of the velocity against c = (τ₁/τ₂)². Lines: closed "
@@ -266,7 +265,7 @@ def _together(places: Sequence[Place]) -> list[list[Place]]:
 def map_gains() -> np.ndarray:
     """Exact steady gains (3, Λ, C_θ) over the map."""
     C_theta, Lambda = (part.ravel() for part in np.meshgrid(MAP_C_THETA, MAP_LAMBDA))
-    return steady.exact_gains(C_theta, Lambda).reshape(3, len(MAP_LAMBDA), len(MAP_C_THETA))
+    return filters.exact_gains(C_theta, Lambda).reshape(3, len(MAP_LAMBDA), len(MAP_C_THETA))
 
 
 def over_groups(own: Sequence[Place], known: Sequence[Place]) -> Figure:
@@ -325,7 +324,7 @@ def _last_crossing(x: np.ndarray, gain: np.ndarray, level: float) -> float:
 def _limit_of(component: int, level: float) -> float:
     """The c at which a steady gain in closed form rises through a level."""
     c = np.geomspace(1e-3, 1e7, 4001)
-    return float(np.exp(_last_crossing(np.log(c), closed_form.steady_gains(c)[component], level)))
+    return float(np.exp(_last_crossing(np.log(c), filters.steady_gains(c)[component], level)))
 
 
 # ---- the live page ---------------------------------------------------------------------------------------------------

@@ -5,44 +5,42 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from radarsim.config import radial
+from radarsim.config import fields
 from radarsim.config.fields import (
+    COEFFICIENTS,
+    HARDEST_MPS2,
+    MOST_SCANS,
+    AccelerationStart,
     Added,
     At,
     Baseline,
+    Coefficients,
     Design,
     Display,
+    Lasting,
     Members,
     Model,
     Name,
     NonNegative,
     Number,
+    Polynomial,
     Positive,
     Probability,
     Scenario,
+    Starting,
     Whole,
     at,
     cross_check,
     key,
     of_each,
-    readable,
-)
-from radarsim.config.radial import (
-    COEFFICIENTS,
-    HARDEST_MPS2,
-    MOST_SCANS,
-    AccelerationStart,
-    Coefficients,
-    Lasting,
-    Polynomial,
-    Starting,
     polynomial_reach_m,
+    readable,
 )
 
 PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
 
 
-class Radar(radial.Radar):
+class Radar(fields.Radar):
     """A surveillance radar: accuracies of one plot, the period of its scans, and what is wrong with its plots."""
 
     repetition_rate_hz: Positive = key(
@@ -114,15 +112,15 @@ class Flying(Model):
     )
 
 
-class Turn(Flying, radial.Turn):
+class Turn(Flying, fields.Turn):
     """Straight flight in a plane through the radar, a turn of constant load, straight flight again."""
 
 
-class FlyBy(Flying, radial.FlyBy):
+class FlyBy(Flying, fields.FlyBy):
     """Straight flight at a constant speed past the radar, at a distance."""
 
 
-class Recorded(Flying, radial.Recorded):
+class Recorded(Flying, fields.Recorded):
     """A flight recorded in a file, smoothed by a spline whose derivatives are the true velocity and acceleration."""
 
 
@@ -254,4 +252,4 @@ class Keys(Lasting):
     @cross_check
     def _within_reach(self) -> Iterator[At]:
         last = (self.plots - 1) * self.radar.scan_period_s
-        yield from radial.within_reach(self.target, self.radar, last)
+        yield from fields.within_reach(self.target, self.radar, last)

@@ -7,9 +7,8 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import term, tr
-from radarsim.report import panels, seen, text
-from radarsim.report import tables as common
-from radarsim.report.chart_text import spoken
+from radarsim.report import panels, seen, tables
+from radarsim.report.chart import spoken
 from radarsim.report.drawing import GREY, Axis, Figure, Line, Note, Panel, Reference, Style
 from radarsim.studies.range_doppler.tables import PERIODS, Result
 
@@ -44,7 +43,7 @@ SEEN = {"consistency": seen.extremes}
 
 def consistency_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: str) -> Figure:
     """NEES per component against time: a panel for each radar or swept value, else for each filter."""
-    rows = common.groups(table, "case", "filter")
+    rows = tables.groups(table, "case", "filter")
     if any(result.swept for result in results):
         nees = {(*key, "nees"): own for key, own in rows.items()}
         every = panels.by_panel(results)
@@ -112,7 +111,7 @@ def _best_settled(drawn: Sequence[Panel]) -> str:
     name = ", ".join(filter(None, (panel.title, star.name)))
     return tr(
         "Least steady σ within {periods} scan periods: {sigma} m ({name}). ",
-        **{"periods": PERIODS, "sigma": text.number(float(star.y[0]), 3), "name": spoken(name)},
+        **{"periods": PERIODS, "sigma": tables.number(float(star.y[0]), 3), "name": spoken(name)},
     )
 
 

@@ -11,11 +11,11 @@ from typing import Any, Literal
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.physics import manoeuvre_covariance, transition
 from radarsim.report import claims
 from radarsim.report.claims import Series, certain, common_times, minus, ratio
 from radarsim.report.statistics import Estimate, difference
-from radarsim.studies.range_doppler import exact, tables
+from radarsim.studies.range_doppler import filters, tables
 
 RADARS = {1: (25, 5, 10), 2: (250, 15, 10), 3: (250, 15, 5), 4: (50, 1, 10), 5: (50, 1, 5)}  # σ_r, σ_V, Δt
 VARIANCE = 1e-3  # the paper's D_M, (m/s³)²
@@ -79,7 +79,7 @@ class Evidence(claims.Evidence):
         axes, c = self.case(key).axes, list(COMPONENTS).index(component)
         f = axes.filters.index(self.filter(key, observes))
         variance = float(axes.manoeuvre_variance[f])
-        _, steady = exact.steady_state(int(axes.observes[f]), variance, axes.sigma, axes.scan_period_s)
+        _, steady = filters.steady_state(int(axes.observes[f]), variance, axes.sigma, axes.scan_period_s)
         when = tables.settling(Estimate(sigma.value, sigma.lo, sigma.hi), sigma.t, float(np.sqrt(steady[c, c])))
         return Estimate(*(part / axes.scan_period_s for part in when))
 

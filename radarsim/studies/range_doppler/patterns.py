@@ -10,6 +10,9 @@ square of that fraction. How much it errs is seen by merging to a quarter as man
 by at most 0.6 of the change, against all 524 288 patterns of 19 scans: measured, not proved. What follows from
 predictions and updates never moving two covariances apart by a greater factor is a bound of first order in the
 fraction, not of second.
+
+Exact means of filters that miss plots, over the patterns of plots. Imported where plots are missed: it loads the
+compiler.
 """
 
 import math
@@ -19,10 +22,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.studies.range_doppler.kernels import merging
-from radarsim.studies.range_doppler.kernels import patterns as kernels
-from radarsim.studies.range_doppler.propagation import Plots, defects
+from radarsim.studies.range_doppler.filters import Plots, defects
+from radarsim.studies.range_doppler.kernels import patterns
+from radarsim.studies.range_doppler.tuning import Designed
 
+# ---- patterns --------------------------------------------------------------------------------------------------------
 KEPT = (512, 2048, 8192, 32768)  # patterns side by side, each compared with the one before
 WHOLE = 1 << 21  # patterns that are never merged: 21 scans, a twentieth of a second
 AT_ONCE = 1 << 15  # of these side by side; more are followed to the end piece by piece
@@ -60,8 +64,8 @@ class Mixture:
     def of(cls, found: np.ndarray) -> "Mixture":
         """Of the sums that `kernels.add_means` has found."""
         started, nees, bias, moment, believed = found[:, 0], found[:, 1], found[:, 2:5], found[:, 5:8], found[:, 8:11]
-        available = started[:, None] + found[:, kernels.FIRST : kernels.OWN]
-        both = found[:, kernels.OWN :].reshape(len(found), -1, 2, 3).swapaxes(0, 1)
+        available = started[:, None] + found[:, patterns.FIRST : patterns.OWN]
+        both = found[:, patterns.OWN :].reshape(len(found), -1, 2, 3).swapaxes(0, 1)
         with np.errstate(invalid="ignore", divide="ignore"):
             bias, moment, believed = (part / available for part in (bias, moment, believed))
             return cls(started, available, bias, moment, believed, nees / started, both[:, :, 1] / both[:, :, 0])
@@ -86,7 +90,7 @@ def mixture(
     defect = defects(truth, dt, plots, drawn)
     scans, _, columns = defect.shape
     others = [(one.observes, one.start) for one in beside]
-    world = kernels.World(
+    world = patterns.World(
         defect=np.ascontiguousarray(defect),
         Q=np.array(design.Q),
         R=plots.sigma**2,
@@ -103,17 +107,17 @@ def mixture(
         from_k=from_k,
     )
     waiting = most_waiting(design.start, scans, plots.detection)
-    sums = scans, kernels.OWN + kernels.BESIDE * len(others)
+    sums = scans, patterns.OWN + patterns.BESIDE * len(others)
     if waiting > MOST_WAITING:
         return Mixture.of(np.full(sums, np.nan))
     found = np.zeros(sums)
-    kernels.add_means(merging.room(min(most, 1 << min(scans, 30)), columns, waiting, scans), world, found)
+    patterns.add_means(patterns.room(min(most, 1 << min(scans, 30)), columns, waiting, scans), world, found)
     return Mixture.of(found)
 
 
 def most_waiting(start: int, scans: int, detection: float) -> int:
     """How many patterns that are not negligible can be without the plots of a start, at any of so many scans."""
-    misses = math.ceil(math.log(kernels.NEGLIGIBLE) / math.log1p(-detection)) if detection < 1 else 0
+    misses = math.ceil(math.log(patterns.NEGLIGIBLE_PROBABILITY) / math.log1p(-detection)) if detection < 1 else 0
     return sum(math.comb(min(scans, start + misses), count) for count in range(start))
 
 
@@ -133,3 +137,60 @@ def close(fine: np.ndarray, coarse: np.ndarray) -> np.ndarray:
     """Where means of e² (any shape) are known: merging to a quarter as many patterns changes σ by less than CLOSE."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.abs(np.sqrt(coarse / fine) - 1) < CLOSE
+
+
+# ---- means -----------------------------------------------------------------------------------------------------------
+PATTERN_SCANS = 60  # of a run with missed plots: beyond, the mean over patterns takes minutes
+
+
+def designs(made: Designed) -> list[Design]:
+    """The filters of a case."""
+    return [Design(d.observes, d.start, d.noise) for d in made.filters]
+
+
+@dataclass(frozen=True)
+class Means:
+    """As `patterns.Mixture`, where known: sigma and bias (K, 3), nees (K,), sigma beside G others (G, K, 3)."""
+
+    sigma: np.ndarray
+    bias: np.ndarray
+    nees: np.ndarray
+    beside: np.ndarray
+
+
+FOUND: dict[tuple, Means] = {}  # of the last filters and worlds: a filter of the range is the same at any σ_V
+MOST_MEANS = 128
+
+
+def means(design: Design, beside: Sequence[Design], made: Designed) -> Means:
+    """The means of one filter over the patterns; those of the last that were asked for are kept."""
+    seen = [part[: design.observes] for part in made.plots[:3]]
+    arrays = (*seen, made.x, made.drawn)
+    others = tuple((one.observes, one.start) for one in beside)
+    asked = made.dt, made.asked_from_k, made.roughly, made.plots.detection
+    key = (design, others, *asked, *(array.tobytes() for array in arrays))
+    found = FOUND.pop(key) if key in FOUND else over_patterns(design, beside, made)
+    if len(FOUND) >= MOST_MEANS:
+        del FOUND[next(iter(FOUND))]
+    FOUND[key] = found
+    return found
+
+
+def over_patterns(design: Design, beside: Sequence[Design], made: Designed) -> Means:
+    """The means of one filter over the patterns, of which as many are kept as it takes."""
+
+    def kept(most: int, whole: bool = False) -> Mixture:
+        return mixture(design, made.plots, made.x, made.dt, most, beside, made.drawn, made.asked_from_k, whole)
+
+    if made.roughly or 2 ** len(made.t) <= WHOLE:
+        one = kept(KEPT[0]) if made.roughly else kept(AT_ONCE, whole=True)
+        return Means(np.sqrt(one.moment), one.bias, one.nees, np.sqrt(one.beside))
+    mixtures = map(kept, KEPT)
+    coarse, fine = next(mixtures), next(mixtures)
+    while not settled(fine, coarse, made.asked_from_k) and (finer := next(mixtures, None)) is not None:
+        coarse, fine = fine, finer
+    known = close(fine.moment, coarse.moment)
+    whole_state = close(fine.nees, coarse.nees) & known.all(axis=1)
+    others = np.where(close(fine.beside, coarse.beside), np.sqrt(fine.beside), np.nan)
+    sigma, bias = (np.where(known, values, np.nan) for values in (np.sqrt(fine.moment), fine.bias))
+    return Means(sigma, bias, np.where(whole_state, fine.nees, np.nan), others)

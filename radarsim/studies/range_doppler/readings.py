@@ -12,9 +12,7 @@ import numpy as np
 
 from radarsim.report.claims import Series, same
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
-from radarsim.report.claims.readings import PaperReadings, Reading, Seen
-from radarsim.report.claims.search import Search
-from radarsim.report.claims.written import choices_in, of_other_cases
+from radarsim.report.claims.over import PaperReadings, Reading, Search, Seen, choices_in, of_other_cases
 from radarsim.report.statistics import Estimate
 from radarsim.studies.range_doppler import measures, recursion
 from radarsim.studies.range_doppler.measures import RADARS

@@ -11,12 +11,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 
 from radarsim.kernels.algebra import CORRECT, NO_NOISE, TAKE, constant_acceleration, pack, predicted_covariance
-from radarsim.physics.motion import (
-    acceleration_step_covariance,
-    manoeuvre_covariance,
-    transition,
-    white_jerk_covariance,
-)
+from radarsim.physics import acceleration_step_covariance, manoeuvre_covariance, transition, white_jerk_covariance
 from radarsim.studies.range_doppler.filters import least_squares_start, observation
 
 Form = Literal["random_jerk", "white_jerk", "white_jerk_rate", "acceleration_step", "normalised"]

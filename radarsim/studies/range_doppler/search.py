@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.report.claims.search import Fine, Printed, Search
+from radarsim.report.claims.over import Fine, Printed, Search
 from radarsim.studies.range_doppler import recursion
 from radarsim.studies.range_doppler.measures import RADARS
 from radarsim.studies.range_doppler.recursion import FORMS, START_NAMES

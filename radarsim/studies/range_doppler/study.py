@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.engine.moments import Layout
-from radarsim.engine.results import Axes
-from radarsim.studies.range_doppler import exact, world
+from radarsim.engine.results import Axes, Layout
+from radarsim.studies.range_doppler import filters
 from radarsim.studies.range_doppler.config import Best, Keys
-from radarsim.studies.range_doppler.design import Designed, designed
+from radarsim.studies.range_doppler.tuning import Designed, designed
 
 if TYPE_CHECKING:
     from radarsim.studies.range_doppler.blocks import Problem
@@ -92,7 +91,7 @@ def prepare(case: Case) -> Plan:
 def shortened(case: Case, at_s: float | None, at_k: int | None) -> Case:
     """The case up to a time (s) or scan: what comes later changes no error there, but by a D_M that is looked for."""
     spec: Keys = case.spec
-    world.true_motion(case)
+    filters.true_motion(case)
     if any(isinstance(f.manoeuvre_variance, Best) for f in spec.filters):
         return case
     until = spec.plots
@@ -170,7 +169,7 @@ class Known:
 
 def exact_values(made: Designed, baseline: int) -> Known:
     """Of filters that get every plot."""
-    errors = [exact.error_recursion(d, made.plots, made.x, made.dt, made.drawn) for d in made.filters]
+    errors = [filters.error_recursion(d, made.plots, made.x, made.dt, made.drawn) for d in made.filters]
     lasting, covariance = np.stack([E for E, _ in errors]), np.stack([S for _, S in errors])
     bias, further = lasting[..., 0], lasting[..., 1:]
     covariance = covariance + np.einsum("fkic,fkjc->fkij", further, further)
@@ -182,7 +181,7 @@ def exact_values(made: Designed, baseline: int) -> Known:
 
 def nees_of(believed: np.ndarray, bias: np.ndarray, moment: np.ndarray, available: np.ndarray) -> np.ndarray:
     """The expectation (F, K) of eᵀP⁻¹e per estimated component."""
-    return exact.normalised_error(believed, bias, moment, available)[0]
+    return filters.normalised_error(believed, bias, moment, available)[0]
 
 
 def gains(sigma: np.ndarray, base: np.ndarray) -> np.ndarray:
@@ -196,7 +195,7 @@ def exact_means(made: Designed, baseline: int) -> Known:
     shape = (len(made.filters), len(made.t), 3)
     sigma, bias, gain = (np.full(shape, np.nan) for _ in range(3))
     nees = np.full(shape[:2], np.nan)
-    from radarsim.studies.range_doppler import means
+    from radarsim.studies.range_doppler import patterns as means
 
     if len(made.t) <= means.PATTERN_SCANS:
         own = means.designs(made)

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import consistency, panels, statistics
+from radarsim.report import notes, panels, statistics
 from radarsim.report import tables as common
-from radarsim.studies.range_doppler import exact
+from radarsim.studies.range_doppler import filters
 from radarsim.studies.range_doppler.study import RangeDopplerAxes
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def _steady(result: Result) -> list[tuple]:
     t, period, rows = np.asarray(axes.t_s, dtype=float), axes.scan_period_s, []
     for f, name in enumerate(axes.filters):
         variance = float(axes.manoeuvre_variance[f])
-        _, true = exact.steady_state(int(axes.observes[f]), variance, axes.sigma, period, axes.process_noise[f])
+        _, true = filters.steady_state(int(axes.observes[f]), variance, axes.sigma, period, axes.process_noise[f])
         for c, (component, unit) in enumerate(axes.components):
             at = np.flatnonzero(axes.available[f, :, c])
             if not at.size:
@@ -133,7 +133,7 @@ def _believed(result: Result) -> common.Columns:
     if own_gains(result):
         with np.errstate(invalid="ignore"):
             variance = np.asarray(result.sums["believed"]) / np.asarray(result.sums["estimates"])
-    return consistency.believed(result, np.sqrt(variance))
+    return notes.believed(result, np.sqrt(variance))
 
 
 @table("consistency")
@@ -156,11 +156,7 @@ def _normalised_errors(result: Result) -> common.Columns:
     looks = there.sum(axis=1)[f]
     bounds = statistics.normalised_bounds(size[at] * n[at], looks)
     mean = statistics.Estimate(*(part[at] for part in mean))
-    return {
-        **common.leading(result, f, k),
-        "n": n[at],
-        **consistency.normalised("nees", mean, bounds, axes.exact_nees[at]),
-    }
+    return {**common.leading(result, f, k), "n": n[at], **notes.normalised("nees", mean, bounds, axes.exact_nees[at])}
 
 
 def nees(result: Result) -> statistics.Estimate:
@@ -178,7 +174,7 @@ def nees(result: Result) -> statistics.Estimate:
         second[..., i, j] = second[..., j, i] = crossed / n
     for i in range(3):
         second[..., i, i] = error[..., i, 1] / n
-    mean, variance = exact.normalised_error(P, first, second, axes.available)
+    mean, variance = filters.normalised_error(P, first, second, axes.available)
     interval = statistics.mean_square(n * mean, n * (variance + mean**2), n)
     return statistics.Estimate(mean, interval.lo, interval.hi)
 

@@ -11,15 +11,14 @@ from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
 from radarsim.kernels import linear
 from radarsim.kernels.algebra import pack, unpack
-from radarsim.kernels.innovations import lasting, log_likelihood
-from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
-from radarsim.physics.motion import transition
+from radarsim.kernels.hypotheses import lasting, log_likelihood
+from radarsim.physics import STANDARD_GRAVITY_MPS2, transition
 from radarsim.studies.interface import EXPLANATIONS, RecordedPlots, Turning, true_column
 from radarsim.studies.range_doppler.config import Filter, Keys, Turn
-from radarsim.studies.range_doppler.design import designed
 from radarsim.studies.range_doppler.filters import least_squares, noise_by_time, observation
 from radarsim.studies.range_doppler.kernels import missed, rows
 from radarsim.studies.range_doppler.study import COMPONENTS, prepare
+from radarsim.studies.range_doppler.tuning import designed
 
 STARTING = 3  # ranges of a track from which its state is found, in the likelihood
 LEAST_MANOEUVRE = 1e-6  # of the stated manoeuvre variance, which counts as none

@@ -3,19 +3,25 @@
 Many variances run through the exact recursion side by side. D_M is looked for in units of σ_r²/Δt⁶, from a memory far
 longer than the run to none at all, first ten to a decade, then ever closer about the best; it is given to four digits,
 which lie within the flat bottom of the curve and are the same on every machine.
+
+The filters of a case, designed, and what they see; NumPy alone.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.config.experiment import Case
+from radarsim.errors import ConfigError
 from radarsim.kernels.algebra import pack
-from radarsim.physics.motion import process_noise
-from radarsim.studies.range_doppler.config import Best, Filter
-from radarsim.studies.range_doppler.filters import least_squares_start
-from radarsim.studies.range_doppler.propagation import Plots, defects, scans, started
+from radarsim.physics import process_noise
+from radarsim.studies.range_doppler import filters
+from radarsim.studies.range_doppler.config import Best, Filter, Keys
+from radarsim.studies.range_doppler.filters import Plots, defects, least_squares_start, scans, started
 
+# ---- tuning ----------------------------------------------------------------------------------------------------------
 LEAST, MOST = 1e-12, 1e8  # D_M Δt⁶/σ_r²; the least is lowered for long runs
 TO_VELOCITY = 1e12  # most of D_M Δt⁴/σ_V², as the config's check has it
 A_DECADE, CLOSER, POINTS = 10, 3, 21
@@ -115,3 +121,67 @@ def side_by_side(observes: int, start: int, Q: np.ndarray, seen: Seen) -> np.nda
     for k, errors in enumerate(scans(first, observes, plots, packed, defect[start:], seen.dt), start):
         sigma[:, k] = np.sqrt(errors.second_moments().T)
     return sigma
+
+
+# ---- design ----------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class Designed:
+    """A case's filters and what they see: truth x (K, 3) at times t (K,), plots, D_M (F,), gains of full detection.
+
+    drawn (K, 3, 1 + C): how the truth of realisations leaves the model beyond x, as `world.drawn_defects` has it.
+    asked_from_k, roughly: as of the case.
+    """
+
+    spec: Keys
+    t: np.ndarray
+    x: np.ndarray
+    drawn: np.ndarray
+    plots: Plots
+    variances: tuple[float, ...]
+    filters: tuple[filters.LinearFilter, ...]
+    asked_from_k: int = 0
+    roughly: bool = False
+
+    @property
+    def dt(self) -> float:
+        """Scan period, s."""
+        return self.spec.radar.scan_period_s
+
+    @property
+    def plain(self) -> bool:
+        """Whether this is the paper's world: every scan has its plot, which errs by noise alone, of one truth."""
+        return self.spec.radar.as_the_papers and not filters.is_drawn(self.spec.target)
+
+    @property
+    def observes(self) -> np.ndarray:
+        """What each filter (F,) observes: 1 the range, 2 the velocity too."""
+        return np.array([d.observes for d in self.filters])
+
+
+def designed(case: Case) -> Designed:
+    """The filters of a case, designed; raises ConfigError for a target that cannot be."""
+    spec: Keys = case.spec
+    dt = spec.radar.scan_period_s
+    t, x = filters.true_motion(case)
+    drawn = filters.drawn_defects(spec.target, t, x)
+    plots = plots_of(spec)._replace(of_truth=drawn.shape[2] - 1)
+    try:
+        variances = manoeuvre_variances(spec.filters, Seen(plots, x, dt, drawn))
+    except ValueError as error:
+        raise ConfigError(f"{case.name}: filters: manoeuvre_variance: {error}") from None
+    made = (
+        filters.design(len(f.observes), f.plots_to_start, variance, plots.sigma, dt, len(t), f.process_noise)
+        for f, variance in zip(spec.filters, variances, strict=True)
+    )
+    return Designed(spec, t, x, drawn, plots, variances, tuple(made), case.asked_from_k, case.roughly)
+
+
+def plots_of(spec: Keys) -> Plots:
+    """What the plots of a config's radar are."""
+    radar = spec.radar
+    return Plots(
+        np.array([radar.sigma_range_m, radar.sigma_velocity_mps]),
+        np.array([radar.bias_range_m, radar.bias_velocity_mps]),
+        np.array([radar.sigma_bias_range_m, radar.sigma_bias_velocity_mps]),
+        radar.detection_probability,
+    )

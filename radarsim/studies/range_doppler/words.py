@@ -7,8 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import listed, numeral, plural, term, tr
-from radarsim.report import panels, text
-from radarsim.report import tables as common
+from radarsim.report import panels, tables
 from radarsim.studies.range_doppler import tuning
 from radarsim.studies.range_doppler.config import Best
 from radarsim.studies.range_doppler.tables import PERIODS, Result, follows_the_model, span_mps
@@ -49,7 +48,7 @@ def _asks_for_variance(results: Sequence[Result]) -> bool:
 def _gain_sentences(results: Sequence[Result], made: Made) -> list[str]:
     plain = panels.unswept(results)
     rows = made["gains"][made["gains"]["case"].isin([result.name for result in plain])]
-    gains, every = common.groups(rows, "component"), common.groups(made["gains"], "component")
+    gains, every = tables.groups(rows, "component"), tables.groups(made["gains"], "component")
     labels = {result.name: panels.plain_label(result) for result in results}
     sentences = [
         _gain_sentence(plain, gains[(c,)], every[(c,)], of.name, labels)
@@ -72,7 +71,7 @@ def _compared(rows: "pd.DataFrame") -> _Moment:
     early, late = last["t_s"].min(), last["t_s"].max()
     if early == late:
         return _Moment(last, tr("at {t_s:g} s", t_s=early))
-    times = [set(np.round(own["t_s"], 6)) for own in common.groups(rows, "case", "filter").values()]
+    times = [set(np.round(own["t_s"], 6)) for own in tables.groups(rows, "case", "filter").values()]
     shared = set.intersection(*times) - {0.0}
     if not shared:
         return _Moment(last, tr("at the last scan (after {early:g} to {late:g} s)", early=early, late=late))
@@ -115,7 +114,7 @@ def _gain_sentence(
 
 def _decides(gains: "pd.DataFrame", end: str = "gain_percent") -> np.ndarray:
     """The gains (rows,), or an end of their intervals, by which one is called more than another: exact ones first."""
-    return common.exact_first(gains, end, "exact_percent")
+    return tables.exact_first(gains, end, "exact_percent")
 
 
 def _capital(word: str) -> str:
@@ -221,7 +220,7 @@ def _best_of_broken(results: Sequence[Result], made: Made) -> list[str]:
     """The D_M of those tried with which the worst error on a manoeuvring target is least, by radar and filter."""
     curves, sentences = made["curves"], []
     rows = curves[(curves["component"] == "r") & (curves["k"] >= FIRST)]
-    rows = rows.assign(error=common.exact_first(rows, "sigma", "exact_sigma"))
+    rows = rows.assign(error=tables.exact_first(rows, "sigma", "exact_sigma"))
     for name, members in _tried_on(results).items():
         own = rows[rows["case"].isin([member.name for member in members])]
         words = [_least_worst(own[own["filter"] == one], members, one) for one in members[0].axes.filters]
@@ -257,7 +256,7 @@ def _broken_sentences(results: Sequence[Result], made: Made) -> list[str]:
     """Where a target breaks the model: the worst σ of the range over the run, and the largest bias, of each filter."""
     compared = {member.name for members in _tried_on(results).values() for member in members}
     broken = [result for result in results if not follows_the_model(result) and result.name not in compared]
-    rows = common.groups(common.where(made["curves"], component="r"), "case", "filter")
+    rows = tables.groups(tables.where(made["curves"], component="r"), "case", "filter")
     sentences = []
     for result in broken[:MOST_TOLD]:
         words = [f"{name} {_worst(rows[result.name, name])}" for name in result.axes.filters]
@@ -349,11 +348,11 @@ def _ambiguity(results: Sequence[Result]) -> list[str]:
 
 def _worst(rows: "pd.DataFrame") -> str:
     worst, bias = (
-        rows.iloc[int(np.abs(common.exact_first(rows, name, f"exact_{name}")).argmax())] for name in ("sigma", "bias")
+        rows.iloc[int(np.abs(tables.exact_first(rows, name, f"exact_{name}")).argmax())] for name in ("sigma", "bias")
     )
     return tr(
         "worst σ of the range {sigma} at {t_s:g} s, largest bias {bias:.4g} m at {bias_t_s:g} s",
-        sigma=text.estimate((worst[key] for key in SIGMA), tr("m")),
+        sigma=tables.estimate((worst[key] for key in SIGMA), tr("m")),
         t_s=worst["t_s"],
         bias=bias["bias"],
         bias_t_s=bias["t_s"],
@@ -377,7 +376,7 @@ def _gain(row: "pd.Series[Any]") -> str:
     if row["gain_lo"] <= 0 <= row["gain_hi"]:
         return tr("neither lower nor higher for certain (gain {gain})", gain=_percent(value, lo, hi))
     if value < -MANIFOLD:
-        factor = text.estimate((1 - value / 100, 1 - hi / 100, 1 - lo / 100), form=".3g")
+        factor = tables.estimate((1 - value / 100, 1 - hi / 100, 1 - lo / 100), form=".3g")
         return tr("higher by a factor of {factor}", factor=factor)
     if value < 0:
         return tr("{percent} higher", percent=_percent(0.0 - value, 0.0 - hi, 0.0 - lo))
@@ -385,7 +384,7 @@ def _gain(row: "pd.Series[Any]") -> str:
 
 
 def _percent(value: float, low: float, high: float) -> str:
-    return text.estimate((value, low, high), "%", ".1f")
+    return tables.estimate((value, low, high), "%", ".1f")
 
 
 def _who(row: "pd.Series[Any]", labels: dict[str, str], several: bool) -> str:
@@ -394,12 +393,12 @@ def _who(row: "pd.Series[Any]", labels: dict[str, str], several: bool) -> str:
 
 def _sigma_sentence(result: Result, curves: "pd.DataFrame") -> str:
     """For experiments without a second filter: σ of the range at the end."""
-    rows = common.where(curves, case=result.name, component="r")
+    rows = tables.where(curves, case=result.name, component="r")
     row = rows.iloc[-1]
     return tr(
         "{case}, {filter}: σ of the range at {t_s:g} s is {sigma}.",
         case=panels.plain_label(result),
         filter=row["filter"],
         t_s=row["t_s"],
-        sigma=text.estimate((row[key] for key in SIGMA), tr("m")),
+        sigma=tables.estimate((row[key] for key in SIGMA), tr("m")),
     )

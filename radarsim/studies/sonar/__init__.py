@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import CaseResult
     from radarsim.report.claims import PaperClaims
-    from radarsim.report.claims.readings import PaperReadings
+    from radarsim.report.claims.over import PaperReadings
     from radarsim.report.drawing import Figure
     from radarsim.studies.sonar.clutter.study import Plan as ClutterPlan
     from radarsim.studies.sonar.schema import Sonar as AllKeys

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import term, tr
-from radarsim.report import panels, seen
-from radarsim.report import tables as common
+from radarsim.report import panels, seen, tables
 from radarsim.report.drawing import Figure, Line, Panel
-from radarsim.studies.sonar.axes import SonarAxes
+from radarsim.studies.sonar.world import SonarAxes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,7 +39,7 @@ def figures(
     results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]", experiment: Experiment
 ) -> dict[str, Figure]:
     """sigma_<component> of every component that some case has."""
-    curves = common.groups(made["curves"], "case", "filter", "component")
+    curves = tables.groups(made["curves"], "case", "filter", "component")
     drawn: dict[str, Figure | None] = {}
     for component in QUANTITIES:
         name = f"sigma_{component}"

@@ -57,7 +57,7 @@ class SonarPart:
 
     def claims(self) -> "Sequence[Claim]":
         """The paper's claims about it."""
-        from radarsim.report.claims.written import claims_of
+        from radarsim.report.claims.over import claims_of
 
         return claims_of(self.file) if self.claimed else ()
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from radarsim.studies.sonar import banks
-from radarsim.studies.sonar.detectors import detector_arrays
+from radarsim.studies.sonar import filters as banks
+from radarsim.studies.sonar.filters import detector_arrays
 from radarsim.studies.sonar.kernels import detector, patterns
-from radarsim.studies.sonar.kernels.imm import ROWS
+from radarsim.studies.sonar.kernels.detector import ROWS
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK
 from radarsim.studies.sonar.kernels.steps import ROW, remember
 

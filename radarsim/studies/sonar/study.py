@@ -13,17 +13,16 @@ from typing import Any
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.engine.moments import Layout
+from radarsim.engine.results import Layout
 from radarsim.studies.noise import noise_key
-from radarsim.studies.sonar import banks
-from radarsim.studies.sonar.axes import GivenPlotsAxes
+from radarsim.studies.sonar import filters
 from radarsim.studies.sonar.config import Keys
-from radarsim.studies.sonar.exact_values import exact_values
-from radarsim.studies.sonar.kernels import detector as detector_kernels
+from radarsim.studies.sonar.exact import exact_values
+from radarsim.studies.sonar.kernels import detector
 from radarsim.studies.sonar.kernels import patterns as pattern_kernels
 from radarsim.studies.sonar.kernels import shared_gains as kernels
 from radarsim.studies.sonar.scene import Scene, third_coordinate
-from radarsim.studies.sonar.world import conversion_bias, step_correlations
+from radarsim.studies.sonar.world import GivenPlotsAxes, conversion_bias, step_correlations
 
 BLOCK = 4096
 FRAMES = ("polar", "cartesian", "cartesian_unbiased")
@@ -59,13 +58,15 @@ def conversion(case: Case, scene: Scene) -> pattern_kernels.Conversion:
     )
 
 
-def designs(specs: Sequence[banks.FilterSpec], scene: Scene, detected: np.ndarray) -> list[list[banks.FilterDesign]]:
+def designs(
+    specs: Sequence[filters.FilterSpec], scene: Scene, detected: np.ndarray
+) -> list[list[filters.FilterDesign]]:
     """The designs of each filter in each coordinate, for patterns detected (M, K') of plots.
 
     A filter that responds to manoeuvres has none, because its gains depend on the plots.
     """
     return [
-        [banks.design_filter(spec, c, scene.plots(c, detected)) for c in range(len(scene.nominal))]
+        [filters.design_filter(spec, c, scene.plots(c, detected)) for c in range(len(scene.nominal))]
         if spec.response is None
         else []
         for spec in specs
@@ -114,7 +115,7 @@ def common_labels(
 def axes(
     spec: Keys,
     scene: Scene,
-    specs: Sequence[banks.FilterSpec],
+    specs: Sequence[filters.FilterSpec],
     values: Mapping[str, np.ndarray],
     known: np.ndarray | None = None,
 ) -> GivenPlotsAxes:
@@ -169,7 +170,7 @@ class RealisationPlan:
     detections: pattern_kernels.Detections
     conversion: pattern_kernels.Conversion
     bank: pattern_kernels.RealisationBank
-    detectors: detector_kernels.Detectors
+    detectors: detector.Detectors
     kept: np.ndarray
     block: int = BLOCK
     gaussian = False
@@ -182,7 +183,7 @@ class RealisationPlan:
         """The sums of one block as the kernels compute them."""
         F, K, C = self.bank.carry.shape
         D, G, T = self.detectors.threshold.shape
-        alarms = detector_kernels.Alarms(np.zeros((D, G, K)), np.zeros((D, G, T, K)), np.zeros((D, G, T, K)))
+        alarms = detector.Alarms(np.zeros((D, G, K)), np.zeros((D, G, T, K)), np.zeros((D, G, T, K)))
         estimates = np.zeros((len(self.kept), F, 2, 6, count))
         sums = pattern_kernels.BlockSums(empty_sums(F, K, C), alarms, np.zeros((F, K, C, 3)), self.kept, estimates)
         inputs = (self.world, self.detections, self.conversion, self.bank, self.detectors)
@@ -191,7 +192,7 @@ class RealisationPlan:
 
 
 def realisation_plan(
-    case: Case, scene: Scene, specs: Sequence[banks.FilterSpec], detectors: detector_kernels.Detectors
+    case: Case, scene: Scene, specs: Sequence[filters.FilterSpec], detectors: detector.Detectors
 ) -> RealisationPlan:
     """The plan of a case whose gains differ between realisations, with exact values by patterns of plots.
 
@@ -209,7 +210,7 @@ def realisation_plan(
         world=world(case, scene),
         detections=detections(case, scene),
         conversion=conversion(case, scene),
-        bank=banks.per_realisation_bank(specs, scene.t, scene.period, scene.nominal, detectors),
+        bank=filters.per_realisation_bank(specs, scene.t, scene.period, scene.nominal, detectors),
         detectors=detectors,
         kept=np.zeros(0, dtype=np.int64),
     )

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import consistency, statistics
+from radarsim.report import notes, statistics
 from radarsim.report import tables as common
 from radarsim.report.tables import Columns, leading
-from radarsim.studies.sonar import operations as counted
-from radarsim.studies.sonar.axes import SonarAxes
+from radarsim.studies.sonar import scene
+from radarsim.studies.sonar.world import SonarAxes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,7 +65,7 @@ def _extrapolation(result: CaseResult[SonarAxes]) -> Columns:
 def _believed(result: CaseResult[SonarAxes]) -> Columns:
     """The measured σ beside the σ that the filter believes, the root of its mean variance."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        return consistency.believed(result, np.sqrt(result.sums["believed"] / common.realisations(result)))
+        return notes.believed(result, np.sqrt(result.sums["believed"] / common.realisations(result)))
 
 
 @table("consistency")
@@ -81,16 +81,16 @@ def _normalised_errors(result: CaseResult[SonarAxes]) -> Columns:
     joint = result.sums["joint"][at]
     mean = statistics.mean_square(joint[:, 0] / size, joint[:, 1] / size**2, n)
     bounds = statistics.normalised_bounds(size * n, looks)
-    nees = consistency.normalised("nees", mean, bounds, result.axes.exact_nees[at] / size)
+    nees = notes.normalised("nees", mean, bounds, result.axes.exact_nees[at] / size)
     return {**columns, "n": n.astype(np.int64), **nees}
 
 
 def operations() -> "pd.DataFrame":
     """Operations of one scan in one coordinate, degree 1, by algorithm, and the numbers that each keeps."""
-    rows = [("recursion (12)-(14)", 2, counted.recursion())]
-    rows += [(f"least squares (2) on {n} plots", 2 * n, counted.batch_of(n)) for n in (2, 3, 5, 6, 10)]
-    rows += [("Kalman (11), degree 1", 2, counted.kalman_of(2)), ("differenced", 3, counted.differenced())]
-    rows += [("augmented", 3, counted.augmented())]
+    rows = [("recursion (12)-(14)", 2, scene.recursion())]
+    rows += [(f"least squares (2) on {n} plots", 2 * n, scene.batch_of(n)) for n in (2, 3, 5, 6, 10)]
+    rows += [("Kalman (11), degree 1", 2, scene.kalman_of(2)), ("differenced", 3, scene.differenced())]
+    rows += [("augmented", 3, scene.augmented())]
     names = ("algorithm", "numbers_kept", "products", "sums", "operations")
     columns = zip(*((name, kept, of.products, of.sums, of.total) for name, kept, of in rows), strict=True)
     return common.frame(dict(zip(names, columns, strict=True)))

@@ -8,11 +8,11 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
-from radarsim.kernels.innovations import log_likelihood
-from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.kernels.hypotheses import log_likelihood
+from radarsim.physics import manoeuvre_covariance, transition
 from radarsim.studies import interface
 from radarsim.studies.interface import OUTLIERS, RecordedPlots, true_column
-from radarsim.studies.sonar import banks, filters, world
+from radarsim.studies.sonar import filters, world
 from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.config import Keys
 from radarsim.studies.sonar.kernels import patterns as pattern_kernels
@@ -96,7 +96,7 @@ class Tracker:
     def __init__(self, case: Case):
         self.spec: Any = case.spec
 
-    def specs(self) -> list[banks.FilterSpec]:
+    def specs(self) -> list[filters.FilterSpec]:
         """The filters."""
         return filter_specs(self.spec)
 
@@ -155,7 +155,7 @@ class Tracker:
 
 
 def _estimated(
-    specs: Sequence[banks.FilterSpec],
+    specs: Sequence[filters.FilterSpec],
     t: np.ndarray,
     period: float,
     z: np.ndarray,
@@ -172,7 +172,7 @@ def _estimated(
     for f, one in enumerate(specs):
         for c in range(len(z)):
             if not one.response:
-                x[f, :, c], P[f, :, c] = banks.apply_filter(one, c, plots[c], z[c])
+                x[f, :, c], P[f, :, c] = filters.apply_filter(one, c, plots[c], z[c])
             known[f, :, c] = np.arange(3) < np.minimum(plots[c].moments()[0], one.size)[:, None]
     return x, P, known
 

@@ -1,4 +1,6 @@
-"""The sonar's world (P3): correlated errors of plots, targets in polar and cartesian coordinates, and conversions.
+"""Labels and exact values of the sums of a sonar case; and those of cases whose filters know their plots.
+
+The sonar's world (P3): correlated errors of plots, targets in polar and cartesian coordinates, and conversions.
 
 Bearings are counted from the x axis (north) towards the y axis (east): x = r cos b, y = r sin b. A state of one
 coordinate is (value, rate, acceleration). Times in s, ranges in m, angles in rad.
@@ -6,11 +8,56 @@ coordinate is (value, rate, acceleration). Times in s, ranges in m, angles in ra
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from radarsim.physics.targets import polynomial
+from radarsim.engine.results import Axes
+from radarsim.physics import polynomial
 
+
+# ---- axes ------------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True, kw_only=True)
+class SonarAxes(Axes):
+    """Labels of F filters over K scans in C coordinates.
+
+    Attributes:
+        coordinates: name and unit of each coordinate that the filters work in.
+        sizes: (F,) components of each filter's state in one coordinate, 2 or 3.
+        exact_ahead: (F, K, C) exact σ of the value extrapolated by one scan, in the row of the scan that it was
+            extrapolated from, in the coordinate's unit; NaN where it is not known.
+        exact_nees: (F, K, C) expected eᵀP⁻¹e of the complete state in a coordinate; NaN likewise.
+        scan_period_s: period of the first sonar, s.
+        sigma: (C,) nominal standard deviation of a plot in each coordinate, in its unit.
+    """
+
+    coordinates: tuple[tuple[str, str], ...]
+    sizes: np.ndarray
+    exact_ahead: np.ndarray
+    exact_nees: np.ndarray
+    scan_period_s: float
+    sigma: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class GivenPlotsAxes(SonarAxes):
+    """Labels of cases whose filters know the target's plots: smoothing, and manoeuvres.
+
+    Attributes:
+        rho: (C,) correlation of the errors of neighbouring plots.
+        sigma_of_plots: (K, C) standard deviation of each plot, infinite where there never is a plot.
+        conversion_bias: mean error along the line of sight of the first plot converted to x and y, m; zero where it is
+            not converted, or converted without bias.
+        polar: (K, C, 3) the target's range, bearing (and depth or elevation) with first and second rates.
+    """
+
+    rho: np.ndarray
+    sigma_of_plots: np.ndarray
+    conversion_bias: float
+    polar: np.ndarray
+
+
+# ---- world -----------------------------------------------------------------------------------------------------------
 PLACED = 8  # plots in the mean position at which the covariance of the unbiased conversion is computed
 Values = float | np.ndarray
 

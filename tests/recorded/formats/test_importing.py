@@ -10,8 +10,7 @@ import pytest
 
 from radarsim.errors import ConfigError
 from radarsim.recorded.formats.importing import Options, import_recording
-from radarsim.recorded.formats.records import Unrolled
-from radarsim.recorded.formats.site import Antenna, Site, biconical, described
+from radarsim.recorded.formats.sites import Antenna, Site, Unrolled, biconical, described
 from radarsim.recorded.formats.text import split
 
 pytest.importorskip("asterix.base", reason="libasterix is not installed")

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from radarsim.studies.ambiguous_doppler import exact, study
+from radarsim.studies.ambiguous_doppler import filters as exact
+from radarsim.studies.ambiguous_doppler import study
 from tests.studies.ambiguous_doppler.conftest import FIXED, MEMORY, NEAREST, ORACLE, RANDOM, RANGE_ONLY, made, summed
 
 LIMIT = 5.85  # unit normals: of 1000, one exceeds it by chance in 200 000 runs

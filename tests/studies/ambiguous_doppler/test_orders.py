@@ -5,9 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from radarsim import physics
 from radarsim.app.configs import load
-from radarsim.physics import targets
-from radarsim.studies.ambiguous_doppler import exact, filters, study
+from radarsim.studies.ambiguous_doppler import filters, study
+from radarsim.studies.ambiguous_doppler import filters as exact
 from radarsim.studies.ambiguous_doppler.filters import Member
 from radarsim.studies.ambiguous_doppler.kernels import records, sums
 from tests.studies.ambiguous_doppler import naive
@@ -146,7 +147,7 @@ def test_published_numbers_of_the_manoeuvre():
     spec, t = load("orders").cases[1].spec, np.arange(15) * 10.0
     members = [Member(order, how, {1: 4.0, 2: 1e-3}[order]) for how in ("unfolded", "none") for order in (1, 2)]
     of = [exact.gains(one, spec.prior, np.array([250.0, 15.0]), 10.0, 15) for one in members]
-    motion = targets.acceleration_pulse([100e3, -250.0], 20.0, 60.0, 30.0, t)
+    motion = physics.acceleration_pulse([100e3, -250.0], 20.0, 60.0, 30.0, t)
     bias, noise = exact.errors(of, motion[None], np.array([250.0, 15.0]))
     E = exact.joint(bias, noise, np.ones(1))[-1, 0]
     assert np.sqrt(np.diag(E)[:2]) == pytest.approx([162, 347], abs=0.5)

@@ -13,8 +13,7 @@ from radarsim.errors import ConfigError, PlotFault
 from radarsim.recorded import fit, follow, plots
 from radarsim.report import notes, statistics
 from radarsim.studies import registry
-from radarsim.studies.ambiguous_doppler import followers, study, track
-from radarsim.studies.ambiguous_doppler import map as fans
+from radarsim.studies.ambiguous_doppler import figures, study, track
 from radarsim.studies.ambiguous_doppler.kernels import records
 from radarsim.studies.ambiguous_doppler.tables import FEW_FOLDS
 
@@ -91,7 +90,7 @@ def test_fan_holds_what_the_filter_estimates():
     case = load("ambiguous_rls4").cases[0]
     plan = study.prepare(case)
     _, out = study.sums.simulated(plan.world, plan.banks, 0)
-    shown = fans.fan(case, 5, 6)
+    shown = figures.fan(case, 5, 6)
     for k, (v, a, p) in enumerate(shown.lists):
         mean = out[plan.banks.bank[5], k, :3, 7]
         assert p @ v == pytest.approx(mean[1], rel=1e-9, abs=1e-6)
@@ -188,7 +187,7 @@ def test_a_remainder_is_followed_as_the_study_does():
 
 def test_a_velocity_counts_in_the_remainder_as_it_folds():
     """However many spans too large it is written."""
-    folds = followers.Folds(load("ambiguous_rls4", ["radar.repetition_rate_hz=[1000, 1200]"]).cases[0].spec.radar)
+    folds = track.Folds(load("ambiguous_rls4", ["radar.repetition_rate_hz=[1000, 1200]"]).cases[0].spec.radar)
     folds.begin(0.0, 15.0)
     assert np.isnan(folds.remainder(2.0 + 15 * 2**20))
     folds.begin(10.0, 18.0)
@@ -226,10 +225,10 @@ def test_plots_with_too_many_folds_have_no_likelihood():
 
 
 def test_sequences_of_folds_are_counted_before_they_are_made():
-    folds = followers.Folds(load("ambiguous_rls4").cases[0].spec.radar)
+    folds = track.Folds(load("ambiguous_rls4").cases[0].spec.radar)
     folds.begin(0.0, 18.0)
-    most = (followers.MOST_LOOKED_AT / 2) ** 2 * 4  # a reach of half as many spans as may be, to either side
-    assert folds.innovations(np.zeros(1), np.array([most * 0.999])).shape[1] <= followers.MOST_LOOKED_AT + 1
+    most = (track.MOST_LOOKED_AT / 2) ** 2 * 4  # a reach of half as many spans as may be, to either side
+    assert folds.innovations(np.zeros(1), np.array([most * 0.999])).shape[1] <= track.MOST_LOOKED_AT + 1
     for e, S in ((np.zeros(1), most * 1.001), (np.zeros(300), most / 299**2), (np.zeros(1), np.nan), (np.zeros(1), 0)):
         with pytest.raises(PlotFault, match="velocity_mps"):
             folds.innovations(e, np.array([S]))
@@ -239,10 +238,10 @@ def test_the_fan_of_a_case_with_rare_folds_is_of_plots_as_they_fall():
     """The fan holds one filter alone, which need not be the one whose wrong folds are rare."""
     case = load("ambiguous_rare").cases[0]
     number = next(i for i, one in enumerate(case.spec.filters) if (one.hypotheses or 1) > 1)
-    shown = fans.fan(case, number, 3)
+    shown = figures.fan(case, number, 3)
     plain = replace(case, spec=case.spec.model_copy(update={"rare": None}))
     assert case.spec.rare is not None
-    np.testing.assert_array_equal(shown.truth, fans.fan(plain, number, 3).truth)
+    np.testing.assert_array_equal(shown.truth, figures.fan(plain, number, 3).truth)
     assert len(shown.lists) == 3
 
 

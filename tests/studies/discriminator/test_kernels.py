@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from radarsim.bursts import blocks as cuts
+from radarsim.bursts import burst as cuts
 from radarsim.bursts import burst as model
-from radarsim.bursts.kernels import data, scoring
 from radarsim.bursts.kernels import lanes as laned
+from radarsim.bursts.kernels import scoring
 from radarsim.bursts.kernels import sequence as kernels
 from radarsim.bursts.kernels import strip as strips
 from radarsim.kernels import lanes
@@ -25,7 +25,7 @@ def burst_of(pulses=600, complex_samples=False, per_pulse=1):
 
 
 def physics_of(burst, mode=kernels.SAMPLES, image=True):
-    physics = np.zeros(1, data.PHYSICS)
+    physics = np.zeros(1, scoring.PHYSICS)
     physics[0] = (
         *(mode, burst.complex_samples, image and not burst.complex_samples, burst.pulses, burst.samples_per_pulse),
         *(burst.amplitude, burst.noise_variance**0.5, 1 / burst.pulses, burst.sampling_period_s / burst.duration_s),
@@ -122,8 +122,8 @@ def demodulated(burst, theta, reference, per_block=20, image=True, seed=1):
     t, u = noisy(burst, theta, seed)
     edges = np.arange(0, burst.pulses + 1, per_block)
     physics = physics_of(burst, kernels.DEMODULATED, image)
-    mean, _ = data.block_table(physics, edges, model.phase_turns(reference, t), u)
-    data.demodulate(physics, edges, rows(u), turns(reference, burst), 0, len(edges) - 1, mean)
+    mean, _ = scoring.block_table(physics, edges, model.phase_turns(reference, t), u)
+    scoring.demodulate(physics, edges, rows(u), turns(reference, burst), 0, len(edges) - 1, mean)
     return t, u, edges, physics, mean
 
 
@@ -187,7 +187,7 @@ def test_drawn_sums_have_the_law_of_demodulated_samples(theta, complex_samples):
     phase = model.phase_turns(theta, t)
     edges = np.array([0, 1, 3, 20, 60])
     physics, clean = physics_of(burst), model.signal(burst, phase)
-    mean, factor = data.block_table(physics, edges, phase, clean)
+    mean, factor = scoring.block_table(physics, edges, phase, clean)
     n = 40_000
     drawn, made = np.empty((2, n, 4, 4))
     samples, other = np.empty((1 + complex_samples, 60)), mean.copy()
@@ -197,8 +197,8 @@ def test_drawn_sums_have_the_law_of_demodulated_samples(theta, complex_samples):
         if i % 8 == 0:
             strips.draw_strip(KEY, i, law, factor, a, b, sums)
             drawn[i : i + 8] = sums.reshape(4, 4, 8).transpose(2, 0, 1)
-        data.draw_samples(physics, KEY, i, rows(clean), samples)
-        data.demodulate(physics, edges, samples, turns(theta, burst), 0, 4, other)
+        scoring.draw_samples(physics, KEY, i, rows(clean), samples)
+        scoring.demodulate(physics, edges, samples, turns(theta, burst), 0, 4, other)
         made[i] = other[scoring.Z0 : scoring.Z0 + 4, :4].T
     for block in range(4):
         scale = np.maximum(made[:, block].std(axis=0), 1e-6)
@@ -238,7 +238,7 @@ def test_merged_blocks_hold_the_same_likelihood(theta, complex_samples, per_puls
     t = model.sample_times(burst, burst.pulses)
     phase, physics, image = model.phase_turns(theta, t), physics_of(burst), not complex_samples
     edges = cuts.block_edges([100, 400, 600], 30)
-    mean, factor = data.block_table(physics, edges, phase, model.signal(burst, phase))
+    mean, factor = scoring.block_table(physics, edges, phase, model.signal(burst, phase))
     tables = cuts.Tables(edges, mean, 30)
     first, weights, count = tables.window(400)
     assert count < np.searchsorted(edges, 400)  # some are merged indeed
@@ -248,7 +248,7 @@ def test_merged_blocks_hold_the_same_likelihood(theta, complex_samples, per_puls
     shifts = np.outer(np.linspace(0, 2, 8), [0.3, 1, 1, -0.5, 0.5, 0])
     for lane in range(8):
         _, u = noisy(burst, theta, lane)
-        data.demodulate(physics, edges, rows(u), turns(theta, burst), 0, len(factor), mean)
+        scoring.demodulate(physics, edges, rows(u), turns(theta, burst), 0, len(factor), mean)
         drawn.reshape(-1, 4, 8)[:, :, lane] = mean[scoring.Z0 : scoring.Z0 + 4, : len(factor)].T
         state["x"] = turns(theta, burst) + shifts[lane]
         kernels.evaluate(physics, rows(u), np.zeros((1, 1)), window, state)
@@ -272,7 +272,7 @@ def evaluate_merged(table, weights, first, begin, blocks, image, amplitude, work
 def test_noise_of_samples_is_white():
     burst = burst_of(pulses=20_001, complex_samples=True)
     samples = np.empty((2, 20_001))
-    data.draw_samples(physics_of(burst), KEY, 1, np.zeros((2, 20_001)), samples)
+    scoring.draw_samples(physics_of(burst), KEY, 1, np.zeros((2, 20_001)), samples)
     unit = samples / burst.noise_variance**0.5
     n = unit.size
     assert unit.var() == pytest.approx(1, abs=5 * np.sqrt(2 / n))

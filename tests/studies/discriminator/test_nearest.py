@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radarsim.bursts.kernels.scoring import SIZE
-from radarsim.studies.discriminator import nearest, rare
+from radarsim.studies.discriminator import nearest, study
 from tests.studies.discriminator.test_rare import RARELY, lone_window, plan_of
 from tests.studies.discriminator.test_study import BASE
 
@@ -26,7 +26,7 @@ def room(plan):
 @pytest.fixture(scope="module")
 def found(plan, room):
     """The losses ahead and behind of some hand-overs, with the linear direction of each."""
-    units = rare.directions(plan, 0)
+    units = study.directions(plan, 0)
     return {k: (units[k], tuple(nearest.either_side(room, 0, units[k]))) for k in HAND_OVERS}
 
 
@@ -41,7 +41,7 @@ def distance(room, unit, low, high):
 def test_gaussian_errors_pass_their_bounds_along_their_own_maps():
     """A lone window scored from the truth, with little noise: each component is lost at five bounds, on either side."""
     plan = lone_window(0.01)
-    room, maps = nearest.Room(plan), rare.linear(plan, 0).errors[0]
+    room, maps = nearest.Room(plan), study.linear(plan, 0).errors[0]
     for c, row in enumerate(maps):
         length = np.linalg.norm(row)
         for side, loss in zip((1, -1), nearest.either_side(room, 0, row / length), strict=True):
@@ -60,7 +60,7 @@ def test_a_turn_brings_every_loss_nearer(room, found):
 
 def test_bounds_of_a_component_are_nearer_than_its_linear_map_says(plan, room):
     """Of the phase at the end, on both sides by itself: more than first order is in an estimate at five σ."""
-    unit = rare.directions(plan, 0)[-5]
+    unit = study.directions(plan, 0)[-5]
     for side in (1, -1):
         straight = nearest.crossing(room, 0, nearest.rounded(side * unit), 1.0, 12.0)
         assert straight == pytest.approx(5.06, abs=0.02)
@@ -130,7 +130,7 @@ def test_without_a_normal_the_direction_stays(room, found, monkeypatch):
 
 def test_a_direction_without_a_loss_has_none(plan, room):
     """The last hand-over is to a window hardly longer, and is always caught."""
-    last = rare.directions(plan, 0)[len(plan.axes.pulses[0]) - 1]
+    last = study.directions(plan, 0)[len(plan.axes.pulses[0]) - 1]
     assert nearest.crossing(room, 0, nearest.rounded(last), 1.0, 12.0) is None
     assert nearest.nearest(room, 0, last) is None
     assert not list(nearest.either_side(room, 0, last))

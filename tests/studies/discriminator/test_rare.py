@@ -16,8 +16,8 @@ from radarsim.errors import ConfigError
 from radarsim.kernels.random import fill_normal_strip, stream
 from radarsim.report import rare as report
 from radarsim.report import statistics
-from radarsim.studies.discriminator import nearest, rare, study
-from radarsim.studies.discriminator.kernels import rare as kernels
+from radarsim.studies.discriminator import nearest, study
+from radarsim.studies.discriminator.kernels import sums as kernels
 from radarsim.studies.discriminator.tables import COUNTED
 from tests.studies.discriminator.test_study import BASE, FROM_TRUTH
 
@@ -44,7 +44,7 @@ def losses(plan, n, batch=512):
     """Weights (n,), and whether estimator 0 lost its lock at its last window (n,)."""
     k, weights, lost = int(plan.options[0]["windows"]) - 1, [], []
     for first in range(0, n, batch):
-        errors, _, some, _ = rare.estimate(plan, first, min(batch, n - first))
+        errors, _, some, _ = study.weighted_estimates(plan, first, min(batch, n - first))
         weights.append(some)
         lost.append((np.abs(errors[:, 0, k]) >= 5 * plan.potential[0, k]).any(axis=1))
     return np.concatenate(weights), np.concatenate(lost)
@@ -73,7 +73,7 @@ def plan():
 def test_errors_are_linear_in_the_normals_near_the_truth():
     """The rows of the maps have the posterior bound as their length, and take small noise to the errors that follow."""
     plan = plan_of(RARELY, burst=BASE["burst"] | {"samples": "complex"})
-    maps = rare.linear(plan, 0)
+    maps = study.linear(plan, 0)
     lengths = np.sqrt((maps.errors**2).sum(axis=2)) / plan.posterior[0, :, :5]
     assert lengths == pytest.approx(1, abs=5e-4)
     small = 1e-3
@@ -90,7 +90,7 @@ def test_maps_take_both_moments_of_a_block_from_each_of_its_normals(plan):
     low = np.tril_indices(4)
 
     def errors(of):
-        return rare.linear(replace(plan, world=replace(plan.world, factor=of)), 0).errors
+        return study.linear(replace(plan, world=replace(plan.world, factor=of)), 0).errors
 
     def alone(entry):
         return np.where(np.arange(10) == entry, 1.0, 0.0) * np.ones((len(law), 1))
@@ -107,7 +107,7 @@ def test_maps_take_both_moments_of_a_block_from_each_of_its_normals(plan):
 
 
 def test_directions_are_unit_vectors_of_the_hand_overs(plan):
-    units = rare.directions(plan, 0)
+    units = study.directions(plan, 0)
     assert len(units) == plan.options[0]["windows"] + 5
     assert np.linalg.norm(units, axis=1) == pytest.approx(1, rel=1e-12)
     table = plan.tables[0].reshape(-1, lanes.COLUMNS)
@@ -190,7 +190,7 @@ def lone_window(noise_variance):
 def test_a_lone_window_loses_as_its_gaussian_integral_says():
     """Phase and frequency from the truth on: errors are Gaussian, and five bounds are passed once in a million."""
     plan = lone_window(0.1)
-    maps = rare.linear(plan, 0).errors[0]
+    maps = study.linear(plan, 0).errors[0]
     spread = np.linalg.norm(maps, axis=1)
     correlation = float(maps[0] @ maps[1] / spread.prod())
     assert correlation == pytest.approx(-math.sqrt(3) / 2, rel=1e-3)
@@ -250,7 +250,7 @@ def test_sums_are_those_of_the_weights_and_add_up(plan):
     sums = plan.layout.unpack(study.simulate(plan, 100, 64))
     parts = study.simulate(plan, 100, 37) + study.simulate(plan, 137, 27)
     assert plan.layout.pack(**sums) == pytest.approx(parts, rel=1e-12)
-    errors, passes, weights, plain = rare.estimate(plan, 100, 64)
+    errors, passes, weights, plain = study.weighted_estimates(plan, 100, 64)
     last = int(plan.options[0]["windows"]) - 1
     lost = (np.abs(errors[:, 0, last]) >= 5 * plan.potential[0, last]).any(axis=1)
     assert sums["losses"][0, last, 0] == pytest.approx(

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from radarsim.app.configs import load
-from radarsim.bursts import fisher as exact
-from radarsim.bursts import schedule
+from radarsim.bursts import burst as schedule
+from radarsim.bursts import estimators
 from radarsim.engine.results import CaseResult
 from radarsim.report.claims import rule
-from radarsim.report.claims.over import under
-from radarsim.report.claims.readings import Unreadable
+from radarsim.report.claims.over import Unreadable, under
 from radarsim.studies import registry
 from radarsim.studies.discriminator import study
 from radarsim.studies.discriminator.readings import PRINTED_PRIOR, ExactEvidence, Readings, windows
@@ -50,7 +49,7 @@ def test_the_probability_of_a_miss_is_that_of_the_prepared_case(cases):
         result = registry.study("discriminator").prepare(cases[noise])
         spec, axes = cases[noise].spec, result.axes
         burst = study.burst_of(spec)
-        fisher = partial(exact.fisher, burst, 5)
+        fisher = partial(estimators.fisher, burst, 5)
         condition = schedule.Condition(threshold=float(taken.get("threshold", "0.5")))
         designer = schedule.Designer(burst, axes.prior_sigma, fisher, condition)
         times = burst.pulse_period_s * np.array(axes.pulses[0])

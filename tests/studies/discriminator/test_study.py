@@ -7,9 +7,9 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.bursts import burst as model
+from radarsim.bursts import estimators as exact
 from radarsim.bursts import estimators as plans
-from radarsim.bursts import fisher as exact
-from radarsim.bursts.kernels import data, scoring
+from radarsim.bursts.kernels import scoring
 from radarsim.bursts.kernels import sequence as kernels
 from radarsim.bursts.kernels import strip as strips
 from radarsim.errors import ConfigError
@@ -148,8 +148,8 @@ def paired_errors(plan, first, count):
     work, sums, drawn = room[:3]
     for start in range(0, count, 8):
         for lane in range(8):
-            data.draw_samples(physics, plan.keys[0], first + start + lane, world.clean, samples)
-            data.demodulate(physics, world.edges, samples, plan.truth, 0, blocks, made)
+            scoring.draw_samples(physics, plan.keys[0], first + start + lane, world.clean, samples)
+            scoring.demodulate(physics, world.edges, samples, plan.truth, 0, blocks, made)
             drawn.reshape(-1, 4, 8)[:, :, lane] = made[scoring.Z0 : scoring.Z0 + 4, :blocks].T
         strips.draw_forecasts(plan.keys[1], first + start, plan.prior_sigma, work)
         for f, options in enumerate(plan.options):
@@ -278,7 +278,7 @@ def twin_errors(plan, first, count):
     for i in range(count):
         state["truth"] = plan.truth
         kernels.draw_prior(plan.keys[1], first + i, plan.prior_sigma, state)
-        data.draw_samples(world.physics, plan.keys[0], first + i, world.clean, samples)
+        scoring.draw_samples(world.physics, plan.keys[0], first + i, world.clean, samples)
         prior = (np.array(state["prior"]) * unit)[:size]
         found[i] = naive.maximum(samples[0], t, 1.0, 2.25, prior, precision, theta, bound) - theta
     return found / bound
@@ -332,9 +332,9 @@ def test_amplitude_is_estimated_or_misprinted():
 
 
 def test_auto_takes_samples_where_block_sums_cannot_serve():
-    assert plan_of(SEQUENCE, engine="auto").world.physics["mode"] == data.BLOCK_SUMS
+    assert plan_of(SEQUENCE, engine="auto").world.physics["mode"] == scoring.BLOCK_SUMS
     estimated = {**SEQUENCE, "amplitude": "estimated"}
-    assert plan_of(estimated, engine="auto").world.physics["mode"] == data.SAMPLES
+    assert plan_of(estimated, engine="auto").world.physics["mode"] == scoring.SAMPLES
     with pytest.raises(ConfigError, match="block_sums cannot serve"):
         plan_of(estimated, engine="block_sums")
 

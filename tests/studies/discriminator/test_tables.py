@@ -5,18 +5,18 @@ import re
 import numpy as np
 import pytest
 
-from radarsim.app import run as experiment
+from radarsim.app import run
 from radarsim.bursts.burst import phase_turns, sample_times, signal
 from radarsim.report.drawing import Line
 from radarsim.studies.discriminator import measures, study, words
 from radarsim.studies.discriminator import tables as report
+from radarsim.studies.discriminator.figures import one_burst
 from radarsim.studies.discriminator.kernels.sums import bin_edges
-from radarsim.studies.discriminator.map import one_burst
 
 
 @pytest.fixture(scope="module")
 def made():
-    return experiment.run("discriminator", realisations=256, threads=1)
+    return run.run("discriminator", realisations=256, threads=1)
 
 
 def test_curves_are_of_the_locked_and_tell_of_all(made):
@@ -82,7 +82,7 @@ def test_figures_show_the_paper_and_the_locks(made):
 
 
 def test_the_burst_that_is_drawn_is_the_first_of_the_run():
-    case = experiment.load("discriminator").cases[0]
+    case = run.load("discriminator").cases[0]
     plan = study.prepare(case)
     number = plan.axes.filters.index("cured")
     squares = plan.layout.unpack(study.simulate(plan, 0, 1))["error_all"][number, ..., 1]
@@ -93,9 +93,9 @@ def test_the_burst_that_is_drawn_is_the_first_of_the_run():
 
 def test_swept_cases_are_drawn_against_their_key():
     swept = {"prior.scale": [0.01, 0.1], "burst.noise_variance": [2.25, 9.0]}
-    base = experiment.load("discriminator_pair").cases[0].spec
+    base = run.load("discriminator_pair").cases[0].spec
     config = {"study": "discriminator", "sweep": swept, "realisations": 64, "seed": 1} | _plain(base)
-    done = experiment.run(config, threads=1)
+    done = run.run(config, threads=1)
     assert done.figures == ("lock_scale_noise_variance",)
     heat, border = (
         done._described["lock_scale_noise_variance"].panels[0],
@@ -106,7 +106,7 @@ def test_swept_cases_are_drawn_against_their_key():
 
 
 def _plain(spec):
-    from radarsim.config.identity import complete
+    from radarsim.config.experiment import complete
 
     return complete(spec)
 

@@ -5,8 +5,7 @@ import pytest
 
 import radarsim
 from radarsim.report.claims import CONFIRMED, REFUTED, page
-from radarsim.report.claims.joint import joint
-from radarsim.report.claims.over import Over, under
+from radarsim.report.claims.over import Over, joint, under
 from radarsim.studies import registry
 from radarsim.studies.multimodel import cost, measures
 from radarsim.studies.multimodel.readings import Readings

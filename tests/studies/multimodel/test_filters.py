@@ -5,30 +5,30 @@ import pytest
 from scipy.linalg import fractional_matrix_power
 
 from radarsim.kernels import algebra
-from radarsim.studies.multimodel import cost, filters
+from radarsim.studies.multimodel import cost, world
 
 PRINTED = np.array([[0.996, 0, 0.002], [0, 0.996, 0.002], [0.004, 0.004, 0.996]])
 TWO = np.array([[0.995, 0.01], [0.005, 0.99]])
 
 
 def test_stationary_probabilities():
-    assert np.allclose(filters.stationary(PRINTED), [0.25, 0.25, 0.5])
-    assert np.allclose(filters.stationary(TWO), [2 / 3, 1 / 3])
-    assert np.allclose(filters.stationary(np.eye(4)), 0.25)
-    assert np.allclose(filters.stationary(np.array([[0.0, 1], [1, 0]])), 0.5)
-    assert np.allclose(filters.stationary(np.ones((1, 1))), 1)
+    assert np.allclose(world.stationary(PRINTED), [0.25, 0.25, 0.5])
+    assert np.allclose(world.stationary(TWO), [2 / 3, 1 / 3])
+    assert np.allclose(world.stationary(np.eye(4)), 0.25)
+    assert np.allclose(world.stationary(np.array([[0.0, 1], [1, 0]])), 0.5)
+    assert np.allclose(world.stationary(np.ones((1, 1))), 1)
 
 
 @pytest.mark.parametrize("T", [PRINTED, TWO])
 def test_whole_powers_are_powers(T):
     for m in (1, 2, 20, 1200):
-        assert np.allclose(filters.transition_powers(T, np.array([m]))[0], np.linalg.matrix_power(T, m), atol=1e-13)
+        assert np.allclose(world.transition_powers(T, np.array([m]))[0], np.linalg.matrix_power(T, m), atol=1e-13)
 
 
 @pytest.mark.parametrize("T", [PRINTED, TWO])
 def test_fractional_powers_are_probabilities_near_the_real_power(T):
     m = np.array([1e-6, 0.1, 0.5, 0.9, 0.999, 1.3, 7.77])
-    powers = filters.transition_powers(T, m)
+    powers = world.transition_powers(T, m)
     assert np.all(powers >= 0)
     assert np.allclose(powers.sum(axis=1), 1, atol=1e-14)
     for power, exponent in zip(powers, m, strict=True):
@@ -38,20 +38,20 @@ def test_fractional_powers_are_probabilities_near_the_real_power(T):
 
 def test_the_printed_matrix_has_no_markov_root():
     assert fractional_matrix_power(PRINTED, 0.9).min() < -1e-7
-    change = np.abs(filters.transition_powers(PRINTED, np.array([0.9]))[0] - fractional_matrix_power(PRINTED, 0.9))
+    change = np.abs(world.transition_powers(PRINTED, np.array([0.9]))[0] - fractional_matrix_power(PRINTED, 0.9))
     assert change.max() < 5e-6
 
 
 def test_rates_are_those_of_a_process():
     """The logarithm of the printed matrix has negative rates."""
-    Q = filters.generator(PRINTED)
+    Q = world.generator(PRINTED)
     assert (Q - np.diag(np.diag(Q))).min() == 0
     assert np.abs(Q.sum(axis=0)).max() < 1e-16
 
 
 def test_start_is_least_squares_with_its_covariance():
     t, spread = np.array([0.0, 0.9, 2.1]), 30.0
-    a, b, g = filters.start_weights(t, spread).reshape(3, 3)
+    a, b, g = world.start_weights(t, spread).reshape(3, 3)
     A = np.stack([np.ones(3), t - t[2]], axis=1)
     assert np.allclose([a, b], np.linalg.pinv(A))
     w = 4.0  # of a target that accelerates the estimate errs by g w / spread

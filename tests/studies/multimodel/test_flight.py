@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from radarsim.studies.multimodel import flight
-from radarsim.studies.multimodel.flight import Phase, fly
+from radarsim.studies.multimodel import world
+from radarsim.studies.multimodel.world import Phase, fly
 
 T = np.arange(0, 60.01, 0.5)
 VACUUM = 1e30  # ballistic coefficient without drag
@@ -12,7 +12,7 @@ VACUUM = 1e30  # ballistic coefficient without drag
 
 def test_without_air_it_is_a_parabola():
     x = fly((1e5, 2e4, 0), (-800, 300, 50), VACUUM, 1.0, [Phase(0)], T)
-    g = flight.STANDARD_GRAVITY_MPS2
+    g = world.STANDARD_GRAVITY_MPS2
     assert np.allclose(x[:, 0], 1e5 - 800 * T, atol=1e-3)
     assert np.allclose(x[:, 3], 2e4 + 300 * T - g * T**2 / 2, atol=1e-3)
     assert np.allclose(x[:, 4], 300 - g * T, atol=1e-6)
@@ -40,7 +40,7 @@ def test_commands_are_followed_with_the_lag():
 
 def test_drag_is_density_times_speed_squared_over_twice_the_coefficient():
     x = fly((0, 3e4, 0), (1500, 0, 0), 5e3, 1.0, [Phase(0)], np.array([0.0, 1.0]))
-    drag = flight.DENSITY_KGPM3 * np.exp(-3e4 / flight.SCALE_HEIGHT_M) * 1500**2 / 1e4
+    drag = world.DENSITY_KGPM3 * np.exp(-3e4 / world.SCALE_HEIGHT_M) * 1500**2 / 1e4
     assert np.isclose(x[0, 2], -drag)
 
 
@@ -54,9 +54,9 @@ def test_velocity_and_acceleration_are_derivatives_of_position():
 
 
 def test_the_ground_and_the_orbit_are_refused():
-    with pytest.raises(flight.Unflyable, match="hits the ground at"):
+    with pytest.raises(world.Unflyable, match="hits the ground at"):
         fly((1e5, 1e3, 0), (-300, 0, 0), 1e4, 1.0, [Phase(0)], T)
-    with pytest.raises(flight.Unflyable, match="orbit"):
+    with pytest.raises(world.Unflyable, match="orbit"):
         fly((1e5, 9e4, 0), (-8500, 0, 0), VACUUM, 1.0, [Phase(0)], T)
 
 
@@ -65,7 +65,7 @@ def test_recorded_flight_gives_back_a_smooth_one():
     at = np.sort(np.concatenate([[0, 60], rng.uniform(0, 60, 150)]))
     true = fly((1e5, 2e4, 0), (-300, 50, 50), VACUUM, 1.0, [Phase(0)], at)
     t = np.linspace(5, 55, 101)
-    x = flight.recorded(at, true[:, 0::3] + rng.normal(size=(len(at), 3)), t)
+    x = world.recorded(at, true[:, 0::3] + rng.normal(size=(len(at), 3)), t)
     exact = fly((1e5, 2e4, 0), (-300, 50, 50), VACUUM, 1.0, [Phase(0)], np.concatenate([[0], t]))[1:]
     assert np.abs(x - exact)[:, 0::3].max() < 2
     assert np.abs(x - exact)[:, 1::3].max() < 1.5

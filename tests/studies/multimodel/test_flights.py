@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from radarsim.studies.multimodel import flight
-from radarsim.studies.multimodel.flights import FLIGHTS
+from radarsim.studies.multimodel import world
 from radarsim.studies.multimodel.readings import Readings
+from radarsim.studies.multimodel.world import FLIGHTS
 
 T = np.arange(0, 186.2, 0.5)
 UNFLYABLE = {"dive 60"}
@@ -13,10 +13,10 @@ UNFLYABLE = {"dive 60"}
 
 def flown(of):
     phases = [
-        flight.Phase(p.start_s, p.lateral_mps2, p.normal_mps2, p.axial_mps2, p.period_s or 0.0, p.trimmed)
+        world.Phase(p.start_s, p.lateral_mps2, p.normal_mps2, p.axial_mps2, p.period_s or 0.0, p.trimmed)
         for p in of.phases
     ]
-    return flight.fly(of.position_m, of.velocity_mps, of.ballistic_coefficient_kgpm2, of.lag_s, phases, T)
+    return world.fly(of.position_m, of.velocity_mps, of.ballistic_coefficient_kgpm2, of.lag_s, phases, T)
 
 
 @pytest.mark.parametrize("name", sorted(set(FLIGHTS) - UNFLYABLE))
@@ -40,7 +40,7 @@ def test_a_flight_is_within_the_printed_axes(name):
 
 @pytest.mark.parametrize("name", sorted(UNFLYABLE))
 def test_one_that_cannot_be_flown_says_why(name):
-    with pytest.raises(flight.Unflyable, match="hits the ground"):
+    with pytest.raises(world.Unflyable, match="hits the ground"):
         flown(FLIGHTS[name])
 
 

@@ -6,7 +6,7 @@ import pytest
 from radarsim.kernels.lanes import WIDTH, rows
 from radarsim.studies.multimodel.kernels import hypothesis, records
 from radarsim.studies.multimodel.kernels import strip as strips
-from radarsim.studies.multimodel.kernels.plots import frame
+from radarsim.studies.multimodel.kernels.strip import frame
 from tests.studies.multimodel import naive
 
 FAMILIES = {"kalman": records.KALMAN, "gpb1": records.GPB1, "imm": records.IMM, "gpb2": records.GPB2}

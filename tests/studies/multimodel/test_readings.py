@@ -6,8 +6,8 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.studies import registry
-from radarsim.studies.multimodel.flights import FLIGHTS
 from radarsim.studies.multimodel.readings import Readings
+from radarsim.studies.multimodel.world import FLIGHTS
 
 OF = Readings()
 CLAIMS = {one.id: one for one in registry.study("multimodel").claims().claims}
@@ -84,11 +84,11 @@ def test_the_output_start_and_bank(case):
 
 @pytest.mark.slow
 def test_a_flown_reading_is_measured_over_its_own_stages(tmp_path):
-    from radarsim.app import readings as app
+    from radarsim.app import readings
 
-    of = next(one for one in app.asked(["P2.3"]))
-    wanted = app.Asked(of.paper, of.claims, whole=False, only={"flight": "pull-up 250"})
-    done = app.readings([wanted], out=tmp_path, realisations=16, figures=False)
+    of = next(one for one in readings.asked(["P2.3"]))
+    wanted = readings.Asked(of.paper, of.claims, whole=False, only={"flight": "pull-up 250"})
+    done = readings.readings([wanted], out=tmp_path, realisations=16, figures=False)
     flown = [one for one in done.read[0].over[0].under if one.reading["flight"] == "pull-up 250"]
     assert flown
     assert all(one.outcome is not None for one in flown)

@@ -5,11 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.app.work import CaseWork
+from radarsim import physics
+from radarsim.app.configs import CaseWork, load
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
-from radarsim.physics import frames
 from radarsim.studies.multimodel import STUDY, tables
 from radarsim.studies.multimodel import study as multimodel
 from radarsim.studies.multimodel import track as multimodel_plots
@@ -64,9 +63,9 @@ def test_plots_have_the_stated_errors_and_covariances():
     mean = np.array([full(R[:, :, i]) for i in range(R.shape[2])])
     nis = np.einsum("nka,nkab,nkb->nk", error, np.linalg.inv(mean), error)
     assert abs(nis.mean() - 3) < 5 * np.sqrt(6 / nis.size)
-    antenna = frames.to_antenna(truth, frames.rotation(0, np.radians(30)), 12)
+    antenna = physics.to_antenna(truth, physics.rotation(0, np.radians(30)), 12)
     sigma = np.array([2.5, np.radians(0.1), np.radians(0.1)])
-    exact = frames.plot_covariance(to_biconical(antenna), sigma, frames.rotation(0, np.radians(30)))
+    exact = physics.plot_covariance(to_biconical(antenna), sigma, physics.rotation(0, np.radians(30)))
     assert np.allclose(mean.mean(axis=0), exact, rtol=1e-3, atol=1e-3 * np.abs(exact).max())
 
 
@@ -122,10 +121,10 @@ def test_covariance_at_the_prediction_is_computed_there():
         P[u::3, v::3] = np.tensordot((a, b)[u] * (a, b)[v], covariance[:3], 1)
     P += np.kron(np.eye(3), np.outer(g, g))
     F, Q = naive.motion("accelerated", 20.0, 0.5)
-    turn, sigma = frames.rotation(0, np.radians(30)), np.array([2.5, np.radians(0.1), np.radians(0.1)])
+    turn, sigma = physics.rotation(0, np.radians(30)), np.array([2.5, np.radians(0.1), np.radians(0.1)])
     for k in range(3, len(z)):
-        at = to_biconical(frames.to_antenna((F @ x)[0::3], turn, 12))
-        x, P, *_ = naive.advance(x, P, F, Q, z[k], frames.plot_covariance(at, sigma, turn))
+        at = to_biconical(physics.to_antenna((F @ x)[0::3], turn, 12))
+        x, P, *_ = naive.advance(x, P, F, Q, z[k], physics.plot_covariance(at, sigma, turn))
         assert np.allclose(sums["error"][0, k - 3, :, 0], x - plan.world.truth[k], rtol=1e-7, atol=1e-5)
 
 
@@ -258,8 +257,8 @@ def test_track_over_recorded_plots_equals_the_experiment():
     case = work()
     plan, sensor = case.plan, case.case.spec.sensor
     z, *_ = multimodel.measured(plan, 0)
-    R = frames.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
-    biconical = to_biconical(frames.to_antenna(z[:, :, 0], R, sensor.antenna_height_m))
+    R = physics.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
+    biconical = to_biconical(physics.to_antenna(z[:, :, 0], R, sensor.antenna_height_m))
     t = np.concatenate([plan.axes.t_s[:1] - 1.5, plan.axes.t_s[:1] - 1.0, plan.axes.t_s[:1] - 0.5, plan.axes.t_s])
     columns = multimodel_plots.columns(case.case.spec)[0]
     track = multimodel_plots.track(case.case, dict(zip(columns, [t + 100, *biconical.T], strict=True)))

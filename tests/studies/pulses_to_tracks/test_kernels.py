@@ -7,12 +7,11 @@ import pytest
 
 from radarsim.bursts.burst import turns_per_parameter
 from radarsim.bursts.kernels import lanes, sequence, strip
-from radarsim.bursts.kernels.data import SAMPLES
-from radarsim.bursts.kernels.scoring import SIZE, STATE
+from radarsim.bursts.kernels.scoring import SAMPLES, SIZE, STATE
 from radarsim.kernels.random import fill_normal_pairs
-from radarsim.studies.pulses_to_tracks import filters, study, world
+from radarsim.studies.pulses_to_tracks import filters, study
 from radarsim.studies.pulses_to_tracks.kernels import chain
-from radarsim.studies.pulses_to_tracks.kernels.estimate import draw_sums, estimate, room_for
+from radarsim.studies.pulses_to_tracks.kernels.chain import draw_sums, estimate, room_for
 from radarsim.studies.pulses_to_tracks.kernels.records import Sums
 from tests.studies.pulses_to_tracks import naive
 from tests.studies.pulses_to_tracks.conftest import CURED, IDEAL, RANGE, SEQUENCE, SPECTRUM, A, made
@@ -185,7 +184,7 @@ def textbook(plan, case, f, count):
 
 def estimated(plan, one, f, k, track, samples, drawn, size):
     """The textbook's estimate of a burst: coefficients (6,), less the truth."""
-    burst = world.bursts(SPEC[0], np.array([[1e5, 0.0, 0.0]]))[0]
+    burst = filters.bursts(SPEC[0], np.array([[1e5, 0.0, 0.0]]))[0]
     variance = float(plan.world.physics[k]["sigma"]) ** 2
     forecast = track.x[1:] if plan.filters.filters[f]["track"] else plan.filters.filters[f]["fixed"] * drawn
     b = np.zeros(6)

@@ -10,7 +10,7 @@ from radarsim.app.quantities import Quantity
 from radarsim.app.solve import solve
 from radarsim.bursts.burst import LIGHT_MPS, Burst
 from radarsim.studies import registry
-from radarsim.studies.pulses_to_tracks import exact, filters, study, world
+from radarsim.studies.pulses_to_tracks import filters, study
 from radarsim.studies.pulses_to_tracks.kernels.records import AGES, LOCKED, TAKEN
 from tests.studies.pulses_to_tracks.conftest import CURED, IDEAL, RANGE, SEQUENCE, SPECTRUM, A, V, made, summed
 
@@ -26,17 +26,17 @@ def test_the_bound_is_that_of_a_sinusoid():
     omega = math.sqrt(6 / (snr * pulses * (pulses**2 - 1))) / period
     expected = 0.03 / 2 * omega / (2 * math.pi)
     for size in (2, 3):
-        assert world.bounds(burst, size)[0] == pytest.approx(expected, rel=1e-9)
-    assert math.isinf(world.bounds(burst, 2)[1])
+        assert filters.bounds(burst, size)[0] == pytest.approx(expected, rel=1e-9)
+    assert math.isinf(filters.bounds(burst, 2)[1])
     # Of a chirp: var of the rate of ω, 360/(snr N (N² − 1)(N² − 4) T_p⁴) (Djuric & Kay 1990).
     rate = math.sqrt(360 / (snr * pulses * (pulses**2 - 1) * (pulses**2 - 4))) / period**2
-    assert world.bounds(burst, 3)[1] == pytest.approx(0.03 / 2 * rate / (2 * math.pi), rel=1e-9)
+    assert filters.bounds(burst, 3)[1] == pytest.approx(0.03 / 2 * rate / (2 * math.pi), rel=1e-9)
 
 
 def test_power_falls_with_range_and_with_the_pulses_length():
     spec = made([RANGE], burst={"snr_range_m": 50e3, "pulse_length_s": 5e-5, "snr_db": 10.0}).spec
     truth = np.array([[100e3, 0.0, 0.0], [50e3, 0.0, 0.0], [50e3, -150.0, 0.0]])
-    power = [0.5 / one.noise_variance for one in world.bursts(spec, truth)]
+    power = [0.5 / one.noise_variance for one in filters.bursts(spec, truth)]
     loss = np.sinc(5e-5 * 2 * 150 / 0.03) ** 2
     np.testing.assert_allclose(
         10 * np.log10(power), [10 - 40 * math.log10(2), 10, 10 + 10 * math.log10(loss)], atol=0.006
@@ -148,7 +148,7 @@ def test_a_narrow_gate_takes_nothing_and_leaves_range_alone():
 
 def test_exact_is_known_of_range_and_idealisations_alone():
     case = made([RANGE, IDEAL, CURED])
-    known = [exact.known(one) for one in case.spec.filters]
+    known = [filters.known(one) for one in case.spec.filters]
     assert known == [True, True, False]
     axes = study.prepare(case).axes
     assert np.isnan(axes.exact_sigma[2]).all()

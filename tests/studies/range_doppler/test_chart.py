@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from radarsim.app.chart import chart
+from radarsim.app.compare import chart
 from radarsim.cli import main
 from radarsim.errors import ConfigError
 from radarsim.studies.range_doppler import chart as drawn
-from radarsim.studies.range_doppler import closed_form, exact, steady
+from radarsim.studies.range_doppler import filters
 from tests.studies.range_doppler import impulse
 
 
@@ -31,48 +31,47 @@ def random_radars(count, most, seed, decades=2):
 
 def recursion(shares):
     """Exact steady gains (3, n) of radars with these shares (2, n)."""
-    return steady.exact_gains(shares[0] ** -2, shares[1] ** 3)
+    return filters.exact_gains(shares[0] ** -2, shares[1] ** 3)
 
 
 def test_a_thousand_random_radars_lie_on_the_chart():
     """Where Δt/τ₁ and Δt/τ₂ are at most 0.05 the closed form is within half a point, up to c of 50 000."""
-    shares = random_radars(1200, closed_form.SMALL, 1, decades=3)
+    shares = random_radars(1200, filters.SMALL, 1, decades=3)
     c = (shares[1] / shares[0]) ** 2
-    shares, c = shares[:, c <= closed_form.LARGEST][:, :1000], c[c <= closed_form.LARGEST][:1000]
+    shares, c = shares[:, c <= filters.LARGEST][:, :1000], c[c <= filters.LARGEST][:1000]
     assert shares.shape == (2, 1000)
     assert c.max() > 1e4
     gains = recursion(shares)
-    away = np.abs(closed_form.steady_gains(c, shares[1]) - gains)
-    assert away.max() < closed_form.ERROR_POINTS <= 0.5
-    assert away[:, c <= closed_form.MODERATE].max() < closed_form.MODERATE_POINTS
+    away = np.abs(filters.steady_gains(c, shares[1]) - gains)
+    assert away.max() < filters.ERROR_POINTS <= 0.5
+    assert away[:, c <= filters.MODERATE].max() < filters.MODERATE_POINTS
     # Without the correction: half a point is just exceeded in the range, where Δt/τ₂ is 0.05.
-    limit = np.abs(closed_form.steady_gains(c) - gains)
-    assert limit.max() < closed_form.LIMIT_POINTS
+    limit = np.abs(filters.steady_gains(c) - gains)
+    assert limit.max() < filters.LIMIT_POINTS
     assert limit[:, shares[1] < 0.045].max() < 0.5
 
 
 @pytest.mark.parametrize(
-    ("most", "points"),
-    [(closed_form.LARGEST, closed_form.ERROR_POINTS), (closed_form.MODERATE, closed_form.MODERATE_POINTS)],
+    ("most", "points"), [(filters.LARGEST, filters.ERROR_POINTS), (filters.MODERATE, filters.MODERATE_POINTS)]
 )
 def test_where_the_closed_form_is_worst_it_is_within_the_stated_points(most, points):
     """Along the edge: the larger of both shares is 0.05. No bound has much to spare."""
     c = np.geomspace(1e-3, most, 600)
-    shares = closed_form.SMALL * np.array([np.minimum(c**-0.5, 1.0), np.minimum(c**0.5, 1.0)])
+    shares = filters.SMALL * np.array([np.minimum(c**-0.5, 1.0), np.minimum(c**0.5, 1.0)])
     gains = recursion(shares)
-    corrected = np.abs(closed_form.steady_gains(c, shares[1]) - gains)
-    limit = np.abs(closed_form.steady_gains(c) - gains)
+    corrected = np.abs(filters.steady_gains(c, shares[1]) - gains)
+    limit = np.abs(filters.steady_gains(c) - gains)
     assert 0.85 * points < corrected.max() < points
     assert corrected[:2].max() < 0.06  # range and velocity, at any c
-    assert 0.9 * closed_form.LIMIT_POINTS < limit.max() < closed_form.LIMIT_POINTS
+    assert 0.9 * filters.LIMIT_POINTS < limit.max() < filters.LIMIT_POINTS
 
 
 def test_the_correction_is_of_the_first_order():
     """Halving the period takes the error of the limit down by two, that with the correction by four."""
     c, steps = np.full(2, 9.6), np.array([0.04, 0.02])
     gains = recursion(np.array([steps * c**-0.5, steps]))
-    without = closed_form.steady_gains(c) - gains
-    corrected = closed_form.steady_gains(c, steps) - gains
+    without = filters.steady_gains(c) - gains
+    corrected = filters.steady_gains(c, steps) - gains
     assert without[:2, 0] / without[:2, 1] == pytest.approx([2, 2], rel=0.1)
     assert corrected[:2, 0] / corrected[:2, 1] == pytest.approx([4, 4], rel=0.15)
 
@@ -82,7 +81,7 @@ def test_many_radars_at_once_are_as_one_by_one():
     gains = recursion(shares)
     for i in range(40):
         sigma, variance = np.array([1.0, shares[0, i]]), shares[1, i] ** 6
-        both = [np.sqrt(np.diag(exact.steady_state(n, variance, sigma, 1.0)[1])) for n in (1, 2)]
+        both = [np.sqrt(np.diag(filters.steady_state(n, variance, sigma, 1.0)[1])) for n in (1, 2)]
         assert gains[:, i] == pytest.approx(100 * (1 - both[1] / both[0]), abs=1e-6)
 
 
@@ -94,7 +93,7 @@ def test_the_lines_over_time_are_those_of_the_textbook_and_end_in_the_closed_for
     for i in (0, len(t) // 4):
         scans = round(t[i] / dt) + 1
         assert gain[i] == pytest.approx(impulse.gains(scans, tau_2**-6, (1.0, 1.0), dt), abs=1e-6)
-    assert gain[-1] == pytest.approx(closed_form.steady_gains(c), abs=0.45)
+    assert gain[-1] == pytest.approx(filters.steady_gains(c), abs=0.45)
 
 
 def test_the_papers_radars_lie_where_the_paper_has_them(tmp_path):
@@ -116,8 +115,8 @@ def test_ones_own_radar_is_named_and_marked(made):
     rows = pd.read_csv(made.folder / "chart.csv")
     assert rows["case"].unique().tolist() == ["rls2, as set", "rls1", "rls2", "rls3", "rls4", "rls5"]
     own = rows.iloc[0]
-    twin = exact.steady_state(2, 1e-3, np.array([250.0, 5.0]), 10.0)[1][0, 0]
-    base = exact.steady_state(1, 1e-3, np.array([250.0, 5.0]), 10.0)[1][0, 0]
+    twin = filters.steady_state(2, 1e-3, np.array([250.0, 5.0]), 10.0)[1][0, 0]
+    base = filters.steady_state(1, 1e-3, np.array([250.0, 5.0]), 10.0)[1][0, 0]
     assert own["steady_gain_percent"] == pytest.approx(100 * (1 - np.sqrt(twin / base)), rel=1e-9)
 
 
@@ -128,7 +127,7 @@ def test_the_lines_of_the_map_are_crossed_where_they_say():
         for j in (3, 12, 22):
             place = drawn._last_crossing(x, drawn.map_gains()[component, j], level)
             if np.isfinite(place):
-                at = steady.exact_gains(np.array([np.exp(place)]), drawn.MAP_LAMBDA[j : j + 1])
+                at = filters.exact_gains(np.array([np.exp(place)]), drawn.MAP_LAMBDA[j : j + 1])
                 assert at[component, 0] == pytest.approx(level, abs=0.4)
 
 
@@ -173,7 +172,7 @@ def test_the_table_on_the_wall_is_the_closed_form():
     rows = re.findall(r"^\| ([\d.]+) \| ([-\d.]+) \| ([-\d.]+) \| ([-\d.]+) \|$", text, re.MULTILINE)
     assert len(rows) == 8
     for c, *gains in rows:
-        assert [float(one) for one in gains] == pytest.approx(closed_form.steady_gains(float(c)), abs=0.0501)
+        assert [float(one) for one in gains] == pytest.approx(filters.steady_gains(float(c)), abs=0.0501)
 
 
 def test_the_command(tmp_path):
@@ -217,7 +216,7 @@ def test_a_config_given_twice_counts_once_and_figures_are_told(tmp_path):
 def test_a_radar_beyond_the_closed_forms_promise_is_told(sigma_velocity_mps, period, said, tmp_path):
     settings = [f"radar.sigma_velocity_mps={sigma_velocity_mps}", f"radar.scan_period_s={period}"]
     found = chart(["rls2"], tmp_path, overrides=settings, formats=[])
-    assert (closed_form.groups(250, sigma_velocity_mps, period, 1e-3).c > closed_form.LARGEST) == bool(said)
+    assert (filters.groups(250, sigma_velocity_mps, period, 1e-3).c > filters.LARGEST) == bool(said)
     assert ("is not promised to be near" in found.sentences[0]) == bool(said)
     assert said in found.sentences[0]
     if said == "here it is":

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from radarsim.studies.range_doppler import closed_form, exact, recursion
+from radarsim.studies.range_doppler import filters, recursion
 from radarsim.studies.range_doppler.measures import RADARS
 
 VERSION = [("random_jerk", 1e-3, "weighted")]
@@ -20,12 +20,12 @@ def test_gains_depend_on_the_scan_and_the_two_groups_alone():
     for _ in range(300):
         sigma_r, sigma_V, dt = 10 ** rng.uniform([0, -1, -1], [3, 2, 2])
         variance = 10 ** rng.uniform(-6, 2)
-        of = closed_form.groups(sigma_r, sigma_V, dt, variance)
+        of = filters.groups(sigma_r, sigma_V, dt, variance)
         # Another radar with the same groups: a range and a period of its own, the rest follows.
         other_r, other_dt = 10 ** rng.uniform([0, -1], [3, 2])
         other_V = other_r / (other_dt * np.sqrt(of.C_theta))
         other_variance = (of.Lambda * other_r / other_dt**3) ** 2
-        same = closed_form.groups(other_r, other_V, other_dt, other_variance)
+        same = filters.groups(other_r, other_V, other_dt, other_variance)
         assert np.allclose(same, of, rtol=1e-12)
         own, other = gains((sigma_r, sigma_V, dt), variance), gains((other_r, other_V, other_dt), other_variance)
         # Gains are differences of two σ: rounding is that of σ, amplified where the groups are extreme.
@@ -45,58 +45,58 @@ def riccati(c):
 @pytest.mark.parametrize("c", [0.0, 1e-3, 0.1, 0.698, 3.0, 30.0, 300.0, 1e4])
 def test_the_rational_forms_solve_the_riccati_and_the_lyapunov_equation(c):
     P, K, H, R = riccati(c)
-    np.testing.assert_allclose(closed_form.believed(c), P, rtol=1e-8)
-    np.testing.assert_allclose(closed_form.steady_gain(c)[:, : len(H)], K, rtol=1e-8)
+    np.testing.assert_allclose(filters.believed(c), P, rtol=1e-8)
+    np.testing.assert_allclose(filters.steady_gain(c)[:, : len(H)], K, rtol=1e-8)
     closed = MOTION - K @ H
-    np.testing.assert_allclose(np.poly(closed), closed_form.error_polynomial(c), rtol=1e-8)
+    np.testing.assert_allclose(np.poly(closed), filters.error_polynomial(c), rtol=1e-8)
     noise = np.diag(scipy.linalg.solve_continuous_lyapunov(closed, -K @ R @ K.T))
-    np.testing.assert_allclose(closed_form.noise_variances(c), noise, rtol=1e-7)
+    np.testing.assert_allclose(filters.noise_variances(c), noise, rtol=1e-7)
 
 
 def test_the_forms_take_arrays():
     c = np.array([[0.0, 0.7], [5.0, 1e12]])
-    assert closed_form.steady_gains(c).shape == (3, 2, 2)
-    np.testing.assert_array_equal(closed_form.steady_gains(c)[:, 1, 0], closed_form.steady_gains(5.0))
-    np.testing.assert_array_equal(closed_form.steady_gains(c)[:, 0, 0], 0)
+    assert filters.steady_gains(c).shape == (3, 2, 2)
+    np.testing.assert_array_equal(filters.steady_gains(c)[:, 1, 0], filters.steady_gains(5.0))
+    np.testing.assert_array_equal(filters.steady_gains(c)[:, 0, 0], 0)
     # The vast c: gains near 100 %, as A ~ (4c)^(1/4) has them.
-    assert (closed_form.steady_gains(c)[:, 1, 1] > 96).all()
+    assert (filters.steady_gains(c)[:, 1, 1] > 96).all()
 
 
 def test_without_velocity_the_variances_are_simple_fractions():
-    np.testing.assert_allclose(closed_form.noise_variances(0.0), [5 / 3, 3 / 2, 1 / 3], rtol=1e-12)
-    np.testing.assert_allclose(closed_form.error_polynomial(0.0), [1, 2, 2, 1], rtol=1e-12)
+    np.testing.assert_allclose(filters.noise_variances(0.0), [5 / 3, 3 / 2, 1 / 3], rtol=1e-12)
+    np.testing.assert_allclose(filters.error_polynomial(0.0), [1, 2, 2, 1], rtol=1e-12)
 
 
 @pytest.mark.parametrize("c", [0.3, 1.0, 10.0, 100.0])
 def test_the_limit_is_that_of_the_recursion_for_fast_scans(c):
     sigma_r, variance = 100.0, 1e-2
-    memory = closed_form.filter_memory(sigma_r, variance)
+    memory = filters.filter_memory(sigma_r, variance)
     sigma = np.array([sigma_r, sigma_r / (memory * np.sqrt(c))])
     away = []
     for share in (0.02, 0.01):
-        both = [exact.steady_state(observes, variance, sigma, share * memory)[1] for observes in (1, 2)]
+        both = [filters.steady_state(observes, variance, sigma, share * memory)[1] for observes in (1, 2)]
         base, own = (np.sqrt(np.diag(S)) for S in both)
-        away.append(recursion.gain(base, own) - closed_form.steady_gains(c))
+        away.append(recursion.gain(base, own) - filters.steady_gains(c))
     np.testing.assert_allclose(2 * away[1] - away[0], 0, atol=0.02)  # of first order in Δt: extrapolated, per cent
     assert np.all(abs(away[1]) < 0.03 * 100)
     unit = sigma_r**2 * share * memory**1 / memory * np.array([1, memory**-2, memory**-4])
-    np.testing.assert_allclose(np.diag(both[1]), unit * closed_form.noise_variances(c), rtol=0.1)
+    np.testing.assert_allclose(np.diag(both[1]), unit * filters.noise_variances(c), rtol=0.1)
 
 
 def test_the_acceleration_gain_changes_sign_at_c_of_seven_tenths():
-    at = closed_form.no_acceleration_gain()
+    at = filters.no_acceleration_gain()
     assert at == pytest.approx(0.698, abs=5e-4)
-    assert closed_form.steady_gains(0.9 * at)[2] < 0 < closed_form.steady_gains(1.1 * at)[2]
+    assert filters.steady_gains(0.9 * at)[2] < 0 < filters.steady_gains(1.1 * at)[2]
 
 
 def test_what_it_says_of_the_papers_radars():
-    of = {n: closed_form.groups(*radar, 1e-3) for n, radar in RADARS.items()}
+    of = {n: filters.groups(*radar, 1e-3) for n, radar in RADARS.items()}
     assert of[2].c == pytest.approx(of[3].c)
     assert of[4].c == pytest.approx(of[5].c)
     assert [round(of[n].c, 2) for n in (1, 2, 4)] == [0.29, 0.70, 18.42]
-    assert closed_form.steady_gains(of[1].c)[2] < -1  # RLS 1 loses in acceleration
-    assert abs(closed_form.steady_gains(of[2].c)[2]) < 0.1  # RLS 2 and 3 neither lose nor gain
-    assert closed_form.steady_gains(of[4].c)[2] > 20
+    assert filters.steady_gains(of[1].c)[2] < -1  # RLS 1 loses in acceleration
+    assert abs(filters.steady_gains(of[2].c)[2]) < 0.1  # RLS 2 and 3 neither lose nor gain
+    assert filters.steady_gains(of[4].c)[2] > 20
 
 
 def test_a_target_that_moves_as_believed_never_loses_by_the_velocity():

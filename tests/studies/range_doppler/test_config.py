@@ -215,7 +215,7 @@ def test_unknown_key(good, said, key, message):
 
 
 def test_the_contracts_example(house, said):
-    from radarsim.config.lookup import SHIPPED
+    from radarsim.config.document import SHIPPED
 
     text = (SHIPPED / "configs/rls2.yaml").read_text()
     house("configs/rls2.yaml", text.replace("sigma_range_m: 250", "sigma_range_m: -250"))
@@ -378,7 +378,7 @@ def test_either_scans_or_a_duration(good, said):
 
 
 def test_a_duration_is_the_scans_that_it_makes(good):
-    from radarsim.config.identity import canonical, complete
+    from radarsim.config.experiment import canonical, complete
 
     given = load(good).cases[0].spec
     del good["scans"]

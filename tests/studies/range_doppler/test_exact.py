@@ -3,12 +3,19 @@
 import numpy as np
 import pytest
 
+from radarsim import physics
 from radarsim.kernels.algebra import pack
-from radarsim.physics import targets
-from radarsim.physics.motion import process_noise, transition
-from radarsim.studies.range_doppler.exact import error_recursion, normalised_error, steady_state
-from radarsim.studies.range_doppler.filters import design, least_squares_start, noise_by_time, observation
-from radarsim.studies.range_doppler.propagation import Plots
+from radarsim.physics import process_noise, transition
+from radarsim.studies.range_doppler.filters import (
+    Plots,
+    design,
+    error_recursion,
+    least_squares_start,
+    noise_by_time,
+    normalised_error,
+    observation,
+    steady_state,
+)
 
 RADARS = {"rls1": (25, 5, 10), "rls2": (250, 15, 10), "rls3": (250, 15, 5), "rls4": (50, 1, 10), "rls5": (50, 1, 5)}
 START = {1: 3, 2: 2}
@@ -19,7 +26,7 @@ def sigmas(radar, observes, variance=1e-3, scans=15, coefficients=(1e5, -250.0, 
     *sigma, dt = RADARS[radar]
     sigma = np.array(sigma, dtype=float)
     made = design(observes, START[observes], variance, sigma, dt, scans)
-    x = targets.polynomial(coefficients, np.arange(scans) * dt)
+    x = physics.polynomial(coefficients, np.arange(scans) * dt)
     lasting, covariance = error_recursion(made, Plots(sigma), x, dt)
     return lasting[:, :, 0], np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)), made
 
@@ -99,7 +106,7 @@ def test_believed_covariance_without_manoeuvre_variance_is_the_true_one():
     sigma = np.array([250.0, 15.0])
     for observes in (1, 2):
         made = design(observes, START[observes], 0.0, sigma, 10.0, 15)
-        x = targets.polynomial([1e5, -250.0, 4.0], np.arange(15) * 10.0)
+        x = physics.polynomial([1e5, -250.0, 4.0], np.arange(15) * 10.0)
         _, covariance = error_recursion(made, Plots(sigma), x, 10.0)
         # Down to the rounding of the start, whose largest terms cancel.
         np.testing.assert_allclose(made.believed[1:], covariance[1:], rtol=1e-9, atol=1e-12)
@@ -111,7 +118,7 @@ def test_believed_covariance_without_manoeuvre_variance_is_the_true_one():
 def test_start_weights_return_a_polynomial_exactly(observes, n):
     dt = 10.0
     weights, _ = least_squares_start(observes, n, np.array([25.0, 5.0]), dt)
-    x = targets.polynomial([3e4, 120.0, -2.0], np.arange(n) * dt)
+    x = physics.polynomial([3e4, 120.0, -2.0], np.arange(n) * dt)
     np.testing.assert_allclose(np.einsum("ijk,kj->i", weights, x[:, :2]), x[-1], rtol=1e-9, atol=1e-9)
     assert not weights[:, observes:].any()
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import norm
 
 from radarsim.app.run import load_all
-from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.physics import manoeuvre_covariance, transition
 from radarsim.studies.range_doppler.track import STARTING, WIDE_ACCELERATION_MPS2, WIDE_VELOCITY_MPS, PlotLikelihood
 
 T_S = np.array([0.0, 4.0, 9.0, 12.0, 20.0, 26.0, 30.0, 33.0])

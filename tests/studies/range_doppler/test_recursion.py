@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from radarsim.physics.motion import manoeuvre_covariance, transition
-from radarsim.studies.range_doppler import exact, recursion
-from radarsim.studies.range_doppler.filters import design
+from radarsim.physics import manoeuvre_covariance, transition
+from radarsim.studies.range_doppler import filters, recursion
+from radarsim.studies.range_doppler.filters import Plots, design
 from radarsim.studies.range_doppler.measures import RADARS
-from radarsim.studies.range_doppler.propagation import Plots
 
 VARIANCES = (1e-5, 1e-3, 1e-1)
 
@@ -20,7 +19,7 @@ def test_the_papers_filter_is_the_one_of_one_filter_at_a_time(radar, start, scan
     for observes, of in zip((1, 2), found, strict=True):
         for i, variance in enumerate(VARIANCES):
             one = design(observes, scans[observes - 1], variance, sigma, dt, 29)
-            _, S = exact.error_recursion(one, Plots(sigma), np.zeros((29, 3)), dt)
+            _, S = filters.error_recursion(one, Plots(sigma), np.zeros((29, 3)), dt)
             true = np.sqrt(np.diagonal(S, axis1=1, axis2=2))
             believed = np.sqrt(np.diagonal(one.believed, axis1=1, axis2=2))
             known = one.available

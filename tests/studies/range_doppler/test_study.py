@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.app.work import CaseWork
-from radarsim.engine.collect import collect
+from radarsim.app.configs import CaseWork, load
+from radarsim.engine.run import collect
 from radarsim.studies.identity import identity
 from radarsim.studies.noise import noise_key
 

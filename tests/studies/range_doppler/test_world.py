@@ -13,10 +13,11 @@ from radarsim.app.configs import load
 from radarsim.errors import ConfigError
 from radarsim.kernels.algebra import pack
 from radarsim.kernels.random import fill_normal_pairs
-from radarsim.physics.motion import process_noise
-from radarsim.studies.range_doppler import means, patterns, study, tuning, world
+from radarsim.physics import process_noise
+from radarsim.studies.range_doppler import filters as world
+from radarsim.studies.range_doppler import patterns, study, tuning
+from radarsim.studies.range_doppler.filters import Plots
 from radarsim.studies.range_doppler.kernels import missed
-from radarsim.studies.range_doppler.propagation import Plots
 from tests.studies.range_doppler import naive
 
 SIGMAS = 5.85  # of all looks in this file, one in a million errs
@@ -234,7 +235,7 @@ def test_gain_is_of_those_that_have_both_estimates(seven):
 @pytest.mark.parametrize("detection", [0.8, 0.5])
 def test_means_over_merged_patterns_are_those_over_all(detection, monkeypatch):
     monkeypatch.setattr(patterns, "WHOLE", 1 << 15)
-    monkeypatch.setattr(means, "FOUND", {})
+    monkeypatch.setattr(patterns, "FOUND", {})
     plan = prepared(scans=16, radar={"detection_probability": detection, "sigma_bias_range_m": 10})
     plots, axes, later = Plots(SIGMA, np.zeros(2), np.array([10.0, 0.0]), detection), plan.axes, slice(3, None)
     Q = pack(process_noise("random_jerk", VARIANCE, DT))
@@ -281,7 +282,7 @@ def test_a_shortened_case_has_the_same_exact_errors_where_it_is_asked():
 
 
 def test_where_patterns_are_too_many_nothing_is_called_exact(monkeypatch):
-    monkeypatch.setattr(means, "PATTERN_SCANS", 8)
+    monkeypatch.setattr(patterns, "PATTERN_SCANS", 8)
     assert np.isnan(prepared(radar={"detection_probability": 0.75}).axes.exact_sigma).all()
 
 
@@ -520,7 +521,7 @@ def test_without_a_manoeuvre_the_best_variance_is_the_least():
 
 def test_the_papers_noise_keeps_its_key():
     """Keys at their defaults change neither noise nor identity: an older config draws what it drew."""
-    from radarsim.config.identity import canonical, world
+    from radarsim.config.experiment import canonical, world
 
     given = load("rls2", ["radar.detection_probability=1", "radar.bias_range_m=0"])
     plain = load("rls2").cases[0].spec

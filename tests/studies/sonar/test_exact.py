@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from radarsim.studies.sonar import exact, filters
-from radarsim.studies.sonar import world as models
+from radarsim.studies.sonar import exact, filters, world
 
 
 def test_sigma_formulas_have_the_digests_values():
@@ -30,7 +29,7 @@ def test_720_formula_is_least_squares(n):
 )
 def test_table_of_the_digest(rho, n, optimal, naive, believed):
     t = np.arange(float(n))
-    C = models.error_covariance(np.ones(n), rho, t, 1.0)
+    C = world.error_covariance(np.ones(n), rho, t, 1.0)
     _, P = exact.generalised_least_squares(t, C, 2)
     W, plain = exact.generalised_least_squares(t, np.eye(n), 2)
     assert np.sqrt(np.diag(P)).round(4) == pytest.approx(optimal)
@@ -48,8 +47,8 @@ def test_recursion_of_true_errors_is_that_of_the_weights(rho, size):
     t = np.arange(12) * 5.0
     plots = filters.Plots(t, seen.astype(float), 5.0, 30.0)
     truth = np.stack([9e3 - 4 * t + 0.01 * t**3, -4 + 0.03 * t**2, 0.06 * t], axis=1)
-    steps = models.step_correlations(rho, t, 5.0)
-    C = models.error_covariance(np.full(12, 30.0), rho, t, 5.0)
+    steps = world.step_correlations(rho, t, 5.0)
+    C = world.error_covariance(np.full(12, 30.0), rho, t, 5.0)
     for design in (
         filters.recursive(plots, size),
         filters.recursive(plots, size, 0.6, 1e-4),
@@ -87,7 +86,7 @@ def test_walk_of_velocity_by_both_ways_of_reckoning():
     design = filters.recursive(plots, 2)
     _, S = exact.recursive_errors(design.gain, design.carry, t, truth, np.zeros(9), np.full(9, 30.0), walk)
     first, W, _ = filters.window_weights(plots, 8, 9, 2)
-    C = models.error_covariance(np.full(9, 30.0), 0.0, t, 5.0)
+    C = world.error_covariance(np.full(9, 30.0), 0.0, t, 5.0)
     _, other = exact.weighted_errors(W, first, t, truth, C, walk, first)
     assert S[0, 8] == pytest.approx(other[0], rel=1e-9)
 
@@ -95,7 +94,7 @@ def test_walk_of_velocity_by_both_ways_of_reckoning():
 def test_consistency_of_the_naive_filter():
     """NEES of a filter that ignores ρ = 0.9: by calculation far over 2; of a consistent one, 2."""
     n, t = 20, np.arange(20.0)
-    C = models.error_covariance(np.ones(n), 0.9, t, 1.0)
+    C = world.error_covariance(np.ones(n), 0.9, t, 1.0)
     W, plain = exact.generalised_least_squares(t, np.eye(n), 2)
     _, P = exact.generalised_least_squares(t, C, 2)
     zero = np.zeros(2)

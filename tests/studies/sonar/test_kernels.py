@@ -5,8 +5,7 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.kernels.random import fill_normal_pairs, fill_uniform_pairs
-from radarsim.studies.sonar import STUDY
-from radarsim.studies.sonar import world as models
+from radarsim.studies.sonar import STUDY, world
 from tests.studies.sonar import naive as naive
 
 T, SCANS = 5.0, 18
@@ -128,7 +127,7 @@ def test_converted_plots_and_their_weights(frame):
     case = load(config(frame, detection_probability=0.8)).cases[0]
     plan = STUDY.prepare(case)
     truth, polar, t = plan.world.truth, plan.axes.polar, np.arange(SCANS) * T
-    convert = models.converted if frame == "cartesian" else models.converted_unbiased
+    convert = world.converted if frame == "cartesian" else world.converted_unbiased
     for realisation in (0, 77):
         sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
         e, detected = plots(plan, realisation, 0.0, 0.8)
@@ -136,7 +135,7 @@ def test_converted_plots_and_their_weights(frame):
         x, y, (xx, _, yy) = convert(r, b, *SIGMA)
         if frame == "cartesian_unbiased":
             xx, _, yy = np.full((3, SCANS), np.nan)
-            xx[detected], _, yy[detected] = convert(*models.places(r[detected], b[detected]), *SIGMA)[2]
+            xx[detected], _, yy[detected] = convert(*world.places(r[detected], b[detected]), *SIGMA)[2]
         for c, (z, variance) in enumerate(((x, xx), (y, yy))):
             for k in range(2, SCANS):
                 at = np.flatnonzero(detected[: k + 1])

@@ -1,4 +1,21 @@
-"""A strip of scans with one filter: the track's start, models over the real interval, missed plots, outputs.
+"""Plots of a strip of scans for eight realisations: noise by counter, biconical coordinates, local frame, covariance.
+
+Layout of the noise: a scan takes three normals. The pair 24 s + j of a realisation (j = 0 … 23) gives the normals j and
+24 + j of the 48 of strip s, whose scan n takes 3 n, 3 n + 1, 3 n + 2 for range, elevation, azimuth. Of the stream of
+detections, the pair 8 s + j gives the uniform numbers of the scans j and 8 + j of strip s.
+
+Letters, each of eight lanes:
+
+    r                       measured range, m
+    sine_e, cosine_e        of the measured elevation; sine_a, cosine_a: of the azimuth (biconical)
+    u                       direction cosine of the plot along the antenna's normal, u² = 1 - sine_e² - sine_a²
+    x, y, z                 position (antenna's axes: x along the normal)
+    p                       covariance of a plot R J diag(sigma²) J' R' (eq. 10) as (xx, xy, xz, yy, yz, zz), m²
+    detected                1 where a plot is detected, else 0
+
+`frame` is the address of the plain numbers of a sensor, see `frame` and `records`.
+
+A strip of scans with one filter: the track's start, models over the real interval, missed plots, outputs.
 
 Letters, each of eight lanes but for the numbers i, j of models:
 
@@ -9,21 +26,209 @@ Letters, each of eight lanes but for the numbers i, j of models:
     R             covariance of a plot (6)
 
 `work`, `plots`, `out` and the like are addresses.
+
+A block of realisations of the multimodel study: plots, all filters on them, and the sums of what they estimate.
+
+Letters, each of eight lanes:
+
+    e          error of an estimate, by state (9), or of its position (3)
+    e0         the same of the baseline filter
+    p          probability of a model
+    q          e' P⁻¹ e of the position, with the covariance that the filter believes
+    counted    1 for the realisations that count, 0 for those beyond the block's last
+
+Arrays and their shapes: `records.World`, `Banks`, `Sums`; arguments that are not these are addresses or numbers.
+
+The logarithm of the likelihood of recorded plots under a filter: the density that its bank gives each plot.
+
+The filter is that of the simulation, run scan by scan. Its eight lanes are eight realisations there; here lane 0 takes
+the plots as they are stated, lane 1 as outliers, with FACTOR times their σ. Where outliers are allowed for, what the
+two leave of each model is merged by moments after every plot.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.kernels.algebra import dot, factored, scaled, whitened
 from radarsim.kernels.compile import inline, kernel, part
-from radarsim.kernels.lanes import address, any_greater, full, get, get3, put, put3, row, where_greater
+from radarsim.kernels.hypotheses import FACTOR
+from radarsim.kernels.lanes import (
+    WIDTH,
+    address,
+    any_greater,
+    full,
+    get,
+    get3,
+    put,
+    put3,
+    root,
+    row,
+    rows,
+    total,
+    where_greater,
+)
+from radarsim.kernels.random import U, fill_normal_strip, sine_cosine_polynomial, threefry, uniform
 from radarsim.studies.multimodel.kernels import records as rec
-from radarsim.studies.multimodel.kernels.filters import merge_gpb1, shares_by_rule, step
-from radarsim.studies.multimodel.kernels.hypothesis import merge, mixed_mean
-from radarsim.studies.multimodel.kernels.plots import noise_at_prediction
+from radarsim.studies.multimodel.kernels.hypothesis import merge, merge_gpb1, mixed_mean, shares_by_rule, step
 from radarsim.studies.multimodel.kernels.records import Rules
 
+# ---- plots -----------------------------------------------------------------------------------------------------------
+STRIP = 16  # scans
+NORMALS, UNIFORMS = 3 * STRIP, STRIP
+RANDOM = NORMALS + UNIFORMS  # rows of random numbers of a strip
+NEARLY_OUTSIDE = 0.1  # u under which no covariance at the prediction is used
+LEAST = 1e-6  # least u²: nearer to the antenna's plane a plot is missed
 
+
+def frame(rotation, height: float, sigma, form: int, unbiased: bool, detection: float) -> np.ndarray:
+    """The numbers (FRAME,) of a sensor, in the order of `records`.
+
+    rotation (3, 3) from the antenna's axes to the local ones; height of the phase centre, m; sigma (3,) of range (m),
+    elevation and azimuth (rad), or of x, y, z (m) where form is CARTESIAN; unbiased: with the unbiased conversion;
+    detection: probability of detection.
+    """
+    return np.concatenate([np.ravel(rotation), sigma, [height, form, unbiased, detection, 0.0, 0.0]]).astype(float)
+
+
+@part
+def draw_strip(keys, first, strip, random):
+    """Random numbers of strip `strip` for the realisations first … first + 7, into `random` (RANDOM rows).
+
+    keys (2, 2): streams of the noise and of the detections.
+    """
+    size = NORMALS // 2 * WIDTH
+    fill_normal_strip(keys[0], first, strip * (NORMALS // 2), random[:size], random[size : 2 * size])
+    k0, k1 = keys[1, 0], keys[1, 1]
+    half = NORMALS * WIDTH + UNIFORMS // 2 * WIDTH
+    for n in range(UNIFORMS // 2 * WIDTH):
+        x, y = threefry(U(first) + U(n % WIDTH), U(strip * (UNIFORMS // 2)) + U(n // WIDTH), k0, k1)
+        random[NORMALS * WIDTH + n], random[half + n] = uniform(x), uniform(y)
+
+
+@inline
+def rotated(frame, x):
+    """R x: from the antenna's axes to those of the local frame."""
+    return (
+        frame[0] * x[0] + frame[1] * x[1] + frame[2] * x[2],
+        frame[3] * x[0] + frame[4] * x[1] + frame[5] * x[2],
+        frame[6] * x[0] + frame[7] * x[1] + frame[8] * x[2],
+    )
+
+
+@inline
+def covariance(frame, r, sine_e, cosine_e, sine_a, cosine_a, u):
+    """R J diag(sigma²) J' R' of eq. (10); a, b, c: the columns of R J diag(sigma)."""
+    zero, s = full(0.0), 1.0 / u
+    a = rotated(frame, (u * frame[rec.SIGMA], sine_e * frame[rec.SIGMA], sine_a * frame[rec.SIGMA]))
+    t = r * cosine_e * frame[rec.SIGMA + 1]
+    b = rotated(frame, ((0.0 - t) * sine_e * s, t, zero))
+    t = r * cosine_a * frame[rec.SIGMA + 2]
+    c = rotated(frame, ((0.0 - t) * sine_a * s, zero, t))
+    x, y, z = (a[0], b[0], c[0]), (a[1], b[1], c[1]), (a[2], b[2], c[2])
+    return dot(x, x), dot(x, y), dot(x, z), dot(y, y), dot(y, z), dot(z, z)
+
+
+@inline
+def put_plot(plots, x, p, detected):
+    """Write a plot's rows: position, covariance, detection."""
+    for i in range(3):
+        put(plots, rec.POSITION + i, x[i])
+    for i in range(6):
+        put(plots, rec.COVARIANCE + i, p[i])
+    put(plots, rec.DETECTED, detected)
+
+
+@inline
+def biconical_plot(plots, frame, r, sine_e, cosine_e, sine_a, cosine_a, detected):
+    """A plot of range r and the two biconical angles, in the local frame (eq. 10 and the two turns)."""
+    e2, a2 = sine_e * sine_e, sine_a * sine_a
+    u2, least = 1.0 - e2 - a2, full(LEAST)
+    detected = where_greater(u2, least, detected, full(0.0))
+    u2 = where_greater(u2, least, u2, least)
+    u = root(u2)
+    x = (r * u, r * sine_e, r * sine_a)
+    if frame[rec.UNBIASED] == 1.0:
+        # E[sin] shrinks by exp(-variance / 2); the second-order term of the Taylor series of u is subtracted.
+        ve, va = frame[rec.SIGMA + 1] * frame[rec.SIGMA + 1], frame[rec.SIGMA + 2] * frame[rec.SIGMA + 2]
+        ce2, ca2, s = 1.0 - e2, 1.0 - a2, 1.0 / u
+        bend = ve * (e2 - ce2 - e2 * ce2 * s * s) + va * (a2 - ca2 - a2 * ca2 * s * s)
+        x = (r * (u - 0.5 * s * bend), r * sine_e * (1.0 + 0.5 * ve), r * sine_a * (1.0 + 0.5 * va))
+    x = rotated(frame, x)
+    p = covariance(frame, r, sine_e, cosine_e, sine_a, cosine_a, u)
+    put_plot(plots, (x[0], x[1] + frame[rec.HEIGHT], x[2]), p, detected)
+
+
+@inline
+def turned(sine, cosine, delta):
+    """Sine and cosine of an angle increased by delta (lanes, |delta| up to pi/4)."""
+    s, c = sine_cosine_polynomial(delta)
+    return sine * c + cosine * s, cosine * c - sine * s
+
+
+@inline
+def make_plots(random, frame, truth, scan, scans, certain, plots):
+    """Plots of the scans `scan` … of a strip from their random rows.
+
+    truth: PLOT_TRUTH plain numbers a scan of the whole track. The first `certain` plots of a track are always
+    detected.
+    """
+    one, zero = full(1.0), full(0.0)
+    for n in range(scans):
+        t, at, normal = rec.PLOT_TRUTH * (scan + n), rec.PLOT_TRUTH * (scan + n) + rec.COORDINATES, 3 * n
+        a, b, c = get(random, normal), get(random, normal + 1), get(random, normal + 2)
+        detected = where_greater(full(frame[rec.DETECTION]), get(random, NORMALS + n), one, zero)
+        if scan + n < certain:
+            detected = one
+        s0, s1, s2 = frame[rec.SIGMA], frame[rec.SIGMA + 1], frame[rec.SIGMA + 2]
+        if frame[rec.FORM] == rec.CARTESIAN:
+            x = truth[at] + s0 * a, truth[at + 1] + s1 * b, truth[at + 2] + s2 * c
+            put_plot(
+                row(plots, n * rec.PLOT), x, (full(s0 * s0), zero, zero, full(s1 * s1), zero, full(s2 * s2)), detected
+            )
+        else:
+            sine_e, cosine_e = turned(truth[t + rec.ELEVATION], truth[t + rec.ELEVATION + 1], s1 * b)
+            sine_a, cosine_a = turned(truth[t + rec.AZIMUTH], truth[t + rec.AZIMUTH + 1], s2 * c)
+            r = truth[t + rec.RANGE] + s0 * a
+            biconical_plot(row(plots, n * rec.PLOT), frame, r, sine_e, cosine_e, sine_a, cosine_a, detected)
+
+
+@part
+def noise_at_prediction(frame, mean, wait, at_plot, noise):
+    """Covariance (6 rows at `noise`) of a plot at the place that the estimate `mean` (9 rows) is extrapolated to over
+    `wait` s, eq. (10).
+
+    Where this place is outside the sector, or nearly so, the covariance at the plot (6 rows at `at_plot`) is taken.
+    """
+    half = 0.5 * wait * wait
+    a = get(mean, 0) + wait * get(mean, 1) + half * get(mean, 2)
+    b = get(mean, 3) + wait * get(mean, 4) + half * get(mean, 5) - frame[rec.HEIGHT]
+    c = get(mean, 6) + wait * get(mean, 7) + half * get(mean, 8)
+    x = frame[0] * a + frame[3] * b + frame[6] * c
+    y = frame[1] * a + frame[4] * b + frame[7] * c
+    z = frame[2] * a + frame[5] * b + frame[8] * c
+    r = root(x * x + y * y + z * z)
+    scale, least, one = 1.0 / r, full(NEARLY_OUTSIDE), full(1.0)
+    sine_e, sine_a, u = y * scale, z * scale, x * scale
+    inside = where_greater(u, least, one, full(0.0))
+    sine_e, sine_a = sine_e * inside, sine_a * inside
+    u = where_greater(u, least, u, one)
+    p = covariance(frame, r, sine_e, root(one - sine_e * sine_e), sine_a, root(one - sine_a * sine_a), u)
+    for i in range(6):
+        put(noise, i, where_greater(inside, full(0.5), p[i], get(at_plot, i)))
+
+
+@kernel
+def fill_plots(keys, frame, truth, certain, first, random, plots):
+    """All plots of the realisations first … first + 7 of a track, PLOT rows a scan; truth (K, PLOT_TRUTH)."""
+    scans = truth.shape[0]
+    for k in range(0, scans, STRIP):
+        draw_strip(keys, first, k // STRIP, random)
+        to = row(address(plots), k * rec.PLOT)
+        make_plots(address(random), address(frame), address(truth), k, min(STRIP, scans - k), certain, to)
+
+
+# ---- strip -----------------------------------------------------------------------------------------------------------
 class Filter(NamedTuple):
     """A filter, by addresses.
 
@@ -247,3 +452,312 @@ def filter_strip(work, numbers, plots, first, stop, models, transitions, interva
 def start_strip(work, numbers, plots, weights, probabilities):
     """`start` of arrays."""
     start(address(work), address(numbers), probabilities.size, address(plots), address(weights), address(probabilities))
+
+
+# ---- sums ------------------------------------------------------------------------------------------------------------
+class SumsMemory(NamedTuple):
+    """Memory of one thread for eight realisations: rows, and whole numbers.
+
+    works      WORK rows of each filter; numbers (F, 8), listed (MOST,): its whole numbers, see `strip.Memory`
+    random     RANDOM rows; plots: PLOT rows a scan of a strip; out: OUTPUT rows a filter and scan of a strip
+    stages     STAGE rows a filter and stage
+    counted    one row
+    """
+
+    works: np.ndarray
+    random: np.ndarray
+    plots: np.ndarray
+    out: np.ndarray
+    stages: np.ndarray
+    counted: np.ndarray
+    numbers: np.ndarray
+    listed: np.ndarray
+
+
+class ScanSums(NamedTuple):
+    """The sums of one filter and scan, by addresses: see `records.Sums`."""
+
+    error: np.ndarray
+    paired: np.ndarray
+    probability: np.ndarray
+    believed: np.ndarray
+
+
+def memory(filters: int, stages: int) -> SumsMemory:
+    """Memory for a number of filters and of stages."""
+    return SumsMemory(
+        works=rows(filters * rec.WORK),
+        random=rows(RANDOM),
+        plots=rows(STRIP * rec.PLOT),
+        out=rows(filters * STRIP * rec.OUTPUT),
+        stages=rows(filters * stages * rec.STAGE),
+        counted=rows(1),
+        numbers=np.zeros((filters, 8), dtype=np.int64),
+        listed=np.zeros(rec.MOST, dtype=np.int64),
+    )
+
+
+@inline
+def position_error(out, truth):
+    """Error of the estimated position (3)."""
+    return get(out, 0) - truth[0], get(out, 3) - truth[3], get(out, 6) - truth[6]
+
+
+@inline
+def believed_error(out, e):
+    """q = e' P⁻¹ e of the position (3), with the covariance that the filter believes."""
+    P = (
+        get(out, rec.VARIANCE),
+        get(out, rec.POSITION_COVARIANCE),
+        get(out, rec.POSITION_COVARIANCE + 1),
+        get(out, rec.VARIANCE + 3),
+        get(out, rec.POSITION_COVARIANCE + 2),
+        get(out, rec.VARIANCE + 6),
+    )
+    L, i, _ = factored(P)  # P = L D L', i: the diagonal of D⁻¹
+    e = whitened(e, L)
+    return dot(scaled(e, i), e)
+
+
+@part
+def add_scan(out, base, truth, counted, size, sums):
+    """Add a reported scan of eight realisations to the sums of that filter and scan (`ScanSums`).
+
+    out, base: outputs of the filter and of the baseline; truth (9,); size: number of models.
+    """
+    for c in range(rec.STATES):
+        e, e0 = counted * (get(out, c) - truth[c]), get(base, c) - truth[c]
+        e2 = e * e
+        sums.error[4 * c] += total(e)
+        sums.error[4 * c + 1] += total(e2)
+        sums.error[4 * c + 2] += total(e2 * e)
+        sums.error[4 * c + 3] += total(e2 * e2)
+        sums.paired[c] += total(e2 * (e0 * e0))
+    for i in range(size):
+        p = counted * get(out, rec.MODELS + i)
+        sums.probability[2 * i] += total(p)
+        sums.probability[2 * i + 1] += total(p * p)
+    q = counted * believed_error(out, position_error(out, truth))
+    sums.believed[0] += total(q)
+    sums.believed[1] += total(q * q)
+
+
+@part
+def add_to_stage(out, plot, truth, reported, stage):
+    """Add a scan to the rows of its stage: squared errors, NIS and merges; NEES where `reported`."""
+    for c in range(rec.STATES):
+        e = get(out, c) - truth[c]
+        put(stage, c, get(stage, c) + e * e)
+    detected = get(plot, rec.DETECTED)
+    put(stage, rec.NIS, get(stage, rec.NIS) + detected * get(out, rec.INNOVATION))
+    put(stage, rec.PLOTS, get(stage, rec.PLOTS) + detected)
+    for i in range(2):
+        put(stage, rec.MERGED + i, get(stage, rec.MERGED + i) + get(out, rec.MERGING + i))
+    if reported:
+        put(stage, rec.NEES, get(stage, rec.NEES) + believed_error(out, position_error(out, truth)))
+
+
+@part
+def close_stages(stages, filters, count, lengths, counted, sums, pairs):
+    """Add each realisation's means over each stage to the sums, and the products of all pairs of filters.
+
+    stages: rows of all filters, STAGE for each of `count` stages; lengths (count, 2): scans of a stage, and the
+    reported ones; sums (F, S, MEANS, 2); pairs (F, F, S, 9).
+    """
+    for s in range(count):
+        for f in range(filters):
+            own = row(stages, (f * count + s) * rec.STAGE)
+            for c in range(rec.MEANS):
+                length = full(max(lengths[2 * s + (1 if c == rec.NEES else 0)], 1.0))
+                if c == rec.NIS:
+                    length = where_greater(get(own, rec.PLOTS), full(0.5), get(own, rec.PLOTS), full(1.0))
+                put(own, c, get(own, c) / length)
+        for f in range(filters):
+            own, at = row(stages, (f * count + s) * rec.STAGE), f * count + s
+            for c in range(rec.MEANS):
+                x = counted * get(own, c)
+                sums[(at * rec.MEANS + c) * 2] += total(x)
+                sums[(at * rec.MEANS + c) * 2 + 1] += total(x * x)
+            for g in range(filters):
+                other, at = row(stages, (g * count + s) * rec.STAGE), (f * filters + g) * count + s
+                for c in range(rec.STATES):
+                    pairs[at * rec.STATES + c] += total(counted * get(own, c) * get(other, c))
+
+
+@inline
+def clear(first, count):
+    """Set `count` rows from the address `first` on to zero."""
+    for n in range(count):
+        put(first, n, full(0.0))
+
+
+@kernel
+def simulate_block(world, banks, memory, sums, baseline, first, count):
+    """Add the realisations first … first + count - 1 to the sums; gains are against the filter `baseline`."""
+    filters, scans, stages = banks.numbers.shape[0], world.truth.shape[0], world.lengths.shape[0]
+    padded = banks.transitions.shape[1] // WIDTH
+    for group in range(0, count, WIDTH):
+        for n in range(WIDTH):
+            memory.counted[n] = 1.0 if group + n < count else 0.0
+        clear(address(memory.stages), filters * stages * rec.STAGE)
+        for k in range(0, scans, STRIP):
+            length, begin = min(STRIP, scans - k), rec.START if k == 0 else 0
+            draw_strip(world.keys, first + group, k // STRIP, memory.random)
+            plots, frame = address(memory.plots), address(world.frame)
+            make_plots(address(memory.random), frame, address(world.plot_truth), k, length, rec.START, plots)
+            # This loop is written out: as a function of its own it makes LLVM fuse the products in GPB2's merges in
+            # another order, and the last bits of the results change.
+            for f in range(filters):
+                work, numbers = row(address(memory.works), f * rec.WORK), row(address(memory.numbers), f)
+                size = banks.numbers[f, rec.SIZE]
+                if k == 0:
+                    start(work, numbers, size, plots, address(world.weights), row(address(banks.probabilities), f))
+                rules = rules_of(row(address(banks.numbers), f), size)
+                design = Filter(rules, row(address(banks.models), 2 * f), row(address(banks.transitions), padded * f))
+                intervals, reported = address(world.intervals[k:]), address(world.reported[k:])
+                span = Scans(begin, length, intervals, address(world.times), reported)
+                own = Memory(work, numbers, address(memory.listed))
+                run_strip(own, design, span, plots, frame, row(address(memory.out), f * STRIP * rec.OUTPUT))
+            add_strip(world, banks, memory, sums, baseline, k, begin, length)
+        lengths, counted = address(world.lengths), get(address(memory.counted), 0)
+        close_stages(
+            address(memory.stages), filters, stages, lengths, counted, address(sums.stage), address(sums.pairs)
+        )
+
+
+@inline
+def add_strip(world, banks, memory, sums, baseline, k, begin, length):
+    """Add the outputs of all filters over a strip that starts at scan k."""
+    stages = world.lengths.shape[0]
+    base = row(address(memory.out), baseline * STRIP * rec.OUTPUT)
+    counted = get(address(memory.counted), 0)
+    for f in range(banks.numbers.shape[0]):
+        for n in range(begin, length):
+            out, truth = row(address(memory.out), (f * STRIP + n) * rec.OUTPUT), address(world.truth[k + n])
+            stage = row(address(memory.stages), (f * stages + world.stage[k + n]) * rec.STAGE)
+            reported = world.reported[k + n] == 1
+            add_to_stage(out, row(address(memory.plots), n * rec.PLOT), truth, reported, stage)
+            if reported:
+                place = world.place[k + n]
+                places = ScanSums(
+                    address(sums.error[f, place]),
+                    address(sums.paired[f, place]),
+                    address(sums.probability[f, place]),
+                    address(sums.believed[f, place]),
+                )
+                add_scan(out, row(base, n * rec.OUTPUT), truth, counted, banks.numbers[f, rec.SIZE], places)
+
+
+# ---- likelihood ------------------------------------------------------------------------------------------------------
+@kernel
+def log_likelihood(work, numbers, plots, models, transitions, intervals, times, rules, frame, share, score):
+    """Add up the densities of the plots of n scans.
+
+    work, numbers: a filter's memory, started; plots (n · PLOT rows), of which lane 1 gets FACTOR times the σ; models,
+    transitions, intervals (n,), times, rules, frame as in `strip.filter_strip`; share of outliers. Out: score (n,), the
+    logarithm of each plot's density given those before it, zero where there is none.
+    """
+    n, own = score.size, rules_of(rules, models.size // rec.MODEL_NUMBERS)
+    out, reported = np.empty(n * rec.OUTPUT * WIDTH), np.zeros(n, dtype=np.int64)
+    for k in range(n):
+        for i in range(6):
+            plots[(k * rec.PLOT + rec.COVARIANCE + i) * WIDTH + 1] *= FACTOR * FACTOR
+    listed = np.zeros(rec.MOST, dtype=np.int64)
+    memory = Memory(address(work), address(numbers), address(listed))
+    design = Filter(own, address(models), address(transitions))
+    for k in range(n):
+        scans = Scans(k, k + 1, address(intervals), address(times), address(reported))
+        run_strip(memory, design, scans, address(plots), address(frame), address(out))
+        score[k] = 0.0
+        if plots[(k * rec.PLOT + rec.DETECTED) * WIDTH] > 0.5:
+            new = numbers[rec.CURRENT] * rec.BANK
+            plain, wild = density(work, rec.BANK - new, new, own, 0), density(work, rec.BANK - new, new, own, 1)
+            score[k] = plain
+            if share > 0.0:
+                plain, wild = plain + np.log(1.0 - share), wild + np.log(share)
+                most = max(plain, wild)
+                score[k] = most + np.log(np.exp(plain - most) + np.exp(wild - most))
+                merge_lanes(work, new, own, np.exp(plain - score[k]), np.exp(wild - score[k]))
+
+
+@inline
+def density(work, old, new, rules, lane):
+    """The logarithm of the density that the old bank gave the plot of a lane: Σ c N(innovation; 0, S) over the models.
+
+    c is the predicted probability of a model. Of pairs of models (GPB2) the memory still has those that end in the last
+    one: their sum is its part of the whole, of which its new probability is the share.
+    """
+    size, total, least = rules.size, 0.0, 1e300
+    last, at = size - 1, rec.RESULT if rules.family == rec.GPB2 else rec.RESULT_GROUP
+    for i in range(size):
+        if predicted_probability(work, old, rules, lane, i) > 0.0:
+            least = min(least, work[(at + 2 * i) * WIDTH + lane])
+    for i in range(size):
+        c = predicted_probability(work, old, rules, lane, i)
+        if c > 0.0:
+            q, determinant = work[(at + 2 * i) * WIDTH + lane], work[(at + 2 * i + 1) * WIDTH + lane]
+            total += c * np.exp(0.5 * (least - q)) / np.sqrt(determinant)
+    part = work[(new + last * rec.HYPOTHESIS + rec.PROBABILITY) * WIDTH + lane] if rules.family == rec.GPB2 else 1.0
+    if not (total > 0.0 and part > 0.0):
+        return np.nan
+    return np.log(total) - np.log(part) - 0.5 * least - 1.5 * np.log(2.0 * np.pi)
+
+
+@inline
+def predicted_probability(work, old, rules, lane, i):
+    """The predicted probability of model i; of GPB2, that of the pair that leads from model i to the last one."""
+    if rules.family == rec.GPB2:
+        last = rules.size - 1
+        return work[(rec.TRANSITION + last * rec.MOST + i) * WIDTH + lane] * probability(work, old, lane, i)
+    c = 0.0
+    for j in range(rules.size):
+        c += work[(rec.TRANSITION + i * rec.MOST + j) * WIDTH + lane] * probability(work, old, lane, j)
+    return c
+
+
+@inline
+def probability(work, bank, lane, i):
+    """The probability of model i of a bank."""
+    return work[(bank + i * rec.HYPOTHESIS + rec.PROBABILITY) * WIDTH + lane]
+
+
+@kernel
+def merge_lanes(work, bank, rules, plain, wild):
+    """Merge each model's hypotheses of lanes 0 and 1, of chances plain and wild, into both."""
+    for i in range(rules.size):
+        first = (bank + i * rec.HYPOTHESIS) * WIDTH
+        p, q = plain * probability(work, bank, 0, i), wild * probability(work, bank, 1, i)
+        # GPB1 has one hypothesis, the first, whatever the models' probabilities are.
+        a, b = (plain, wild) if rules.family == rec.GPB1 else (p, q)
+        whole = a + b
+        if whole > 0.0:
+            merge_states(work, first, a / whole, b / whole)
+        work[first + rec.PROBABILITY * WIDTH] = work[first + rec.PROBABILITY * WIDTH + 1] = p + q
+
+
+@kernel
+def merge_states(work, first, a, b):
+    """Merge mean and covariance of lanes 0 and 1 of a hypothesis, of weights a and b, into both."""
+    d = np.empty(rec.STATES)
+    for s in range(rec.STATES):
+        at = first + s * WIDTH
+        d[s] = work[at + 1] - work[at]
+        work[at] = work[at + 1] = work[at] + b * d[s]
+    for axis in range(3):
+        at = rec.OWN + 6 * axis
+        for i in range(3):
+            for j in range(i, 3):
+                both(work, first + at * WIDTH, a, b, d[3 * axis + i] * d[3 * axis + j])
+                at += 1
+    for pair in range(3):
+        one, other = (0, 1 + pair) if pair < 2 else (1, 2)
+        for i in range(3):
+            for j in range(3):
+                at = rec.CROSS + 9 * pair + 3 * i + j
+                both(work, first + at * WIDTH, a, b, d[3 * one + i] * d[3 * other + j])
+
+
+@inline
+def both(work, at, a, b, spread):
+    """One element of the merged covariance, into lanes 0 and 1."""
+    work[at] = work[at + 1] = a * work[at] + b * work[at + 1] + a * b * spread

@@ -1,4 +1,22 @@
-"""The chain over all scans of a block: range, forecast, burst, estimate, update; and the sums over realisations.
+"""The classical way to a burst's frequency: the highest line of its spectrum, eight bursts side by side.
+
+A Kalman filter of range, velocity and acceleration, one realisation at a time; plain numbers.
+
+x (3) is the state, P (6) its covariance, packed as in `kernels.algebra`. Numbers are taken one after the other: for
+independent errors that is the same as all at once, and needs no inverse.
+
+The bursts of eight realisations: their sums drawn, and what a filter's estimator makes of them.
+
+As in P4's kernels an estimate is its deviation from the truth, in turns over the burst.
+
+Hypotheses on a track's folds, and on which of its bursts locked: the Bayes filter where none is dropped.
+
+Given its folds, and which of its bursts locked, a hypothesis is a Kalman filter of its own (`kernels.steps`). A scan
+moves all and weighs them by the range, branches each over the folds that the velocity leaves possible (and, as a
+mixture, over a burst that did not lock), and drops what is too far below the best or beyond the number that is kept.
+The acceleration is taken before the velocity, so that it weighs a hypothesis and not its folds.
+
+The chain over all scans of a block: range, forecast, burst, estimate, update; and the sums over realisations.
 
 A filter runs over the realisations of a block scan by scan, so that bursts of one entry of its menu are estimated eight
 side by side. States are errors: estimate less truth.
@@ -8,27 +26,414 @@ import math
 
 import numpy as np
 
-from radarsim.bursts.kernels.lanes import PASSES, lane
-from radarsim.kernels.algebra import add_scaled, take_rate, take_second_rate, take_value
-from radarsim.kernels.compile import inline, kernel, part
-from radarsim.kernels.lanes import WIDTH
-from radarsim.kernels.random import normals
-from radarsim.studies.pulses_to_tracks.kernels import records as rec
-from radarsim.studies.pulses_to_tracks.kernels.estimate import estimate, room_for
-from radarsim.studies.pulses_to_tracks.kernels.folds import ranges_to_hypotheses, take_folds
-from radarsim.studies.pulses_to_tracks.kernels.records import Work, hypotheses
-from radarsim.studies.pulses_to_tracks.kernels.steps import (
-    a_scan_later,
-    begun,
-    folded,
-    lock_weight,
-    mixed,
-    put_state,
-    scored,
-    state_of,
+from radarsim.bursts.kernels.lanes import LIVE, PASSES, PRIOR, X, lane, merge, sine_cosine, step
+from radarsim.bursts.kernels.lanes import ROWS as WORK
+from radarsim.bursts.kernels.scoring import SIZE
+from radarsim.bursts.kernels.strip import evaluate, put_drawn, take_window
+from radarsim.kernels.algebra import (
+    NO_NOISE,
+    add_scaled,
+    add_spread,
+    predicted,
+    predicted_covariance,
+    take_rate,
+    take_second_rate,
+    take_value,
 )
+from radarsim.kernels.compile import inline, kernel, part
+from radarsim.kernels.hypotheses import FALL, INNOVATION, NEAR, NOTHING, Lists, branched, column, keep_greatest
+from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, rows, where_greater
+from radarsim.kernels.random import LANE_BITS, U, normals, threefry, words_to_normals
+from radarsim.studies.pulses_to_tracks.kernels import records as rec
+from radarsim.studies.pulses_to_tracks.kernels.records import Work, hypotheses
 
 
+# ---- spectrum --------------------------------------------------------------------------------------------------------
+@part
+def loaded(drawn, pulses, offset, order, work, re, im):
+    """The pulses' sums in the transform's order, padded with zeros, turned back by the acceleration in work.
+
+    offset is that of the true frequency from the lines, in lines, so that it lies between them as it would.
+    """
+    bend, zero = get(work, X + 2), full(0.0)
+    step, lines = 1.0 / pulses, 1.0 / order.size
+    for i in range(order.size):
+        j = order[i]
+        if j >= pulses:
+            put(re, i, zero)
+            put(im, i, zero)
+            continue
+        t = j * step
+        s, c = sine_cosine(bend * (t * t) + offset * lines * j)
+        x, y = get(drawn, 4 * j), get(drawn, 4 * j + 1)
+        put(re, i, c * x + s * y)
+        put(im, i, c * y - s * x)
+
+
+@part
+def transformed(twiddle, size, re, im):
+    """The discrete Fourier transform in place, of values in bit-reversed order (Cooley and Tukey 1965)."""
+    half = 1
+    while half < size:
+        stride = size // (2 * half)
+        for begin in range(0, size, 2 * half):
+            for j in range(half):
+                c, s = twiddle[j * stride, 0], twiddle[j * stride, 1]
+                low, high = begin + j, begin + j + half
+                x, y = get(re, high), get(im, high)
+                u, v = c * x + s * y, c * y - s * x
+                x, y = get(re, low), get(im, low)
+                put(re, low, x + u)
+                put(im, low, y + v)
+                put(re, high, x - u)
+                put(im, high, y - v)
+        half *= 2
+
+
+@part
+def highest_line(drawn, pulses, offset, twiddle, order, work, re, im):
+    """Put the frequency of the highest line into work, in turns over the burst, from −half the rate to half of it."""
+    size = order.size
+    loaded(drawn, pulses, offset, order, work, re, im)
+    transformed(twiddle, size, re, im)
+    best, found = full(-1.0), full(0.0)
+    for m in range(size):
+        x, y = get(re, m), get(im, m)
+        power = x * x + y * y
+        line = float(m if 2 * m < size else m - size)
+        found = where_greater(power, best, full(line), found)
+        best = where_greater(power, best, power, best)
+    put(work, X + 1, (found + offset) * (pulses / size))
+
+
+# ---- steps -----------------------------------------------------------------------------------------------------------
+@inline
+def state_of(rows, i):
+    """x (3) and P (6) of row i of rows (n, 9); a row cut out of them would be counted, a fifth of the time."""
+    return (rows[i, 0], rows[i, 1], rows[i, 2]), (
+        rows[i, 3],
+        rows[i, 4],
+        rows[i, 5],
+        rows[i, 6],
+        rows[i, 7],
+        rows[i, 8],
+    )
+
+
+@inline
+def put_state(rows, i, x, P):
+    """Write x and P into row i of rows (n, 9)."""
+    rows[i, 0], rows[i, 1], rows[i, 2] = x
+    rows[i, 3], rows[i, 4], rows[i, 5], rows[i, 6], rows[i, 7], rows[i, 8] = P
+
+
+@inline
+def begun(world, realisation, noise):
+    """State and covariance after the first range, which errs by noise, and the designation, which is drawn."""
+    v, a = normals(world.keys[2, 0], world.keys[2, 1], realisation, 0)
+    x = noise, world.prior[0] * v, world.prior[1] * a
+    return x, (world.sigma_r**2, 0.0, 0.0, world.prior[0] ** 2, 0.0, world.prior[1] ** 2)
+
+
+@inline
+def a_scan_later(world, own, k, x, P):
+    """State and covariance a scan later, at scan k."""
+    Q = own.noise
+    q = (Q[0], Q[1], Q[2], Q[3], Q[4], Q[5]) if k >= own.start else NO_NOISE
+    return add_scaled(predicted(x, world.motion), 1.0, world.missed[k]), predicted_covariance(P, world.motion, q)
+
+
+@inline
+def folded(x, span):
+    """x, less the nearest whole number of spans."""
+    return x - span * np.rint(x / span)
+
+
+@inline
+def scored(sigma, takes, v, a, i, ages, locks, of_measured):
+    """Count a burst of realisation i whose estimates err by v and a: whether it locked, and the errors' powers.
+
+    sigma (2,) are the Fisher bounds; ages (n,) scans since a burst was lost.
+    """
+    worst = abs(v) / sigma[0]
+    if takes == 2:
+        worst = max(worst, abs(a) / sigma[1])
+    locked = worst < 5.0
+    ages[i] = min(ages[i] + 1, rec.AGES - 1) if locked else 0
+    locks[rec.LOCKED] += 1.0 if locked else 0.0
+    locks[rec.LOCKED_3] += 1.0 if worst < 3.0 else 0.0
+    for c in range(takes):
+        square = v * v if c == 0 else a * a
+        of_measured[c, 1, 0] += square
+        of_measured[c, 1, 1] += square * square
+        of_measured[c, 0, 0] += square if locked else 0.0
+        of_measured[c, 0, 1] += square * square if locked else 0.0
+
+
+@inline
+def lock_weight(distance, determinant, takes, lock, density):
+    """Probability that an estimate has locked, by its squared distance in variances from the prediction.
+
+    determinant is that of its innovation's covariance, lock the probability before, density that of one not locked.
+    """
+    near = lock * math.exp(-0.5 * distance) / math.sqrt((2.0 * math.pi) ** takes * determinant)
+    return near / (near + (1.0 - lock) * density)
+
+
+@inline
+def mixed(x, P, y, Q, w):
+    """Mean and covariance of a mixture: (y, Q) with the weight w, (x, P) with the rest."""
+    d = add_scaled(y, -1.0, x)
+    P = add_spread(NO_NOISE, 1.0 - w, P, (w * d[0], w * d[1], w * d[2]))
+    return add_scaled(x, w, d), add_spread(P, w, Q, ((1.0 - w) * d[0], (1.0 - w) * d[1], (1.0 - w) * d[2]))
+
+
+# ---- estimate --------------------------------------------------------------------------------------------------------
+AT_ONCE = 64  # blocks whose normals are drawn before their sums are made: 32 KiB
+
+
+@part
+def draw_pairs(k0, k1, who, pair, a, b):
+    """Unit normals of the realisations who (8,) over pairs `pair`, `pair` + 1, …, both even, into flat a and b.
+
+    As `fill_normal_strip`. Who is read so that all but the first loop run in vector registers: five times faster.
+    """
+    x, y = a.view(np.uint64), b.view(np.uint64)
+    for i in range(a.size // 2):
+        x[i] = U(who[i & (WIDTH - 1)])
+    for i in range(a.size // 2):
+        x[i], y[i] = threefry(x[i], (pair >> U(1)) + (U(i) >> U(LANE_BITS)), k0, k1)
+    words_to_normals(a, b)
+
+
+@kernel
+def draw_sums(world, k, who, a, b, drawn):
+    """Block sums of scan k of the realisations who (8,) into rows; as `bursts.kernels.strip.draw_strip`."""
+    k0, k1 = world.keys[1, 0], world.keys[1, 1]
+    blocks, factor = world.mean.shape[0], world.factor[world.law[k]]
+    for begin in range(0, blocks, AT_ONCE):
+        end = min(begin + AT_ONCE, blocks)
+        pair = U(2 * (blocks * k + begin))
+        draw_pairs(k0, k1, who, pair, a[: 2 * WIDTH * (end - begin)], b[: 2 * WIDTH * (end - begin)])
+        put_drawn(world.mean[begin:end], factor[begin:end], a, b, drawn[4 * WIDTH * begin :])
+
+
+@part
+def put_forecast(world, forecast, work):
+    """Errors of the forecast (8, 2) of velocity and acceleration as those of the phase's coefficients."""
+    zero, turns = full(0.0), world.to_turns
+    for j in range(SIZE):
+        put(work, PRIOR + j, zero)
+    for n in range(WIDTH):
+        v, a = forecast[n, 0], forecast[n, 1]
+        work[lane(PRIOR + 1, n)] = turns[0, 0] * v + turns[0, 1] * a
+        work[lane(PRIOR + 2, n)] = turns[1, 1] * a
+    for j in range(SIZE):
+        put(work, X + j, get(work, PRIOR + j))
+
+
+@part
+def ideal(world, k, window, work, sums, drawn):
+    """The estimate that the Fisher bound allows: one step from the truth, linear in the noise."""
+    zero = full(0.0)
+    physics, table = world.physics[k], address(world.tables[0])
+    for j in range(SIZE):
+        put(work, PRIOR + j, zero)
+        put(work, X + j, zero)
+    merge(drawn, table, address(world.tables[1]), window.table, window.weights, window.blocks, sums)
+    evaluate(physics, work, sums, table, window, 0)
+    put(work, LIVE, full(1.0))
+    step(work, window, physics.amplitude / physics.sigma**2, False, full(1.0))
+
+
+@kernel
+def estimate(world, filters, f, k, entry, who, forecast, room, found):
+    """Velocity and acceleration at the middle of the bursts of scan k, less the true ones, into found (8, 2).
+
+    By the estimator of filter f with windows of an entry of its menu, of the realisations who (8,), whose forecasts err
+    by forecast (8, 2). Returns the passes over a window's data of each as the sum over the first eight lanes of work.
+    """
+    work_, sums_, drawn_, a, b, re, im = room
+    draw_sums(world, k, who, a, b, drawn_)
+    work, sums, drawn = address(work_), address(sums_), address(drawn_)
+    physics, own, free = world.physics[k], filters.filters[f], filters.windows[filters.free[f, k]]
+    put(work, PASSES, full(0.0))
+    if own.kind == rec.BOUND:
+        ideal(world, k, free, work, sums, drawn)
+    else:
+        tables = address(world.tables[0]), address(world.tables[1])
+        put_forecast(world, forecast, work)
+        if own.kind == rec.SEQUENCE:
+            first = filters.first[f, k, entry]
+            for w in range(filters.count[f, k, entry]):
+                window = filters.windows[first + w]
+                take_window(physics, drawn, tables, window, filters.options[f], w == 0, work, sums)
+        else:
+            highest_line(
+                *(drawn, physics.pulses, world.offset[k], world.twiddle, world.reversed),
+                *(work, address(re), address(im)),
+            )
+        # What goes to the filter must not hold the forecast once more: the last step is on the likelihood alone.
+        take_window(physics, drawn, tables, free, filters.last[f], own.kind != rec.SEQUENCE, work, sums)
+    measured = world.measured
+    for n in range(WIDTH):
+        for c in range(2):
+            total = 0.0
+            for j in range(SIZE):
+                total += measured[c, j] * work[lane(X + j, n)]
+            found[n, c] = total
+
+
+def room_for(blocks: int, lines: int) -> tuple:
+    """Work arrays for eight bursts: estimates, sums of a window, sums drawn, normals, a spectrum."""
+    return (
+        *(rows(WORK), rows(4 * blocks), rows(4 * blocks), rows(2 * AT_ONCE), rows(2 * AT_ONCE)),
+        *(rows(lines), rows(lines)),
+    )
+
+
+# ---- folds -----------------------------------------------------------------------------------------------------------
+WEIGHT_COLUMN = 3  # of the first list of `kernels.hypotheses.Lists`
+
+
+@inline
+def heaviest(weights, count):
+    """The first of the greatest weights."""
+    best = 0
+    for h in range(1, count):
+        best = h if weights[h] > weights[best] else best
+    return best
+
+
+@part
+def ranges_to_hypotheses(world, own, k, first, work):
+    """Predict all hypotheses to scan k and weigh them by its range; the tracks become those of the best."""
+    variance, held = world.sigma_r**2, work.held
+    for i in range(held.count.size):
+        noise = world.sigma_r * normals(world.keys[0, 0], world.keys[0, 1], first + i, k)[0]
+        states, weights = held.states[i], held.weights[i]
+        if k == 0:
+            held.count[i], held.right[i, 0], weights[0] = 1, 1.0, 0.0
+            x, P = begun(world, first + i, noise)
+            put_state(states, 0, x, P)
+        else:
+            for h in range(held.count[i]):
+                x, P = state_of(states, h)
+                x, P = a_scan_later(world, own, k, x, P)
+                P, gain, S = take_value(P, variance, 1.0)
+                e = noise - x[0]
+                weights[h] -= 0.5 * (e * e / S + math.log(S))
+                put_state(states, h, add_scaled(x, e, gain), P)
+        x, P = state_of(states, heaviest(weights, held.count[i]))
+        put_state(work.tracks, i, x, P)
+
+
+@part
+def branches(own, sigma, measured, span, held, i, lists):
+    """Branch the hypotheses of realisation i over the folds of a measured velocity and acceleration: how many.
+
+    A parent below zero, -1 - h, is that of a branch in which the burst did not lock.
+    """
+    v, a, best = measured[0], measured[1], NOTHING
+    w, e = column(lists, 0, WEIGHT_COLUMN), column(lists, 2, INNOVATION)
+    near, c = column(lists, 2, NEAR), column(lists, 2, FALL)
+    mixture, lock, lost = own.use == rec.MIXTURE, 0.0, NOTHING
+    if mixture:
+        lock, lost = math.log(own.lock), math.log((1.0 - own.lock) * own.density)
+    states = held.states[i]
+    for h in range(held.count[i]):
+        x, P = state_of(states, h)
+        weight = held.weights[i, h] + lock
+        if own.takes == 2:
+            off = a - x[2]
+            P, gain, S = take_second_rate(P, sigma[1] ** 2, 1.0)
+            x = add_scaled(x, off, gain)
+            weight -= 0.5 * (off * off / S + math.log(2.0 * math.pi * S))
+        S = P[3] + sigma[0] ** 2
+        w[h], e[h], c[h] = weight - 0.5 * math.log(2.0 * math.pi * S), folded(v - x[1], span), 0.5 / S
+        near[h] = w[h] - c[h] * e[h] * e[h]
+        best = max(best, near[h], held.weights[i, h] + lost)
+    made = branched(lists, 0, held.count[i], span, best, own.deepest, own.kept)
+    if mixture:
+        weights, found = lists.children, row(lists.children, lists.most // WIDTH)
+        for h in range(held.count[i]):
+            if held.weights[i, h] + lost >= best - own.deepest:
+                weights[made], found[made], lists.parents[made] = held.weights[i, h] + lost, 0.0, -1 - h
+                made += 1
+        if made > own.kept:
+            keep_greatest(lists, made, own.kept)
+            made = own.kept
+    return made
+
+
+@part
+def inherited(own, sigma, measured, span, held, i, made, lists):
+    """Put `made` branches in the place of realisation i's hypotheses.
+
+    Gives the weights of those that took the velocity, of those that took it in a wrong fold, and of all.
+    """
+    weights, found = lists.children, row(lists.children, lists.most // WIDTH)
+    best = weights[heaviest(weights, made)]
+    states, taken, wrong, whole = held.states[i], 0.0, 0.0, 0.0
+    for j in range(made):
+        parent, weight = lists.parents[j], math.exp(weights[j] - best)
+        h = parent if parent >= 0 else -1 - parent
+        x, P = state_of(states, h)
+        right = held.right[i, h]
+        if parent >= 0:
+            if own.takes == 2:
+                P, gain, _ = take_second_rate(P, sigma[1] ** 2, 1.0)
+                x = add_scaled(x, measured[1] - x[2], gain)
+            off = abs(found[j] + x[1]) > 0.5 * span
+            P, gain, _ = take_rate(P, sigma[0] ** 2, 1.0)
+            x = add_scaled(x, found[j], gain)
+            right, taken, wrong = 0.0 if off else right, taken + weight, wrong + (weight if off else 0.0)
+        whole += weight
+        put_state(held.fresh, j, x, P)
+        held.fresh[j, 9] = right
+    for j in range(made):
+        held.weights[i, j], held.right[i, j] = weights[j] - best, held.fresh[j, 9]
+        for n in range(9):
+            held.states[i, j, n] = held.fresh[j, n]
+    held.count[i] = made
+    return taken, wrong, whole
+
+
+@inline
+def put_estimate(own, held, i, best, whole, to):
+    """The best hypothesis of realisation i, or the mean of all by their weights, of sum `whole`, into to (3)."""
+    for c in range(3):
+        to[c] = held.states[i, best, c]
+        if own.averages == 1:
+            total = 0.0
+            for h in range(held.count[i]):
+                total += math.exp(held.weights[i, h]) * held.states[i, h, c]
+            to[c] = total / whole
+
+
+@part
+def take_folds(world, filters, f, k, work, sums):
+    """As `chain.take_estimates`, by hypotheses."""
+    own, held, span, sigma = filters.filters[f], work.held, world.span, filters.sigma[f, k]
+    locks, folds = sums.locks[f, k], sums.folds[f, k]
+    lists = Lists(
+        address(held.columns), address(held.children), address(held.parents), held.weights.shape[1], held.parents.size
+    )
+    for i in range(held.count.size):
+        v, a = folded(work.measured[i, 0], span), work.measured[i, 1]
+        scored(sigma, own.takes, v, a, i, work.ages, locks, sums.measured[f, k])
+        made = branches(own, sigma, (v, a), span, held, i, lists)
+        taken, wrong, whole = inherited(own, sigma, (v, a), span, held, i, made, lists)
+        best = heaviest(held.weights[i], made)
+        put_estimate(own, held, i, best, whole, work.tracks[i])
+        locks[rec.TAKEN] += taken / whole
+        locks[rec.WRONG_FOLD] += wrong / whole
+        folds[rec.RIGHT] += held.right[i, best]
+        folds[rec.LISTED] += held.right[i, :made].max()
+        folds[rec.NUMBER] += made
+
+
+# ---- chain -----------------------------------------------------------------------------------------------------------
 @part
 def take_ranges(world, own, k, first, tracks):
     """Predict all tracks (n, 9) to scan k and take its range; the first sets it, and draws the designation."""

@@ -13,10 +13,21 @@ from radarsim.kernels.compile import aligned_zeros, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, row
 from radarsim.kernels.linear import CROSSED, fill_plots, plain
 from radarsim.kernels.random import fill_uniform_pairs
-from radarsim.studies.range_doppler.kernels.chunk import CHUNK, places, work
-from radarsim.studies.range_doppler.kernels.draws import count_plots, displace, displace_plots, draw_once
-from radarsim.studies.range_doppler.kernels.scores import OWN, PAIRED, pair, score
-from radarsim.studies.range_doppler.kernels.steps import advance, make_starts
+from radarsim.studies.range_doppler.kernels.steps import (
+    CHUNK,
+    OWN,
+    PAIRED,
+    advance,
+    count_plots,
+    displace,
+    displace_plots,
+    draw_once,
+    make_starts,
+    pair,
+    places,
+    score,
+    work,
+)
 
 ROWS = (OWN + PAIRED) // WIDTH  # of what is found of a filter and scan
 

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from radarsim.config.fields import (
+    PLAIN_SHARE,
     Added,
     At,
     Design,
@@ -20,7 +21,6 @@ from radarsim.config.fields import (
     cross_check,
     key,
 )
-from radarsim.config.rare import PLAIN_SHARE
 from radarsim.studies.sonar import config
 
 FIGURES = ("track_map", "confirmation", "track_life", "false_tracks", "track_classes")

@@ -7,10 +7,9 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import tr
-from radarsim.report import panels, seen
-from radarsim.report import tables as common
+from radarsim.report import panels, seen, tables
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Style
-from radarsim.studies.sonar.clutter.axes import ClutterAxes
+from radarsim.studies.sonar.clutter.filters import ClutterAxes
 from radarsim.studies.sonar.clutter.map import realisation_map
 
 if TYPE_CHECKING:
@@ -78,7 +77,7 @@ def by_line(tracking: "pd.DataFrame", column: str, result: CaseResult[ClutterAxe
 
 def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | None:
     """Probability of a confirmed track against time: a panel for each case, a line for each tracker."""
-    groups = common.groups(tracks, "case", "filter")
+    groups = tables.groups(tracks, "case", "filter")
     confirmed = ("t_s", "confirmed", "confirmed_lo", "confirmed_hi", "exact_confirmed")
     drawn: list[Panel] = []
     some = panels.spread_out(results, panels.MOST)
@@ -126,7 +125,7 @@ def life_figure(results: Results, made: "Mapping[str, pd.DataFrame]") -> Figure 
     }
     drawn = [Panel(x, y, tuple(_lines(rows, column, value, ends)), direct=False) for ends, (value, y) in shown.items()]
     curves = made["curves"]
-    at_end = common.where(curves, component="r", k=results[0].axes.k[-1])
+    at_end = tables.where(curves, component="r", k=results[0].axes.k[-1])
     at_end = at_end.merge(tracking[["case", *KEYS]].drop_duplicates("case"), on="case", how="left")
     y = Axis(tr("$\\sigma$ of $r$ of kept tracks, m"), limits=(0, None))
     drawn.append(

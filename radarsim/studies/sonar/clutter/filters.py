@@ -1,4 +1,7 @@
-"""P3's trackers and the field of false plots as arrays for the kernels."""
+"""Labels and exact laws of the sums of trackers among false plots.
+
+P3's trackers and the field of false plots as arrays for the kernels.
+"""
 
 import math
 from collections.abc import Sequence
@@ -8,11 +11,41 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from radarsim.studies.sonar.clutter.config import Keys, Sector
-from radarsim.studies.sonar.clutter.kernels.field import Cells, Field
-from radarsim.studies.sonar.clutter.kernels.gate import KNOWN, NEAREST, OPEN, PDA
-from radarsim.studies.sonar.clutter.kernels.tracker import Trackers
+from radarsim.studies.sonar.clutter.kernels.tracker import KNOWN, NEAREST, OPEN, PDA, Cells, Field, Trackers
+from radarsim.studies.sonar.kernels.patterns import Detections
+from radarsim.studies.sonar.kernels.shared_gains import World
 from radarsim.studies.sonar.scene import lateral_scale
+from radarsim.studies.sonar.world import SonarAxes
 
+
+# ---- axes ------------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True, kw_only=True)
+class ClutterAxes(SonarAxes):
+    """Labels and exact laws of F trackers, and the arrays that both the kernels and a map of one realisation read.
+
+    Attributes:
+        associations: how each filter chooses its plots: nearest, pda or known.
+        thresholds: (T,) thresholds of a track's score, in natural logarithms.
+        exact_confirmed: (F, K) probability that a track of the target was confirmed by each scan; NaN where no law is
+            known.
+        exact_begun: (F, K) probability that a track begun by a false plot is confirmed at each scan; NaN likewise.
+        area_m2: area of the surveyed sector, m².
+        world: the target and its plots.
+        detections: which scans give a plot of the target.
+        field: the false plots among which the target is tracked.
+    """
+
+    associations: tuple[str, ...]
+    thresholds: np.ndarray
+    exact_confirmed: np.ndarray
+    exact_begun: np.ndarray
+    area_m2: float
+    world: World
+    detections: Detections
+    field: Field
+
+
+# ---- filters ---------------------------------------------------------------------------------------------------------
 ASSOCIATIONS = {"nearest": NEAREST, "pda": PDA, "known": KNOWN}
 THRESHOLDS = np.arange(0.0, 15.5, 0.5)  # of the score, in natural logarithms
 CELL = 8.0  # size of a cell in σ of a plot, in each direction; about the size of a settled gate

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.studies.sonar.clutter.axes import ClutterAxes
-from radarsim.studies.sonar.clutter.filters import TrackerSpec, conditions, gate_threshold, tracker_specs
-from radarsim.studies.sonar.clutter.multitrack import confirmed_tracks
-from radarsim.studies.sonar.clutter.track import false_plots, target_plots
+from radarsim.studies.sonar.clutter.filters import ClutterAxes, TrackerSpec, conditions, gate_threshold, tracker_specs
+from radarsim.studies.sonar.clutter.track import confirmed_tracks, false_plots, target_plots
 
 NEAR_M = 2500.0  # the map shows what is nearer than this to the target's course
 EVERY = 4  # scans between the gates that the map shows

@@ -10,8 +10,8 @@ from radarsim.report import rare, statistics
 from radarsim.report import tables as common
 from radarsim.report.statistics import Z95, Estimate, Values
 from radarsim.report.tables import Columns, leading, of_rows, stacked
-from radarsim.studies.sonar.clutter.axes import ClutterAxes
-from radarsim.studies.sonar.clutter.kernels import counts as at
+from radarsim.studies.sonar.clutter.filters import ClutterAxes
+from radarsim.studies.sonar.clutter.kernels import tracker as at
 from radarsim.studies.sonar.clutter.kernels.ends import DROPPED, DROPPED_AFTER, KINDS, LOST, LOST_AFTER
 
 if TYPE_CHECKING:

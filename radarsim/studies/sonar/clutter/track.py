@@ -1,6 +1,13 @@
-"""Plots of cases among false ones: those of one realisation, and the trackers over recorded ones."""
+"""All tracks of one tracker over the plots of many scans: for recorded plots, and for the map.
 
-from collections.abc import Mapping
+The steps are those of the kernels, with a track in each lane. In addition tracks compete for plots: a plot goes to the
+nearest track, confirmed tracks before tentative ones, and plots that no track takes begin new tracks.
+
+Plots of cases among false ones: those of one realisation, and the trackers over recorded ones.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -9,17 +16,202 @@ from radarsim.engine.results import Track
 from radarsim.errors import ConfigError
 from radarsim.studies.noise import noise_key
 from radarsim.studies.sonar import study as base
-from radarsim.studies.sonar.clutter import filters as design
-from radarsim.studies.sonar.clutter.kernels.field import Field, whole_field
-from radarsim.studies.sonar.clutter.multitrack import confirmed_tracks
-from radarsim.studies.sonar.clutter.study import SIZE
-from radarsim.studies.sonar.clutter.world import detections
+from radarsim.studies.sonar.clutter import filters
+from radarsim.studies.sonar.clutter.filters import Conditions, TrackerSpec, trackers
+from radarsim.studies.sonar.clutter.kernels.tracker import (
+    CLOSEST,
+    CONFIRMED,
+    NONE,
+    PDA,
+    TENTATIVE,
+    Field,
+    Rule,
+    Tracks,
+    associate_innovations,
+    clear,
+    next_state,
+    no_tracks,
+    predict,
+    update,
+    whole_field,
+)
+from radarsim.studies.sonar.clutter.study import SIZE, detected_plots
 from radarsim.studies.sonar.kernels import patterns as pattern_kernels
 from radarsim.studies.sonar.kernels import shared_gains as sonar_kernels
+from radarsim.studies.sonar.kernels.steps import CHUNK
 from radarsim.studies.sonar.scene import build_scene
 from radarsim.studies.sonar.track import MOST_ROWS
 
 
+# ---- multitrack ------------------------------------------------------------------------------------------------------
+@dataclass
+class TrackHistory:
+    """One track: its lane (chunk, index), its state under the rules, and the estimates at each of its scans.
+
+    scans holds the numbers of the scans; states (n, 4) r, vr, b, vb with variances (n, 4), NaN for rates not yet known;
+    scores (n,); gates (n, 5) the predicted position and the covariance of its innovation.
+    """
+
+    lane: tuple[int, int]
+    state: int = TENTATIVE
+    age: int = 1
+    hits: int = 1
+    misses: int = 0
+    since: float = 0.0
+    score: float = 0.0
+    was_confirmed: bool = False
+    scans: list[int] = field(default_factory=list)
+    states: list[np.ndarray] = field(default_factory=list)
+    variances: list[np.ndarray] = field(default_factory=list)
+    scores: list[float] = field(default_factory=list)
+    gates: list[np.ndarray] = field(default_factory=list)
+
+
+class MultiTracker:
+    """The tracks of one tracker, alive and ended."""
+
+    def __init__(self, spec: TrackerSpec, given: Conditions):
+        arrays = trackers([spec], given)
+        self.spec, self.given, self.manoeuvre = spec, given, arrays.manoeuvre[0]
+        association, gate = int(arrays.association[0]), arrays.gate[0]
+        self.rule = Rule(association, gate, given.detection, spec.gate_probability, given.density, spec.speed)
+        self.chunks: list[Tracks] = []
+        self.free: list[tuple[int, int]] = []
+        self.alive: list[TrackHistory] = []
+        self.ended: list[TrackHistory] = []
+
+    def process(self, scan: int, dt: float, r: np.ndarray, b: np.ndarray) -> None:
+        """Process the plots (n,) of a scan, dt after the last one."""
+        predicted = self._predicted(dt)
+        innovations, distance = self._distances(predicted, r, b)
+        owner = self._owners(distance)
+        taken = [np.zeros((6, CHUNK)) for _ in self.chunks]
+        for a, track in enumerate(self.alive):
+            self._associate(track, predicted[a], innovations[:, a, owner == a], taken)
+        new = [self._begin(r[p], b[p], taken) for p in np.flatnonzero(owner < 0)]
+        for chunk, rows in zip(self.chunks, taken, strict=True):
+            joint = self.rule.association == PDA
+            update(chunk, dt, self.given.period, self.given.sigma, self.manoeuvre, joint, rows)
+        for track, gate in zip(self.alive, predicted, strict=True):
+            self._judge(track)
+            track.gates.append(gate)
+        for track in new:
+            track.gates.append(np.full(5, np.nan))
+        self.alive += new
+        for track in self.alive:
+            self._record(track, scan)
+        self._remove_ended()
+
+    def _predicted(self, dt: float) -> np.ndarray:
+        """Positions and innovation covariances (A, 5) of the live tracks; after one plot widened by targets' speed."""
+        rows = []
+        for chunk in self.chunks:
+            rows.append(np.empty((5, CHUNK)))
+            predict(chunk, dt, self.given.period, self.given.sigma, self.manoeuvre, rows[-1])
+        out = np.array([rows[c][:, i] for c, i in (track.lane for track in self.alive)]).reshape(-1, 5)
+        for track, row in zip(self.alive, out, strict=True):
+            track.since += dt
+            if not self._settled(track):
+                reach = self.spec.speed * track.since
+                row[2] += reach**2
+                row[4] += (reach / max(row[0], CLOSEST)) ** 2
+        return out
+
+    def _settled(self, track: TrackHistory) -> bool:
+        chunk, i = track.lane
+        return bool(self.chunks[chunk].plots[i] > 1.5)
+
+    def _distances(self, predicted: np.ndarray, r: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Innovations (2, A, n), bearings within half a circle, and their normalised squares (A, n)."""
+        nu_r = r - predicted[:, :1]
+        nu_b = np.mod(b - predicted[:, 1:2] + np.pi, 2 * np.pi) - np.pi
+        rr, rb, bb = (predicted[:, j, None] for j in (2, 3, 4))
+        return np.stack([nu_r, nu_b]), (bb * nu_r**2 - 2 * rb * nu_r * nu_b + rr * nu_b**2) / (rr * bb - rb**2)
+
+    def _owners(self, distance: np.ndarray) -> np.ndarray:
+        """The track (n,) that each plot goes to, -1 for none: the nearest one, but confirmed tracks first.
+
+        Only probabilistic association takes more than one plot, and only for a track of two plots or more.
+        """
+        owner = np.full(distance.shape[1], -1)
+        several = np.array([self.rule.association == PDA and self._settled(track) for track in self.alive])
+        confirmed = np.array([track.state == CONFIRMED for track in self.alive])
+        busy = np.zeros(len(self.alive), dtype=bool)
+        for group in (confirmed, ~confirmed) if len(self.alive) else ():
+            a, p = np.nonzero((distance <= self.rule.gate) & group[:, None])
+            order = np.argsort(distance[a, p], kind="stable")
+            for track, plot in zip(a[order], p[order], strict=True):
+                if owner[plot] < 0 and (several[track] or not busy[track]):
+                    owner[plot], busy[track] = track, True
+        return owner
+
+    def _associate(
+        self, track: TrackHistory, gate: np.ndarray, innovations: np.ndarray, taken: list[np.ndarray]
+    ) -> None:
+        """Associate a track with the plots that it owns, given their innovations (2, n); writes to its chunk's rows."""
+        nu = np.ascontiguousarray(innovations)
+        result = associate_innovations(self.rule, self._settled(track), gate[0], tuple(gate[2:]), *nu)
+        chunk, i = track.lane
+        taken[chunk][:, i] = result.taken, result.nu_r, result.nu_b, result.rr, result.rb, result.bb
+        track.age, track.score = track.age + 1, track.score + result.score
+        if result.taken:
+            track.hits, track.misses, track.since = track.hits + 1, 0, 0.0
+        else:
+            track.misses += 1
+
+    def _begin(self, r: float, b: float, taken: list[np.ndarray]) -> TrackHistory:
+        """A track of one plot, in a free lane."""
+        if not self.free:
+            self.free = [(len(self.chunks), i) for i in reversed(range(CHUNK))]
+            self.chunks.append(no_tracks())
+            taken.append(np.zeros((6, CHUNK)))
+        chunk, i = self.free.pop()
+        clear(self.chunks[chunk], i)
+        taken[chunk][:, i] = 1.0, r, b, 0.0, 0.0, 0.0
+        return TrackHistory((chunk, i))
+
+    def _judge(self, track: TrackHistory) -> None:
+        rule = float(self.spec.m), float(self.spec.n), float(self.spec.misses)
+        state = next_state(track.state, float(track.hits), float(track.misses), float(track.age), *rule)
+        chunk, i = track.lane
+        uncertain = self.chunks[chunk].P[:, 0, i].max() > self.spec.lost**2
+        track.state = NONE if track.state == CONFIRMED and uncertain else state
+        track.was_confirmed |= track.state == CONFIRMED
+
+    def _record(self, track: TrackHistory, scan: int) -> None:
+        chunk, i = track.lane
+        tracks, unit = self.chunks[chunk], np.repeat(self.given.sigma, 2) / np.tile([1.0, self.given.period], 2)
+        x, P = tracks.x[:, :2, i].ravel(), tracks.P[:, [0, 3], i].ravel()
+        known = np.array([True, self._settled(track)] * 2)
+        track.scans.append(scan)
+        track.states.append(np.where(known, x, np.nan))
+        track.variances.append(np.where(known, P * unit**2, np.nan))
+        track.scores.append(track.score)
+
+    def _remove_ended(self) -> None:
+        ended = [track for track in self.alive if track.state == NONE]
+        self.alive = [track for track in self.alive if track.state != NONE]
+        self.free += [track.lane for track in ended]
+        self.ended += ended
+
+    def confirmed(self) -> list[TrackHistory]:
+        """The tracks that were confirmed at some time, ordered by their first scan."""
+        tracks = (track for track in (*self.ended, *self.alive) if track.was_confirmed)
+        return sorted(tracks, key=lambda track: track.scans[0])
+
+
+def confirmed_tracks(
+    spec: TrackerSpec, given: Conditions, scans: Iterable[tuple[float, np.ndarray, np.ndarray]]
+) -> list[TrackHistory]:
+    """The confirmed tracks over scans (t, r (n,), b (n,)) in order of time."""
+    tracker, last = MultiTracker(spec, given), None
+    for k, (t, r, b) in enumerate(scans):
+        tracker.process(k, 0.0 if last is None else t - last, r, b)
+        last = t
+    return tracker.confirmed()
+
+
+# ---- track -----------------------------------------------------------------------------------------------------------
 def target_plots(
     world: sonar_kernels.World, detections: pattern_kernels.Detections, realisation: int
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -55,8 +247,8 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     scan without plots has one row without values.
     """
     spec, scene = case.spec, build_scene(case)
-    field = design.field(noise_key(case, "false"), spec.sensor.sector, design.conditions(spec))
-    z, true = target_plots(base.world(case, scene), detections(case, scene), realisation)
+    field = filters.field(noise_key(case, "false"), spec.sensor.sector, filters.conditions(spec))
+    z, true = target_plots(base.world(case, scene), detected_plots(case, scene), realisation)
     rows: list[tuple[float, ...]] = []
     for k, t in enumerate(scene.t):
         own = [(z[k, 0], z[k, 1], 1.0)] if np.isfinite(z[k, 0]) else []
@@ -82,7 +274,7 @@ class Tracker:
 
     def feed(self, columns: Mapping[str, np.ndarray]) -> Track:
         """The tracks over all rows: columns (n,), NaN where a value is missing."""
-        spec, specs = self.case.spec, design.tracker_specs(self.case.spec)
+        spec, specs = self.case.spec, filters.tracker_specs(self.case.spec)
         chosen = [f for f, one in enumerate(specs) if one.association != "known"]
         if not chosen:
             raise ConfigError(
@@ -92,7 +284,7 @@ class Tracker:
         plots = np.stack([columns["range_m"], columns["bearing_rad"]])
         complete = np.isfinite(plots).all(axis=0)
         scans = [(time, *plots[:, complete & (row == k)]) for k, time in enumerate(t)]
-        by_filter = {f: confirmed_tracks(specs[f], design.conditions(spec), scans) for f in chosen}
+        by_filter = {f: confirmed_tracks(specs[f], filters.conditions(spec), scans) for f in chosen}
         tracks = [(f, n, track) for f, found in by_filter.items() for n, track in enumerate(found, start=1)]
         estimate, sigma = np.full((2, len(tracks), len(t), 4), np.nan)
         score = np.full((len(tracks), len(t)), np.nan)

@@ -14,8 +14,18 @@ from radarsim.kernels.compile import kernel, part
 from radarsim.kernels.lanes import address
 from radarsim.kernels.random import U, uniforms
 from radarsim.studies.sonar.kernels import detector
-from radarsim.studies.sonar.kernels.detector import AdaptiveRules, Alarms, adapt, add_alarms, detector_statistics
-from radarsim.studies.sonar.kernels.imm import PROBABILITY, ROWS, ModelPairs, interact, mode_sums
+from radarsim.studies.sonar.kernels.detector import (
+    PROBABILITY,
+    ROWS,
+    AdaptiveRules,
+    Alarms,
+    ModelPairs,
+    adapt,
+    add_alarms,
+    detector_statistics,
+    interact,
+    mode_sums,
+)
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK, Sums, move_and_measure
 from radarsim.studies.sonar.kernels.steps import ROW, Filters, Model, Plots, copy_row, fit, recur, remember
 from radarsim.studies.sonar.kernels.sums import Course, add_ahead, add_sums, rows_of

@@ -8,12 +8,11 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
-from radarsim.report import panels, seen
-from radarsim.report import tables as common
+from radarsim.report import panels, seen, tables
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.studies.sonar.figures import QUANTITIES, case_lines
 from radarsim.studies.sonar.manoeuvre import exact
-from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
+from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -192,7 +191,7 @@ def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
 
 def response_figure(results: Results, curves: "pd.DataFrame") -> Figure | None:
     """σ of the first coordinate during the manoeuvre, a line for each filter."""
-    groups = common.groups(curves, "case", "filter", "component")
+    groups = tables.groups(curves, "case", "filter", "component")
     drawn = []
     for result in results:
         component, unit = result.axes.components[0]
@@ -209,7 +208,7 @@ def response_figure(results: Results, curves: "pd.DataFrame") -> Figure | None:
 
 def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
     """Probability that filters assign to a manoeuvre, against time."""
-    groups = common.groups(modes, "case", "filter", "component")
+    groups = tables.groups(modes, "case", "filter", "component")
     drawn = []
     for result in results:
         lines = case_lines(result, groups, result.axes.components[0][0], ("t_s", "probability", "lo", "hi"))

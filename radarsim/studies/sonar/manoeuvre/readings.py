@@ -14,11 +14,10 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.report.claims import Evidence, certain
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
-from radarsim.report.claims.readings import PaperReadings, Reading, Seen
-from radarsim.report.claims.written import choices_in, with_arguments
+from radarsim.report.claims.over import PaperReadings, Reading, Seen, choices_in, with_arguments
 from radarsim.report.statistics import Estimate
 from radarsim.studies.sonar.manoeuvre import exact, measures
-from radarsim.studies.sonar.manoeuvre.switched import switched_window
+from radarsim.studies.sonar.manoeuvre.exact import switched_window
 from radarsim.studies.sonar.measures import Evidence as SonarEvidence
 
 ENOUGH, DETECTS, SINGLE, SWITCHES = "P3.3", "P3.8", "P3.9", "P3.10"

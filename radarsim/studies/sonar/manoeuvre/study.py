@@ -12,17 +12,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.engine.moments import Layout
+from radarsim.engine.results import Layout
 from radarsim.studies.sonar import study as base
-from radarsim.studies.sonar.banks import FilterSpec, needed_tests
 from radarsim.studies.sonar.config import Accelerating, Target, Turning
-from radarsim.studies.sonar.detectors import AdaptiveRule, DetectorTest, ModelPair, detector_arrays
-from radarsim.studies.sonar.filters import window_weights
+from radarsim.studies.sonar.filters import (
+    AdaptiveRule,
+    DetectorTest,
+    FilterSpec,
+    ModelPair,
+    detector_arrays,
+    needed_tests,
+    window_weights,
+)
 from radarsim.studies.sonar.kernels.detector import Detectors
 from radarsim.studies.sonar.manoeuvre import exact
-from radarsim.studies.sonar.manoeuvre import uses as tracks
-from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes, UsesAxes
 from radarsim.studies.sonar.manoeuvre.config import RESPONDING_KINDS, Detector, Filter, Keys, Uses
+from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes, UsesAxes
 from radarsim.studies.sonar.scene import Scene, build_scene, courses, filter_specs, lateral_scale
 from radarsim.studies.sonar.world import error_covariance
 
@@ -205,8 +210,8 @@ def own_ship(uses: Uses, t: np.ndarray) -> np.ndarray:
 def uses_axes(uses: Uses, spec: Keys, scene: Scene, at: np.ndarray) -> UsesAxes:
     """True values at scans (A,): the closest approach at constant courses, the position where the target will be."""
     t = scene.t[at]
-    track, own = tracks.flat(scene.truth[at, :2, :2], spec.frame == "polar"), own_ship(uses, t)
-    true = tracks.uses(track, own, uses.horizon_s)
+    track, own = exact.flat(scene.truth[at, :2, :2], spec.frame == "polar"), own_ship(uses, t)
+    true = exact.uses(track, own, uses.horizon_s)
     _, later = courses(spec.target, t + uses.horizon_s, None)
     true[:, 2:4] = later[:, :2, 0]
     relative = track - own
@@ -224,8 +229,8 @@ def estimated_uses(
     state, polar, own = x[:, :, :2, :2], frame == "polar", own_ship(uses, t)
     spread = np.stack([P[:, :, :2, 0, 0], P[:, :, :2, 0, 1], P[:, :, :2, 1, 1]], axis=-1)
     complete = np.all(known[:, :, :2, :2], axis=(2, 3), keepdims=True)[..., 0]
-    values = tracks.uses(tracks.flat(state, polar), own, uses.horizon_s)
-    variance = tracks.variances(state, spread, polar, own, uses.horizon_s)
+    values = exact.uses(exact.flat(state, polar), own, uses.horizon_s)
+    variance = exact.variances(state, spread, polar, own, uses.horizon_s)
     return np.where(complete, values, np.nan), np.where(complete, np.sqrt(variance), np.nan)
 
 
@@ -233,13 +238,13 @@ def use_sums(uses: Uses, frame: str, labels: UsesAxes, t: np.ndarray, kept: np.n
     """Sums (F, A, 6, 5) over the complete states of the estimates kept (A, F, 2, 6, count) at times t (A,)."""
     polar, own = frame == "polar", own_ship(uses, t)
     A, F = kept.shape[:2]
-    sums = np.zeros((F, A, len(tracks.QUANTITIES), 5))
+    sums = np.zeros((F, A, len(exact.QUANTITIES), 5))
     for a, f in np.ndindex(A, F):
         complete = (kept[a, f, :, 5] > 0).all(axis=0)
         estimates = np.moveaxis(kept[a, f][:, :, complete], -1, 0)
-        values = tracks.uses(tracks.flat(estimates[..., :2], polar), own[a], uses.horizon_s)
-        e = tracks.errors(values, labels.true[a])
-        spread = tracks.variances(estimates[..., :2], estimates[..., 2:5], polar, own[a], uses.horizon_s)
+        values = exact.uses(exact.flat(estimates[..., :2], polar), own[a], uses.horizon_s)
+        e = exact.errors(values, labels.true[a])
+        spread = exact.variances(estimates[..., :2], estimates[..., 2:5], polar, own[a], uses.horizon_s)
         sums[f, a] = np.stack([part.sum(axis=0) for part in (np.ones_like(e), e, e**2, e**4, spread)], axis=-1)
     return sums
 
@@ -255,5 +260,5 @@ def shapes(spec: Keys, detectors: Detectors, K: int, A: int) -> dict[str, tuple[
     if any(member.kind in RESPONDING_KINDS for member in spec.filters):
         sums["modes"] = (F, K, G - 1, 3)
     if spec.uses:
-        sums["uses"] = (F, A, len(tracks.QUANTITIES), 5)
+        sums["uses"] = (F, A, len(exact.QUANTITIES), 5)
     return sums

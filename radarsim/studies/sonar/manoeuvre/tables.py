@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import consistency, notes, statistics
+from radarsim.report import notes, statistics
 from radarsim.report import tables as common
-from radarsim.report.tables import Columns, interval, leading
+from radarsim.report.tables import Columns, interval_columns, leading
 from radarsim.studies.sonar.exact import sigma_acceleration
 from radarsim.studies.sonar.manoeuvre import exact
-from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
-from radarsim.studies.sonar.manoeuvre.uses import QUANTITIES
+from radarsim.studies.sonar.manoeuvre.exact import QUANTITIES, ManoeuvreAxes
 from radarsim.studies.sonar.tables import Index
 
 if TYPE_CHECKING:
@@ -86,7 +85,7 @@ def _detections(result: CaseResult[ManoeuvreAxes]) -> Columns:
         "n": n.astype(np.int64),
         "phase": PHASES[axes.phase[k]],
         "shift": axes.shifts[d, g, k],
-        **interval("probability", of, ""),
+        **interval_columns("probability", of, ""),
         "exact": axes.exact_alarms[at],
     }
 
@@ -117,7 +116,7 @@ def _delays(result: CaseResult[ManoeuvreAxes]) -> Columns:
         "n": np.full(d.size, result.count, dtype=np.int64),
         "event": EVENTS[phase[k]],
         "delay_s": columns["t_s"] - since[phase[k]],
-        **interval("probability", of, ""),
+        **interval_columns("probability", of, ""),
         "exact": np.where(np.array(axes.independent)[d], law[at], np.nan),
         "independent": law[at],
     }
@@ -221,7 +220,7 @@ def _uses(result: CaseResult[ManoeuvreAxes]) -> Columns:
     n, first, square, fourth, spread = np.moveaxis(sums[f, a, u], -1, 0)
     of = statistics.root_mean_square(square, fourth, n)
     distance = _distance(sums, uses.true, uses.closing_mps)[f, u, a]
-    compared = consistency.ratio_columns(of, np.sqrt(spread / n))
+    compared = notes.ratio_columns(of, np.sqrt(spread / n))
     verdict = np.select(
         [distance < NEAR_ZERO, compared["ratio_lo"] > 1.05, compared["ratio_hi"] < 0.95],
         [NEAR, "error larger", "error smaller"],

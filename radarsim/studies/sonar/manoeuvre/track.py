@@ -3,9 +3,9 @@
 import numpy as np
 
 from radarsim.studies.sonar import track as base
-from radarsim.studies.sonar.banks import FilterSpec
+from radarsim.studies.sonar.filters import FilterSpec
 from radarsim.studies.sonar.manoeuvre import study
-from radarsim.studies.sonar.manoeuvre.uses import QUANTITIES
+from radarsim.studies.sonar.manoeuvre.exact import QUANTITIES
 
 
 class Tracker(base.Tracker):

@@ -5,10 +5,9 @@ from typing import TYPE_CHECKING
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import term, tr
-from radarsim.report import panels, text
-from radarsim.report import tables as common
-from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
+from radarsim.report import panels, tables
 from radarsim.studies.sonar.manoeuvre.config import Keys
+from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes
 from radarsim.studies.sonar.manoeuvre.figures import USUAL, every_scan, last_of, usual
 from radarsim.studies.sonar.manoeuvre.tables import NEAR
 
@@ -36,12 +35,12 @@ def _detected(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame") -> 
     """The detectors with the most and the fewest detections of a manoeuvre; empty where there are none."""
     rows = detections[detections["case"] == result.name]
     last = [last_of(usual(rows, name), "manoeuvre") for name in every_scan(result)]
-    found = [one.assign(decides=common.exact_first(one, "probability", "exact")).iloc[0] for one in last if len(one)]
+    found = [one.assign(decides=tables.exact_first(one, "probability", "exact")).iloc[0] for one in last if len(one)]
     ranked = sorted(found, key=lambda row: row["decides"])
     if not ranked:
         return ""
     ends = [
-        f"{row['filter']} {text.estimate((row[key] for key in ('probability', 'lo', 'hi')), form='.3g')}"
+        f"{row['filter']} {tables.estimate((row[key] for key in ('probability', 'lo', 'hi')), form='.3g')}"
         for row in ranked[:: len(ranked) - 1 or 1]
     ]
     if len(ends) == 1:
@@ -67,11 +66,11 @@ def _first_order(made: "Mapping[str, pd.DataFrame]") -> list[str]:
         return []
     rows = made["uses"]
     first = rows.iloc[0]
-    rows = common.where(rows, case=first["case"], filter=first["filter"])
+    rows = tables.where(rows, case=first["case"], filter=first["filter"])
     rows = rows[rows["k"] == rows["k"].max()]
     ratios = []
     for row in rows.itertuples():
-        ratio = f"{tr(USES[row.component])} {text.estimate((row.ratio, row.ratio_lo, row.ratio_hi), form='.3f')}"
+        ratio = f"{tr(USES[row.component])} {tables.estimate((row.ratio, row.ratio_lo, row.ratio_hi), form='.3f')}"
         ratios.append(tr("{ratio} (near zero)", ratio=ratio) if row.first_order == NEAR else ratio)
     return [
         tr(

@@ -7,11 +7,10 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
-from radarsim.report import panels, seen
-from radarsim.report import tables as common
+from radarsim.report import panels, seen, tables
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
-from radarsim.studies.sonar.axes import GivenPlotsAxes
 from radarsim.studies.sonar.figures import QUANTITIES
+from radarsim.studies.sonar.world import GivenPlotsAxes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -74,7 +73,7 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
 def gains_figure(table: "pd.DataFrame") -> Figure:
     """A_n and B_n as measured and by the closed forms."""
     first = table.iloc[0]
-    rows = common.where(table, filter=first["filter"], component=first["component"])
+    rows = tables.where(table, filter=first["filter"], component=first["component"])
     marks = [
         panels.line(rows, ("plots", key, f"{key}_lo", f"{key}_hi", f"{key}_formula"), f"${key}_n$", n)
         for n, key in enumerate(("A", "B"))
@@ -103,7 +102,7 @@ def believed_figure(
     sigma = cases[0].axes.sigma[0]
     last, component = int(cases[0].axes.k[-1]), cases[0].axes.components[0][0]
     true_rows, consistency_rows = (
-        common.where(table, k=last, component=component).set_index(["case", "filter"])
+        tables.where(table, k=last, component=component).set_index(["case", "filter"])
         for table in (believed, consistency)
     )
     left: list[Mark] = []
@@ -142,7 +141,7 @@ def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.Dat
     if len({r.spec.sensor.detection_probability for r in cases}) < 2:
         return None
     component, unit = cases[0].axes.components[0]
-    groups = common.groups(curves[curves["component"] == component], "case", "filter")
+    groups = tables.groups(curves[curves["component"] == component], "case", "filter")
     y = Axis(panels.sigma_of(QUANTITIES[component].symbol, unit), limits=(0, None))
     drawn = []
     for f in cases[0].axes.filters:

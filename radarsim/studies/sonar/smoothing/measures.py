@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.physics.motion import transition
+from radarsim.physics import transition
 from radarsim.report import statistics
 from radarsim.report.claims import Missing, ratio
 from radarsim.report.statistics import Estimate

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.engine.moments import Layout
-from radarsim.studies.sonar import banks
+from radarsim.engine.results import Layout
+from radarsim.studies.sonar import filters
 from radarsim.studies.sonar import study as base
-from radarsim.studies.sonar.axes import GivenPlotsAxes
-from radarsim.studies.sonar.detectors import detector_arrays
-from radarsim.studies.sonar.exact_values import exact_values
+from radarsim.studies.sonar.exact import exact_values
+from radarsim.studies.sonar.filters import detector_arrays
 from radarsim.studies.sonar.kernels import shared_gains as kernels
 from radarsim.studies.sonar.scene import Scene, build_scene, filter_specs
+from radarsim.studies.sonar.world import GivenPlotsAxes
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,10 @@ def prepare(case: Case) -> SharedPlan | base.RealisationPlan:
     return base.realisation_plan(case, scene, specs, detector_arrays([], [], np.zeros(K, dtype=np.int64), C))
 
 
-def _shared_plan(case: Case, scene: Scene, specs: list[banks.FilterSpec]) -> SharedPlan:
+def _shared_plan(case: Case, scene: Scene, specs: list[filters.FilterSpec]) -> SharedPlan:
     size = max(one.size for one in specs)
     designs = base.designs(specs, scene, np.maximum(scene.certain, 0)[None])
-    bank = banks.shared_bank(specs, designs)
+    bank = filters.shared_bank(specs, designs)
     F, K, C = bank.known.shape
     covariance = np.array([[design.covariance[0] for design in row] for row in designs])
     values = exact_values(scene, designs, np.ones(1), size)

@@ -10,7 +10,7 @@ from radarsim.report import statistics
 from radarsim.report import tables as common
 from radarsim.report.tables import Columns, leading, stacked
 from radarsim.studies.sonar import exact
-from radarsim.studies.sonar.axes import GivenPlotsAxes
+from radarsim.studies.sonar.world import GivenPlotsAxes
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -5,11 +5,10 @@ from typing import TYPE_CHECKING
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, tr
-from radarsim.report import panels, text
-from radarsim.report import tables as common
-from radarsim.studies.sonar.axes import SonarAxes
+from radarsim.report import panels, tables
 from radarsim.studies.sonar.config import Keys, correlation_of
 from radarsim.studies.sonar.figures import QUANTITIES
+from radarsim.studies.sonar.world import SonarAxes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,7 +38,7 @@ def answer(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.Data
 def _best(result: CaseResult[SonarAxes], curves: "pd.DataFrame") -> str:
     """The filters with the least and the largest σ at the end of a case."""
     first = result.axes.components[0][0]
-    rows = common.where(curves, case=result.name, component=first)
+    rows = tables.where(curves, case=result.name, component=first)
     last = rows[rows["k"] == rows["k"].max()]
     # By exact values where all are known, so that filters of equal accuracy are not ranked by their noise.
     order = last["exact_sigma"].round(9) if last["exact_sigma"].notna().all() else last["sigma"]
@@ -58,7 +57,7 @@ def _with(row: "pd.Series") -> str:
     return " ".join(
         (
             row["filter"],
-            text.estimate((row[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(row["unit"])),
+            tables.estimate((row[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(row["unit"])),
         )
     )
 
@@ -77,7 +76,7 @@ def _most_optimistic(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[st
         tr(
             "Most optimistic: {filter}, whose true σ is {ratio} times the one it believes ({quantity}, scan {k}).",
             filter=f"{worst['filter']} ({swept})" if swept else str(worst["filter"]),
-            ratio=text.estimate((worst[key] for key in ("ratio", "ratio_lo", "ratio_hi")), form=".2f"),
+            ratio=tables.estimate((worst[key] for key in ("ratio", "ratio_lo", "ratio_hi")), form=".2f"),
             quantity=QUANTITIES[worst["component"]].name,
             k=worst["k"],
         )

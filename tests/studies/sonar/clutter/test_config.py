@@ -3,7 +3,7 @@
 import pytest
 
 from radarsim.app.configs import load
-from radarsim.config.identity import world
+from radarsim.config.experiment import world
 from radarsim.errors import ConfigError
 
 SECTOR = {"range_m": [2e3, 15e3], "bearing_deg": [-40, 80]}

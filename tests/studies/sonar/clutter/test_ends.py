@@ -14,9 +14,8 @@ from radarsim.kernels import random
 from radarsim.report import rare
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter import filters as design
-from radarsim.studies.sonar.clutter import tables
-from radarsim.studies.sonar.clutter import track as plots
-from radarsim.studies.sonar.clutter.kernels import counts as places
+from radarsim.studies.sonar.clutter import tables, track
+from radarsim.studies.sonar.clutter.kernels import tracker as places
 from radarsim.studies.sonar.clutter.kernels.ends import outside
 from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
 from radarsim.studies.sonar.kernels.steps import CHUNK
@@ -147,7 +146,7 @@ def test_weights_and_ends_are_the_twins(density, detection):
         sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
         errors = errors_of(plan, realisation, scans)
         u = np.array([uniform_of(plan.axes.detections.key, realisation, k) for k in range(scans)])
-        field = lambda k, i=realisation: plots.false_plots(plan.axes.field, i, k).T  # noqa: E731
+        field = lambda k, i=realisation: track.false_plots(plan.axes.field, i, k).T  # noqa: E731
         for f, choice in enumerate(design.tracker_specs(case.spec)):
             gate = design.gate_threshold(choice.gate_probability)
             laws = naive_ends.Laws(choice, given, gate, scans, choice.misses)

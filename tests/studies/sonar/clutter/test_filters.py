@@ -3,19 +3,18 @@
 import numpy as np
 import pytest
 
-from radarsim.studies.sonar.clutter import filters as design
-from radarsim.studies.sonar.clutter import multitrack
-from radarsim.studies.sonar.clutter.kernels.gate import OPEN
+from radarsim.studies.sonar.clutter import filters, track
+from radarsim.studies.sonar.clutter.kernels.tracker import OPEN
 
 SIGMA, T = np.array([30.0, 0.0175]), 5.0
 
 
 def choice(association="nearest", gate=0.99, m=3, n=4, misses=3):
-    return design.TrackerSpec(association, gate, m, n, misses, 10.0, 10.0, np.array([1e-4, 1e-12]))
+    return filters.TrackerSpec(association, gate, m, n, misses, 10.0, 10.0, np.array([1e-4, 1e-12]))
 
 
 def charted(of, scans, density=0.0, detection=0.9):
-    return multitrack.confirmed_tracks(of, design.Conditions(T, SIGMA, detection, density), scans)
+    return track.confirmed_tracks(of, filters.Conditions(T, SIGMA, detection, density), scans)
 
 
 def course(r, b, scans, seed, missed=()):
@@ -74,11 +73,11 @@ def test_more_tracks_than_a_chunk_holds():
 
 
 def test_gate_thresholds_and_poisson_distribution():
-    assert design.gate_threshold(0.99) == pytest.approx(9.210340371976184)
-    assert design.gate_threshold(1.0) == OPEN
+    assert filters.gate_threshold(0.99) == pytest.approx(9.210340371976184)
+    assert filters.gate_threshold(1.0) == OPEN
     from scipy import stats
 
     for mean in (0.0, 0.01, 1.5, 40.0):
-        share = design.poisson_share(mean)
+        share = filters.poisson_share(mean)
         assert share == pytest.approx(stats.poisson.cdf(np.arange(share.size), mean), abs=1e-14)
         assert share[-1] == 1.0

@@ -9,9 +9,9 @@ from radarsim.app.configs import load
 from radarsim.kernels import random
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter import filters as design
-from radarsim.studies.sonar.clutter import track as plots
+from radarsim.studies.sonar.clutter import track
 from radarsim.studies.sonar.clutter.filters import tracker_specs
-from radarsim.studies.sonar.clutter.kernels import counts as places
+from radarsim.studies.sonar.clutter.kernels import tracker as places
 from tests.studies.sonar.clutter import naive as naive
 
 T, SIGMA = 5.0, np.array([30.0, np.radians(1)])
@@ -55,8 +55,8 @@ def test_estimates_are_the_twins(density):
     wanted, t, compared = tracker_specs(case.spec), plan.axes.t_s, 0
     for realisation in (0, 1, 2, 3, 511, 70_000):
         sums = sums_of(plan, realisation)
-        z, true = plots.target_plots(plan.axes.world, plan.axes.detections, realisation)
-        false = [plots.false_plots(plan.axes.field, realisation, k).T for k in range(len(t))]
+        z, true = track.target_plots(plan.axes.world, plan.axes.detections, realisation)
+        false = [track.false_plots(plan.axes.field, realisation, k).T for k in range(len(t))]
         for f, choice in enumerate(wanted):
             gate = design.gate_threshold(choice.gate_probability)
             of = (choice, SIGMA, 0.8, choice.gate_probability, gate, density / 1e6, T)
@@ -105,7 +105,7 @@ def test_the_field_is_poisson_and_even_in_area():
     """Numbers in a sector, over realisations, and places of their plots, against their laws."""
     _, plan = prepared([tracker("pda")], density=2.0)
     area = plan.axes.area_m2
-    found = [plots.false_plots(plan.axes.field, i, 3) for i in range(2000)]
+    found = [track.false_plots(plan.axes.field, i, 3) for i in range(2000)]
     number = np.array([one.shape[1] for one in found])
     mean = 2e-6 * area
     assert abs(number.mean() - mean) < 3.9 * np.sqrt(mean / 2000)

@@ -14,8 +14,8 @@ from radarsim.errors import ConfigError
 from radarsim.kernels import random
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter import filters as design
-from radarsim.studies.sonar.clutter import track as plots
-from radarsim.studies.sonar.clutter.kernels import counts as places
+from radarsim.studies.sonar.clutter import track
+from radarsim.studies.sonar.clutter.kernels import tracker as places
 from radarsim.studies.sonar.clutter.kernels.rare import Shift
 from tests.studies.sonar.clutter.naive_false import FalseTrack
 from tests.studies.sonar.clutter.test_study import config, simulated, tracker
@@ -90,7 +90,7 @@ def test_weights_and_lives_are_the_twins(density, rare):
         words = words_of(plan.shift.plots, realisation)
         for f, choice in enumerate(design.tracker_specs(case.spec)):
             gate = design.gate_threshold(choice.gate_probability)
-            field = lambda k, i=realisation: plots.false_plots(plan.field_about_false, i, k).T  # noqa: E731
+            field = lambda k, i=realisation: track.false_plots(plan.field_about_false, i, k).T  # noqa: E731
             weight, held = FalseTrack(choice, given, gate, SECTOR, words, field).follow(first, 12, law, shares)
             assert sums["drawn"][f] == pytest.approx([float(law == 0), weight, weight**2], rel=1e-9, abs=0)
             expected = np.zeros((12, 4))

@@ -6,7 +6,7 @@ from scipy import stats
 
 from radarsim.app.configs import load
 from radarsim.studies.sonar import STUDY
-from radarsim.studies.sonar.clutter.kernels import counts as places
+from radarsim.studies.sonar.clutter.kernels import tracker as places
 
 N = 100_000
 RATE = 5e-5  # of either tail: 99.99 % bounds

@@ -6,7 +6,7 @@ from scipy import stats
 
 import radarsim
 from radarsim.studies.sonar.clutter import tables as report
-from radarsim.studies.sonar.clutter.kernels import counts as places
+from radarsim.studies.sonar.clutter.kernels import tracker
 
 
 def config(**more):
@@ -41,11 +41,11 @@ def test_tables_say_what_the_sums_hold(result):
     case = result.cases[2]
     counts = case.sums["counts"][1]
     rows = tracks[(tracks["case"] == case.name) & (tracks["filter"] == "PDA")]
-    assert rows["kept"].to_numpy() == pytest.approx(counts[:, places.KEPT] / 2000)
-    assert rows["lost"].sum() == counts[:, places.LOST].sum()
+    assert rows["kept"].to_numpy() == pytest.approx(counts[:, tracker.KEPT] / 2000)
+    assert rows["lost"].sum() == counts[:, tracker.LOST].sum()
     row = tracking[(tracking["case"] == case.name) & (tracking["filter"] == "PDA")].iloc[0]
-    held = counts[:, places.KEPT].sum() * 5.0
-    ends = counts[:, [places.LOST, places.DROPPED]].sum()
+    held = counts[:, tracker.KEPT].sum() * 5.0
+    ends = counts[:, [tracker.LOST, tracker.DROPPED]].sum()
     assert row["life_s"] == pytest.approx(held / ends)
     assert row["ends_per_hour"] == pytest.approx(3600 * ends / held)
     assert row["life_lo"] < row["life_s"] < row["life_hi"]

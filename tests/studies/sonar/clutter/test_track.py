@@ -5,17 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarsim.app import run as experiment
+from radarsim.app import run
 from radarsim.errors import ConfigError
-from radarsim.recorded import follow as recorded
-from radarsim.recorded import plots
+from radarsim.recorded import follow, plots
 
 EXAMPLE = Path(__file__).parents[4] / "docs/examples/sonar_clutter.csv"
 ONE = ("sweep.sensor.false_plots_per_km2=[0.03]",)
 
 
 def loaded(name="sonar_clutter", overrides=ONE):
-    return experiment.load_all([name], overrides)[0]
+    return run.load_all([name], overrides)[0]
 
 
 def written(path, rows):
@@ -24,7 +23,7 @@ def written(path, rows):
 
 
 def test_the_example_is_realisation_3_of_the_shipped_config():
-    columns = recorded.simulated(loaded(), 3)
+    columns = follow.simulated(loaded(), 3)
     kept = np.genfromtxt(EXAMPLE, delimiter=",", names=True)
     assert list(columns) == list(kept.dtype.names)
     for name, values in columns.items():
@@ -35,7 +34,7 @@ def test_the_example_is_realisation_3_of_the_shipped_config():
 
 def test_the_target_of_the_example_is_found():
     """The track of the highest score is the target's, in every tracker; the one told its plots is left out."""
-    _, track = recorded.track(loaded(), EXAMPLE)
+    _, track = follow.track(loaded(), EXAMPLE)
     assert set(track.filters) == {"nearest", "PDA", "nearest, 4 of 6"}
     truth = np.genfromtxt(EXAMPLE, delimiter=",", names=True)
     for name in set(track.filters):
@@ -49,7 +48,7 @@ def test_the_target_of_the_example_is_found():
 
 
 def test_columns_tell_the_tracks_apart(tmp_path):
-    _, track = recorded.track(loaded(), EXAMPLE)
+    _, track = follow.track(loaded(), EXAMPLE)
     plots.write(track, tmp_path / "track.csv")
     header, first = (tmp_path / "track.csv").read_text().split("\n")[:2]
     assert header == "t_s,filter,component,unit,estimate,sigma,track,score"
@@ -66,10 +65,10 @@ def test_one_plot_a_scan_is_the_plain_filter(tmp_path):
     sector = {"range_m": [1e3, 2e4], "bearing_rad": [-1, 1]}
     rules = {"kind": "kalman", "manoeuvre_variance": 1e-4, "name": "a"}
     tracker = {**rules, "association": "nearest", "gate_probability": 1.0}
-    (one,) = experiment.load_all([base | {"sensor": sensor, "filters": [rules]}])
-    (other,) = experiment.load_all([base | {"sensor": sensor | {"sector": sector}, "filters": [tracker]}])
-    _, plain = recorded.track(one, path)
-    _, found = recorded.track(other, path)
+    (one,) = run.load_all([base | {"sensor": sensor, "filters": [rules]}])
+    (other,) = run.load_all([base | {"sensor": sensor | {"sector": sector}, "filters": [tracker]}])
+    _, plain = follow.track(one, path)
+    _, found = follow.track(other, path)
     assert found.estimate.shape == plain.estimate.shape
     np.testing.assert_allclose(found.estimate, plain.estimate, rtol=1e-13, atol=1e-15)
     np.testing.assert_allclose(found.sigma, plain.sigma, rtol=1e-12)
@@ -78,15 +77,15 @@ def test_one_plot_a_scan_is_the_plain_filter(tmp_path):
 def test_equal_times_are_for_trackers_alone(tmp_path):
     path = written(tmp_path / "plots.csv", [(0, 9e3, 0.3), (0, 8e3, 0.2), (5, 9e3, 0.3)])
     with pytest.raises(ConfigError, match="must be later than the row before, got 0 after 0"):
-        recorded.track(loaded("sonar_smoothing", ()), path)
-    recorded.track(loaded(), path)
+        follow.track(loaded("sonar_smoothing", ()), path)
+    follow.track(loaded(), path)
     with pytest.raises(ConfigError, match="must not be earlier than the row before, got 4 after 5"):
-        recorded.track(loaded(), written(path, [(5, 9e3, 0.3), (4, 8e3, 0.2)]))
+        follow.track(loaded(), written(path, [(5, 9e3, 0.3), (4, 8e3, 0.2)]))
 
 
 def test_a_scan_without_plots_and_no_track_at_all(tmp_path):
     path = written(tmp_path / "plots.csv", [(0, 9e3, 0.3), (5, "", ""), (10, 9e3, "")])
-    _, track = recorded.track(loaded(), path)
+    _, track = follow.track(loaded(), path)
     assert track.estimate.shape == (0, 3, 4)
 
 
@@ -94,4 +93,4 @@ def test_an_oracle_alone_cannot_track(tmp_path):
     path = written(tmp_path / "plots.csv", [(0, 9e3, 0.3)])
     config = loaded("sonar_clutter", (*ONE, "filters=[{name: a, kind: kalman, association: known}]"))
     with pytest.raises(ConfigError, match="nearest or pda is needed"):
-        recorded.track(config, path)
+        follow.track(config, path)

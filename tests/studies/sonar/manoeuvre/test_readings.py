@@ -75,10 +75,10 @@ def test_a_part_on_delays_asks_for_the_readings_rate():
 
 def test_more_plots_can_be_worth_while_under_a_reading(tmp_path):
     """At 0.01 false alarms eight plots see the weakest manoeuvre sooner than four or five; in %, as the words want."""
-    from radarsim.app import readings as app
+    from radarsim.app import readings
 
-    wanted = app.asked(["P3.8"], ["false_alarms=0.01", "manoeuvre=80 s", "seen=beginning", "tests=sliding"])
-    done = app.readings(wanted, out=tmp_path, realisations=200, figures=False)
+    wanted = readings.asked(["P3.8"], ["false_alarms=0.01", "manoeuvre=80 s", "seen=beginning", "tests=sliding"])
+    done = readings.readings(wanted, out=tmp_path, realisations=200, figures=False)
     shipped, other = done.read[0].over[0].under
     weak = [one.parts[4][1] for one in (shipped, other)]
     assert all(one.parts[4][0].unit == "%" for one in (shipped, other))
@@ -87,10 +87,10 @@ def test_more_plots_can_be_worth_while_under_a_reading(tmp_path):
 
 
 def test_the_joint_search_names_numbers_as_shipped_in_the_order_of_the_claims(tmp_path):
-    from radarsim.app import readings as app
-    from radarsim.report.claims.joint import joint
+    from radarsim.app import readings
+    from radarsim.report.claims.over import joint
 
-    done = app.readings(app.asked(["P3.3", "P3.9"]), out=tmp_path, figures=False)
+    done = readings.readings(readings.asked(["P3.3", "P3.9"]), out=tmp_path, figures=False)
     numbers = joint(OF, done.read[0].over).numbers.values()
     shipped = [part.what for claim in ("P3.3", "P3.9") for part in CLAIMS[claim].parts]
     assert [number.what for number in numbers] == shipped

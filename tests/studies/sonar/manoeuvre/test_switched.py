@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from radarsim.studies.sonar.manoeuvre.switched import switched_window
+from radarsim.studies.sonar.manoeuvre.exact import switched_window
 
 DT, SIGMA = 5.0, 10.0
 

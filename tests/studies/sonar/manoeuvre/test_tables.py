@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.app import output
+from radarsim.app import result as output
 from radarsim.app.configs import load
 from radarsim.report import claims, figures, panels
 from radarsim.studies.sonar import STUDY
@@ -102,7 +102,7 @@ def test_uses_tell_where_the_first_order_holds_and_where_not(tables):
 
 
 def test_figures_draw(result):
-    described = output.figures(result.cases, result.tables, result.experiment)
+    described = output.case_figures(result.cases, result.tables, result.experiment)
     assert set(described) >= OWN
     for name in OWN:
         assert figures.render(described[name]).axes
@@ -113,7 +113,7 @@ def test_a_case_without_detectors_has_its_own_figures_alone():
     changes = ["detectors=[]", "sweep.target.acceleration_mps2=[0.4]", "uses.at_s=[100]", "realisations=64"]
     made = load("sonar_manoeuvre", changes)
     result = radarsim.run(made)
-    described = output.figures(result.cases, result.tables, result.experiment)
+    described = output.case_figures(result.cases, result.tables, result.experiment)
     assert OWN & set(described) == {"response", "modes", "uses"}
     assert "detections" not in result.tables
     assert STUDY.question(made).startswith("How well are course, speed")
@@ -123,7 +123,7 @@ def test_cases_in_several_frames_stand_side_by_side():
     result = radarsim.run(
         load("sonar_manoeuvre_turning", ["sweep.target.turns.0.rate_radps=[0.07]", "realisations=64"])
     )
-    described = output.figures(result.cases, result.tables, result.experiment)
+    described = output.case_figures(result.cases, result.tables, result.experiment)
     panels = described["response"].panels
     assert [panel.title for panel in panels[:2]] == ["4.01°/s, polar", "4.01°/s, cartesian unbiased"]
     assert [panel.y.label for panel in panels[:2]] == ["$\\sigma$ of $r$, m", "$\\sigma$ of $x$, m"]
@@ -138,7 +138,7 @@ def test_a_detector_that_never_has_its_plots():
     made = load("sonar_manoeuvre", [*changes, "sweep.target.acceleration_mps2=[0.8]"])
     result = radarsim.run(made)
     assert "detections" not in result.tables
-    assert set(output.figures(result.cases, result.tables, made)) & OWN == {"uses"}
+    assert set(output.case_figures(result.cases, result.tables, made)) & OWN == {"uses"}
     assert STUDY.answer(result.cases, result.tables)
 
 

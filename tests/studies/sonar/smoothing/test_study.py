@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.app.work import CaseWork
+from radarsim.app.configs import CaseWork, load
 from radarsim.studies.sonar import STUDY
 
 N = 100_000

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.app import output
+from radarsim.app import result as output
 from radarsim.app.configs import load
 from radarsim.report import claims, figures
-from radarsim.studies.sonar import STUDY, exact, operations
+from radarsim.studies.sonar import STUDY, exact, scene
 
 FIGURES = {
     "sonar_smoothing": {"plots", "smoothing_gains", "sigma_r", "sigma_vb"},
@@ -24,7 +24,7 @@ def results():
 
 def test_each_config_has_its_figures_and_they_draw(results):
     for stem, wanted in FIGURES.items():
-        described = output.figures(results[stem].cases, results[stem].tables, results[stem].experiment)
+        described = output.case_figures(results[stem].cases, results[stem].tables, results[stem].experiment)
         assert wanted <= set(described)
         for name in wanted & {"plots", "believed", "missed", "conversion", "smoothing_gains"}:
             drawn = figures.render(described[name])
@@ -66,15 +66,15 @@ def test_conversion_table(results):
 
 
 def test_operations_are_counted():
-    assert operations.recursion().total == 19
-    assert operations.batch_of(6).total > 3 * operations.recursion().total
-    assert operations.augmented().total > 2 * operations.differenced().total
+    assert scene.recursion().total == 19
+    assert scene.batch_of(6).total > 3 * scene.recursion().total
+    assert scene.augmented().total > 2 * scene.differenced().total
 
 
 def test_counted_formulas_are_the_filters():
     """What is counted computes: recursion and batch agree with each other on numbers."""
-    numbers = operations.Number
-    tally = operations.Tally()
+    numbers = scene.Number
+    tally = scene.Tally()
 
     def wrap(values):
         return [numbers(float(v), tally) for v in values]
@@ -84,8 +84,8 @@ def test_counted_formulas_are_the_filters():
     for k in range(1, 4):
         step = wrap([times[k] - times[k - 1]])[0]
         u, w = wrap([plots[k]])[0], wrap([weights[k]])[0]
-        memory, estimate = operations.line_step(memory, estimate, u, w, step)
-    anew = operations.batch(wrap(times), wrap(plots), wrap(weights))
+        memory, estimate = scene.line_step(memory, estimate, u, w, step)
+    anew = scene.batch(wrap(times), wrap(plots), wrap(weights))
     assert [n.value for n in estimate] == pytest.approx([n.value for n in anew])
 
 

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from radarsim.config.experiment import Case
-from radarsim.engine.moments import Layout
-from radarsim.engine.results import Axes
+from radarsim.engine.results import Axes, Layout
 from radarsim.studies.noise import noise_key
 
 from random_walk import exact, filters

@@ -32,29 +32,37 @@ import numpy as np
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import address
 from radarsim.kernels.random import uniforms
-from radarsim.studies.sonar.clutter.kernels import rules as life
-from radarsim.studies.sonar.clutter.kernels.blocks import measure_target
-from radarsim.studies.sonar.clutter.kernels.counts import COUNTS
-from radarsim.studies.sonar.clutter.kernels.field import draws_of
-from radarsim.studies.sonar.clutter.kernels.gate import KNOWN, OPEN, PDA, Rule, distance_squared, inverse_two
+from radarsim.studies.sonar.clutter.kernels import tracker
 from radarsim.studies.sonar.clutter.kernels.rare import LARGEST, MOST_MEAN, associate_drawn, box_of
-from radarsim.studies.sonar.clutter.kernels.rules import ENDS as TRACKS_ENDED
-from radarsim.studies.sonar.clutter.kernels.rules import judge, off_target
-from radarsim.studies.sonar.clutter.kernels.sums import add_drawn, add_weight
 from radarsim.studies.sonar.clutter.kernels.tracker import (
+    COUNTS,
+    KNOWN,
+    OPEN,
+    PDA,
+    Rule,
     Scan,
     Target,
     Workspace,
+    add_drawn,
+    add_weight,
     associate,
     associate_track,
     begin,
+    distance_squared,
+    draws_of,
     gate_of,
+    inverse_two,
+    judge,
+    measure_target,
+    off_target,
+    predict,
     reset,
     rule_of,
     settle,
     tracks_of,
+    update,
 )
-from radarsim.studies.sonar.clutter.kernels.tracks import predict, update
+from radarsim.studies.sonar.clutter.kernels.tracker import ENDS as TRACKS_ENDED
 from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
 from radarsim.studies.sonar.kernels.steps import CHUNK, copy_row
 from radarsim.studies.sonar.kernels.sums import Course
@@ -265,9 +273,13 @@ def look(field, laws, scan, tracks, status, predicted, own):
     cells, plots = field.cells, tracks.plots
     for i in range(scan.count):
         own[BOX, i] = 0.0
-        if status[life.STATE, i] != life.NONE and status[life.AGE, i] < laws.young_age and laws.shares[-1] > 0.0:
+        if (
+            status[tracker.STATE, i] != tracker.NONE
+            and status[tracker.AGE, i] < laws.young_age
+            and laws.shares[-1] > 0.0
+        ):
             place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
-            reach = laws.rule.speed * (status[life.SINCE, i] + scan.dt)
+            reach = laws.rule.speed * (status[tracker.SINCE, i] + scan.dt)
             mean = box_of(cells, gate_of(place, S, plots[i] > 1.5, reach), laws.rule.gate).mean
             own[BOX, i] = -math.expm1(-mean) if 0.0 < mean <= MOST_MEAN else 0.0
 
@@ -311,12 +323,12 @@ def detect_drawn(detections, laws, scan, status, predicted, target, plots, own):
         u, _ = uniforms(detections.key[0], detections.key[1], scan.first + i, k)
         law, h = int(own[LAW, i]), 1.0 - detection
         if law == laws.shares.size - 1 and may_be_seduced(laws, k, certain, own, i):
-            h = missed_if_seduced(seduction(laws, status[life.AGE, i], h, own[BOX, i]), h, own[BOX, i])
-        if own[ENDED, i] > 0.0 or certain >= 0 or status[life.STATE, i] != life.CONFIRMED:
+            h = missed_if_seduced(seduction(laws, status[tracker.AGE, i], h, own[BOX, i]), h, own[BOX, i])
+        if own[ENDED, i] > 0.0 or certain >= 0 or status[tracker.STATE, i] != tracker.CONFIRMED:
             seen = u < 1.0 - h if certain < 0 else certain > 0
             detected[i] = 1.0 if seen and own[ENDED, i] == 0.0 else 0.0
             continue
-        misses, longest = int(status[life.MISSES, i]), max(own[LONGEST, i], status[life.MISSES, i])
+        misses, longest = int(status[tracker.MISSES, i]), max(own[LONGEST, i], status[tracker.MISSES, i])
         own[LONGEST, i] = longest
         h = undetected_by(laws, law, longest, misses, k, detection) if law <= laws.length.size else h
         detected[i] = 1.0 if u < 1.0 - h else 0.0
@@ -345,7 +357,7 @@ def drawn_false(laws, k, certain, missed, detected, status, own, i):
     The probability h of the law of false plots, that of the law that the realisation is drawn from, and η, zero where
     it is not shifted. missed: the probability that the target is not detected; detected: whether it is.
     """
-    age, law, last = status[life.AGE, i], int(own[LAW, i]), laws.shares.size - 1
+    age, law, last = status[tracker.AGE, i], int(own[LAW, i]), laws.shares.size - 1
     needed = sooner(laws, age) if own[CAME, i] == 0.0 else 0.0
     eta = seduction(laws, age, missed, own[BOX, i]) if may_be_seduced(laws, k, certain, own, i) else 0.0
     drawn = needed if law == last - 1 else 0.0
@@ -364,14 +376,14 @@ def associate_young(field, detections, ends, laws, scan, tracks, status, chunk):
     predicted, detected, z, lives = chunk.work.predicted, chunk.detected, chunk.z, address(status)
     keys, last, missed = (ends.plots[0], ends.plots[1]), own.shape[0] - 1, 1.0 - detections.probability
     for i in range(scan.count):
-        if status[life.STATE, i] == life.NONE:
+        if status[tracker.STATE, i] == tracker.NONE:
             out[:, i] = 0.0
             if detected[i] > 0.0:
                 begin(tracks, status, i, z, out)
             continue
-        status[life.SINCE, i] += scan.dt
+        status[tracker.SINCE, i] += scan.dt
         place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
-        gate = gate_of(place, S, tracks.plots[i] > 1.5, rule.speed * status[life.SINCE, i])
+        gate = gate_of(place, S, tracks.plots[i] > 1.5, rule.speed * status[tracker.SINCE, i])
         plot, realisation = (detected[i], z[0, i], z[1, i]), scan.first + i
         if own[BOX, i] > 0.0:
             certain, box, seen = detections.certain[scan.k], box_of(draws.cells, gate, rule.gate), detected[i] > 0.0
@@ -408,7 +420,7 @@ def add_ended(limits, n, tracks, status, course, laws, own, ended):
     for i in range(n):
         if status[TRACKS_ENDED, i] > 0.0 and own[ENDED, i] == 0.0:
             own[ENDED, i] = 1.0
-            lost = status[life.MISSES, i] < misses and off_target(tracks, course, beyond, i)
+            lost = status[tracker.MISSES, i] < misses and off_target(tracks, course, beyond, i)
             beside = own[CAME, i] > 0.0 and own[SEDUCED, i] == 0.0
             kind = (LOST if lost else DROPPED) + (DROPPED_AFTER if beside else 0)
             add_weight(weight_of(laws.shares, own, i), ended, kind)

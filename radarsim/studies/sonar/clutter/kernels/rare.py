@@ -23,24 +23,36 @@ import numpy as np
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import address
 from radarsim.kernels.random import uniform, uniforms
-from radarsim.studies.sonar.clutter.kernels import rules as life
-from radarsim.studies.sonar.clutter.kernels.counts import COUNTS
-from radarsim.studies.sonar.clutter.kernels.field import TURN, cell_words, draws_of, even_places, place_in
-from radarsim.studies.sonar.clutter.kernels.gate import KNOWN, PDA, associated, empty_gate, inverse_two, with_plot
-from radarsim.studies.sonar.clutter.kernels.rules import judge_false
-from radarsim.studies.sonar.clutter.kernels.sums import add_drawn, add_scores, add_weight
+from radarsim.studies.sonar.clutter.kernels import tracker
 from radarsim.studies.sonar.clutter.kernels.tracker import (
+    COUNTS,
+    KNOWN,
+    PDA,
+    TURN,
     Scan,
     Target,
+    add_drawn,
+    add_scores,
+    add_weight,
     associate_track,
+    associated,
+    cell_words,
+    draws_of,
+    empty_gate,
+    even_places,
     gate_of,
+    inverse_two,
+    judge_false,
+    place_in,
+    predict,
     reset,
     rule_of,
     settle,
     step,
     tracks_of,
+    update,
+    with_plot,
 )
-from radarsim.studies.sonar.clutter.kernels.tracks import predict, update
 from radarsim.studies.sonar.kernels.steps import CHUNK
 
 MOST_MEAN = 16.0  # of a box: where it is larger, false plots are in the gate anyway, and the field is as it is
@@ -159,18 +171,18 @@ def associate_false(field, shift, trackers, f, scan, work, own, counts):
     lives, taken = address(status), address(out)
     keys, most, held_on = (shift.plots[0], shift.plots[1]), trackers.misses[f], shift.shares[2] > 0.0
     for i in range(scan.count):
-        if status[life.STATE, i] == life.NONE:
+        if status[tracker.STATE, i] == tracker.NONE:
             out[:, i] = 0.0
             continue
-        status[life.SINCE, i] += scan.dt
+        status[tracker.SINCE, i] += scan.dt
         place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
-        gate = gate_of(place, S, plots[i] > 1.5, rule.speed * status[life.SINCE, i])
-        box, tentative = box_of(draws.cells, gate, rule.gate), status[life.STATE, i] == life.TENTATIVE
+        gate = gate_of(place, S, plots[i] > 1.5, rule.speed * status[tracker.SINCE, i])
+        box, tentative = box_of(draws.cells, gate, rule.gate), status[tracker.STATE, i] == tracker.TENTATIVE
         if (tentative or held_on) and 0.0 < box.mean <= MOST_MEAN:
             rest = (
-                (m - status[life.HITS, i]) / (n - status[life.AGE, i])
+                (m - status[tracker.HITS, i]) / (n - status[tracker.AGE, i])
                 if tentative
-                else 1.0 / (most - status[life.MISSES, i])
+                else 1.0 / (most - status[tracker.MISSES, i])
             )
             drawn = rest if own[LAW, i] > (0.0 if tentative else 1.0) else 0.0
             found, factor, _ = associate_drawn(keys, rule, (scan.first + i, scan.k), gate, NO_PLOT, box, rest, drawn)
@@ -189,7 +201,7 @@ def begin_false(shift, first, n, status, own):
         own[LAW, i] = 0.0 if u < shift.shares[0] else 1.0 if u < shift.shares[0] + shift.shares[1] else 2.0
         own[FOUND, i], own[LONG, i], own[HELD, i] = 1.0, 1.0, 0.0
         if own[LAW, i] > 0.0:
-            status[life.FIRST, i] = -1.0
+            status[tracker.FIRST, i] = -1.0
 
 
 @inline
@@ -202,7 +214,7 @@ def weight_of(shares, own, i):
 def add_held(shares, own, state, n, held):
     """Count a scan of the n tracks that are confirmed, by their weights so far; state (CHUNK,)."""
     for i in range(n):
-        if state[i] == life.CONFIRMED:
+        if state[i] == tracker.CONFIRMED:
             add_weight(weight_of(shares, own, i), held, int(own[HELD, i]))
             own[HELD, i] += 1.0
 
@@ -238,9 +250,9 @@ def simulate_false(seeds, field, shift, trackers, work, dt, first, total, scores
             for k in range(1, dt.size):
                 scan = Scan(first + done, n, k, dt[k])
                 left = scan_false(field, shift, trackers, f, scan, work, own, counts)
-                add_held(shift.shares, own, status[life.STATE], n, sums.held[f])
+                add_held(shift.shares, own, status[tracker.STATE], n, sums.held[f])
                 if not left:
                     break
             for i in range(n):
                 add_drawn(weight_of(shift.shares, own, i), own[LAW, i] == 0.0, sums.drawn[f])
-            add_scores(trackers.thresholds, n, status[life.FIRST], status[life.BEST], scores[f])
+            add_scores(trackers.thresholds, n, status[tracker.FIRST], status[tracker.BEST], scores[f])

@@ -1,0 +1,291 @@
+"""A result as it was stored: run.json and the tables beside it, read only where they are the ones that it records.
+
+What there is to run: configs, scenarios, studies and filters. Loads no kernels.
+
+Dropping stored blocks: what `radarsim clean` removes, and nothing beyond DIR/.blocks.
+
+Claims as a run has stored them: the table is read only if it is the one that run.json records.
+
+What `radarsim readings` came to: rows of its tables under a directory, and the classes that radarsim ships.
+
+classes.csv beside this module is that of the shipped configs, copied by `make readings-pages`; where a directory of
+results has its own, of a claim that was judged there, that one counts.
+"""
+
+import csv
+import hashlib
+import io
+import json
+import os
+import re
+import time
+from collections.abc import Callable, Collection, Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from radarsim.app.configs import document as lookup
+from radarsim.config.experiment import Experiment
+from radarsim.engine.blocks import QUESTION
+from radarsim.engine.store import is_directory, removable
+from radarsim.errors import ConfigError, StoreError
+from radarsim.language import term
+from radarsim.report import files, tables
+from radarsim.report.claims.declared import PaperClaims
+from radarsim.report.claims.over import PaperReadings
+from radarsim.report.claims.page import COLUMNS, Class, Known, declared
+from radarsim.studies import registry
+from radarsim.studies.identity import identity
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+# ---- stored tables ---------------------------------------------------------------------------------------------------
+AGAIN = "`radarsim report` makes it again"
+Row = TypeVar("Row")
+
+
+def content(path: Path) -> bytes | None:
+    """The bytes of a file; None where there is none. Raises StoreError where it cannot be read."""
+    try:
+        return files.read(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def rows(
+    path: Path, text: bytes, needed: Collection[str], made: Callable[[dict[str, Any]], Row], kind: str
+) -> list[Row]:
+    """What `made` makes of each row of a CSV file with the columns needed; StoreError, with kind, for any other."""
+    try:
+        table = csv.DictReader(io.StringIO(text.decode("utf-8"), newline=""), strict=True)
+        read, names = list(table), set(table.fieldnames or ())
+    except (ValueError, csv.Error) as error:
+        raise StoreError(f"{path}: cannot be read: {error}") from error
+    try:
+        if names >= set(needed):
+            return [made(row) for row in read]
+    except (LookupError, TypeError, ValueError):
+        pass  # reported like any other damaged table
+    raise StoreError(f"{path}: is no {kind}")
+
+
+def record(folder: Path) -> dict[str, Any] | None:
+    """The run.json of a folder; None where there is none. Raises StoreError where it is damaged."""
+    path = folder / "run.json"
+    if (text := content(path)) is None:
+        return None
+    try:
+        found = json.loads(text)
+        files.to_json(found)  # ValueError for what no run writes, such as NaN or half a character
+        if all(isinstance(found[key], dict) for key in ("cases", "outputs", "resolved")):
+            return dict(found)
+    except (ValueError, LookupError, TypeError, RecursionError):
+        pass
+    raise StoreError(f"{path}: is no record of a run; {AGAIN}")
+
+
+def table(folder: Path, name: str, outputs: "dict[str, str]") -> "pd.DataFrame | None":
+    """A table of a folder whose run.json names these outputs; None where the run wrote none of this name.
+
+    Raises StoreError where it cannot be read or is another one than recorded.
+    """
+    path = folder / f"{name}.csv"
+    if path.name not in outputs:
+        return None
+    try:
+        text = files.read(path)
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be read: {error.strerror}; {AGAIN}") from error
+    if hashlib.sha256(text).hexdigest() != outputs[path.name]:
+        raise StoreError(f"{path}: altered since it was written; {AGAIN}")
+    try:
+        return tables.from_csv(text)
+    except ValueError as error:
+        raise StoreError(f"{path}: is no table; {AGAIN}") from error
+
+
+# ---- inventory -------------------------------------------------------------------------------------------------------
+Inventory = Sequence[tuple[str, Sequence[str], Sequence[tuple[str, ...]]]]  # title, columns, rows
+
+
+def described(file: Path | None) -> str:
+    """The first line of a YAML file's leading comment, without its own name; empty where there is no such file."""
+    if file is None:
+        return ""
+    with file.open(encoding="utf-8") as lines:
+        for line in lines:
+            words = line.lstrip("#").strip()
+            if not line.startswith("#"):
+                break
+            if not words.startswith("yaml-language-server"):
+                return words.partition(" — ")[2] or words
+    return ""
+
+
+def inventory() -> Inventory:
+    """What `radarsim list` shows: title, columns and rows of each kind of thing at hand."""
+    configs = [(stem, described(lookup.config_file(stem))) for stem in lookup.stems("configs")]
+    scenarios = [(stem, described(lookup.scenario_file(stem, None))) for stem in lookup.stems("scenarios")]
+    studies = registry.parts(lambda study: (study.about, dict(study.filters)))
+    about = [(name, words) for name, (words, _) in studies.items()]
+    about += [(name, f"cannot be used: {words}") for name, words in registry.unusable().items()]
+    filters = [(name, key, words) for name, (_, of) in studies.items() for key, words in of.items()]
+    return [
+        (term("Configs (radarsim run NAME)"), ("name", "what it is"), configs),
+        (term("Scenarios (target: NAME)"), ("name", "what it is"), scenarios),
+        (term("Studies (study: NAME)"), ("name", "paper and question"), about),
+        (term("Filters"), ("study", "keys", "what it is"), filters),
+    ]
+
+
+def selected(whole: Inventory, words: Sequence[str]) -> Inventory:
+    """Of an inventory the kinds that some words name, and the rows that hold all other words, in any case of letters.
+
+    Raises ConfigError where nothing is left.
+    """
+    kinds = {title.partition(" ")[0].lower(): title for title, _, _ in whole}
+    wanted = {kinds[word.lower()] for word in words if word.lower() in kinds} or set(kinds.values())
+    parts = [word.lower() for word in words if word.lower() not in kinds]
+    found = [
+        (title, columns, [row for row in rows if all(part in " ".join(row).lower() for part in parts)])
+        for title, columns, rows in whole
+        if title in wanted
+    ]
+    if parts and not any(rows for _, _, rows in found):
+        raise ConfigError(
+            f"{' '.join(words)}: nothing of this name; `radarsim list` shows all, or one of {', '.join(kinds)}"
+        )
+    return [(title, columns, rows) for title, columns, rows in found if rows or not parts]
+
+
+# ---- clean -----------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class Cleaned:
+    """How much was dropped, or would be: files and bytes of so many identities."""
+
+    path: Path
+    identities: int
+    files: int
+    size: int
+
+
+def clean(
+    out: str | os.PathLike[str], experiments: Iterable[Experiment] | None = None, dry_run: bool = False
+) -> Cleaned:
+    """Drop the stored blocks of all experiments, or of some, below out/.blocks; with dry_run only say how much.
+
+    Of a case those that other sources made go too.
+
+    Links are not followed and files that no store makes are left, and with them their folder. Raises ConfigError if
+    `out` does not exist or its .blocks is a link, StoreError if a file cannot be removed.
+    """
+    blocks = Path(out) / ".blocks"
+    if not is_directory(Path(out)):
+        raise ConfigError(f"{out}: no such directory of results")
+    if blocks.is_symlink():
+        raise ConfigError(f"{blocks}: is a link; clean the directory that it points to")
+    wanted = None
+    if experiments is not None:
+        wanted = {identity(case)[:QUESTION] for experiment in experiments for case in experiment.cases}
+    try:
+        folders = [path for path in sorted(blocks.iterdir()) if _is_identity(path)] if is_directory(blocks) else []
+        folders = [path for path in folders if wanted is None or path.name[:QUESTION] in wanted]
+        files = [one for folder in folders for one in removable(folder)]
+        if not dry_run:
+            for path, _ in files:
+                path.unlink(missing_ok=True)
+            for folder in [*folders, blocks]:
+                with suppress(OSError):  # somebody else's file is in it
+                    folder.rmdir()
+    except OSError as error:
+        raise StoreError(f"{error.filename or blocks}: cannot be removed: {error.strerror}") from error
+    return Cleaned(blocks, len(folders), len(files), sum(size for _, size in files))
+
+
+def _is_identity(path: Path) -> bool:
+    return bool(re.fullmatch(r"[0-9a-f]{2,128}", path.name)) and path.is_dir() and not path.is_symlink()
+
+
+# ---- stored claims ---------------------------------------------------------------------------------------------------
+LOOKS, PAUSE_S = 5, 0.1  # at a table that fits no record: a run beside us may be writing both just now
+
+
+def stored(path: Path) -> list[dict[str, Any]] | None:
+    """The rows of a stored claims.csv, numbers as such; None if there is none.
+
+    Raises StoreError where it cannot be read, is no such table, or is another one than run.json beside it records.
+    """
+    from radarsim.report.claims import CLAIMED, NUMBERS
+
+    for look in range(LOOKS):
+        text = content(path)
+        if text is None:
+            return None
+        recorded = _recorded(path)
+        if recorded is None or hashlib.sha256(text).hexdigest() == recorded:
+
+            def numbered(row: dict[str, Any]) -> dict[str, Any]:
+                return row | {name: float(row[name]) if row[name] else "" for name in NUMBERS}
+
+            return rows(path, text, CLAIMED, numbered, f"table of claims; {AGAIN}")
+        if look < LOOKS - 1:
+            time.sleep(PAUSE_S)
+    raise StoreError(f"{path}: altered since it was written; {AGAIN}")
+
+
+def _recorded(path: Path) -> str | None:
+    """The SHA-256 of the file that run.json beside it records; None where there is no run.json or it names no such."""
+    record = path.with_name("run.json")
+    text = content(record)
+    try:
+        return None if text is None else json.loads(text)["outputs"].get(path.name)
+    except (ValueError, LookupError, TypeError, AttributeError) as error:
+        raise StoreError(f"{record}: is no record of a run; {AGAIN}") from error
+
+
+# ---- stored readings -------------------------------------------------------------------------------------------------
+PLACE, CLASSES = Path("readings", "readings.csv"), Path("readings", "classes.csv")
+NEEDED = {"claim", "reading", "kind", "outcome"}
+SHIPPED = Path(__file__).with_name("classes.csv")
+
+
+def stored_readings(out: Path) -> list[dict[str, Any]]:
+    """The rows of readings.csv under `out`; none where there is no such file. Raises StoreError for a damaged one."""
+    return _rows(out / PLACE, NEEDED, dict)
+
+
+def stored_classes(out: Path | None) -> list[Class]:
+    """The classes that were worked out under `out`. Raises StoreError for a damaged file."""
+    return _rows(out / CLASSES, set(COLUMNS), Class.of_row) if out else []
+
+
+@cache
+def shipped_classes() -> tuple[Class, ...]:
+    """The classes that radarsim ships."""
+    return tuple(_rows(SHIPPED, set(COLUMNS), Class.of_row))
+
+
+def classes_of(papers: Iterable[tuple[PaperReadings, PaperClaims]], out: Path | None) -> Known:
+    """The class over all readings of each claim of which its paper leaves something open; None where it is not known.
+
+    One that was worked out of other words, numbers or choices than the claim has now is none.
+    """
+    found = {(one.claim, one.declared): one for one in (*shipped_classes(), *stored_classes(out))}
+    return {
+        claim.id: found.get((claim.id, declared(readings, claim)))
+        for readings, claims in papers
+        for claim in claims.claims
+        if readings.open(claim)
+    }
+
+
+def _rows(path: Path, needed: set[str], made: Callable[[dict[str, Any]], Row]) -> list[Row]:
+    text = content(path)
+    kind = "table of readings; remove it, `radarsim readings` makes it again"
+    return [] if text is None else rows(path, text, needed, made, kind)

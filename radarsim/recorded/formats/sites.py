@@ -1,0 +1,401 @@
+r"""What every reader of a recording gives: some records at a time, as columns.
+
+A radar on the earth (WGS 84): what it sees of positions, and where its plots are. By pymap3d.
+
+Local axes: x north, y up, z east, with the origin at the radar. Bearings are counted from north to east. Elevations are
+those above the plane that is level at the radar; an aircraft far away and low lies below it.
+
+Ships by AIS: NMEA sentences `!AIVDM…`, by pyais.
+
+A message gives only the second of its minute. The time is that of the tag block (`\c:1577836800*..\!AIVDM…`) or of
+a number or ISO time before the sentence, or of a number after it; where there is neither, the seconds are made to run
+on from minute to minute.
+"""
+
+import datetime
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any, BinaryIO, NamedTuple, Protocol
+
+import numpy as np
+
+from radarsim import physics
+from radarsim.errors import ConfigError
+
+# ---- records ---------------------------------------------------------------------------------------------------------
+BATCH = 20_000  # records that are held at a time
+DAY_S = 86400.0
+PLOTS, POSITIONS = "plots", "positions"
+
+# What a record can hold beside its track and address. Angles are counted from north to east.
+PLOT_COLUMNS = ("t_s", "range_m", "bearing_rad", "velocity_mps", "span_mps", "altitude_m")
+POSITION_COLUMNS = ("t_s", "latitude_deg", "longitude_deg", "altitude_m", "east_mps", "north_mps", "up_mps")
+
+
+class Batch(NamedTuple):
+    """Some records, in the order of the file.
+
+    kind is PLOTS (measured by a radar: PLOT_COLUMNS) or POSITIONS (on the earth: POSITION_COLUMNS). track holds the
+    track of each record, '' where it has none; address what names the aircraft or ship everywhere (24 bits in
+    hexadecimal, MMSI), '' where it is not known; radar what names the sensor (SAC/SIC), '' where the format does not;
+    columns, arrays (n,), not-a-number where a record is silent.
+    """
+
+    kind: str
+    track: list[str]
+    address: list[str]
+    radar: list[str]
+    columns: dict[str, np.ndarray]
+
+    def rows(self, keep: list[int]) -> "Batch":
+        """Those of its records."""
+        track, address, radar = ([column[i] for i in keep] for column in (self.track, self.address, self.radar))
+        return Batch(self.kind, track, address, radar, {name: column[keep] for name, column in self.columns.items()})
+
+
+class Reader(Protocol):
+    """A reader of one format. Times count from midnight where `of_day`, else from 1970 (UTC), as the format has them.
+
+    records: how many were read until now; skipped: how many of them were passed over, by what they were.
+    """
+
+    of_day: bool
+    records: int
+    skipped: Counter[str]
+
+    def batches(self) -> Iterator[Batch]:
+        """The records, some at a time; raises ConfigError with file, place, what was expected and read."""
+
+
+@dataclass
+class Gathered:
+    """Records of one kind, one after the other, until there are enough for a batch."""
+
+    kind: str
+    names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        self._empty()
+
+    def _empty(self) -> None:
+        self.track: list[str] = []
+        self.address: list[str] = []
+        self.radar: list[str] = []
+        self.rows: list[tuple[float, ...]] = []
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def add(self, track: str, address: str, row: tuple[float, ...], radar: str = "") -> None:
+        """One more record; row in the order of `names`."""
+        self.track.append(track)
+        self.address.append(address)
+        self.radar.append(radar)
+        self.rows.append(row)
+
+    def taken(self) -> Batch:
+        """The records until now as a batch; it starts again."""
+        table = np.array(self.rows, dtype=float).reshape(-1, len(self.names))
+        columns = dict(zip(self.names, table.T.copy(), strict=True))
+        batch = Batch(self.kind, self.track, self.address, self.radar, columns)
+        self._empty()
+        return batch
+
+
+class Unrolled:
+    """Times of a clock that starts again after `period_s`, made to run on. Records out of order by half of it are seen
+    as they are; so are times that fall from, or to, further than near_s from the clock's turn."""
+
+    def __init__(self, period_s: float, near_s: float = math.inf):
+        self.period_s, self.near_s, self.turns = period_s, near_s, 0
+        self.last: float | None = None
+
+    def __call__(self, t: float) -> float:
+        """t (s) of the clock, with the turns that it has made added."""
+        if self.last is not None:
+            near = max(t, self.last) >= self.period_s - self.near_s and min(t, self.last) <= self.near_s
+            if near and t < self.last - self.period_s / 2:
+                self.turns += 1
+            elif near and t > self.last + self.period_s / 2 and self.turns:
+                return t + (self.turns - 1) * self.period_s
+        self.last = t
+        return t + self.turns * self.period_s
+
+
+def utc_s(text: str) -> float:
+    """Seconds from 1970 of a date and time in ISO 8601, in UTC where it names no zone; raises ValueError."""
+    moment = datetime.datetime.fromisoformat(text)
+    return (moment if moment.tzinfo else moment.replace(tzinfo=datetime.UTC)).timestamp()
+
+
+def needs(module: str, extra: str) -> ConfigError:
+    """The fault of a library that an extra of ours brings."""
+    return ConfigError(f"{module} is not installed, which this needs: pip install 'radarsim[{extra}]'")
+
+
+def counted(skipped: Mapping[str, int]) -> list[str]:
+    """What was passed over, in words."""
+    return [f"{count} {what}" for what, count in skipped.items() if count]
+
+
+# ---- site ------------------------------------------------------------------------------------------------------------
+try:
+    import pymap3d
+except ImportError:
+    pymap3d = None
+
+CLOSE_M = 0.01  # to which a height is met when the elevation of a plot is looked for
+ROUNDS = 20
+
+
+class Antenna(NamedTuple):
+    """The normal of an antenna: azimuth from north to east, elevation above the level, both in rad."""
+
+    azimuth_rad: float
+    elevation_rad: float
+
+
+class Site:
+    """Where the radar stands: latitude and longitude in degrees, height above the ellipsoid in m."""
+
+    def __init__(self, latitude_deg: float, longitude_deg: float, height_m: float):
+        if pymap3d is None:
+            raise needs("pymap3d", "recordings")
+        self.place = (latitude_deg, longitude_deg, height_m)
+
+    def seen(self, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Range, bearing, elevation, local position and, where speeds are known, radial velocity of positions (n,).
+
+        A height that is not known is taken as 0, that of the sea.
+        """
+        lat, lon = columns["latitude_deg"], columns["longitude_deg"]
+        height = np.nan_to_num(columns["altitude_m"], nan=0.0)
+        east, north, up = pymap3d.geodetic2enu(lat, lon, height, *self.place)
+        local = np.stack([north, up, east], axis=-1)
+        return described(local) | {"velocity_mps": self._radial(columns, lat, lon, height)}
+
+    def _radial(self, columns: dict[str, np.ndarray], lat: np.ndarray, lon: np.ndarray, h: np.ndarray) -> np.ndarray:
+        """Radial velocities (n,) in m/s, positive where the range grows: speeds over ground, seen along the line."""
+        up = np.nan_to_num(columns["up_mps"], nan=0.0)
+        speed = np.stack(pymap3d.enu2uvw(columns["east_mps"], columns["north_mps"], up, lat, lon), axis=-1)
+        target = np.stack(pymap3d.geodetic2ecef(lat, lon, h), axis=-1)
+        line = target - np.stack(pymap3d.geodetic2ecef(*self.place))
+        return np.einsum("ni,ni->n", speed, line) / np.linalg.norm(line, axis=-1)
+
+    def local(self, range_m: np.ndarray, bearing_rad: np.ndarray, altitude_m: np.ndarray) -> np.ndarray:
+        """Local positions (n, 3) of plots of slant range and bearing at a height (n,), all in m and rad.
+
+        Not-a-number where the height is not known, or where no point of that range has it.
+        """
+        sine = np.zeros_like(range_m)
+        bearing = np.degrees(bearing_rad)
+        with np.errstate(invalid="ignore"):
+            for _ in range(ROUNDS):
+                height = pymap3d.aer2geodetic(bearing, np.degrees(np.arcsin(sine)), range_m, *self.place)[2]
+                miss = altitude_m - height
+                # A step of the sine lifts the point by nearly that part of the range.
+                sine = np.clip(sine + miss / range_m, -1.0, 1.0)
+                if not np.any(np.abs(miss[np.isfinite(miss)]) > CLOSE_M):
+                    break
+            sine = np.where(np.abs(miss) <= 10 * CLOSE_M, sine, np.nan)
+        flat = range_m * np.sqrt(1 - sine**2)
+        return np.stack([flat * np.cos(bearing_rad), range_m * sine, flat * np.sin(bearing_rad)], axis=-1)
+
+
+def described(local: np.ndarray) -> dict[str, np.ndarray]:
+    """Range, bearing, elevation above the level and the coordinates of local positions (n, 3) in m."""
+    x, y, z = local.T
+    r = np.linalg.norm(local, axis=-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        elevation = np.arcsin(y / r)
+    return {
+        "range_m": r,
+        "bearing_rad": np.arctan2(z, x) % (2 * math.pi),
+        "level_elevation_rad": elevation,
+        "x_m": x,
+        "y_m": y,
+        "z_m": z,
+    }
+
+
+def biconical(local: np.ndarray, antenna: Antenna) -> dict[str, np.ndarray]:
+    """The angles to an antenna's axes of local positions (n, 3), rad; not-a-number behind the antenna."""
+    placed = physics.to_antenna(local, physics.rotation(*antenna), 0.0)
+    r = np.linalg.norm(placed, axis=-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        angles = np.arcsin(placed[:, 1:] / r[:, None])
+    angles[~(placed[:, 0] > 0)] = np.nan
+    return {"elevation_rad": angles[:, 0], "azimuth_rad": angles[:, 1]}
+
+
+def site_of(text: str) -> Site:
+    """The site of `LAT,LON,HEIGHT` (degrees, degrees, m); raises ConfigError."""
+    try:
+        latitude, longitude, height = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ConfigError(f"at: must be LATITUDE,LONGITUDE,HEIGHT in degrees, degrees, m; got {text!r}") from None
+    faults = []
+    if not -90 <= latitude <= 90:
+        faults.append(f"at: the latitude must be from -90 to 90 degrees, got {latitude:g}")
+    if not -180 <= longitude <= 360:
+        faults.append(f"at: the longitude must be from -180 to 360 degrees, got {longitude:g}")
+    if not -500 <= height <= 100e3:
+        faults.append(f"at: the height must be from -500 to 100000 m, got {height:g}")
+    if faults:
+        raise ConfigError(*faults)
+    return Site(latitude, longitude, height)
+
+
+def sites_of(texts: Sequence[str]) -> tuple[Site | None, dict[str, Site]]:
+    """The site of the one radar, `LAT,LON,HEIGHT`, or of each of several, `SAC/SIC=LAT,LON,HEIGHT`."""
+    named = {name.strip(): site_of(place) for name, sign, place in (text.partition("=") for text in texts) if sign}
+    plain = [text for text in texts if "=" not in text]
+    if len(plain) > 1 or (plain and named):
+        raise ConfigError(
+            f"at: must be one LAT,LON,HEIGHT, or SAC/SIC=LAT,LON,HEIGHT of each radar; got {' '.join(texts)}"
+        )
+    if faults := [name for name in named if not re.fullmatch(r"\d{1,3}/\d{1,3}", name)]:
+        raise ConfigError(*(f"at: SAC/SIC must be two numbers, as 25/12; got {name!r}" for name in faults))
+    return (site_of(plain[0]) if plain else None), named
+
+
+def antenna_of(text: str) -> Antenna:
+    """The antenna of `AZIMUTH,ELEVATION` in degrees; raises ConfigError."""
+    try:
+        azimuth, elevation = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ConfigError(f"antenna: must be AZIMUTH,ELEVATION in degrees, got {text!r}") from None
+    if not (-360 <= azimuth <= 360 and -90 <= elevation <= 90):
+        raise ConfigError(
+            f"antenna: must be an azimuth from -360 to 360 and an elevation from -90 to 90 degrees, got {text!r}"
+        )
+    return Antenna(math.radians(azimuth), math.radians(elevation))
+
+
+# ---- ais -------------------------------------------------------------------------------------------------------------
+pyais: ModuleType | None
+try:
+    import pyais
+    from pyais.exceptions import AISBaseException
+except ImportError:
+    pyais = None
+
+KNOT_MPS = 1852 / 3600
+SENTENCE = re.compile(rb"![A-Z]{2}VD[MO],[^\r\n]*")
+TAG_TIME = re.compile(rb"[\\,]c:(\d{9,13})")
+AFTER = re.compile(rb"\*[0-9A-Fa-f]{2}[,; \t]+(\d{9,13}(?:\.\d+)?)\s*$")
+PARTS = re.compile(rb"![A-Z]{2}VD[MO],(\d),(\d),(\d?),")
+NO_SPEED, NO_COURSE, NO_SECOND = 102.2, 360.0, 60
+MOST_OPEN = 100  # messages of several sentences that wait for their end
+LEAST_GOOD = 0.5  # of the sentences; a file with fewer is no AIS
+
+
+def sound(sentence: bytes) -> bool:
+    """Whether a sentence has the sum that it states after its asterisk: the exclusive or of all its characters."""
+    body, star, stated = sentence[1:].partition(b"*")
+    total = 0
+    for byte in body:
+        total ^= byte
+    return bool(star) and stated[:2].upper() == b"%02X" % total
+
+
+class Ais:
+    """A file of AIS sentences; class A and B reports of position are read, all others passed over."""
+
+    of_day = False
+
+    def __init__(self, path: str, file: BinaryIO):
+        if pyais is None:
+            raise needs("pyais", "ais")
+        self.path, self.file = path, file
+        self.records = 0
+        self.skipped: Counter[str] = Counter()
+        self.open: dict[bytes, list[bytes]] = {}
+        self.minute = Unrolled(60.0)
+
+    def batches(self) -> Iterator[Batch]:
+        """The reports of position, some at a time; raises ConfigError where most sentences are damaged."""
+        gathered, damaged, first = Gathered(POSITIONS, POSITION_COLUMNS), 0, ""
+        for number, line in enumerate(self.file, start=1):
+            sentence = SENTENCE.search(line)
+            if not sentence and (not line.strip() or line.lstrip().startswith((b"#", b"$"))):
+                continue
+            try:
+                if not sentence or not sound(sentence[0]):
+                    raise AISBaseException
+                message = self._decoded(sentence[0])
+            except AISBaseException:
+                damaged, first = damaged + 1, first or f"{self.path}:{number}"
+                continue
+            if message is not None:
+                self._take(message, self._stated(line, sentence.start(), number), gathered)
+            if len(gathered) >= BATCH:
+                yield gathered.taken()
+        if damaged and damaged >= LEAST_GOOD * (self.records + damaged):
+            raise ConfigError(f"{first}: must be AIS sentences (!AIVDM,…); {damaged} lines are none or damaged, "
+                              f"{self.records} messages were read")  # fmt: skip
+        if damaged:
+            self.skipped["damaged lines"] = damaged
+        if len(gathered):
+            yield gathered.taken()
+
+    def _decoded(self, sentence: bytes) -> Any:
+        """The message that a sentence ends; none while further sentences of it are to come."""
+        assert pyais is not None  # `__init__` has made sure
+        parts = PARTS.match(sentence)
+        if parts and parts[1] != b"1":
+            held = self.open.setdefault(parts[3], [])
+            if parts[2] == b"1":
+                held.clear()
+            held.append(sentence)
+            if len(self.open) > MOST_OPEN:
+                self.open.pop(next(iter(self.open)))
+            if parts[2] != parts[1]:
+                return None
+            whole = self.open.pop(parts[3])
+            self.records += 1
+            return pyais.decode(*whole)
+        self.records += 1
+        return pyais.decode(sentence)
+
+    def _stated(self, line: bytes, before: int, number: int) -> float:
+        """The time before a sentence, s from 1970; not-a-number where none is stated."""
+        head = line[:before]
+        if found := TAG_TIME.search(head) or AFTER.search(line):
+            stamp = float(found[1])
+            return stamp / 1000 if stamp > 1e11 else stamp
+        text = head.decode("ascii", "replace").strip(" \t,;\\")
+        if not text or "*" in text:
+            return math.nan
+        try:
+            return float(text)
+        except ValueError:
+            pass
+        try:
+            return utc_s(text)
+        except ValueError:
+            must = "before the sentence must stand a time in s from 1970 or ISO 8601, or a tag block"
+            read = f"{self.records} messages were read"
+            raise ConfigError(f"{self.path}:{number}: {must}; got {text[:60]!r}; {read}") from None
+
+    def _take(self, message: Any, stated: float, gathered: Gathered) -> None:
+        latitude, longitude = getattr(message, "lat", None), getattr(message, "lon", None)
+        if latitude is None or longitude is None or message.msg_type not in (1, 2, 3, 18, 19):
+            self.skipped["messages that are no ship's position"] += 1
+            return
+        if None in (message.second, message.speed, message.course):
+            self.skipped["messages cut short"] += 1
+            return
+        second = int(message.second)
+        if abs(latitude) > 90 or abs(longitude) > 180 or (math.isnan(stated) and second >= NO_SECOND):
+            self.skipped["reports without position or time"] += 1
+            return
+        t = self.minute(second) if math.isnan(stated) else stated
+        speed, course = float(message.speed), math.radians(float(message.course))
+        known = speed <= NO_SPEED and float(message.course) < NO_COURSE
+        east, north = (speed * KNOT_MPS * part(course) if known else math.nan for part in (math.sin, math.cos))
+        gathered.add(str(message.mmsi), str(message.mmsi), (t, latitude, longitude, 0.0, east, north, 0.0))

@@ -1,0 +1,444 @@
+"""What is compared: cases of stored results, and which answers to which.
+
+The table of a comparison: every measured value of two sides at common times, their difference with its interval.
+
+Where both sides are of the same measurements their errors go together, and the interval of a difference needs the
+correlation ρ of their mean squares. Stored results hold that of each filter with the baseline of its run. Where both
+runs have the same baseline (its rows are equal to the last digit), ρ is at least ρ₁ρ₂ − √((1 − ρ₁²)(1 − ρ₂²)), since a
+matrix of correlations has no negative eigenvalue: with it the interval covers 95 % or more. Where no filter links them,
+ρ is taken as −1, the worst there is: the half-widths add. Sides of different noise are independent.
+
+What a comparison says in sentences.
+
+Figures of a comparison: each quantity of all sides on common axes, and beside it the differences.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from radarsim.language import plural, term, tr
+from radarsim.report import seen, tables
+from radarsim.report.drawing import PAGE_MM, Axis, Figure, Mark, Panel, Reference, Style
+from radarsim.report.panels import MOST, left_out, letter, line, literal, time_axis, with_unit
+from radarsim.report.statistics import Estimate, difference
+from radarsim.report.tables import UNITS, interval, significant_digits
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+# ---- sides -----------------------------------------------------------------------------------------------------------
+class Series(NamedTuple):
+    """A measured quantity of a stored table: its columns, that of exact values; whether it is compared in per cent."""
+
+    table: str
+    value: str
+    lo: str
+    hi: str
+    exact: str
+    words: str
+    unit: str
+    ratio: bool
+
+
+SERIES = (
+    Series("curves", "sigma", "sigma_lo", "sigma_hi", "exact_sigma", "σ", "", True),
+    Series("gains", "gain_percent", "gain_lo", "gain_hi", "exact_percent", "gain", "%", False),
+    Series("locks", "lock_rate", "lock_lo", "lock_hi", "", term("rate of locks"), "", False),
+    Series("probabilities", "probability", "probability_lo", "probability_hi", "", "probability", "", False),
+)
+LABELS = ("filter", "component", "model")  # that say which line a row is of; the time says where on it
+
+
+@dataclass(frozen=True)
+class Side:
+    """One case of one stored result.
+
+    label is what it is called here; noise what its random numbers and its world depend on, None where that is not
+    known; count its realisations; tables its rows of the stored tables, by name.
+    """
+
+    run: str
+    case: str
+    label: str
+    noise: str | None
+    count: int
+    tables: "Mapping[str, pd.DataFrame]" = field(repr=False)
+
+    def rest(self) -> str:
+        """The name of the case without its config's: the swept keys."""
+        return self.case.partition(" ")[2]
+
+
+class Pair(NamedTuple):
+    """A side, and the one that it is compared with."""
+
+    side: Side
+    against: Side
+
+    @property
+    def common_noise(self) -> bool:
+        """Whether both are of the same measurements: study, seed, target and sensor, and as many realisations."""
+        return self.side.noise is not None and self.side.noise == self.against.noise
+
+
+def pairs(runs: Sequence[Sequence[Side]]) -> tuple[list[Pair], list[str]]:
+    """Each further run's cases against those of the first, and a line for each case that none answers to.
+
+    A run of a single case is set beside every case of the other one; else cases of the same swept values, or the same
+    name, answer to one another.
+    """
+    first, found, alone = runs[0], [], []
+    for run in runs[1:]:
+        own = [Pair(side, other) for side in run for other in first if min(len(run), len(first)) == 1]
+        if not own:
+            named = {other.case: other for other in first} | {other.rest(): other for other in first if other.rest()}
+            answering = {side.label: named.get(side.rest() or side.case) for side in run}
+            own = [Pair(side, other) for side in run if (other := answering[side.label]) is not None]
+            alone += [f"{label}: no such case in {first[0].run}" for label, other in answering.items() if other is None]
+        found += own
+    return found, alone
+
+
+# ---- table -----------------------------------------------------------------------------------------------------------
+COLUMNS = (
+    *("quantity", "filter", "component", "model", "unit", "t_s", "run", "case", "value", "lo", "hi", "exact"),
+    *("against_run", "against_case", "against_filter", "against", "against_lo", "against_hi", "against_exact"),
+    *("difference", "difference_lo", "difference_hi", "percent", "percent_lo", "percent_hi", "exact_percent"),
+    *("pairing", "label", "against_label"),
+)
+INDEPENDENT, LINKED, UNLINKED, SAME = "independent", "paired", "common noise", "same numbers"
+MEANING = {
+    INDEPENDENT: term("independent noise"),
+    LINKED: term("paired on common noise through the common baseline; the interval covers 95 % or more"),
+    UNLINKED: term("common noise but no common baseline filter; the interval holds whatever the correlation"),
+    SAME: term("the same numbers"),
+}
+DIGITS = 9  # of a time, by which rows find one another
+
+
+def compared(pairs: Sequence[Pair]) -> "pd.DataFrame":
+    """A row for each value of a side that the other side has too."""
+    parts = [part for pair in pairs for series in SERIES if (part := _part(pair, series)) is not None]
+    return tables.joined(parts, COLUMNS)
+
+
+def filters_of(side: Side) -> list[str]:
+    """The filters of a side, in their order."""
+    return list(dict.fromkeys(side.tables["curves"]["filter"])) if "curves" in side.tables else []
+
+
+def _part(pair: Pair, series: Series) -> dict[str, Any] | None:
+    """The columns of one quantity of one pair; None where they share no row."""
+    a, b = (side.tables.get(series.table) for side in pair)
+    if a is None or b is None or not len(a) or not len(b):
+        return None
+    own, other = filters_of(pair.side), filters_of(pair.against)
+    alone = len(own) == len(other) == 1 and own != other  # two lone filters answer to one another by any name
+    b = b.assign(against_filter=b["filter"])
+    if alone:
+        b = b.assign(filter=own[0])
+    keys = [name for name in (*LABELS, "unit") if name in a and name in b]
+    a, b = (rows.assign(at=rows["t_s"].round(DIGITS)) for rows in (a, b))
+    if not set(a["at"]) & set(b["at"]):  # no common time: the ends of both
+        a, b = (rows.groupby(keys, sort=False).tail(1).assign(at=np.nan) for rows in (a, b))
+    rows = a.merge(b, on=[*keys, "at"], suffixes=("", "_b"))
+    return _columns(pair, series, rows) if len(rows) else None
+
+
+def _columns(pair: Pair, series: Series, rows: "pd.DataFrame") -> dict[str, Any]:
+    n = len(rows)
+    empty, blank = np.full(n, np.nan), np.full(n, "", dtype=object)
+    unit = np.full(n, series.unit, dtype=object)
+    measured, other = (_estimate(rows, series, end) for end in ("", "_b"))
+    rho, pairing = correlation(pair, series, rows)
+    same = pairing == SAME
+
+    def apart_of(one: Estimate, two: Estimate) -> Estimate:
+        apart = difference(one, two, rho)
+        return Estimate(apart.value, *(np.where(same, apart.value, end) for end in apart[1:]))
+
+    apart = apart_of(measured, other)
+    exact, against_exact = (_column(rows, f"{series.exact}{end}", empty) for end in ("", "_b"))
+    percent, exact_percent = Estimate(empty, empty, empty), empty
+    if series.ratio:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = apart_of(*(Estimate(*map(np.log, of)) for of in (measured, other)))
+            percent = Estimate(*(100 * np.expm1(end) for end in ratio))
+            exact_percent = 100 * (exact / against_exact - 1)
+    return {
+        "quantity": np.full(n, series.value, dtype=object),
+        **{name: _column(rows, name, blank) for name in LABELS},
+        "unit": _column(rows, "unit", unit),
+        "t_s": rows["t_s"].to_numpy(dtype=float),
+        **{name: np.full(n, value, dtype=object) for name, value in _names(pair, "").items()},
+        **tables.interval_columns("value", measured, ""),
+        "exact": exact,
+        **{name: np.full(n, value, dtype=object) for name, value in _names(pair, "against_").items()},
+        "against_filter": rows["against_filter"].to_numpy(),
+        **tables.interval_columns("against", other),
+        "against_exact": against_exact,
+        **tables.interval_columns("difference", apart),
+        **tables.interval_columns("percent", percent),
+        "exact_percent": exact_percent,
+        "pairing": pairing,
+    }
+
+
+def _names(pair: Pair, before: str) -> Mapping[str, str]:
+    side = pair.against if before else pair.side
+    return {f"{before}run": side.run, f"{before}case": side.case, f"{before}label": side.label}
+
+
+def _column(rows: "pd.DataFrame", name: str, absent: np.ndarray) -> np.ndarray:
+    return rows[name].to_numpy() if name in rows else absent
+
+
+def _estimate(rows: "pd.DataFrame", series: Series, end: str) -> Estimate:
+    return Estimate(*(rows[f"{name}{end}"].to_numpy(dtype=float) for name in (series.value, series.lo, series.hi)))
+
+
+def correlation(pair: Pair, series: Series, rows: "pd.DataFrame") -> tuple[np.ndarray, np.ndarray]:
+    """Of each row the correlation of both estimates, as bad as it can be, and in a word what is known of it."""
+    n = len(rows)
+    if not pair.common_noise:
+        return np.zeros(n), np.full(n, INDEPENDENT, dtype=object)
+    a, b = (_estimate(rows, series, end) for end in ("", "_b"))
+    same = np.all([x == y for x, y in zip(a, b, strict=True)], axis=0)
+    rho = np.full(n, -1.0)
+    if series.ratio and pair.side.count == pair.against.count:
+        one = _with_baseline(pair.side, rows, "filter")
+        two = _with_baseline(pair.against, rows, "against_filter")
+        linked = _same_baseline(pair, rows)
+        with np.errstate(invalid="ignore"):
+            worst = one * two - np.sqrt(np.maximum((1 - one**2) * (1 - two**2), 0))
+        rho = np.where(linked & np.isfinite(worst), worst, rho)
+    words = np.where(rho > -1, LINKED, UNLINKED).astype(object)
+    return np.where(same, 1.0, rho), np.where(same, SAME, words)
+
+
+def _with_baseline(side: Side, rows: "pd.DataFrame", column: str) -> np.ndarray:
+    """The correlation of each row's mean square with the baseline's: from the widths of both σ and of their gain."""
+    base, widths = baseline(side), _widths(side.tables["curves"], "sigma_lo", "sigma_hi")
+    gains = side.tables["gains"]
+    ratios = _widths(gains.assign(hi=100 - gains["gain_lo"], lo=100 - gains["gain_hi"]), "lo", "hi")
+    found = np.full(len(rows), np.nan)
+    for i, (f, c, t) in enumerate(rows[[column, "component", "t_s"]].itertuples(index=False, name=None)):
+        own, other, joint = widths.get((f, c, t)), widths.get((base, c, t)), ratios.get((f, c, t))
+        if f == base:
+            found[i] = 1.0
+        elif own and other and joint is not None:
+            found[i] = np.clip((own**2 + other**2 - joint**2) / (2 * own * other), -1, 1)
+    return found
+
+
+def _widths(table: "pd.DataFrame", lo: str, hi: str) -> dict[tuple, float]:
+    """Half the logarithm of the upper over the lower end, by filter, component and time."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        half = 0.5 * np.log(table[hi].to_numpy(dtype=float) / table[lo].to_numpy(dtype=float))
+    keys = table[["filter", "component", "t_s"]].itertuples(index=False, name=None)
+    return {key: value for key, value in zip(keys, half.tolist(), strict=True) if np.isfinite(value)}
+
+
+def baseline(side: Side) -> str:
+    """The filter that a side's gains are against; empty where there are no gains."""
+    gains = side.tables.get("gains")
+    return "" if gains is None or not len(gains) else str(gains["baseline"].iloc[0])
+
+
+def _same_baseline(pair: Pair, rows: "pd.DataFrame") -> np.ndarray:
+    """Whether both sides' baselines have the very same numbers at the row's component and time: the same filter."""
+    known = []
+    for side in pair:
+        curves = side.tables["curves"]
+        own = curves[curves["filter"] == baseline(side)]
+        values = own[["component", "t_s", "sigma", "sigma_lo", "sigma_hi"]].itertuples(index=False, name=None)
+        known.append({(c, t): rest for c, t, *rest in values})
+    places = rows[["component", "t_s"]].itertuples(index=False, name=None)
+    return np.array([place in known[0] and known[0][place] == known[1].get(place) for place in places], dtype=bool)
+
+
+# ---- words -----------------------------------------------------------------------------------------------------------
+MOST_SENTENCES = 12  # sentences; the table has all
+
+
+def sentences(made: "pd.DataFrame") -> list[str]:
+    """At the last common time, of the first component of each quantity: both values, and by how much they differ."""
+    last = at_the_end(made)
+    lines = []
+    for quantity, rows in last.groupby("quantity", sort=False):
+        series = next(one for one in SERIES if one.value == quantity)
+        first = tables.where(rows, component=rows["component"].iloc[0], model=rows["model"].iloc[0])
+        lines += [_sentence(series.words, row) for row in first.to_dict("records")]
+        if series.ratio:
+            break  # gains and shares of the same filters stand in the table
+    left = len(lines) - MOST_SENTENCES
+    return lines[:MOST_SENTENCES] + (
+        [
+            plural(
+                "{count} further comparison: in comparison.csv.",
+                "{count} further comparisons: in comparison.csv.",
+                left,
+            )
+        ]
+        if left > 0
+        else []
+    )
+
+
+def at_the_end(made: "pd.DataFrame") -> "pd.DataFrame":
+    """The rows of the last common time of each line."""
+    keys = ["quantity", "label", "against_label", "filter", "component", "model"]
+    return made.groupby(keys, sort=False).tail(1)
+
+
+def _sentence(words: str, row: dict[Any, Any]) -> str:
+    of = str(row["component"] or row["model"])
+    unit = tr(UNITS.get(row["unit"], row["unit"]))
+    other = f"{row['against_label']}" + ("" if row["against_filter"] == row["filter"] else f", {row['against_filter']}")
+    return tr(
+        "{label}, {filter}: {what} at {t_s:g} s {value} against {against} of {other}: {change}.",
+        label=row["label"],
+        filter=row["filter"],
+        what=tr("{quantity} of {symbol}", quantity=tr(words), symbol=of) if of else tr(words),
+        t_s=row["t_s"],
+        value=f"{value(row['value'])} {unit}".rstrip(),
+        against=f"{value(row['against'])} {unit}".rstrip(),
+        other=other,
+        change=change(row),
+    )
+
+
+def change(row: dict[Any, Any]) -> str:
+    """By how much a value differs, with its interval, and the exact change where it is known."""
+    if row["percent"] != row["percent"]:
+        text = f"{signed(row['difference'])} {tr(UNITS.get(row['unit'], row['unit']))}".rstrip()
+        return f"{text} {interval(signed(row['difference_lo']), signed(row['difference_hi']))}"
+    exact = row["exact_percent"]
+    known = tr(", exactly {value}", value=percent(exact)) if exact == exact else ""
+    return f"{percent(row['percent'])} {interval(percent(row['percent_lo']), percent(row['percent_hi']))}{known}"
+
+
+def percent(value: float) -> str:
+    """A change in per cent with its sign; from four times on as a multiple."""
+    if value >= 300:
+        return tr("{factor} times", factor=significant_digits(1 + value / 100, ".3g"))
+    return f"{signed(value, '.3g')} %"
+
+
+def signed(value: float, form: str = ".3g") -> str:
+    """A number with its sign."""
+    text = significant_digits(value, form)
+    return text if text.startswith("−") or value == 0 else f"+{text}"
+
+
+def value(number: float) -> str:
+    """A number at four digits."""
+    return significant_digits(number)
+
+
+def pairings(made: "pd.DataFrame") -> list[str]:
+    """How the differences are paired, a line each kind."""
+    kinds = made.loc[made["quantity"] == "sigma", "pairing"].tolist()
+    counts = {words: kinds.count(kind) for kind, words in MEANING.items()}
+    return [
+        tr("{count:,} of {total:,} differences of σ: {words}", count=count, total=len(kinds), words=tr(words))
+        for words, count in counts.items()
+        if count
+    ]
+
+
+# ---- figures ---------------------------------------------------------------------------------------------------------
+HEIGHT_MM = 70.0
+
+
+def figures(sides: Sequence[Side], made: "pd.DataFrame") -> dict[str, Figure]:
+    """A figure for each quantity and component that two sides share: values on the left, differences on the right.
+
+    made is table.compared's. Of more than eight sides the first eight are drawn, and the caption says so.
+    """
+    drawn = {}
+    for (quantity, component, model), rows in made.groupby(["quantity", "component", "model"], sort=False):
+        series = next(one for one in SERIES if one.value == quantity)
+        component, model = str(component), str(model)
+        if rows["t_s"].nunique() < 2:
+            continue
+        parts = [series.value.removesuffix("_percent"), component, f"model{model}" if model else ""]
+        name = "_".join(filter(None, parts))
+        drawn[name] = _figure(name, series, sides, rows, component, model)
+    return drawn
+
+
+def _figure(
+    name: str, series: Series, sides: Sequence[Side], rows: "pd.DataFrame", component: str, model: str
+) -> Figure:
+    taking_part = {*rows["label"], *rows["against_label"]}
+    every = [side for side in sides if side.label in taking_part]
+    some = every[:MOST]
+    filters = list(dict.fromkeys(f for side in some for f in filters_of(side)))
+    unit = rows["unit"].iloc[0]
+    symbol = letter(component) if component else model
+    what = f"{tr(series.words)} {symbol}".strip()
+    if series.value in ("sigma", "gain_percent"):
+        words = {"sigma": term("$\\sigma$ of {symbol}"), "gain_percent": term("gain in $\\sigma$ of {symbol}")}
+        what = tr(words[series.value], symbol=symbol)
+    values = [mark for n, side in enumerate(some) for mark in _values(series, side, n, filters, component, model)]
+    apart = _apart(series, some, rows, filters)
+    keys = [(literal(side.label), Style(n, 0)) for n, side in enumerate(some)]
+    keys += [(literal(f), Style(0, n, n)) for n, f in enumerate(filters)] if len(filters) > 1 else []
+    low = None if series.value == "gain_percent" else 0.0
+    y = Axis(with_unit(what, unit), limits=(low, None))
+    of = term("change") if series.ratio else term("difference")
+    against = rows["against_label"].iloc[0] if rows["against_label"].nunique() == 1 else tr("the first")
+    difference = Axis(with_unit(tr("{of} against {name}", of=of, name=literal(against)), "%" if series.ratio else unit))
+    panels = (
+        Panel(time_axis(), y, tuple(values), direct=False, legend="none"),
+        Panel(time_axis(), difference, (Reference(0), *apart), keys=tuple(keys), legend="right"),
+    )
+    caption = (
+        tr(
+            "Left: {words} of {value} on common axes. Right: the {of} against {against} at common times. "
+            "Bands: 95 % intervals.",
+            words=series.words,
+            value=", ".join(side.label for side in some),
+            of=of,
+            against=against,
+        )
+    ) + left_out([side.label for side in every], [side.label for side in some])
+    figure = Figure(name, tr("{what} side by side", what=what), caption, panels, 2, PAGE_MM, HEIGHT_MM)
+    told = seen.at_the_end(replace(figure, panels=panels[1:]))
+    return seen.crossed(seen.begun(figure, tr("Right: {told}", told=told[0].lower() + told[1:]) if told else ""))
+
+
+def _values(series: Series, side: Side, n: int, filters: Sequence[str], component: str, model: str) -> list[Mark]:
+    """A line for each filter of a side."""
+    table, marks = side.tables.get(series.table), list[Mark]()
+    if table is None:
+        return marks
+    for i, f in enumerate(filters):
+        own = table[table["filter"] == f]
+        own = own[own["component"] == component] if component else own
+        own = own[own["model"] == model] if "model" in own and model else own
+        if len(own):
+            columns = ["t_s", series.value, series.lo, series.hi, *([series.exact] if series.exact else [])]
+            marks.append(line(own, columns, "", Style(n, i, i), f"{literal(side.label)}, {literal(f)}"))
+    return marks
+
+
+def _apart(series: Series, sides: Sequence[Side], rows: "pd.DataFrame", filters: Sequence[str]) -> list[Mark]:
+    """A line for each filter of each side that is compared with another."""
+    value, exact = ("percent", "exact_percent") if series.ratio else ("difference", "")
+    numbers, marks = {side.label: n for n, side in enumerate(sides)}, list[Mark]()
+    several = rows["against_label"].nunique() > 1
+    for key, own in rows.groupby(["label", "against_label", "filter"], sort=False):
+        label, against, f = map(str, key)
+        if label not in numbers or against not in numbers:
+            continue
+        name = f"{literal(label)}, {literal(f)}" + (f" against {literal(against)}" if several else "")
+        i = filters.index(f)
+        columns = ["t_s", value, f"{value}_lo", f"{value}_hi", *([exact] if exact else [])]
+        marks.append(line(own, columns, "", Style(numbers[label], i, i), name))
+    return marks

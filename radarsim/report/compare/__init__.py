@@ -1,1 +1,0 @@
-"""Stored results side by side: the cases that answer to one another, their differences, figures, sentences."""
