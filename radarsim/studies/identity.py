@@ -22,7 +22,7 @@ from radarsim.engine.blocks import QUESTION
 from radarsim.studies.registry import SHIPPED, module, study
 
 PACKAGE = Path(__file__).parents[1]
-ROOMS = ("bursts", "config", "kernels", "physics", "engine/moments.py")
+ROOMS = ("bursts", "config", "kernels", "physics.py", "engine/results.py")
 SHOW = {"claims", "figures", "map", "measures", "readings", "tables", "words"}  # files of a study, by their stem
 
 
