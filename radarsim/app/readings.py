@@ -294,7 +294,7 @@ def _most(parts: Sequence[Any]) -> float:
 
 # ---- readings --------------------------------------------------------------------------------------------------------
 FOLDER, TABLE, DRAWN = *PLACE.parts, "drawn.json"
-DRAW = (("claims", "curve.py"), *((name,) for name in ("figures.py", "legends.py", "drawing.py", "chart_look.py")))
+DRAW = (("claims", "page.py"), ("figures.py",), ("drawing.py",), ("chart.py",))
 
 
 @dataclass(frozen=True)
