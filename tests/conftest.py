@@ -10,12 +10,16 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 TESTS = Path(__file__).parent
 # Folders, in the order in which their groups begin; what is short is left for the end, where processes wait.
 LONG = ("studies", "trust", "cli", "app", "engine", "docs", "report", "language", "kernels", "recorded")
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does; no module of tests has loaded NumPy yet
+# What Hypothesis tests are laws, which hold on a machine that is busy, too: it looks at no clock.
+settings.register_profile("no clock", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("no clock")
 gc.set_threshold(100_000)  # as the command does; of the suite's time 7 % went into looking through objects that stay
 
 

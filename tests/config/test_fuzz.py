@@ -34,7 +34,7 @@ target.aspect_deg target.aspect_rad target.range_m target.start_s filters filter
 filters.0.observes filters.0.initial_scans manoeuvre_variance baseline scans sweep.scans figures.a include.0
 """
 KEYS = st.sampled_from(WORDED.split())
-quick = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+quick = settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 
 
 def outcome(source, overrides=()):
@@ -86,7 +86,7 @@ def test_any_name_and_any_override(text):
 
 
 @pytest.mark.slow
-@settings(max_examples=5000, deadline=None)
+@settings(max_examples=5000)
 @given(st.lists(st.tuples(KEYS, VALUES), max_size=3), st.lists(st.tuples(KEYS, st.text(max_size=12)), max_size=3))
 def test_long(changes, pairs):
     outcome({"study": "range_doppler", **dict(changes)}, [f"{key}={value}" for key, value in pairs])

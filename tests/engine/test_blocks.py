@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from radarsim.engine.blocks import Forest, Node, Partial, Total, maximal, simulated, widest
@@ -63,7 +63,6 @@ def shuffled_cuts(draw):
     return blocks, draw(st.permutations(nodes))
 
 
-@settings(deadline=None, max_examples=100)
 @given(shuffled_cuts())
 def test_any_cut_in_any_order_gives_the_bytes_of_the_textbook(case):
     blocks, nodes = case
@@ -75,7 +74,6 @@ def test_any_cut_in_any_order_gives_the_bytes_of_the_textbook(case):
     assert bytes_of(forest.total()) == (blocks * WORK.block, textbook(WORK, blocks * WORK.block).tobytes())
 
 
-@settings(deadline=None)
 @given(shuffled_cuts(), st.data())
 def test_gaps_and_nodes_tile_the_blocks_and_the_prefix_ends_at_the_first_gap(case, data):
     blocks, nodes = case

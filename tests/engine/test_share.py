@@ -29,7 +29,7 @@ def test_shares_tile_the_blocks_and_the_last_has_the_cut_one(realisations, of):
     assert max(sizes) - min(sizes) <= 1
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(st.integers(1, 3_000), st.integers(1, 9), st.randoms())
 def test_united_by_copying_they_give_the_bytes_of_one_run(tmp_path_factory, realisations, of, draw):
     root = tmp_path_factory.mktemp("shares")
@@ -88,7 +88,7 @@ def test_progress_is_that_of_the_share(tmp_path):
     assert seen[-1] == (400, 400, 0)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.integers(1, 3_000), st.integers(2, 9), st.data())
 def test_what_is_missing_is_named_by_realisations_and_shares(tmp_path_factory, realisations, of, data):
     """Of a store without some of its shares, by the names of its files: they lie as the shares that were not copied."""

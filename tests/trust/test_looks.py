@@ -99,7 +99,7 @@ def test_runs_that_decide_refute_few_claims_that_are_true_at_the_border(monkeypa
             {"paper": "p", "claim": "P9.1", "as_shipped": said.kind, "extension": False, "n": 1.0, "needed": needed}
         ]
 
-    monkeypatch.setattr(readings.simulation, "simulated", simulated)
+    monkeypatch.setattr(readings.run, "simulate", simulated)
     monkeypatch.setattr(readings, "rows_of", rows_of)
     for _ in range(runs):
         means = walk(rng, most, len(borders))
@@ -206,7 +206,7 @@ def curves(results):
 
 
 class Synthetic:
-    """A case of one σ whose errors are drawn here: what `simulation.simulated` asks of cases, works and studies."""
+    """A case of one σ whose errors are drawn here: what `run.simulate` asks of cases, works and studies."""
 
     def __init__(self, draw, gaussian, most):
         self.draw, self.identity = draw, "synthetic"
@@ -227,7 +227,18 @@ class Synthetic:
             if n > last:
                 held[n] = held[last] + self.draw(rng, n - last)
             square, fourth = held[n]
-            return Collected(n, np.array([0.0, square, 0.0, fourth, fourth]), n, 0, n, 0.0, 0.0, None, ())
+            return Collected(
+                n,
+                np.array([0.0, square, 0.0, fourth, fourth]),
+                asked=n,
+                from_store=0,
+                computed=n,
+                seconds=0.0,
+                kernel_seconds=0.0,
+                stopped=None,
+                warnings=(),
+                kept_as=None,
+            )
 
         study = SimpleNamespace(curves=curves, tables=tables, relabelled=lambda axes, case: axes)
         monkeypatch.setattr(run, "CaseWork", lambda case: self)
