@@ -197,8 +197,8 @@ def believed(result: CaseResult, sigma: np.ndarray) -> dict[str, np.ndarray]:
     """Columns of one case: the measured σ beside sigma (F, K, C), the σ that the filters believe.
 
     Rows stand where a filter has an estimate, as in `tables.curves`. The interval of the ratio is that of the measured
-    σ alone. Where the believed one hangs on the plots (missed ones, filters that adapt) its mean has a chance of its
-    own, which is small beside: rows of `sonar_manoeuvre` and of a radar that misses plots cover 94 … 95 %.
+    σ alone. Where the believed one hangs on which plots are missed its mean has a chance of its own, which is small
+    beside: rows of a radar that misses plots cover 94 … 95 %. Rows of filters that adapt bring the note VARIES.
     """
     at = f, k, c = tables.shown(result)
     n = tables.realisations(result)[at]

@@ -10,7 +10,7 @@ from radarsim.report import notes, statistics
 from radarsim.report import tables as common
 from radarsim.report.tables import Columns, leading
 from radarsim.studies.sonar import scene
-from radarsim.studies.sonar.world import SonarAxes
+from radarsim.studies.sonar.world import GivenPlotsAxes, SonarAxes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,7 +65,10 @@ def _extrapolation(result: CaseResult[SonarAxes]) -> Columns:
 def _believed(result: CaseResult[SonarAxes]) -> Columns:
     """The measured σ beside the σ that the filter believes, the root of its mean variance."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        return notes.believed(result, np.sqrt(result.sums["believed"] / common.realisations(result)))
+        columns = notes.believed(result, np.sqrt(result.sums["believed"] / common.realisations(result)))
+    adapts = result.axes.adapts[common.shown(result)[0]] if isinstance(result.axes, GivenPlotsAxes) else False
+    # An alarm changes a window's length, and what is believed by a factor: its mean over realisations is itself a draw.
+    return {**columns, "note": np.where(adapts, notes.VARIES, "").astype(object)} if np.any(adapts) else columns
 
 
 @table("consistency")

@@ -49,12 +49,14 @@ class GivenPlotsAxes(SonarAxes):
         conversion_bias: mean error along the line of sight of the first plot converted to x and y, m; zero where it is
             not converted, or converted without bias.
         polar: (K, C, 3) the target's range, bearing (and depth or elevation) with first and second rates.
+        adapts: (F,) whether what a filter believes hangs on a detector's alarms.
     """
 
     rho: np.ndarray
     sigma_of_plots: np.ndarray
     conversion_bias: float
     polar: np.ndarray
+    adapts: np.ndarray
 
 
 # ---- world -----------------------------------------------------------------------------------------------------------
