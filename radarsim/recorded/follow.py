@@ -106,11 +106,13 @@ def unlike(track: Track, other: Track) -> np.ndarray:
     with np.errstate(all="ignore"):
         bad = known & (~np.isfinite(sigma) | (length & (sigma <= 0)))
         bad |= known != np.isfinite(other.estimate)
-        bad |= known & (np.abs(sigma - other.sigma) > SIGMA * sigma)
-        bad |= known & (sigma > 0) & (np.abs(track.estimate - other.estimate) > ESTIMATE * sigma)
+        # What is no number differs from every number: "not within" in place of "beyond".
+        bad |= known & ~(np.abs(sigma - other.sigma) <= SIGMA * sigma)
+        bad |= known & (sigma > 0) & ~(np.abs(track.estimate - other.estimate) <= ESTIMATE * sigma)
         rows = bad.any(axis=(0, 2))
         if track.probability is not None and other.probability is not None:
-            rows |= (np.abs(track.probability - other.probability) > CHANCE).any(axis=(0, 2))
+            alike = np.isclose(track.probability, other.probability, rtol=0, atol=CHANCE, equal_nan=True)
+            rows |= ~alike.all(axis=(0, 2))
     return rows
 
 

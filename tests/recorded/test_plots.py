@@ -108,14 +108,23 @@ def test_an_unwritable_place(tmp_path):
         plots.write(track, tmp_path / "no folder" / "track.csv")
 
 
-def test_intervals_that_no_filter_can_take_are_a_fault_of_the_file(tmp_path):
+def test_intervals_that_no_filter_can_take_are_a_fault_of_the_file(tmp_path, monkeypatch):
+    from numpy.linalg import LinAlgError
+
     from radarsim.app import run
     from radarsim.recorded import follow
 
     path = tmp_path / "plots.csv"
     path.write_text("t_s,range_m,bearing_rad\n0,9000,1\n1e-6,9000,1\n1e7,9000,1\n")
     (config,) = run.load_all(["sonar_smoothing"])
-    with pytest.raises(ConfigError, match="t_s: intervals so different"):
+    with pytest.raises(ConfigError, match=r"plots\.csv:4: t_s: after a gap of 1e\+07 s .* split the file here"):
+        follow.track(config, path)
+
+    def without_solution(tracker, columns):
+        raise LinAlgError
+
+    monkeypatch.setattr(type(follow.recorded_of(config.cases[0]).tracker(config.cases[0])), "feed", without_solution)
+    with pytest.raises(ConfigError, match=r"plots\.csv: t_s: intervals so different"):
         follow.track(config, path)
 
 

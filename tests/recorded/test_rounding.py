@@ -137,3 +137,4 @@ def test_tracks_differ_by_sigma_estimate_or_an_impossible_sigma(tmp_path):
         other = follow.rows_of(track, np.arange(SCANS + 1))
         getattr(other, name)[1, 9, 0] = value
         assert unlike(other, track).nonzero()[0].tolist() == [9]
+        assert unlike(track, other).nonzero()[0].tolist() == [9]

@@ -6,6 +6,7 @@ import pytest
 import radarsim
 from radarsim.app.configs import load
 from radarsim.report.drawing import Line
+from radarsim.report.statistics import FEW_EVENTS
 from radarsim.studies import registry
 from radarsim.studies.pulses_to_tracks import study, tables
 from radarsim.studies.pulses_to_tracks.tables import OF_ALL
@@ -108,7 +109,11 @@ def test_a_filter_looks_the_same_in_every_figure(found):
     for name in ("sigma_r", "locks"):
         for mark in (mark for panel in drawn[name].panels for mark in panel.marks if isinstance(mark, Line)):
             looks.setdefault(mark.label, {})[name] = mark.style
-    assert set(looks["cured"]) == {"sigma_r", "locks"}
+    missed = found.tables["locks"].assign(lost=lambda rows: (1 - rows["lock_rate"]) * rows["n"])
+    missed = missed.groupby("filter")["lost"].sum().round()
+    often = set(missed[missed >= FEW_EVENTS].index)
+    assert often
+    assert {name for name, own in looks.items() if set(own) == {"sigma_r", "locks"}} == often
     assert all(len(set(own.values())) == 1 for own in looks.values())
 
 
@@ -120,9 +125,12 @@ def test_the_threshold_is_seen(swept):
 
 
 def test_losses_that_a_sample_may_lack_are_marked(found):
-    """1500 tracks may lack the lost burst that decides σ: sequences are marked, what is known to lock is not."""
+    """1500 tracks may lack the lost burst that decides σ: sequences are marked, what is known to lock is not.
+
+    From the third scan on: a velocity of another fold becomes a wrong range only with the next scan.
+    """
     curves = found.tables["curves"].fillna({"note": ""})
-    marked = curves[curves["k"] > 1].groupby("filter")["note"].agg(lambda notes: (notes != "").mean())
+    marked = curves[curves["k"] > 2].groupby("filter")["note"].agg(lambda notes: (notes != "").mean())
     assert (marked[["r", "ideal", "spectrum"]] == 0).all()
     assert (marked[["sequence", "cured", "cured, gated", "cured, mixture"]] == 1).all()
     for name in ("gains", "idealisations", "estimates"):

@@ -160,7 +160,8 @@ def test_weights_and_ends_are_the_twins(density, detection):
                 expected[k, int(lost) + 2 * came] = weight, weight**2, 1, weight**4
             assert sums["ended"][f] == pytest.approx(expected, rel=1e-6, abs=0)
             seen += k is not None, lost, law == 0, k is not None and k > 12
-    assert (seen > [20, 1, 5, 1]).all(), seen
+    # Every tenth realisation is drawn as it is, and then for all four filters: at least one of the forty.
+    assert (seen >= [21, 2, len(filters), 2]).all(), seen
 
 
 # ---- plain sampling -------------------------------------------------------------------------------------------------
