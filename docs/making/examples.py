@@ -18,6 +18,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import chdir
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -116,11 +117,25 @@ def agrees(said: str, printed: str) -> bool:
 
 
 def shortened(printed: str, said: str) -> str:
-    """What was printed, cut where the page cuts it off after so many lines."""
-    lines = said.splitlines()
-    if lines[-1] != ANYTHING:
-        return printed
-    return "\n".join([*printed.splitlines()[: len(lines) - 1], ANYTHING]) + "\n"
+    """What was printed, cut where the page cuts it.
+
+    A line `…` stands for all up to the line that has most of its first words in common with the page's next one.
+    """
+    lines, kept, cut = printed.splitlines(), [], False
+    for line in said.splitlines():
+        if line == ANYTHING:
+            kept.append(ANYTHING)
+        elif lines:
+            at = max(range(len(lines)), key=[in_common(line, other) for other in lines].__getitem__) if cut else 0
+            kept.append(lines[at])
+            del lines[: at + 1]
+        cut = line == ANYTHING
+    return "\n".join(kept if cut else kept + lines) + "\n"
+
+
+def in_common(one: str, other: str) -> int:
+    """How many words two lines begin alike with."""
+    return sum(takewhile(bool, (a == b for a, b in zip(one.split(), other.split(), strict=False))))
 
 
 def python(text: str, names: dict) -> str:

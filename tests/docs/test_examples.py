@@ -29,6 +29,16 @@ def test_all_examples_with_their_figures(page, tmp_path):
     check(page, tmp_path, slow=True)
 
 
+def test_what_is_written_anew_is_cut_where_the_page_cuts_it():
+    said = "Range: 5 %.\n…\ncase=2  r+Vr  r    7.5 m\n…\nWarning: 3 lost.\n"
+    rows = [f"case={n}   {name}     {what}    1.5 m" for n in (1, 2) for name in ("r", "r+Vr") for what in ("r", "Vr")]
+    printed = "\n".join(["Range: 6 %.", "Velocity: 7 %.", *rows, "Warning: 4 lost.", "More."]) + "\n"
+    made = examples.shortened(printed, said)
+    assert made == "Range: 6 %.\n…\ncase=2   r+Vr     r    1.5 m\n…\nWarning: 4 lost.\nMore.\n"
+    assert examples.agrees(made, printed)
+    assert examples.shortened(printed, "Range: 5 %.\n…\n") == "Range: 6 %.\n…\n"
+
+
 def test_the_s_band_radar_is_answered_in_under_ten_commands():
     page = (ROOT / "docs" / "howto" / "s_band.md").read_text(encoding="utf-8")
     commands = [line for line in page.splitlines() if line.startswith("$ radarsim ")]
