@@ -94,14 +94,14 @@ def names_in_the_identity(right):
     return lambda case: right(case)[:32] + repr(case.spec)
 
 
-@fault("app.work:CaseWork.simulate", f"{P1_STUDY}::test_every_sigma_is_exact_within_its_statistical_error")
+@fault("app.configs:CaseWork.simulate", f"{P1_STUDY}::test_every_sigma_is_exact_within_its_statistical_error")
 def every_block_is_the_first(right):
     return lambda work, first, count: right(work, 0, count)
 
 
 # ---- sums and stored blocks ---------------------------------------------------------------------------------------
 @fault(
-    "engine.moments:Sums.__add__", "engine/test_blocks.py::test_sums_are_a_commutative_monoid_where_addition_is_exact"
+    "engine.results:Sums.__add__", "engine/test_blocks.py::test_sums_are_a_commutative_monoid_where_addition_is_exact"
 )
 def realisations_of_one_side_counted(right):
     return lambda one, other: type(one)(one.count, right(one, other).values)
@@ -117,7 +117,7 @@ def shares_overlap(right):
     return lambda blocks, number, of: min(right(blocks, number, of) + (number > 0), blocks)
 
 
-@fault("engine.moments:Layout.unpack", "trust/test_faults.py::test_what_is_packed_is_unpacked")
+@fault("engine.results:Layout.unpack", "trust/test_faults.py::test_what_is_packed_is_unpacked")
 def arrays_of_sums_in_another_order(right):
     def unpacked(layout, values):
         names = sorted(layout.shapes, reverse=True)
@@ -132,7 +132,7 @@ def a_block_of_another_case_is_read(right):
     return lambda store, header, values, piece: None
 
 
-@fault("engine.audit:agree", "engine/test_audit.py::test_sums_that_were_forged_with_a_right_checksum_do_not_add_up")
+@fault("engine.store:agree", "engine/test_audit.py::test_sums_that_were_forged_with_a_right_checksum_do_not_add_up")
 def forged_sums_agree(right):
     return lambda *_: True
 
@@ -219,18 +219,18 @@ def exact_values_judged_by_their_sample(right):
 
 
 # ---- worlds and exact values --------------------------------------------------------------------------------------
-@fault("physics.frames:rotation", "physics/test_frames.py::test_rotation_is_a_right_hand_turn")
+@fault("physics:rotation", "physics/test_frames.py::test_rotation_is_a_right_hand_turn")
 def a_left_hand_turn(right):
     return lambda azimuth, elevation: right(-azimuth, elevation)
 
 
-@fault("physics.motion:transition", "physics/test_targets.py::test_transition_is_the_papers_matrix")
+@fault("physics:transition", "physics/test_targets.py::test_transition_is_the_papers_matrix")
 def acceleration_moves_nothing(right):
     return lambda dt, size=3: right(dt, size) * [[abs(i - j) < 2 for j in range(size)] for i in range(size)]
 
 
 @fault(
-    "studies.range_doppler.exact:error_recursion",
+    "studies.range_doppler.filters:error_recursion",
     f"{P1_EXACT}::test_a_quadratic_truth_leaves_no_bias_and_a_cubic_one_does",
 )
 def bias_of_the_first_estimate_lost(right):
@@ -242,12 +242,12 @@ def bias_of_the_first_estimate_lost(right):
     return started
 
 
-@fault("studies.range_doppler.exact:steady_state", f"{P1_EXACT}::test_settles_to_the_steady_state")
+@fault("studies.range_doppler.filters:steady_state", f"{P1_EXACT}::test_settles_to_the_steady_state")
 def what_a_filter_believes_is_true(right):
     return lambda *given: (right(*given)[0],) * 2
 
 
-@fault("studies.range_doppler.exact:error_recursion", f"{P1_EXACT}::test_agrees_with_an_outside_calculation")
+@fault("studies.range_doppler.filters:error_recursion", f"{P1_EXACT}::test_agrees_with_an_outside_calculation")
 def gains_of_a_filter_without_process_noise(right):
     return lambda one, *more: right(dataclasses.replace(one, noise=(0.0,) * len(one.noise)), *more)
 
