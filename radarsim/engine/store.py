@@ -16,8 +16,9 @@ written under a temporary name, synchronised and renamed: it is there whole or n
 so that several runs may share a store; a file that another run merged away is looked for in its parent.
 
 An identity is 32 digits of the question (what is asked) and 32 of the sources that answer it. Where only the sources
-differ, tasks whose sums were marked in the headers are computed again: if all have the marked bytes, the folder is
-taken over. What was found lies there, so that nobody looks a second time:
+differ, tasks whose sums were marked in the headers are computed again, and totals are added up again from the blocks
+beside them: if all the bytes are the same, the folder is taken over. What was found lies there, so that nobody looks a
+second time:
 
     <sources>.same              these sources give the bytes of this folder
     <sources>-<platform>.other  on this platform they do not
@@ -382,8 +383,8 @@ def _gives_the_same(folder: Path, work: Work) -> bool:
     if files[0].exists() or _unkept.get(files[0]) is not None:
         return _unkept.get(files[0], False)
     marks, stored = _marked(folder, work)
-    again, seconds, same = 0, 0.0, bool(marks)
-    for piece in sorted(marks, key=marks.__getitem__):
+    again, seconds, same = 0, 0.0, bool(marks) and not audited(folder).astray
+    for piece in sorted(marks if same else {}, key=marks.__getitem__):
         if again == 0:
             work.simulate(piece.realisations(work.block)[0], 1)  # compiles
         elif seconds > PROOF_S:
@@ -637,10 +638,12 @@ ACROSS = 1e-9  # of sums made on several platforms
 
 @dataclass
 class Audit:
-    """Of one identity: the pieces that are whole, with their headers and sums; faults, each naming its file; notes."""
+    """Of one identity: the pieces that are whole, with their headers and sums; totals that go astray, since they are
+    not the sum of the blocks beside them; faults, each naming its file; notes."""
 
     path: Path
     pieces: dict[Piece, tuple[dict, np.ndarray]] = field(default_factory=dict)
+    astray: list[Total] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
@@ -745,7 +748,9 @@ def _added_up(found: Audit, total: Total) -> None:
         end = Sums(*_sums(found, cut))
         sums = added(sums, end, 0) if full else end
     used: list[Piece] = [total, *inner, *([cut] if rest else [])]
-    if not agree(sums.values, values, {name for piece in used for name in found.pieces[piece][0]["platforms"]}):
+    platforms = {name for piece in used for name in found.pieces[piece][0]["platforms"]}
+    if sums.count != total.count or not agree(sums.values, values, platforms):
+        found.astray.append(total)
         found.faults.append(f"{found.path / (total.name + SUFFIX)}: is not the sum of the blocks beside it")
 
 

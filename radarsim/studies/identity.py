@@ -4,9 +4,9 @@ Its first half is the question: the resolved case with every default written out
 and the study's `model`. Realisations, limits, threads, output, file and display names are not in it.
 
 Its second half is a hash of files, which an edit of any kind changes, of words too: of radarsim's own studies those of
-the study and of the rooms that it stands on, but for what shows numbers; of a study from another package all files of
-that, and the versions of what is installed. It is a quick answer alone. Where it differs, stored blocks are computed
-again in part and taken over if their bytes are the same; see radarsim.engine.store.
+the study, of the rooms that it stands on and of what runs it, but for what shows numbers; of a study from another
+package all files of that, and the versions of what is installed. It is a quick answer alone. Where it differs, stored
+blocks are computed again in part and taken over if their bytes are the same; see radarsim.engine.store.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ from radarsim.engine.blocks import QUESTION
 from radarsim.studies.registry import SHIPPED, module, study
 
 PACKAGE = Path(__file__).parents[1]
-ROOMS = ("bursts", "config", "kernels", "physics.py", "engine/results.py")
+ROOMS = ("app/configs.py", "bursts", "config", "engine", "kernels", "physics.py")
 SHOW = {"claims", "figures", "map", "measures", "readings", "tables", "words"}  # files of a study, by their stem
 
 
