@@ -19,17 +19,23 @@ def markdown() -> str:
     parts = []
     for floor in FLOORS:
         package = import_module(f"radarsim.{floor}")
-        parts += [f"## {floor}", inspect.getdoc(package) or ""]
-        for info in pkgutil.walk_packages(package.__path__, f"radarsim.{floor}."):
-            module = import_module(info.name)
+        room = hasattr(package, "__path__")
+        parts += [f"## {floor}", (inspect.getdoc(package) or "") if room else ""]
+        names = [info.name for info in pkgutil.walk_packages(package.__path__, f"radarsim.{floor}.")] if room else []
+        for module in map(import_module, names or [package.__name__]):
             if not holds_keys(module):
-                parts += [f"### {info.name}", described(module)]
+                parts += [f"### {module.__name__}", described(module)]
     return "\n\n".join(parts)
 
 
 def holds_keys(module: ModuleType) -> bool:
     """Whether a module is a part of the schema, which has a page of its own."""
-    return any(inspect.isclass(value) and issubclass(value, BaseModel) for _, value in public(module))
+    return bool(keys_in(module)) and not module.__name__.startswith("radarsim.report.")
+
+
+def keys_in(module: ModuleType) -> list[str]:
+    """The names of its classes of keys."""
+    return [name for name, value in public(module) if inspect.isclass(value) and issubclass(value, BaseModel)]
 
 
 def plain(app, what: str, name: str, thing: object, options: dict, lines: list[str]) -> None:
@@ -40,7 +46,7 @@ def plain(app, what: str, name: str, thing: object, options: dict, lines: list[s
 
 def paragraph(text: str) -> str:
     """One paragraph for Sphinx: examples as they are, what stands in columns as it stands, prose without markup."""
-    if text.lstrip().startswith((">>>", "* ", "- ")):
+    if not text.startswith("    - ") and text.lstrip().startswith((">>>", "* ", "- ")):
         return text
     if re.search(r"\S   ?\S|\n +\S", text):
         return "::\n\n" + textwrap.indent(text, "    ")
@@ -49,7 +55,8 @@ def paragraph(text: str) -> str:
 
 def described(module: ModuleType) -> str:
     """Autodoc's directives for a module and its public names, in the order of the file."""
-    return f"```{{eval-rst}}\n.. automodule:: {module.__name__}\n   :members:\n   :undoc-members:\n```"
+    left_out = f"   :exclude-members: {', '.join(keys)}\n" if (keys := keys_in(module)) else ""
+    return f"```{{eval-rst}}\n.. automodule:: {module.__name__}\n   :members:\n   :undoc-members:\n{left_out}```"
 
 
 def public(module: ModuleType) -> list[tuple[str, object]]:
