@@ -25,14 +25,15 @@ CASE = ("config.experiment", "config.fields")
 ROOMS = {
     "errors": (),
     "language": ("errors",),
-    "config": ("errors", "physics"),
+    "config": ("errors", "constants"),
     "engine": ("errors",),
     "kernels": (),
-    "physics": (),
-    "bursts": ("kernels", "physics"),
+    "constants": (),
+    "physics": ("constants",),
+    "bursts": ("constants", "kernels", "physics"),
     "report": ("errors", "config", "language", *DATA),
     "studies.noise": (*CASE, "kernels.random"),
-    "studies.radial": ("errors", "physics"),
+    "studies.radial": ("errors", "constants", "physics"),
     "studies.interface": (*CASE, *DATA, "report"),
     "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "studies.interface"),
     "studies.registry": ("errors", "config", "studies.interface"),
@@ -48,8 +49,8 @@ ROOMS = {
 }
 
 # Inside a study: what of the shared rooms a role stands on, and on which roles of its own study.
-GROUND = ("errors", "kernels", "physics", "bursts", *CASE)
-KEYS = ("errors", "config.document", "config.fields", "physics")
+GROUND = ("errors", "constants", "kernels", "physics", "bursts", *CASE)
+KEYS = ("errors", "constants", "config.document", "config.fields", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
 SHOWN = (*SUMS, "cost", "tables", "figures", "map")

@@ -4,14 +4,14 @@ import gc
 import os
 import sys
 
-from radarsim.cli import console, design, experiments, own_data, papers
+from radarsim.cli import design, experiments, maintenance, own_data, papers
 from radarsim.cli.group import main
 
 # Matrices here are of a few rows: where other processes run too, a second thread of OpenBLAS made a Riccati equation
 # cost 15 times its processor time. It reads this when NumPy loads it, which is not yet.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-__all__ = ["console", "design", "entry", "experiments", "main", "own_data", "papers"]
+__all__ = ["design", "entry", "experiments", "main", "maintenance", "own_data", "papers"]
 
 
 def entry() -> None:

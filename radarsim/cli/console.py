@@ -1,7 +1,4 @@
-"""The terminal: progress with rate and time left, tables, lines under labels, each as wide as it is.
-
-Commands that describe, check and clean the installation and its results. Heavy imports wait inside the commands.
-"""
+"""What the terminal shows while it waits, and how lines are said: progress, fields, warnings."""
 
 import re
 import shutil
@@ -13,10 +10,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TextIO
 
-import click
-
-from radarsim.cli.group import Count, json_option, main, out_option, seed_option, set_option
-from radarsim.errors import StoreError
 from radarsim.language import numeral, plural, term, tr
 from radarsim.report.tables import clock, labelled, printable, unbroken
 
@@ -27,7 +20,6 @@ if TYPE_CHECKING:
     from rich.status import Status
 
 
-# ---- console ---------------------------------------------------------------------------------------------------------
 SILENT_S = 0.7  # a run shorter than this shows no progress
 PIPED_WIDTH = 10_000  # whatever reads it wraps it, or not
 COLUMNS = (  # of tables
@@ -250,148 +242,3 @@ def print_facts(facts: Mapping[str, str]) -> None:
     width = max(len(tr(label)) for label in facts)
     for label, fact in facts.items():
         say(f"{tr(label):<{width}}  {fact}")
-
-
-# ---- maintenance -----------------------------------------------------------------------------------------------------
-@main.command(name="list")
-@click.argument("words", nargs=-1, metavar="[WORD…]")
-@json_option
-def list_(words: tuple[str, ...], as_json: bool) -> None:
-    """Available configs, scenarios, studies and filters.
-
-    WORD is one of these kinds, or what an entry's name or line has to contain.
-
-    \b
-    Examples
-      radarsim list
-      radarsim list sonar
-      radarsim list filters
-      radarsim list --json | jq -r '.configs[].name'
-    """
-    from radarsim.app import result as documents
-    from radarsim.app.stored import inventory, selected
-    from radarsim.cli import outcomes
-
-    found = selected(inventory(), words)
-    if as_json:
-        click.echo(documents.text(documents.inventory(found)))
-    else:
-        outcomes.print_inventory(found)
-
-
-@main.command()
-def schema() -> None:
-    """JSON Schema of the YAML, for editors and other programs.
-
-    \b
-    Example
-      radarsim schema > schema.json
-    """
-    from radarsim.app.configs import schema_json
-
-    click.echo(schema_json(), nl=False)
-
-
-@main.command(name="compile")
-@click.argument("configs", nargs=-1, metavar="[CONFIG…]")
-@json_option
-def compile_(configs: tuple[str, ...], as_json: bool) -> None:
-    """Compile the kernels of all shipped configs, or of some, so that their first run need not.
-
-    The machine code is kept for this processor, where `radarsim doctor` says. After an installation or an upgrade it
-    takes about a minute of CPU time, else next to none; a line for each config says how much.
-
-    \b
-    Examples
-      radarsim compile
-      radarsim compile sonar_clutter
-    """
-    from radarsim.app import result as documents
-    from radarsim.app.doctor import compiled
-
-    done = []
-    for one in compiled(configs):
-        done.append(one._asdict())
-        if not as_json:
-            click.echo(f"{one.config}  {one.seconds:.1f} s")
-    if as_json:
-        click.echo(documents.text(done))
-
-
-@main.command()
-@click.argument("result", required=False, metavar="[RESULT]")
-@click.option("--recompute", type=Count(), default=0, metavar="N", help="Compute N stored pieces of each case again.")
-@json_option
-def doctor(result: str | None, recompute: int, as_json: bool) -> None:
-    """The machine, and a self-test with known answers; of RESULT: is all that is stored of it whole?
-
-    RESULT is a folder such as results/rls2. Every output is checked against run.json, every stored block of its cases
-    against its checksum, every total against its blocks; --recompute computes the N smallest pieces of each case again.
-    Damage ends in exit code 4 and names each file: `radarsim run` computes what is missing, `radarsim report` makes
-    tables again.
-
-    \b
-    Examples
-      radarsim doctor
-      radarsim doctor results/rls2 --recompute 3
-    """
-    if recompute and result is None:
-        raise click.UsageError("--recompute needs a RESULT: a folder such as results/rls2")
-    from radarsim.app import doctor
-    from radarsim.app import result as documents
-    from radarsim.cli import outcomes
-
-    if result is None:
-        from radarsim.app import selftest
-
-        facts = doctor.machine()
-        if not as_json:
-            print_facts(facts)
-        verdicts = selftest.verdicts()
-        if as_json:
-            click.echo(documents.text({**facts, "self-test": [documents.fields(verdict) for verdict in verdicts]}))
-        else:
-            print_facts({f"self-test {verdict.study}": verdict.words for verdict in verdicts})
-        bad = [f"self-test: {verdict.study}: {verdict.words}" for verdict in verdicts if not verdict.good]
-    else:
-        found = doctor.inspected(result, recompute)
-        if as_json:
-            click.echo(documents.text(documents.fields(found)))
-        else:
-            outcomes.print_inspection(found)
-        bad = found.faults
-    if bad:
-        raise StoreError(*bad)
-
-
-@main.command()
-@click.argument("configs", nargs=-1, metavar="[CONFIG…]")
-@seed_option
-@set_option
-@out_option
-@click.option("--dry-run", is_flag=True, help="Remove nothing; say how much it would be.")
-@json_option
-def clean(
-    configs: tuple[str, ...], seed: int | None, overrides: tuple[str, ...], out: str, dry_run: bool, as_json: bool
-) -> None:
-    """Drop stored blocks, all or of some configs; tables, figures and reports stay.
-
-    Without CONFIG all blocks below DIR/.blocks, those of older configs and older versions too. Nothing else is touched.
-
-    \b
-    Examples
-      radarsim clean --dry-run
-      radarsim clean rls2 --out results
-    """
-    from radarsim.app import result as documents
-    from radarsim.app import run, stored
-    from radarsim.cli import outcomes
-
-    if not configs and (overrides or seed is not None):
-        raise click.UsageError("--set and --seed need a CONFIG whose blocks they mean")
-    chosen = run.load_all(configs, run.merged(overrides, None, seed)) if configs else None
-    cleaned = stored.clean(out, chosen, dry_run)
-    if as_json:
-        click.echo(documents.text(documents.fields(cleaned) | {"dry_run": dry_run}))
-    else:
-        outcomes.print_cleaned(cleaned, dry_run)

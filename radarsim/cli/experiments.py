@@ -303,7 +303,7 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
     """
     from radarsim.app import result
     from radarsim.app import run as experiment
-    from radarsim.cli import papers
+    from radarsim.cli import verdicts
 
     rows = experiment.claims(names, out)
     if figure is not None:
@@ -315,4 +315,4 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
 
         click.echo(page.page(rows, {of.paper: of.page for of in experiment.papers()}), nl=False)
     else:
-        papers.print_claims(rows, {row["claim"] for row in rows if parts or row["claim"] in names}, out, names)
+        verdicts.print_claims(rows, {row["claim"] for row in rows if parts or row["claim"] in names}, out, names)

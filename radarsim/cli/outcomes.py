@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.cli.console import counted_cases, field, print_warnings, say, say_aside, show
-from radarsim.cli.papers import print_verdicts
+from radarsim.cli.verdicts import print_verdicts
 from radarsim.language import few, listed, numeral, plural, term, tr
 from radarsim.report.tables import clock, known, significant_digits
 from radarsim.report.tables import unit as unit_of

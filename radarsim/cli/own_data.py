@@ -221,7 +221,7 @@ def track(
     import contextlib
 
     from radarsim.app import run
-    from radarsim.cli import console, papers
+    from radarsim.cli import console, verdicts
     from radarsim.recorded import advice, follow, page
     from radarsim.recorded import figures as accuracy
     from radarsim.recorded import plots as files
@@ -240,7 +240,7 @@ def track(
 
     sources = [plots, *([loaded.path] if loaded.path else [])]
     with contextlib.ExitStack() as stack:
-        write = stack.enter_context(Writer(output, read)).write if output else papers.echo
+        write = stack.enter_context(Writer(output, read)).write if output else verdicts.echo
         counter = stack.enter_context(console.Counter("tracking", "rows"))
         followed = follow.follow(loaded, plots, sink, further["threads"], counter.update)
     drawn = follow.draw(followed, figures, sources) if figures else []
@@ -250,7 +250,7 @@ def track(
             judged = accuracy.judged(followed)
             advised = advice.advised(followed, counter.update)
     if not quiet:
-        papers.report(followed, judged, advised, stderr=output is None)
+        verdicts.report(followed, judged, advised, stderr=output is None)
     if output:
         console.field("track", output)
     if drawn:
@@ -285,7 +285,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     import json
 
     from radarsim.app import configs, run
-    from radarsim.cli import console, papers
+    from radarsim.cli import console, verdicts
     from radarsim.recorded import fit as fitting
 
     (loaded,) = run.load_all([config], overrides)
@@ -294,7 +294,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     if options["as_json"]:
         click.echo(json.dumps(fitting.as_json(found), indent=2))
     else:
-        papers.report_fit(found)
+        verdicts.report_fit(found)
     if options["write"]:
         path = Path(options["write"])
         made = configs.new(path.name, loaded.path or config, path.parent, fitting.settings(found))

@@ -54,8 +54,8 @@ from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from radarsim.config.document import Faults, KeyPath, Origin, did_you_mean, dotted, short
+from radarsim.constants import STANDARD_GRAVITY_MPS2, Band, outside_band
 from radarsim.errors import ConfigError
-from radarsim.physics import STANDARD_GRAVITY_MPS2, Band, outside_band
 
 # ---- values ----------------------------------------------------------------------------------------------------------
 NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")

@@ -22,7 +22,7 @@ from radarsim.engine.blocks import QUESTION
 from radarsim.studies.registry import SHIPPED, module, study
 
 PACKAGE = Path(__file__).parents[1]
-ROOMS = ("app/configs.py", "bursts", "config", "engine", "kernels", "physics.py")
+ROOMS = ("app/configs.py", "bursts", "config", "engine", "constants.py", "kernels", "physics.py")
 SHOW = {"claims", "figures", "map", "measures", "readings", "tables", "words"}  # files of a study, by their stem
 
 

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from radarsim import physics
+from radarsim.constants import STANDARD_GRAVITY_MPS2
 from radarsim.errors import ConfigError
-from radarsim.physics import STANDARD_GRAVITY_MPS2
 
 
 def truth(target: Any, t: np.ndarray) -> np.ndarray:

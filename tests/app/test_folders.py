@@ -196,13 +196,13 @@ def test_names_that_some_file_systems_take_for_one_are_refused(tmp_path):
 
 WRITER = """
 import sys
-from radarsim.report import files, provenance
+from radarsim.report import files
 for i in range(int(sys.argv[3])):
     own = f"{sys.argv[2]} {i}".encode()
     further = {f"only_{sys.argv[2]}.csv": own}
     contents = {f"{n}.csv": own for n in range(12)} | further
-    record = provenance.to_json({"outputs": dict.fromkeys(contents, "")})
-    files.replace_all(sys.argv[1], contents | {"run.json": record}, stale=provenance.outputs)
+    record = files.to_json({"outputs": dict.fromkeys(contents, "")})
+    files.replace_all(sys.argv[1], contents | {"run.json": record}, stale=files.outputs)
 """
 
 

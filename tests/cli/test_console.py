@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from radarsim.cli import console, main, outcomes, papers
+from radarsim.cli import console, main, outcomes, verdicts
 from radarsim.report import notes
 from radarsim.report.claims.judge import SAID
 from radarsim.report.tables import significant_digits
@@ -56,16 +56,16 @@ def parts(*extensions):
 
 def test_a_part_that_is_not_counted_says_so(capsys):
     """Beside the paper's own parts, once; of a claim that is an extension as a whole its first line says it."""
-    papers.print_claims(parts(False, True), {"P9.1"})
+    verdicts.print_claims(parts(False, True), {"P9.1"})
     lines = capsys.readouterr().out.split("size")[1:]
     assert ["extension, not counted" in line for line in lines] == [False, True]
-    papers.print_claims(parts(True, True), {"P9.1"})
+    verdicts.print_claims(parts(True, True), {"P9.1"})
     assert capsys.readouterr().out.count("extension, not counted") == 1
 
 
 def test_a_list_of_claims_is_a_line_each(capsys):
     long = "one two three four five six seven eight nine ten eleven twelve thirteen"
-    papers.print_claims([*parts(False, False), *[one | {"claim": "P9.2", "statement": long} for one in parts(False)]])
+    verdicts.print_claims([*parts(False, False), *[one | {"claim": "P9.2", "statement": long} for one in parts(False)]])
     first, second, counted, hint = capsys.readouterr().out.splitlines()
     assert first == "P9.1   confirmed: It is so"
     assert second == f"P9.2   confirmed: {long.removesuffix('thirteen')}…"

@@ -59,8 +59,9 @@ def test_public_names_are_seen():
     from radarsim.kernels import linear as kernels
     from radarsim.studies.range_doppler import filters
 
-    names = {"error_recursion", "steady_state", "normalised_error"}
-    assert {name for name, _ in modules.public(filters)} == names
+    seen = {name for name, _ in modules.public(filters)}
+    assert {"error_recursion", "steady_state", "normalised_error"} <= seen
+    assert not {"np", "pack"} & seen  # imported
     assert "simulate_block" in dict(modules.public(kernels))  # compiled ones too
 
 

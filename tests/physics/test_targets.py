@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarsim import physics
+from radarsim import constants, physics
 from radarsim.physics import manoeuvre_covariance, transition
 
 T = np.linspace(0.0, 60.0, 60001)
@@ -36,7 +36,7 @@ def test_velocity_and_acceleration_are_the_derivatives(name):
 def test_a_turn_keeps_its_speed_and_its_radius():
     """A full circle from and back to a point gives the range it began with."""
     speed, g = 300.0, 3.0
-    period = 2 * np.pi * speed / (g * physics.STANDARD_GRAVITY_MPS2)
+    period = 2 * np.pi * speed / (g * constants.STANDARD_GRAVITY_MPS2)
     t = np.array([0.0, 10.0, 10.0 + period])
     x = physics.turn(1e5, speed, np.pi, g, 10.0, 2 * period, t)
     assert x[1] == pytest.approx([97000.0, -300.0, x[1, 2]])

@@ -155,7 +155,7 @@ def test_a_file_of_the_users_is_no_measure_of_the_paper(tmp_path, monkeypatch):
     """A config of a shipped one's name in the working directory changes neither what is judged nor how."""
     (tmp_path / "scenarios").mkdir()
     (tmp_path / "scenarios" / "polynomial.yaml").write_text("kind: polynomial\ncoefficients: [5e4, -100]\n")
-    text = (configs.lookup.SHIPPED / "configs" / "rls1.yaml").read_text()
+    text = (configs.document.SHIPPED / "configs" / "rls1.yaml").read_text()
     (tmp_path / "rls1.yaml").write_text(text.replace("sigma_range_m: 25", "sigma_range_m: 30"))
     monkeypatch.chdir(tmp_path)
     configs.shipped.cache_clear()
@@ -163,7 +163,7 @@ def test_a_file_of_the_users_is_no_measure_of_the_paper(tmp_path, monkeypatch):
     assert found["class"].eq(claims.NOT_JUDGED).all()
     why = "not the paper's experiment: rls1: radar.sigma_range_m is 30, the paper's 25"
     assert found["why"].str.startswith(why).all()
-    unchanged = radarsim.run(configs.lookup.SHIPPED / "configs" / "rls1.yaml", realisations=50).cases
+    unchanged = radarsim.run(configs.document.SHIPPED / "configs" / "rls1.yaml", realisations=50).cases
     assert not output.case_tables(unchanged)["claims"].empty
 
 
@@ -175,7 +175,7 @@ QUICK = ("rls1", "rls2", "rls3", "manoeuvre_variance", "discriminator_as_printed
     "config",
     [
         pytest.param(path.stem, marks=() if path.stem in QUICK else pytest.mark.slow)
-        for path in sorted((configs.lookup.SHIPPED / "configs").glob("*.yaml"))
+        for path in sorted((configs.document.SHIPPED / "configs").glob("*.yaml"))
     ],
 )
 def test_a_config_holds_the_claims_that_it_is_said_to_hold(config):

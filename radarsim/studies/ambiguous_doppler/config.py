@@ -39,7 +39,7 @@ from radarsim.config.fields import (
     of_each,
     polynomial_reach_m,
 )
-from radarsim.physics import STANDARD_GRAVITY_MPS2
+from radarsim.constants import STANDARD_GRAVITY_MPS2
 
 MOST_RARE_SCANS = 64  # sequences of folds are looked for before the run, and each shifts the noise of every scan
 MOST_SCANS = 10_000  # plots and estimates of eight realisations are held for the whole run

@@ -32,9 +32,10 @@ import numpy as np
 
 from radarsim import physics
 from radarsim.config.experiment import Case
+from radarsim.constants import STANDARD_GRAVITY_MPS2
 from radarsim.errors import ConfigError
 from radarsim.kernels import random
-from radarsim.physics import STANDARD_GRAVITY_MPS2, Unreadable, points, smoothed
+from radarsim.physics import Unreadable, points, smoothed
 from radarsim.studies.multimodel.config import Flight, Keys, Sensor
 from radarsim.studies.multimodel.kernels import records, strip
 from radarsim.studies.noise import noise_key

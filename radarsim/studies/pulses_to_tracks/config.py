@@ -35,7 +35,7 @@ from radarsim.config.fields import (
     key,
     of_each,
 )
-from radarsim.physics import Band
+from radarsim.constants import Band
 
 MOST_SCANS = 1000  # each scan has windows of its own
 FEWEST_PULSES, MOST_PULSES = 4, 4096

@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.config.experiment import Case
+from radarsim.constants import STANDARD_GRAVITY_MPS2
 from radarsim.engine.results import Track
 from radarsim.kernels import linear
 from radarsim.kernels.algebra import pack, unpack
 from radarsim.kernels.hypotheses import lasting, log_likelihood
-from radarsim.physics import STANDARD_GRAVITY_MPS2, transition
+from radarsim.physics import transition
 from radarsim.studies.interface import EXPLANATIONS, RecordedPlots, Turning, true_column
 from radarsim.studies.range_doppler.config import Filter, Keys, Turn
 from radarsim.studies.range_doppler.filters import least_squares, noise_by_time, observation

@@ -1,0 +1,215 @@
+"""What the terminal shows of tracks over recorded plots, and of claims: what was found, measured and expected."""
+
+import shlex
+import sys
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TextIO
+
+from radarsim.app import configs
+from radarsim.cli.console import field, say
+from radarsim.language import listed, plural, term, tr
+from radarsim.recorded import figures, fit, page
+from radarsim.recorded.advice import Advice
+from radarsim.recorded.fit import Fit
+from radarsim.recorded.follow import Followed
+from radarsim.report.tables import interval, labelled, printable, significant_digits
+
+if TYPE_CHECKING:
+    from radarsim.app.readings import Done
+    from radarsim.app.result import Result
+
+
+# ---- findings --------------------------------------------------------------------------------------------------------
+def echo(rows: Iterable[Sequence[str]]) -> None:
+    """Rows of CSV to the terminal; names with a comma or a quote are quoted as in a file."""
+    import csv
+
+    csv.writer(sys.stdout, lineterminator="\n").writerows(rows)
+
+
+def report(followed: Followed, judged: Sequence[figures.Judged], advised: Advice | None, stderr: bool = False) -> None:
+    """Print what was found; to stderr where the track itself goes to stdout. advised: where a likelihood is known."""
+    stream = sys.stderr if stderr else sys.stdout
+    for line in page.sentences(followed, judged, advised):
+        write(stream, line)
+
+
+def write(stream: TextIO, line: str) -> None:
+    """A line, to a terminal broken between words."""
+    from radarsim.cli.console import broken
+
+    for part in broken(printable(line), stream):
+        stream.write(part + "\n")
+
+
+def report_fit(found: Fit) -> None:
+    """Print what was fitted, and the options that put it into the config."""
+    tracks = plural("{count} track", "{count} tracks", found.tracks)
+    told = tr("{rows} of {tracks}; filter {filter}", rows=page.counted(found.rows), tracks=tracks, filter=found.filter)
+    lines = [labelled("plots", told)]
+    for one in found.keys:
+        value, stated = significant_digits(one.value), significant_digits(one.stated)
+        lo, hi = (
+            significant_digits(one.lo),
+            tr("no upper end") if one.hi == float("inf") else significant_digits(one.hi),
+        )
+        least = one.lo == 0
+        doubt = (
+            tr("; the plots do not tell it from zero") if least else tr("; the plots do not tell it from larger ones")
+        )
+        line = tr(
+            "{key}: {value} {interval}, stated {stated}",
+            key=one.key,
+            value=value,
+            interval=interval(lo, hi),
+            stated=stated,
+        )
+        lines.append(line + ("" if one.identifiable else doubt))
+    if found.outliers is not None:
+        lines.append(tr("outliers: {share} % of the plots", share=significant_digits(100 * found.outliers, "#.2g")))
+    settings = " ".join(f"--set {key}={value:g}" for key, value in fit.settings(found).items())
+    if found.beside is not None:
+        lines.append(labelled("", tr("the intervals do not hold: {what}", what=page.what(*found.beside))))
+    lines.append(
+        labelled(
+            "",
+            tr(
+                "with these values the plots are {times} times as likely as with those stated",
+                times=page.times(found.gain),
+            ),
+        )
+    )
+    if settings:
+        lines.append(labelled("", tr("to use what the plots tell: {settings}", settings=settings)))
+    for line in lines:
+        write(sys.stdout, line)
+
+
+# ---- verdicts --------------------------------------------------------------------------------------------------------
+SHORT = 12  # words of a claim in a list
+NOTHING_RUN = term(
+    "nothing is run here: `make reproduce-figures` runs it all, docs/claims.md has the results at full size"
+)
+
+
+def print_verdicts(result: "Result") -> None:
+    """The claims that a run can judge by their class over all readings, and which of them came out otherwise here."""
+    from radarsim.report.claims import page, rule
+
+    verdicts, shipped = result.verdicts(), result.verdicts("as_shipped")
+    for kind, names in verdicts.items():
+        field("claims", f"{page.of_class(kind, len(names))}: {page.in_a_row(names)}")
+        here = {own: [name for name in every if name in names] for own, every in shipped.items() if own != kind}
+        if said := "; ".join(f"{tr(own)}: {page.in_a_row(few)}" for own, few in here.items() if few):
+            field("", tr("as shipped {claims}", claims=said))
+    for reason, names in result.unjudged().items():
+        field("", tr("not judged: {names}: {reason}", names=", ".join(names), reason=rule.said(reason)))
+    if alone := result.as_shipped():
+        told = {"names": page.in_a_row(alone), "paper": alone[0].partition(".")[0]}
+        words = tr(
+            "as shipped alone: {names}; `radarsim readings {paper}` judges under all that the paper allows", **told
+        )
+        field("", words)
+    if verdicts and result.written is not None:
+        told = {"command": configs.command(result.experiment, (), result.written.folder.parent, verb="claims")}
+        field("", tr("`{command}` says what each of them is", **told))
+
+
+def print_claims(
+    rows: Sequence[dict[str, Any]],
+    detailed: Collection[str] = (),
+    out: str = configs.RESULTS,
+    names: Sequence[str] = (),
+) -> None:
+    """A line a claim: its number, how far it stands, what it says; of those that are detailed what was measured too.
+    The commands that it names are those for the directory `out`, and for the names that were asked for.
+
+    Of experiments that are not the paper's a line for each reason, with the claims that cannot be judged for it.
+    """
+    from radarsim.report.claims import NOT_JUDGED, NOT_RUN, page, rule
+
+    stated: list[dict[str, Any]] = []
+    foreign: dict[tuple[str, str], list[str]] = {}
+    for row in rows:
+        if row["class"] == NOT_JUDGED and not row["what"]:
+            foreign.setdefault((row["config"], row["why"]), []).append(row["claim"])
+        else:
+            stated.append(row)
+    for own in page.grouped(stated):
+        _print_claim(own, own[0]["claim"] in detailed, configs.into(out))
+    for (stem, why), names in foreign.items():
+        told = {"stem": stem, "names": page.in_a_row(names), "reason": rule.said(why)}
+        say(tr("{stem}: not judged: {names}: {reason}", **told))
+    say(page.counted(stated) or tr("no claims are judged by this"))
+    if stated and all(row["class"] == NOT_RUN for row in stated):
+        say(tr(NOTHING_RUN))
+    elif any(row["class"] != NOT_RUN and row["claim"] not in detailed for row in stated):
+        if names:
+            command = f"radarsim claims {shlex.join(names)} --parts{configs.into(out)}"
+            say(tr("`{command}` says what was measured", command=command))
+        else:
+            command = f"radarsim claims {stated[0]['claim']}{configs.into(out)}"
+            say(tr("`{command}` says what was measured; --parts of all of them", command=command))
+
+
+def _named(row: Mapping[str, Any]) -> str:
+    """What a part of a claim measures, in which case."""
+    return ": ".join(filter(None, (str(row["case"]), tr(str(row["what"])))))
+
+
+def _print_claim(parts: Sequence[Mapping[str, Any]], detailed: bool, into: str) -> None:
+    """A claim in a line; detailed, its place, config, original sentence and a line a part."""
+    from radarsim.report.claims import NOT_JUDGED, NOT_RUN, page, rule
+
+    first = parts[0]
+    verdict = page.verdict_of(parts).replace("*", "")
+    if not detailed:
+        words = tr(first["statement"]).split()
+        short = " ".join(words[:SHORT]) + (" …" if len(words) > SHORT else "")
+        by = f" (radarsim run {first['config']}{into})" if first["class"] == NOT_RUN else ""
+        say(f"{first['claim']:<6} {verdict}{by}: {short}")
+        return
+    place = f"{tr(first['paper'])}, {tr(first['place'])}"
+    say(f"{first['claim']:<6} {verdict}: {tr(first['statement'])} [{place}; {first['config']}]")
+    if first["original"]:
+        say(f"       «{first['original']}»")
+    if first["class"] == NOT_RUN:
+        say(f"       radarsim run {first['config']}{into}")
+        return
+    for row in parts:
+        said = [_named(row)]
+        if page.number(row["measured"]) is not None:
+            said.append(page.measured(row) + tr("; expected {words}", words=page.expected(row["expected"])))
+        if (exact := page.number(row["exact"])) is not None:
+            said.append(tr("exactly {value}", value=page.plain(exact)))
+        if (missed := page.number(row["miss"])) is not None and missed:
+            said.append(tr("off by {miss:.3g} margins", miss=missed))
+        if row["verdict"] == NOT_JUDGED:
+            said.append(rule.said(row["why"]))
+        if page.extension([row]) and not page.extension(parts):
+            said.append(tr(page.NOT_COUNTED))
+        say(f"       {tr(row['verdict']):<20} {'; '.join(said)}")
+
+
+def print_readings(done: "Done", detailed: bool) -> None:
+    """A line a claim, of single claims a line a reading too, and what the joint search came to."""
+    from radarsim.report.claims import rule
+
+    for read in done.read:
+        for over in read.over:
+            if detailed:
+                for one in over.under:
+                    outcome = tr(one.outcome.kind) if one.outcome else tr("not possible: {why}", why=rule.said(one.why))
+                    say(f"       {one.kind}  {outcome:<24} {one.name}")
+            found = over.outcome
+            words = tr(found.kind) if found else tr("not judged")  # on what it depends, the sentence says
+            say(f"{over.claim.id:<6} {words:<28} {over.sentence()}")
+        if read.counted is not None:
+            say(f"{read.paper.readings.paper}: {read.counted.sentence()}")
+    if done.files:
+        curves = sum(name.endswith(".svg") for name in done.files)
+        drawn = plural("{count} figure drawn again", "{count} figures drawn again", curves)
+        field("table", tr("{file}; curves: {drawn}", file=str(done.folder / "readings.csv"), drawn=drawn))
+    if done.outdated:
+        told = {"configs": listed(done.outdated), "command": f"radarsim report {' '.join(done.outdated)}"}
+        field("note", tr("claims and reports of {configs} were written with other classes: `{command}`", **told))
