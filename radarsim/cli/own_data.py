@@ -7,7 +7,6 @@ import click
 
 from radarsim.cli.group import Count, completed, config_argument, main, set_option
 from radarsim.language import plural, tr
-from radarsim.report.tables import labelled
 
 if TYPE_CHECKING:
     from typing import Any
@@ -225,6 +224,7 @@ def track(
     from radarsim.recorded import advice, follow, page
     from radarsim.recorded import figures as accuracy
     from radarsim.recorded import plots as files
+    from radarsim.report import tables
     from radarsim.report.files import Writer
 
     (loaded,) = run.load_all([config], overrides)
@@ -232,6 +232,7 @@ def track(
     started = False
 
     def sink(piece: "Track", name: str | None) -> None:
+
         nonlocal started
         if not started:
             write([files.header_of(piece, name is not None)])
@@ -257,7 +258,7 @@ def track(
         console.field("figures", f"{figures} ({', '.join(drawn)})")
     if folder:
         page.write(followed, loaded, plots, judged, advised, folder, sources)
-        click.echo(labelled("report", str(Path(folder) / page.NAME)), err=output is None)
+        click.echo(tables.labelled("report", str(Path(folder) / page.NAME)), err=output is None)
     console.print_warnings(run.cache_troubles())
 
 
@@ -287,6 +288,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     from radarsim.app import configs, run
     from radarsim.cli import console, verdicts
     from radarsim.recorded import fit as fitting
+    from radarsim.report import tables
 
     (loaded,) = run.load_all([config], overrides)
     with console.Counter("fitting", "likelihoods") as counter:
@@ -298,4 +300,4 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     if options["write"]:
         path = Path(options["write"])
         made = configs.new(path.name, loaded.path or config, path.parent, fitting.settings(found))
-        click.echo(labelled("config", str(made)), err=options["as_json"])
+        click.echo(tables.labelled("config", str(made)), err=options["as_json"])
