@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 import radarsim
 
-FLOORS = ("physics", "kernels", "bursts", "studies", "engine", "report", "config", "recorded", "app")
+FLOORS = ("constants", "physics", "kernels", "bursts", "studies", "engine", "report", "config", "recorded", "app")
 
 
 def markdown() -> str:
