@@ -9,19 +9,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from radarsim.app import configs, stored
-from radarsim.app import configs as arguments
-from radarsim.app.configs import command, load
+from radarsim.app import stored
+from radarsim.app.configs import command, directory, load
 from radarsim.app.result import captions, recorded_case
 from radarsim.app.run import namesakes
 from radarsim.config.experiment import Case, Experiment, canonical, digest, world
 from radarsim.errors import ConfigError
-from radarsim.report import compare as figures
 from radarsim.report import compare as sides
-from radarsim.report import compare as table
-from radarsim.report import compare as words
-from radarsim.report import files, tables
-from radarsim.report import html as asked
+from radarsim.report import files
 from radarsim.report import tables as common
 from radarsim.report.compare import SERIES, Side
 from radarsim.report.drawing import Chart
@@ -75,25 +70,25 @@ def compare(
     their own. Raises ConfigError where one is missing, with the command
     that computes it, or where they share nothing; StoreError where a stored table is damaged.
     """
-    configs.directory(out)
+    directory(out)
     if len(sources) < 2:
         raise ConfigError(f"compare: takes two results or more, got {len(sources)}")
     runs = _named(_found(sources, Path(out)))
     every = [_sides(run) for run in runs]
     pairs, alone = sides.pairs(_labelled(every))
-    made = table.compared(pairs)
+    made = sides.compared(pairs)
     if not len(made):
         raise ConfigError(f"{' and '.join(run.label for run in runs)} share no filter and component to compare")
     folder = Path(out) / FOLDER
-    sentences, notes = words.sentences(made), [*words.pairings(made), *alone]
+    sentences, notes = sides.sentences(made), [*sides.pairings(made), *alone]
     warnings = [line for run in runs for line in _stale(run)] + _replaced(folder, runs)
-    described = figures.figures([side for run in _labelled(every) for side in run], made)
+    described = sides.figures([side for run in _labelled(every) for side in run], made)
     contents = {"comparison.csv": common.to_csv(made)}
     if formats:
-        from radarsim.report import figures as drawing  # Matplotlib
+        from radarsim.report.figures import save  # Matplotlib
 
         for name, figure in described.items():
-            saved = drawing.save(figure, formats, width_mm)
+            saved = save(figure, formats, width_mm)
             contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
         if described:
             contents["figures/captions.md"] = captions(described).encode()
@@ -102,7 +97,7 @@ def compare(
     ).encode()
     contents["compare.json"] = files.to_json(_record(runs, contents))
     files.replace_all(folder, contents, stale=_earlier)
-    last = words.at_the_end(made)
+    last = sides.at_the_end(made)
     kept = (tuple(rows.to_dict("records")) for rows in (made, last))
     return Compared(folder, tuple(sorted(contents)), tuple(sentences), tuple(notes), tuple(warnings), *kept)
 
@@ -235,7 +230,7 @@ def _page(
     cases = [case for run in runs for case in _cases(run)]
     names = [case.name for case in cases]
     unique = len(set(names)) == len(names) and len({case.study for case in cases}) == 1
-    differing = asked.asked(cases) if unique else {}
+    differing = html.asked(cases) if unique else {}
     labels = [run.label for run in runs]
     return html.comparison(labels, sentences, notes, warnings, described, made, differing, outputs)
 
@@ -276,17 +271,17 @@ def chart(
     once. width_mm is the width of the figures' files in place of their own. progress is told of each figure. Raises
     ConfigError where the study has none, configs are of several, or two have one name.
     """
-    arguments.directory(out)
+    directory(out)
     experiments = [load(config, overrides) for config in dict.fromkeys(configs)]
     if faults := namesakes(experiments):
         raise ConfigError(*faults)
     made = described([case for one in experiments for case in one.cases])
-    contents = {"chart.csv": tables.to_csv(made.table), "chart.html": made.page.encode()}
+    contents = {"chart.csv": common.to_csv(made.table), "chart.html": made.page.encode()}
     if formats:
-        from radarsim.report import figures  # Matplotlib
+        from radarsim.report.figures import save  # Matplotlib
 
         for n, (name, figure) in enumerate(made.figures.items()):
-            contents |= {f"{name}.{kind}": data for kind, data in figures.save(figure, formats, width_mm).items()}
+            contents |= {f"{name}.{kind}": data for kind, data in save(figure, formats, width_mm).items()}
             if progress is not None:
                 progress(n + 1, len(made.figures), 0)
         contents["captions.md"] = captions(made.figures).encode()

@@ -66,9 +66,7 @@ def new(
 
     Raises ConfigError where it is there already, StoreError where it cannot be written.
     """
-    from radarsim.config import load as own
-
-    name, text = own.new(name, like, registry, values)
+    name, text = reading.new(name, like, registry, values)
     path = Path(folder) / name
     try:
         files.create(path, text.encode())

@@ -44,7 +44,6 @@ ROUNDINGS = 10  # a power p ≤ 4 of an error, and heavy tails in it
 def machine() -> dict[str, str]:
     """The machine, what runs on it, and where compiled kernels are kept, a text each."""
     from radarsim.kernels import compile
-    from radarsim.report import files
 
     facts, cache = described(), compile.ROOT
     kept = [path.stat().st_size for path in cache.rglob("*") if path.is_file()] if cache.is_dir() else []

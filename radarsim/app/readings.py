@@ -32,7 +32,6 @@ from radarsim.engine.run import Signals
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.report import files
 from radarsim.report.claims import PaperClaims, page
-from radarsim.report.claims import page as classes
 from radarsim.report.claims.declared import Claim
 from radarsim.report.claims.judge import NOT_JUDGED
 from radarsim.report.claims.over import (
@@ -480,11 +479,10 @@ def _curve(done: Done, over: Over, drawn: dict[str, str]) -> dict[str, bytes]:
     name = f"{over.claim.id}.svg"
     if drawn.get(name) == mark and (done.folder / name).is_file():
         return {}
-    from radarsim.report import figures as drawing  # Matplotlib
-    from radarsim.report.claims import page as curve
+    from radarsim.report.figures import save  # Matplotlib
 
     drawn[name] = mark
-    return {name: drawing.save(curve.specification(of, over), ("svg",))["svg"]}
+    return {name: save(page.specification(of, over), ("svg",))["svg"]}
 
 
 @cache
@@ -511,9 +509,9 @@ def _table(done: Done) -> str:
 def _classes(done: Done) -> str:
     """What each claim came to over its readings."""
     every = [(read.paper.readings, over) for read in done.read for over in read.over]
-    new = [found.as_row() for of, over in every if (found := classes.of_over(of, over)) is not None]
+    new = [found.as_row() for of, over in every if (found := page.of_over(of, over)) is not None]
     kept = [one.as_row() for one in stored_classes(done.folder.parent)]
-    return _with(classes.COLUMNS, kept, new, {over.claim.id for _, over in every})
+    return _with(page.COLUMNS, kept, new, {over.claim.id for _, over in every})
 
 
 def _outdated(done: Done) -> tuple[str, ...]:
@@ -548,10 +546,12 @@ def _order(claim: str) -> tuple[str, float, str]:
 
 def pages(done: Done) -> str:
     """The page of each paper, one after the other."""
-    from radarsim.report.claims.readings_page import page
+    from radarsim.report.claims import readings_page
 
     return "\n".join(
-        page(read.paper.readings, read.paper.claims.paper, read.over, read.counted or _counted(read.paper, read.over))
+        readings_page.page(
+            read.paper.readings, read.paper.claims.paper, read.over, read.counted or _counted(read.paper, read.over)
+        )
         for read in done.read
     )
 

@@ -29,7 +29,7 @@ from radarsim.language import tr
 from radarsim.report import claims, files, notes, rare, seen
 from radarsim.report import tables as common
 from radarsim.report.chart import spoken
-from radarsim.report.claims import page as forest
+from radarsim.report.claims import page
 from radarsim.report.claims.page import OVER, with_classes
 from radarsim.report.drawing import Figure
 from radarsim.studies.registry import study
@@ -119,8 +119,6 @@ class Result:
         """What a notebook shows: question, answer, realisations, σ and gain at the last scan; text escaped."""
         from html import escape
 
-        from radarsim.report import files
-
         shown = ("case", "filter", "component", "unit", "t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")
         columns = [*shown, *(name for name in ("gain_percent", "gain_lo", "gain_hi") if len(self.gains))]
         rows = self.last_scan[columns].dropna(axis=1, how="all")
@@ -209,11 +207,11 @@ class Result:
         >>> result.figure("sigma_r").axes[0].get_xlabel()
         'time from the first plot, s'
         """
-        from radarsim.report import figures
+        from radarsim.report.figures import render
 
         if name not in self._described:
             raise KeyError(f"no figure {name!r}; there are: {', '.join(self._described)}")
-        return figures.render(self._described[name])
+        return render(self._described[name])
 
     def write(
         self, out: str | os.PathLike[str], figures: bool | str | Sequence[str] = True, width_mm: float | None = None
@@ -223,8 +221,7 @@ class Result:
         figures may name the formats of their files: svg, png, pdf; width_mm is their width in place of their own. What
         was written comes back. Raises DisagreementError, with all written, where there are `faults`.
         """
-        from radarsim.app import configs
-        from radarsim.report import files, html
+        from radarsim.report import html
 
         folder = Path(out) / self.experiment.stem
         self._tables["claims"] = over_readings(self._tables["claims"], self.experiment.study, Path(out))
@@ -241,8 +238,6 @@ class Result:
     @cached_property
     def faults(self) -> tuple[str, ...]:
         """What no chance makes, a line each: exact and measured values apart."""
-        from radarsim.report import claims, notes
-
         own, made = study(self.experiment.study), self._tables
         nearly = [case.name for case in self.experiment.cases if own.exact_but_for(case)]
         bounds = ("claims",) if own.exact_errors else ("claims", "curves", "gains")
@@ -260,22 +255,18 @@ class Result:
 
         What is of an extension stands apart.
         """
-        from radarsim.report.claims import page
-
         found: dict[str, list[str]] = {}
-        claims = page.grouped(self._tables["claims"].to_dict("records"))
-        for parts in sorted(claims, key=lambda parts: page.ORDER.index(parts[0][column])):
+        grouped = page.grouped(self._tables["claims"].to_dict("records"))
+        for parts in sorted(grouped, key=lambda parts: page.ORDER.index(parts[0][column])):
             said = parts[0][column] + (", extension" if page.extension(parts) else "")
             found.setdefault(said, []).append(parts[0]["claim"])
         return found
 
     def unjudged(self) -> dict[str, list[str]]:
         """The claims of this config that it cannot judge any more, or not in every part, by the reason."""
-        from radarsim.report.claims import NOT_JUDGED
-
         table = self._tables["claims"]
         found: dict[str, list[str]] = {}
-        for row in table[table["verdict"] == NOT_JUDGED].to_dict("records"):
+        for row in table[table["verdict"] == claims.NOT_JUDGED].to_dict("records"):
             names = found.setdefault(row["why"], [])
             if row["claim"] not in names:
                 names.append(row["claim"])
@@ -283,11 +274,8 @@ class Result:
 
     def as_shipped(self) -> list[str]:
         """The claims judged under the shipped reading alone although their paper leaves open what they hang on."""
-        from radarsim.report.claims import first_rows
-        from radarsim.report.claims import page as classes
-
-        rows = first_rows(self._tables["claims"].to_dict("records"))
-        return [row["claim"] for row in rows if classes.alone(row)]
+        rows = claims.first_rows(self._tables["claims"].to_dict("records"))
+        return [row["claim"] for row in rows if page.alone(row)]
 
     @property
     def unmet(self) -> list[str]:
@@ -301,8 +289,6 @@ class Result:
 
     @cached_property
     def _of_intervals(self) -> list[str]:
-        from radarsim.report import files
-
         return files.of_intervals(self.cases, self._tables, partial(study(self.experiment.study).answer, self.cases))
 
 
@@ -344,7 +330,7 @@ def case_figures(
     """The figures of an experiment, described, by the stem of their file: the study's own, and of sweeps."""
     own = study(results[0].study)
     drawn = dict(own.figures(results, _banded(made), experiment))
-    if (judged := forest.figure(made["claims"].to_dict("records"))) is not None:
+    if (judged := page.figure(made["claims"].to_dict("records"))) is not None:
         drawn["claims"] = judged
     if any(notes.heavy(made[name]).any() for name in ("curves", "gains")):
         drawn = {
@@ -414,11 +400,11 @@ def write_files(
     began = time.perf_counter()
     described = case_figures(results, made, experiment) if draw else {}
     if draw:
-        from radarsim.report import figures as drawing  # Matplotlib
+        from radarsim.report.figures import save  # Matplotlib
 
         made_by = f"radarsim {files.versions()['radarsim']}, {experiment.stem}, config {files.asked(experiment)}"
         for name, figure in described.items():
-            saved = drawing.save(figure, formats, width_mm, made_by)
+            saved = save(figure, formats, width_mm, made_by)
             contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
         contents["figures/captions.md"] = captions(described).encode()
     drawn = time.perf_counter()
@@ -427,7 +413,7 @@ def write_files(
     of_intervals = files.of_intervals(results, made, partial(own.answer, results))
     run = {**run, "warnings": [*run.get("warnings", ()), *of_intervals]}
     record = files.record(experiment, results, run, contents, answer, store.described())
-    page = html.report_page(
+    report = html.report_page(
         experiment,
         made,
         list(described.values()),
@@ -439,7 +425,7 @@ def write_files(
         agreement=notes.agreement(made["curves"]) if own.exact_errors else None,
         drawn_from=own.drawn_from(),
     )
-    contents["report.html"] = page.encode()
+    contents["report.html"] = report.encode()
     contents["run.json"] = files.to_json(files.with_output(record, "report.html", contents["report.html"]))
     removed = sorted(set(files.outputs(folder)) - set(contents))
     files.replace_all(folder, contents, stale=files.outputs)

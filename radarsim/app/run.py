@@ -320,12 +320,12 @@ def seconds(experiment: Experiment, figures: bool | str | Sequence[str], width_m
     described = output.case_figures([result], made, experiment) if formats else {}
     if not described:
         return SPARE * tables
-    from radarsim.report import figures as drawing
+    from radarsim.report.figures import save
 
     names = list(described)
     started = time.perf_counter()
     for name in dict.fromkeys((names[0], names[-1])):
-        drawing.save(described[name], formats, width_mm, "")
+        save(described[name], formats, width_mm, "")
     each = (time.perf_counter() - started) / len(dict.fromkeys((names[0], names[-1])))
     return SPARE * (tables + each * len(names))
 
@@ -408,7 +408,7 @@ def run(
     >>> len(result.curves) > 50
     True
     """
-    from radarsim.app import readings as deciding  # with it the parts that judge and draw, which `check` does without
+    from radarsim.app import readings  # with it the parts that judge and draw, which `check` does without
 
     configs.check(
         **{"threads": threads, "workers": workers, "precision": precision, "time_limit": time_limit},
@@ -419,7 +419,7 @@ def run(
     if precision is not None:
         check_precision([experiment], precision, of)
     if decide:
-        deciding.check(experiment)
+        readings.check(experiment)
     limit = time_limit if time_limit is None or callable(time_limit) else stopping.time_limit(time_limit)
     started, kept = time.perf_counter(), None
     if out is not None and isinstance(limit, stopping.TimeLimit) and limit.left >= WORTH_MEASURING_S:
@@ -428,7 +428,7 @@ def run(
         threads = pool.workers if pool else int(threads or available_cores())
         options = RunOptions(out, threads, stopping.Either(stop, limit), pool)
         if decide:
-            simulated = deciding.simulated(experiment, options, progress)
+            simulated = readings.simulated(experiment, options, progress)
         else:
             simulated = simulate(experiment, options, progress=progress, precision=precision, of=of)
         if stop is not None:
@@ -439,7 +439,7 @@ def run(
     if kept is not None:
         facts["seconds_kept_for_writing"] = kept
     if decide:
-        left = deciding.left(experiment, simulated)
+        left = readings.left(experiment, simulated)
         facts |= {"unmet": [*facts["unmet"], *left], "stop": "; ".join((*facts["unmet"], *left)) or "done"}
     ended_by = None if simulated.stopped or precision is None else (precision, of)
     result = result_of(experiment, simulated, facts, repeated(experiment, simulated.done, overrides, ended_by))
@@ -634,8 +634,8 @@ def finite(value: float) -> float | None:
 
 def draw_claims(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[str]) -> None:
     """Write the forest plot of claims; raises ConfigError for a name that says no format, or where none is judged."""
-    from radarsim.report import figures
     from radarsim.report.claims import page
+    from radarsim.report.figures import save
 
     kind = Path(path).suffix[1:].lower()
     if kind not in configs.FORMATS:
@@ -643,7 +643,7 @@ def draw_claims(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[str])
     figure = page.figure(rows)
     if figure is None:
         raise ConfigError(f"{path}: no claim is judged here, so there is nothing to draw")
-    files.replace_all(Path(path).parent, {Path(path).name: figures.save(figure, (kind,))[kind]})
+    files.replace_all(Path(path).parent, {Path(path).name: save(figure, (kind,))[kind]})
 
 
 def papers() -> "list[PaperClaims]":

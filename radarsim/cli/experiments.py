@@ -80,20 +80,20 @@ def run(
 
     limit = stopping.time_limit(time_limit) if time_limit else None
     with stopping.Signals() as stop:
-        from radarsim.app import run as experiment
+        from radarsim.app import run as simulation
 
-        overrides = experiment.merged(overrides, realisations, seed)
+        overrides = simulation.merged(overrides, realisations, seed)
         loaded = _loaded(configs, overrides, None if precision is None else (precision, of), decide)
-        if scheduler and not quiet and (line := experiment.trust(scheduler)):
+        if scheduler and not quiet and (line := simulation.trust(scheduler)):
             click.echo(f"note: {line}", err=True)
-        with experiment.cluster(workers, scheduler) as pool:
+        with simulation.cluster(workers, scheduler) as pool:
             means: dict[str, Any] = {"out": out, "threads": threads, "executor": pool}
             means |= {"time_limit": limit, "stop": stop}
             compute: Callable[..., Result | Shares]
-            draw = partial(experiment.run, figures=drawing.formats, width_mm=drawing.width_mm)
+            draw = partial(simulation.run, figures=drawing.formats, width_mm=drawing.width_mm)
             compute = partial(draw, overrides=overrides, precision=precision, of=of, decide=decide)
             if shard:
-                compute = partial(experiment.run_share, part=shard)
+                compute = partial(simulation.run_share, part=shard)
             whole, at_once = precision is None and not decide, pool.workers if pool else threads
             look = None if shard or quiet else partial(_say_what_lacks, out, at_once, whole)
             _compute_each(loaded, partial(compute, **means), out, quiet, as_json, look)
@@ -126,10 +126,10 @@ def _loaded(
     configs: tuple[str, ...], overrides: tuple[str, ...], precision: tuple[float, str] | None, decide: bool
 ) -> "list[Experiment]":
     """The experiments, all checked, with what their claims and a precision ask for."""
-    from radarsim.app import readings, run
+    from radarsim.app import readings
     from radarsim.app import run as simulation
 
-    loaded = run.load_all(configs, overrides)
+    loaded = simulation.load_all(configs, overrides)
     if precision is not None:
         simulation.check_precision(loaded, *precision)
     for one in loaded if decide else ():
@@ -229,11 +229,11 @@ def check(
     _refuse_of_nothing(of, precision)
     from radarsim.app import outlook as overview
     from radarsim.app import result
-    from radarsim.app import run as experiment
+    from radarsim.app import run as simulation
     from radarsim.cli import console, outcomes
 
     made = []
-    for one in experiment.load_all(configs, experiment.merged(overrides, realisations, seed)):
+    for one in simulation.load_all(configs, simulation.merged(overrides, realisations, seed)):
         with console.Progress(one.stem, quiet=as_json, what="cases") as bar:
             outlook = overview.outlook(one, None, precision, bar.update, of, out, shard)
         made.append(result.outlook(one, outlook))
@@ -267,12 +267,12 @@ def report(
       radarsim report rls2
       radarsim report rls2 --json --no-figures
     """
-    from radarsim.app import run as experiment
+    from radarsim.app import run as simulation
 
-    overrides = experiment.merged(overrides, realisations, seed)
+    overrides = simulation.merged(overrides, realisations, seed)
     shown: dict[str, Any] = {"figures": drawing.formats, "width_mm": drawing.width_mm}
-    read = partial(experiment.report, out=out, overrides=overrides, **shown)
-    loaded = experiment.load_all(configs, overrides)
+    read = partial(simulation.report, out=out, overrides=overrides, **shown)
+    loaded = simulation.load_all(configs, overrides)
     _compute_each(loaded, lambda one, progress: read(experiment=one), out, False, as_json, None)
 
 
@@ -302,17 +302,17 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
       radarsim claims --figure claims.svg
     """
     from radarsim.app import result
-    from radarsim.app import run as experiment
+    from radarsim.app import run as simulation
     from radarsim.cli import verdicts
 
-    rows = experiment.claims(names, out)
+    rows = simulation.claims(names, out)
     if figure is not None:
-        experiment.draw_claims(rows, figure)
+        simulation.draw_claims(rows, figure)
     if as_json:
         click.echo(result.text(rows))
     elif markdown:
         from radarsim.report.claims import page
 
-        click.echo(page.page(rows, {of.paper: of.page for of in experiment.papers()}), nl=False)
+        click.echo(page.page(rows, {of.paper: of.page for of in simulation.papers()}), nl=False)
     else:
         verdicts.print_claims(rows, {row["claim"] for row in rows if parts or row["claim"] in names}, out, names)

@@ -84,11 +84,12 @@ def simulate(config: str, output: str, realisation: int, overrides: tuple[str, .
     """
     from radarsim.app import run
     from radarsim.cli import console
-    from radarsim.recorded import follow, plots
+    from radarsim.recorded import follow
+    from radarsim.recorded import plots as files
 
     (loaded,) = run.load_all([config], overrides)
     columns = follow.simulated(loaded, realisation)
-    plots.write_columns(columns, output, loaded.path)
+    files.write_columns(columns, output, loaded.path)
     count = len(next(iter(columns.values())))
     rows = plural("{count} row", "{count} rows", count)
     console.field("plots", f"{output} ({rows}: {', '.join(columns)})")

@@ -11,7 +11,6 @@ import unicodedata
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
 from radarsim.errors import ConfigError
@@ -242,7 +241,7 @@ class Document:
 
     data: Any
     source: str
-    file: FilePath | None = None
+    file: Path | None = None
     values: Mapping[KeyPath, Origin] = field(default_factory=dict)
     keys: Mapping[KeyPath, Origin] = field(default_factory=dict)
 

@@ -12,7 +12,6 @@ import re
 import stat
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from pathlib import Path as FilePath
 from types import MappingProxyType
 from typing import Any, get_args
 
@@ -90,14 +89,14 @@ def _from_user(source: str | bytes | os.PathLike[str], faults: Faults) -> Docume
     name = os.fsdecode(source)
     # A file without suffix that is called as a config does not hide it.
     found = config_file(name) if is_stem(name) else None
-    by_path = os.path.isfile(name) and (bool(FilePath(name).suffix) or found is None)
+    by_path = os.path.isfile(name) and (bool(Path(name).suffix) or found is None)
     file = None if by_path else found
-    if file is None and is_stem(name) and not by_path and not FilePath(name).suffix:
+    if file is None and is_stem(name) and not by_path and not Path(name).suffix:
         known = stems("configs")
         near = did_you_mean(name, known) or f"; there are: {', '.join(known)}"
         faults.add(Origin(name), (), f"no such config{near}")
         return None
-    file = file or FilePath(name)
+    file = file or Path(name)
     document = read(file, faults)
     if document and not is_stem(file.stem):  # it names the folder of results
         faults.add(
@@ -122,7 +121,7 @@ def _setting(text: str, faults: Faults) -> Setting | None:
     return None if read_value is None else Setting(key, read_value.data, origin)
 
 
-def read(file: FilePath, faults: Faults) -> Document | None:
+def read(file: Path, faults: Faults) -> Document | None:
     """The document in a file; None, and a fault noted, if there is none."""
     shown = str(file)
     try:

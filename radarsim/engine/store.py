@@ -132,7 +132,6 @@ def linear_algebra() -> str:
 
     The processor, or OPENBLAS_CORETYPE, chooses the kernels; the order of sums differs between them.
     """
-    import numpy  # noqa: F401  (loads the library)
     from threadpoolctl import threadpool_info
 
     found = {

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import numeral, plural, term, tr
-from radarsim.recorded import figures, fit
 from radarsim.recorded import figures as accuracy
+from radarsim.recorded import fit
 from radarsim.recorded.advice import Advice, Asked, Finding
 from radarsim.recorded.follow import Followed, drawn, put
 from radarsim.report.tables import labelled, number, power_of_ten, significant_digits, unit
@@ -21,13 +21,13 @@ from radarsim.studies.interface import BIAS, CORRELATION, OUTLIERS
 CLEAR = 3.0  # of the logarithm of a likelihood, twenty times: from there on one filter is clearly the best
 
 
-def sentences(followed: Followed, judged: Sequence[figures.Judged], advised: Advice | None) -> list[str]:
+def sentences(followed: Followed, judged: Sequence[accuracy.Judged], advised: Advice | None) -> list[str]:
     """All that is said, a line each; advised: where a likelihood is known."""
     lines = [tested(one, advised is None) for one in judged if one.tests]
     return [*rows(followed), *errors(followed), *lines, *verdict(followed, judged, advised)]
 
 
-def verdict(followed: Followed, judged: Sequence[figures.Judged], advised: Advice | None) -> list[str]:
+def verdict(followed: Followed, judged: Sequence[accuracy.Judged], advised: Advice | None) -> list[str]:
     """Which filter is best, and what is to be changed: by the likelihood where it is known."""
     return nearest(judged) if advised is None else likely(followed, advised)
 
@@ -86,14 +86,14 @@ def errors(followed: Followed) -> list[str]:
 
 
 FINDINGS = {
-    figures.FITS: term("the stated σ fits"),
-    figures.SMALL: term("the plots err more than stated, or the target manoeuvres harder than the filter allows"),
-    figures.LARGE: term("the plots err less than stated, or the filter allows for harder manoeuvres than there are"),
-    figures.UNKNOWN: term("too few plots to decide"),
+    accuracy.FITS: term("the stated σ fits"),
+    accuracy.SMALL: term("the plots err more than stated, or the target manoeuvres harder than the filter allows"),
+    accuracy.LARGE: term("the plots err less than stated, or the filter allows for harder manoeuvres than there are"),
+    accuracy.UNKNOWN: term("too few plots to decide"),
 }
 
 
-def tested(one: figures.Judged, cured: bool) -> str:
+def tested(one: accuracy.Judged, cured: bool) -> str:
     """One test; cured: with the σ under which it would be passed, where it is not."""
     bounds = tr(
         "NIS {nis:.3g} of {plots}, 95 % of right filters [{lo:.3g}, {hi:.3g}]",
@@ -107,12 +107,12 @@ def tested(one: figures.Judged, cured: bool) -> str:
     return f"{one.filter}, {one.name}: {bounds}: {tr(FINDINGS[one.verdict])}{cure}"
 
 
-def nearest(judged: Sequence[figures.Judged]) -> list[str]:
+def nearest(judged: Sequence[accuracy.Judged]) -> list[str]:
     """What to write into the config: of the filter whose tests are most nearly right."""
     verdicts: dict[str, set[str]] = {}
     for one in judged:
         verdicts.setdefault(one.filter, set()).add(one.verdict)
-    if fitting := [name for name, found in verdicts.items() if found == {figures.FITS}]:
+    if fitting := [name for name, found in verdicts.items() if found == {accuracy.FITS}]:
         words = tr("{names}: all tests fit", names=", ".join(fitting))
         return [labelled("", words)] if len(fitting) < len(verdicts) else []
     wrong = [one for one in judged if one.better]
@@ -235,7 +235,8 @@ def write(
     sources: Iterable[str | os.PathLike] = (),
 ) -> list[str]:
     """Write the page and `figures/` into a folder; the names of the figures. Errors of `follow.put`."""
-    from radarsim.report import figures, html
+    from radarsim.report import html
+    from radarsim.report.figures import save
 
     made = drawn(followed)
     page = html.followed(
@@ -250,7 +251,7 @@ def write(
     )
     contents = {NAME: page.encode()}
     for name, one in made.items():
-        contents |= {f"figures/{name}.{kind}": data for kind, data in figures.save(one).items()}
+        contents |= {f"figures/{name}.{kind}": data for kind, data in save(one).items()}
     put(Path(folder), contents, sources)
     return list(made)
 

@@ -29,11 +29,11 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.config.fields import Model
 from radarsim.config.load import as_yaml
 from radarsim.language import current, numeral, plural, term, tr
-from radarsim.report import chart, files, tables
-from radarsim.report import tables as text
+from radarsim.report import chart, files
+from radarsim.report import tables as common
 from radarsim.report.chart import spoken
-from radarsim.report.claims import page, rule
 from radarsim.report.claims import page as claims_page
+from radarsim.report.claims import rule
 from radarsim.report.claims.judge import LOOKED
 from radarsim.report.drawing import Figure, Line
 from radarsim.report.tables import number
@@ -117,7 +117,7 @@ def _seed(case: Case) -> int:
 
 
 def _frame(columns: Sequence[str], rows: Sequence[tuple[object, ...]]) -> "pd.DataFrame":
-    return tables.frame({name: [row[i] for row in rows] for i, name in enumerate(columns)})
+    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(columns)})
 
 
 def described(model: Model, before: str = "") -> Iterator[tuple[str, str, str]]:
@@ -235,7 +235,7 @@ def report_page(
 
 def in_clauses(answer: Sequence[str]) -> list[str]:
     """The sentences of an answer, a long one in its clauses."""
-    parts = [text.clauses(sentence) if len(sentence) > LONG else [sentence] for sentence in answer]
+    parts = [common.clauses(sentence) if len(sentence) > LONG else [sentence] for sentence in answer]
     return [f"{part};" if part is not own[-1] else part for own in parts for part in own]
 
 
@@ -330,7 +330,7 @@ def cell(value: object) -> str:
     """A number for people, whole ones in full, others at four digits; text as it is, nothing for not-a-number."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return str(value)
-    return numeral(str(value)) if isinstance(value, int) else text.number(value)
+    return numeral(str(value)) if isinstance(value, int) else common.number(value)
 
 
 @cache
@@ -341,7 +341,7 @@ def _template(name: str) -> "Template":
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     own: dict[str, Callable[..., str]] = {
         "number": cell,
-        "unit": lambda name: tr(text.unit(name)),
+        "unit": lambda name: tr(common.unit(name)),
         "expected": claims_page.expected,
         "css": _css,
         "kept": kept,
@@ -356,7 +356,7 @@ def _template(name: str) -> "Template":
 
 def kept(words: object) -> str:
     """Text in which numbers stay with their units, and with ± before them."""
-    return text.unbroken(str(words))
+    return common.unbroken(str(words))
 
 
 def _measured(part: Mapping[str, Any]) -> str:
@@ -420,7 +420,7 @@ def table_in_words(name: str, table: "pd.DataFrame") -> dict[str, Any]:
     if "unit" in table:
         place = list(table.columns).index("unit")
         for row in made["rows"]:
-            row[place] = tr(text.unit(row[place]))
+            row[place] = tr(common.unit(row[place]))
     return made
 
 
@@ -600,6 +600,6 @@ def _claims_of(path: Path) -> str:
     """How many claims of a table are of which class; nothing where there is none."""
     try:
         text = files.read(path).decode("utf-8")
-        return page.counted(list(csv.DictReader(io.StringIO(text, newline=""))))
+        return claims_page.counted(list(csv.DictReader(io.StringIO(text, newline=""))))
     except (OSError, ValueError, LookupError, csv.Error):
         return ""

@@ -14,7 +14,6 @@ from radarsim.engine.results import CaseResult
 from radarsim.language import plural, power_of_ten, term, tr
 from radarsim.report import seen
 from radarsim.report import tables as common
-from radarsim.report import tables as text
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.report.statistics import Z95
 
@@ -63,7 +62,7 @@ def number(value: object, powers: bool = False) -> str:
     A mapping of keys as "key value, key value", numbers of a list one after the other.
     """
     if isinstance(value, list | tuple) and all(isinstance(one, int | float) for one in value):
-        return text.in_a_row(map(number, value))
+        return common.in_a_row(map(number, value))
     if isinstance(value, Mapping):
         return ", ".join(f"{literal(str(key))} {number(one)}" for key, one in value.items())
     if not isinstance(value, int | float) or isinstance(value, bool):
@@ -75,7 +74,7 @@ def number(value: object, powers: bool = False) -> str:
         and (power >= (2 if powers else LONG) or power < (0 if powers else -1))
     ):
         return power_of_ten(power)
-    return text.number(value)
+    return common.number(value)
 
 
 def in_short(value: object, among: Sequence[object]) -> object:
@@ -114,7 +113,7 @@ def with_its_unit(result: CaseResult, key: str, value: object) -> str:
     if not isinstance(value, int | float) or isinstance(value, bool):
         return number(value)
     factor, own = in_degrees(key_label(result, key).unit)
-    shown = number(value, is_power(key)) if factor == 1.0 else text.number(factor * value, FEW_DIGITS)
+    shown = number(value, is_power(key)) if factor == 1.0 else common.number(factor * value, FEW_DIGITS)
     return f"{shown}{own}" if own.startswith("°") else " ".join(filter(None, (shown, own.partition("(")[0])))
 
 
@@ -126,7 +125,7 @@ def key_label(result: CaseResult, key: str) -> Label:
 
 def unit_of(name: str) -> str:
     """A unit as people write it, in the language spoken."""
-    return tr(text.unit(name))
+    return tr(common.unit(name))
 
 
 def is_power(key: str) -> bool:
@@ -508,7 +507,7 @@ def _shown_value(result: CaseResult, key: str, value: object) -> str:
     """A value of a key without its unit, as its axis has it."""
     factor = axis_factor(result, key)
     turned = factor != 1.0 and isinstance(value, int | float) and not isinstance(value, bool)
-    return text.number(factor * float(str(value)), FEW_DIGITS) if turned else number(value, is_power(key))
+    return common.number(factor * float(str(value)), FEW_DIGITS) if turned else number(value, is_power(key))
 
 
 def family_panel(title: str, members: Sequence[CaseResult], rows: Mapping, words: str) -> Panel:

@@ -438,10 +438,9 @@ def test_where_the_quantity_jumps_over_the_target_it_is_said():
 def test_what_takes_long_is_foretold_with_its_time_and_what_it_is(monkeypatch):
     from radarsim.app import question
     from radarsim.studies.range_doppler import patterns
-    from radarsim.studies.range_doppler import patterns as means
 
     monkeypatch.setattr(patterns, "WHOLE", 1 << 15)
-    monkeypatch.setattr(means, "FOUND", {})
+    monkeypatch.setattr(patterns, "FOUND", {})
     said = []
     late = {"overrides": [*MISSED, "scans=17"], "between": (10, 20), "told": said.append}
     found = solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r"), 15, **late)
@@ -460,13 +459,12 @@ def test_what_takes_long_is_foretold_with_its_time_and_what_it_is(monkeypatch):
 def test_a_root_among_many_patterns_is_that_of_all_of_them_side_by_side():
     """17 scans: looked for roughly, then by secants of the means over all 131 072 patterns."""
     from radarsim.studies.range_doppler import patterns, study
-    from radarsim.studies.range_doppler import patterns as means
 
     late = {"overrides": [*MISSED, "scans=17"], "between": (10, 20)}
     found = solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r"), 15, **late)
     assert (found.exact, found.notes, found.lo) == (True, (), found.value)
     made = study.designed(Cases("rls2", tuple(late["overrides"])).at("radar.sigma_velocity_mps", found.value))
-    own = means.designs(made)
+    own = patterns.designs(made)
     mixed = [patterns.mixture(one, made.plots, made.x, made.dt, 1 << 17, own) for one in own]
     gain = 100 * (1 - np.sqrt(mixed[1].beside[0, -1, 0] / mixed[0].beside[1, -1, 0]))
     assert abs(gain - 15) <= 1e-9 * abs(found.slope * found.value)

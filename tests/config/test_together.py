@@ -148,7 +148,6 @@ def test_figure_names_are_those_that_the_report_draws():
 
 
 def test_unknown_figures_of_bursts_are_refused():
-    from radarsim.app.configs import load
     from radarsim.errors import ConfigError
 
     for name in ("residuals", "locks", "accuracy", "lock_density", "lock_scale_noise_variance"):

@@ -71,8 +71,6 @@ def test_gaussian_errors_need_as_many_as_their_chi_square_says(results):
 
 
 def test_losses_are_what_locks_leave(results):
-    import pandas as pd
-
     table = pd.DataFrame(
         {
             "case": "a",
@@ -94,8 +92,6 @@ def test_what_is_not_known_is_never_reached(results):
     (case,) = results["range_doppler"]
     sums = {name: array.copy() for name, array in case.sums.items()}
     sums["error"][0, 3, 0] = np.nan
-    from dataclasses import replace
-
     lost = replace(case, sums=sums)
     assert worst(lost, curves).percent == np.inf
     assert "sigma not known" in str(worst(lost, curves))

@@ -15,7 +15,6 @@ from radarsim.physics import transition
 from radarsim.studies.discriminator import study
 from radarsim.studies.range_doppler import filters
 from radarsim.studies.sonar import filters as banks
-from radarsim.studies.sonar import filters as sonar_filters
 from radarsim.studies.sonar.world import step_correlations
 from tests.studies.multimodel.test_kernels import DT, run_kernel
 
@@ -132,7 +131,7 @@ def test_sonar_filters(kind, size, length, variance, rho):
     t, detected = np.arange(SCANS) * period, np.ones((1, SCANS))
     detected[0, 8] = 0
     spec = banks.FilterSpec(kind, size, length, np.array([variance]), np.array([rho]))
-    made = banks.design_filter(spec, 0, sonar_filters.Plots(t, detected, period, sigma))
+    made = banks.design_filter(spec, 0, banks.Plots(t, detected, period, sigma))
     truth = random_track(rng, size, variance, period, SCANS, size)
     z = np.where(detected > 0, sonar_plots(rng, truth, rho, sigma, period, t), 0.0)
     found = sonar_estimates(made, z)

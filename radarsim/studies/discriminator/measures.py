@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from radarsim.bursts import burst as schedule
+from radarsim.bursts import burst as model
 from radarsim.bursts import estimators
 from radarsim.bursts.burst import balanced_inverse
 from radarsim.engine.results import CaseResult
@@ -132,15 +132,15 @@ class Evidence(claims.Evidence):
         designer, times = self._designer(key)
         threshold = designer.condition.threshold
         forms = [designer.handover(before)(after) for before, after in pairwise(times[:-1])]  # the last is cut short
-        return certain(max(schedule.tail_probability(form.values, threshold) for form in forms))
+        return certain(max(model.tail_probability(form.values, threshold) for form in forms))
 
-    def _designer(self, key: str) -> tuple[schedule.Designer, np.ndarray]:
+    def _designer(self, key: str) -> tuple[model.Designer, np.ndarray]:
         """What designed the sequence, and its windows in s."""
         result, i = self.case(key), self.estimator(key, "sequence")
-        burst, condition = study.burst_of(result.spec), schedule.Condition(threshold=READINGS[key][1])
+        burst, condition = study.burst_of(result.spec), model.Condition(threshold=READINGS[key][1])
         fisher = partial(estimators.fisher, burst, len(COMPONENTS))
         times = burst.pulse_period_s * np.array(result.axes.pulses[i])
-        return schedule.Designer(burst, result.axes.prior_sigma, fisher, condition), times
+        return model.Designer(burst, result.axes.prior_sigma, fisher, condition), times
 
     def phase_offsets(self, key: str) -> np.ndarray:
         """How far the best phase lies from the start's, rad, one σ: from the forecast, then at each hand-over."""

@@ -15,9 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from radarsim.bursts import burst as cuts
 from radarsim.bursts import burst as model
-from radarsim.bursts import burst as schedules
 from radarsim.bursts import estimators
 from radarsim.bursts.kernels import sequence as kernels
 from radarsim.bursts.kernels import strip as strips
@@ -31,8 +29,6 @@ from radarsim.kernels.lanes import WIDTH
 from radarsim.kernels.random import fill_normal_strip
 from radarsim.studies.discriminator import nearest
 from radarsim.studies.discriminator.config import Estimator, Keys
-from radarsim.studies.discriminator.kernels import sums
-from radarsim.studies.discriminator.kernels import sums as rare_kernels
 from radarsim.studies.discriminator.kernels import sums as sums_of
 from radarsim.studies.noise import noise_key
 
@@ -46,7 +42,7 @@ class RarePlan(nearest.Plan, Protocol):
     @property
     def keys(self) -> np.ndarray: ...
     @property
-    def mixture(self) -> sums.Mixture | None: ...
+    def mixture(self) -> sums_of.Mixture | None: ...
 
 
 class NoLoss(ValueError):
@@ -122,7 +118,7 @@ def leading(matrix: np.ndarray) -> np.ndarray:
     return found * np.sign(found[np.argmax(np.abs(found))])
 
 
-def mixture(plan: RarePlan, f: int, plain: float) -> sums.Mixture:
+def mixture(plan: RarePlan, f: int, plain: float) -> sums_of.Mixture:
     """The mixture for the losses of estimator f at its last window, with a share of plain bursts.
 
     From each direction the nearest losses on both sides are looked for; each is shifted to, and has a share by the
@@ -137,12 +133,12 @@ def mixture(plan: RarePlan, f: int, plain: float) -> sums.Mixture:
     return made(plan, units, shift, chance + LEAST_SHARE * chance.max(), plain)
 
 
-def made(plan: RarePlan, units: np.ndarray, shift: np.ndarray, shares: np.ndarray, plain: float) -> sums.Mixture:
+def made(plan: RarePlan, units: np.ndarray, shift: np.ndarray, shares: np.ndarray, plain: float) -> sums_of.Mixture:
     """A mixture of directions units (M, 6 + 4B), shifts and shares (M,) among those that are not plain."""
     sigma, noise = plan.prior_sigma, units[:, SIZE:].reshape(len(units), -1, 4)
     cumulative = np.cumsum([plain, *((1.0 - plain) * shares / shares.sum())])
     cumulative[-1] = 1.0
-    return sums.Mixture(
+    return sums_of.Mixture(
         cumulative=cumulative,
         shift=np.asarray(shift, dtype=float),
         forecast=units[:, :SIZE] * sigma,
@@ -159,13 +155,13 @@ def weighted_estimates(plan: RarePlan, first: int, count: int) -> tuple[np.ndarr
     errors, passes = np.zeros((count, *shape, SIZE)), np.zeros((count, shape[0]), np.int64)
     weights, chosen = np.empty(count), np.zeros(-(-count // WIDTH) * WIDTH, np.int64)
     room = nearest.Room(plan)
-    sums.choose(plan.keys[2], first, law.cumulative, chosen)
+    sums_of.choose(plan.keys[2], first, law.cumulative, chosen)
     for start in range(0, count, WIDTH):
         stop = min(start + WIDTH, count)
         strips.draw_forecasts(plan.keys[1], first + start, plan.prior_sigma, room.work)
         fill_normal_strip(plan.keys[0], first + start, 0, room.a, room.b)
-        sums.move(law, chosen[start : start + WIDTH], room.work, room.a, room.b)
-        sums.weigh(law, room.work, room.a, room.b, room.along, weights[start:stop])
+        sums_of.move(law, chosen[start : start + WIDTH], room.work, room.a, room.b)
+        sums_of.weigh(law, room.work, room.a, room.b, room.along, weights[start:stop])
         room.put()
         for f in range(shape[0]):
             room.follow(f, errors[start:stop, f])
@@ -229,7 +225,7 @@ class Plan:
     potential: np.ndarray
     posterior: np.ndarray
     ridges: tuple[int, ...]
-    mixture: rare_kernels.Mixture | None = None
+    mixture: sums_of.Mixture | None = None
     block: int = BLOCK
     gaussian = False
 
@@ -279,13 +275,13 @@ def forecast(spec: Keys, burst: model.Burst) -> np.ndarray:
     return given
 
 
-def designer_of(burst: model.Burst, sigma: np.ndarray, condition: schedules.Condition) -> schedules.Designer:
+def designer_of(burst: model.Burst, sigma: np.ndarray, condition: model.Condition) -> model.Designer:
     """The designer of a burst's windows under a forecast sigma (size,)."""
-    return schedules.Designer(burst, sigma, partial(estimators.fisher, burst, len(sigma)), condition)
+    return model.Designer(burst, sigma, partial(estimators.fisher, burst, len(sigma)), condition)
 
 
 @lru_cache(maxsize=64)
-def designed_windows(burst: model.Burst, sigma: tuple[float, ...], condition: schedules.Condition) -> tuple[int, ...]:
+def designed_windows(burst: model.Burst, sigma: tuple[float, ...], condition: model.Condition) -> tuple[int, ...]:
     """Windows in pulses of one condition, designed once: of many cases that differ elsewhere they are the same."""
     return tuple(designer_of(burst, np.array(sigma), condition).windows())
 
@@ -298,11 +294,11 @@ def windows_of(spec: Keys, burst: model.Burst, sigma: np.ndarray) -> list[list[i
             found.append([burst.pulses])
             continue
         if e.schedule == "designed":
-            condition = schedules.Condition(e.lock_probability, e.main_lobe_threshold, e.tail)
+            condition = model.Condition(e.lock_probability, e.main_lobe_threshold, e.tail)
             windows = list(designed_windows(burst, tuple(sigma.tolist()), condition))
         else:
             windows = sorted({burst.pulses_in(duration) for duration in e.schedule})
-        found.append(schedules.denser(windows, e.density)[: e.first_windows])
+        found.append(model.denser(windows, e.density)[: e.first_windows])
     return found
 
 
@@ -317,7 +313,7 @@ def prepare(case: Case) -> Plan:
     """Schedules, block sums' law, step matrices and bounds of a case."""
     try:
         return prepared(case)
-    except schedules.NoSchedule as error:
+    except model.NoSchedule as error:
         raise ConfigError(f"{case.name}: estimators: no designed schedule: {error}") from None
     except np.linalg.LinAlgError:
         raise ConfigError(f"{case.name}: prior: too wide, equations (15) and (16) cannot be solved") from None
@@ -329,14 +325,14 @@ def prepared(case: Case) -> Plan:
     burst, mode = burst_of(spec), mode_of(spec)
     phase, sigma = phase_of(spec, burst), forecast(spec, burst)
     size = len(sigma)
-    designer = designer_of(burst, sigma, schedules.Condition())  # of forms, which no condition enters
+    designer = designer_of(burst, sigma, model.Condition())  # of forms, which no condition enters
     windows = windows_of(spec, burst, sigma)
     every = sorted({w for own in windows for w in own})
     image = estimators.has_image(burst, sigma, every, phase.turns)
     per_window = (IMAGE_BLOCKS_PER_WINDOW if image else BLOCKS_PER_WINDOW)[mode]
-    edges = cuts.block_edges(every, per_window, 8 if mode == DEMODULATED else 1)
+    edges = model.block_edges(every, per_window, 8 if mode == DEMODULATED else 1)
     world = estimators.world(burst, mode, edges, image, phase.turns, phase.reference)
-    tables = cuts.Tables(edges, world.mean, per_window)
+    tables = model.Tables(edges, world.mean, per_window)
     blocks = tables.window if mode == BLOCK_SUMS else tables.drawn
     designs = [design_of(e, w) for e, w in zip(spec.estimators, windows, strict=True)]
     mean_information = dict(zip(every, estimators.fisher_sums(burst, size, every), strict=True))

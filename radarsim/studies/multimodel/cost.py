@@ -59,12 +59,12 @@ def seconds_per_update(plan: Plan) -> dict[str, float]:
     The least of some passes over the first scans of the flight, in a thread of a pool as kernels run.
     """
     from radarsim.kernels.lanes import WIDTH, rows
-    from radarsim.studies.multimodel.kernels import strip as plots
+    from radarsim.studies.multimodel.kernels import strip
 
     world = plan.world
     count = min(len(world.truth), MOST_SCANS)
     found = rows(count * PLOT)
-    plots.fill_plots(world.keys, world.frame, world.plot_truth[:count], START, 0, rows(plots.RANDOM), found)
+    strip.fill_plots(world.keys, world.frame, world.plot_truth[:count], START, 0, rows(strip.RANDOM), found)
     with ThreadPoolExecutor(1) as pool:
         seconds = [
             min(pool.submit(_seconds, plan, f, found, count).result() for _ in range(PASSES))

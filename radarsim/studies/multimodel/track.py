@@ -14,7 +14,6 @@ from radarsim.studies.interface import OUTLIERS, RecordedPlots, true_column
 from radarsim.studies.multimodel import world
 from radarsim.studies.multimodel.config import Filter, Keys, Sensor
 from radarsim.studies.multimodel.kernels import records as rec
-from radarsim.studies.multimodel.kernels import strip as kernel
 from radarsim.studies.multimodel.kernels import strip as strips
 from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
 from radarsim.studies.multimodel.kernels.strip import NORMALS, STRIP
@@ -250,7 +249,7 @@ def _score(spec: Keys, t: np.ndarray, z: np.ndarray, R: np.ndarray, whole: np.nd
     own = banks(spec, times)
     size, score = own.numbers[0, rec.SIZE], np.empty(len(t) - first - 1)
     design = own.models[0, : rec.MODEL_NUMBERS * size], own.transitions[0], index[1:].copy(), times, own.numbers[0]
-    kernel.log_likelihood(
+    strips.log_likelihood(
         work, numbers, _lanes(plots[first + 1 :]), *design, sensor_frame(spec.sensor), outliers, score
     )
     return float(score.sum())

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from radarsim.bursts import burst as schedule
+from radarsim.bursts import burst as model
 from radarsim.bursts import estimators
 from radarsim.bursts.burst import LIGHT_MPS, Burst, Tables, block_edges
 from radarsim.bursts.estimators import energy_ratio, fisher, fisher_sums
@@ -175,16 +175,16 @@ def theta_spreads(burst: Burst, size: int, spreads: tuple[float, float]) -> np.n
     return np.array([UNKNOWN_RAD, *(2.0 / burst.wavelength_m * np.array([at_start, acceleration]))])[:size]
 
 
-def designer(burst: Burst, size: int, spreads: tuple[float, float]) -> schedule.Designer:
+def designer(burst: Burst, size: int, spreads: tuple[float, float]) -> model.Designer:
     """Who designs the windows of a forecast: by the paper's Gaussian tail, P_Δ = 0.99, c = 1."""
     sigma = theta_spreads(burst, size, spreads)
-    return schedule.Designer(burst, sigma, partial(fisher, burst, size), schedule.Condition())
+    return model.Designer(burst, sigma, partial(fisher, burst, size), model.Condition())
 
 
 def windows(burst: Burst, one: Any, spreads: tuple[float, float]) -> tuple[int, ...]:
     """The windows in pulses of a filter's sequence; raises NoSchedule where there are none."""
     found = designer(burst, parameters(one), spreads).windows()
-    return tuple(schedule.denser(found, 2) if one.estimator == "dense" else found)
+    return tuple(model.denser(found, 2) if one.estimator == "dense" else found)
 
 
 def menu(burst: Burst, one: Any, widest: tuple[float, float]) -> Menu:

@@ -195,13 +195,13 @@ def exact_means(made: Designed, baseline: int) -> Known:
     shape = (len(made.filters), len(made.t), 3)
     sigma, bias, gain = (np.full(shape, np.nan) for _ in range(3))
     nees = np.full(shape[:2], np.nan)
-    from radarsim.studies.range_doppler import patterns as means
+    from radarsim.studies.range_doppler import patterns
 
-    if len(made.t) <= means.PATTERN_SCANS:
-        own = means.designs(made)
-        base = means.means(own[baseline], own, made)
+    if len(made.t) <= patterns.PATTERN_SCANS:
+        own = patterns.designs(made)
+        base = patterns.means(own[baseline], own, made)
         for f, design in enumerate(own):
-            of = base if f == baseline else means.means(design, [own[baseline]], made)
+            of = base if f == baseline else patterns.means(design, [own[baseline]], made)
             sigma[f], bias[f], nees[f] = of.sigma, of.bias, of.nees
             gain[f] = gains(of.beside[0], base.beside[f])
     return Known(sigma, bias, gain, nees, np.zeros((*shape, 3)))

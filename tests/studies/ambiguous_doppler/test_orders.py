@@ -8,7 +8,6 @@ import pytest
 from radarsim import physics
 from radarsim.app.configs import load
 from radarsim.studies.ambiguous_doppler import filters, study
-from radarsim.studies.ambiguous_doppler import filters as exact
 from radarsim.studies.ambiguous_doppler.filters import Member
 from radarsim.studies.ambiguous_doppler.kernels import records, sums
 from tests.studies.ambiguous_doppler import naive
@@ -132,11 +131,11 @@ def test_expected_error_is_exact_and_never_beats_the_clairvoyant():
 def test_shares_of_least_error():
     """Against the solution of the constrained problem by hand: two independent errors of variances 1 and 3."""
     E = np.broadcast_to(np.diag([1.0, 3.0]), (1, 3, 2, 2))
-    assert np.allclose(exact.best_shares(E, np.ones((2, 3), bool)), np.array([0.75, 0.25])[None, :, None])
-    alone = exact.best_shares(E, np.array([[True, False, False], [True, True, False]]))
+    assert np.allclose(filters.best_shares(E, np.ones((2, 3), bool)), np.array([0.75, 0.25])[None, :, None])
+    alone = filters.best_shares(E, np.array([[True, False, False], [True, True, False]]))
     assert np.allclose(alone[0], [[0.75, 0, 0], [0.25, 1, 0]])
     certain = np.broadcast_to(np.diag([0.0, 3.0]), (1, 3, 2, 2))
-    assert np.allclose(exact.best_shares(certain, np.ones((2, 3), bool))[0, :, 0], [1, 0])
+    assert np.allclose(filters.best_shares(certain, np.ones((2, 3), bool))[0, :, 0], [1, 0])
 
 
 def test_published_numbers_of_the_manoeuvre():
@@ -146,10 +145,10 @@ def test_published_numbers_of_the_manoeuvre():
     """
     spec, t = load("orders").cases[1].spec, np.arange(15) * 10.0
     members = [Member(order, how, {1: 4.0, 2: 1e-3}[order]) for how in ("unfolded", "none") for order in (1, 2)]
-    of = [exact.gains(one, spec.prior, np.array([250.0, 15.0]), 10.0, 15) for one in members]
+    of = [filters.gains(one, spec.prior, np.array([250.0, 15.0]), 10.0, 15) for one in members]
     motion = physics.acceleration_pulse([100e3, -250.0], 20.0, 60.0, 30.0, t)
-    bias, noise = exact.errors(of, motion[None], np.array([250.0, 15.0]))
-    E = exact.joint(bias, noise, np.ones(1))[-1, 0]
+    bias, noise = filters.errors(of, motion[None], np.array([250.0, 15.0]))
+    E = filters.joint(bias, noise, np.ones(1))[-1, 0]
     assert np.sqrt(np.diag(E)[:2]) == pytest.approx([162, 347], abs=0.5)
     assert 1 / np.sqrt(np.linalg.inv(E).sum()) == pytest.approx(155, abs=0.5)
     one, two = np.sqrt([noise[-1, i, 0, i, 0] for i in range(2)])

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from radarsim.bursts import burst as cuts
-from radarsim.bursts import burst as filters
+from radarsim.bursts import burst as model
 from radarsim.bursts import estimators
 from radarsim.bursts.burst import Burst
 from tests.studies.discriminator import naive as naive
@@ -23,25 +22,25 @@ PRINTED_PRIOR = np.array([6.1, 67.5, 6.1e3, 183.38e3, 2.426e6])
 def designer(burst=COMPUTED, sigma=None, **condition):
     fisher = partial(estimators.fisher, burst, 5)
     sigma = estimators.spreads(fisher(burst.duration_s)) * TIMES if sigma is None else sigma
-    return filters.Designer(burst, sigma, fisher, filters.Condition(**condition))
+    return model.Designer(burst, sigma, fisher, model.Condition(**condition))
 
 
 def test_paper_pairs_three_sigma_with_its_probability():
-    assert filters.spread_factor(0.99) == pytest.approx(3.0)
-    assert filters.spread_factor(0.9) < 3.0 < filters.spread_factor(0.999)
+    assert model.spread_factor(0.99) == pytest.approx(3.0)
+    assert model.spread_factor(0.9) < 3.0 < model.spread_factor(0.999)
 
 
 @pytest.mark.parametrize(("weights", "threshold"), [([1], 0.1), ([1], 60), ([2, 2], 5), ([0.5] * 5, 1), ([1e6], 1)])
 def test_tail_of_equal_weights_is_chi_square(weights, threshold):
     expected = chi2.sf(threshold / weights[0], len(weights))
-    assert filters.tail_probability(np.array(weights, float), threshold) == pytest.approx(expected, rel=1e-9)
+    assert model.tail_probability(np.array(weights, float), threshold) == pytest.approx(expected, rel=1e-9)
 
 
 def test_tail_of_unequal_weights_against_sampling():
     weights, rng = np.array([0.19, 0.05, 2e-3, 1e-7]), np.random.default_rng(1)
     n = 2_000_000
     share = np.mean(rng.standard_normal((n, 4)) ** 2 @ weights > 1.0)
-    expected = filters.tail_probability(weights, 1.0)
+    expected = model.tail_probability(weights, 1.0)
     assert share == pytest.approx(expected, abs=4 * np.sqrt(expected / n))
 
 
@@ -50,7 +49,7 @@ def test_gaussian_condition_is_equation_14():
     before, after = 462e-5, 948e-5
     values = d.handover(before)(after).values
     (one, _), (other, mu) = d.posterior(before), d.posterior(after)
-    assert filters.excess(values, d.condition) == pytest.approx(naive.handover_form(one, other, mu) - 1.0, rel=1e-6)
+    assert model.excess(values, d.condition) == pytest.approx(naive.handover_form(one, other, mu) - 1.0, rel=1e-6)
 
 
 def test_computed_schedule():
@@ -74,14 +73,14 @@ def test_each_designed_window_is_the_longest_safe_one():
     windows = d.windows()
     for a, b in itertools.pairwise(windows[:-1]):
         form = d.handover(a * period)
-        shorter, longer = (filters.excess(form(after * period).values, d.condition) for after in (b - 1, b + 1))
+        shorter, longer = (model.excess(form(after * period).values, d.condition) for after in (b - 1, b + 1))
         assert shorter < 0 < longer
 
 
 def losses(d, windows):
     """The probability of each hand-over's loss, as the form's tail has it."""
     forms = [d.handover(a * 1e-5)(b * 1e-5) for a, b in itertools.pairwise(windows)]
-    return [filters.tail_probability(form.values, 1.0) for form in forms]
+    return [model.tail_probability(form.values, 1.0) for form in forms]
 
 
 def test_hand_overs_of_the_paper_are_less_safe_than_designed():
@@ -111,10 +110,10 @@ def test_a_perfect_forecast_needs_one():
 
 
 def test_density_puts_windows_at_geometric_means():
-    assert filters.denser([100, 400, 30000], 2) == [100, 200, 400, 3464, 30000]
-    assert filters.denser([100, 800], 3) == [100, 200, 400, 800]
-    assert filters.denser([5, 6], 2) == [5, 6]  # no room between
-    assert len(filters.denser(designer().windows(), 2)) == 25
+    assert model.denser([100, 400, 30000], 2) == [100, 200, 400, 3464, 30000]
+    assert model.denser([100, 800], 3) == [100, 200, 400, 800]
+    assert model.denser([5, 6], 2) == [5, 6]  # no room between
+    assert len(model.denser(designer().windows(), 2)) == 25
 
 
 def test_direction_is_the_leading_error_of_a_handover():
@@ -122,7 +121,7 @@ def test_direction_is_the_leading_error_of_a_handover():
     d = designer()
     windows = d.windows()
     k, period = 6, 1e-5
-    direction = filters.handover_directions(d, windows)[k]
+    direction = model.handover_directions(d, windows)[k]
     information, mu = d.posterior(windows[k] * period)
     assert direction @ information @ direction / (2 * mu) == pytest.approx(1.0)
     values = d.handover(windows[k - 1] * period)(windows[k] * period).values
@@ -133,7 +132,7 @@ def test_direction_is_the_leading_error_of_a_handover():
 @pytest.mark.parametrize("per_window", [4, 16, 64])
 def test_blocks_end_with_windows_and_grow_with_time(per_window):
     windows = designer().windows()
-    edges = cuts.block_edges(windows, per_window)
+    edges = model.block_edges(windows, per_window)
     assert set(windows) <= set(edges)
     assert edges[0] == 0
     lengths = np.diff(edges)
@@ -160,9 +159,9 @@ def test_a_wide_phase_prior_says_nothing():
 @pytest.mark.parametrize("per_window", [4, 16, 24])
 def test_merged_blocks_are_few_and_short(per_window):
     windows = designer().windows()
-    edges = cuts.block_edges(windows, per_window)
+    edges = model.block_edges(windows, per_window)
     for pulses in windows:
-        ends = cuts.merged(edges, pulses, per_window)
+        ends = model.merged(edges, pulses, per_window)
         merged = edges[[0, *ends]]
         assert merged[-1] == pulses
         assert np.diff(merged).max() <= max(1, pulses / per_window)

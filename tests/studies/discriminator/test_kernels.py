@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from radarsim.bursts import burst as cuts
 from radarsim.bursts import burst as model
 from radarsim.bursts.kernels import lanes as laned
 from radarsim.bursts.kernels import scoring
@@ -237,9 +236,9 @@ def test_merged_blocks_hold_the_same_likelihood(theta, complex_samples, per_puls
     burst = burst_of(complex_samples=complex_samples, per_pulse=per_pulse)
     t = model.sample_times(burst, burst.pulses)
     phase, physics, image = model.phase_turns(theta, t), physics_of(burst), not complex_samples
-    edges = cuts.block_edges([100, 400, 600], 30)
+    edges = model.block_edges([100, 400, 600], 30)
     mean, factor = scoring.block_table(physics, edges, phase, model.signal(burst, phase))
-    tables = cuts.Tables(edges, mean, 30)
+    tables = model.Tables(edges, mean, 30)
     first, weights, count = tables.window(400)
     assert count < np.searchsorted(edges, 400)  # some are merged indeed
     work, sums, drawn, *_ = strips.room_for(len(factor))

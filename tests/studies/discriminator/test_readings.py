@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from radarsim.app.configs import load
-from radarsim.bursts import burst as schedule
+from radarsim.bursts import burst as model
 from radarsim.bursts import estimators
 from radarsim.engine.results import CaseResult
 from radarsim.report.claims import rule
@@ -50,11 +50,11 @@ def test_the_probability_of_a_miss_is_that_of_the_prepared_case(cases):
         spec, axes = cases[noise].spec, result.axes
         burst = study.burst_of(spec)
         fisher = partial(estimators.fisher, burst, 5)
-        condition = schedule.Condition(threshold=float(taken.get("threshold", "0.5")))
-        designer = schedule.Designer(burst, axes.prior_sigma, fisher, condition)
+        condition = model.Condition(threshold=float(taken.get("threshold", "0.5")))
+        designer = model.Designer(burst, axes.prior_sigma, fisher, condition)
         times = burst.pulse_period_s * np.array(axes.pulses[0])
         forms = [designer.handover(before)(after).values for before, after in pairwise(times[:-1])]
-        wanted = max(schedule.tail_probability(form, condition.threshold) for form in forms)
+        wanted = max(model.tail_probability(form, condition.threshold) for form in forms)
         assert ExactEvidence(OF.reading(**taken)).worst_handover("any").value == pytest.approx(wanted, rel=1e-6)
         assert 0.02 < wanted < 0.025
 

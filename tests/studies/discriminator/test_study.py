@@ -8,7 +8,6 @@ import pytest
 from radarsim.app.configs import load
 from radarsim.bursts import burst as model
 from radarsim.bursts import estimators as exact
-from radarsim.bursts import estimators as plans
 from radarsim.bursts.kernels import scoring
 from radarsim.bursts.kernels import sequence as kernels
 from radarsim.bursts.kernels import strip as strips
@@ -232,7 +231,7 @@ def fixed_windows(variance):
 
 
 def test_the_bias_without_the_image_is_the_one_foretold(monkeypatch):
-    monkeypatch.setattr(plans, "IMAGE_BIAS", np.inf)
+    monkeypatch.setattr(exact, "IMAGE_BIAS", np.inf)
     n = 4000
     for variance in (1e-3, 1e-5):
         spec, plan = fixed_windows(variance)
@@ -248,10 +247,10 @@ def test_the_image_is_taken_where_its_bias_would_pass_the_limit():
     at_one = image_biases(plan, spec, 8)[0].max()
     for share, taken in ((0.9, False), (1.1, True)):
         # The forecast is a multiple of the potential spreads, so that all information is by A²/σ².
-        spec, plan = fixed_windows((at_one / (share * plans.IMAGE_BIAS)) ** 2)
+        spec, plan = fixed_windows((at_one / (share * exact.IMAGE_BIAS)) ** 2)
         assert bool(plan.world.physics["image"]) is taken
         foretold, found = image_biases(plan, spec, n)
-        assert foretold.max() == pytest.approx(share * plans.IMAGE_BIAS, rel=0.01)
+        assert foretold.max() == pytest.approx(share * exact.IMAGE_BIAS, rel=0.01)
         assert found == pytest.approx(0 if taken else foretold, abs=5 / np.sqrt(n))
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from radarsim.bursts import burst as world
+from radarsim.bursts import burst as model
 from radarsim.bursts import estimators
 from radarsim.bursts.burst import Condition, Designer
 from radarsim.studies.discriminator import versions
@@ -17,7 +17,7 @@ COMPUTED = SHIPPED._replace(noise_variance=2.25, threshold=1.0, sigma=None)
 
 
 def one_at_a_time(version, pulses=30000):
-    burst = world.Burst(10e9, 1e-5, 1e-6, 1e-6, pulses, 1.0, version.noise_variance)
+    burst = model.Burst(10e9, 1e-5, 1e-6, 1e-6, pulses, 1.0, version.noise_variance)
 
     def fisher(duration):
         return estimators.fisher(burst, 5, duration)

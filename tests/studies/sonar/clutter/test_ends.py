@@ -290,8 +290,6 @@ def test_wrong_values_are_told_by_their_key(detection, events, words):
 @pytest.mark.parametrize("of", [(0.9, 0.0, 0.9999, 4), (0.98, 0.001, 0.9999, 3), (0.98, 0.0, 0.999, 4)])
 def test_intervals_of_unmarked_rows_cover(of):
     """Of 200 seeds of 4000 realisations, about the mean of them all: 91 % to 99 % where half are unmarked at least."""
-    from radarsim.report import rare
-
     plan, unmarked, covered = compared(*of), [], []
     sums = [simulated(reseeded(plan, seed), 4000) for seed in range(200)]
     ended = np.array([one["ended"].sum(axis=1) for one in sums])
