@@ -35,7 +35,7 @@ ROOMS = {
     "studies.noise": (*CASE, "kernels.random"),
     "studies.radial": ("errors", "constants", "physics"),
     "studies.interface": (*CASE, *DATA, "report"),
-    "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "studies.interface"),
+    "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "report.quantities", "studies.interface"),
     "studies.registry": ("errors", "config", "studies.interface"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry"),
     "recorded": ("errors", "config", "language", "engine", "kernels", "physics", "report", "studies"),
@@ -78,7 +78,16 @@ ROLES = {
         (*READ, "track"),
     ),  # of several: their type
     "__init__": (
-        (*CASE, *DATA, "studies.interface", "studies.folder", "report.claims", "report.drawing"),
+        (
+            *CASE,
+            *DATA,
+            "studies.interface",
+            "studies.folder",
+            "language",
+            "report.claims",
+            "report.drawing",
+            "report.quantities",
+        ),
         (*READ, "track", "part", "__init__"),
     ),
 }

@@ -115,8 +115,8 @@ class Series(NamedTuple):
 
 def checked(quantity: Quantity, case: Case) -> None:
     """ConfigError for a filter or a rate that a case has not, before anything is prepared."""
-    known = registry.study(case.study).rates(case.spec)
-    if quantity.kind not in ("gain", "sigma") and known is not None and quantity.of.table not in known:
+    known = {one.name for one in registry.study(case.study).quantities(case.spec)}
+    if quantity.kind not in known:
         raise none_made(quantity, case.name, case.study)
     if quantity.filter is not None:
         named(quantity.filter, [member.name for member in case.spec.members])

@@ -38,6 +38,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, get_args
 
+from radarsim.report.quantities import COMMON, Quantity
 from radarsim.studies.interface import OptionalPart, Paper, Study
 
 if TYPE_CHECKING:
@@ -75,7 +76,8 @@ class StudyFolder(Study):
     """A study whose parts are the functions of the files of a folder.
 
     package is the folder as Python imports it, `__name__` in its `__init__.py`. paper is whose claims it judges. offers
-    are the optional parts that it has; rate_tables what `Study.rates` says. The others are as in `Study`.
+    are the optional parts that it has; own_quantities what it measures beside σ and gain. The others are as in
+    `Study`.
     """
 
     package: str
@@ -87,7 +89,7 @@ class StudyFolder(Study):
     model: int = 1
     exact_errors: bool = True
     draws_sweeps: bool = False
-    rate_tables: tuple[str, ...] | None = None
+    own_quantities: tuple[Quantity, ...] = ()
 
     def __post_init__(self) -> None:
         if unknown := set(self.offers) - set(get_args(OptionalPart)):
@@ -101,8 +103,8 @@ class StudyFolder(Study):
     def keys(self) -> "type[Keys]":
         return self.file("config").Keys
 
-    def rates(self, spec: Any) -> tuple[str, ...] | None:
-        return self.rate_tables
+    def quantities(self, spec: Any = None) -> tuple[Quantity, ...]:
+        return (*COMMON, *self.own_quantities)
 
     prepare, simulate = part("study"), part("study")
     shortened, exact_but_for, costly = part("study"), part("study"), part("study")

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from radarsim.report.claims import PaperClaims
     from radarsim.report.claims.over import PaperReadings
     from radarsim.report.drawing import Chart, Figure
+    from radarsim.report.quantities import Quantity
 
 
 class Plan(Protocol):
@@ -228,9 +229,11 @@ class Study(ABC):
         """Whether the exact errors of a case take long, and with `Case.roughly` much less. Default: no."""
         return False
 
-    def rates(self, spec: Any) -> tuple[str, ...] | None:
-        """Which of the tables of rates, locks, folds and tracking, are made of a case. Default: None, a run tells."""
-        return None
+    def quantities(self, spec: Any = None) -> "tuple[Quantity, ...]":
+        """What a case measures, without spec any case. Default: σ and gain, of the common tables."""
+        from radarsim.report.quantities import COMMON
+
+        return COMMON
 
     def relabelled(self, axes: "Axes", case: "Case") -> "Axes":
         """The axes of a plan with the display names of a case that has the same identity. Default: names of filters."""
@@ -263,6 +266,12 @@ class Study(ABC):
         from radarsim.report import tables
 
         return tables.gains(results)
+
+    def table(self, name: str, results: "Sequence[CaseResult]") -> "pd.DataFrame | None":
+        """The table of a name; None where it makes none."""
+        if name in ("curves", "gains"):
+            return self.gains(results) if name == "gains" else self.curves(results)
+        return self.tables(results).get(name)
 
     @abstractmethod
     def figures(

@@ -102,10 +102,16 @@ def test_a_wrong_name_is_refused_before_anything_is_prepared(study, monkeypatch)
 
 
 @pytest.mark.parametrize("study", CONFIGS)
-def test_studies_say_truly_which_rates_they_make(study):
+def test_studies_declare_the_quantities_that_their_tables_hold(study):
     case = load(CONFIGS[study][0]).cases[-1]
     work = CaseWork(case)
-    tables = registry.study(case.study).tables([case_result(case, work, collect(work, 2, threads=1))])
-    rates = registry.study(case.study).rates(case.spec)
-    assert rates is not None
-    assert set(rates) == set(tables) & {"locks", "folds", "tracking"}
+    study_of, result = registry.study(case.study), case_result(case, work, collect(work, 2, threads=1))
+    tables = study_of.tables([result])
+    made = tables | {"curves": study_of.curves([result]), "gains": study_of.gains([result])}
+    quantities = study_of.quantities(case.spec)
+    for one in quantities:
+        value, exact = one.read(made[one.table])
+        assert len(exact) == len(value.value) == len(made[one.table])
+        assert one.per == "" or one.per in made[one.table]
+        assert set(one.ends) <= set(made[one.table])
+    assert {one.table for one in quantities} >= set(tables) & {"locks", "folds", "tracking", "probabilities"}

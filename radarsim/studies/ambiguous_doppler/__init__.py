@@ -1,5 +1,6 @@
 """Folded Doppler velocity: filters that unfold it by hypotheses, with memory and without (the wish that ends P1)."""
 
+from radarsim.report.quantities import RIGHT, WRONG
 from radarsim.studies.folder import StudyFolder
 from radarsim.studies.interface import Paper
 
@@ -15,5 +16,5 @@ STUDY = StudyFolder(
     },
     paper=Paper("Gorshkov & Zavizhenets 2017, conclusion", page="ambiguous_doppler"),
     offers=("inputs", "recorded", "warnings"),
-    rate_tables=("folds",),
+    own_quantities=(RIGHT, WRONG),
 )

@@ -1,5 +1,6 @@
 """P4 (Uss, Baryshev & Djavad 2010): Doppler frequency and its derivatives from one burst, and how often they lock."""
 
+from radarsim.report.quantities import LOCK, LOST
 from radarsim.studies.folder import StudyFolder
 from radarsim.studies.interface import Paper
 
@@ -25,5 +26,5 @@ STUDY = StudyFolder(
     offers=("curves", "readings"),
     exact_errors=False,  # exact_sigma is the bound, which an estimator reaches or does not
     draws_sweeps=True,  # lock is what is swept for, and has figures of its own
-    rate_tables=("locks",),
+    own_quantities=(LOCK, LOST),
 )

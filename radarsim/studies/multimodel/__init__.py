@@ -1,5 +1,7 @@
 """P2 (Sychev & Osipov 2023): multiple-model filters on an aeroballistic target, families × merging rules."""
 
+from radarsim.language import term
+from radarsim.report.quantities import Quantity
 from radarsim.studies.folder import StudyFolder
 from radarsim.studies.interface import Paper
 
@@ -20,5 +22,7 @@ STUDY = StudyFolder(
         held_too={"multimodel_families": ("P2.8", "P2.9")},
     ),
     offers=("cost", "readings", "seconds_per_update", "recorded"),
-    rate_tables=(),
+    own_quantities=(
+        Quantity("probability", term("probability"), "probabilities", "probability", per="model", kind="share"),
+    ),
 )

@@ -32,5 +32,4 @@ STUDY = StudyFolder(
         "costly",
         "seconds_at_most",
     ),
-    rate_tables=(),
 )

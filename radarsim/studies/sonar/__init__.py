@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
+from radarsim.language import term
+from radarsim.report.quantities import COMMON, Quantity
 from radarsim.studies.interface import Plan, RecordedPlots, Study
 from radarsim.studies.sonar.part import SonarPart
 
@@ -20,6 +22,10 @@ if TYPE_CHECKING:
     from radarsim.studies.sonar.smoothing.study import SharedPlan
     from radarsim.studies.sonar.study import RealisationPlan
 
+TRACKING = (  # of a tracker among false plots
+    Quantity("loss", term("ends of a track an hour"), "tracking", "ends_per_hour|ends", unit="/h"),
+    Quantity("false_tracks", term("false tracks an hour"), "tracking", "false_tracks_per_hour|false", unit="/h"),
+)
 CaseOrResult = TypeVar("CaseOrResult", "Case", "CaseResult")
 
 
@@ -50,8 +56,8 @@ class Sonar(Study):
     def prepare(self, case: "Case") -> Plan:
         return part_of(case.spec).file("study").prepare(case)
 
-    def rates(self, spec: "AllKeys") -> tuple[str, ...]:
-        return ("tracking",) if "clutter" in spec.parts else ()
+    def quantities(self, spec: "AllKeys | None" = None) -> tuple[Quantity, ...]:
+        return COMMON + TRACKING if spec is None or "clutter" in spec.parts else COMMON
 
     def simulate(self, plan: "RealisationPlan | SharedPlan | ClutterPlan", first: int, count: int) -> "np.ndarray":
         return plan.simulate(first, count)

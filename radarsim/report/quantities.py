@@ -1,0 +1,125 @@
+"""What a study measures, each quantity declared once.
+
+From a declaration follow the options of `radarsim solve`, what `--of` takes in `run --precision` and in `sensitivity`,
+what `compare` puts side by side, their words, units and axes. `Study.quantities` gives those of a study. Declared here
+are those that several studies measure.
+"""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+from radarsim.language import term
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+
+    from radarsim.report.statistics import Estimate
+
+Kind = Literal["size", "share", "signed"]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number that a table of a study holds for each filter, with its 95 % interval or exactly.
+
+    name: what options call it, `false_tracks` is `--false-tracks`. words: what sentences call it, a `term`. table: the
+    stem of its file. column: that of its value, `x|y` where the ends of the interval are `y_lo` and `y_hi`, else they
+    are `x_lo` and `x_hi`; in a table without these it is known exactly. exact: the column of exact values, by default
+    `exact_x`; a table need not have it. per: the column that tells several values of one filter apart (`component`,
+    `model`), empty where each filter has one.
+
+    kind: a `size` is positive, its changes and its precision are in per cent of it; a `share` lies from 0 to 1, is
+    shown in per cent and changes by points, its precision is in per cent of it; a `signed` one changes, and is known,
+    by its own unit. unit: the column's; by default that of the component. axis: what an axis calls it, with `{symbol}`
+    for the component's letter; by default its words and that.
+
+    last: its precision is that at the last scan or window of each filter. squares: it is made of squared errors, which
+    rare large ones decide. paired: it is against the baseline filter, which has none itself. rest: it is what the
+    column leaves of 1.
+    """
+
+    name: str
+    words: str
+    table: str
+    column: str
+    exact: str = ""
+    per: str = ""
+    kind: Kind = "size"
+    unit: str = ""
+    more_is_better: bool = False
+    axis: str = ""
+    last: bool = False
+    squares: bool = False
+    paired: bool = False
+    rest: bool = False
+
+    @property
+    def value(self) -> str:
+        """The column of its value."""
+        return self.column.partition("|")[0]
+
+    @property
+    def ends(self) -> tuple[str, str]:
+        """The columns of the ends of its interval."""
+        stem = self.column.rpartition("|")[2]
+        return f"{stem}_lo", f"{stem}_hi"
+
+    @property
+    def known(self) -> str:
+        """The column of its exact value."""
+        return self.exact or f"exact_{self.value}"
+
+    @property
+    def option(self) -> str:
+        """The option that names it."""
+        return f"--{self.name.replace('_', '-')}"
+
+    @property
+    def scale(self) -> float:
+        """By what the column's numbers are multiplied for people."""
+        return 100.0 if self.kind == "share" else 1.0
+
+    def shown_unit(self, of_component: str = "") -> str:
+        """The unit in which people read it, of a component with a unit."""
+        return "%" if self.kind == "share" else self.unit or of_component
+
+    def complement(self, name: str, words: str) -> "Quantity":
+        """What a share leaves of 1."""
+        return replace(self, name=name, words=words, more_is_better=not self.more_is_better, rest=not self.rest)
+
+    def read(self, rows: "pd.DataFrame") -> "tuple[Estimate, np.ndarray]":
+        """Values with their intervals, and exact values (rows,) or not-a-number, of rows of its table."""
+        import numpy as np
+
+        from radarsim.report.statistics import Estimate
+
+        names = [self.value, *self.ends, self.known]
+        value, lo, hi, known = (
+            rows[name].to_numpy(dtype=float) if name in rows else np.full(len(rows), np.nan) for name in names
+        )
+        if self.ends[0] not in rows:
+            lo = hi = known = value
+        if self.rest:
+            value, lo, hi, known = 1 - value, 1 - hi, 1 - lo, 1 - known
+        return Estimate(value, lo, hi), known
+
+
+SIGMA = Quantity(
+    *("sigma", term("σ"), "curves", "sigma"), per="component", axis=term("$\\sigma$ of {symbol}"), squares=True
+)
+GAIN = Quantity(
+    *("gain", term("gain"), "gains", "gain_percent|gain", "exact_percent"),
+    per="component",
+    kind="signed",
+    unit="%",
+    more_is_better=True,
+    axis=term("gain in $\\sigma$ of {symbol}"),
+    squares=True,
+    paired=True,
+)
+COMMON = (SIGMA, GAIN)
+LOCK = Quantity("lock", term("lock rate"), "locks", "lock_rate|lock", kind="share", more_is_better=True, last=True)
+LOST = LOCK.complement("lost", term("rate of lost locks"))
+RIGHT = Quantity("right", term("rate of right folds"), "folds", "right", kind="share", more_is_better=True, last=True)
+WRONG = RIGHT.complement("wrong", term("rate of wrong folds"))
