@@ -108,13 +108,63 @@ def _in_every_member(document: Document, model: type[Study], key: str) -> list[K
 
 def _without_twin(document: Document, path: KeyPath, model: type[Study]) -> Document:
     """The document without what the new value replaces: the same quantity in the other unit, or said another way."""
-    twin = in_degrees(str(path[-1])) or in_radians(str(path[-1]))
-    twin = twin or model.in_place_of.get(".".join(map(str, path)), "").rpartition(".")[2]
+    twin = _twin(path, model)
     if not twin or document.get((*path[:-1], twin)) is ABSENT:
         return document
     holder = document.get(path[:-1])
     assert isinstance(holder, dict)  # it has the twin
     return document.with_data(path[:-1], {key: value for key, value in holder.items() if key != twin})
+
+
+def _twin(path: KeyPath, model: type[Study]) -> str:
+    twin = in_degrees(str(path[-1])) or in_radians(str(path[-1]))
+    return twin or model.in_place_of.get(".".join(map(str, path)), "").rpartition(".")[2]
+
+
+def overlaid(document: Document, model: type[Study], over: Document, read: Read, faults: Faults) -> Document:
+    """The document of an included config with the keys that stand beside `include` laid over it.
+
+    Mappings are changed key by key, scenarios by their content; whatever else takes the place of what was there: lists,
+    values, a scenario's stem, and a mapping of another kind.
+    """
+    stems = [key for key, value in over.data.items() if isinstance(value, str)]
+    over = scenarios_inlined(over, model, read, faults)
+    for key, value in over.data.items():
+        if isinstance(value, dict) and key not in stems:
+            document = scenarios_inlined(document, model, read, faults, only=key)
+            document = _merged(document, model, over, (key,))
+        else:
+            document = _replaced(document, model, over, (key,))
+    return document
+
+
+def _merged(document: Document, model: type[Study], over: Document, path: KeyPath) -> Document:
+    """The document with the keys that another has in the mapping at a path."""
+    below, value = document.get(path), over.get(path)
+    if not isinstance(below, dict) or not isinstance(value, dict):
+        return _replaced(document, model, over, path)
+    kind = model_at(model, document.data, path)
+    if kind is not None and kind is not model_at(model, document.with_data(path, below | value).data, path):
+        return _replaced(document, model, over, path)
+    for key in value:
+        document = _merged(document, model, over, (*path, key))
+    return document
+
+
+def _replaced(document: Document, model: type[Study], over: Document, path: KeyPath) -> Document:
+    twin = _twin(path, model)
+    if over.get((*path[:-1], twin)) is ABSENT:  # both given side by side are a fault, which the check finds
+        document = _without_twin(document, path, model)
+    return document.laid(path, over)
+
+
+def leaves(data: object, path: KeyPath = ()) -> Iterator[KeyPath]:
+    """The paths of what is no mapping, or an empty one."""
+    if not isinstance(data, dict) or not data:
+        yield path
+        return
+    for key, value in data.items():
+        yield from leaves(value, (*path, key))
 
 
 def scenarios_inlined(
@@ -194,6 +244,20 @@ class Draft:
     seed: int | None
 
 
+Over = tuple[Document, ...]  # keys laid over an included config, those of the nearest config first
+
+
+def changes_included(document: Document) -> bool:
+    """Whether a config changes what it includes: keys of a study stand beside `include`."""
+    return "include" in document.data and not set(COMMON_KEYS).issuperset(document.data)
+
+
+def _renamed(drafts: list[Draft], stem: str) -> list[Draft]:
+    """The drafts of a config that changes what it includes, called after it where it is included in its turn."""
+    several = len({draft.stem for draft in drafts}) > 1
+    return [replace(draft, stem=f"{stem}:{draft.stem}" if several else stem) for draft in drafts]
+
+
 class Expander:
     """Expands configs into drafts, each config once.
 
@@ -206,7 +270,7 @@ class Expander:
         settings = list(settings)
         self.common = [s for s in settings if s.key.split(".")[0] in COMMON_KEYS]
         self.settings = [s for s in settings if s.key.split(".")[0] not in COMMON_KEYS]
-        self.expanded: dict[FilePath, list[Draft]] = {}
+        self.expanded: dict[tuple[FilePath, ...], list[Draft]] = {}
 
     def experiment(self, document: Document) -> Experiment | None:
         """The whole experiment of the top config; None if faults were noted."""
@@ -216,7 +280,7 @@ class Expander:
                 self.faults.add(setting.origin, (), f"{first} has no keys of its own")
             else:
                 document = document.graft((first, *rest), setting.value, setting.origin)
-        common, drafts = self._expand(document, ())
+        common, drafts = self._expand(document, (), ())
         cases = [case for draft in drafts if (case := self._case(draft))]
         self._refuse_twins(cases, document)
         self._refuse_mixture(drafts, common, document)
@@ -233,13 +297,17 @@ class Expander:
             realisations=common.realisations or max(case.realisations for case in cases),
             seed=cases[0].seed if common.seed is None else common.seed,
             figures=dict(common.figures),
+            changes_included=changes_included(document),
         )
 
-    def _expand(self, document: Document, chain: tuple[FilePath, ...]) -> tuple[Common, list[Draft]]:
-        """The common keys of a config, and the drafts it stands for."""
+    def _expand(self, document: Document, chain: tuple[FilePath, ...], over: Over) -> tuple[Common, list[Draft]]:
+        """The common keys of a config, and the drafts it stands for; over is laid over them, the nearest first."""
         common = self._common(document.only(COMMON_KEYS))
-        inside = self._included(document, common, chain) if "include" in document.data else self._own(document, common)
-        drafts = self._swept(document, common, inside)
+        if "include" in document.data:
+            inside = self._included(document, common, chain, over)
+        else:
+            inside = self._own(document, common, over)
+        drafts = self._swept(document, common, inside, over)
         given = {key: getattr(common, key) for key in ("realisations", "seed") if getattr(common, key) is not None}
         return common, [replace(draft, **given) for draft in drafts]
 
@@ -253,7 +321,7 @@ class Expander:
             return common.model_copy(update={"realisations": 1})  # its fault is noted; it must not be called missing
         return common
 
-    def _own(self, document: Document, common: Common) -> list[Draft]:
+    def _own(self, document: Document, common: Common, over: Over) -> list[Draft]:
         """The one draft of a config with a study of its own."""
         if common.study is None or not self.studies.has(common.study):
             if "study" not in document.data:
@@ -268,30 +336,30 @@ class Expander:
                 self.faults.add(document.origin(("study",)), ("study",), message, common.study)
             return []
         own = document.without(COMMON_KEYS)
+        for one in over:
+            own = overlaid(own, self.studies.keys(common.study), one, self.read, self.faults)
         for setting in self.settings:
             own = self._placed(own, common.study, setting)
         own = scenarios_inlined(own, self.studies.keys(common.study), self.read, self.faults)
         stem = composed(document.file.stem) if document.file else "config"
         return [Draft(own, stem, common.study, (), common.realisations, common.seed)]
 
-    def _included(self, document: Document, common: Common, chain: tuple[FilePath, ...]) -> list[Draft]:
-        """The drafts of all included configs."""
-        for key in document.data:
-            if key not in COMMON_KEYS:
-                message = "a config with include has no keys of a study; " + unknown_key(key, COMMON_KEYS)
-                self.faults.add(document.key_origin((key,)), (key,), message)
+    def _included(self, document: Document, common: Common, chain: tuple[FilePath, ...], over: Over) -> list[Draft]:
+        """The drafts of all included configs, with the keys that stand beside `include` laid over each."""
+        if changes_included(document):
+            over = (document.without(COMMON_KEYS), *over)
         chain = (*chain, document.file.resolve()) if document.file else chain
         drafts: list[Draft] = []
         for i, name in enumerate(common.include or ()):
             origin = document.origin(("include", i))
-            drafts += self._include(name, origin, ("include", i), document.file, chain)
+            drafts += self._include(name, origin, ("include", i), document.file, chain, over)
             if len(drafts) > MOST_CASES:
                 self.faults.add(origin, ("include",), f"more than {MOST_CASES} cases")
                 return []
         return drafts
 
     def _include(
-        self, name: str, origin: Origin, path: KeyPath, beside: FilePath | None, chain: tuple[FilePath, ...]
+        self, name: str, origin: Origin, path: KeyPath, beside: FilePath | None, chain: tuple[FilePath, ...], over: Over
     ) -> list[Draft]:
         """The drafts of one included config."""
         file = config_file(name, beside) if is_stem(name) else None
@@ -303,14 +371,16 @@ class Expander:
             self.faults.add(origin, path, "a config cannot include itself", name)
         elif len(chain) > DEEPEST_INCLUDE:
             self.faults.add(origin, path, f"includes nested more than {DEEPEST_INCLUDE} deep", name)
-        elif file.resolve() in self.expanded:
-            return self.expanded[file.resolve()]
+        elif (once := (file.resolve(), *(FilePath(one.source) for one in over))) in self.expanded:
+            return self.expanded[once]
         elif included := self.read(file, self.faults):
-            _, drafts = self._expand(included, chain)
-            return self.expanded.setdefault(file.resolve(), drafts)
+            _, drafts = self._expand(included, chain, over)
+            if changes_included(included):
+                drafts = _renamed(drafts, composed(file.stem))
+            return self.expanded.setdefault(once, drafts)
         return []
 
-    def _swept(self, document: Document, common: Common, drafts: list[Draft]) -> list[Draft]:
+    def _swept(self, document: Document, common: Common, drafts: list[Draft], over: Over) -> list[Draft]:
         """Each draft once for each combination of swept values; the last key changes fastest."""
         if not common.sweep or not drafts:
             return drafts
@@ -319,14 +389,14 @@ class Expander:
             return []
         axes = []
         for n, key in enumerate(common.sweep):
-            if not self._may_be_swept(document, list(common.sweep)[:n], key, drafts):
+            if not self._may_be_swept(document, list(common.sweep)[:n], key, drafts, over):
                 continue
             values = document.data["sweep"][key]
             axes.append([Setting(key, v, document.origin(("sweep", key, i))) for i, v in enumerate(values)])
         return [self._with(draft, settings) for draft in drafts for settings in itertools.product(*axes)]
 
-    def _may_be_swept(self, document: Document, before: list[str], key: str, drafts: list[Draft]) -> bool:
-        """Whether a swept key is one that this sweep, and no other and no override, decides.
+    def _may_be_swept(self, document: Document, before: list[str], key: str, drafts: list[Draft], over: Over) -> bool:
+        """Whether a swept key is one that this sweep, and no other, no override and no key laid over it, decides.
 
         before: the keys that the same sweep names before it.
         """
@@ -352,6 +422,12 @@ class Expander:
                 set_here = key_paths(draft.document, self.studies.keys(draft.study), setting.key, missing_ok=True)
                 if any(path[: len(s)] == s for path in set_here for s in swept):
                     self.faults.add(setting.origin, (), f"the config sweeps it: set sweep.{key}=[...] instead")
+                    return False
+        for one in over:
+            for path in leaves(one.data):
+                if any(path[: len(s)] == s for s in swept):
+                    message = f"{document.source}, which is included, sweeps it; sweep it here instead, and not there"
+                    self.faults.add(one.key_origin(path), path, message)
                     return False
         return True
 

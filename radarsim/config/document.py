@@ -287,6 +287,15 @@ class Document:
         whole = {path: Origin(other.source, prefix=len(path))}
         return self._replaced(path, other.data, whole | moved(other.values), moved(other.keys))
 
+    def laid(self, path: KeyPath, over: "Document") -> "Document":
+        """The document with what another one has at a path, with its origins, in place of what it has there itself."""
+
+        def of(origins: Mapping[KeyPath, Origin]) -> dict[KeyPath, Origin]:
+            return {below: origin for below, origin in origins.items() if below[: len(path)] == path}
+
+        values, keys = {path: over.origin(path)} | of(over.values), {path: over.key_origin(path)} | of(over.keys)
+        return self._replaced(path, over.get(path), values, keys)
+
     def _replaced(
         self, path: KeyPath, value: object, values: dict[KeyPath, Origin], keys: dict[KeyPath, Origin]
     ) -> "Document":

@@ -106,7 +106,10 @@ class Case:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What a config asks for; figures holds, for a figure, names or patterns of the cases that it shows."""
+    """What a config asks for; figures holds, for a figure, names or patterns of the cases that it shows.
+
+    changes_included: keys of the study stand beside `include`, so that a case is not what the config of its stem says.
+    """
 
     stem: str
     study: str
@@ -115,6 +118,7 @@ class Experiment:
     realisations: int
     seed: int
     figures: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    changes_included: bool = False
 
     @cached_property
     def resolved(self) -> dict[str, Any]:

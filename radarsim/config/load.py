@@ -34,7 +34,7 @@ from radarsim.config.document import (
     short,
     stems,
 )
-from radarsim.config.experiment import Experiment
+from radarsim.config.experiment import Experiment, complete
 from radarsim.config.fields import DEEPEST, Model, NotFinite, from_python, from_text, in_radians
 from radarsim.config.schema import COMMON_KEYS, Common, Studies
 from radarsim.errors import ConfigError
@@ -300,8 +300,8 @@ def starter(data: Mapping[str, Any], study_keys: type[Model], name: str, like: s
     for key in ("study", "include"):
         if key in common:
             lines += _entry(key, common.pop(key), Common, "")
-    if own:
-        lines += _mapping(own, study_keys, "", optional=True)
+    if own:  # what lies over an included config says nothing of the keys that it does not name
+        lines += _mapping(own, study_keys, "", optional="include" not in data)
     lines += [line for key, value in common.items() for line in _entry(key, value, Common, "")]
     missing = [key for key in ("sweep", "realisations", "seed") if key not in data]
     samples = {"sweep": "{some_key: [1, 2, 3]}", "realisations": "1e5", "seed": "1"}
@@ -311,7 +311,7 @@ def starter(data: Mapping[str, Any], study_keys: type[Model], name: str, like: s
 
 def _mapping(data: Mapping[str, Any], model: type[Model] | None, indent: str, optional: bool) -> list[str]:
     """The lines of a mapping, and of the optional keys it lacks."""
-    lines = [line for key, value in data.items() for line in _entry(key, value, model, indent)]
+    lines = [line for key, value in data.items() for line in _entry(key, value, model, indent, optional)]
     if optional and model is not None:
         given = {in_radians(key) or key for key in data} | set(data)
         for key, field in model.model_fields.items():
@@ -322,11 +322,11 @@ def _mapping(data: Mapping[str, Any], model: type[Model] | None, indent: str, op
     return lines
 
 
-def _entry(key: str, value: object, model: type[Model] | None, indent: str) -> list[str]:
-    """The lines of one key: short values beside it, mappings and lists of mappings below."""
+def _entry(key: str, value: object, model: type[Model] | None, indent: str, optional: bool = True) -> list[str]:
+    """The lines of one key: short values beside it, mappings, with the optional keys they lack, and lists below."""
     about, inner = _about(model, key), _inner(model, key, value)
     if isinstance(value, Mapping) and inner is not None and key != "sweep":
-        return [_line(f"{indent}{key}:", about), *_mapping(value, inner, indent + "  ", optional=True)]
+        return [_line(f"{indent}{key}:", about), *_mapping(value, inner, indent + "  ", optional)]
     if isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
         lines = [_line(f"{indent}{key}:", about)]
         if inner is not None:
@@ -426,6 +426,9 @@ def new(
     faults.raise_if_any()
     assert document is not None  # a file that cannot be read is a fault
     data = copy.deepcopy(dict(document.data))
+    if values and "include" in data and len(experiment.cases) == 1:  # values have their places in the whole
+        (case,) = experiment.cases
+        data = {"study": case.study, **complete(case.spec), "realisations": case.realisations, "seed": case.seed}
     for key, value in values.items():
         _put(data, key, value)
     return f"{name}.yaml", starter(data, studies.keys(experiment.study), name, experiment.stem)

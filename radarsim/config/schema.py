@@ -21,7 +21,9 @@ class Common(Model):
 
     study: Stem | None = key("study", "the study, which decides the other keys", None)
     include: Annotated[tuple[Stem, ...], Field(min_length=1)] | None = key(
-        "included configs", "stems of other configs, to be run together in place of an experiment of one's own", None
+        "included configs",
+        "stems of other configs, run together; keys of the study beside it are laid over each of them",
+        None,
     )
     sweep: Annotated[dict[str, Annotated[tuple[Anything, ...], Field(min_length=1)]], Field(min_length=1)] | None = key(
         "swept keys", "a case for each combination of values: key or dotted path, and its list of values", None
@@ -83,12 +85,7 @@ def schema(studies: Studies) -> dict[str, Any]:
         "$schema": DIALECT,
         "title": TITLE,
         "oneOf": [{"$ref": f"#/$defs/{name}"} for name in (*kinds, "include", "scenario")],
-        "$defs": {
-            **kinds,
-            "include": _comparison(common, list(models)),
-            "scenario": _scenario(models, kinds),
-            **definitions,
-        },
+        "$defs": {**kinds, "include": _comparison(common, kinds), "scenario": _scenario(models, kinds), **definitions},
     }
 
 
@@ -104,13 +101,18 @@ def _experiment(name: str, study: dict[str, Any], common: dict[str, Any]) -> dic
     }
 
 
-def _comparison(common: dict[str, Any], studies: list[str]) -> dict[str, Any]:
-    """A config that includes others."""
+def _comparison(common: dict[str, Any], kinds: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """A config that includes others; of the keys of their studies that lie over them a mapping need not be whole."""
+    keys = {key: part for kind in reversed(kinds.values()) for key, part in kind["properties"].items()}
     return {
         "title": "include",
-        "description": "Several configs compared in one run.",
+        "description": "Configs run together; keys of the study are laid over each: mappings key by key, lists whole.",
         "type": "object",
-        "properties": {**common, "study": {"enum": studies, "description": common["study"]["description"]}},
+        "properties": {
+            **{key: {"description": part["description"]} for key, part in keys.items() if "description" in part},
+            **common,
+            "study": {"enum": list(kinds), "description": common["study"]["description"]},
+        },
         "required": ["include"],
         "additionalProperties": False,
     }

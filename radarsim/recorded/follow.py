@@ -172,6 +172,9 @@ def one_case(experiment: Experiment, what: str, command: str) -> Case:
 def choice(experiment: Experiment, command: str) -> str:
     """What cases there are to choose from, and the command for the first: configs put together, or swept values."""
     stems = list(dict.fromkeys(case.stem for case in experiment.cases))
+    if len(stems) > 1 and experiment.changes_included:
+        one = shlex.quote(f"include=[{stems[0]}]")
+        return f"choose one of {listed(stems)}: {command.format(named(experiment.path or ''))} --set {one}"
     if len(stems) > 1:
         name = named(str(Path(experiment.path or "").parent / f"{stems[0]}.yaml"))
         return f"choose one of {listed(stems)}: {command.format(name)}"

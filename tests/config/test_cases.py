@@ -224,7 +224,7 @@ INCLUDES = [
     ("include: []", "c.yaml:1:10: include: must hold at least 1, got []"),
     ("include: a", "c.yaml:1:10: include: must be a list, got 'a'"),
     ("include: [3]", "c.yaml:1:11: include.0: must be text, got 3"),
-    ("include: [a]\nscan: 3", "c.yaml:2:1: scan: a config with include has no keys of a study; "),
+    ("include: [a]\nscan: 3", "c.yaml:2:1: scan: unknown key; did you mean scans? allowed: radar, "),
     ("include: [a]\nfigures: {sigma_r: [b]}", "c.yaml:2:21: figures.sigma_r.0: no case has this name, got 'b'"),
     ("include: [loop]", "configs/loop.yaml:1:14: include.1: a config cannot include itself, got 'loop'"),
     ("include: [ring]", "configs/gnir.yaml:1:11: include.0: a config cannot include itself, got 'ring'"),
