@@ -5,7 +5,7 @@ as often as that interval covers.
 
 `radarsim solve`: the value of a numeric key at which a quantity reaches a target.
 
-Where the quantity is known exactly the root is that of the exact function, found here; else see `sampled_search`.
+Where the quantity is known exactly the root is that of the exact function, found here; else `by_sampling` looks for it.
 """
 
 import math

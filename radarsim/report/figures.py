@@ -408,7 +408,7 @@ def _ticks(side: XAxis | YAxis, axis: Ends, placed: bool) -> None:
 
 
 class Round(Locator):
-    """Ticks at the round values that the page's charts have too (report/chart_scale.py).
+    """Ticks at the round values that the page's charts have too (report/chart.py).
 
     Of an axis of x so many, at most, that their numbers stand apart. words are the numbers of the last ones.
     """

@@ -1,4 +1,4 @@
-"""The truth of a target in range that the keys of `config.radial` describe."""
+"""The truth of a target in range that the keys of `config.fields` describe."""
 
 from typing import Any
 

@@ -130,7 +130,7 @@ def log_posterior(work, window, weight):
 
 @part
 def step(work, window, weight, coherent, share):
-    """One step (6) of the live lanes and its squared length; share is their coherence. See `scoring_step`."""
+    """One step (6) of the live lanes and its squared length; share is their coherence."""
     for j in range(SIZE):
         gradient = (TURN * weight) * get(work, SLOPES + j)
         put(work, B + j, gradient + window.precision[j] * from_prior(work, window, j))

@@ -30,7 +30,7 @@ follow = following(evaluate, scoring(evaluate))
 def take_window(physics, drawn, tables, window, options, first, work, sums):
     """One window of an estimator on eight bursts, the first or a later one: the estimate in work moves.
 
-    drawn are rows of the blocks' sums, tables the addresses of those of `blocks.Tables`: of the blocks, and weights.
+    drawn are rows of the blocks' sums, tables the addresses of those of `burst.Tables`: of the blocks, and weights.
     """
     table, weights = tables
     merge(drawn, table, weights, window.table, window.weights, window.blocks, sums)
@@ -41,7 +41,7 @@ def take_window(physics, drawn, tables, window, options, first, work, sums):
 def run_strip(physics, drawn, tables, windows, options, work, sums, errors):
     """All windows (K,) of an estimator on eight bursts; writes errors (up to 8, K, 6), in turns over the burst.
 
-    drawn are rows of the blocks' sums, tables those of `blocks.Tables`. Passes are left in work.
+    drawn are rows of the blocks' sums, tables those of `burst.Tables`. Passes are left in work.
     """
     table, weights = address(tables[0]), address(tables[1])
     work, sums, drawn = address(work), address(sums), address(drawn)
@@ -112,7 +112,7 @@ def estimate_strips(physics, law, tables, windows, options, noise, first, out) -
     """As `sequence.estimate_block`, with block sums: errors (n, F, K, 6) and passes (n, F) are written.
 
     law is of the sums drawn: mean (blocks, 4) and factor (blocks, 10); noise the keys (2, 2), and sigma (6,) of the
-    forecast's errors; tables those of `blocks.Tables`; out = (errors, passes). All is relative to the truth.
+    forecast's errors; tables those of `burst.Tables`; out = (errors, passes). All is relative to the truth.
     """
     (mean, factor), (keys, sigma) = law, noise
     run_strips(physics, mean, factor, tables, windows, options, keys, first, sigma, room_for(len(mean)), *out)

@@ -20,7 +20,7 @@ Claims as they are written in YAML beside a study: statement, place, and what is
          measure: {gain: {component: r, pick: $pick}}, expected: {between: ["10", "50"]}}
 
 `measure` names a function of the study's measures, or a method of its evidence; it is called with the evidence, the
-cases under `of`, and the arguments that are given by name. `expected` names a function of `claims.ranges`. `$name` is
+cases under `of`, and the arguments that are given by name. `expected` names a function of `claims.rule`. `$name` is
 a value of `names:`, or of `each:`, which makes a part of every combination of its values; `"a, b":` takes several at
 once. An argument that is none of the function's is a fault with file and line, as in a config.
 
@@ -418,7 +418,7 @@ class FileKeys(Model):
 
 
 class AlternativeKeys(Model):
-    """A way to take a choice; see `readings.Alternative`."""
+    """A way to take a choice; see `Alternative`."""
 
     name: str
     kind: Literal["E", "U", "N"]
@@ -427,7 +427,7 @@ class AlternativeKeys(Model):
 
 
 class ChoiceKeys(Model):
-    """What a paper leaves open; see `readings.Choice`. claims: without the paper; english: where the paper speaks."""
+    """What a paper leaves open; see `Choice`. claims: without the paper; english: where the paper speaks."""
 
     key: Stem
     asks: str

@@ -1,6 +1,6 @@
 """The windows of many readings of the paper at once: (14)–(16) for arrays of noise, threshold, prior and the rest.
 
-`schedule.py` does it for one burst, in every option of a config; this does it for real samples, one a pulse, in the
+`bursts/burst.py` does it for one burst, in every option of a config; this does it for real samples, one a pulse, in the
 options that the paper leaves open. The tests hold the one against the other.
 """
 

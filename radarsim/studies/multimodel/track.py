@@ -59,7 +59,7 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
 
 
 def normals(key: np.ndarray, realisation: int, count: int) -> np.ndarray:
-    """The three normals of each scan (count, 3) of a realisation, in the layout of `kernels.plots`."""
+    """The three normals of each scan (count, 3) of a realisation, in the layout of `kernels.strip`."""
     half = NORMALS // 2
     drawn = np.empty((-(-count // STRIP), NORMALS))
     for strip, row in enumerate(drawn):

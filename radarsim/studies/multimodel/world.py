@@ -143,7 +143,7 @@ def _check(track: np.ndarray, t: np.ndarray) -> None:
 def recorded(times: np.ndarray, positions: np.ndarray, t: np.ndarray) -> np.ndarray:
     """States (K, 9) at times t of a recorded flight: times (n,), at least 5 and increasing, positions (n, 3).
 
-    As `physics.recorded.smoothed`; raises Unflyable as `fly`.
+    As `physics.smoothed`; raises Unflyable as `fly`.
     """
     track = smoothed(times, positions, t)
     _check(track, t)
@@ -383,7 +383,7 @@ def plot_truth(case: Case, t: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def sensor_frame(sensor: Sensor) -> np.ndarray:
-    """The numbers (n,) of a sensor as the kernels take them; see `kernels.plots.frame`."""
+    """The numbers (n,) of a sensor as the kernels take them; see `strip.frame`."""
     R = physics.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
     form = records.BICONICAL if sensor.sigma_range_m is not None else records.CARTESIAN
     unbiased = sensor.conversion == "unbiased"

@@ -361,7 +361,7 @@ def known(one: Any) -> bool:
 def errors(spec: Any, one: Any, sigma: np.ndarray, missed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean and covariance (K, 3), (K, 3, 3) of the errors of a filter whose estimates always lock.
 
-    sigma (K, 2) of velocity and acceleration; missed (K, 3) what the model misses, see `world.defects`. The filter's
+    sigma (K, 2) of velocity and acceleration; missed (K, 3) what the model misses, see `defects`. The filter's
     covariance P gives the gains; that of the errors, S, has no manoeuvre noise.
     """
     F, S, mean = constant_acceleration(spec.radar.scan_period_s), designation(spec), (0.0, 0.0, 0.0)

@@ -315,7 +315,7 @@ def least_squares_start(observes: int, start: int, sigma: np.ndarray, dt: float)
 def noise_by_time(noise: str, manoeuvre_variance: float, period: float) -> np.ndarray:
     """Process noise over any time t, (2, 6) packed: Q_ij = a_ij t^(5 − i − j) + b_ij t^(6 − i − j), i and j from 0.
 
-    What `physics.motion.process_noise` adds over a scan period (s), for plots at uneven times: the jerk stays constant
+    What `physics.process_noise` adds over a scan period (s), for plots at uneven times: the jerk stays constant
     between two plots; white jerk keeps its density; of the acceleration's steps there are as many as periods.
     """
     made = np.zeros((2, 6))
@@ -336,7 +336,7 @@ def design(
     """The paper's filter: least squares on `start` scans, then eqs. (5), (9), (13) with M of eq. (6); sigma (2,).
 
     Before the start the estimates are the plots themselves: the range, and the velocity where it is observed. `noise`
-    is the form of the process noise, see `physics.motion.process_noise`.
+    is the form of the process noise, see `physics.process_noise`.
     """
     F, Q = constant_acceleration(dt), tuple(map(float, pack(process_noise(noise, manoeuvre_variance, dt))))
     R_range, R_velocity = map(float, sigma**2)
@@ -473,7 +473,7 @@ def exact_gains(C_theta: np.ndarray, Lambda: np.ndarray) -> np.ndarray:
 def errors_of_many(C_theta: np.ndarray, Lambda: np.ndarray) -> np.ndarray:
     """Steady variances (3, n) of the filters of many radars at once, each in units of its own; C_θ = 0: range alone.
 
-    As `exact.steady_state`, by doubling: each round of the Riccati equation's iteration does as many scans as all
+    As `steady_state`, by doubling: each round of the Riccati equation's iteration does as many scans as all
     before (Anderson, Int. J. Control 28, 1978, 295-306), and so does each of the sum of what the noise leaves.
     """
     n, unit = len(Lambda), np.maximum(1.0, Lambda ** (-1 / 3))  # time in memories τ₂, where longer than a scan
@@ -499,7 +499,7 @@ def error_recursion(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Lasting errors E (K, 3, C) and covariance S (K, 3, 3) of what noise makes, at every scan of a truth (K, 3).
 
-    See `propagation`, of which drawn is. Before the start the estimates are the plots.
+    drawn: see `defects`. Before the start the estimates are the plots.
     """
     defect, observes, begun = defects(truth, dt, plots, drawn), one.observes, one.start - 1
     E, S = np.zeros_like(defect), np.zeros((len(truth), 6))

@@ -62,7 +62,7 @@ class Mixture:
 
     @classmethod
     def of(cls, found: np.ndarray) -> "Mixture":
-        """Of the sums that `kernels.add_means` has found."""
+        """Of the sums that `kernels.patterns.add_means` has found."""
         started, nees, bias, moment, believed = found[:, 0], found[:, 1], found[:, 2:5], found[:, 5:8], found[:, 8:11]
         available = started[:, None] + found[:, patterns.FIRST : patterns.OWN]
         both = found[:, patterns.OWN :].reshape(len(found), -1, 2, 3).swapaxes(0, 1)
@@ -84,7 +84,7 @@ def mixture(
 ) -> Mixture:
     """Means over all patterns of plots, of a filter on the truth (K, 3) at scans dt (s) apart; beside it others.
 
-    drawn: of a truth that is drawn, as `propagation.defects` takes it. from_k: nothing is known before this scan,
+    drawn: of a truth that is drawn, as `filters.defects` takes it. from_k: nothing is known before this scan,
     counted from 1. whole: beyond `most` patterns none are merged.
     """
     defect = defects(truth, dt, plots, drawn)

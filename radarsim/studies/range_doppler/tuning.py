@@ -31,7 +31,7 @@ COMPONENTS = {"sigma_r": 0, "sigma_Vr": 1, "sigma_ar": 2}
 
 
 class Seen(NamedTuple):
-    """What filters see: plots, of a truth x (K, 3) at scans dt (s) apart, drawn as `propagation.defects` takes it."""
+    """What filters see: plots, of a truth x (K, 3) at scans dt (s) apart, drawn as `filters.defects` takes it."""
 
     plots: Plots
     x: np.ndarray
@@ -128,7 +128,7 @@ def side_by_side(observes: int, start: int, Q: np.ndarray, seen: Seen) -> np.nda
 class Designed:
     """A case's filters and what they see: truth x (K, 3) at times t (K,), plots, D_M (F,), gains of full detection.
 
-    drawn (K, 3, 1 + C): how the truth of realisations leaves the model beyond x, as `world.drawn_defects` has it.
+    drawn (K, 3, 1 + C): how the truth of realisations leaves the model beyond x, as `filters.drawn_defects` has it.
     asked_from_k, roughly: as of the case.
     """
 

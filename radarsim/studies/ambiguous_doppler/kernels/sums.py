@@ -212,7 +212,7 @@ WRONG, BEYOND, FULL, EVENTS = 0, 1, 2, 3
 
 
 class Mixture(NamedTuple):
-    """A mixture of M shifted laws beside the plain one, over a realisation's normals as `plots.fill_normals` has them.
+    """A mixture of M shifted laws beside the plain one, over a realisation's normals as `steps.fill_normals` has them.
 
     key (2,)              of the stream that says which part a realisation is drawn from
     cumulative (M + 1,)   running sums of the shares α, the plain one first; the last is 1

@@ -8,7 +8,7 @@ as in `kernels.steps`, of each order j
 
 Hypotheses on the folds of one realisation, in each of which orders interact: an IMM over orders and folds.
 
-Given its folds a hypothesis is a filter of interacting orders (`kernels.orders`), with an unfolded velocity. A scan
+Given its folds a hypothesis is a filter of interacting orders, as above, with an unfolded velocity. A scan
 mixes and moves the orders of every hypothesis and weighs all by the range, branches each over the folds that any of its
 orders leaves possible, and drops what is too far below the best or beyond the number that is kept. Mixing makes
 covariances depend on the data, so that each hypothesis has its own; lanes are eight hypotheses.
@@ -255,7 +255,7 @@ def run_choosing(outputs, bank, reads, widths, scans, out):
 
 
 # ---- together --------------------------------------------------------------------------------------------------------
-GROUP = 3 * ROWS  # rows of eight hypotheses: of three orders, as `kernels.orders` has them
+GROUP = 3 * ROWS  # rows of eight hypotheses: of three orders
 BROAD = rec.PLOT + 3  # rows of a plot in all lanes, then the numbers 0 … 7, and two rows of branches
 LEAST_SHARE = 1e-150  # an order's least probability after a range, so that a product with a far velocity's is not zero
 NO_WEIGHT = 1e-200  # a share of the whole below which an order's nearest fold does not count

@@ -47,16 +47,16 @@ class World(NamedTuple):
     """What is observed.
 
     keys     (4, 2)           of the streams of ranges, bursts, the designation, fixed forecasts
-    missed   (K, 3)           see `world.defects`
+    missed   (K, 3)           see `filters.defects`
     motion   (5,)             F, as `kernels.algebra` has it
     sigma_r                   of a range, m
     prior    (2,)             standard deviations of the designation
     span                      of velocity, m/s
-    physics  (K,)             bursts, see `bursts.kernels.data.PHYSICS`
+    physics  (K,)             bursts, see `bursts.kernels.scoring.PHYSICS`
     law      (K,)             of which law
     mean     (blocks, 4)      of the sums drawn
     factor   (S, blocks, 10)  roots of their covariances
-    tables   two flat arrays, see `bursts.blocks.Tables`
+    tables   two flat arrays, see `bursts.burst.Tables`
     to_turns (2, 2)           of a forecast's errors of velocity and acceleration b₁ and b₂ in turns over the burst
     measured (2, 6)           of an estimate in turns over the burst velocity and acceleration at its middle
     offset   (K,)             of the true Doppler frequency from the spectrum's lines, in lines
@@ -110,7 +110,7 @@ class Filters(NamedTuple):
 class Hypotheses(NamedTuple):
     """Up to H hypotheses of each of n realisations, H a whole number of lanes.
 
-    states  (n, H, 9)  see `steps.state_of`
+    states  (n, H, 9)  see `chain.state_of`
     weights (n, H)     logarithms, the best one's 0
     count   (n,)       how many there are
     right   (n, H)     1 of those that have taken no velocity in a wrong fold, else 0
@@ -147,13 +147,13 @@ def hypotheses(realisations: int, most: int) -> Hypotheses:
 class Work(NamedTuple):
     """Work arrays for n realisations.
 
-    tracks    (n, 9)  states and covariances, see `steps.state_of`; of several hypotheses the best before the burst
+    tracks    (n, 9)  states and covariances, see `chain.state_of`; of several hypotheses the best before the burst
     forecasts (n, 2)  errors of the forecasts of velocity and acceleration
     entries   (n,)    of the menu
     measured  (n, 2)  the bursts' velocity and acceleration, less the truth
     ages      (n,)    scans since the last burst that was lost
     passes    (n,)    passes over a window's data so far
-    room              see `estimate.room_for`
+    room              see `chain.room_for`
     held              of filters that keep several
     """
 

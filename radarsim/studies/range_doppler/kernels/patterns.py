@@ -1,8 +1,6 @@
 """Patterns of plots that are alike made one: where they lie by their believed covariances, and the groups of them.
 
-Blocks of eight patterns as in `kernels.patterns`.
-
-Means over the patterns of plots that came and that did not: P, S and E of `propagation` for each, eight at a time.
+Means over the patterns of plots that came and that did not: P, S and E of `filters.Errors` for each, eight at a time.
 
 Patterns lie in blocks of eight. A block holds the rows of its patterns one after the other, each of eight numbers:
 P (6) and S (6) packed, E (3 C), their probability, plots so far, and whether the last scan had one. What is beyond the
@@ -241,7 +239,7 @@ FIRST = 11  # of the probabilities of a plot alone
 class World(NamedTuple):
     """What a filter sees over K scans, and what is asked of it.
 
-    defect     (K, 3, C)  of the truth at every scan from the one before, as `propagation.defects` has it
+    defect     (K, 3, C)  of the truth at every scan from the one before, as `filters.defects` has it
     Q          (6,)       covariance that a scan adds, packed
     R          (2,)       variances of the plots
     inputs     (2, C)     what the plots add to the columns of E
@@ -521,7 +519,7 @@ def follow(room, rows, n, k, world, found):
 
 @kernel
 def add_means(room, world, found):
-    """`patterns.mixture`: the sums of each scan into found (K, OWN + G BESIDE), in a `merging.room`."""
+    """`patterns.mixture`: the sums of each scan into found (K, OWN + G BESIDE), in a `room`."""
     rows, spare, columns = address(room.rows), address(room.spare), world.defect.shape[2]
     n, held, alike = 0, 1, ALIKE
     room.waiting[0, :] = 0.0

@@ -18,7 +18,7 @@ is in its gate, beside the target's or in place of it.
 P3's second half: tracks among false and missed plots.
 
 The errors in the sums of `sonar.study` are those of the tracks kept, which are confirmed and on the target. The sums
-`counts`, `begun`, `ratios` and `scores` are described in `kernels.counts`. Where false tracks are sought (`rare`),
+`counts`, `begun`, `ratios` and `scores` are described in `kernels.tracker`. Where false tracks are sought (`rare`),
 `held` and `drawn` of `kernels.rare` are in place of `begun`, and the scores of false tracks are those of the plain
 ones. Where ends of the target's track are sought, they are those of further realisations: `ended` and `ended_drawn`
 of `kernels.ends`.

@@ -263,7 +263,7 @@ class Tracker:
 
     Every confirmed track is returned, from its first plot on. A row without range or bearing is not a plot, but its
     time is that of a scan. Filters with association `known` are left out; raises ConfigError where there are no others.
-    Tracks are described in `multitrack`.
+    How tracks share plots stands above.
     """
 
     most_rows = MOST_ROWS

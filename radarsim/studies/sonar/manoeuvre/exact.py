@@ -35,7 +35,7 @@ class UsesAxes:
 
     Attributes:
         at: (A,) scans, counted from 0.
-        true: (A, 6) true values of `uses.QUANTITIES`.
+        true: (A, 6) true values of `QUANTITIES`.
         closing_mps: (A,) speed of the target relative to the own ship, m/s.
     """
 

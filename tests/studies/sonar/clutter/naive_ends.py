@@ -1,6 +1,6 @@
 """Textbook twin of the target's track drawn where it ends: plain Python and NumPy, one realisation.
 
-Laws, ratios and weights are computed anew; the filter is that of `naive`, boxes are those of `naive_false`.
+Laws, ratios and weights are computed anew; the filter is that of `naive`, boxes are those of `naive_false.box_of`.
 """
 
 import functools

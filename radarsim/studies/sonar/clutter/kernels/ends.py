@@ -451,7 +451,7 @@ def scan_target(detections, field, trackers, ends, laws, f, scan, chunk):
 def simulate_ends(world, detections, field, trackers, ends, work, first, total, sums):
     """Add the weighted ends of the target's first confirmed tracks to sums, an EndSums.
 
-    Arguments as those of `blocks.simulate_block`.
+    Arguments as those of `tracker.simulate_block`.
     """
     F, K = trackers.gate.size, world.dt.size
     plots, shift = np.empty((2, 4, CHUNK)), np.zeros((2, 3, CHUNK))

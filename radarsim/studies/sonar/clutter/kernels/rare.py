@@ -234,7 +234,7 @@ def scan_false(field, shift, trackers, f, scan, work, own, counts):
 def simulate_false(seeds, field, shift, trackers, work, dt, first, total, scores, sums):
     """Add the weighted sums of tracks that false plots begin at scan 0 to sums, and scores of the plain ones to scores.
 
-    Arguments as those of `blocks.simulate_false`; scores (F, T + 1).
+    Arguments as those of `tracker.simulate_false`; scores (F, T + 1).
     """
     z, detected, counts, own = np.empty((2, CHUNK)), np.ones(CHUNK), np.zeros(COUNTS), np.zeros((ROWS, CHUNK))
     for done in range(0, total, CHUNK):
