@@ -48,6 +48,7 @@ from pydantic import (
     TypeAdapter,
     ValidationError,
     WithJsonSchema,
+    create_model,
     model_validator,
 )
 from pydantic.fields import FieldInfo
@@ -504,6 +505,28 @@ def unique_names(members: tuple[N, ...]) -> tuple[N, ...]:
 # Of most studies: the list of what is compared, and the name of the one that gains are against; its own name.
 Members = Annotated[tuple[N, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()]
 Baseline = Annotated[Name | None, Design(), NameIn("filters")]
+
+
+class Member(Model):
+    """A member of a list whose members are told apart by their names."""
+
+    name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
+
+
+def keys_of(parts: Mapping[str, type[Model]], filters: type[Member], most_scans: int) -> type[Study]:
+    """The keys of a study of these parts, by name, and of `filters`, `baseline` and `scans` with their marks."""
+    about = {name: (one.__doc__ or name).strip().partition("\n")[0].rstrip(".") for name, one in parts.items()}
+    own: Any = {name: (one, key(name.replace("_", " "), about[name])) for name, one in parts.items()}
+    own |= {
+        "filters": (Members[filters], key("filters", "the filters; all see the same world")),  # type: ignore[valid-type]
+        "baseline": (
+            Baseline,
+            key("baseline filter", "name of the filter that gains are against; default: the first", None),
+        ),
+        "scans": (Annotated[int, Whole(2, most_scans), Design()], key("number of scans", "number of plots")),
+    }
+    made: type[Study] = create_model("Keys", __base__=Study, __module__=filters.__module__, **own)
+    return made
 
 
 # ---- numeric ---------------------------------------------------------------------------------------------------------

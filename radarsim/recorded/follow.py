@@ -137,8 +137,9 @@ Part = Literal["tracker", "simulated", "likelihood"]
 
 def borrowed(case: Case, part: Part) -> list[str]:
     """The keys of a case, dotted, that a part of its study does not know: of another study, whose keys it extends."""
-    module = getattr(recorded_of(case), part).__module__
-    if module == RecordedPlots.__module__:  # nobody's: it does nothing
+    of = recorded_of(case)
+    module = getattr(of, part).__module__
+    if module == RecordedPlots.__module__ or of.of_any_keys:  # nobody's: it does nothing
         return []
     packages = module.split(".")
     return unknown_to(case.spec, ".".join(packages[:3] if packages[0] == "radarsim" else packages[:1]))

@@ -120,11 +120,13 @@ class RecordedPlots(ABC):
     """What a study does with recorded plots: `radarsim track` and `radarsim simulate`.
 
     rows_asked: of how many rows `radarsim track` asks the likelihood for its advice, so that it takes some seconds.
-    from_any_origin: whether ranges count from any point, so that they may be negative.
+    from_any_origin: whether ranges count from any point, so that they may be negative. of_any_keys: whether all that it
+    does it asks of the study, so that there are no keys that it could pass over.
     """
 
     rows_asked: int = 3000
     from_any_origin: bool = False
+    of_any_keys: bool = False
 
     @abstractmethod
     def columns(self, spec: Any) -> Sequence[Sequence[str]]:

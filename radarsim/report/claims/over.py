@@ -52,7 +52,7 @@ from radarsim.config.check import check
 from radarsim.config.document import Document, Faults, did_you_mean
 from radarsim.config.document import KeyPath as Keys
 from radarsim.config.fields import Anything, Flag, Model, Name, Stem
-from radarsim.config.load import read
+from radarsim.config.load import parse, read
 from radarsim.engine.results import CaseResult
 from radarsim.language import term, tr
 from radarsim.report.claims import rule
@@ -408,15 +408,6 @@ class ClaimKeys(Model):
     parts: tuple[PartKeys, ...] = ()
 
 
-class FileKeys(Model):
-    """The claims of a paper that one file holds; config: of those that name none."""
-
-    paper: Name
-    config: Stem
-    names: dict[str, Anything] = {}  # noqa: RUF012
-    claims: tuple[ClaimKeys, ...]
-
-
 class AlternativeKeys(Model):
     """A way to take a choice; see `Alternative`."""
 
@@ -444,6 +435,16 @@ class ChoicesKeys(Model):
     paper: Name
     names: dict[str, Anything] = {}  # noqa: RUF012
     choices: tuple[ChoiceKeys, ...]
+
+
+class FileKeys(Model):
+    """The claims of a paper that one file holds; config: of those that name none. choices: as in readings.yaml."""
+
+    paper: Name
+    config: Stem
+    names: dict[str, Anything] = {}  # noqa: RUF012
+    claims: tuple[ClaimKeys, ...]
+    choices: tuple[ChoiceKeys, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -481,22 +482,38 @@ def claims_of(file: Callable[[str], ModuleType]) -> Sequence[Claim]:
 @cache
 def claims_in(file: Path, *measures: ModuleType) -> tuple[Claim, ...]:
     """The claims of a file, measured by functions of these modules; raises ConfigError, one line for each fault."""
-    return _made(file, FileKeys, lambda keys, document, faults: _Reader(document, faults, measures).claims(keys))
+    faults = Faults()
+    return _made(read(file, faults), faults, FileKeys, lambda keys, reader: reader.claims(keys), measures)
+
+
+@cache
+def written_in(text: str, source: str, *measures: ModuleType) -> tuple[tuple[Claim, ...], tuple[Choice, ...]]:
+    """The claims, and the choices if any, of a text as in claims.yaml; source: the file that holds it, for faults.
+
+    Empty lines before the text make the lines of faults those of that file.
+    """
+    faults = Faults()
+    document = parse(text, source, faults)
+    claims = _made(document, faults, FileKeys, lambda keys, reader: reader.claims(keys), measures)
+    return claims, _made(document, faults, FileKeys, lambda keys, reader: reader.choices(keys))
 
 
 def choices_in(file: Path) -> tuple[Choice, ...]:
     """What a paper leaves open, by a file readings.yaml; raises ConfigError, one line for each fault."""
-    return _made(file, ChoicesKeys, lambda keys, document, faults: _Reader(document, faults, ()).choices(keys))
+    faults = Faults()
+    return _made(read(file, faults), faults, ChoicesKeys, lambda keys, reader: reader.choices(keys))
 
 
 def _made(
-    file: Path, model: type[Keyed], make: Callable[[Keyed, Document, Faults], Iterator[Written]]
+    document: Document | None,
+    faults: Faults,
+    model: type[Keyed],
+    make: "Callable[[Keyed, _Reader], Iterator[Written]]",
+    measures: Sequence[ModuleType] = (),
 ) -> tuple[Written, ...]:
-    """What is made of a checked file."""
-    faults = Faults()
-    document = read(file, faults)
+    """What is made of a checked document."""
     keys = None if document is None else check(model, document, faults)
-    made = () if document is None or keys is None else tuple(make(keys, document, faults))
+    made = () if document is None or keys is None else tuple(make(keys, _Reader(document, faults, measures)))
     faults.raise_if_any()
     return made
 
@@ -546,7 +563,7 @@ class _Reader:
             given = one.model_dump(exclude={"id", "config", "parts", "parts_of"})
             yield Claim(f"{keys.paper}.{one.id}", parts=tuple(own), config=one.config or keys.config, **given)
 
-    def choices(self, keys: ChoicesKeys) -> Iterator[Choice]:
+    def choices(self, keys: ChoicesKeys | FileKeys) -> Iterator[Choice]:
         """The choices in their order."""
         names = self._named(keys.names)
         for i, one in enumerate(keys.choices):

@@ -1,0 +1,352 @@
+"""A study in one file: a class says what its keys, filters and claims are, and all else of a study follows from it.
+
+    class Walk(LinearStudy):  # or another base that computes
+        name, about = "walk", "Random walk (textbook)."  # as of every study
+        filters = {"gain": "a fixed gain; without it a Kalman filter"}
+        asks = "How well is a random walk followed?"
+        components = (Component("x", "m", "$x$", "position"),)
+        parts = {"sensor": Sensor, "target": Target}
+        Filter = Filter
+        scan_period = "sensor.scan_period_s"
+        measured = (Measured("x_m", "m", ("sensor.sigma_x_m",)),)
+        paper = Paper("Kalman 1960", may_grow=("filters",))
+        claims_yaml = "…"
+
+    STUDY = Walk()
+
+| given | is |
+|---|---|
+| `asks` | the question, one sentence |
+| `components` | the errors that are shown, the leading one first |
+| `parts`, `Filter` | the keys: by name the model of each part, and of a filter, a subclass of `Member` |
+| `scan_period` | the key of the time between two plots |
+| `measured` | the numbers of a recorded plot, where there is such |
+| `paper`, `claims_yaml` | whose claims are judged: a text as claims.yaml, and under `choices` as readings.yaml |
+
+`filters`, `baseline` and `scans` are added to the keys, with their marks. Made are the tables curves, gains and `last`,
+the figures, the question and the answer, claims and readings, and what is done with recorded plots; `shipped/` beside
+the file holds configs. Claims find a case by its keys, `of: [{radar.scan_period_s: 2}]`, and are measured by functions
+of the file whose first argument is `seen`, or by those of `radarsim.studies.judged`. The alternatives of a choice set
+keys, `sets: {radar.scan_period_s: 2}`.
+
+A base for a kind of model derives from `OneFile` and gives `prepare`, with `axes` and `sums` from here, `simulate`, and
+if it can `limits`, `realisation`, `tracker` and `likelihood`. `radarsim.studies.linear` is one.
+
+Whatever a class lacks, or has of the wrong kind, is one line of a ConfigError when its keys are first asked for.
+"""
+
+import inspect
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from operator import attrgetter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from radarsim.config.fields import Member, Model, keys_of
+from radarsim.config.fields import Study as Keys
+from radarsim.errors import ConfigError
+from radarsim.language import few, listed, tr
+from radarsim.studies.interface import Likelihood, Paper, RecordedPlots, Study, Tracker, true_column
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+
+    from radarsim.config.experiment import Case, Experiment
+    from radarsim.engine.results import Axes, CaseResult, Layout
+    from radarsim.report.claims import PaperClaims
+    from radarsim.report.claims.declared import Claim
+    from radarsim.report.claims.over import Choice, PaperReadings
+    from radarsim.report.drawing import Figure
+
+
+class Component(NamedTuple):
+    """A component of the errors: its name in tables, its unit, its letter (mathematical text), what it is called."""
+
+    name: str
+    unit: str
+    symbol: str = ""
+    words: str = ""
+
+
+class Measured(NamedTuple):
+    """A number of a plot: its column, its unit, and the keys of its standard deviation."""
+
+    column: str
+    unit: str
+    sigma_keys: tuple[str, ...] = ()
+
+
+NEEDED: Mapping[str, tuple[type, str]] = {
+    "name": (str, "the value of `study:` in YAML"),
+    "about": (str, "one line for `radarsim list`"),
+    "filters": (Mapping, "what `radarsim list` says of its filters: keys, and what they make"),
+    "asks": (str, "the question, one sentence"),
+    "components": (tuple, "the components of the errors, each Component(name, unit, symbol, words)"),
+    "parts": (Mapping, "the models of the keys' parts, by name"),
+    "Filter": (type, "the keys of a filter, a subclass of radarsim.config.fields.Member"),
+    "scan_period": (str, "the dotted key of the time between two plots, s"),
+}
+
+
+class OneFile(Study):
+    """A study that one class of one file declares; what a subclass gives is said at the head of this module.
+
+    measured: the numbers of a recorded plot. most_scans: of `scans`. extra_figures: names of figures that a subclass
+    draws beside those of each component, with * for what varies.
+    """
+
+    asks: str
+    components: tuple[Component, ...]
+    parts: Mapping[str, type[Model]]
+    Filter: type[Member]
+    scan_period: str
+    measured: tuple[Measured, ...] = ()
+    paper: Paper | None = None
+    claims_yaml: str = ""
+    most_scans: int = 10_000
+    extra_figures: tuple[str, ...] = ()
+
+    # ---- what is asked -------------------------------------------------------------------------------------------
+    def keys(self) -> "type[Keys]":
+        return self._keys
+
+    @cached_property
+    def _keys(self) -> "type[Keys]":
+        if faults := [f"{self.place}: {fault}" for fault in self.missing()]:
+            raise ConfigError(*faults)
+        if self.claims_yaml:
+            _ = self._written  # a claim that names what is not there is known before anything runs
+        made = keys_of(self.parts, self.Filter, self.most_scans)
+        shown = (f"{kind}_{one.name}" for one in self.components for kind in ("sigma", "gain", "dynamic"))
+        made.figure_names = (*shown, *self.extra_figures)
+        return made
+
+    @property
+    def place(self) -> str:
+        """The file, and line, of the class, for messages."""
+        try:
+            return f"{inspect.getsourcefile(type(self))}:{inspect.getsourcelines(type(self))[1]}"
+        except (OSError, TypeError):  # made by a call
+            return str(sys.modules[type(self).__module__].__file__)
+
+    def missing(self) -> Iterator[str]:
+        """What the class lacks, or has of the wrong kind: a line each."""
+        for name, (kind, words) in NEEDED.items():
+            value = getattr(self, name, None)
+            if not isinstance(value, kind) or not value:
+                got = "nothing" if value is None else repr(value)[:40]
+                yield f"{type(self).__name__}.{name} must be given: {words}; got {got}"
+        for one in getattr(self, "components", ()):
+            if not isinstance(one, Component) or not (one.name and one.unit):
+                yield f"components: {one!r} must be Component(name, unit, symbol, words), with a unit"
+        for name, part in (*dict(getattr(self, "parts", {})).items(), ("Filter", getattr(self, "Filter", Member))):
+            base = Member if name == "Filter" else Model
+            if not (isinstance(part, type) and issubclass(part, base)):
+                yield f"{name} must be a subclass of radarsim.config.fields.{base.__name__}, got {part!r}"
+        keys = {"scan_period": (getattr(self, "scan_period", ""),)} | {
+            one.column: one.sigma_keys for one in self.measured
+        }
+        for name, every in keys.items():
+            yield from (f"{name}: there is no key {key}" for key in every if key and not self._has(key))
+
+    def _has(self, key: str) -> bool:
+        """Whether a dotted name is a key, or a property, of the parts; a bare one is of the filters."""
+        part, _, own = key.partition(".")
+        if part in ("filters", "scans", "baseline"):
+            return True
+        model, first = self.parts.get(part, Model) if own else self.Filter, (own or part).partition(".")[0]
+        return first in model.model_fields or isinstance(getattr(model, first, None), property)
+
+    # ---- numbers -------------------------------------------------------------------------------------------------
+    def scan_period_s(self, spec: Any) -> float:
+        """The time between two plots of a config."""
+        return float(attrgetter(self.scan_period)(spec))
+
+    def axes(self, spec: Any, sigma: "np.ndarray | None" = None, bias: "np.ndarray | None" = None) -> "Axes":
+        """The axes of a case, with the exact σ and bias (F, K, C) where they are known."""
+        import numpy as np
+
+        from radarsim.engine.results import Axes
+
+        names, k = tuple(one.name for one in spec.filters), np.arange(spec.scans)
+        shape = len(names), k.size, len(self.components)
+        return Axes(
+            filters=names,
+            components=tuple((one.name, one.unit) for one in self.components),
+            k=k + 1,
+            t_s=k * self.scan_period_s(spec),
+            available=np.ones(shape, dtype=bool),
+            baseline=names.index(spec.baseline) if spec.baseline else 0,
+            exact_sigma=np.full(shape, np.nan) if sigma is None else sigma,
+            exact_bias=np.full(shape, np.nan) if bias is None else bias,
+        )
+
+    def sums(self, spec: Any) -> "Layout":
+        """The sums of a case: `error` (F, K, C, 4) of e, e², e³, e⁴, and `paired` (F, K, C) of e² times the
+        baseline's e²."""
+        from radarsim.engine.results import Layout
+
+        shape = len(spec.filters), spec.scans, len(self.components)
+        return Layout(error=(*shape, 4), paired=shape)
+
+    def limits(self, spec: Any) -> "np.ndarray | None":
+        """The σ (F, C) that the errors of a config tend to, not-a-number where there is none; None: not known."""
+        return None
+
+    # ---- what is shown -------------------------------------------------------------------------------------------
+    def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
+        from radarsim.report import tables
+
+        return {"last": tables.joined(map(self._last, results))}
+
+    def _last(self, result: "CaseResult") -> Mapping[str, Any]:
+        """σ at the last scan, exact where that is known, and the one that it tends to."""
+        import numpy as np
+
+        from radarsim.report import statistics, tables
+
+        f, c = np.nonzero(result.axes.available[:, -1])
+        sigma = statistics.errors(result.sums["error"][f, -1, c], tables.realisations(result)[f, -1, c]).sigma
+        limits = self.limits(result.spec)
+        return {
+            **tables.leading(result, f, **tables.components(result, c)),
+            "last_sigma|last": sigma,
+            "exact_last_sigma": result.axes.exact_sigma[f, -1, c],
+        } | ({} if limits is None else {"steady_sigma": limits[f, c]})
+
+    def figures(
+        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+    ) -> "dict[str, Figure]":
+        from radarsim.report import panels
+
+        quantities = {one.name: panels.Quantity(one.symbol or panels.letter(one.name), one.words or one.name)
+                      for one in self.components}  # fmt: skip
+        return panels.per_component(results, made, quantities, experiment)
+
+    def question(self, experiment: "Experiment") -> str:
+        names = dict.fromkeys(one.name for case in experiment.cases for one in case.spec.filters)
+        return f"{tr(self.asks)} {tr('Filters: {names}.', names=few(list(names)))}"
+
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
+        from radarsim.report import panels
+
+        shown, others = panels.reported(results)
+        return [*(sentence for result in shown for sentence in self._sentences(result, made)), *others]
+
+    def _sentences(self, result: "CaseResult", made: "Mapping[str, pd.DataFrame]") -> Iterator[str]:
+        """σ of the leading component at the last scan, and what each filter gains."""
+        from radarsim.report import panels, tables
+
+        leading = self.components[0]
+        last = tables.where(made["last"], case=result.name, component=leading.name).to_dict("records")
+        keys: tuple[str, ...] = ("last_sigma", "last_lo", "last_hi")
+        each = [f"{row['filter']} {tables.estimate((row[key] for key in keys), tr(row['unit']))}" for row in last]
+        told = {"quantity": tr(leading.words or leading.name), "t": float(result.axes.t_s[-1])}
+        words = tr("σ of the {quantity} after {t:g} s: {filters}.", **told, filters=listed(each))
+        yield panels.at_its_place(result, words)
+        gains = tables.where(made["gains"], case=result.name, component=leading.name)
+        gains = gains[gains["k"] == gains["k"].max()]
+        if len(gains):
+            keys = ("gain_percent", "gain_lo", "gain_hi")
+            each = [f"{row['filter']} {tables.estimate((row[key] for key in keys), '%', '.3g')}"
+                    for row in gains.to_dict("records")]  # fmt: skip
+            told = {"base": result.axes.filters[result.axes.baseline], "filters": listed(each)}
+            yield panels.at_its_place(result, tr("Gain against {base} there: {filters}.", **told))
+
+    # ---- the paper -----------------------------------------------------------------------------------------------
+    @cached_property
+    def _written(self) -> "tuple[tuple[Claim, ...], tuple[Choice, ...]]":
+        """What `claims_yaml` holds."""
+        from radarsim.report.claims.over import written_in
+        from radarsim.studies import judged
+
+        own = sys.modules[type(self).__module__]
+        source = Path(own.__file__ or "").read_text(encoding="utf-8")
+        above = source[: max(source.find(self.claims_yaml), 0)].count("\n")
+        claims, choices = written_in("\n" * above + self.claims_yaml, str(own.__file__), judged, own)
+        keys = [key for choice in choices for one in choice.alternatives for key in one.sets if not self._has(key)]
+        if keys:
+            raise ConfigError(*(f"{self.place}: claims_yaml: choices: sets: there is no key {key}" for key in keys))
+        return claims, choices
+
+    def claims(self) -> "PaperClaims | None":
+        if self.paper is None or not self.claims_yaml:
+            return None
+        from radarsim.report.claims import PaperClaims
+        from radarsim.studies import judged
+
+        evidence = getattr(sys.modules[type(self).__module__], "Evidence", judged.Evidence)
+        return PaperClaims(self._written[0], evidence, *self.paper)
+
+    def readings(self) -> "PaperReadings | None":
+        if self.paper is None or not self.claims_yaml or not self._written[1]:
+            return None
+        from radarsim.studies.judged import Readings
+
+        return Readings(self._written[0][0].paper, self._written[1])
+
+    # ---- beside --------------------------------------------------------------------------------------------------
+    def columns(self, spec: Any, one: Any) -> tuple[str, ...]:
+        """The columns of recorded plots that a filter takes, in the order of `measured`. Default: theirs."""
+        return tuple(number.column for number in self.measured)
+
+    def realisation(self, case: "Case", i: int) -> "tuple[Mapping[str, np.ndarray], np.ndarray]":
+        """The plots of realisation i as a run draws them, columns (K,), and the true components (K, C)."""
+        raise NotImplementedError
+
+    def tracker(self, case: "Case") -> Tracker:
+        """The filters of a case before their first plot."""
+        raise NotImplementedError
+
+    def likelihood(
+        self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"
+    ) -> Likelihood | None:
+        """As `RecordedPlots.likelihood`. Default: not known."""
+        return None
+
+    def recorded(self) -> RecordedPlots | None:
+        own = type(self)
+        given = own.tracker is not OneFile.tracker and own.realisation is not OneFile.realisation
+        return Recorded(self) if self.measured and given else None
+
+    def shipped(self) -> Path | None:
+        folder = Path(str(sys.modules[type(self).__module__].__file__)).parent / "shipped"
+        return folder if folder.is_dir() else None
+
+
+class Recorded(RecordedPlots):
+    """What a study of one file does with recorded plots: a file may have all columns, or those of some filters."""
+
+    from_any_origin = True
+    of_any_keys = True
+
+    def __init__(self, study: OneFile):
+        self.study = study
+
+    def columns(self, spec: Any) -> Sequence[Sequence[str]]:
+        each = list(dict.fromkeys(self.study.columns(spec, one) for one in spec.filters))
+        every = tuple(dict.fromkeys(name for names in each for name in names))
+        return [("t_s", *names) for names in dict.fromkeys((every, *each))]
+
+    def sigmas(self, spec: Any) -> Mapping[str, Sequence[str]]:
+        pairs = [zip(self.study.columns(spec, one), self.study.measured, strict=False) for one in spec.filters]
+        return {column: number.sigma_keys for each in pairs for column, number in each}
+
+    def scan_period_s(self, spec: Any) -> float:
+        return self.study.scan_period_s(spec)
+
+    def simulated(self, case: "Case", realisation: int) -> "Mapping[str, np.ndarray]":
+        plots, truth = self.study.realisation(case, realisation)
+        columns = (true_column(one.name, one.unit) for one in self.study.components)
+        t_s = self.study.axes(case.spec).t_s
+        return {"t_s": t_s, **plots} | dict(zip(columns, truth.T, strict=True))
+
+    def tracker(self, case: "Case") -> Tracker:
+        return self.study.tracker(case)
+
+    def likelihood(
+        self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"
+    ) -> Likelihood | None:
+        return self.study.likelihood(case, filter_name, tracks)

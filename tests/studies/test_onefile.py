@@ -1,0 +1,245 @@
+"""The frame of studies in one file: what follows from the class, and what is said of one that lacks something."""
+
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from radarsim.config.experiment import Case, Experiment
+from radarsim.config.fields import Member, Model, NonNegative, Positive, key
+from radarsim.engine.results import CaseResult
+from radarsim.errors import ConfigError
+from radarsim.report import tables
+from radarsim.studies.interface import Paper
+from radarsim.studies.noise import noise_key
+from radarsim.studies.onefile import Component, Measured, OneFile
+
+N = 4000
+
+
+class Sensor(Model):
+    """A gauge."""
+
+    sigma_x_m: Positive = key("σ of the measured x", "standard deviation of a plot, m", symbol="σ_x")
+    scan_period_s: Positive = key("scan period", "time between two plots, s", symbol="T")
+
+
+class Target(Model):
+    """What is gauged."""
+
+    sigma_step_m: NonNegative = key("σ of a step", "standard deviation of a step, m", symbol="σ_w")
+
+
+class Smoothing(Member):
+    """Exponential smoothing."""
+
+    gain: Positive = key("gain", "share of the innovation, no unit")
+
+
+class Plan(NamedTuple):
+    layout: object
+    axes: object
+    key: np.ndarray
+    spec: object
+    block: int = 1000
+    gaussian: bool = True
+
+
+class Walk(OneFile):
+    """A random walk followed with fixed gains."""
+
+    name, about, filters = "walk", "A random walk.", {"gain": "fixed"}
+    asks = "How well is a random walk followed?"
+    components = (Component("x", "m", "$x$", "position"),)
+    parts = {"sensor": Sensor, "target": Target}  # noqa: RUF012
+    Filter = Smoothing
+    scan_period = "sensor.scan_period_s"
+    measured = (Measured("x_m", "m", ("sensor.sigma_x_m",)),)
+    paper = Paper("Kalman 1960", may_grow=("filters",))
+    claims_yaml = """
+paper: walk
+config: walk
+claims:
+- id: 1
+  place: section 1
+  statement: The quick filter is the better one where steps are long
+  parts:
+  - {of: [{target.sigma_step_m: 2}], what: gain, unit: "%", measure: {gain: {filter: quick, component: x}},
+     expected: {above: 0}}
+choices:
+- key: noise
+  asks: what sigma is
+  original: nothing
+  alternatives:
+  - {name: of a plot, kind: U, reason: the usual}
+  - {name: a half of it, kind: U, reason: as usual, sets: {sensor.sigma_x_m: 0.5, gain: 0.3}}
+"""
+
+    def prepare(self, case):
+        spec, sigma = case.spec, np.empty((len(case.spec.filters), case.spec.scans, 1))
+        for f, one in enumerate(spec.filters):
+            S = 0.0
+            for k in range(spec.scans):
+                S = (1 - one.gain) ** 2 * (S + spec.target.sigma_step_m**2) + one.gain**2 * spec.sensor.sigma_x_m**2
+                sigma[f, k] = np.sqrt(S)
+        return Plan(self.sums(spec), self.axes(spec, sigma, 0 * sigma), noise_key(case, "plots"), spec)
+
+    def simulate(self, plan, first, count):
+        spec, random = plan.spec, np.random.default_rng(first)
+        x, estimate = np.zeros(count), np.zeros((len(spec.filters), count))
+        gains = np.array([[one.gain] for one in spec.filters])
+        sums = {name: np.zeros(shape) for name, shape in plan.layout.shapes.items()}
+        for k in range(spec.scans):
+            x = x + spec.target.sigma_step_m * random.standard_normal(count)
+            estimate += gains * (x + spec.sensor.sigma_x_m * random.standard_normal(count) - estimate)
+            e = estimate - x
+            sums["error"][:, k, 0] = np.stack([(e**p).sum(axis=1) for p in (1, 2, 3, 4)], axis=1)
+            sums["paired"][:, k, 0] = (e**2 * e[plan.axes.baseline] ** 2).sum(axis=1)
+        return plan.layout.pack(**sums)
+
+    def limits(self, spec):
+        q, R = spec.target.sigma_step_m**2, spec.sensor.sigma_x_m**2
+        kept = np.array([[(1 - one.gain) ** 2, one.gain**2] for one in spec.filters])
+        return np.sqrt((kept[:, :1] * q + kept[:, 1:] * R) / (1 - kept[:, :1]))
+
+
+FILTERS = ({"name": "slow", "gain": 0.2}, {"name": "quick", "gain": 0.6})
+
+
+def case_of(study, step=2.0):
+    given = {"sensor": {"sigma_x_m": 1.0, "scan_period_s": 2.0}, "target": {"sigma_step_m": step}, "filters": FILTERS}
+    spec = study.keys().model_validate({**given, "scans": 40})
+    return Case(f"walk step={step}", "walk", "walk", spec, (("target.sigma_step_m", step),), N, 1)
+
+
+@pytest.fixture(scope="module")
+def made():
+    """The study, its cases' results and their tables."""
+    study, results = Walk(), []
+    for case in (case_of(study, 0.1), case_of(study)):
+        plan = study.prepare(case)
+        sums = plan.layout.unpack(study.simulate(plan, 0, N))
+        results.append(CaseResult(case.name, "walk", case.spec, case.swept, N, sums, plan.axes))
+    every = study.tables(results) | {"curves": tables.curves(results), "gains": tables.gains(results)}
+    return study, results, every
+
+
+def test_keys_are_the_parts_and_what_every_study_has():
+    keys = Walk().keys()
+    assert list(keys.model_fields) == ["sensor", "target", "filters", "baseline", "scans"]
+    assert keys.figure_names == ("sigma_x", "gain_x", "dynamic_x")
+    with pytest.raises(ValueError, match="names must differ"):
+        keys.model_validate({**case_of(Walk()).spec.model_dump(), "filters": (FILTERS[0], FILTERS[0])})
+    one, other = (noise_key(case_of(Walk(), step), "plots") for step in (1.0, 2.0))
+    assert one.tolist() != other.tolist()
+
+
+def test_the_table_of_the_last_scan_holds_what_was_measured_and_what_is_exact(made):
+    _, results, every = made
+    last = every["last"]
+    assert list(last["filter"]) == ["slow", "quick"] * 2
+    off = abs(last["last_sigma"] - last["exact_last_sigma"])
+    assert (off < 2.5 * (last["last_hi"] - last["last_lo"]) / 2).all()
+    assert last["steady_sigma"].to_numpy() == pytest.approx(last["exact_last_sigma"].to_numpy(), rel=1e-4)
+    assert list(last["exact_last_sigma"]) == [one for r in results for one in r.axes.exact_sigma[:, -1, 0]]
+
+
+def test_question_answer_and_figures(made):
+    study, results, every = made
+    experiment = Experiment("walk", "walk", None, (case_of(study, 0.1), case_of(study)), N, 1)
+    assert study.question(experiment) == "How well is a random walk followed? Filters: slow and quick."
+    answer = study.answer(results, every)
+    assert answer[2].startswith("σ_w = 2 m: σ of the position after 78 s: slow ")
+    assert answer[3].startswith("σ_w = 2 m: Gain against slow there: quick ")
+    drawn = study.figures(results, every, experiment)
+    assert set(drawn) == {"sigma_x", "gain_x"}
+    assert "position" in drawn["sigma_x"].title
+
+
+def test_claims_find_a_case_by_its_keys_and_readings_set_keys(made):
+    study, results, every = made
+    papers = study.claims()
+    (claim,) = papers.claims
+    places = {result.name: {"filters": {0, 1}} for result in results}
+    seen = papers.evidence(results, every, places)
+    found, exact = claim.parts[0].measure(seen), claim.parts[0].measure(seen.exactly())
+    assert exact.value == pytest.approx(
+        100 * (1 - results[1].axes.exact_sigma[1, -1, 0] / results[1].axes.exact_sigma[0, -1, 0])
+    )
+    assert found.lo < exact.value < found.hi
+    assert seen.case({"scans": 40}) is results[0]
+    with pytest.raises(ConfigError, match=r"target\.step: there is no such key"):
+        seen.case({"target.step": 2})
+    readings = study.readings()
+    assert [readings.name(one) for one in readings.of_claim("walk.1")] == ["as shipped", "noise: a half of it"]
+    changed = readings.changed(claim, case_of(study), readings.reading(noise="a half of it")).spec
+    assert (changed.sensor.sigma_x_m, [one.gain for one in changed.filters]) == (0.5, [0.3, 0.3])
+    assert changed.target == case_of(study).spec.target
+
+
+def test_a_ratio_is_paired_where_one_of_the_two_is_the_baseline(made):
+    study, results, every = made
+    seen = study.claims().evidence(results, every, {result.name: {"filters": {0, 1}} for result in results})
+    from radarsim.studies import judged
+
+    at = {"target.sigma_step_m": 2}
+    one = judged.ratio(seen, at, "quick", "slow", "x")
+    other = judged.ratio(seen, at, "slow", "quick", "x")
+    assert one.value == pytest.approx(1 / other.value)
+    assert judged.sigma(seen, at, "quick", "x").value / judged.sigma(seen, at, "slow", "x").value == pytest.approx(
+        one.value
+    )
+    assert one.lo < one.value < one.hi
+    assert other.lo < other.value < other.hi
+
+
+WRONG = {
+    "asks": (None, r"test_onefile\.py: Wrong\.asks must be given: the question, one sentence; got nothing"),
+    "components": ((Component("x", ""),), "components: .* must be Component.*, with a unit"),
+    "Filter": (Sensor, r"Filter must be a subclass of radarsim\.config\.fields\.Member, got .*Sensor"),
+    "scan_period": ("sensor.period_s", r"scan_period: there is no key sensor\.period_s"),
+    "measured": ((Measured("x_m", "m", ("sensor.sigma",)),), r"x_m: there is no key sensor\.sigma"),
+    "claims_yaml": (
+        Walk.claims_yaml.replace("{gain: {filter", "{gian: {filter"),
+        r"test_onefile\.py:\d+:\d+: claims\.0\.parts\.0\.measure: must be one of them; did you mean gain\?",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_missing_is_one_line(name):
+    value, said = WRONG[name]
+    Wrong = type("Wrong", (Walk,), {name: value, "__module__": __name__})
+    with pytest.raises(ConfigError, match=said) as caught:
+        Wrong().keys()
+    assert len(caught.value.lines) == 1
+
+
+def test_a_key_that_no_reading_can_set_is_one_line():
+    text = Walk.claims_yaml.replace("sensor.sigma_x_m: 0.5", "sensor.sigma: 1")
+    with pytest.raises(ConfigError, match=r"choices: sets: there is no key sensor\.sigma"):
+        type("Wrong", (Walk,), {"claims_yaml": text, "__module__": __name__})().keys()
+
+
+class Misnamed(Walk):
+    """A study whose claim is judged by a measure that is not there."""
+
+    claims_yaml = """
+paper: walk
+config: walk
+claims:
+- id: 1
+  place: section 1
+  statement: The quick filter is the better one
+  parts:
+  - {of: [{}], what: gain, measure: {gian: {filter: quick, component: x}}, expected: {above: 0}}
+"""
+
+
+def test_a_fault_of_a_claim_has_its_file_and_line():
+    with pytest.raises(ConfigError, match=r"did you mean gain\?") as caught:
+        Misnamed().keys()
+    line = re.match(r".*test_onefile\.py:(\d+):", caught.value.lines[0])[1]
+    assert "gian: {filter: quick" in Path(__file__).read_text(encoding="utf-8").splitlines()[int(line) - 1]
