@@ -135,7 +135,7 @@ IMAGE_SHARE, IMAGE_BIAS = 0.02, 0.2
 
 @dataclass(frozen=True)
 class Design:
-    """One estimator: window lengths in pulses, and how it starts, steps and searches; see `kernels.sequence.OPTIONS`."""
+    """One estimator: window lengths in pulses, and how it starts, steps and searches; see `sequence.OPTIONS`."""
 
     windows: tuple[int, ...]
     phases: int = 0

@@ -79,8 +79,8 @@ class Filters(NamedTuple):
     """What F filters in C coordinates store from scan to scan, for a chunk.
 
     x (F, C, 4, CHUNK) state, Y (F, C, 8, CHUNK) information, and further rows (F, C, >= 10, CHUNK) whose meaning
-    depends on the kind of filter: here the joint covariance J; for others see `detector.adapt` and `detector.interact`. P
-    (6, CHUNK) of the filter that was updated last.
+    depends on the kind of filter: here the joint covariance J; for others see `detector.adapt` and
+    `detector.interact`. P (6, CHUNK) of the filter that was updated last.
     """
 
     x: np.ndarray
