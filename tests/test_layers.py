@@ -377,8 +377,10 @@ def probing(module: str, call: str, arguments: list[ast.expr]) -> bool:
         of = ast.unparse(arguments[0]).lower()
         asked = {one.value for one in arguments[1:] if isinstance(one, ast.Constant) and isinstance(one.value, str)}
         return bool(asked & PARTS) or any(word in of for word in ("study", "tracker", "plan"))
-    if call == "ast.parse" or name == "find_spec":
+    if call == "ast.parse":
         return module not in READ_SOURCES
+    if name == "find_spec":
+        return module not in READ_SOURCES | {"studies.registry"}  # where a package that fails to import lies
     return name in ("import_module", "__import__") and module not in LOAD_BY_NAME
 
 

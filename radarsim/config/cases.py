@@ -258,6 +258,18 @@ def _renamed(drafts: list[Draft], stem: str) -> list[Draft]:
     return [replace(draft, stem=f"{stem}:{draft.stem}" if several else stem) for draft in drafts]
 
 
+def no_such_config(name: str, studies: Studies, known: bool = False) -> str:
+    """That there is no config of a name: the fault of the package that would have it, or else the nearest name.
+
+    known: where none is near, the names there are.
+    """
+    if faults := studies.lacking(name):
+        return f"no such config: {'; '.join(faults)}"
+    there = stems("configs")
+    every = f"; there are: {', '.join(there)}" if known else ""
+    return f"no such config{did_you_mean(name, there) or every}"
+
+
 class Expander:
     """Expands configs into drafts, each config once.
 
@@ -366,7 +378,7 @@ class Expander:
         if not is_stem(name):
             self.faults.add(origin, path, "must be the stem of a config, without folder or suffix", name)
         elif file is None:
-            self.faults.add(origin, path, f"no such config{did_you_mean(name, stems('configs'))}", name)
+            self.faults.add(origin, path, no_such_config(name, self.studies), name)
         elif file.resolve() in chain:
             self.faults.add(origin, path, "a config cannot include itself", name)
         elif len(chain) > DEEPEST_INCLUDE:

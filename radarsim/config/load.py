@@ -18,7 +18,7 @@ from typing import Any, get_args
 import yaml
 from pydantic_core import PydanticUndefined
 
-from radarsim.config.cases import Expander, Setting
+from radarsim.config.cases import Expander, Setting, no_such_config
 from radarsim.config.check import models_in
 from radarsim.config.document import (
     RESERVED,
@@ -27,12 +27,10 @@ from radarsim.config.document import (
     KeyPath,
     Origin,
     config_file,
-    did_you_mean,
     is_reserved,
     is_stem,
     one_line,
     short,
-    stems,
 )
 from radarsim.config.experiment import Experiment, complete
 from radarsim.config.fields import DEEPEST, Model, NotFinite, from_python, from_text, in_radians
@@ -57,7 +55,7 @@ def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Iterable
     if isinstance(source, Mapping):
         document = _from_mapping(source, faults)
     elif isinstance(source, str | bytes | os.PathLike):
-        document = _from_user(source, faults)
+        document = _from_user(source, studies, faults)
     else:
         faults.add(Origin("config"), (), f"must be a path, a name or a mapping, got {repr(source)[:60]}")
     experiment = None if document is None else Expander(read, settings, faults, studies).experiment(document)
@@ -84,7 +82,7 @@ def _from_mapping(source: Mapping[str, Any], faults: Faults) -> Document:
     return Document(from_python(source, (), origin, faults), "config", None, {(): origin})
 
 
-def _from_user(source: str | bytes | os.PathLike[str], faults: Faults) -> Document | None:
+def _from_user(source: str | bytes | os.PathLike[str], studies: Studies, faults: Faults) -> Document | None:
     """The config that the user named by path or stem."""
     name = os.fsdecode(source)
     # A file without suffix that is called as a config does not hide it.
@@ -92,9 +90,7 @@ def _from_user(source: str | bytes | os.PathLike[str], faults: Faults) -> Docume
     by_path = os.path.isfile(name) and (bool(Path(name).suffix) or found is None)
     file = None if by_path else found
     if file is None and is_stem(name) and not by_path and not Path(name).suffix:
-        known = stems("configs")
-        near = did_you_mean(name, known) or f"; there are: {', '.join(known)}"
-        faults.add(Origin(name), (), f"no such config{near}")
+        faults.add(Origin(name), (), no_such_config(name, studies, known=True))
         return None
     file = file or Path(name)
     document = read(file, faults)

@@ -52,6 +52,9 @@ class Studies(Protocol):
     def has(self, name: str) -> bool:
         """Whether there is a study of that name."""
 
+    def lacking(self, stem: str) -> tuple[str, ...]:
+        """Why there is no config of a stem: faults of packages that would have it."""
+
     def keys(self, name: str) -> type[Study]:
         """The schema of a study's keys, imported when first asked for."""
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TypeVar
 
@@ -129,6 +130,24 @@ def unusable() -> dict[str, str]:
         except ConfigError as error:
             found[name] = error.lines[0]
     return found
+
+
+def lacking(stem: str) -> tuple[str, ...]:
+    """Why there is no config of a stem: faults of the studies of this name, or whose packages ship such a config."""
+    return tuple(fault for name, fault in unusable().items() if stem == name or _ships(name, stem))
+
+
+def _ships(name: str, stem: str) -> bool:
+    """Whether a package that may fail to import has a config of this stem in a folder `configs` within it."""
+    for entry in entries()[name].values():
+        try:
+            spec = find_spec(entry.module.partition(".")[0])  # of the outermost module, which this does not import
+        except (ImportError, ValueError):
+            continue
+        folders = spec.submodule_search_locations if spec is not None else None
+        if any(True for folder in folders or () for _ in Path(folder).rglob(f"configs/{stem}.yaml")):
+            return True
+    return False
 
 
 def keys(name: str) -> type[Keys]:

@@ -53,6 +53,10 @@ def radarsim(tmp_path_factory):
             (site / f"module_of_{name}.py").write_text(source)
     for number in (1, 2):
         outside.metadata(site, f"pack-twice{number}", "2.0", {"twice": "module_of_typed:STUDY"})
+    outside.metadata(site, "pack-shipping", "2.0", {"shipping": "packed.study:STUDY"})
+    (site / "packed" / "shipped" / "configs").mkdir(parents=True)
+    (site / "packed" / "__init__.py").write_text("raise ImportError('no numba here')")
+    (site / "packed" / "shipped" / "configs" / "packed_slopes.yaml").write_text("study: shipping\nrealisations: 9\n")
     outside.metadata(site, "pack-thief", "2.0", {"sonar": "module_of_typed:STUDY"})
     return lambda *arguments, **options: outside.command(*arguments, **{"site": site, "cwd": folder} | options)
 
@@ -60,7 +64,7 @@ def radarsim(tmp_path_factory):
 def test_all_that_is_whole_is_listed_and_of_the_others_why_they_are_not(radarsim):
     studies = json.loads(radarsim("list", "--json").stdout)["studies"]
     told = {one["name"]: one["paper and question"] for one in studies if "cannot be used" in one["paper and question"]}
-    assert told.keys() == {*PACKAGES, "twice", "sonar"}
+    assert told.keys() == {*PACKAGES, "twice", "sonar", "shipping"}
     assert "the package pack-thief is not used" in told["sonar"]
     assert any(one["name"] == "sonar" and "Butyrskiy" in one["paper and question"] for one in studies)
 
@@ -83,3 +87,13 @@ def test_one_line_with_the_packages_name_where_it_is_asked_for(radarsim, tmp_pat
     assert lines.pop() == "study twice: offered by the packages pack-twice1 and pack-twice2: uninstall all but one"
     for (name, (_, said)), line in zip(PACKAGES.items(), lines, strict=True):
         assert line.startswith(f"study {name}: the package pack-{name} 2.0 {said}")
+
+
+@pytest.mark.parametrize("stem", ["shipping", "packed_slopes"])
+def test_a_config_that_a_broken_package_would_have_is_not_merely_missing(radarsim, tmp_path, stem):
+    fault = "study shipping: the package pack-shipping 2.0 cannot be loaded: ImportError: no numba here\n"
+    assert radarsim("run", stem, cwd=tmp_path, code=2).stderr == f"{stem}: no such config: {fault}"
+    (tmp_path / "both.yaml").write_text(f"include: [rls2, {stem}]\n")
+    said = radarsim("check", "both.yaml", cwd=tmp_path, code=2).stderr
+    assert said == f"both.yaml:1:17: include.1: no such config: {fault.strip()}, got '{stem}'\n"
+    assert "no such config; there are: " in radarsim("run", "wholly_unknown", cwd=tmp_path, code=2).stderr
