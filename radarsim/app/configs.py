@@ -19,6 +19,7 @@ from typing import Any, SupportsFloat, SupportsIndex
 
 import numpy as np
 
+from radarsim import language
 from radarsim.config import document
 from radarsim.config import load as reading
 from radarsim.config.experiment import Case, Experiment
@@ -32,6 +33,7 @@ from radarsim.studies.registry import study
 
 # ---- configs ---------------------------------------------------------------------------------------------------------
 document.further_folders = registry.folders
+language.packages = registry.packages
 
 
 def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Iterable[str] = ()) -> Experiment:

@@ -325,6 +325,12 @@ UNITS = {
 }
 
 
+class Words(str):
+    """What a key is called, and the outermost package of the schema that calls it so, in whose catalogues it stands."""
+
+    package = ""
+
+
 class Label(NamedTuple):
     """A key in words: "scan period", its symbol in the papers ("Δt", "σ_r": a subscript after _) and its unit.
 
@@ -351,32 +357,38 @@ def label(keys: Study | type[Study] | None, key: str) -> Label:
     steps = [step for step in key.split(".") if not step.isdecimal()]
     stem, _, end = steps[-1].rpartition("_")
     unit = UNITS.get(end, "") if stem and not stem.endswith("_per") else ""  # hertz per second are not seconds
-    found = _field(keys, steps) if keys is not None else None
-    found = found or _field(Common, steps)
+    holder, found = (_field(keys, steps) if keys is not None else None) or _field(Common, steps) or (None, None)
     if found is None:
         name = stem if unit else steps[-1]
         return Label(name.replace("_", " "), "", unit)
     extra = found.json_schema_extra if isinstance(found.json_schema_extra, dict) else {}
-    text = found.title or (stem if unit else steps[-1]).replace("_", " ")
+    text = Words(found.title or (stem if unit else steps[-1]).replace("_", " "))
+    text.package = holder.__module__.partition(".")[0] if holder else ""
     own = unit if in_radians(steps[-1]) else str(extra.get("unit", unit))  # a twin in degrees has no field of its own
     return Label(text, str(extra.get("symbol", "")), own)
 
 
-def _field(keys: Model | type[Model], steps: list[str]) -> FieldInfo | None:
-    """The field that dotted steps lead to, from the top or, for a bare key, from the members of the study's list."""
+def _field(keys: Model | type[Model], steps: list[str]) -> tuple[type[Model], FieldInfo] | None:
+    """The field that dotted steps lead to, from the top or, for a bare key, from the members of the study's list.
+
+    With it the schema that calls it so: a base class, where the field is inherited.
+    """
     model = keys if isinstance(keys, type) else type(keys)
     if steps and _named(steps[0]).isdisjoint(model.model_fields) and issubclass(model, Study):
         steps = [model.bare_keys, *steps]
     holders: list[Any] = [keys]
-    found: FieldInfo | None = None
+    found: tuple[type[Model], FieldInfo] | None = None
     for step in steps:
         at = next(((one, name) for one in holders for name in _named(step) if name in _fields(one)), None)
         if at is None:
             return None
         holder, name = at
-        found = _fields(holder)[name]
+        info = _fields(holder)[name]
+        line = [one for one in (holder if isinstance(holder, type) else type(holder)).__mro__ if issubclass(one, Model)]
+        alike = [one for one in line if name in one.model_fields and one.model_fields[name].title == info.title]
+        found = alike[-1], info
         given = [] if isinstance(holder, type) else list(_models(getattr(holder, name)))
-        holders = [*given, *models_in(found.annotation)]
+        holders = [*given, *models_in(info.annotation)]
     return found
 
 

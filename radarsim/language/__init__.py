@@ -10,18 +10,25 @@ A catalogue is one file, `<code>.po`, in gettext's format. Numbers that are put 
 language writes them: the catalogue says how under the context "number". A word (`term`) may have several forms: where a
 translation says `{quantity:genitive}`, the word is looked up under the context "genitive".
 
+A package with a study of its own has its own catalogues, `PACKAGE/language/<code>.po`: what its code says, its keys'
+words and the terms that it marks are looked up there and nowhere else. What is said for it by radarsim's code, such as
+its claims, is looked up in radarsim's catalogue first, then in those of the packages.
+
 Tables are the same in every language, and so are messages on faults of a config: neither may import this room.
 """
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from gettext import GNUTranslations, NullTranslations
 from importlib import resources
 from numbers import Real
+from pathlib import Path
 from string import Formatter
+from types import FrameType
 from typing import Any
 
 from radarsim.errors import ConfigError
@@ -35,11 +42,21 @@ NUMBER = "number"  # context of the point and of the separator of thousands
 
 
 class Term(str):
-    """A word or sentence that stands in the catalogues; put into another sentence it is translated."""
+    """A word or sentence that stands in the catalogues of a package; put into another sentence it is translated."""
 
-    __slots__ = ()
+    __slots__ = ("package",)
+    package: str
 
 
+OURS = "radarsim"
+
+
+def no_packages() -> tuple[str, ...]:
+    """Packages with studies of their own, by the names of their modules: none, but see radarsim.app.configs."""
+    return ()
+
+
+packages: Callable[[], tuple[str, ...]] = no_packages
 _chosen: list[str] = []  # the last one counts
 
 
@@ -73,45 +90,73 @@ def speaking(code: str) -> Iterator[None]:
 
 
 @cache
-def messages(code: str) -> tuple[catalogue.Entry, ...]:
-    """The catalogue of a language; English needs none."""
-    if code == ENGLISH:
+def messages(code: str, package: str = OURS) -> tuple[catalogue.Entry, ...]:
+    """The catalogue of a package, which is imported, in a language; English needs none, another package may have none.
+
+    Raises ConfigError where the file is no catalogue.
+    """
+    folders = getattr(sys.modules.get(package), "__path__", ())
+    files = [file for folder in folders if (file := Path(folder, "language", f"{code}.po")).is_file()]
+    if code == ENGLISH or not files:
         return ()
-    text = resources.files(__name__).joinpath(f"{code}.po").read_text(encoding="utf-8")
-    return tuple(catalogue.entries(text))
+    try:
+        return tuple(catalogue.entries(files[0].read_text(encoding="utf-8")))
+    except (OSError, ValueError, SyntaxError) as error:
+        raise ConfigError(f"{files[0]}: {error}") from error
 
 
 @cache
-def translations(code: str) -> NullTranslations:
-    """The catalogue of a language, as the standard library reads it."""
-    return GNUTranslations(catalogue.compiled(messages(code))) if messages(code) else NullTranslations()
+def translations(code: str, package: str = OURS) -> NullTranslations:
+    """The catalogue of a package in a language, as the standard library reads it."""
+    found = messages(code, package)
+    return GNUTranslations(catalogue.compiled(found)) if found else NullTranslations()
 
 
-def term(message: str) -> Term:
-    """Mark a message that is said later."""
-    return Term(message)
+def term(message: str, package: str = "") -> Term:
+    """Mark a message that is said later; of the package that calls this, unless another one is named."""
+    made = Term(message)
+    made.package = package or _top(sys._getframe(1))
+    return made
 
 
 def tr(message: str, /, **values: Any) -> str:
     """A message in the language spoken, with its places filled."""
-    said = translations(current()).gettext(message) if message else ""  # an empty one is the catalogue's header
-    return _Filled().vformat(said, (), values) if values else said
+    found = _catalogue(message, sys._getframe(1)) if message else None  # an empty one is a catalogue's header
+    said = found.gettext(message) if found else message
+    return _Filled().vformat(said, (), values) if values else str(said)
 
 
 def plural(one: str, many: str, count: int, /, **values: Any) -> str:
     """A message that counts, in the form that the language has for this count, which is `{count}` in it."""
-    said = translations(current()).ngettext(one, many, count)
-    return _Filled().vformat(said, (), {"count": count, **values})
+    found = _catalogue(one, sys._getframe(1)) or NullTranslations()
+    return _Filled().vformat(found.ngettext(one, many, count), (), {"count": count, **values})
 
 
-def in_form(word: str, context: str) -> str:
+def in_form(word: Term, context: str) -> str:
     """A word in one of its forms; without it as it stands."""
-    return translations(current()).pgettext(context, word) if (context, word) in _forms(current()) else tr(word)
+    if context and (found := _catalogue(word, sys._getframe(), context)):
+        return found.pgettext(context, word)
+    return tr(word)
+
+
+def _catalogue(message: str, caller: FrameType, context: str = "") -> NullTranslations | None:
+    """The catalogue that has a message: its package's or its caller's, else the first one; None where none has it."""
+    code = current()
+    if code == ENGLISH:
+        return None
+    own = getattr(message, "package", "") or _top(caller)
+    asked = [own] if own != OURS and own in packages() else [OURS, *(one for one in packages() if one in sys.modules)]
+    return next((translations(code, one) for one in asked if (context, message) in _translated(code, one)), None)
+
+
+def _top(frame: FrameType) -> str:
+    """The outermost package of the code that a frame runs."""
+    return str(frame.f_globals.get("__name__", OURS)).partition(".")[0]
 
 
 @cache
-def _forms(code: str) -> frozenset[tuple[str, str]]:
-    return frozenset(one.key for one in messages(code) if one.context)
+def _translated(code: str, package: str) -> frozenset[tuple[str, str]]:
+    return frozenset(one.key for one in messages(code, package) if one.done)
 
 
 def numeral(text: str) -> str:

@@ -46,7 +46,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from radarsim.config.fields import Member, Model, keys_of
 from radarsim.config.fields import Study as Keys
 from radarsim.errors import ConfigError
-from radarsim.language import few, listed, tr
+from radarsim.language import Term, few, listed, term, tr
 from radarsim.studies.interface import Likelihood, Paper, RecordedPlots, Study, Tracker, true_column
 
 if TYPE_CHECKING:
@@ -221,13 +221,19 @@ class OneFile(Study):
     ) -> "dict[str, Figure]":
         from radarsim.report import panels
 
-        quantities = {one.name: panels.Quantity(one.symbol or panels.letter(one.name), one.words or one.name)
-                      for one in self.components}  # fmt: skip
+        quantities = {
+            one.name: panels.Quantity(one.symbol or panels.letter(one.name), self._term(one.words or one.name))
+            for one in self.components
+        }
         return panels.per_component(results, made, quantities, experiment)
 
     def question(self, experiment: "Experiment") -> str:
         names = dict.fromkeys(one.name for case in experiment.cases for one in case.spec.filters)
-        return f"{tr(self.asks)} {tr('Filters: {names}.', names=few(list(names)))}"
+        return f"{tr(self._term(self.asks))} {tr('Filters: {names}.', names=few(list(names)))}"
+
+    def _term(self, words: str) -> Term:
+        """Words of the study, said in the language spoken by the catalogue of its package."""
+        return term(words, type(self).__module__.partition(".")[0])
 
     def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
         from radarsim.report import panels
@@ -243,7 +249,7 @@ class OneFile(Study):
         last = tables.where(made["last"], case=result.name, component=leading.name).to_dict("records")
         keys: tuple[str, ...] = ("last_sigma", "last_lo", "last_hi")
         each = [f"{row['filter']} {tables.estimate((row[key] for key in keys), tr(row['unit']))}" for row in last]
-        told = {"quantity": tr(leading.words or leading.name), "t": float(result.axes.t_s[-1])}
+        told = {"quantity": self._term(leading.words or leading.name), "t": float(result.axes.t_s[-1])}
         words = tr("σ of the {quantity} after {t:g} s: {filters}.", **told, filters=listed(each))
         yield panels.at_its_place(result, words)
         gains = tables.where(made["gains"], case=result.name, component=leading.name)

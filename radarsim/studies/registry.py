@@ -171,6 +171,11 @@ def folders() -> tuple[Path, ...]:
     return tuple(Path(folder) for folder in found.values() if folder is not None)
 
 
+def packages() -> tuple[str, ...]:
+    """The outermost modules of the packages that offer studies, none of which this imports."""
+    return tuple(dict.fromkeys(module(name).partition(".")[0] for name in offered()))
+
+
 def package(name: str) -> str | None:
     """The installed package that offers a study, with its version; None for one that is shipped here."""
     if name in SHIPPED:

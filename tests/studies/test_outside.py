@@ -22,6 +22,10 @@ def place(tmp_path_factory):
     (folder / "site").mkdir()
     outside.command("new-study", "fifth", site=folder / "site", cwd=folder)
     outside.installed(folder / "fifth", folder / "site")
+    page = (outside.ROOT / "docs/howto/translate.md").read_text(encoding="utf-8")
+    (folder / "fifth/src/fifth/language").mkdir()
+    catalogue = page.partition("```po\n")[2].partition("```")[0]
+    (folder / "fifth/src/fifth/language/ru.po").write_text(catalogue, encoding="utf-8")
     return folder
 
 
@@ -101,6 +105,15 @@ def test_its_claims_are_listed_among_all(ran, radarsim, tmp_path):
     assert {row["claim"].partition(".")[0] for row in rows} == {"P1", "P2", "P3", "P4", "fifth"}
     assert "fifth.1 confirmed" in radarsim("claims", "fifth").stdout
     assert "## fifth Kalman 1960" in radarsim("claims", "--markdown").stdout
+
+
+def test_it_speaks_the_language_of_its_catalogue(ran, radarsim, tmp_path):
+    radarsim("run", "fifth_step", "-n", 500, "--language", "ru", "--out", tmp_path)
+    page = (tmp_path / "fifth_step/report.html").read_text(encoding="utf-8")
+    assert "Как фильтры fixed, kalman следят за случайным блужданием?" in page
+    assert "СКО координаты" in page  # radarsim's title, the word in the form that it asks for
+    assert "Ошибка фильтра Калмана более чем на 10 % меньше" in radarsim("claims", "fifth", "--language", "ru").stdout
+    assert "How well do the filters" in (ran / "report.html").read_text(encoding="utf-8")
 
 
 def test_recorded_plots_and_a_config_of_ones_own(radarsim, tmp_path):

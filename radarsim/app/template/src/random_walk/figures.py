@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
+from radarsim.language import term
 from radarsim.report import panels
 from radarsim.report.drawing import Figure
 
 # Yours: of each component its letter and what it is called.
-QUANTITIES = {"x": panels.Quantity("$x$", "position")}
+QUANTITIES = {"x": panels.Quantity("$x$", term("position"))}
 
 
 def figures(results: Sequence[CaseResult], made: Mapping, experiment: Experiment) -> dict[str, Figure]:

@@ -1,15 +1,16 @@
-"""What the report asks and answers. Yours: sentences with numbers and 95 % intervals, made from the tables."""
+"""What the report asks and answers. Yours: sentences with numbers and 95 % intervals, from the tables, through `tr`."""
 
 from collections.abc import Mapping, Sequence
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
+from radarsim.language import tr
 
 
 def question(experiment: Experiment) -> str:
     """What an experiment asks, in one sentence."""
     names = list(dict.fromkeys(one.name for case in experiment.cases for one in case.spec.filters))
-    return f"How well do the filters {', '.join(names)} follow a random walk?"
+    return tr("How well do the filters {names} follow a random walk?", names=", ".join(names))
 
 
 def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
@@ -21,6 +22,8 @@ def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
         if (row["case"], row["filter"]) in last.index:
             gain = last.loc[(row["case"], row["filter"])]
             interval = f"[{gain['gain_lo']:.3g}, {gain['gain_hi']:.3g}]"
-            words += f", a gain of {gain['gain_percent']:.3g} % {interval} against {gain['baseline']}"
-        sentences.append(f"{row['case']}, {row['filter']}: σ of the position at the last scan is {words}.")
+            told = {"gain": f"{gain['gain_percent']:.3g} % {interval}", "base": gain["baseline"]}
+            words = tr("{words}, a gain of {gain} against {base}", words=words, **told)
+        told = {"case": row["case"], "filter": row["filter"], "words": words}
+        sentences.append(tr("{case}, {filter}: σ of the position at the last scan is {words}.", **told))
     return sentences

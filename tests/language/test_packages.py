@@ -1,0 +1,112 @@
+"""Catalogues of packages with studies of their own: each speaks by its own, and by no other's."""
+
+import importlib
+import sys
+
+import pytest
+
+from radarsim import language
+from radarsim.config.check import label
+from radarsim.errors import ConfigError
+from radarsim.language import speaking, term, tr
+from radarsim.studies import registry
+
+CATALOGUE = """
+msgid ""
+msgstr "Content-Type: text/plain; charset=UTF-8\\n"
+
+msgid "range"
+msgstr "диапазон"
+
+msgctxt "genitive"
+msgid "range"
+msgstr "диапазона"
+
+msgid "σ of the {quantity}"
+msgstr "своё {quantity}"
+
+msgid "a question of its own"
+msgstr "свой вопрос"
+
+msgid "scan period"
+msgstr ""
+"""
+CODE = """
+from radarsim.config.fields import Model, Study, Member, Members, Positive, key
+from radarsim.language import plural, term, tr
+
+RANGE = term("range")
+
+def says(message, **values):
+    return tr(message, **values)
+
+class Sensor(Model):
+    scan_period_s: Positive = key("scan period", "time between two plots, s")
+    reach_m: Positive = key("range", "how far it sees, m")
+
+class Keys(Study):
+    sensor: Sensor = key("sensor", "the sensor")
+    filters: Members[Member] = key("filters", "the filters")
+"""
+
+
+@pytest.fixture(autouse=True)
+def packages(tmp_path, monkeypatch):
+    """Two packages that offer studies: `speaks` has a catalogue, `silent` none."""
+    for name in ("speaks", "silent"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text(CODE, encoding="utf-8")
+    (tmp_path / "speaks" / "language").mkdir()
+    (tmp_path / "speaks" / "language" / "ru.po").write_text(CATALOGUE, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(language, "packages", lambda: ("speaks", "silent", "not_imported"))
+    made = [importlib.import_module(name) for name in ("speaks", "silent")]
+    for kept in (language.messages, language.translations, language._translated):
+        kept.cache_clear()
+    yield made
+    for kept in (language.messages, language.translations, language._translated):
+        kept.cache_clear()
+    for name in ("speaks", "silent"):
+        del sys.modules[name]
+
+
+def test_what_a_package_says_is_looked_up_in_its_catalogue_alone(packages):
+    speaks, _ = packages
+    with speaking("ru"):
+        assert [one.says("range") for one in packages] == ["диапазон", "range"]
+        assert speaks.says("radial velocity") == "radial velocity"  # radarsim's, which it does not translate
+        assert speaks.says("σ of the {quantity}", quantity=speaks.RANGE) == "своё диапазон"
+    assert speaks.says("range") == "range"
+
+
+def test_its_words_stay_its_own_in_radarsims_sentences(packages):
+    speaks, silent = packages
+    with speaking("ru"):
+        assert tr("range") == tr(term("range")) == "дальность"
+        assert tr("σ of the {quantity}", quantity=speaks.RANGE) == "СКО диапазона"
+        assert tr("σ of the {quantity}", quantity=silent.RANGE) == "СКО range"
+        assert tr("σ of the {quantity}", quantity=term("range")) == "СКО дальности"
+        assert tr(speaks.RANGE) == "диапазон"
+
+
+def test_what_radarsim_says_for_it_is_found_in_its_catalogue(packages):
+    with speaking("ru"):
+        assert tr("a question of its own") == "свой вопрос"
+    assert tr("a question of its own") == "a question of its own"
+
+
+def test_keys_are_called_by_the_catalogue_of_their_schemas_package(packages):
+    speaks, _ = packages
+    ours = label(registry.keys("range_doppler"), "radar.scan_period_s").text
+    with speaking("ru"):
+        assert tr(ours) == "период обзора"
+        assert [tr(label(one.Keys, "sensor.scan_period_s").text) for one in packages] == ["scan period"] * 2
+        assert [tr(label(one.Keys, "sensor.reach_m").text) for one in packages] == ["диапазон", "range"]
+        assert tr(label(speaks.Keys, "filters.0.name").text) == tr(label(registry.keys("range_doppler"), "name").text)
+
+
+def test_a_file_that_is_no_catalogue_is_named(packages, tmp_path):
+    (tmp_path / "silent" / "language").mkdir()
+    (tmp_path / "silent" / "language" / "ru.po").write_text("range: диапазон\n", encoding="utf-8")
+    with speaking("ru"), pytest.raises(ConfigError, match=r"silent.language.ru.po: no line of a catalogue: range: "):
+        packages[1].says("range")
