@@ -38,7 +38,7 @@ ROOMS = {
     "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "report.quantities", "studies.interface"),
     "studies.onefile": ("errors", "language", *CASE, *DATA, "report", "studies.interface", "studies.judged"),
     "studies.judged": ("errors", "config", *DATA, "report"),  # claims and readings of studies in one file
-    "studies.registry": ("errors", "config", "studies.interface"),
+    "studies.registry": ("errors", "config", "report.quantities", "studies.interface"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry"),
     "recorded": ("errors", "config", "language", "engine", "kernels", "physics", "report", "studies"),
     "app": ("errors", "config", "language", "engine", "kernels", "physics", "report", "studies", "recorded"),

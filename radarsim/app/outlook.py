@@ -16,6 +16,7 @@ from radarsim.engine.run import collect
 from radarsim.engine.store import Stock, Store, available_cores, stock
 from radarsim.errors import ConfigError
 from radarsim.language import few, listed, tr
+from radarsim.report.quantities import SIGMA, Quantity
 from radarsim.studies import registry
 
 PILOT_S = 0.3  # of all cases together, unless single realisations take longer
@@ -64,7 +65,7 @@ class Outlook:
     seconds: float
     memory_mb: float
     precision: float | None = None
-    of: str = "sigma"
+    of: Quantity = SIGMA
     warnings: tuple[str, ...] = ()
     share: tuple[int, int] | None = None
 
@@ -88,6 +89,7 @@ def outlook(
     if precision is not None:
         check_precision([experiment], precision, of)
     cases: list[CaseOutlook] = []
+    quantity = SIGMA if precision is None else registry.quantity(of, experiment.cases[0])
     largest, preparing = 0, 0.0
     study = registry.study(experiment.study)
     study.prepare(experiment.cases[0])  # what it loads is not to be timed
@@ -103,7 +105,7 @@ def outlook(
             short *= (held.asked - held.stored) / case.realisations
             cases.append(CaseOutlook(*labels, held.asked, short, timed=False, stock=None if out is None else held))
         else:
-            one = measured(experiment, work, labels, PILOT_S / len(experiment.cases), stocked, precision, of)
+            one = measured(work, labels, PILOT_S / len(experiment.cases), stocked, precision, of)
             cases.append(one if out is not None else replace(one, stock=None))
             largest = max(largest, work.size)
         if progress is not None:
@@ -111,7 +113,9 @@ def outlook(
     # Vectors of sums in flight: two a thread, one a level of the tree; beside them the interpreter and its libraries.
     memory = 200 + 8e-6 * largest * (2 * threads + 32)
     seconds = preparing + sum(c.seconds for c in cases) / threads
-    return Outlook(tuple(cases), threads, seconds, memory, precision, of, tuple(study.warnings(experiment)), share)
+    return Outlook(
+        tuple(cases), threads, seconds, memory, precision, quantity, tuple(study.warnings(experiment)), share
+    )
 
 
 def surely_short(work: CaseWork, most_s: float) -> float | None:
@@ -124,7 +128,6 @@ def surely_short(work: CaseWork, most_s: float) -> float | None:
 
 
 def measured(
-    experiment: Experiment,
     work: CaseWork,
     labels: tuple[str, str, int],
     pilot_s: float,
@@ -136,12 +139,12 @@ def measured(
     case = work.case
     work.simulate(0, 1)
     each = seconds_each(work, case.realisations, pilot_s)
-    need = None if precision is None else needed(experiment, work, precision, each, of)
+    need = None if precision is None else needed(work, precision, each, of)
     held = stocked(case.realisations if need is None else ending(need, case.realisations))
     return CaseOutlook(*labels, held.asked, each * (held.asked - held.stored), True, need, held)
 
 
-def needed(experiment: Experiment, work: CaseWork, percent: float, seconds_each: float, of: str) -> Need:
+def needed(work: CaseWork, percent: float, seconds_each: float, of: str) -> Need:
     """How many realisations a precision takes.
 
     From exact values for σ, where errors are Gaussian with these, else from a pilot. Raises ConfigError where the case
@@ -149,17 +152,18 @@ def needed(experiment: Experiment, work: CaseWork, percent: float, seconds_each:
     """
     from radarsim.report import precision
 
-    exact, table = work.plan.gaussian and of == "sigma", table_of(experiment, of)
+    quantity = registry.quantity(of, work.case)
+    exact, table = work.plan.gaussian and quantity == SIGMA, table_of(work.case, quantity)
     count = LEAST if exact else min(max(LEAST, int(PILOT_OF_PRECISION_S / seconds_each)), MOST)
     result = case_result(work.case, work, collect(work, count))
     if exact:
         result = precision.gaussian(result)
         axes = result.axes
         exact = bool(np.isfinite(axes.exact_sigma[axes.available]).all())
-    n = precision.needed(result, percent, table, of, work.case.realisations, tailed(work, of))
-    cell = precision.worst(result, table, of)
-    if cell is None and of != "sigma":
-        raise ConfigError(unknown(work.case, of))
+    n = precision.needed(result, percent, table, quantity, work.case.realisations, tailed(work, quantity))
+    cell = precision.worst(result, table, quantity)
+    if cell is None and quantity != SIGMA:
+        raise ConfigError(unknown(work.case, quantity))
     last = tr("no sigma in this case") if cell is None else cell.last()
     below = None if cell is None else cell.below
     return Need(n, tr("exact") if exact else tr("pilot of {count:,}", count=count), last, below)

@@ -491,7 +491,7 @@ def share_record(done: "Shares") -> dict[str, Any]:
 
 def outlook(experiment: "Experiment", one: "Outlook") -> dict[str, Any]:
     """What a run would take."""
-    return {"config": experiment.stem, "path": experiment.path, **asdict(one)}
+    return {"config": experiment.stem, "path": experiment.path, **asdict(one), "of": one.of.name}
 
 
 def answer(one: "Answer") -> dict[str, Any]:

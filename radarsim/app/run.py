@@ -34,6 +34,7 @@ from radarsim.engine.run import Collected, Shared, Signals, Stop, collect, share
 from radarsim.engine.store import Stock, available_cores, stock
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.report import files
+from radarsim.report.quantities import SIGMA, Quantity
 from radarsim.studies import registry
 from radarsim.studies.registry import study
 
@@ -70,14 +71,13 @@ class SimulatedCases:
         reasons = [] if self.stopped is None else [self.stopped]
         if self.precision is None:
             return reasons
-        from radarsim.report.precision import OF
-
         wide = [cell for cell in self.cells.values() if cell.percent >= self.precision]
         cases = f" in {len(wide)} of {len(self.cells)} cases" if len(self.cells) > 1 else ""
         if wide:
             worst = max(wide, key=lambda cell: cell.percent)
-            unit = "%" if OF[worst.of].relative else "points"
-            reasons.append(f"precision of {self.precision:g} {unit} not reached{cases}; worst: {worst}")
+            reasons.append(
+                f"precision of {self.precision:g} {worst.of.half_width_unit} not reached{cases}; worst: {worst}"
+            )
         return reasons
 
 
@@ -146,7 +146,8 @@ def simulate(
                 collector = _collector(work, options, over_all, collect)
                 wanted = None
                 if precision is not None:
-                    wanted = Wanted(precision, of, table_of(experiment, of), tailed(work, of))
+                    quantity = registry.quantity(of, case)
+                    wanted = Wanted(precision, quantity, table_of(case, quantity), tailed(work, quantity))
                 made[key] = work, *_collected(case, work, wanted, collector)
             work, collected, cell = made[key]
             if collected.count:
@@ -168,30 +169,24 @@ def _collector(work: CaseWork, options: RunOptions, progress: Progress, of: Call
 
 
 class Wanted(NamedTuple):
-    """A precision in per cent, of which kind of quantity, the table that holds it, and that of curves if `tailed`."""
+    """A precision in per cent, of which quantity, the table that holds it, and that of curves if `tailed`."""
 
     percent: float
-    of: str
+    of: Quantity
     table: "Table"
     curves: "Table | None"
 
 
-def tailed(work: CaseWork, of: str) -> "Table | None":
-    """The table of a case's curves where rare large errors may decide a kind of quantity; None where they do not."""
-    from radarsim.report.precision import OF
-
-    return study(work.case.study).curves if OF[of].squares and not work.plan.gaussian else None
+def tailed(work: CaseWork, of: Quantity) -> "Table | None":
+    """The table of a case's curves where rare large errors may decide a quantity; None where they do not."""
+    return study(work.case.study).curves if of.squares and not work.plan.gaussian else None
 
 
-def table_of(experiment: Experiment, of: str) -> "Table":
-    """The table of a study that holds a kind of quantity, from results; empty where the study makes none."""
+def table_of(case: Case, of: Quantity) -> "Table":
+    """The table of a case's study that holds a quantity, from results; empty where it makes none."""
     from radarsim.report import tables
-    from radarsim.report.precision import OF
 
-    own = study(experiment.study)
-    if of not in ("sigma", "gain"):
-        return lambda results: own.tables(results).get(OF[of].table, tables.frame({}))
-    return own.gains if of == "gain" else own.curves
+    return lambda results: tables.frame({}) if (made := study(case.study).table(of.table, results)) is None else made
 
 
 def _collected(
@@ -210,7 +205,7 @@ def _collected(
         if best is None or looked[-1].count > best.count:
             best = looked[-1]
             cell = worst(case_result(case, work, best), wanted.table, wanted.of) if best.count else None
-            if cell is None and best.count and wanted.of != "sigma":
+            if cell is None and best.count and wanted.of != SIGMA:
                 raise ConfigError(unknown(case, wanted.of))
         if looked[-1].stopped or cell is None:
             break
@@ -231,20 +226,17 @@ def _collected(
     return whole, cell
 
 
-def unknown(case: Case, of: str) -> str:
-    """The line for a case that has no quantity of a kind."""
-    from radarsim.report.precision import OF
-
-    return f"{case.name}: of: must be what the case has, got {of}: no {OF[of].words} in {OF[of].table}.csv"
+def unknown(case: Case, of: Quantity) -> str:
+    """The line for a case that has no row of a quantity."""
+    return f"{case.name}: of: must be what the case has, got {of.name}: no {of.words} in {of.table}.csv"
 
 
 def check_precision(experiments: Sequence[Experiment], percent: float, of: str = "sigma") -> None:
-    """ConfigError for an invalid precision, and for every case of too few realisations ever to be looked at."""
-    from radarsim.report.precision import FIRST, OF
+    """ConfigError for an invalid precision, of what a case does not measure, or of too few realisations for a look."""
+    from radarsim.report.precision import FIRST
 
-    if of not in OF:
-        raise ConfigError(f"of: must be one of {', '.join(OF)}, got {of!r}")
-
+    for case in (case for experiment in experiments for case in experiment.cases):
+        registry.quantity(of, case)
     if not 0 < percent <= 100:
         raise ConfigError(f"precision: must be > 0 and ≤ 100 %, got {percent:g}")
     faults = [
@@ -392,7 +384,7 @@ def run(
     config is a path, the name of a shipped config, a dict as YAML would give it, or an Experiment loaded with these
     overrides. overrides are texts `key=value` with dotted keys. With a precision, in per cent, a case ends at the first
     of 2000, 4000, 8000 …, N realisations at which the 95 % half-width of every σ is under it, or of every quantity of
-    another kind, `of`: gain, lock, lost, right, wrong, loss, false_tracks; where errors are not known to be Gaussian,
+    another name, `of`, that the study measures (gain, lock, …); where errors are not known to be Gaussian,
     of σ and gains not before 64,000, or 512,000 where large ones have come. decide: all cases end at the first of
     these at which every claim of the config is decided. time_limit is in seconds, tables and figures counted in, or a
     condition that runs already. `result.unmet` says what of the two was not reached. workers are processes of this
@@ -608,7 +600,10 @@ def facts_of(simulated: SimulatedCases, threads: int, seconds: float) -> dict[st
         facts["seconds_per_update"] = measured
     if simulated.precision is None:
         return facts
-    widest = {name: asdict(cell) | {"percent": finite(cell.percent)} for name, cell in simulated.cells.items()}
+    widest = {
+        name: asdict(cell) | {"percent": finite(cell.percent), "of": cell.of.name}
+        for name, cell in simulated.cells.items()
+    }
     return facts | {"precision": {"asked_percent": simulated.precision, "widest": widest}}
 
 

@@ -275,14 +275,12 @@ time_limit_option = click.option(
 threads_option = click.option(
     "--threads", type=click.IntRange(1, 1024), metavar="T", help="Threads; default: all cores."
 )
-OF = ("sigma", "gain", "lock", "lost", "right", "wrong", "loss", "false_tracks")
 of_option = click.option(
     "--of",
-    type=click.Choice(OF),
-    metavar="WHAT",
+    metavar="NAME",
     default="sigma",
-    help="What --precision is of, default sigma: gain (in points); lock, lost, right, wrong (at the last scan); "
-    "loss, false_tracks (an hour).",
+    help="What --precision is of, default sigma: gain (in points), or what else the study measures, as `radarsim "
+    "solve --help` names it (lock, false-tracks).",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout in place of text.")
 format_option = click.option(

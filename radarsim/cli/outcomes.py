@@ -209,8 +209,7 @@ def print_needs(experiment: "Experiment", outlook: "Outlook") -> None:
         for case in outlook.cases
         if (need := case.need) is not None
     ]
-    unit = tr("points") if outlook.of == "gain" else "%"
-    wanted = tr("for ± {percent:g} {unit}", percent=outlook.precision, unit=unit)
+    wanted = tr("for ± {percent:g} {unit}", percent=outlook.precision, unit=tr(outlook.of.half_width_unit))
     columns = ("case", wanted, "one thread", "known from", "last to get there")
     show("", columns, rows, right=columns[1:3], spare=columns[4:])
     short = [name for name, need in needs.items() if need.realisations is None or need.realisations > asked[name]]

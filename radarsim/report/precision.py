@@ -12,11 +12,12 @@ number of realisations below which no run ends: FLOOR, and FLOOR_OF_TAILS where 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
+from radarsim.report.quantities import SIGMA, Quantity
 
 if TYPE_CHECKING:
     import pandas
@@ -30,40 +31,9 @@ EQUAL = 1e-9  # relative difference of widths that is rounding
 MOST = 10**12  # realisations, as in a config
 
 
-class Of(NamedTuple):
-    """A quantity that a precision may be asked of: the table that holds it, and the columns of value and interval.
-
-    relative: its half-width counts in per cent of it, else it is one of per cent. last: only the last scan or window of
-    each filter counts. rest: what is left of one is meant, the losses of a lock rate. squares: it is made of squared
-    errors, which rare large ones decide.
-    """
-
-    words: str
-    table: str
-    columns: tuple[str, str, str]
-    relative: bool = True
-    last: bool = False
-    rest: bool = False
-    squares: bool = False
-
-
-LOCKS, FOLDS = ("lock_rate", "lock_lo", "lock_hi"), ("right", "right_lo", "right_hi")
-OF = {
-    "sigma": Of("sigma", "curves", ("sigma", "sigma_lo", "sigma_hi"), squares=True),
-    "gain": Of("gain", "gains", ("gain_percent", "gain_lo", "gain_hi"), relative=False, squares=True),
-    "lock": Of("lock rate", "locks", LOCKS, last=True),
-    "lost": Of("rate of lost locks", "locks", LOCKS, last=True, rest=True),
-    "right": Of("rate of right folds", "folds", FOLDS, last=True),
-    "wrong": Of("rate of wrong folds", "folds", FOLDS, last=True, rest=True),
-    "loss": Of("ends of a track an hour", "tracking", ("ends_per_hour", "ends_lo", "ends_hi")),
-    "false_tracks": Of("false tracks an hour", "tracking", ("false_tracks_per_hour", "false_lo", "false_hi")),
-}
-SIGMA = OF["sigma"]
-
-
 @dataclass(frozen=True)
 class Cell:
-    """The 95 % half-width of a quantity, in per cent (infinite where it is not known), and which one that is.
+    """The 95 % half-width of a quantity, in its `half_width_unit` (infinite where not known), and which one that is.
 
     component is empty and k zero where the quantity has none. below bounds a rate of events that were never seen.
     """
@@ -74,15 +44,14 @@ class Cell:
     component: str
     k: int
     count: int
-    of: str = "sigma"
+    of: Quantity = SIGMA
     below: float | None = None
 
     def __str__(self) -> str:
-        unit = "%" if OF[self.of].relative else "points"
-        width = f"± {self.percent:.3g} {unit}" if math.isfinite(self.percent) else "not known"
+        width = f"± {self.percent:.3g} {self.of.half_width_unit}" if math.isfinite(self.percent) else "not known"
         if self.below is not None:
             width = f"none seen, so below {self.below:.2g},"
-        return f"{self.case}: filter {self.place()}: {OF[self.of].words} {width} at {self.count:,} realisations"
+        return f"{self.case}: filter {self.place()}: {self.of.words} {width} at {self.count:,} realisations"
 
     def place(self) -> str:
         """Filter, component and scan, as far as it has them."""
@@ -120,35 +89,38 @@ def least(result: CaseResult, curves: Table | None) -> int:
     return FLOOR_OF_TAILS if (TAILED * made["n_eff"] < made["n"]).any() else FLOOR
 
 
-def worst(result: CaseResult, table: Table, of: str = "sigma") -> Cell | None:
+def worst(result: CaseResult, table: Table, of: Quantity = SIGMA) -> Cell | None:
     """The quantity of a case with the widest interval; None where the case has none.
 
     Where the case draws rare events of one filter, only its rate of them counts: others are left as rare as they are.
     """
-    what, made = OF[of], table([result])
+    made = table([result])
     aimed_at = getattr(getattr(result.spec, "rare", None), "aimed_at", None)
-    if what.last and aimed_at is not None:
+    if of.last and aimed_at is not None:
         made = made[made["filter"] == aimed_at]
-    if what.last and len(made):
-        made = made.groupby(["case", "filter"], sort=False).tail(1)
+    if of.last and len(made):
+        made = made.groupby(["case", "filter", *filter(None, [of.per])], sort=False).tail(1)
     if not len(made):
         return None
-    value, lo, hi = (made[name].to_numpy(dtype=float) for name in what.columns)
-    if what.rest:
-        value, lo, hi = 1 - value, 1 - hi, 1 - lo
+    (value, lo, hi), _ = of.read(made)
     with np.errstate(divide="ignore", invalid="ignore"):
-        percent = np.where(hi == lo, 0.0, 50 * (hi - lo) / value if what.relative else 0.5 * (hi - lo))
+        percent = np.where(hi == lo, 0.0, 0.5 * (hi - lo) if of.kind == "signed" else 50 * (hi - lo) / value)
     percent = np.where(np.isnan(percent) | np.isnan(value), np.inf, percent)
     # Of equal ones the first: Gaussian errors without bias are all known equally well, up to rounding.
     first = int(np.flatnonzero(percent >= percent.max() * (1 - EQUAL))[0])
     row = made.iloc[first]
-    component, k = str(row.get("component", "")), int(row.get("k", 0))
+    component, k = str(row.get(of.per, "")), int(row.get("k", 0))
     below = float(hi[first]) if value[first] == 0 and math.isinf(percent[first]) else None
     return Cell(float(percent.max()), str(row["case"]), str(row["filter"]), component, k, result.count, of, below)
 
 
 def needed(
-    result: CaseResult, percent: float, table: Table, of: str = "sigma", most: int = MOST, curves: Table | None = None
+    result: CaseResult,
+    percent: float,
+    table: Table,
+    of: Quantity = SIGMA,
+    most: int = MOST,
+    curves: Table | None = None,
 ) -> int | None:
     """At which look a run of at most `most` likely ends, or of how many more it would; None if beyond all bounds.
 

@@ -80,6 +80,11 @@ class Quantity:
         """By what the column's numbers are multiplied for people."""
         return 100.0 if self.kind == "share" else 1.0
 
+    @property
+    def half_width_unit(self) -> str:
+        """What half the width of its interval is counted in for a precision."""
+        return "%" if self.kind != "signed" else "points" if self.unit == "%" else self.unit
+
     def shown_unit(self, of_component: str = "") -> str:
         """The unit in which people read it, of a component with a unit."""
         return "%" if self.kind == "share" else self.unit or of_component

@@ -13,9 +13,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TypeVar
 
+from radarsim.config.experiment import Case
 from radarsim.config.fields import Study as Keys
 from radarsim.config.schema import COMMON_KEYS
 from radarsim.errors import ConfigError, RadarsimError
+from radarsim.report.quantities import Quantity
 from radarsim.studies.interface import Study
 
 Part = TypeVar("Part")
@@ -163,6 +165,14 @@ def keys(name: str) -> type[Keys]:
 def usable() -> tuple[str, ...]:
     """The names of the studies whose keys can be read."""
     return tuple(parts(lambda one: keys(one.name)))
+
+
+def quantity(name: str, case: Case) -> Quantity:
+    """The quantity of a name that a case measures. Raises ConfigError where there is none such."""
+    measured = {one.name: one for one in part(case.study, lambda one: one.quantities(case.spec))}
+    if name not in measured:
+        raise ConfigError(f"{case.name}: study {case.study} measures no {name!r}, but {', '.join(measured)}")
+    return measured[name]
 
 
 def folders() -> tuple[Path, ...]:

@@ -68,7 +68,7 @@ def test_an_unmet_precision_names_the_worst_cell_and_writes_what_is_done(tmp_pat
     row = pd.read_csv(tmp_path / "rls2" / "curves.csv").iloc[int(np.argmax(widths))]
     assert result.stderr == (
         f"rls2: precision of 0.1 % not reached; worst: rls2: filter '{row['filter']}', component {row.component}, "
-        f"k = {row.k}: sigma ± {widths.max():.3g} % at 5,000 realisations\n"
+        f"k = {row.k}: σ ± {widths.max():.3g} % at 5,000 realisations\n"
     )
     assert record(tmp_path / "rls2")["stop"].startswith("precision of 0.1 % not reached")
     command("report", "rls2", "--no-figures", "--out", tmp_path)
@@ -107,7 +107,7 @@ def test_a_precision_of_rates_is_relative_and_of_the_last_window(tmp_path):
     )
     assert 0.5 <= predicted["cases"][0]["need"]["realisations"] / rare["n"] <= 2
     refused = command("run", "rls2", "-n", 4_000, "--precision", 1, "--of", "lock", *PLAIN, "--out", tmp_path, code=2)
-    assert refused.stderr == "rls2: of: must be what the case has, got lock: no lock rate in locks.csv\n"
+    assert refused.stderr == "rls2: study range_doppler measures no 'lock', but sigma, gain\n"
 
 
 def test_all_cases_count_for_a_precision(tmp_path):
@@ -338,7 +338,7 @@ def test_a_share_may_be_limited_in_time(tmp_path):
         (["--precision", "nan"], "must be a number > 0"),
         (["--precision", "101"], "≤ 100"),
         (["--of", "gain"], "--of says what a precision is of"),
-        (["--precision", "1", "--of", "speed"], "is not one of"),
+        (["--precision", "1", "--of", "speed"], "rls2: study range_doppler measures no 'speed', but sigma, gain"),
         (["--precision", "1", "-n", "1999"], "rls2.yaml: realisations: must be at least 2000 for a precision"),
         (["--time-limit", "0"], "must be a number > 0"),
         (["--time-limit", "inf"], "must be a number > 0"),

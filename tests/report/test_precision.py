@@ -14,6 +14,7 @@ from radarsim.app.selftest import KNOWN
 from radarsim.config.schema import LARGEST_REALISATIONS
 from radarsim.report import precision
 from radarsim.report.precision import FIRST, gaussian, grown, looks, needed, worst
+from radarsim.report.quantities import LOCK, LOST, WRONG
 from radarsim.report.tables import curves
 from radarsim.studies import registry
 
@@ -82,7 +83,7 @@ def test_losses_are_what_locks_leave(results):
         }
     )
     (case,) = results["range_doppler"]
-    lock, lost = (worst(case, lambda _: table, of) for of in ("lock", "lost"))
+    lock, lost = (worst(case, lambda _: table, of) for of in (LOCK, LOST))
     assert (lock.k, lost.k) == (2, 2)  # the last
     assert lock.percent == pytest.approx(50 * 0.1 / 0.9)
     assert lost.percent == pytest.approx(50 * 0.1 / 0.1)
@@ -94,7 +95,7 @@ def test_what_is_not_known_is_never_reached(results):
     sums["error"][0, 3, 0] = np.nan
     lost = replace(case, sums=sums)
     assert worst(lost, curves).percent == np.inf
-    assert "sigma not known" in str(worst(lost, curves))
+    assert "σ not known" in str(worst(lost, curves))
     assert needed(lost, 10, curves) is None
     sums["error"][0, 3, 0] = 0.0
     assert worst(replace(case, sums=sums), curves).percent < 10
@@ -113,23 +114,23 @@ def folds(*rates):
 def test_of_rare_events_the_filter_they_are_drawn_for_counts_alone(results):
     (case,) = results["range_doppler"]
     table = folds((0.75, 0.625, 0.875), (1.0, 0.5, 1.0))
-    assert worst(case, table, "wrong").filter == "other"
+    assert worst(case, table, WRONG).filter == "other"
     for aimed_at, filter_name in (("sought", "sought"), ("other", "other"), (None, "other")):
         aimed = replace(case, spec=SimpleNamespace(rare=SimpleNamespace(aimed_at=aimed_at)))
-        assert worst(aimed, table, "wrong").filter == filter_name
+        assert worst(aimed, table, WRONG).filter == filter_name
     drawn = replace(case, spec=SimpleNamespace(rare=SimpleNamespace(aimed_at="sought")))
-    assert worst(drawn, table, "wrong").percent == 50.0
+    assert worst(drawn, table, WRONG).percent == 50.0
     assert worst(drawn, curves).percent == worst(case, curves).percent  # σ is of plain realisations, of all filters
 
 
 def test_events_never_seen_are_told_with_their_bound(results):
     (case,) = results["range_doppler"]
-    none = worst(case, folds((1.0, 0.75, 1.0), (0.5, 0.25, 0.75)), "wrong")
+    none = worst(case, folds((1.0, 0.75, 1.0), (0.5, 0.25, 0.75)), WRONG)
     assert (none.filter, none.percent, none.below) == ("sought", np.inf, 0.25)
     told = f"one: filter 'sought', k = 9: rate of wrong folds none seen, so below 0.25, at {case.count:,} realisations"
     assert str(none) == told
-    assert worst(case, folds((0.75, 0.5, 1.0), (0.5, 0.25, 0.75)), "wrong").below is None
-    unknown = worst(case, folds((np.nan, np.nan, np.nan), (0.5, 0.25, 0.75)), "wrong")
+    assert worst(case, folds((0.75, 0.5, 1.0), (0.5, 0.25, 0.75)), WRONG).below is None
+    unknown = worst(case, folds((np.nan, np.nan, np.nan), (0.5, 0.25, 0.75)), WRONG)
     assert unknown.below is None
     assert "not known" in str(unknown)
 
