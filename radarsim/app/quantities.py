@@ -22,6 +22,7 @@ from radarsim.config.experiment import Case
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.errors import ConfigError
 from radarsim.language import term, tr
+from radarsim.report.quantities import Quantity
 from radarsim.report.statistics import Estimate
 from radarsim.studies import registry
 
@@ -34,58 +35,28 @@ UNKNOWN = Estimate(np.nan, np.nan, np.nan)
 UNPAIRED = 4  # times the realisations where a change moves the scans, so that the noise compared is of other scans
 
 
-class Kind(NamedTuple):
-    """A kind of quantity: where it is read, in which unit, and which way is better.
-
-    columns: the value's in its table, both ends' of its interval, and, if the table has one, its exact value's. scale
-    turns the table's numbers into `unit` (empty: that of the component).
-    """
-
-    words: str
-    table: str
-    columns: tuple[str, str, str, str]
-    unit: str
-    scale: float
-    more_is_better: bool
-
-
-GAIN_COLUMNS = ("gain_percent", "gain_lo", "gain_hi", "exact_percent")
-SIGMA_COLUMNS = ("sigma", "sigma_lo", "sigma_hi", "exact_sigma")
-KINDS = {
-    "gain": Kind("gain", "gains", GAIN_COLUMNS, "%", 1.0, True),
-    "sigma": Kind("σ", "curves", SIGMA_COLUMNS, "", 1.0, False),
-    "lock": Kind("lock rate", "locks", ("lock_rate", "lock_lo", "lock_hi", "exact_lock_rate"), "%", 100.0, True),
-    "right": Kind("right folds", "folds", ("right", "right_lo", "right_hi", "exact_right"), "%", 100.0, True),
-    "loss": Kind("ends of a track an hour", "tracking", ("ends_per_hour", "ends_lo", "ends_hi", ""), "/h", 1.0, False),
-    "false_tracks": Kind(
-        *("false tracks an hour", "tracking", ("false_tracks_per_hour", "false_lo", "false_hi", "")),
-        *("/h", 1.0, False),
-    ),
-}
-
-
-SAID = (  # the kinds, their units, and which units keys have
-    *(term("gain"), term("lock rate"), term("right folds"), term("ends of a track an hour"), term("/h")),
-    *(term("false tracks an hour"), term("σ")),
-)
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """What is asked for: a kind of `KINDS`, of a filter, for gain and sigma of a component.
+class Wanted(NamedTuple):
+    """A quantity by names: its own, that of a filter, and which of the filter's values (a component).
 
     Where it has a course over scans: at a time at_s, linear between two scans, or at scan at_k; neither: at the last.
     """
 
-    kind: str
+    name: str
     filter: str | None = None
     component: str | None = None
     at_s: float | None = None
     at_k: int | None = None
 
-    @property
-    def of(self) -> Kind:
-        return KINDS[self.kind]
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked for: a quantity that a case measures, the others as in `Wanted`."""
+
+    of: Quantity
+    filter: str | None = None
+    component: str | None = None
+    at_s: float | None = None
+    at_k: int | None = None
 
     @property
     def words(self) -> str:
@@ -113,107 +84,134 @@ class Series(NamedTuple):
     values: Estimate
 
 
-def checked(quantity: Quantity, case: Case) -> None:
-    """ConfigError for a filter or a rate that a case has not, before anything is prepared."""
-    known = {one.name for one in registry.study(case.study).quantities(case.spec)}
-    if quantity.kind not in known:
-        raise none_made(quantity, case.name, case.study)
-    if quantity.filter is not None:
-        named(quantity.filter, [member.name for member in case.spec.members])
+def checked(wanted: Wanted, case: Case) -> Asked:
+    """What is asked of a case, before anything is prepared. ConfigError for a quantity or filter that it has not."""
+    name, chosen, component, at_s, at_k = wanted
+    of = registry.quantity(name, case)
+    if not of.per:
+        if chosen is not None and component is not None:
+            raise ConfigError(f"{of.option} names the filter itself: leave --filter out")
+        chosen, component = component if chosen is None else chosen, None
+    if chosen is not None:
+        named(chosen, [member.name for member in case.spec.members])
+    return Asked(of, chosen, component, at_s, at_k)
 
 
-def named(name: str, names: Sequence[str]) -> None:
-    """ConfigError unless one of the filters has this name."""
+def named(name: str, names: Sequence[str], what: str = "filter") -> None:
+    """ConfigError unless one of the filters, or of what else, has this name."""
     if name not in names:
         near = did_you_mean(name, names) or f"; there are: {', '.join(names)}"
-        raise ConfigError(f"no filter {name!r}{near}")
+        raise ConfigError(f"no {what} {name!r}{near}")
 
 
-def none_made(quantity: Quantity, name: str, study: str) -> ConfigError:
-    """That the study of a case makes no table of the quantity's kind."""
-    what, table = quantity.of.words, quantity.of.table
-    return ConfigError(f"{name}: study {study} knows no {what}: it makes no {table}.csv")
-
-
-def resolved(quantity: Quantity, axes: Axes) -> Quantity:
-    """The quantity with its filter, found where there is but one. ConfigError for names that the case has not."""
-    names, chosen = list(axes.filters), quantity.filter
+def resolved(asked: Asked, axes: Axes) -> Asked:
+    """The same with its filter, found where there is but one. ConfigError for names that the case has not."""
+    names, chosen = list(axes.filters), asked.filter
     if chosen is None:
-        others = [name for i, name in enumerate(names) if quantity.kind != "gain" or i != axes.baseline]
+        others = [name for i, name in enumerate(names) if not asked.of.paired or i != axes.baseline]
         if len(others) != 1:
             raise ConfigError(f"--filter: name one of {', '.join(names)}")
         chosen = others[0]
     named(chosen, names)
-    if quantity.kind == "gain" and chosen == names[axes.baseline]:
-        raise ConfigError(f"filter {chosen!r} is the baseline, against which gains are: its gain is 0 % at any value")
-    components = [name for name, _ in axes.components]
-    if quantity.component is not None and quantity.component not in components:
-        near = did_you_mean(quantity.component, components) or f"; there are: {', '.join(components)}"
-        raise ConfigError(f"no component {quantity.component!r}{near}")
-    return replace(quantity, filter=chosen)
+    if asked.of.paired and chosen == names[axes.baseline]:
+        words = asked.of.words
+        raise ConfigError(
+            f"filter {chosen!r} is the baseline, against which {words}s are: its {words} is 0 % at any value"
+        )
+    if asked.component is not None and planned(asked.of):
+        named(asked.component, [name for name, _ in axes.components], "component")
+    return replace(asked, filter=chosen)
 
 
-def unit(quantity: Quantity, axes: Axes) -> str:
+def unit(asked: Asked, axes: Axes) -> str:
     """The unit in which a quantity is given."""
     from radarsim.report import tables
 
-    return quantity.of.unit or tables.unit(dict(axes.components)[str(quantity.component)])
+    return tables.unit(asked.of.shown_unit(dict(axes.components).get(str(asked.component), "")))
 
 
-def shortened(quantity: Quantity, case: Case) -> Case:
+def shortened(quantity: Asked, case: Case) -> Case:
     """The case as far as a quantity asks for it. Raises ConfigError where the whole case cannot be."""
     return registry.study(case.study).shortened(case, quantity.at_s, quantity.at_k)
 
 
-def labels(quantity: Quantity, case: Case) -> Axes:
+def labels(quantity: Asked, case: Case) -> Axes:
     """The labels of a case's plan, with the exact errors as far as a quantity asks for them. Raises ConfigError."""
     return registry.study(case.study).prepare(shortened(quantity, case)).axes
 
 
-def exact(quantity: Quantity, case: Case, axes: Axes) -> float:
+PLANNED = {("curves", "sigma"): "exact_sigma", ("gains", "gain_percent"): "exact_gains"}  # by table and column
+
+
+def planned(of: Quantity) -> bool:
+    """Whether a plan has its exact values, where they are known: σ and gain, of the common tables."""
+    return (of.table, of.value) in PLANNED
+
+
+def exact(asked: Asked, case: Case, axes: Axes) -> float:
     """The exact value from the labels of a case's plan; not-a-number where none is known without sampling."""
-    if quantity.kind not in ("gain", "sigma") or not registry.study(case.study).exact_errors:
+    if not planned(asked.of) or not registry.study(case.study).exact_errors:
         return np.nan
-    f = axes.filters.index(str(quantity.filter))
-    c = [name for name, _ in axes.components].index(str(quantity.component))
+    f = axes.filters.index(str(asked.filter))
+    c = [name for name, _ in axes.components].index(str(asked.component))
     there = axes.available[f, :, c]
-    if quantity.kind == "gain":
+    if asked.of.paired:
+        if f == axes.baseline:
+            return np.nan
         there = there & axes.available[axes.baseline, :, c]
-    known = np.asarray(axes.exact_gains if quantity.kind == "gain" else axes.exact_sigma, dtype=float)
+    known = np.asarray(getattr(axes, PLANNED[asked.of.table, asked.of.value]), dtype=float)
     value = np.where(there, known[f, :, c], np.nan)
     k, t_s = np.asarray(axes.k), np.asarray(axes.t_s, dtype=float)
-    return float(at(quantity, Series(k, t_s, Estimate(value, value, value))).value)
+    return float(at(asked, Series(k, t_s, Estimate(value, value, value))).value)
 
 
-def sampled(quantity: Quantity, result: CaseResult) -> tuple[Estimate, float]:
+def sampled(asked: Asked, result: CaseResult) -> tuple[Estimate, float]:
     """Value and 95 % interval from a case's tables, and its exact value where the table has one, else not-a-number."""
-    rows = _rows(quantity, result)
-    if not len(rows):
+    table = table_of(asked.of, result)
+    table = table[table["filter"] == asked.filter]
+    if not len(table):
         return UNKNOWN, np.nan
-    *columns, known = quantity.of.columns
-    scale = quantity.of.scale
-    values = [scale * rows[name].to_numpy(dtype=float) for name in columns]
-    exactly = scale * rows[known].to_numpy(dtype=float) if known in rows else np.full(len(rows), np.nan)
-    k = rows["k"].to_numpy() if "k" in rows else np.zeros(len(rows), dtype=int)
-    t_s = rows["t_s"].to_numpy(dtype=float) if "t_s" in rows else np.zeros(len(rows))
-    return (
-        at(quantity, Series(k, t_s, Estimate(*values))),
-        float(at(quantity, Series(k, t_s, Estimate(exactly, exactly, exactly))).value),
-    )
+    own, known = ({part: one for (_, part), one in courses(asked.of, table, of).items()} for of in (False, True))
+    name = asked.component or ""
+    named(name, list(own), asked.of.per)
+    return at(asked, own[name]), float(at(asked, known[name]).value)
 
 
-def noted(quantity: Quantity, result: CaseResult) -> str:
+def table_of(of: Quantity, result: CaseResult) -> "pd.DataFrame":
+    """The table of a case that holds a quantity. Raises ConfigError where the study makes none."""
+    made = registry.study(result.study).table(of.table, [result])
+    if made is None:
+        raise ConfigError(f"{result.name}: no {of.words}: study {result.study} makes no {of.table}.csv")
+    return made
+
+
+def courses(of: Quantity, table: "pd.DataFrame", exactly: bool = False) -> dict[tuple[str, str], Series]:
+    """A quantity, or its exact values, over scans in its table, by filter and component, which is empty without any."""
+    values, known = of.read(table)
+    ends = Estimate(known, known, known) if exactly else values
+    size = len(table)
+    k = table["k"].to_numpy() if "k" in table else np.zeros(size, dtype=int)
+    t_s = table["t_s"].to_numpy(dtype=float) if "t_s" in table else np.zeros(size)
+    parts = table[of.per] if of.per else np.full(size, "", dtype=object)
+    groups: Any = table.groupby([table["filter"], parts], sort=False).indices.items()
+    return {
+        (name, str(part)): Series(k[rows], t_s[rows], Estimate(*(of.scale * end[rows] for end in ends)))
+        for (name, part), rows in groups
+    }
+
+
+def noted(quantity: Asked, result: CaseResult) -> str:
     """What the tables would note of the interval there, no exact value beside it: why it is too narrow, or nothing."""
     from radarsim.report import notes
 
     study, name = registry.study(result.study), quantity.of.table
-    made = {"curves": study.curves([result]), "gains": study.gains([result])} | study.tables([result])
-    table = notes.noted({key: made[key] for key in {"curves", name}}, [result], exact=False)[name]
+    made = {key: table for key in {"curves", name} if (table := study.table(key, [result])) is not None}
+    table = notes.noted(made, [result], exact=False)[name]
     if "note" not in table:
         return ""
     rows = table[table["filter"] == quantity.filter]
     if quantity.component is not None:
-        rows = rows[rows["component"] == quantity.component]
+        rows = rows[rows[quantity.of.per].astype(str) == quantity.component]
     if quantity.at_k is not None:
         rows = rows[rows["k"] == quantity.at_k]
     elif quantity.at_s is not None and "t_s" in rows:
@@ -222,7 +220,7 @@ def noted(quantity: Quantity, result: CaseResult) -> str:
     return str(rows["note"].iloc[-1]) if len(rows) else ""
 
 
-def scan(quantity: Quantity, axes: Axes) -> int:
+def scan(quantity: Asked, axes: Axes) -> int:
     """The scan that a quantity at a time is read at, or the later of two; 0 where it is asked for by its number."""
     k, t_s = np.asarray(axes.k), np.asarray(axes.t_s, dtype=float)
     if quantity.at_k is not None or not len(k):
@@ -231,33 +229,7 @@ def scan(quantity: Quantity, axes: Axes) -> int:
     return int(k[last if quantity.at_s is None else min(int(np.searchsorted(t_s, quantity.at_s * (1 - 1e-12))), last)])
 
 
-def courses(kind: str, table: "pd.DataFrame") -> dict[tuple[str, str], Series]:
-    """The values of every filter and component from a table of a kind that is at hand, without their intervals."""
-    value, k, t_s = (table[name].to_numpy(dtype=float) for name in (KINDS[kind].columns[0], "k", "t_s"))
-    rows: Any = table.groupby(["filter", "component"], sort=False).indices.items()
-    return {cell: Series(k[at], t_s[at], Estimate(*[value[at]] * 3)) for cell, at in rows}
-
-
-def _rows(quantity: Quantity, result: CaseResult) -> "pd.DataFrame":
-    """The rows of the quantity's table that are of its filter and component; of a table without scans one row.
-
-    Raises ConfigError where the study makes no such table.
-    """
-    study, name = registry.study(result.study), quantity.of.table
-    table: Any
-    if name in ("curves", "gains"):
-        table = study.gains([result]) if name == "gains" else study.curves([result])
-    else:
-        table = study.tables([result]).get(name)
-    if table is None:
-        raise none_made(quantity, result.name, result.study)
-    table = table[table["filter"] == quantity.filter]
-    if quantity.component is not None:
-        table = table[table["component"] == quantity.component]
-    return table
-
-
-def at(quantity: Quantity, series: Series) -> Estimate:
+def at(quantity: Asked, series: Series) -> Estimate:
     """The series at the time or scan that is asked for: not-a-number where there is no estimate.
 
     Raises ConfigError for a time or scan beyond the run.

@@ -11,7 +11,7 @@ from typing import Any
 
 from radarsim.app import quantities
 from radarsim.app.configs import CaseWork, load
-from radarsim.app.quantities import UNKNOWN, Quantity
+from radarsim.app.quantities import UNKNOWN, Asked
 from radarsim.app.run import case_result
 from radarsim.config import fields
 from radarsim.config.check import label
@@ -45,7 +45,7 @@ class Answer:
 
     key: str
     unit: str
-    quantity: Quantity
+    quantity: Asked
     quantity_unit: str
     equals: float
     now: float | None
@@ -121,7 +121,7 @@ class Question:
 
     cases: Cases
     key: str
-    quantity: Quantity
+    quantity: Asked
     equals: float
     over: quantities.Range
     now: float | None
@@ -185,7 +185,7 @@ class Curve:
         self,
         cases: Cases,
         key: str,
-        quantity: Quantity,
+        quantity: Asked,
         threads: int | None,
         progress: Callable[[int, int, int], None] | None,
         realisations: int,
@@ -204,7 +204,7 @@ class Curve:
         case = self.cases.base
         if not math.isnan(quantities.exact(self.quantity, case, axes)):
             return True
-        if self.quantity.kind in ("gain", "sigma"):
+        if quantities.planned(self.quantity.of):
             return False
         _, known = self._sampled(case, 1)
         self.from_tables = not math.isnan(known)

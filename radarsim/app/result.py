@@ -499,6 +499,12 @@ def answer(one: "Answer") -> dict[str, Any]:
     return {**asdict(one), "quantity": one.quantity.words}
 
 
+def sensitivity(one: "DataclassInstance") -> dict[str, Any]:
+    """What each key changes, the quantities by name."""
+    made = fields(one)
+    return made | {"of": [of["name"] for of in made["of"]]}
+
+
 def drawn(one: "Drawn") -> dict[str, Any]:
     """A chart: the sentences, the rows of chart.csv, and the files."""
     return {"folder": str(one.folder), "sentences": one.sentences, "cases": one.rows, "files": one.files}

@@ -15,19 +15,21 @@ import numpy as np
 
 from radarsim.app import configs, quantities
 from radarsim.app.configs import CaseWork
-from radarsim.app.quantities import UNPAIRED, Quantity
+from radarsim.app.quantities import UNPAIRED, Asked
 from radarsim.app.question import Cases, Config
+from radarsim.app.run import case_result
 from radarsim.config import fields
 from radarsim.config.check import Label, label
-from radarsim.config.document import did_you_mean
 from radarsim.config.experiment import Case
 from radarsim.config.fields import Study
 from radarsim.engine.results import Axes, CaseResult
+from radarsim.engine.run import collect
 from radarsim.errors import ConfigError
-from radarsim.language import tr
+from radarsim.language import listed, term, tr
 from radarsim.report import files, panels, statistics
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.report.quantities import Quantity
 from radarsim.studies import registry
 
 if TYPE_CHECKING:
@@ -39,24 +41,31 @@ MOST_BARS = 16
 NOTHING = 1e-9  # per cent: what rounding may make of no change
 ROUNDED = NOTHING / 100  # the same of a ratio; of gains, in points, still less
 FOLDER = "sensitivity"
-COLUMNS = (
-    *("case", "filter", "component", "unit", "key", "value", "changed_value"),
-    *("sigma", "sigma_change_percent", "sigma_change_lo", "sigma_change_hi"),
-    *("gain_percent", "gain_change_points", "gain_change_lo", "gain_change_hi", "exact"),
-)
+LABELS = ("case", "filter", "component", "unit", "key", "value", "changed_value")
+
+
+def columns(of: Sequence[Quantity]) -> tuple[str, ...]:
+    """Those of sensitivity.csv, of some quantities."""
+    return *LABELS, *(name for one in of for name in (_value(one), *one.changes)), "exact"
+
+
+def _value(of: Quantity) -> str:
+    """The column of a quantity's value."""
+    return f"{of.name}_percent" if of.shown_unit() == "%" else of.name
 
 
 @dataclass(frozen=True)
 class Sensitivity:
     """What was found: one row a key, filter and component, by falling effect of the key on the component that leads.
 
-    at says when; without_effect are keys that change nothing, left_out those that cannot be raised, with the reason.
-    without_estimate are filters that no row is about, as they have no estimate there. not_paired are sampled keys that
-    change when the scans are.
-    labels: what people call each key of the rows, with its symbol and unit.
+    of are the quantities, the first of which decides; leading is empty where that has no components. at says when;
+    without_effect are keys that change nothing, left_out those that cannot be raised, with the reason. without_estimate
+    are filters that no row is about, as they have no estimate there. not_paired are sampled keys that change when the
+    scans are. labels: what people call each key of the rows, with its symbol and unit.
     """
 
     stem: str
+    of: tuple[Quantity, ...]
     leading: str
     at: str
     rows: tuple[dict[Hashable, Any], ...]
@@ -73,25 +82,30 @@ def sensitivity(
     overrides: Sequence[str] = (),
     at_s: float | None = None,
     at_k: int | None = None,
+    of: str | None = None,
     component: str | None = None,
     case: str | None = None,
     realisations: int | None = None,
     progress: Callable[[int, int, int], None] | None = None,
 ) -> Sensitivity:
-    """The changes of σ and gain at a time, at a scan, or at the time of the last scan, for +10 % of each numeric key.
+    """The changes of a quantity, or of σ and gain, at a time, at a scan, or at the time of the last scan, for +10 % of
+    each numeric key.
 
     Whole numbers grow by at least one. component leads the order: by default the first. Raises ConfigError.
     """
     cases = Cases(config, tuple(overrides), case)
-    names = [name for name, _ in quantities.labels(Quantity("sigma", at_k=1), cases.base).components]
-    leading = names[0] if component is None else component
-    if leading not in names:
-        near = did_you_mean(leading, names) or f"; there are: {', '.join(names)}"
-        raise ConfigError(f"no component {leading!r}{near}")
-    axes = registry.study(cases.base.study).prepare(cases.base).axes
-    timed = registry.study(cases.base.study).exact_errors and at_s is None and at_k is None
-    asked = Quantity("sigma", at_s=float(axes.t_s[-1]) if timed else at_s, at_k=at_k)
-    look = Look(asked, axes, realisations or cases.base.realisations)
+    study = registry.study(cases.base.study)
+    every = study.quantities(cases.base.spec)
+    kinds = tuple(one for one in every if quantities.planned(one)) or every[:1]
+    kinds = kinds if of is None else (registry.quantity(of, cases.base),)
+    first = quantities.labels(Asked(kinds[0], at_k=1), cases.base)
+    parts = tuple(first.components) if quantities.planned(kinds[0]) else _parts(kinds[0], cases.base)
+    leading = parts[0][0] if component is None else component
+    quantities.named(leading, [name for name, _ in parts], kinds[0].per or "component")
+    axes = study.prepare(cases.base).axes
+    timed = study.exact_errors and at_s is None and at_k is None and quantities.planned(kinds[0])
+    asked = Asked(kinds[0], at_s=float(axes.t_s[-1]) if timed else at_s, at_k=at_k)
+    look = Look(asked, kinds, axes, parts, realisations or cases.base.realisations)
     base = look.of(cases.base)
     if not np.isfinite(base.whole[0]).any():
         raise ConfigError("there is no estimate there")
@@ -107,15 +121,26 @@ def sensitivity(
             left_out[key.path] = error.lines[0]
         if progress is not None:
             progress(n + 1, len(keys), 0)
-    effect = {key.path: size(rows, key.path, leading) for key in keys}
+    effect = {key.path: size(rows, key.path, leading, kinds[0].changes[0]) for key in keys}
     idle = [path for path, (own, every) in effect.items() if every < NOTHING and path not in left_out]
     shown = [row for row in rows if row["key"] not in idle]
     shown.sort(key=lambda row: effect[row["key"]], reverse=True)
     labels = {str(row["key"]): named(cases.base.spec, str(row["key"])) for row in shown}
     silent = [name for name, own in zip(axes.filters, base.whole[0], strict=True) if not np.isfinite(own).any()]
     return Sensitivity(
-        cases.base.stem, leading, when(asked), tuple(shown), tuple(idle), tuple(silent), tuple(apart), left_out, labels
+        *(cases.base.stem, kinds, leading, when(asked), tuple(shown), tuple(idle), tuple(silent), tuple(apart)),
+        *(left_out, labels),
     )
+
+
+def _parts(of: Quantity, case: Case) -> tuple[tuple[str, str], ...]:
+    """The components, or what else a quantity has several values of a filter by, with their units, from its table."""
+    work = CaseWork(case)
+    table = quantities.table_of(of, case_result(case, work, collect(work, 1)))
+    if not of.per:
+        return (("", of.shown_unit()),)
+    units = table["unit"] if "unit" in table else [of.shown_unit()] * len(table)
+    return tuple(dict(zip(table[of.per].astype(str), units, strict=True)).items())
 
 
 TARGET = "target"  # the key whose own keys are called like others: a duration, a range
@@ -140,25 +165,25 @@ def more(key: fields.NumericKey) -> float:
     return key.value + max(1, round(MORE * key.value)) if key.whole else key.value * (1 + MORE)
 
 
-def when(asked: Quantity) -> str:
+def when(asked: Asked) -> str:
     """At which time or scan, in words."""
     if asked.at_k is not None:
         return tr("at k = {k}", k=str(asked.at_k))
     return tr("at the last scan") if asked.at_s is None else tr("at {t_s:g} s", t_s=asked.at_s)
 
 
-def size(rows: Sequence[dict[Hashable, Any]], path: str, leading: str) -> tuple[float, float]:
-    """The greatest change of σ that a key makes: of the leading component, and of any, per cent."""
+def size(rows: Sequence[dict[Hashable, Any]], path: str, leading: str, change: str) -> tuple[float, float]:
+    """The greatest change, in this column, that a key makes: of the leading component, and of any."""
     own = [row for row in rows if row["key"] == path]
     parts = [[row for row in own if row["component"] == leading], own]
-    first, every = (max((abs(row["sigma_change_percent"]) for row in part), default=0.0) for part in parts)
+    first, every = (max((abs(row[change]) for row in part), default=0.0) for part in parts)
     return first, every
 
 
 class Seen(NamedTuple):
-    """σ, and gain in per cent, of F filters and C components at one time: of the whole case (2, F, C), and of all its
-    realisations but one of n batches (2, n, F, C), n = 1 where exact. Not-a-number where there is no estimate.
-    t_s (K,) are the times of the scans, s."""
+    """Q quantities of F filters and C components at one time: of the whole case (Q, F, C), and of all its realisations
+    but one of n batches (Q, n, F, C), n = 1 where exact. Not-a-number where there is no estimate. t_s (K,) are the
+    times of the scans, s."""
 
     whole: np.ndarray
     but_one: np.ndarray
@@ -173,18 +198,16 @@ class Seen(NamedTuple):
 class Look:
     """How a case is looked at: every filter and component at one time, exactly or in batches of realisations."""
 
-    asked: Quantity
+    asked: Asked
+    kinds: tuple[Quantity, ...]
     axes: Axes
+    parts: tuple[tuple[str, str], ...]
     realisations: int
 
     @property
     def cells(self) -> list[tuple[int, int]]:
         """Filters and components, by their places."""
-        return [(f, c) for f in range(len(self.axes.filters)) for c in range(len(self.axes.components))]
-
-    def quantity(self, kind: str, f: int, c: int) -> Quantity:
-        """σ or gain of one filter and component."""
-        return replace(self.asked, kind=kind, filter=self.axes.filters[f], component=self.axes.components[c][0])
+        return [(f, c) for f in range(len(self.axes.filters)) for c in range(len(self.parts))]
 
     def pair(self, case: Case, base: Seen, raised: Case) -> tuple[Seen, Seen]:
         """What a case, `base` with the usual realisations, and a raised one show. Raises ConfigError.
@@ -200,18 +223,24 @@ class Look:
 
     def of(self, case: Case) -> Seen:
         """What a case shows. Raises ConfigError."""
-        if not registry.study(case.study).exact_errors:
-            return self._sampled(case)
         axes = quantities.labels(self.asked, case)
-        known = self._each(lambda quantity: quantities.exact(quantity, case, axes))
+        known = self._each(lambda asked: quantities.exact(asked, case, axes))
+        if not quantities.planned(self.asked.of):
+            work = CaseWork(case)
+            known = self._of_result(case_result(case, work, collect(work, 1)), exactly=True)
         # Of some filters alone, the others would seem to change nothing.
         exact = np.isfinite(known[0]).any(axis=1).all()
         return Seen(known, known[:, None], np.asarray(axes.t_s)) if exact else self._sampled(case)
 
-    def _each(self, of: Callable[[Quantity], float]) -> np.ndarray:
-        """(2, F, C) of a function of the quantity."""
-        values = [of(self.quantity(kind, f, c)) for kind in ("sigma", "gain") for f, c in self.cells]
-        return np.array(values).reshape(2, len(self.axes.filters), len(self.axes.components))
+    def _each(self, of: Callable[[Asked], float]) -> np.ndarray:
+        """(Q, F, C) of a function of what is asked."""
+        names = [(self.axes.filters[f], self.parts[c][0] or None) for f, c in self.cells]
+        values = [
+            of(replace(self.asked, of=kind, filter=filter_name, component=part))
+            for kind in self.kinds
+            for filter_name, part in names
+        ]
+        return np.array(values).reshape(len(self.kinds), len(self.axes.filters), len(self.parts))
 
     def _sampled(self, case: Case) -> Seen:
         work, each = CaseWork(case), max(2, self.realisations // BATCHES)
@@ -223,35 +252,41 @@ class Look:
 
     def _of_sums(self, case: Case, work: CaseWork, packed: np.ndarray, count: int) -> np.ndarray:
         sums = work.plan.layout.unpack(packed)
-        study = registry.study(case.study)
-        results = [CaseResult(case.name, case.study, case.spec, case.swept, count, sums, work.plan.axes)]
-        tables = {"sigma": study.curves(results), "gain": study.gains(results)}
-        known = {kind: quantities.courses(kind, made) for kind, made in tables.items()}
+        return self._of_result(CaseResult(case.name, case.study, case.spec, case.swept, count, sums, work.plan.axes))
 
-        def value(quantity: Quantity) -> float:
-            course = known[quantity.kind].get((str(quantity.filter), str(quantity.component)))
-            return math.nan if course is None else float(quantities.at(quantity, course).value)
+    def _of_result(self, result: CaseResult, exactly: bool = False) -> np.ndarray:
+        """(Q, F, C) from the tables of a case: measured, or exact values."""
+        known = {kind: quantities.courses(kind, quantities.table_of(kind, result), exactly) for kind in self.kinds}
+
+        def value(asked: Asked) -> float:
+            course = known[asked.of].get((str(asked.filter), asked.component or ""))
+            return math.nan if course is None else float(quantities.at(asked, course).value)
 
         return self._each(value)
 
     def rows(self, case: Case, key: fields.NumericKey, base: Seen, raised: Seen) -> list[dict[Hashable, Any]]:
         """A row for each filter and component that has an estimate, with the changes from base to raised."""
+        changes = [
+            (_change(of, base.whole[q], raised.whole[q]), _change(of, base.but_one[q], raised.but_one[q]))
+            for q, of in enumerate(self.kinds)
+        ]
         made: list[dict[Hashable, Any]] = []
-        with np.errstate(divide="ignore", invalid="ignore"):
-            grown, ratios = np.log(raised.whole[0] / base.whole[0]), np.log(raised.but_one[0] / base.but_one[0])
-        gained, points = raised.whole[1] - base.whole[1], raised.but_one[1] - base.but_one[1]
         for f, c in self.cells:
-            if not np.isfinite(grown[f, c]):
+            if not np.isfinite(changes[0][0][f, c]):
                 continue
-            change = interval(ratios[:, f, c], grown[f, c])
-            gain = [math.nan] * 4
-            if f != self.axes.baseline:
-                gain = [base.whole[1, f, c], *interval(points[:, f, c], gained[f, c])]
-            name, unit = self.axes.components[c]
-            values = [case.name, self.axes.filters[f], name, unit, key.path, key.value, more(key), base.whole[0, f, c]]
-            values += [*(100 * math.expm1(end) for end in change), *gain, base.exact]
-            made.append(dict(zip(COLUMNS, values, strict=True)))
+            name, unit = self.parts[c]
+            values = [case.name, self.axes.filters[f], name, unit, key.path, key.value, more(key)]
+            for q, (of, (change, but_one)) in enumerate(zip(self.kinds, changes, strict=True)):
+                ends = interval(but_one[:, f, c], change[f, c])
+                values += [base.whole[q, f, c], *(100 * math.expm1(end) if of.kind == "size" else end for end in ends)]
+            made.append(dict(zip(columns(self.kinds), [*values, base.exact], strict=True)))
         return made
+
+
+def _change(of: Quantity, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """The change of values of a quantity, of a size that of its logarithm."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.log(after / before) if of.kind == "size" else after - before
 
 
 def interval(but_one: np.ndarray, value: float) -> tuple[float, float, float]:
@@ -270,24 +305,23 @@ def interval(but_one: np.ndarray, value: float) -> tuple[float, float, float]:
 
 def table(found: Sensitivity) -> "pd.DataFrame":
     """sensitivity.csv."""
-    return common.frame({name: [row[name] for row in found.rows] for name in COLUMNS})
+    return common.frame({name: [row[name] for row in found.rows] for name in columns(found.of)})
 
 
 def tornado(found: Sensitivity) -> Figure:
-    """Bars of the changes of the leading component by key: σ of each filter, and gains."""
+    """Bars of the changes of the leading component by key: each quantity of each filter."""
     rows = [row for row in found.rows if row["component"] == found.leading]
     keys = list(dict.fromkeys(row["key"] for row in rows))[:MOST_BARS][::-1]
     filters = list(dict.fromkeys(row["filter"] for row in rows))
-    gaining = any(math.isfinite(row["gain_change_points"]) for row in rows)
-    kinds = [("sigma_change", "percent", tr("change of $\\sigma$, %"))]
-    kinds += [("gain_change", "points", tr("change of gain, points"))] if gaining else []
+    kinds = [of for of in found.of if any(math.isfinite(row[of.changes[0]]) for row in rows)]
     made = []
-    for n, (name, ending, words) in enumerate(kinds):
+    for n, of in enumerate(kinds):
+        change, *bounds = of.changes
         marks: list[Mark] = [Reference(0.0, "x")]
         for i, one in enumerate(filters):
             own = {row["key"]: row for row in rows if row["filter"] == one}
             for j, key in enumerate(keys):
-                value = own[key][f"{name}_{ending}"] if key in own else math.nan
+                value = own[key][change] if key in own else math.nan
                 at = j - 0.7 * ((i + 0.5) / len(filters) - 0.5)
                 if math.isfinite(value):
                     x, y = np.array([0.0, value]), np.array([at, at])
@@ -295,17 +329,19 @@ def tornado(found: Sensitivity) -> Figure:
                         Line(x, y, "", Style(i, 0, width_pt=9.0 / len(filters), flat=True), name=f"{one}, {key}")
                     )
                 if math.isfinite(value) and not own[key]["exact"]:
-                    ends = np.array([own[key][f"{name}_lo"], own[key][f"{name}_hi"]])
+                    ends = np.array([own[key][bound] for bound in bounds])
                     marks.append(Line(ends, y, "", Style(i, 0, width_pt=1.0, flat=True), name=f"{one}, {key}, 95 %"))
         ticks = tuple((float(j), tick(found.labels[key]) if n == 0 else "") for j, key in enumerate(keys))
         y_axis = Axis("", limits=(-0.6, len(keys) - 0.4), ticks=ticks)
         names = [(panels.literal(one), Style(i, 0, width_pt=4.0, flat=True)) for i, one in enumerate(filters)]
         styles = tuple(names) if n == len(kinds) - 1 else ()
+        words = tr("change of {quantity}, {unit}", quantity=term(of.words), unit=tr(of.changed_unit))
         made.append(Panel(Axis(words), y_axis, tuple(marks), keys=styles, direct=False, legend="right"))
+    what = listed([tr(of.words) for of in kinds])
+    if found.leading:
+        what = tr("{quantity} of {symbol}", quantity=what, symbol=found.leading)
     caption = tr(
-        "Change of σ and gain of {component} {when} for a tenth more of each key, the largest first.",
-        component=found.leading,
-        when=found.at,
+        "Change of {quantity} {when} for a tenth more of each key, the largest first.", quantity=what, when=found.at
     )
     if not all(row["exact"] for row in rows):
         caption += " " + tr("Thin lines: 95 % intervals.")

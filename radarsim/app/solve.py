@@ -15,7 +15,7 @@ from functools import partial
 from itertools import pairwise
 
 from radarsim.app import quantities, question
-from radarsim.app.quantities import UNPAIRED, Quantity
+from radarsim.app.quantities import UNPAIRED, Wanted
 from radarsim.app.question import Answer, Cases, Curve, Question
 from radarsim.config import fields
 from radarsim.errors import ConfigError
@@ -195,7 +195,7 @@ DOUBT = 0.01  # of the quantity: how near to the target the rough one may come w
 def solve(
     config: question.Config,
     key: str,
-    quantity: Quantity,
+    wanted: Wanted,
     equals: float,
     *,
     overrides: Sequence[str] = (),
@@ -220,7 +220,7 @@ def solve(
         raise ConfigError(f"--equals: must be a finite number, got {equals:g}")
     cases = Cases(config, tuple(overrides), case)
     found = fields.find(cases.base.spec, key)
-    quantities.checked(quantity, cases.base)
+    quantity = quantities.checked(wanted, cases.base)
     axes = quantities.labels(quantity, cases.base)
     quantity = quantities.resolved(quantity, axes)
     over = question.range_of(found, key, between)

@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from radarsim.app.compare import Drawn
     from radarsim.app.question import Answer
     from radarsim.app.sensitivity import Sensitivity
+    from radarsim.report.quantities import Quantity
 
 
 PLAIN = ".6g"
-RATES = ("lock", "right")  # kinds of which what is left to 100 % matters
 MOST_DIGITS = 12  # behind the point: beyond, rounding shows
 SAME = 1e-9  # of a quantity: how near an exact root comes
 
@@ -72,26 +72,25 @@ def print_drawn(drawn: "Drawn") -> None:
 
 
 def print_sensitivity(found: "Sensitivity", written: "Sequence[str]") -> None:
-    """A table of the leading component: key, its values, and the change of σ and gain of each filter."""
+    """A table of the leading component: key, its values, and the change of each quantity of each filter."""
     rows = [row for row in found.rows if row["component"] == found.leading]
-    filters = list(dict.fromkeys(row["filter"] for row in rows))
-    gaining = [
-        one for one in filters if any(not math.isnan(row["gain_percent"]) for row in rows if row["filter"] == one)
+    shown = [
+        (of, one)
+        for of in found.of
+        for one in dict.fromkeys(row["filter"] for row in rows)
+        if any(not math.isnan(row[of.changes[0]]) for row in rows if row["filter"] == one)
     ]
     cells = []
     for key in dict.fromkeys(row["key"] for row in rows):
         own = {row["filter"]: row for row in rows if row["key"] == key}
         first = next(iter(own.values()))
         changed = _with_unit(first["changed_value"], found.labels[str(key)].unit)
-        line = [key, f"{_number(first['value'])} → {changed}"]
-        line += [_change(own.get(one), "sigma_change", "percent", "%") for one in filters]
-        line += [_change(own.get(one), "gain_change", "points", "") for one in gaining]
+        line = [key, f"{_number(first['value'])} → {changed}", *(_change(own.get(one), of) for of, one in shown)]
         cells.append(line)
-    columns = ["key", "value", *(tr("σ of {name}", name=one) for one in filters)]
-    columns += [tr("gain of {name}, points", name=one) for one in gaining]
-    title = tr(
-        "{stem}: change of {component} {when} for +10 %", stem=found.stem, component=found.leading, when=found.at
-    )
+    heads = [(tr("{kind} of {filter}", kind=of.words, filter=one), of.changed_unit) for of, one in shown]
+    columns = ["key", "value", *(head if unit == "%" else f"{head}, {tr(unit)}" for head, unit in heads)]
+    what = found.leading or tr(found.of[0].words)
+    title = tr("{stem}: change of {component} {when} for +10 %", stem=found.stem, component=what, when=found.at)
     show(title, columns, cells, right=columns[1:], spare=columns[:1:-1])
     if found.without_effect:
         field("no effect", ", ".join(found.without_effect))
@@ -107,12 +106,12 @@ def print_sensitivity(found: "Sensitivity", written: "Sequence[str]") -> None:
     field("files", ", ".join(written))
 
 
-def _change(row: "dict[Hashable, Any] | None", name: str, ending: str, unit: str) -> str:
+def _change(row: "dict[Hashable, Any] | None", of: "Quantity") -> str:
     """A change with its sign, and with its interval where it has one."""
     if row is None:
         return ""
-    value, lo, hi = (row[f"{name}_{end}"] for end in (ending, "lo", "hi"))
-    text = f"{_number(value, '+.3g')} {unit}".strip()
+    value, lo, hi = (row[name] for name in of.changes)
+    text = f"{_number(value, '+.3g')}{' %' * (of.changed_unit == '%')}"
     return text if row["exact"] else f"{text} [{_number(lo, '+.2g')}, {_number(hi, '+.2g')}]"
 
 
@@ -144,7 +143,8 @@ def _now(answer: "Answer") -> str:
 
 
 def _quantity(answer: "Answer", value: float) -> str:
-    return f"{_rate(value) if answer.quantity.kind in RATES else _number(value, '.4g')} {tr(answer.quantity_unit)}"
+    number = _rate(value) if answer.quantity.of.kind == "share" else _number(value, ".4g")
+    return f"{number} {tr(answer.quantity_unit)}"
 
 
 def _rate(percent: float) -> str:

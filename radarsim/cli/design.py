@@ -1,5 +1,7 @@
 """The commands that ask about a design: solve, sensitivity, chart. Heavy imports wait inside the commands."""
 
+import functools
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -7,17 +9,10 @@ import click
 from radarsim.cli import group
 
 if TYPE_CHECKING:
-    from radarsim.app.quantities import Quantity
+    from radarsim.app.quantities import Wanted
+    from radarsim.report.quantities import Quantity
 
-
-OPTIONS = {
-    "gain": ("COMPONENT", "Gain in a component (r, Vr, …) against the baseline, per cent."),
-    "sigma": ("COMPONENT", "σ of a component, in its unit."),
-    "lock": ("NAME", "Rate of locks of this estimator, per cent (discriminator)."),
-    "right": ("NAME", "Rate of rightly unfolded velocities of this filter, per cent."),
-    "loss": ("NAME", "Ends of the target's track an hour with this tracker (sonar)."),
-    "false_tracks": ("NAME", "False tracks an hour of this tracker (sonar)."),
-}
+OF = "of_"  # what the parameters of quantities begin with
 
 
 class Named(click.ParamType):
@@ -29,17 +24,49 @@ class Named(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         text = str(value)
         if text.startswith("--"):
-            filters = "" if self.name == "COMPONENT" else ", of the filter itself, without --filter"
+            filters = ", of the filter itself, without --filter" if self.name == "NAME" else ""
             self.fail(f"must be followed by a {self.name}{filters}, got {text}", param, ctx)
         return text
 
 
-def quantity_options(command: Any) -> Any:
-    """The options that name a quantity."""
-    for kind, (metavar, text) in reversed(OPTIONS.items()):
-        name = f"--{kind.replace('_', '-')}"
-        command = click.option(name, kind, type=Named(metavar), metavar=metavar, help=text)(command)
-    return command
+class Asking(click.Command):
+    """A command with an option for each quantity that a study measures, shipped or installed."""
+
+    @functools.cached_property
+    def asking(self) -> dict[str, click.Option]:
+        """Those options, by the quantity's name; what another option has is its name no more."""
+        from radarsim.studies import registry
+
+        measured: dict[str, dict[str, Quantity]] = {}
+        for study, every in registry.parts(lambda one: one.quantities()).items():
+            for one in every:
+                measured.setdefault(one.name, {})[study] = one
+        taken = {name for param in self.params for name in param.opts}
+        return {
+            name: _option(by_study, len(by_study) == len(registry.names()))
+            for name, by_study in measured.items()
+            if next(iter(by_study.values())).option not in taken
+        }
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        return [*super().get_params(ctx), *self.asking.values()]
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        for title, params in (("Quantities", self.asking.values()), ("Options", super().get_params(ctx))):
+            with formatter.section(title):
+                options = [param for param in params if isinstance(param, click.Option)]
+                formatter.write_dl([record for option in options if (record := option.get_help_record(ctx))])
+
+
+def _option(by_study: "Mapping[str, Quantity]", everywhere: bool) -> click.Option:
+    """The option of a quantity, by the studies that measure it."""
+    one = next(iter(by_study.values()))
+    metavar = one.per.upper() or "NAME"
+    unit = one.shown_unit() or "in the component's unit"
+    where = "" if everywhere else f" ({', '.join(by_study)})"
+    words = one.words[0].upper() + one.words[1:] if one.words[0].isascii() else one.words
+    text = f"{words}{' against the baseline' * one.paired}, {unit}{where}."
+    return click.Option([one.option, f"{OF}{one.name}"], type=Named(metavar), metavar=metavar, help=text)
 
 
 at_options = (
@@ -48,10 +75,9 @@ at_options = (
 )
 
 
-@group.main.command()
+@group.main.command(cls=Asking)
 @group.config_argument
 @click.argument("key", metavar="KEY")
-@quantity_options
 @click.option("--filter", "filter_name", metavar="NAME", help="The filter, where there are several.")
 @at_options[0]
 @at_options[1]
@@ -77,7 +103,7 @@ def solve(
     seed: int | None,
     threads: int | None,
     as_json: bool,
-    **kinds: str | None,
+    **quantities: str | None,
 ) -> None:
     """The value of KEY at which a quantity reaches a target.
 
@@ -99,11 +125,11 @@ def solve(
     from radarsim.cli import answers, console
     from radarsim.errors import TargetUnmet
 
-    quantity = asked(kinds, filter_name, at_s, at_k)
+    wanted = asked({name: value for name, value in quantities.items() if value is not None}, filter_name, at_s, at_k)
     overrides = run.merged(overrides, None, seed)
     with console.Progress(key, quiet=as_json, what="values") as progress:
         answer = solving.solve(
-            *(config, key, quantity, equals),
+            *(config, key, wanted, equals),
             overrides=overrides,
             between=between,
             case=case,
@@ -120,22 +146,16 @@ def solve(
         raise TargetUnmet(*answers.unattained(answer))
 
 
-def asked(kinds: "dict[str, str | None]", filter_name: str | None, at_s: float | None, at_k: int | None) -> "Quantity":
+def asked(given: "Mapping[str, str]", filter_name: str | None, at_s: float | None, at_k: int | None) -> "Wanted":
     """The quantity that the options name. Raises UsageError unless it is one."""
-    from radarsim.app.quantities import Quantity
+    from radarsim.app.quantities import Wanted
 
-    given = {kind: value for kind, value in kinds.items() if value is not None}
     if len(given) != 1:
-        options = ", ".join(f"--{kind.replace('_', '-')}" for kind in OPTIONS)
-        raise click.UsageError(f"name one quantity: {options}")
+        raise click.UsageError("name one quantity, as `radarsim solve --help` lists them: --sigma, --gain, …")
     if at_s is not None and at_k is not None:
         raise click.UsageError("--at and --at-k do not go together: a time or a scan")
-    ((kind, name),) = given.items()
-    of_component = kind in ("gain", "sigma")
-    if not of_component and filter_name is not None:
-        raise click.UsageError(f"--{kind.replace('_', '-')} names the filter itself: leave --filter out")
-    component, chosen = (name, filter_name) if of_component else (None, name)
-    return Quantity(kind, chosen, component, at_s, at_k)
+    ((name, value),) = given.items()
+    return Wanted(name.removeprefix(OF), filter_name, value, at_s, at_k)
 
 
 @group.main.command()
@@ -174,6 +194,9 @@ def chart(
 @group.config_argument
 @at_options[0]
 @at_options[1]
+@click.option(
+    "--of", metavar="NAME", help="Of this quantity (`radarsim solve --help` lists them); default: σ and gain."
+)
 @click.option("--component", metavar="COMPONENT", help="The component that is shown and leads; default: the first.")
 @click.option("--case", metavar="CASE", help="The case, of a config that has several.")
 @group.set_option
@@ -186,6 +209,7 @@ def sensitivity(
     config: str,
     at_s: float | None,
     at_k: int | None,
+    of: str | None,
     component: str | None,
     case: str | None,
     overrides: tuple[str, ...],
@@ -195,16 +219,17 @@ def sensitivity(
     drawing: group.Drawing,
     as_json: bool,
 ) -> None:
-    """What +10 % of each key changes: σ and gain, the largest effect first.
+    """What +10 % of each key changes: σ and gain, or another quantity; the largest effect first.
 
-    Every key that holds a number is raised by a tenth, one at a time; whole numbers by at least one. Exact where σ is;
-    else paired, with the same noise, and with 95 % intervals. All filters and components are in
+    Every key that holds a number is raised by a tenth, one at a time; whole numbers by at least one. Exact where the
+    quantity is; else paired, with the same noise, and with 95 % intervals. All filters and components are in
     DIR/sensitivity/CONFIG/sensitivity.csv, the leading component is drawn beside it as tornado.svg.
 
     \b
     Examples
       radarsim sensitivity rls2
       radarsim sensitivity rls2 --at 60 --component Vr
+      radarsim sensitivity discriminator --of lock -n 2000
     """
     from radarsim.app import result, run
     from radarsim.app import sensitivity as finding
@@ -215,6 +240,7 @@ def sensitivity(
     asked_for: dict[str, Any] = {
         "at_s": at_s,
         "at_k": at_k,
+        "of": of,
         "component": component,
         "case": case,
         "realisations": realisations,
@@ -225,6 +251,6 @@ def sensitivity(
         )
     written = finding.write(found, out, *drawing)
     if as_json:
-        click.echo(result.text(result.fields(found) | {"files": written}))
+        click.echo(result.text(result.sensitivity(found) | {"files": written}))
     else:
         answers.print_sensitivity(found, written)

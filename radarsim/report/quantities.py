@@ -85,6 +85,17 @@ class Quantity:
         """What half the width of its interval is counted in for a precision."""
         return "%" if self.kind != "signed" else "points" if self.unit == "%" else self.unit
 
+    @property
+    def changed_unit(self) -> str:
+        """What its changes are counted in."""
+        return "%" if self.kind == "size" else "points" if self.shown_unit() == "%" else self.unit
+
+    @property
+    def changes(self) -> tuple[str, str, str]:
+        """The columns of a change and of its interval's ends."""
+        word = {"%": "_percent", "points": "_points"}.get(self.changed_unit, "")
+        return f"{self.name}_change{word}", f"{self.name}_change_lo", f"{self.name}_change_hi"
+
     def shown_unit(self, of_component: str = "") -> str:
         """The unit in which people read it, of a component with a unit."""
         return "%" if self.kind == "share" else self.unit or of_component

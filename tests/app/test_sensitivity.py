@@ -12,6 +12,7 @@ from radarsim.app.configs import load
 from radarsim.app.sensitivity import sensitivity
 from radarsim.cli import main
 from radarsim.errors import ConfigError
+from radarsim.report.quantities import COMMON
 from tests.studies.range_doppler import impulse
 
 RLS2 = {"variance": 1e-3, "sigma": (250.0, 15.0), "dt": 10.0}
@@ -98,7 +99,7 @@ def test_the_command_writes_table_and_figure(tmp_path):
     folder = tmp_path / "sensitivity" / "rls2"
     assert sorted(path.name for path in folder.iterdir()) == ["sensitivity.csv", "tornado.svg"]
     rows = pd.read_csv(folder / "sensitivity.csv")
-    assert tuple(rows.columns) == finding.COLUMNS
+    assert tuple(rows.columns) == finding.columns(COMMON)
     assert rows["exact"].all()
     lines = ended.stdout.splitlines()
     assert lines[0] == "rls2: change of r at 60 s for +10 %"

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 import radarsim
-from radarsim.app.quantities import Quantity
+from radarsim.app.quantities import Wanted, checked
 from radarsim.app.question import Cases, Curve
 from radarsim.app.solve import solve
 from radarsim.cli import main
@@ -17,7 +17,7 @@ from radarsim.errors import ConfigError
 from radarsim.report.statistics import Estimate
 from tests.studies.range_doppler import impulse
 
-GAIN = Quantity("gain", "r+Vr", "r", 60.0)
+GAIN = Wanted("gain", "r+Vr", "r", 60.0)
 RLS2 = {"variance": 1e-3, "sigma": (250.0, 15.0), "dt": 10.0}
 
 
@@ -48,9 +48,9 @@ def test_what_is_not_attainable_has_its_limit():
 @pytest.mark.parametrize(
     ("key", "quantity", "equals", "setting"),
     [
-        ("radar.sigma_range_m", Quantity("sigma", "r", "Vr", 100.0), 5.0, {"sigma": lambda x: (x, 15.0)}),
-        ("manoeuvre_variance", Quantity("sigma", "r+Vr", "ar", at_k=12), 0.5, {"variance": lambda x: x}),
-        ("manoeuvre_variance", Quantity("gain", None, "Vr"), 25.0, {"variance": lambda x: x}),
+        ("radar.sigma_range_m", Wanted("sigma", "r", "Vr", 100.0), 5.0, {"sigma": lambda x: (x, 15.0)}),
+        ("manoeuvre_variance", Wanted("sigma", "r+Vr", "ar", at_k=12), 0.5, {"variance": lambda x: x}),
+        ("manoeuvre_variance", Wanted("gain", None, "Vr"), 25.0, {"variance": lambda x: x}),
     ],
 )
 def test_other_keys_and_quantities_against_the_textbook(key, quantity, equals, setting):
@@ -59,7 +59,7 @@ def test_other_keys_and_quantities_against_the_textbook(key, quantity, equals, s
     component = ("r", "Vr", "ar").index(quantity.component)
     for value in (found.value, *found.others):
         given = RLS2 | {name: of(value) for name, of in setting.items()}
-        if quantity.kind == "gain":
+        if quantity.name == "gain":
             attained = impulse.gains(scans, **given)[component]
         else:
             attained = impulse.sigmas({"r": 1, "r+Vr": 2}[quantity.filter], scans, **given)[component]
@@ -67,7 +67,7 @@ def test_other_keys_and_quantities_against_the_textbook(key, quantity, equals, s
 
 
 def test_all_roots_are_those_of_a_dense_grid():
-    quantity = Quantity("gain", "r+Vr", "ar", 100.0)
+    quantity = Wanted("gain", "r+Vr", "ar", 100.0)
     found = solve("rls2", "manoeuvre_variance", quantity, 0.0, between=(1e-6, 1e-1))
     grid = np.geomspace(1e-6, 1e-1, 120)
     gains = np.array([impulse.gains(11, x, (250.0, 15.0), 10.0)[2] for x in grid])
@@ -102,14 +102,14 @@ def test_the_confirming_run_confirms():
 
 
 def test_a_time_between_two_scans_is_interpolated():
-    period = solve("rls2", "radar.scan_period_s", Quantity("sigma", "r+Vr", "r", 60.0), 150.0)
+    period = solve("rls2", "radar.scan_period_s", Wanted("sigma", "r+Vr", "r", 60.0), 150.0)
     k, share = divmod(60 / period.value, 1)
     ends = [impulse.sigmas(2, int(k) + i, 1e-3, (250.0, 15.0), period.value)[0] for i in (1, 2)]
     assert ends[0] + share * (ends[1] - ends[0]) == pytest.approx(150, rel=1e-8)
 
 
 def test_of_whole_numbers_one_that_does_as_well():
-    quantity = Quantity("sigma", "r", "r", 140.0)
+    quantity = Wanted("sigma", "r", "r", 140.0)
     found = solve("rls2", "filters.0.initial_scans", quantity, 180.0)
     sigma = {n: impulse.sigmas(1, 15, 1e-3, (250.0, 15.0), 10.0, start=n)[0] for n in range(3, 16)}
     assert sigma[found.value] <= 180 < sigma[found.value - 1]
@@ -119,7 +119,7 @@ def test_of_whole_numbers_one_that_does_as_well():
 
 def test_linear_sonar_filters_are_exact_too():
     """Least squares over growing memory: σ is proportional to that of a plot."""
-    quantity = Quantity("sigma", "growing", "r")
+    quantity = Wanted("sigma", "growing", "r")
     case = "sonar_missed sensor.detection_probability=1"
     found = solve("sonar_missed", "sensor.sigma_range_m", quantity, 10.0, case=case)
     assert found.exact
@@ -171,7 +171,7 @@ def covered(seeds, realisations, quantity, equals, overrides=(), **given):
 # Known roots: with every plot, and with one of ten missed.
 KNOWN = {
     "every plot": (GAIN, 30, []),
-    "missed plots": (Quantity("gain", "r+Vr", "r", at_k=11), 25, ["radar.detection_probability=0.9", "scans=11"]),
+    "missed plots": (Wanted("gain", "r+Vr", "r", at_k=11), 25, ["radar.detection_probability=0.9", "scans=11"]),
 }
 
 
@@ -193,7 +193,7 @@ def test_the_interval_holds_the_root_where_the_quantity_s_own_interval_there_hol
     exact = solve("rls2", key, quantity, equals, overrides=overrides, between=between).value
     for seed in range(seeds):
         cases = Cases("rls2", (*overrides, f"seed={seed}"))
-        at_root = Curve(cases, key, quantity, 1, None, 400).simulated(exact, 400)
+        at_root = Curve(cases, key, checked(quantity, cases.base), 1, None, 400).simulated(exact, 400)
         found = solve(
             *("rls2", key, quantity, equals),
             **{"overrides": cases.overrides, "between": between, "sampled": True, "realisations": 400, "threads": 1},
@@ -204,7 +204,7 @@ def test_the_interval_holds_the_root_where_the_quantity_s_own_interval_there_hol
 
 
 MOVED = {"overrides": ["duration_s=140"], "between": (5, 9)}  # of the scan period, s: 60 s lie at scan 7 to 13
-SEEN = Quantity("sigma", "r", "r", at_s=60.0)
+SEEN = Wanted("sigma", "r", "r", at_s=60.0)
 
 
 def test_a_key_that_moves_the_scans_is_said_not_to_be_paired():
@@ -216,15 +216,17 @@ def test_a_key_that_moves_the_scans_is_said_not_to_be_paired():
     assert found.notes == (words,)
     assert said[-1] == words
     assert found.lo <= exact.value <= found.hi
-    more = Curve(Cases("rls2", tuple(MOVED["overrides"])), "radar.scan_period_s", SEEN, 1, None, 800)
+    cases = Cases("rls2", tuple(MOVED["overrides"]))
+    more = Curve(cases, "radar.scan_period_s", checked(SEEN, cases.base), 1, None, 800)
     assert found.attained == more.simulated(found.value, 800).value
 
 
 @pytest.mark.parametrize(
-    ("key", "quantity"), [("radar.sigma_range_m", SEEN), ("radar.scan_period_s", Quantity("sigma", "r", "r", at_k=9))]
+    ("key", "quantity"), [("radar.sigma_range_m", SEEN), ("radar.scan_period_s", Wanted("sigma", "r", "r", at_k=9))]
 )
 def test_a_key_that_leaves_the_scans_is_paired(key, quantity):
-    curve = Curve(Cases("rls2", ("duration_s=140",)), key, quantity, 1, None, 100)
+    cases = Cases("rls2", ("duration_s=140",))
+    curve = Curve(cases, key, checked(quantity, cases.base), 1, None, 100)
     for value in (6, 7, 8):
         curve.simulated(value, 100)
     assert len(curve.scans) == 1
@@ -248,14 +250,14 @@ def test_the_interval_of_a_key_that_moves_the_scans_covers_a_known_root():
     [
         (("rls2", "radar.wavelength_m", GAIN, 30), "has no effect on the gain of r+Vr in r at 60 s"),
         (("rls2", "radar.sigma_rnge_m", GAIN, 30), "did you mean radar.sigma_range_m?"),
-        (("rls2", "radar.sigma_range_m", Quantity("gain", "r+V", "r"), 30), "did you mean r+Vr?"),
-        (("rls2", "radar.sigma_range_m", Quantity("gain", "r", "r"), 30), "is the baseline"),
-        (("rls2", "radar.sigma_range_m", Quantity("sigma", None, "r"), 30), "--filter: name one of r, r+Vr"),
-        (("rls2", "radar.sigma_range_m", Quantity("sigma", "r", "vr"), 30), "no component 'vr'"),
-        (("rls2", "radar.sigma_range_m", Quantity("sigma", "r", "r", 1e4), 30), "must be from 0 to 140 s"),
-        (("rls2", "radar.sigma_range_m", Quantity("sigma", "r", "r", at_k=16), 30), "must be from 1 to 15"),
-        (("rls2", "radar.sigma_range_m", Quantity("sigma", "r", "Vr", at_k=1), 30), "there is no estimate there"),
-        (("rls2", "radar.sigma_range_m", Quantity("lock", "r"), 30), "makes no locks.csv"),
+        (("rls2", "radar.sigma_range_m", Wanted("gain", "r+V", "r"), 30), "did you mean r+Vr?"),
+        (("rls2", "radar.sigma_range_m", Wanted("gain", "r", "r"), 30), "is the baseline"),
+        (("rls2", "radar.sigma_range_m", Wanted("sigma", None, "r"), 30), "--filter: name one of r, r+Vr"),
+        (("rls2", "radar.sigma_range_m", Wanted("sigma", "r", "vr"), 30), "no component 'vr'"),
+        (("rls2", "radar.sigma_range_m", Wanted("sigma", "r", "r", 1e4), 30), "must be from 0 to 140 s"),
+        (("rls2", "radar.sigma_range_m", Wanted("sigma", "r", "r", at_k=16), 30), "must be from 1 to 15"),
+        (("rls2", "radar.sigma_range_m", Wanted("sigma", "r", "Vr", at_k=1), 30), "there is no estimate there"),
+        (("rls2", "radar.sigma_range_m", Wanted("lock", "r"), 30), "range_doppler measures no 'lock', but sigma, gain"),
         (("range_doppler", "radar.sigma_range_m", GAIN, 30), "choose one with --case: 'rls1', "),
         (("nosuch", "radar.sigma_range_m", GAIN, 30), "no such config"),
         (
@@ -278,7 +280,7 @@ def test_a_range_that_is_none(between):
 
 
 def test_a_range_without_a_whole_number_is_refused_and_another_ends_at_whole_ones():
-    quantity = Quantity("sigma", "r", "r")
+    quantity = Wanted("sigma", "r", "r")
     with pytest.raises(ConfigError, match="takes whole numbers, and there is none"):
         solve("rls2", "filters.0.initial_scans", quantity, 180, between=(3.2, 3.8))
     found = solve("rls2", "filters.0.initial_scans", quantity, 180, between=(3.2, 14.7))
@@ -326,7 +328,6 @@ def test_the_command_gives_one_json_document():
         ("--equals", 30),
         ("--gain", "r", "--sigma", "r", "--equals", 30),
         ("--gain", "r", "--at", 60, "--at-k", 3, "--equals", 30),
-        ("--lock", "sequence", "--filter", "sequence", "--equals", 30),
         ("--gain", "r"),
     ],
 )
@@ -336,9 +337,16 @@ def test_options_that_do_not_go_together(words):
     assert "Error" in ended.stderr
 
 
+def test_a_rate_names_its_filter_itself():
+    words = ("--lock", "sequence", "--filter", "sequence", "--equals", 30)
+    ended = command("discriminator", "burst.noise_variance", *words)
+    assert ended.exit_code == 2
+    assert ended.stderr == "--lock names the filter itself: leave --filter out\n"
+
+
 def test_rates_of_other_studies_are_read_by_the_names_of_their_tables():
     """Folds unfolded rightly: sampled with an interval that holds the config's own rate when that is the target."""
-    quantity = Quantity("right", "memory", at_k=4)
+    quantity = Wanted("right", "memory", at_k=4)
     given = {"between": (5, 45), "realisations": 300}
     first = solve("ambiguous_rls2", "radar.sigma_velocity_mps", quantity, 85.0, **given)
     assert not first.exact
@@ -350,7 +358,7 @@ def test_rates_of_other_studies_are_read_by_the_names_of_their_tables():
 @pytest.mark.slow
 def test_rare_wrong_folds_are_read_by_their_weights():
     """Once in 1000: of 500 plain realisations half see none. The rate at the root, of other noise, is the target."""
-    quantity, rare = Quantity("right", "memory", at_k=6), ["scans=6", "rare={filter: memory}"]
+    quantity, rare = Wanted("right", "memory", at_k=6), ["scans=6", "rare={filter: memory}"]
     key, given = "radar.repetition_rate_hz", {"between": (600, 1300), "realisations": 500, "overrides": rare}
     found = solve("ambiguous_rls5", key, quantity, 99.9, **given)
     assert not found.exact
@@ -372,7 +380,7 @@ def test_with_missed_plots_the_gain_is_the_run_s(k):
     """Of the realisations in which both filters have an estimate; at scan 3 the range alone has not always begun."""
     result = radarsim.run("rls2", overrides=MISSED, realisations=1000)
     row = result.gains.query(f"component == 'r' and k == {k}").iloc[0]
-    found = solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r", at_k=k), 20, overrides=MISSED)
+    found = solve("rls2", "radar.sigma_velocity_mps", Wanted("gain", None, "r", at_k=k), 20, overrides=MISSED)
     assert found.exact
     assert found.attained_now == pytest.approx(row["exact_percent"], rel=1e-12)
 
@@ -388,7 +396,7 @@ def test_what_comes_later_is_left_out_and_changes_nothing(at, overrides):
     case = load("rls2", overrides).cases[0]
     whole = registry.study(case.study).prepare(case).axes
     for kind, name in (("gain", "r+Vr"), ("sigma", "r")):
-        quantity = Quantity(kind, name, "r", **at)
+        quantity = checked(Wanted(kind, name, "r", **at), case)
         part = quantities.labels(quantity, case)
         assert len(part.k) < len(whole.k) or not at
         expected = quantities.exact(quantity, case, whole)
@@ -400,7 +408,8 @@ def test_a_variance_that_is_looked_for_is_of_the_whole_run():
     from radarsim.app.configs import load
 
     best = ["target=turn", "manoeuvre_variance={minimise: sigma_r, over: worst}", "scans=20"]
-    assert len(quantities.labels(Quantity("sigma", "r", "r", at_k=4), load("rls2", best).cases[0]).k) == 20
+    case = load("rls2", best).cases[0]
+    assert len(quantities.labels(checked(Wanted("sigma", "r", "r", at_k=4), case), case).k) == 20
 
 
 def test_a_value_that_makes_the_run_impossible_is_refused_though_only_its_beginning_is_asked():
@@ -428,7 +437,7 @@ def test_where_the_quantity_jumps_over_the_target_it_is_said():
     before, after = (impulse.sigmas(1, n, 1e-3, (250.0, 15.0), 10.0)[0] for n in (15, 14))
     middle = (before + after) / 2
     given = {"overrides": ["duration_s=140"], "between": (9.9, 10.1)}
-    found = solve("rls2", "radar.scan_period_s", Quantity("sigma", "r", "r"), middle, **given)
+    found = solve("rls2", "radar.scan_period_s", Wanted("sigma", "r", "r"), middle, **given)
     assert found.value == pytest.approx(10, rel=1e-9)
     assert min(abs(found.attained - before), abs(found.attained - after)) < 1e-3
     assert found.slope is None
@@ -443,12 +452,12 @@ def test_what_takes_long_is_foretold_with_its_time_and_what_it_is(monkeypatch):
     monkeypatch.setattr(patterns, "FOUND", {})
     said = []
     late = {"overrides": [*MISSED, "scans=17"], "between": (10, 20), "told": said.append}
-    found = solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r"), 15, **late)
+    found = solve("rls2", "radar.sigma_velocity_mps", Wanted("gain", None, "r"), 15, **late)
     words = "a mean over patterns of plots, of which nearly equal ones are merged: right to about a ten-thousandth"
     assert found.notes == (f"σ is {words}",)
     assert found.attained == pytest.approx(15, abs=1e-6)  # first looked for roughly, then of the exact quantity
     monkeypatch.setattr(question, "LONG_S", 0.0)
-    solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r", at_k=11), 15, **late)
+    solve("rls2", "radar.sigma_velocity_mps", Wanted("gain", None, "r", at_k=11), 15, **late)
     solve("rls2", "radar.sigma_velocity_mps", GAIN, 30, sampled=True, realisations=400, told=said.append)
     assert said[-2].startswith(
         "computes the gain of r+Vr in r at k = 11 at about 37 values of radar.sigma_velocity_mps: "
@@ -461,7 +470,7 @@ def test_a_root_among_many_patterns_is_that_of_all_of_them_side_by_side():
     from radarsim.studies.range_doppler import patterns, study
 
     late = {"overrides": [*MISSED, "scans=17"], "between": (10, 20)}
-    found = solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r"), 15, **late)
+    found = solve("rls2", "radar.sigma_velocity_mps", Wanted("gain", None, "r"), 15, **late)
     assert (found.exact, found.notes, found.lo) == (True, (), found.value)
     made = study.designed(Cases("rls2", tuple(late["overrides"])).at("radar.sigma_velocity_mps", found.value))
     own = patterns.designs(made)
@@ -480,7 +489,7 @@ def test_a_root_among_many_patterns_takes_few_looks_at_all_of_them(monkeypatch):
         return plain(*given)
 
     monkeypatch.setattr(patterns, "mixture", counted)
-    found = solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r"), 25, overrides=[*MISSED, "scans=16"])
+    found = solve("rls2", "radar.sigma_velocity_mps", Wanted("gain", None, "r"), 25, overrides=[*MISSED, "scans=16"])
     assert found.attained == pytest.approx(25, rel=1e-11)
     assert 2 + 2 + 2 <= looks.count(True) <= 7  # as it is, with the filter of the range; a root; its slope
 
@@ -488,7 +497,7 @@ def test_a_root_among_many_patterns_takes_few_looks_at_all_of_them(monkeypatch):
 def test_an_interval_that_rests_on_heavy_tails_says_so():
     """While filters begin, rare patterns of plots decide: where the run's row is marked, so is the answer."""
     given = {"overrides": [*MISSED, "scans=7"], "between": (2, 40), "sampled": True, "realisations": 1000}
-    early = solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", "r+Vr", "r", 50.0), 60, **given)
+    early = solve("rls2", "radar.sigma_velocity_mps", Wanted("gain", "r+Vr", "r", 50.0), 60, **given)
     assert any(note.startswith("the interval may be too narrow: under 100 effective") for note in early.notes)
     late = solve("rls2", "radar.sigma_velocity_mps", GAIN, 30, **given | {"overrides": [], "between": (4, 40)})
     assert late.notes == ()
@@ -533,14 +542,14 @@ def test_sampled_it_is_said_where_the_quantity_jumps_over_the_target(monkeypatch
 
 CLUTTER = "sonar_clutter sensor.false_plots_per_km2=1"
 CONFIRMED = {
-    "lock": ("discriminator", "burst.noise_variance", Quantity("lock", "sequence"), 95.0, {}),
-    "right": ("ambiguous_rls2", "radar.sigma_velocity_mps", Quantity("right", "memory", at_k=4), 85.0, {}),
+    "lock": ("discriminator", "burst.noise_variance", Wanted("lock", "sequence"), 95.0, {}),
+    "right": ("ambiguous_rls2", "radar.sigma_velocity_mps", Wanted("right", "memory", at_k=4), 85.0, {}),
     "loss": (
-        *("sonar_clutter", "sensor.detection_probability", Quantity("loss", "nearest"), 5.0),
+        *("sonar_clutter", "sensor.detection_probability", Wanted("loss", "nearest"), 5.0),
         {"case": CLUTTER, "between": (0.6, 1)},
     ),
     "false tracks": (
-        *("sonar_clutter", "sensor.sigma_range_m", Quantity("false_tracks", "nearest"), 6e4),
+        *("sonar_clutter", "sensor.sigma_range_m", Wanted("false_tracks", "nearest"), 6e4),
         {"case": CLUTTER, "between": (15, 100)},
     ),
 }
@@ -561,7 +570,7 @@ def test_the_run_that_a_sampled_answer_names_confirms_it(kind):
     overrides = [words[i + 1] for i, word in enumerate(words) if word == "--set"]
     result = radarsim.run(words[2], overrides=overrides, realisations=1000)
     one = next(one for one in result.cases if one.name == given.get("case", one.name))
-    seen, _ = quantities.sampled(quantity, one)
+    seen, _ = quantities.sampled(checked(quantity, one), one)
     half = (seen.hi - seen.lo) / 2
     assert abs(seen.value - equals) <= 2 * math.sqrt(2) * half, (seen, found)
 

@@ -95,7 +95,7 @@ def test_a_wrong_name_is_refused_before_anything_is_prepared(study, monkeypatch)
     key = SOLVED[study].split()[0]
     monkeypatch.setattr(type(registry.study(load(config).cases[0].study)), "prepare", prepared)
     asked = [("--sigma", "r", "--filter", "nobody"), ("--loss" if study != "clutter" else "--lock", "nobody")]
-    for quantity, said in zip(asked, ("no filter 'nobody'", "it makes no "), strict=True):
+    for quantity, said in zip(asked, ("no filter 'nobody'", " measures no '"), strict=True):
         result = CliRunner().invoke(main, ["solve", config, key, *quantity, *case, "--equals", "1"])
         assert result.exit_code == 2
         assert said in result.stderr

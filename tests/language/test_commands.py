@@ -10,12 +10,13 @@ from making import messages
 from radarsim.app import question, readings, stored
 from radarsim.app.compare import chart, described
 from radarsim.app.configs import load
-from radarsim.app.quantities import Quantity
+from radarsim.app.quantities import Asked
 from radarsim.cli import main
 from radarsim.language import speaking, tr
 from radarsim.report.claims import page as curve
 from radarsim.report.claims import rule
 from radarsim.report.claims.declared import differences
+from radarsim.report.quantities import SIGMA
 from radarsim.studies.range_doppler.chart import SAID
 from radarsim.studies.range_doppler.study import exact_but_for
 from tests.language.test_russian import NAMES, shown, untranslated
@@ -135,7 +136,7 @@ def test_what_solve_announces():
             12.3,
         )
         near = tr(exact_but_for(load("rls2", ["radar.detection_probability=0.9", "scans=22"]).cases[0]))
-        quantity = Quantity("sigma", "r", "Vr", at_s=60.0).said
+        quantity = Asked(SIGMA, "r", "Vr", at_s=60.0).said
     assert said == ["вычисляется q примерно при 7 значениях k: около 12 с"]
     assert near.startswith("среднее")
     assert untranslated(near, set()) == []
