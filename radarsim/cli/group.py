@@ -280,7 +280,7 @@ of_option = click.option(
     metavar="NAME",
     default="sigma",
     help="What --precision is of, default sigma: gain (in points), or what else the study measures, as `radarsim "
-    "solve --help` names it (lock, false-tracks).",
+    "solve --help` names it (lock, false_tracks).",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout in place of text.")
 format_option = click.option(
