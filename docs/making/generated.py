@@ -3,15 +3,20 @@
 import re
 from pathlib import Path
 
-from making import commands, modules
+from making import commands, modules, tables
 
 MARK = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
-PARTS = {"commands": commands.markdown, "modules": modules.markdown}
+PARTS = {"commands": commands.markdown, "modules": modules.markdown, "tables": tables.markdown}
+
+
+def filled(page: str) -> str:
+    """A page with each part in the place of its mark; KeyError for a mark that nothing makes."""
+    return MARK.sub(lambda found: PARTS[found[1]](), page)
 
 
 def fill(app, name: str, source: list[str]) -> None:
-    """Put each part in the place of its mark; KeyError for a mark that nothing makes."""
-    source[0] = MARK.sub(lambda found: PARTS[found[1]](), source[0])
+    """Fill a page while Sphinx reads it."""
+    source[0] = filled(source[0])
 
 
 def outdated(app, env, added: set[str], changed: set[str], removed: set[str]) -> list[str]:

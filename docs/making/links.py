@@ -5,6 +5,8 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+from making.generated import filled
+
 LINK = re.compile(r"(?<!!)\[(?:[^\[\]]|\[[^\]]*\])*\]\(([^)\s]+)\)|!\[[^\]]*\]\(([^)\s]+)\)")
 OUTSIDE = re.compile(r"[a-z]+:")
 
@@ -36,5 +38,5 @@ def broken(path: Path) -> Iterator[str]:
         target = (path.parent / file).resolve() if file else path
         if not target.exists():
             yield f"{link}: no such file"
-        elif anchor and anchor not in anchors(target.read_text(encoding="utf-8")):
+        elif anchor and anchor not in anchors(filled(target.read_text(encoding="utf-8"))):
             yield f"{link}: no such heading"

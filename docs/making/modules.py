@@ -10,6 +10,7 @@ from types import ModuleType
 from pydantic import BaseModel
 
 import radarsim
+from making import tables
 
 FLOORS = ("constants", "physics", "kernels", "bursts", "studies", "engine", "report", "config", "recorded", "app")
 
@@ -48,7 +49,7 @@ def paragraph(text: str) -> str:
     """One paragraph for Sphinx: examples as they are, what stands in columns as it stands, prose without markup."""
     if not text.startswith("    - ") and text.lstrip().startswith((">>>", "* ", "- ")):
         return text
-    if re.search(r"\S   ?\S|\n +\S", text):
+    if re.search(r"\S   ?\S|\n +\S", text) or tables.LINE.match(text):
         return "::\n\n" + textwrap.indent(text, "    ")
     return re.sub(r"([|*\\]|_(?=\W|$))", r"\\\1", text)
 

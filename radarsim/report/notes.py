@@ -65,7 +65,10 @@ class Beside(NamedTuple):
 
 
 def beside(table: "pd.DataFrame") -> Iterator[Beside]:
-    """The measured columns of a table that have an exact one."""
+    """The measured columns of a table that have an exact one.
+
+    exact: the measured value, known without sampling, empty where not; `exact_NAME` of the column NAME or gain_NAME
+    """
     columns = [str(name) for name in table.columns]
     for exact in (name for name in columns if name == "exact" or name.startswith("exact_")):
         own = exact.removeprefix("exact").removeprefix("_")
@@ -194,11 +197,11 @@ OPTIMISTIC, CONSISTENT, PESSIMISTIC = "optimistic", "consistent", "pessimistic"
 
 
 def believed(result: CaseResult, sigma: np.ndarray) -> dict[str, np.ndarray]:
-    """Columns of one case: the measured σ beside sigma (F, K, C), the σ that the filters believe.
+    """The measured σ, by component and scan, beside the σ that the filters believe, sigma (F, K, C).
 
-    Rows stand where a filter has an estimate, as in `tables.curves`. The interval of the ratio is that of the measured
-    σ alone. Where the believed one hangs on which plots are missed its mean has a chance of its own, which is small
-    beside: rows of a radar that misses plots cover 94 … 95 %. Rows of filters that adapt bring the note VARIES.
+    Over 1 a filter is *optimistic*, its errors are larger than it believes; under 1 it is *pessimistic*. The interval
+    is that of the measured σ alone. Where the believed one hangs on which plots are missed its mean has a chance of its
+    own, which is small beside: rows of a radar that misses plots cover 94 … 95 %. Filters that adapt bring a `note`.
     """
     at = f, k, c = tables.shown(result)
     n = tables.realisations(result)[at]
@@ -211,7 +214,11 @@ def believed(result: CaseResult, sigma: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def ratio_columns(true: Estimate, claimed: np.ndarray) -> dict[str, np.ndarray]:
-    """`sigma`, `believed_sigma` and their `ratio` with its interval, of estimates (n,) of σ and believed ones (n,)."""
+    """Columns of estimates (n,) of σ and believed ones (n,).
+
+    believed_sigma [unit]: root of the mean variance that the filter believes
+    ratio ±: true over believed
+    """
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = Estimate(*(end / claimed for end in true))
     return {"sigma": true.value, "believed_sigma": claimed, **tables.interval_columns("ratio", ratio)}
@@ -220,10 +227,13 @@ def ratio_columns(true: Estimate, claimed: np.ndarray) -> dict[str, np.ndarray]:
 def normalised(
     quantity: str, mean: Estimate, bounds: tuple[np.ndarray, np.ndarray], exact: np.ndarray | None = None
 ) -> tables.Columns:
-    """Columns of `nees` or `nis`, arrays of one shape: the mean with its interval, the bounds, and the verdict.
+    """What a filter believes of its whole state (NEES) or of its innovations (NIS), by normalised squares.
 
-    In 95 % of runs all means of a filter that is right about itself lie between their bounds. Where the expectation is
-    known, it is judged by them in place of the mean.
+    nees ±, nis ±: mean of `eᵀP⁻¹e`, `νᵀS⁻¹ν` per degree of freedom, P and S the covariances that the filter believes
+    nees_bound_lo, nees_bound_hi, nis_bound_lo, nis_bound_hi: between them lie all means of a filter that is right about
+        itself in 95 % of runs (Bonferroni)
+    nees_verdict, nis_verdict: consistent, optimistic or pessimistic, as the exact mean, or where it is not known the
+        measured one, lies by these bounds
     """
     known = {} if exact is None else {f"exact_{quantity}": exact}
     decides = mean.value if exact is None else np.where(np.isnan(exact), mean.value, exact)
@@ -282,6 +292,8 @@ def noted(
 
     A table may bring notes of its own on rows that have no other. exact: whether the columns `exact_…` hold exact
     values, in place of bounds that the measured ones reach or not (`Study.exact_errors`).
+
+    note: why a row rests on too few realisations or events for its interval; only in tables that have such a row
     """
     return {name: _noted(name, table, made, results, exact) for name, table in made.items()}
 

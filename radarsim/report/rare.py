@@ -64,11 +64,19 @@ def complement(of: statistics.Estimate) -> statistics.Estimate:
 
 
 def rows(labels: Mapping[str, Any], event: str, sought: np.ndarray, of: Counted, drawn: Drawn) -> dict[str, Any]:
-    """Columns of the table from labels (case, filter, k, t_s) of n rows; sought (n,): whether it is drawn for these.
+    """How probable rare events are, with the key `rare`: by the weights of realisations that are drawn for them.
 
-    variance_factor is how many times more plain realisations would know the probability as well. The interval is known
-    from Σw², and that by (Σw²)²/Σw⁴ realisations: where few weigh most, larger weights may be missing, and the rate and
-    its interval are too small together: see `note`.
+    From labels (case, filter, k, t_s) of n rows and sought (n,). The interval is known from Σw², and that by
+    (Σw²)²/Σw⁴ realisations: where few weigh most, larger weights may be missing, and the rate and its interval are too
+    small together, and a `note` stands there. docs/rare.md has more.
+
+    event: in words
+    sought: whether realisations are drawn for it
+    rate ±: its probability
+    events: number of realisations that have it; `n_eff` effective ones
+    variance_factor: how many times more plain realisations would know the probability as well
+    plain: number of the n that are drawn as they are
+    mean_weight, mean_weight_se: mean of all weights, which must be one, and its standard error
     """
     estimate, size = rate(of, drawn), len(sought)
     variance = of.squared / drawn.n - estimate.value**2
@@ -120,12 +128,12 @@ def _weighing(of: Counted) -> np.ndarray:
     return np.where(of.number > 0, found, 0.0)
 
 
-def table(parts: "list[dict[str, Any]]") -> "dict[str, pd.DataFrame]":
-    """The table `rare` of cases' columns, under its name; nothing where no case has any."""
+def table(parts: "Sequence[dict[str, Any]]") -> "pd.DataFrame | None":
+    """The table `rare` of cases' columns; None where no case has any."""
     if not parts:
-        return {}
+        return None
     made = tables.joined(parts)
-    return {"rare": made.assign(note=made["note"].mask(_unaimed(made), ASTRAY))}
+    return made.assign(note=made["note"].mask(_unaimed(made), ASTRAY))
 
 
 def told(row: "pd.Series") -> dict[str, Any]:

@@ -153,7 +153,7 @@ def known(value: float, form: str = "#.4g", after: str = "") -> str:
 
 # ---- tables ----------------------------------------------------------------------------------------------------------
 Columns = Mapping[str, Any]  # of one length: arrays, or estimates of such
-Maker = TypeVar("Maker", bound=Callable[..., Columns])
+Maker = TypeVar("Maker", bound=Callable[..., Any])
 LABEL_COLUMNS = (
     "case",
     "filter",
@@ -208,28 +208,40 @@ def of_rows(rows: Sequence[Columns]) -> dict[str, np.ndarray]:
 
 
 class Tables:
-    """The tables of a study, declared by functions that make the columns of one case; their docstrings say what of.
+    """The tables of a study, declared by functions that make the columns of one case, or the whole table of all cases.
 
-    A table may be of such cases alone as `of` holds for.
+    Their docstrings are the reference page: what a row is, then a paragraph of columns, a line each, of those that the
+    functions below and those of `notes` and `rare` do not declare already. `name: meaning`; `name ± stem: meaning` of
+    an estimate, whose ends are `stem_lo` and `stem_hi`, without stem those of the name; several names before one
+    meaning are parted by commas, a unit that the name does not end in stands in brackets before the colon, `[unit]` is
+    that of the column `unit`; further lines are indented. Of `exact_NAME` nothing need be said.
     """
 
     def __init__(self) -> None:
-        self.declared: dict[str, tuple[Callable[[Any], Columns], Callable[[Any], bool]]] = {}
+        self.declared: dict[str, tuple[Callable[[Any], Any], Callable[[Any], bool] | None]] = {}
 
     def __call__(self, name: str, of: Callable[[Any], bool] = lambda result: True) -> Callable[[Maker], Maker]:
-        """Declares the table of a name, made of the cases that `of` holds for."""
+        """Declares the table of a name, made of the cases that `of` holds for, each by itself."""
+        return self._declare(name, of)
 
-        def declare(made: Maker) -> Maker:
-            self.declared[name] = made, of
-            return made
+    def whole(self, name: str) -> Callable[[Maker], Maker]:
+        """Declares the table of a name, made of all cases at once; not there where the function returns None."""
+        return self._declare(name, None)
+
+    def _declare(self, name: str, of: Callable[[Any], bool] | None) -> Callable[[Maker], Maker]:
+        def declare(make: Maker) -> Maker:
+            self.declared[name] = make, of
+            return make
 
         return declare
 
     def made(self, results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
         """All of them, with the rows of all cases."""
-        return {
-            name: joined(make(result) for result in results if of(result)) for name, (make, of) in self.declared.items()
+        made = {
+            name: make(results) if of is None else joined(make(result) for result in results if of(result))
+            for name, (make, of) in self.declared.items()
         }
+        return {name: table for name, table in made.items() if table is not None}
 
 
 def names(values: Sequence[str], index: np.ndarray) -> np.ndarray:
@@ -250,7 +262,13 @@ def shown(result: CaseResult, mask: np.ndarray | None = None) -> tuple[np.ndarra
 def leading(
     result: CaseResult, f: np.ndarray, k: np.ndarray | None = None, **labels: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """The first columns of n rows: case, filter, further labels and, for scans k (n,), their number and time."""
+    """The first columns of n rows: case, filter, further labels and, for scans k (n,), their number and time.
+
+    case: the config's stem, and each swept key with its value
+    filter: the filter's name
+    k: the scan, from 1
+    t_s: time from the first plot
+    """
     columns = {"case": np.full(f.size, result.name, dtype=object), "filter": names(result.axes.filters, f)}
     columns |= labels
     if k is not None:
@@ -259,13 +277,20 @@ def leading(
 
 
 def interval_columns(name: str, of: statistics.Estimate, ends: str | None = None) -> dict[str, Any]:
-    """An estimate as columns `name`, `…_lo` and `…_hi`; ends: what stands before `_lo`, by default the name."""
+    """An estimate as columns `name`, `…_lo` and `…_hi`; ends: what stands before `_lo`, by default the name.
+
+    lo, hi: ends of the 95 % interval of the measured column before them; `…_lo`, `…_hi` where a table has several
+    """
     prefix = f"{name}_" if ends is None else ends and f"{ends}_"
     return {name: of.value, f"{prefix}lo": of.lo, f"{prefix}hi": of.hi}
 
 
 def components(result: CaseResult, c: np.ndarray) -> dict[str, np.ndarray]:
-    """The labels `component` and `unit` of components c (n,)."""
+    """The labels of components c (n,).
+
+    component: what is estimated: `r`, `Vr`, `x`, `f0`, …
+    unit: its unit
+    """
     labels, units = zip(*result.axes.components, strict=True)
     return {"component": names(labels, c), "unit": names(units, c)}
 
@@ -277,13 +302,22 @@ def exact_first(rows: "pd.DataFrame", value: str, exact: str) -> np.ndarray:
 
 
 def realisations(result: CaseResult) -> np.ndarray:
-    """How many realisations stand behind each sum (F, K, C): all, or `estimates` where not all have an estimate."""
+    """How many realisations stand behind each sum (F, K, C): all, or `estimates` where not all have an estimate.
+
+    n: number of realisations behind the row
+    """
     counted = result.sums.get("estimates")
     return np.full(result.axes.available.shape, float(result.count)) if counted is None else np.asarray(counted)
 
 
 def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
-    """σ with its interval, bias, spread, exact values, effective realisations, by case, filter, component and scan."""
+    """Errors about the truth by case, filter, component and scan, wherever the filter has an estimate.
+
+    sigma ± [unit]: root of the mean squared error: sigma² = bias² + spread²
+    bias, bias_se [unit]: mean error, and its standard error
+    spread [unit]: standard deviation of the errors
+    n_eff: realisations that stand behind σ where a few large errors decide, n/(κ − 1)
+    """
     return joined(map(_curves, results))
 
 
@@ -310,7 +344,11 @@ GAINS = ("case", "filter", "baseline", "component", "k", "t_s", "gain_percent", 
 
 
 def gains(results: Sequence[CaseResult]) -> "pd.DataFrame":
-    """Paired gains against the baseline filter, where both have an estimate (contract: gains.csv; P1 eq. 17)."""
+    """Paired gains against the baseline filter, where both have an estimate (P1 eq. 17).
+
+    baseline: the filter compared with
+    gain_percent ± gain: by how much σ is less than the baseline's, of the same realisations
+    """
     return joined(map(_gains, results), GAINS)
 
 

@@ -1,14 +1,17 @@
 """What the reference pages are read off: descriptions of keys with units, docstrings, columns of result files."""
 
 import re
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
-from making import commands, generated, keys, modules
+from making import commands, generated, keys, modules, tables
 
+from radarsim.app.run import run
 from radarsim.cli import main
 from radarsim.config.schema import schema
 from radarsim.studies import registry
+from tests.trust.cases import CASES, MORE, Small
 
 ROOT = Path(__file__).parents[2]
 UNITS = {
@@ -105,30 +108,75 @@ def test_marks_are_replaced_and_unknown_ones_refused():
         generated.fill(None, "page", ["<!-- generated: nothing -->"])
 
 
-CONFIGS = (
-    "rls2",
-    "sonar_smoothing",
-    "sonar_conversion",
-    "sonar_manoeuvre",
-    "sonar_clutter",
-    "multimodel",
-    "discriminator",
-)
+# With the small case of every study, what writes further tables and columns.
+FURTHER = {
+    "smoothing": Small("sonar_smoothing", ("scans=8",), 200, 0),
+    "conversion": Small("sonar_conversion", ("scans=3",), 200, 0),
+    "turning": Small("sonar_manoeuvre_turning", ("scans=30",), 50, 0),
+    "orders": Small("ambiguous_orders", ("scans=6",), 50, 0),
+    "hypotheses": Small("pulses_folds", ("scans=3",), 20, 0),
+}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("config", CONFIGS)
-def test_every_file_and_column_is_in_the_documentation(config, tmp_path):
-    from radarsim.app.run import run
+@pytest.fixture(scope="module")
+def written():
+    """Columns that runs write, by study and table."""
+    found = defaultdict(set)
+    for small in (CASES | MORE | FURTHER).values():
+        result = run(small.loaded(20))
+        for table, rows in result.tables.items():
+            found[result.experiment.study, table] |= set(rows.columns)
+    return found
 
-    result = run(config, realisations=50, out=tmp_path, figures=False)
-    study = result.experiment.study
-    common = (ROOT / "docs/results.md").read_text(encoding="utf-8")
-    tables = (ROOT / "docs/reference/tables.md").read_text(encoding="utf-8")
-    before, _, own = tables.partition(f"\n## {study}\n")
-    told = common + before.partition("\n## ")[0] + own.partition("\n## ")[0]
+
+@pytest.fixture(scope="module")
+def declared():
+    """Columns that docstrings declare, by study and table; None: of every table, of every study."""
+    found = defaultdict(set)
+    for one in (*tables.SHARED, *(one for functions in tables.SEVERAL.values() for one in functions)):
+        found[None, None] |= own_names(one)
+    for study in registry.SHIPPED:
+        for module in tables.modules(study):
+            found[study, None] |= own_names(module)
+            for name, (function, _) in module.table.declared.items():
+                found[study, name] |= own_names(function)
+    return found
+
+
+def own_names(thing):
+    return {name for column in tables.read(thing)[1] for name in column.names}
+
+
+def test_every_column_that_a_run_writes_is_declared(written, declared):
+    for (study, table), names in written.items():
+        known = declared[None, None] | declared[study, None] | declared[study, table]
+        assert table == "claims" or not {one for one in names - known if not one.startswith("exact_")}, (study, table)
+
+
+def test_every_declared_column_is_written(written, declared):
+    for (study, table), names in declared.items():
+        rows = [own for at, own in written.items() if study in (at[0], None) and table in (at[1], None)]
+        assert not names - set().union(*rows), (study, table)
+
+
+def test_a_line_that_declares_nothing_is_refused():
+    def table():
+        """A table.
+
+        rate ± lock: of bursts
+        and what they are
+        """
+
+    with pytest.raises(ValueError, match="table: a line of columns must be `name: meaning`"):
+        tables.read(table)
+    assert tables.with_ends("rate ± lock") == ("rate", "lock_lo", "lock_hi")
+    assert tables.with_ends("rate ±") == ("rate", "rate_lo", "rate_hi")
+    assert tables.units(("t_s", "gain_percent")) == "s, %"
+
+
+def test_files_and_claims_stand_among_the_result_files(tmp_path):
+    result = run("rls2", realisations=50, out=tmp_path, figures=False)
+    told = (ROOT / "docs/results.md").read_text(encoding="utf-8") + tables.markdown()
     words = set(re.findall(r"\w+", " ".join(re.findall(r"`[^`]+`", told))))
-    names = {file.name for file in (tmp_path / config).iterdir() if file.is_file()}
-    assert not [name for name in names if f"`{name}`" not in told]
-    columns = {column for table in result.tables.values() for column in table.columns}
-    assert not sorted(column for column in columns - words if not column.endswith(("_lo", "_hi")))
+    assert not [file.name for file in (tmp_path / "rls2").iterdir() if file.is_file() and file.stem not in words]
+    assert not set(result.tables["claims"].columns) - words

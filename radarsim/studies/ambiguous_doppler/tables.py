@@ -1,4 +1,4 @@
-"""The study's own tables: folds, calibration, and gains with a further column on the oracle."""
+"""Tables of filters that unfold ambiguous velocities."""
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
@@ -24,15 +24,20 @@ WRONG_FOLD = "wrong fold"  # the event of rare.csv
 FEW_FOLDS = f"under {statistics.FEW_EVENTS} velocities off by half the span: rarer ones may decide"
 
 
-def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
-    """Curves and gains (with what is lost against the oracle), folds, calibration, orders; rare."""
-    few = _few_folds(results)
-    return {
-        "curves": _noted(common.curves(results), few),
-        "gains": _noted(common.joined(map(_gains, results)), few),
-        **table.made(results),
-        **rare.table([rows for result in results if "events" in result.sums for rows in _rare(result)]),
-    }
+@table.whole("curves")
+def _curves(results: Sequence[Result]) -> "pd.DataFrame":
+    """As everywhere; marked where few folds may decide."""
+    return _noted(common.curves(results), _few_folds(results))
+
+
+@table.whole("gains")
+def _gains(results: Sequence[Result]) -> "pd.DataFrame":
+    """As everywhere; and against the filter whose velocity is unfolded by the truth, the oracle.
+
+    above_oracle_percent ± above_oracle: by how much σ is above the oracle's, paired; empty without such a filter
+    """
+    parts = ({**common.gains([one]), "above_oracle_percent|above_oracle": _above_oracle(one)} for one in results)
+    return _noted(common.joined(parts), _few_folds(results))
 
 
 def _few_folds(results: Sequence[Result]) -> set[tuple[str, str, int]]:
@@ -55,11 +60,6 @@ def _noted(table: "pd.DataFrame", few: set[tuple[str, str, int]]) -> "pd.DataFra
     return table.assign(note=[FEW_FOLDS if any(one in few for one in row) else "" for row in rows])
 
 
-def _gains(result: Result) -> common.Columns:
-    """The common table, with 100 (σ/σ_oracle − 1), paired, where a filter has the true folds."""
-    return {**common.gains([result]), "above_oracle_percent|above_oracle": _above_oracle(result)}
-
-
 def _above_oracle(result: Result) -> statistics.Estimate:
     """By how much σ is above the oracle's (rows,), in the order of the rows of gains."""
     axes, b = result.axes, result.axes.baseline
@@ -80,8 +80,13 @@ def _above_oracle(result: Result) -> statistics.Estimate:
 def _folds(result: Result) -> common.Columns:
     """How often all folds are right, by scan, of every filter that unfolds.
 
-    right is the share of realisations whose best hypothesis has all folds right, listed that whose list holds the right
-    one, hypotheses the mean number kept, beyond the share whose velocity is off by more than half the span.
+    With the key `rare` the rates are by the weights of `rare.csv`, of all n; all else is of the plain realisations.
+
+    right ±: share of realisations whose best hypothesis has all folds right so far; of a `remainder` that scan's fold
+    exact_right: known of the nearest fold, without missed plots, where truth and filter agree; of a `remainder` always
+    listed: share whose list holds the right sequence
+    hypotheses: mean number of hypotheses kept
+    beyond ±: share whose velocity is off by more than half the span
     """
     axes = result.axes
     shown = np.broadcast_to(unfolding(result)[:, None], axes.exact_right.shape)
@@ -122,11 +127,7 @@ def events(result: Result, at: tuple[np.ndarray, ...], event: int) -> rare.Count
     return rare.Counted(*np.moveaxis(np.asarray(result.sums["events"])[(*at, event)], -1, 0))
 
 
-def _rare(result: Result) -> Iterator[dict[str, np.ndarray]]:
-    """Wrong folds of every filter of one order that unfolds, at the last scan, by the weights of the realisations.
-
-    Those of the sought filter that found no room in a full list in a row of their own: no shift leads there.
-    """
+def _rare_parts(result: Result) -> Iterator[dict[str, np.ndarray]]:
     (f,) = np.nonzero(unfolding(result) & ~result.axes.combines)
     sought = np.array([one.name == result.spec.rare.filter for one in result.spec.filters])
     yield _rare_rows(result, f, sought[f], WRONG, WRONG_FOLD)
@@ -147,8 +148,12 @@ def _rare_rows(result: Result, f: np.ndarray, sought: np.ndarray, event: int, na
 def _calibration(result: Result) -> common.Columns:
     """By the probability that a filter gives its best hypothesis, in ten bins: how often that is right.
 
-    Of filters that keep several hypotheses, at each scan, over realisations with a plot there; empty bins have no row.
-    expected is the mean of these probabilities, which `right` equals where truth and filter agree.
+    Of filters that keep several hypotheses, with orders or without, at each scan, over realisations with a plot there;
+    empty bins have no row.
+
+    bin_lo, bin_hi: ends of the bin
+    right ±: how often the best hypothesis has all folds right
+    expected: mean of these probabilities, which `right` equals where truth and filter agree
     """
     axes, counted = result.axes, np.asarray(result.sums["calibration"])
     at = f, k, bins = np.nonzero(axes.remembers[:, None, None] & (counted[..., 0] > 0))
@@ -166,9 +171,10 @@ def _calibration(result: Result) -> common.Columns:
 def _orders(result: Result) -> common.Columns:
     """Mean weight of each order in the range, by scan, of filters that combine orders.
 
-    The weight is the probability of the order, its share (of several members the sum; it may be negative), or how often
-    it is chosen. best_order_sigma_r and best_combination_sigma_r are exact bounds of the same members on this target,
-    all folds right: the best member at each scan, and the best linear combination.
+    order: of the member's model, from 0
+    weight ±: its probability, its share (of several members the sum; it may be negative), or how often it is chosen
+    best_order_sigma_r [m]: exact, for one who knows the target, all folds right: σ of the best member at each scan
+    best_combination_sigma_r [m]: the same of the best linear combination of the members
     """
     axes, given = result.axes, [set(one.orders) for one in result.spec.filters]
     own = np.array([[axes.combines[f] and order in given[f] for order in range(3)] for f in range(len(given))])
@@ -182,6 +188,18 @@ def _orders(result: Result) -> common.Columns:
         "best_order_sigma_r": axes.best_order[f, k, 0],
         "best_combination_sigma_r": axes.best_combination[f, k, 0],
     }
+
+
+@table.whole("rare")
+def _rare(results: Sequence[Result]) -> "pd.DataFrame | None":
+    """Wrong folds of every filter of one order that unfolds, at the last scan.
+
+    Those of the sought filter that found no room in a full list in a row of their own: no shift leads there.
+    """
+    return rare.table([part for result in results if "events" in result.sums for part in _rare_parts(result)])
+
+
+tables = table.made
 
 
 INPUTS = ("radar", "σ_r, m", "σ_V, m/s", "Δt, s", "λ, m", "F, Hz", "D, m/s", "D/σ_V", "P_D", "scans")

@@ -1,4 +1,8 @@
-"""P4's tables: curves of locked bursts, locks, windows, residuals, bounds, motion, passes."""
+"""Tables of a burst's Doppler frequency and its derivatives (P4).
+
+Here `k` is the window and `t_s` its length. A burst is locked where all components are within five potential σ of that
+window.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -20,16 +24,6 @@ QUANTILES = (0.05, 0.5, 0.95)
 table = common.Tables()
 
 
-def tables(results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
-    """curves and gains in place of the common ones, and locks, windows, residuals, bounds, motion, passes; rare."""
-    return {
-        "curves": curves(results),
-        "gains": common.joined((), common.GAINS),
-        **table.made(results),
-        **rare.table([_rare(result) for result in results if "losses" in result.sums]),
-    }
-
-
 def last_locks(made: "Mapping[str, pd.DataFrame]", result: CaseResult, name: str) -> "pd.Series":
     """The row of locks at the last window of an estimator."""
     return common.where(made["locks"], case=result.name, filter=name).iloc[-1]
@@ -40,13 +34,13 @@ def plain(result: CaseResult) -> int:
     return int(result.sums["drawn"][0]) if "drawn" in result.sums else result.count
 
 
-def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
-    """σ of the locked bursts in place of the common table."""
-    return common.joined(map(_curves, results))
-
-
+@table("curves")
 def _curves(result: CaseResult) -> common.Columns:
-    """σ of the locked bursts, window by window; sigma_all of all of them, none dropped."""
+    """As everywhere, window by window, of the locked bursts; `exact_sigma` is the potential σ.
+
+    sigma_all [unit]: σ of all bursts, none dropped
+    posterior_sigma [unit]: the potential σ with the prior
+    """
     axes, at = result.axes, common.shown(result)
     f, k, c = at
     locked = np.broadcast_to(result.sums["locks"][..., [COUNTED.index("lock")]], axes.available.shape)
@@ -69,6 +63,12 @@ def _curves(result: CaseResult) -> common.Columns:
     }
 
 
+@table.whole("gains")
+def _gains(results: Sequence[CaseResult]) -> "pd.DataFrame":
+    """Without rows: estimators have no baseline."""
+    return common.joined((), common.GAINS)
+
+
 def _labels(result: CaseResult, f: np.ndarray, k: np.ndarray, c: np.ndarray | None = None) -> dict[str, np.ndarray]:
     """The first columns of rows of windows, of which t_s is the length."""
     components = {} if c is None else common.components(result, c)
@@ -83,7 +83,15 @@ def _at_windows(result: CaseResult) -> tuple[np.ndarray, np.ndarray]:
 
 @table("locks")
 def _locks(result: CaseResult) -> common.Columns:
-    """Share of bursts within 5 and 3 potential σ at each window, within as many posterior ones, and within 3 so far."""
+    """How many bursts lock, at each window; with the key `rare` by the weights of `rare.csv`.
+
+    lock_rate ± lock: share within five potential σ
+    lock_rate_3sigma: within three
+    posterior_rate, posterior_rate_3sigma: within as many σ with the prior
+    always_rate_3sigma ± always: within three at this and all earlier windows
+    always_posterior_rate_3sigma ± always_posterior: within as many σ with the prior
+    energy_ratio: μ of the window
+    """
     f, k = _at_windows(result)
     count = result.sums["locks"][f, k]
     rates = {name: statistics.rate(count[:, i], result.count) for i, name in enumerate(COUNTED)}
@@ -118,8 +126,7 @@ def losses(result: CaseResult, at: tuple[np.ndarray, ...]) -> rare.Counted:
     return rare.Counted(*np.moveaxis(result.sums["losses"][at], -1, 0))
 
 
-def _rare(result: CaseResult) -> dict[str, np.ndarray]:
-    """Loss of lock at the last window of each estimator, by the weights of the bursts."""
+def _rare_part(result: CaseResult) -> dict[str, np.ndarray]:
     windows = np.array([len(own) for own in result.axes.pulses])
     f, k = np.arange(len(windows)), windows - 1
     lost = losses(result, (f, k, np.full(f.size, COUNTED.index("lock"))))
@@ -129,7 +136,11 @@ def _rare(result: CaseResult) -> dict[str, np.ndarray]:
 
 @table("residuals")
 def _residuals(result: CaseResult) -> common.Columns:
-    """Median and 5 to 95 % band of |error| over all bursts, locked or not, from the histograms."""
+    """Size of the errors of all bursts, locked or not, from the histograms.
+
+    q05, median, q95 [unit]: 5 %, half and 95 % of the errors lie below
+    posterior_sigma [unit]: the potential σ with the prior
+    """
     at = f, k, c = common.shown(result)
     bound = result.axes.posterior_sigma[at]
     low, middle, high = quantiles(result.sums["residuals"][at], bin_edges(), QUANTILES)
@@ -160,7 +171,11 @@ def quantiles(counts: np.ndarray, edges: np.ndarray, at: Sequence[float]) -> lis
 
 @table("windows")
 def _windows(result: CaseResult) -> common.Columns:
-    """The schedules: what (15), (16) and the options made."""
+    """The schedules: what (15), (16) and the options made.
+
+    pulses: number in the window
+    energy_ratio: μ of the window
+    """
     f, k = _at_windows(result)
     pulses = result.axes.pulses
     return {
@@ -172,7 +187,14 @@ def _windows(result: CaseResult) -> common.Columns:
 
 @table("bounds")
 def _bounds(result: CaseResult) -> common.Columns:
-    """Spreads of prior and bound (closed form, and the exact sum over samples), T_min, and what no polynomial fits."""
+    """What limits an estimate, by component.
+
+    prior_sigma [unit]: spread of the forecast
+    potential_sigma [unit]: the potential σ by the closed form
+    potential_sigma_sum [unit]: by the sum over samples
+    shortest_window_s: T_min of (17)
+    model_error_turns, model_error_hz: what of the truth no polynomial holds
+    """
     axes = result.axes
     f, k = next((f, k) for f, k in zip(*_at_windows(result), strict=True) if _is_whole(result, f, k))
     size = len(axes.components)
@@ -197,7 +219,13 @@ def _is_whole(result: CaseResult, f: int, k: int) -> bool:
 
 @table("motion")
 def _motion(result: CaseResult) -> common.Columns:
-    """Spreads of radial velocity and acceleration, λ/2 of those of f₀ and f₁, at the burst's beginning and middle."""
+    """What the spreads mean for a target: λ/2 of those of f₀ and f₁.
+
+    band: metre, decimetre or centimetre
+    wavelength_m: its wavelength
+    at: beginning or middle of the burst
+    sigma_velocity_mps, sigma_acceleration_mps2: spread of radial velocity and acceleration there
+    """
     axes, rows = result.axes, []
     covariance, duration = axes.potential_covariance, axes.burst_s
     for band, wavelength in WAVELENGTHS_M:
@@ -210,8 +238,25 @@ def _motion(result: CaseResult) -> common.Columns:
 
 @table("passes")
 def _passes(result: CaseResult) -> common.Columns:
-    """Passes over a window's data a burst, the measure of an estimator's cost: mean with its interval."""
+    """What an estimator costs.
+
+    passes ±: mean number of passes over a window's data a burst
+    """
     n, total = plain(result), result.sums["passes"]
     of = statistics.mean(total[:, 0], total[:, 1], n)
     count = len(of.value)
     return {**common.leading(result, np.arange(count)), "n": np.full(count, n), "passes": of}
+
+
+@table.whole("rare")
+def _rare(results: Sequence[CaseResult]) -> "pd.DataFrame | None":
+    """Loss of lock at the last window of each estimator; `plain` bursts are not shifted."""
+    return rare.table([_rare_part(result) for result in results if "losses" in result.sums])
+
+
+tables = table.made
+
+
+def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
+    """σ of the locked bursts in place of the common table."""
+    return common.joined(map(_curves, results))

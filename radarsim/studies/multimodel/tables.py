@@ -1,6 +1,9 @@
-"""P2's own tables: probabilities of the models, stages of the flight, consistency, operations, cost."""
+"""Tables of filters with several models of motion (P2).
 
-from collections.abc import Mapping, Sequence
+stage: name of a stage of the flight
+"""
+
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,14 +24,14 @@ table = common.Tables()
 FREEDOM = 3  # degrees of freedom of a position's or a plot's normalised error squared
 
 
-def tables(results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
-    """The tables beyond curves and gains: probabilities, stages, consistency, operations."""
-    return table.made(results)
-
-
 @table("probabilities")
 def _probabilities(result: CaseResult) -> common.Columns:
-    """Mean probability of each model by scan, with its interval; models count from 1 (contract: probabilities.csv)."""
+    """How probable a filter takes each of its models to be, by scan.
+
+    model: number of the model, from 1
+    probability ±: mean over the realisations
+    motion: the model in words
+    """
     axes, models = result.axes, [world.labels(options.models) for options in result.spec.filters]
     shown = [(f, m) for f, own in enumerate(models) for m in range(len(own)) if len(own) > 1]
     scans = len(axes.k)
@@ -73,7 +76,7 @@ def stage_gain(result: CaseResult, f: int, base: int, s: int, c: int) -> statist
 def _stages(result: CaseResult) -> common.Columns:
     """σ over each stage of the flight, of all its scans, and the paired gain against the baseline filter.
 
-    `note` says where few realisations make the spread of their mean squares, of the filter or of the baseline.
+    begin_s, end_s: times from which and to which the stage lasts
     """
     rows, axes, b = [], result.axes, result.axes.baseline
     places = {name: s for s, name in enumerate(stage_names(result))}
@@ -98,11 +101,10 @@ def _stages(result: CaseResult) -> common.Columns:
 
 @table("consistency")
 def _consistency(result: CaseResult) -> common.Columns:
-    """NEES and NIS of each filter by stage, per degree of freedom, with bounds and verdicts.
+    """NEES of the position by stage, at the reported scans, and NIS of the plots, at all scans.
 
-    NEES of the position with the filter's own covariance, at the reported scans; NIS of the plot against what the
-    hypothesis predicted that was the most probable before it, at all scans. In 95 % of runs in which all of a case's
-    filters are right about themselves, all their stages lie within the bounds.
+    The plot against what the hypothesis predicted that was the most probable before it. The bounds, from the spread of
+    the realisations, are shared among all filters and stages of a case.
     """
     axes, n = result.axes, result.count
     names = stage_names(result)
@@ -124,9 +126,14 @@ def _consistency(result: CaseResult) -> common.Columns:
 
 @table("operations")
 def _operations(result: "CaseResult[FlightAxes]") -> common.Columns:
-    """Arithmetic operations of one update of one realisation, counted: mean over the scans of each stage, and over all.
+    """Arithmetic operations of one update of one realisation, counted: mean over each stage, and the whole flight.
 
-    merged: hypotheses that went into merges of more than one; merges: their number; both a scan.
+    family: family of the filter
+    merge: its rule of merging
+    models: number of its models
+    merged: number of hypotheses that go into merges of more than one
+    merges: number of these merges
+    operations: number of operations
     """
     rows, scans = [], result.axes.stage_scans
     for f, options in enumerate(result.spec.filters):
@@ -140,6 +147,9 @@ def _operations(result: "CaseResult[FlightAxes]") -> common.Columns:
             counted = {"merged": merged, "merges": merges, "operations": fixed + each * merged + once * merges}
             rows.append(row | counted)
     return common.of_rows(rows)
+
+
+tables = table.made
 
 
 def cost(made: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":

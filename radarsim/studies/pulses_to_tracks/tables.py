@@ -1,4 +1,9 @@
-"""The study's own tables: locks, what was measured, what a loss costs, and the idealisation beside each filter."""
+"""Tables of tracks from bursts of pulses.
+
+`exact_sigma` of `curves.csv` is filled for range alone and for idealisations (`estimator: fisher_bound`). A `note`
+*bursts lost more rarely than seen here may decide* stands where the bursts that the sample leaves possible to be lost
+(95 %) beyond those it saw would add more to σ² than half its interval; docs/trust.md has why.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -75,7 +80,13 @@ def _scans(result: Result, shown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @table("locks")
 def _locks(result: Result) -> common.Columns:
-    """Share of bursts that locked, of those taken (or mean weight), and of those taken in a fold that is not true."""
+    """How many bursts lock, by scan.
+
+    lock_rate ± lock: share whose estimate is within five Fisher bounds of the truth in all that is taken of it
+    lock_rate_3sigma: within three
+    taken: share taken into the track; of a mixture the mean weight
+    wrong_fold ±: share taken in a fold that is not the truth's
+    """
     f, k = _scans(result, result.axes.takes > 0)
     of, n = np.asarray(result.sums["locks"])[f, k], np.full(f.size, float(result.count))
     return {
@@ -90,7 +101,12 @@ def _locks(result: Result) -> common.Columns:
 
 @table("estimates")
 def _estimates(result: Result) -> common.Columns:
-    """Errors of the burst's velocity and acceleration, of those that locked and of all, beside the Fisher bound."""
+    """Errors of the burst's velocity and acceleration, by scan and component; `n` and `sigma` of those that locked.
+
+    sigma_all ± [unit]: σ of all bursts; marked where few lost ones decide it
+    bound [unit]: the Fisher bound
+    energy_db: energy of the burst over the density of the noise
+    """
     axes = result.axes
     f, c, k = np.nonzero(np.moveaxis(np.isfinite(axes.bound), 1, 2))
     of, locked = np.asarray(result.sums["measured"])[f, k, c], np.asarray(result.sums["locks"])[f, k, rec.LOCKED]
@@ -109,7 +125,10 @@ def _estimates(result: Result) -> common.Columns:
 
 @table("losses")
 def _losses(result: Result) -> common.Columns:
-    """σ of the track by the scans since the last burst that did not lock; 6: six and more, or none was lost so far."""
+    """What a lost burst costs: σ of the track after it.
+
+    since_loss: scans since the last burst that did not lock; 6: six and more, or none so far
+    """
     counted = np.asarray(result.sums["ages"])
     shown = (counted > 0) & (result.axes.takes > 0)[:, None, None]
     f, c, k, age = np.nonzero(np.broadcast_to(shown[:, None], (len(counted), 3, *shown.shape[1:])))
@@ -124,7 +143,11 @@ def _losses(result: Result) -> common.Columns:
 
 @table("idealisations")
 def _ideal(result: Result) -> common.Columns:
-    """σ of a filter over the exact σ of its idealisation, where the case has one."""
+    """σ of a filter beside the exact σ of its idealisation, where the case has one.
+
+    ideal: name of the idealisation, a filter that is otherwise the same
+    over_ideal ±: σ over the exact σ of that
+    """
     axes = result.axes
     at = f, k, c = common.shown(result, np.broadcast_to((axes.ideal >= 0)[:, None, None], axes.available.shape))
     moments = np.asarray(result.sums["error"])[at]
@@ -138,9 +161,11 @@ def _ideal(result: Result) -> common.Columns:
 
 @table("folds")
 def _folds(result: Result) -> common.Columns:
-    """Of filters that keep several hypotheses: how often the best one has taken no velocity in a wrong fold.
+    """Of filters that keep several hypotheses, by scan: how often these have taken no velocity in a wrong fold.
 
-    listed is how often any of the list has taken none, hypotheses the mean number of them.
+    right ±: share of realisations whose best one has taken none
+    listed: share of those where any of the list has taken none
+    hypotheses: mean number of them
     """
     f, k = _scans(result, np.array([(one.hypotheses or 1) > 1 for one in result.spec.filters]))
     of, n = np.asarray(result.sums["folds"])[f, k], np.full(f.size, float(result.count))
@@ -155,7 +180,10 @@ def _folds(result: Result) -> common.Columns:
 
 @table("passes")
 def _passes(result: Result) -> common.Columns:
-    """Mean passes over a window's data that a burst takes: the measure of cost."""
+    """What an estimator costs.
+
+    passes ±: mean number of passes over a window's data a burst
+    """
     f, scans = np.flatnonzero(result.axes.takes > 0), result.axes.k.size
     of, n = np.asarray(result.sums["passes"])[f], np.full(f.size, float(result.count))
     found = statistics.mean(of[:, 0] / scans, of[:, 1] / scans**2, n)

@@ -1,4 +1,8 @@
-"""P1's own tables: steady state, believed against true σ, NEES, radar."""
+"""Tables of filters that measure range and radial velocity (P1).
+
+With missed plots `n` of `curves.csv` is how many realisations have an estimate at that scan, and a gain is of those in
+which both filters have one; `exact_sigma` is the mean over all patterns of plots, empty where these are too many.
+"""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -19,12 +23,6 @@ SETTLED = 0.05  # within this share of the steady value, for good; the paper giv
 
 Result = CaseResult[RangeDopplerAxes]
 table = common.Tables()
-
-
-def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
-    """The tables beyond curves: steady, believed, consistency, radar; and gains where plots may be missed."""
-    made = {"steady": steady(results), **table.made(results)}
-    return made | ({"gains": gains(results)} if any(own_gains(result) for result in results) else {})
 
 
 def follows_the_model(result: Result) -> bool:
@@ -67,14 +65,20 @@ STEADY = (
 )
 
 
+@table.whole("steady")
 def steady(results: Sequence[Result]) -> "pd.DataFrame":
     """Steady σ against settling, both exact, of every case, filter and component; and σ measured at the last scan.
 
-    Settled is the first scan from which the exact σ(k) stays within 5 % of its steady value to the end of the run;
-    infinite where it does not settle within the run. Cases whose target breaks the filters' model have no steady error
-    and no rows; nor have those whose plots may be missed or are biased.
-    `best` marks, among the cases of one config that differ in D_M, the least steady σ of those that settle in under
-    ten periods.
+    Cases whose target breaks the filters' model have no steady error and no rows; nor have those whose plots may be
+    missed or are biased.
+
+    manoeuvre_variance [(m/s³)²]: D_M of the filter's model
+    steady_sigma [unit]: σ in steady state, exact
+    last_sigma ± last [unit]: σ measured at the last scan
+    settling_periods, settling_s [scan periods, s]: time from which on the exact σ stays within 5 % of its steady value
+        to the end of the run; `inf` if it does not
+    under_10_periods: whether it settles within ten scan periods
+    best: whether its steady σ is the least of those that do, among the D_M tried for one radar
     """
     rows = [row for result in results if follows_the_model(result) and result.axes.plain for row in _steady(result)]
     if not rows:
@@ -128,7 +132,7 @@ def _for_good(settled: np.ndarray, t: np.ndarray) -> float:
 
 @table("believed")
 def _believed(result: Result) -> common.Columns:
-    """Measured σ beside the σ that a filter believes, by component: `ratio` over 1 is optimistic."""
+    """As everywhere."""
     variance = np.diagonal(result.axes.believed, axis1=2, axis2=3)
     if own_gains(result):
         with np.errstate(invalid="ignore"):
@@ -138,10 +142,9 @@ def _believed(result: Result) -> common.Columns:
 
 @table("consistency")
 def _normalised_errors(result: Result) -> common.Columns:
-    """NEES of each filter's estimate by scan: the mean of eᵀP⁻¹e per estimated component, with bounds and verdict.
+    """NEES of all components that a filter estimates at a scan; the bounds are shared among all scans of a filter.
 
-    In 95 % of runs of a filter that is right about itself the means of all its scans lie within the bounds. Where plots
-    may be missed, of the realisations in which the filter has started, `n`.
+    Where plots may be missed, of the realisations in which the filter has started, `n`.
     """
     axes = result.axes
     there: np.ndarray
@@ -181,8 +184,13 @@ def nees(result: Result) -> statistics.Estimate:
 
 @table("radar")
 def _radar(result: Result) -> common.Columns:
-    """C_θ = σ_r²/(Δt²σ_V²) (eq. 11), the target's greatest radial speed at a scan, its Doppler frequency 2V/λ, and the
-    unambiguous span of velocity λF/2."""
+    """What a radar makes of its target.
+
+    C_theta: σ_r²/(Δt²σ_V²) (eq. 11)
+    speed_mps: the target's greatest radial speed at a scan
+    doppler_hz, doppler_per_repetition_rate: its Doppler frequency 2V/λ, also over the repetition rate
+    unambiguous_velocity_mps: unambiguous span of velocity λF/2
+    """
     axes = result.axes
     doppler = 2 * axes.speed_mps / axes.wavelength_m
     row = {
@@ -191,6 +199,15 @@ def _radar(result: Result) -> common.Columns:
         "unambiguous_velocity_mps": span_mps(result),
     }
     return common.of_rows([row])
+
+
+@table.whole("gains")
+def _gains_where_missed(results: Sequence[Result]) -> "pd.DataFrame | None":
+    """As everywhere; where plots may be missed, of realisations in which both filters have an estimate."""
+    return gains(results) if any(own_gains(result) for result in results) else None
+
+
+tables = table.made
 
 
 def span_mps(result: Result) -> float:

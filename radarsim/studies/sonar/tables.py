@@ -1,4 +1,4 @@
-"""Tables that all parts of P3 have: extrapolation, believed, consistency, operations."""
+"""Tables of any part of P3."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -17,11 +17,6 @@ if TYPE_CHECKING:
 
 Index = tuple[np.ndarray, ...]
 table = common.Tables()
-
-
-def tables(results: Sequence[CaseResult[SonarAxes]]) -> "dict[str, pd.DataFrame]":
-    """The tables of these cases in addition to curves and gains."""
-    return {**table.made(results), "operations": operations()}
 
 
 # ---- parts of tables ----------------------------------------------------------------------------------------------
@@ -63,7 +58,7 @@ def _extrapolation(result: CaseResult[SonarAxes]) -> Columns:
 
 @table("believed")
 def _believed(result: CaseResult[SonarAxes]) -> Columns:
-    """The measured σ beside the σ that the filter believes, the root of its mean variance."""
+    """As everywhere."""
     with np.errstate(invalid="ignore", divide="ignore"):
         columns = notes.believed(result, np.sqrt(result.sums["believed"] / common.realisations(result)))
     adapts = result.axes.adapts[common.shown(result)[0]] if isinstance(result.axes, GivenPlotsAxes) else False
@@ -73,10 +68,7 @@ def _believed(result: CaseResult[SonarAxes]) -> Columns:
 
 @table("consistency")
 def _normalised_errors(result: CaseResult[SonarAxes]) -> Columns:
-    """NEES eᵀP⁻¹e of the state in a coordinate, per component, where the state is complete.
-
-    For a consistent filter the means of all its scans are within their bounds in 95 % of runs.
-    """
+    """NEES of a coordinate's state, where it is complete; the bounds are shared among all scans of a filter."""
     n = complete(result)
     at, columns = of_coordinates(result, n > 0)
     looks = np.sum(n > 0, axis=1)[at[0], at[2]]
@@ -88,8 +80,14 @@ def _normalised_errors(result: CaseResult[SonarAxes]) -> Columns:
     return {**columns, "n": n.astype(np.int64), **nees}
 
 
-def operations() -> "pd.DataFrame":
-    """Operations of one scan in one coordinate, degree 1, by algorithm, and the numbers that each keeps."""
+@table.whole("operations")
+def _operations(results: Sequence[CaseResult[SonarAxes]]) -> "pd.DataFrame":
+    """Operations of one scan of one coordinate at degree 1.
+
+    algorithm: in words, with the equation of the paper
+    numbers_kept: how many numbers are kept from scan to scan
+    products, sums, operations: number of products and divisions, of sums and differences, and of both
+    """
     rows = [("recursion (12)-(14)", 2, scene.recursion())]
     rows += [(f"least squares (2) on {n} plots", 2 * n, scene.batch_of(n)) for n in (2, 3, 5, 6, 10)]
     rows += [("Kalman (11), degree 1", 2, scene.kalman_of(2)), ("differenced", 3, scene.differenced())]
@@ -97,3 +95,6 @@ def operations() -> "pd.DataFrame":
     names = ("algorithm", "numbers_kept", "products", "sums", "operations")
     columns = zip(*((name, kept, of.products, of.sums, of.total) for name, kept, of in rows), strict=True)
     return common.frame(dict(zip(names, columns, strict=True)))
+
+
+tables = table.made

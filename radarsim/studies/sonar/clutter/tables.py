@@ -1,4 +1,7 @@
-"""P3's tables of tracks among false plots: tracks, tracking, gates, track_classes; rare."""
+"""Tables of trackers among false plots (P3).
+
+docs/sonar_clutter.md says what confirmed, tentative, kept, lost and dropped mean.
+"""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -23,11 +26,6 @@ ENDED = "target's track ended"
 PART = 0.05  # of a rate: what is less does not decide whether its interval holds
 HOW = {"target's track dropped": [DROPPED, DROPPED_AFTER], "target's track lost": [LOST, LOST_AFTER]}
 BESIDE = [DROPPED_AFTER, LOST_AFTER]
-
-
-def tables(results: Sequence[CaseResult[ClutterAxes]]) -> "dict[str, pd.DataFrame]":
-    """The tables of these cases, all of which have trackers."""
-    return {**table.made(results), **rare.table([part for result in results for part in _rare(result)])}
 
 
 def trackers(result: CaseResult[ClutterAxes]) -> np.ndarray:
@@ -112,10 +110,12 @@ def mean_of_counts(times: np.ndarray, counts: np.ndarray) -> Estimate:
 # ---- tables ----------------------------------------------------------------------------------------------------------
 @table("tracks")
 def _tracks(result: CaseResult[ClutterAxes]) -> Columns:
-    """By scan: probabilities that a track of the target was confirmed by then, and that one is kept.
+    """By scan: tracks of the target.
 
-    In addition, numbers of n realisations that have a tentative one, lost or dropped a confirmed one, or dropped a
-    tentative one.
+    confirmed ±: share of realisations that have confirmed one by then
+    kept ±: share that have a confirmed one
+    tentative: number of realisations that have a tentative one
+    lost, dropped, tentative_dropped: number that have lost or dropped a confirmed one, or dropped a tentative one
     """
     chosen, K, n = trackers(result), len(result.axes.k), result.count
     counts = np.asarray(result.sums["counts"])[chosen]
@@ -134,8 +134,24 @@ def _tracks(result: CaseResult[ClutterAxes]) -> Columns:
 def _tracking(result: CaseResult[ClutterAxes]) -> Columns:
     """One row a tracker: how surely and soon it confirms the target's track, how long it keeps it, its false tracks.
 
-    The life of a track is the mean time between ends, over the time of all confirmed tracks. false_confirmed is the
-    probability that a track begun by a false plot is confirmed; false tracks are counted over the whole sector.
+    Where false tracks are sought (key `rare`), these are by the weights of `rare.csv`.
+
+    association, gate_probability: rule of association and probability of the gate
+    m, of: the tracker confirms with m plots of so many scans
+    detection_probability: of the target's plots
+    false_plots_per_km2 [1/km²]: density of false plots a scan
+    false_in_gate: mean number of false plots in the gate a scan
+    confirmed ±: share of realisations that confirm a track of the target
+    time_to_confirm_s ± time: mean time until then
+    kept_at_end ± kept: share that have it at the last scan
+    lost, dropped: number of confirmed tracks of the target that are lost or dropped
+    ends_per_hour ± ends [1/h]: rate at which confirmed tracks of the target end
+    life_s ± life: mean time between such ends, over the time of all confirmed tracks
+    wrong_share ± wrong: share of the plots in the target's track that are not the target's
+    false_confirmed ±: probability that a track begun by a false plot is confirmed
+    false_tracks_per_hour ± false [1/h]: rate of confirmed false tracks over the sector
+    false_tracks_at_once: mean number of these at a time
+    false_life_s: mean life of one
     """
     return of_rows([_summary(result, f) for f in trackers(result)])
 
@@ -176,11 +192,15 @@ def _summary(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
 
 @table("gates")
 def _gates(result: CaseResult[ClutterAxes]) -> Columns:
-    """By scan: the share of the target's plots in the gate, and false plots in it, for n tracks of two plots or more.
+    """By scan, the gates of n tracks of two plots or more.
 
     The exact share, the gate's probability, holds for a filter that knows the target's plots and has the target's
     model. The expected number of false plots is density times area, π γ √|S| times the range, over the gates as they
     were; the edges of the sector are neglected.
+
+    plots: number of the target's plots
+    inside ±: share of these in the gate
+    false_in_gate ± false: mean number of false plots in it
     """
     counts, filters = np.asarray(result.sums["counts"]), result.spec.filters
     f, k = np.nonzero(counts[:, :, at.LOOKED] > 0)
@@ -208,11 +228,17 @@ def straight(result: CaseResult[ClutterAxes]) -> bool:
 
 @table("track_classes")
 def _classes(result: CaseResult[ClutterAxes]) -> Columns:
-    """Error rates of calling a track true once its score reaches a threshold, and false if it ends before.
+    """Tracks called true once their score reaches a threshold, false if they end before.
 
-    For the target's first tracks, and for tracks that false plots began. The score is the logarithm of the likelihood
-    ratio of all plots in the gate. For false tracks its exponential is a martingale of mean one, so that at most
-    exp(−threshold) of them ever reach the threshold (Ville), for any tracker.
+    The target's first tracks, and those that false plots began, where these are sought the plain ones alone. The score
+    is the logarithm of the likelihood ratio of all plots in the gate. For false tracks its exponential is a martingale
+    of mean one, so that at most exp(−threshold) of them ever reach the threshold (Ville), for any tracker.
+
+    threshold: least score of a track called true
+    n_true, n_false: number of true and of false tracks
+    true_called_false ± true: share of the true ones called false
+    false_called_true ± false: share of the false ones called true
+    bound: the latter is at most, exp(−threshold)
     """
     chosen, thresholds = trackers(result), result.axes.thresholds
     scores = np.asarray(result.sums["scores"])[:, chosen]
@@ -229,17 +255,20 @@ def _classes(result: CaseResult[ClutterAxes]) -> Columns:
     }
 
 
-def _rare(result: CaseResult[ClutterAxes]) -> list[dict[str, Any]]:
-    """Of a case the events that are sought."""
+@table.whole("rare")
+def _rare(results: Sequence[CaseResult[ClutterAxes]]) -> "pd.DataFrame | None":
+    """That a track begun by a false plot is confirmed, or how the target's track ends, by tracker.
+
+    Where false tracks are sought: that one is confirmed (`event` false track, k = 1), and that it is held to its k-th
+    scan, `t_s` after the confirmation (false track held). Where ended tracks are: that the first confirmed track of the
+    target has ended by each scan (target's track ended; `sought` by the last one), and by the last one how: target's
+    track dropped, target's track lost; of further realisations, so that no other table changes by that.
+    """
     made = {"held": _rare_false, "ended": _rare_ends}
-    return [rows(result) for name, rows in made.items() if name in result.sums]
+    return rare.table([rows(one) for one in results for name, rows in made.items() if name in one.sums])
 
 
 def _rare_false(result: CaseResult[ClutterAxes]) -> dict[str, Any]:
-    """Probabilities that a track begun by a false plot is confirmed (k = 1), and that it is held to its k-th scan.
-
-    Scans and t_s count from the confirmation.
-    """
     chosen = trackers(result)
     shown = held(result, (chosen,)).number > 0
     shown[:, 0] = True
@@ -250,10 +279,6 @@ def _rare_false(result: CaseResult[ClutterAxes]) -> dict[str, Any]:
 
 
 def _rare_ends(result: CaseResult[ClutterAxes]) -> dict[str, Any]:
-    """Probabilities that the target's first confirmed track has ended by a scan; by the last one, how it ended, too.
-
-    Scans count from the first one.
-    """
     return stacked([_ended(result, f) for f in trackers(result)])
 
 
@@ -294,3 +319,6 @@ def ends_note(
     own_note, any_note = rare.note(drawn, whole), rare.note(drawn, *said)
     in_part = np.where(any_note != "", rare.IN_PART, "").astype(object)
     return np.where(own_note != "", own_note, in_part)
+
+
+tables = table.made

@@ -1,6 +1,12 @@
-"""P3's tables on manoeuvres: detections, delays, thresholds, classes of tracks, modes of filters, uses of a track."""
+"""Tables of detectors of manoeuvres, of filters that respond to them, and of uses of a track (P3).
 
-from collections.abc import Sequence
+The `filter` of a detector's row is the detector; `component` may be `joint`, too.
+
+plots: number of plots in the detector's window
+threshold_k: its threshold k
+false_alarm_probability: of the threshold, by the χ² law
+"""
+
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +21,7 @@ from radarsim.studies.sonar.manoeuvre.exact import QUANTITIES, ManoeuvreAxes
 from radarsim.studies.sonar.tables import Index
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 table = common.Tables()
 PHASES = np.array(["steady", "manoeuvre", "after"], dtype=object)
@@ -23,11 +29,6 @@ EVENTS = np.array(["false alarm", "alarm", "all clear"], dtype=object)  # the fi
 JOINT = "joint"
 NEAR = "fails: near zero"
 NEAR_ZERO = 3.0  # in σ: speeds and distances, which cannot be negative, are not of first order nearer to zero
-
-
-def tables(results: Sequence[CaseResult[ManoeuvreAxes]]) -> "dict[str, pd.DataFrame]":
-    """The tables of cases with detectors, filters that respond to manoeuvres, or uses."""
-    return table.made(results)
 
 
 def measured(result: CaseResult[ManoeuvreAxes]) -> bool:
@@ -75,7 +76,12 @@ def _of_thresholds(
 
 @table("detections", measured)
 def _detections(result: CaseResult[ManoeuvreAxes]) -> Columns:
-    """Probability of an alarm at each test; `shift` is the mean of â in units of its σ_a, `n` the number of tests."""
+    """Alarms of each detector, at each of n tests.
+
+    phase: which the test falls in: steady, manoeuvre, after
+    shift: mean of the estimated acceleration in its own σ
+    probability: of an alarm
+    """
     axes = result.axes
     at, columns = _tested(result)
     d, g, _, k = at
@@ -92,10 +98,12 @@ def _detections(result: CaseResult[ManoeuvreAxes]) -> Columns:
 
 @table("delays", measured)
 def _delays(result: CaseResult[ManoeuvreAxes]) -> Columns:
-    """Probability that the first event of a phase has come by a scan: false alarm, alarm, end of alarms.
+    """How soon the first event of a phase comes.
 
-    The delay is counted from the start of the phase. `independent` is the law of tests that are independent of one
-    another, and `exact` the same where they are; overlapping windows have no closed law.
+    event: false alarm, alarm, or end of alarms (all clear)
+    delay_s: time since the phase began
+    probability: that the event has come by then; exact where tests are independent: overlapping windows have no law
+    independent: what independent tests would give
     """
     axes, K = result.axes, len(result.axes.k)
     at, columns = _tested(result)
@@ -130,9 +138,12 @@ def phase_starts(result: CaseResult[ManoeuvreAxes]) -> np.ndarray:
 
 @table("classes", measured)
 def _classes(result: CaseResult[ManoeuvreAxes]) -> Columns:
-    """Classification of tracks by their alarms: a track is called manoeuvring if there was one in a phase.
+    """Tracks classed by their alarms: called manoeuvring if there was one in a phase, of which k is the last scan.
 
-    The error is a steady track called manoeuvring, or a manoeuvring one called steady; k is the last scan of the phase.
+    truth: the track's phase: steady, or manoeuvre
+    duration_s: time since the phase began
+    called_manoeuvring: share of tracks called so
+    error_probability: that a steady track is called manoeuvring, or a manoeuvring one steady
     """
     delays = _delays(result)
     last = np.concatenate([_last_of(delays, event) for event in EVENTS[:2]])
@@ -159,9 +170,13 @@ def _last_of(rows: Columns, event: str) -> np.ndarray:
 
 @table("thresholds", measured)
 def _thresholds(result: CaseResult[ManoeuvreAxes]) -> Columns:
-    """Thresholds of each detector with full windows: false alarms by the χ² law, and the accelerations they detect.
+    """Thresholds of each detector with full windows, and the accelerations that they detect.
 
-    `threshold_to_plot_variance` is k σ_a²/σ², in 1/s⁴: the k of the paper, which is compared with the plot's variance.
+    no_alarm_probability: of a test without a manoeuvre
+    sigma_acceleration [unit]: σ_a of a window's estimate
+    threshold_acceleration [unit]: estimate from which there is an alarm
+    threshold_to_plot_variance [1/s⁴]: k σ_a²/σ², the k of the paper, which is compared with the plot's variance
+    acceleration_for_50_percent, acceleration_for_68_percent, acceleration_for_90_percent [unit]: detected so often
     """
     axes = result.axes
     places = [(d, *place) for d, limits in enumerate(axes.thresholds) for place in np.ndindex(*limits.shape)]
@@ -187,10 +202,10 @@ def _thresholds(result: CaseResult[ManoeuvreAxes]) -> Columns:
 
 @table("modes", lambda result: "modes" in result.sums)
 def _modes(result: CaseResult[ManoeuvreAxes]) -> Columns:
-    """Mean probability that a filter assigns to a manoeuvre, and the mean number of plots in its memory.
+    """What an adaptive filter or an IMM lives by, by scan.
 
-    For an adaptive filter the probability is the share of realisations in its manoeuvring mode; for an imm that of the
-    second model.
+    probability: of a manoeuvre: share of realisations in the manoeuvring mode, or mean of the second model's
+    memory_plots: mean number of plots that an adaptive filter rests on
     """
     sums = np.asarray(result.sums["modes"])
     kinds = np.array([member.kind for member in result.spec.filters])
@@ -207,11 +222,11 @@ def _modes(result: CaseResult[ManoeuvreAxes]) -> Columns:
 
 @table("uses", lambda result: "uses" in result.sums)
 def _uses(result: CaseResult[ManoeuvreAxes]) -> Columns:
-    """Course, speed, predicted position, closest approach: errors about the truth beside σ from the track's covariance.
+    """Course, speed, predicted position, closest approach: errors beside `believed_sigma` from the track's covariance.
 
-    believed_sigma is the root of the mean first-order variance, ratio the measured σ over it. `distance_in_sigma` is
-    the distance of speed or closest approach from zero, which they cannot pass, in believed σ: within three the first
-    order fails, and with it that of the course and of the time of the closest approach.
+    true_value [unit]: of the quantity that `component` names
+    distance_in_sigma: distance of speed or closest approach from zero, which they cannot pass, in believed σ
+    first_order: whether it holds: within three σ it fails, and with it that of course and time of closest approach
     """
     uses, sums = result.axes.uses, np.asarray(result.sums["uses"])
     if uses is None:
@@ -250,3 +265,6 @@ def _distance(sums: np.ndarray, true: np.ndarray, closing: np.ndarray) -> np.nda
         cpa = true[:, 4] / believed[..., 4]
     far = np.full_like(speed, np.inf)
     return np.stack([speed, speed, far, far, np.minimum(cpa, relative), relative], axis=1)
+
+
+tables = table.made

@@ -1,6 +1,5 @@
-"""Tables of filters that know their plots (P3): what each plot gains, gains of growing memory, bias of conversion."""
+"""Tables of filters that know their plots (P3)."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,14 +12,9 @@ from radarsim.studies.sonar import exact
 from radarsim.studies.sonar.world import GivenPlotsAxes
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 table = common.Tables()
-
-
-def tables(results: Sequence[CaseResult[GivenPlotsAxes]]) -> "dict[str, pd.DataFrame]":
-    """The tables of these cases in addition to those of all parts."""
-    return table.made(results)
 
 
 def textbook(result: CaseResult[GivenPlotsAxes]) -> bool:
@@ -39,10 +33,14 @@ def _width(result: CaseResult[GivenPlotsAxes]) -> int:
 
 @table("plots", textbook)
 def _plots(result: CaseResult[GivenPlotsAxes]) -> Columns:
-    """The gain of each further plot: σ of growing memory after n plots, per σ of a plot.
+    """What each further plot buys to growing memory.
 
-    Smoothed, one scan ahead, and for degree 2 of the acceleration. `formula` is the paper's for degree 1, and its (3)
-    for the acceleration; `bought_percent` is the reduction by the n-th plot.
+    degree: of the polynomial
+    what: smoothed, extrapolated by one scan, or for degree 2 the acceleration
+    plots: number in memory
+    ratio ±: σ over σ of a plot
+    formula: the paper's for degree 1, and its (3) for the acceleration
+    bought_percent, formula_bought_percent: reduction by the last of these plots
     """
     return stacked(
         [
@@ -85,9 +83,11 @@ def _bought(result: CaseResult[GivenPlotsAxes], f: int, c: int, what: str) -> Co
 
 @table("smoothing_gains", textbook)
 def _gains(result: CaseResult[GivenPlotsAxes]) -> Columns:
-    """A_n and B_n of (14) as measured by filters of degree 1 without process noise.
+    """A_n and B_n of (14), by filters of degree 1 without process noise: var r/σ² and T₀ cov(r, v)/σ².
 
-    For them var r / σ² = A and T₀ cov(r, v) / σ² = B.
+    plots: their number n
+    A ±, B ±: as measured
+    A_formula, B_formula: by the paper
     """
     axes = result.axes
     parts: list[Columns] = []
@@ -110,7 +110,16 @@ def _gains(result: CaseResult[GivenPlotsAxes]) -> Columns:
 
 @table("conversion", lambda result: result.spec.frame != "polar")
 def _conversion(result: CaseResult[GivenPlotsAxes]) -> Columns:
-    """Mean error along the line of sight of the converted first plot; `across_m` is range × bearing error."""
+    """Errors of a first plot that is converted to another frame.
+
+    frame: what it is converted to
+    range_m: its range
+    sigma_range_m, sigma_bearing_rad: σ of its measurement
+    across_m: error across the line of sight, range × bearing error
+    bias_m ± bias: mean error along the line of sight
+    formula_m: the same by formula
+    bias_to_sigma_range: the mean error over σ of the range
+    """
     axes, sensor = result.axes, result.spec.sensor
     r, b = axes.polar[0, :2, 0]
     of = statistics.errors(result.sums["error"][0, 0, [0, _width(result)]], result.count)
@@ -125,3 +134,6 @@ def _conversion(result: CaseResult[GivenPlotsAxes]) -> Columns:
         "bias_to_sigma_range": bias / sensor.sigma_range_m,
     }
     return common.of_rows([row])
+
+
+tables = table.made

@@ -1,0 +1,107 @@
+"""Result tables as Markdown, from the docstrings of what makes them: see `radarsim.report.tables.Tables`."""
+
+import inspect
+import pkgutil
+import re
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from types import ModuleType
+from typing import NamedTuple
+
+from radarsim.report import notes, rare
+from radarsim.report import tables as common
+from radarsim.studies import registry
+
+SHARED = (common.leading, common.components, common.realisations, common.interval_columns, notes.beside, notes.noted)
+SEVERAL = {  # tables that studies have in common
+    "curves": (common.curves,),
+    "gains": (common.gains,),
+    "believed": (notes.believed, notes.ratio_columns),
+    "consistency": (notes.normalised,),
+    "rare": (rare.rows,),
+}
+UNITS = {  # by how a name ends
+    **{"_s": "s", "_m": "m", "_mps": "m/s", "_mps2": "m/s²", "_rad": "rad", "_hz": "Hz", "_db": "dB"},
+    **{"_percent": "%", "_turns": "turns"},
+}
+NAME = r"\w+(?: ±(?: \w+)?)?"
+LINE = re.compile(rf"(?P<names>{NAME}(?:, {NAME})*)(?: \[(?P<unit>[^\]]+)\])?: (?P<meaning>\S.*)")
+
+
+class Column(NamedTuple):
+    """One column or several of one meaning, with the ends of their intervals."""
+
+    names: tuple[str, ...]
+    unit: str
+    meaning: str
+
+
+def read(of: Callable | ModuleType) -> tuple[str, list[Column]]:
+    """What a docstring says of a table, and the columns that it declares."""
+    prose, columns = [], []
+    for paragraph in (inspect.getdoc(of) or "").split("\n\n"):
+        if not LINE.match(paragraph):
+            prose.append(paragraph)
+            continue
+        for line in re.sub(r"\n +", " ", paragraph).splitlines():
+            found = LINE.fullmatch(line)
+            if found is None:
+                raise ValueError(f"{of.__name__}: a line of columns must be `name: meaning`, is {line!r}")
+            names = tuple(name for one in found["names"].split(", ") for name in with_ends(one))
+            columns.append(Column(names, found["unit"] or units(names), found["meaning"]))
+    return "\n\n".join(prose), columns
+
+
+def with_ends(name: str) -> tuple[str, ...]:
+    """The names of an estimate `name ± stem` and of its ends; a name without a mark by itself."""
+    value, marked, stem = (part.strip() for part in name.partition("±"))
+    return (value, f"{stem or value}_lo", f"{stem or value}_hi") if marked else (value,)
+
+
+def units(names: tuple[str, ...]) -> str:
+    """The units that names end in; nothing where they end in none."""
+    return ", ".join(dict.fromkeys(of for name in names for ending, of in UNITS.items() if name.endswith(ending)))
+
+
+def modules(study: str) -> Iterator[ModuleType]:
+    """The modules of a study that declare tables, that of the whole study first."""
+    package = import_module(registry.SHIPPED[study])
+    names = [one.name for one in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")]
+    for name in sorted(names, key=lambda name: name.count(".")):
+        if name.endswith(".tables"):
+            yield import_module(name)
+
+
+def markdown() -> str:
+    """Columns that mean the same everywhere, tables of several studies, and each study's own, as they are made."""
+    shared = [column for function in SHARED for column in read(function)[1]]
+    parts = ["Columns that mean the same everywhere:", listed(shared), "## Tables of several studies"]
+    for name, functions in SEVERAL.items():
+        parts += [f"### `{name}.csv`", *described(*functions)]
+    for study in registry.SHIPPED:
+        parts.append(f"## {study}")
+        for module in modules(study):
+            parts += described(module)
+            for name, (function, _) in module.table.declared.items():
+                parts += [f"### `{name}.csv`", *described(function)]
+    return "\n\n".join(filter(None, parts))
+
+
+def described(*things: Callable | ModuleType) -> list[str]:
+    """What the first says, of a table or of all of a module, and the columns that all of them declare."""
+    found = [read(thing) for thing in things]
+    return [linked(found[0][0]), listed([column for _, own in found for column in own])]
+
+
+def linked(prose: str) -> str:
+    """Prose in which pages that are named are links."""
+    return re.sub(r"\bdocs/([\w/]+\.md)", r"[\1](../\1)", prose)
+
+
+def listed(columns: list[Column]) -> str:
+    """Columns as a table; nothing of none."""
+    of = {"unit": "that of `unit`"}
+    rows = [(", ".join(f"`{name}`" for name in one.names), of.get(one.unit, one.unit), one.meaning) for one in columns]
+    lines = [" | ".join(cell.replace("|", "\\|") for cell in row) for row in rows]
+    head = ["| column | unit | meaning |", "|---|---|---|"]
+    return "\n".join([*head, *(f"| {line} |" for line in lines)]) if lines else ""
