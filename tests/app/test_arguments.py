@@ -5,11 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import radarsim
-from radarsim.cli import main
 from radarsim.engine.executors import Threads
+from tests.program import command
 
 COUNT, ABOVE = "must be a whole number from 1 to 1024, got", "must be > 0"
 
@@ -76,9 +75,7 @@ def test_a_key_that_is_no_text_is_named():
 @pytest.mark.parametrize("words", [["run", "rls2", "-n", "10"], ["report", "rls2"], ["claims"], ["clean"]])
 def test_no_directory_without_a_name(words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    ended = CliRunner().invoke(main, [*words, "--out", ""])
-    assert ended.exit_code == 2
-    assert "'--out': must name a directory, got ''" in ended.output
+    assert "'--out': must name a directory, got ''" in command(*words, "--out", "", code=2).output
     assert not list(tmp_path.iterdir())
     with pytest.raises(radarsim.ConfigError, match="out: must name a directory"):
         radarsim.load("rls2", out="")

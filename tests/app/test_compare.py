@@ -5,19 +5,11 @@ import math
 import shutil
 
 import pytest
-from click.testing import CliRunner
 
 from radarsim.app import run
 from radarsim.app.result import recorded_case
-from radarsim.cli import main
 from radarsim.report import tables
-
-
-def radarsim(*arguments, code=0):
-    """Run the command in this process; its result, after checking the exit code."""
-    result = CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
-    assert result.exit_code == code, result.output
-    return result
+from tests.program import command
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +22,7 @@ def out(tmp_path_factory):
 
 
 def test_two_radars_side_by_side(out):
-    said = radarsim("compare", "rls2", "rls4", "--out", out).output
+    said = command("compare", "rls2", "rls4", "--out", out).output
     exact = -76.9  # per cent: the exact σ_r of RLS 4 at 140 s against that of RLS 2
     assert f"exactly −{-exact:g} %" in said
     made = tables.from_csv((out / "compare" / "comparison.csv").read_bytes())
@@ -49,26 +41,26 @@ def test_two_radars_side_by_side(out):
 
 def test_two_versions_of_one_differ_by_nothing(out, tmp_path):
     run.run("rls2", realisations=4000, out=tmp_path, figures=False)
-    done = radarsim("compare", out / "rls2", tmp_path / "rls2", "--out", tmp_path, "--no-figures", "--json")
+    done = command("compare", out / "rls2", tmp_path / "rls2", "--out", tmp_path, "--no-figures", "--json")
     found = json.loads(done.stdout)
     assert {row["difference"] for row in found["rows"]} == {0.0}
     assert {row["pairing"] for row in found["rows"]} == {"same numbers"}
 
 
 def test_what_is_missing_is_said_with_the_command_for_it(out, tmp_path):
-    said = radarsim("compare", "rls2", "rls5", "nosuch", "--out", out, code=2).stderr.splitlines()
+    said = command("compare", "rls2", "rls5", "nosuch", "--out", out, code=2).stderr.splitlines()
     assert said[0].endswith(f"`radarsim run rls5 --out {out}` computes it")
     assert said[1].startswith("nosuch: no such config")
-    assert "two results or more" in radarsim("compare", "rls2", "--out", out, code=2).stderr
+    assert "two results or more" in command("compare", "rls2", "--out", out, code=2).stderr
     (tmp_path / "empty").mkdir()
-    assert "no run.json" in radarsim("compare", "rls2", tmp_path / "empty", "--out", out, code=2).stderr
+    assert "no run.json" in command("compare", "rls2", tmp_path / "empty", "--out", out, code=2).stderr
 
 
 def test_a_table_that_was_altered_is_no_result(out, tmp_path):
     run.run("rls2", realisations=4000, out=tmp_path, figures=False)
     with (tmp_path / "rls2" / "curves.csv").open("a") as file:
         file.write("\n")
-    assert "altered" in radarsim("compare", "rls4", tmp_path / "rls2", "--out", out, code=4).stderr
+    assert "altered" in command("compare", "rls4", tmp_path / "rls2", "--out", out, code=4).stderr
 
 
 @pytest.mark.parametrize(
@@ -83,7 +75,7 @@ def test_a_record_that_no_run_writes_is_no_result(out, tmp_path, alter):
     record = json.loads((copy / "run.json").read_text())
     alter(record)
     (copy / "run.json").write_text(json.dumps(record))
-    assert "is no record of a run" in radarsim("compare", "rls4", copy, "--out", out, code=4).stderr
+    assert "is no record of a run" in command("compare", "rls4", copy, "--out", out, code=4).stderr
 
 
 @pytest.mark.parametrize("cases", [None, [[[]]], [{}], [{"case": "rls2", "radar": "\ud800"}]])
@@ -94,10 +86,10 @@ def test_a_case_that_no_longer_reads_as_a_config_is_none(cases):
 
 def test_a_result_of_an_earlier_config_is_marked(out):
     text = (out / "rls2" / "run.json").read_text()
-    assert "earlier state" not in radarsim("compare", "rls2", "rls4", "--out", out, "--no-figures").stderr
+    assert "earlier state" not in command("compare", "rls2", "rls4", "--out", out, "--no-figures").stderr
     (out / "rls2" / "run.json").write_text(text.replace('"sigma_range_m": 250', '"sigma_range_m": 251'))
     try:
-        said = radarsim("compare", "rls2", "rls4", "--out", out, "--no-figures").stderr
+        said = command("compare", "rls2", "rls4", "--out", out, "--no-figures").stderr
     finally:
         (out / "rls2" / "run.json").write_text(text)
     assert "earlier state of rls2; `radarsim run rls2" in said

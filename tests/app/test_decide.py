@@ -3,13 +3,12 @@
 import math
 
 import pytest
-from click.testing import CliRunner
 
 import radarsim
 from radarsim.app import readings
-from radarsim.cli import main
 from radarsim.report import claims
 from radarsim.report.claims.rule import CONFIRMED, UNDECIDED
+from tests.program import command
 
 
 def test_what_is_known_exactly_is_decided_at_the_first_look(tmp_path):
@@ -43,9 +42,8 @@ def test_a_time_limit_before_all_cases_names_the_claims_that_wait(tmp_path):
 
 def test_undecided_at_the_most_is_exit_code_3(tmp_path):
     """Eight bursts leave P4.4 open; a look at the most is made though it is no 2000·2^m."""
-    command = ["run", "discriminator_paper", "-n", "60", "--decide", "--out", str(tmp_path), "--no-figures", "-q"]
-    done = CliRunner().invoke(main, command)
-    assert done.exit_code == 3
+    words = ("run", "discriminator_paper", "-n", "60", "--decide", "--no-figures", "-q")
+    done = command(*words, "--out", tmp_path, code=3)
     assert "P4.4 not yet decided at 60 realisations; " in done.stderr
 
 
@@ -58,16 +56,12 @@ def test_undecided_at_the_most_is_exit_code_3(tmp_path):
     ],
 )
 def test_bad_input(words, said, tmp_path):
-    done = CliRunner().invoke(main, ["run", *words, "--out", str(tmp_path)])
-    assert done.exit_code == 2
-    assert said in done.stderr
-    assert "Traceback" not in done.stderr
+    assert said in command("run", *words, "--out", tmp_path, code=2).stderr
 
 
 def test_an_exact_value_that_simulation_denies_is_exit_code_4_with_all_written(tmp_path, monkeypatch):
     monkeypatch.setattr(claims, "errors", lambda table: ["P1.1: exact 1, simulated 2"])
-    done = CliRunner().invoke(main, ["run", "rls1", "rls2", "-n", "500", "--out", str(tmp_path), "--no-figures", "-q"])
-    assert done.exit_code == 4
+    done = command("run", "rls1", "rls2", "-n", "500", "--out", tmp_path, "--no-figures", "-q", code=4)
     assert done.stderr == "".join(f"{stem}: P1.1: exact 1, simulated 2\n" for stem in ("rls1", "rls2"))
     for stem in ("rls1", "rls2"):
         assert (tmp_path / stem / "claims.csv").is_file()

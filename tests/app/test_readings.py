@@ -6,19 +6,19 @@ import json
 import math
 import re
 import weakref
+from functools import partial
 
 import pytest
-from click.testing import CliRunner
 
 from radarsim.app import readings as app
 from radarsim.app.readings import Plan
 from radarsim.app.run import RunOptions
 from radarsim.app.stored import shipped_classes, stored_classes
-from radarsim.cli import main
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.report.claims import rule
 from radarsim.report.claims.over import Alternative, Choice, PaperReadings, Unreadable
 from radarsim.studies import registry
+from tests.program import command
 
 COLUMNS = "measured,lo,hi,exact,expected_lo,expected_hi,margin,verdict"
 
@@ -200,11 +200,7 @@ def test_a_curve_is_drawn_again_where_what_draws_it_has_changed(tmp_path, monkey
 
 
 def test_the_command(tmp_path):
-    def run(*arguments, code=0):
-        result = CliRunner().invoke(main, ["readings", *arguments, "--out", str(tmp_path)], catch_exceptions=False)
-        assert result.exit_code == code, result.output
-        return result
-
+    run = partial(command, "readings", "--out", tmp_path)
     text = run("P1.7").stdout
     assert re.search(r"^P1\.7 +depends on +holds in 2 of 3 readings; depends on: start", text, re.MULTILINE)
     assert (tmp_path / "readings/P1.7.svg").stat().st_size > 10_000
@@ -372,9 +368,8 @@ def test_what_is_undecided_runs_on_until_it_is_decided(ran, tmp_path):
 
 def test_what_is_left_undecided_is_exit_code_3(tmp_path):
     """Eight bursts a reading leave P4.4 open."""
-    command = ["readings", "P4.4", "-n", "8", "--decide", "--only", "curvature=before", "--no-figures"]
-    done = CliRunner().invoke(main, [*command, "--out", str(tmp_path)])
-    assert done.exit_code == 3, done.output
+    words = ("readings", "P4.4", "-n", "8", "--decide", "--only", "curvature=before", "--no-figures")
+    done = command(*words, "--out", tmp_path, code=3)
     assert "P4.4 not yet decided under " in done.stderr
 
 

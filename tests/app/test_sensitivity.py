@@ -5,14 +5,13 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
 
 from radarsim.app import sensitivity as finding
 from radarsim.app.configs import load
 from radarsim.app.sensitivity import sensitivity
-from radarsim.cli import main
 from radarsim.errors import ConfigError
 from radarsim.report.quantities import COMMON
+from tests.program import command
 from tests.studies.range_doppler import impulse
 
 RLS2 = {"variance": 1e-3, "sigma": (250.0, 15.0), "dt": 10.0}
@@ -94,8 +93,7 @@ def test_sampled_changes_are_paired_and_near_the_exact_ones(exact, monkeypatch):
 
 
 def test_the_command_writes_table_and_figure(tmp_path):
-    ended = CliRunner().invoke(main, ["sensitivity", "rls2", "--at", "60", "--out", str(tmp_path), "--format", "svg"])
-    assert ended.exit_code == 0, ended.output
+    ended = command("sensitivity", "rls2", "--at", "60", "--out", tmp_path, "--format", "svg")
     folder = tmp_path / "sensitivity" / "rls2"
     assert sorted(path.name for path in folder.iterdir()) == ["sensitivity.csv", "tornado.svg"]
     rows = pd.read_csv(folder / "sensitivity.csv")
@@ -108,8 +106,8 @@ def test_the_command_writes_table_and_figure(tmp_path):
 
 
 def test_the_command_gives_one_json_document(tmp_path):
-    words = ["sensitivity", "rls2", "--component", "Vr", "--no-figures", "--out", str(tmp_path), "--json"]
-    document = json.loads(CliRunner().invoke(main, words).stdout)
+    words = ("sensitivity", "rls2", "--component", "Vr", "--no-figures", "--out", tmp_path, "--json")
+    document = json.loads(command(*words).stdout)
     assert document["leading"] == "Vr"
     assert {"key", "filter", "sigma_change_percent", "gain_change_points"} <= set(document["rows"][0])
 

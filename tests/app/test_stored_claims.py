@@ -5,11 +5,10 @@ import json
 import os
 
 import pytest
-from click.testing import CliRunner
 
 from radarsim.app import run, stored
-from radarsim.cli import main
 from radarsim.errors import StoreError
+from tests.program import command
 
 
 @pytest.fixture
@@ -110,9 +109,7 @@ def test_an_experiment_of_the_papers_that_is_not_run_says_so_and_what_it_does_no
 def test_claims_that_cannot_be_judged_stand_in_one_line_a_reason(tmp_path):
     config = tmp_path / "foreign.yaml"
     config.write_text(FOREIGN)
-    done = CliRunner().invoke(main, ["claims", str(config), "--out", str(tmp_path)])
-    assert done.exit_code == 0
-    first, last = done.output.splitlines()
+    first, last = command("claims", config, "--out", tmp_path).output.splitlines()
     (of,) = [one for one in run.papers() if one.claims[0].id == "P1.1"]
     assert first.startswith(
         f"foreign: not judged: P1.1–{of.claims[-1].id}: not the paper's experiment: foreign: target.kind"

@@ -3,12 +3,11 @@
 import io
 
 import pytest
-from click.testing import CliRunner
 from PIL import Image
 
 from radarsim.app.run import run
-from radarsim.cli import main
 from radarsim.report.figures import MM, PNG_DPI
+from tests.program import command
 
 WIDTHS = ("85", "120")
 
@@ -23,7 +22,7 @@ def out(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    ("command", "folder"),
+    ("words", "folder"),
     [
         (["compare", "rls2", "rls4"], "compare/figures"),
         (["chart"], "chart"),
@@ -31,11 +30,9 @@ def out(tmp_path_factory):
     ],
     ids=lambda part: part[0] if isinstance(part, list) else "",
 )
-def test_the_files_have_the_width_asked_for(command, folder, out):
+def test_the_files_have_the_width_asked_for(words, folder, out):
     for width in WIDTHS:
-        given = [*command, "--out", str(out), "--format", "png", "--width", width]
-        done = CliRunner().invoke(main, given, catch_exceptions=False)
-        assert done.exit_code == 0, done.output
+        command(*words, "--out", out, "--format", "png", "--width", width)
         drawn = list((out / folder).glob("*.png"))
         assert drawn
         for path in drawn:
@@ -43,6 +40,5 @@ def test_the_files_have_the_width_asked_for(command, folder, out):
 
 
 def test_another_width_is_refused_with_those_there_are(out):
-    done = CliRunner().invoke(main, ["chart", "--out", str(out), "--width", "90"])
-    assert done.exit_code == 2
-    assert all(width in done.output for width in ("85", "120", "175"))
+    refused = command("chart", "--out", out, "--width", "90", code=2).output
+    assert all(width in refused for width in ("85", "120", "175"))

@@ -7,12 +7,12 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
 
-from radarsim.cli import console, main, outcomes, verdicts
+from radarsim.cli import console, outcomes, verdicts
 from radarsim.report import notes
 from radarsim.report.claims.judge import SAID
 from radarsim.report.tables import significant_digits
+from tests.program import command
 
 
 @pytest.mark.parametrize(
@@ -37,9 +37,7 @@ def test_a_number_that_is_not_known_has_no_unit():
 
 
 def test_claims_without_results_say_where_to_find_them(tmp_path):
-    result = CliRunner().invoke(main, ["claims", "--out", str(tmp_path / "none")])
-    assert result.exit_code == 0
-    *_, counted, pointer = result.stdout.splitlines()
+    *_, counted, pointer = command("claims", "--out", tmp_path / "none").stdout.splitlines()
     assert re.fullmatch(r"\d+ not run; \d+ extensions not counted", counted.strip())
     assert "make reproduce-figures" in pointer
     assert "docs/claims.md" in pointer
@@ -121,8 +119,7 @@ def test_a_bar_moves_within_a_second_though_nothing_is_reported(monkeypatch):
 
 def test_list_ends_with_configs_and_takes_words():
     def listed(*words, code=0):
-        result = CliRunner().invoke(main, ["list", *words])
-        assert result.exit_code == code
+        result = command("list", *words, code=code)
         return result.stdout if code == 0 else result.stderr
 
     titles = [line for line in listed().splitlines() if line.startswith(("Configs", "Scenarios", "Studies", "Filters"))]

@@ -12,6 +12,7 @@ from radarsim.cli import main
 from radarsim.engine.run import collect
 from radarsim.studies import registry
 from tests.cli.test_stopped import ended_by
+from tests.program import command
 
 MANOEUVRE = ("sonar_manoeuvre", "--case", "sonar_manoeuvre target.acceleration_mps2=0.4")
 CLUTTER = ("sonar_clutter", "--case", "sonar_clutter sensor.false_plots_per_km2=1")
@@ -61,10 +62,8 @@ def test_solve_gives_one_document(study):
 @pytest.mark.parametrize("study", CONFIGS)
 def test_sensitivity_gives_one_document_of_every_filter(study, tmp_path):
     config, *case = CONFIGS[study]
-    command = ["sensitivity", config, *case, "-n", "40", "--no-figures", "--out", str(tmp_path), "--json"]
-    result = CliRunner().invoke(main, command)
-    assert result.exit_code == 0, result.output
-    found = json.loads(result.stdout)
+    words = ("sensitivity", config, *case, "-n", "40", "--no-figures", "--out", tmp_path, "--json")
+    found = json.loads(command(*words).stdout)
     case = next(one for one in load(config).cases if len(case) == 0 or one.name == case[1])
     seen, silent = {row["filter"] for row in found["rows"]}, set(found["without_estimate"])
     assert seen | silent == {member.name for member in case.spec.members}
@@ -74,15 +73,15 @@ def test_sensitivity_gives_one_document_of_every_filter(study, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["solve", "sensitivity"])
+@pytest.mark.parametrize("verb", ["solve", "sensitivity"])
 @pytest.mark.parametrize("study", CONFIGS)
-def test_a_signal_ends_it(command, study, tmp_path):
+def test_a_signal_ends_it(verb, study, tmp_path):
     config, *case = CONFIGS[study]
-    given = words(study, 10**7) if command == "solve" else ["sensitivity", config, *case, "-n", "1e7"]
+    given = words(study, 10**7) if verb == "solve" else ["sensitivity", config, *case, "-n", "1e7"]
     if study in ("range_doppler", "smoothing"):  # exact: in a moment
         given += ["--set", "radar.detection_probability=0.7" if study == "range_doppler" else "scans=200"]
         given += ["--set", "scans=40"] if study == "range_doppler" else []
-    number = signal.SIGINT if command == "solve" else signal.SIGTERM
+    number = signal.SIGINT if verb == "solve" else signal.SIGTERM
     ended_by(number, [*given, "--json"], tmp_path, after_s=0.5)
 
 
@@ -96,9 +95,7 @@ def test_a_wrong_name_is_refused_before_anything_is_prepared(study, monkeypatch)
     monkeypatch.setattr(type(registry.study(load(config).cases[0].study)), "prepare", prepared)
     asked = [("--sigma", "r", "--filter", "nobody"), ("--loss" if study != "clutter" else "--lock", "nobody")]
     for quantity, said in zip(asked, ("no filter 'nobody'", " measures no '"), strict=True):
-        result = CliRunner().invoke(main, ["solve", config, key, *quantity, *case, "--equals", "1"])
-        assert result.exit_code == 2
-        assert said in result.stderr
+        assert said in command("solve", config, key, *quantity, *case, "--equals", "1", code=2).stderr
 
 
 @pytest.mark.parametrize("study", CONFIGS)

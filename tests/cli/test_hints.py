@@ -1,11 +1,10 @@
 """Words for files of other programs, for filters without rows, for names of configs."""
 
 import pytest
-from click.testing import CliRunner
 
 from radarsim.app import configs
-from radarsim.cli import main
 from radarsim.errors import ConfigError
+from tests.program import command
 from tests.recorded.test_plots import faults
 
 COLUMNS = "plots.csv:1: must have the columns t_s, range_m, bearing_rad or t_s, x_m, y_m; got "
@@ -30,9 +29,7 @@ def test_a_decimal_comma_is_told(tmp_path):
 def test_a_filter_without_a_row_is_named(tmp_path, ranges, silent):
     rows = "".join(f"{10 * k},{r},-250\n" for k, r in enumerate(ranges))
     (tmp_path / "plots.csv").write_text("t_s,range_m,velocity_mps\n" + rows)
-    words = ["track", "rls2", str(tmp_path / "plots.csv"), "-o", str(tmp_path / "track.csv")]
-    ended = CliRunner().invoke(main, words)
-    assert ended.exit_code == 0
+    ended = command("track", "rls2", tmp_path / "plots.csv", "-o", tmp_path / "track.csv")
     assert (silent or "plots    4 rows") in ended.output
     assert ("no rows" in ended.output) == bool(silent)
 

@@ -17,15 +17,9 @@ from radarsim.app.run import case_result
 from radarsim.engine import run as stopping
 from radarsim.engine.run import collect
 from radarsim.errors import ConfigError, TargetUnmet
-from tests.cli.test_run import csv_bytes
-from tests.cli.test_run import radarsim as command
+from tests.program import command, csv_bytes, record
 
 PLAIN = ("--no-figures", "--quiet")
-
-
-def record(folder):
-    """What run.json holds."""
-    return json.loads((folder / "run.json").read_text())
 
 
 def few(case):

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 from radarsim.app import doctor, selftest
-from tests.cli.test_run import csv_bytes
-from tests.cli.test_run import radarsim as command
 from tests.engine.test_audit import damage
 from tests.engine.test_damage import reforged
+from tests.program import command, csv_bytes, record
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +63,7 @@ def test_every_stored_block_may_be_computed_again(out):
 
 def test_a_hundred_of_a_hundred_damaged_files_are_named_and_come_again(out):
     good, draw = contents(out), random.Random(1)
-    identity = json.loads((out / "rls2" / "run.json").read_text())["identities"]["rls2"]
+    identity = record(out / "rls2")["identities"]["rls2"]
     outputs = [path for path in (out / "rls2").iterdir() if path.name != "run.json"]
     files = [*(path for path in block_files(out) if identity in str(path)), *outputs]
     from radarsim.app.doctor import inspected
@@ -87,7 +86,7 @@ def test_a_hundred_of_a_hundred_damaged_files_are_named_and_come_again(out):
 
 
 def test_forged_sums_are_found_by_computing_them_again(out):
-    identity = json.loads((out / "rls2" / "run.json").read_text())["identities"]["rls2"]
+    identity = record(out / "rls2")["identities"]["rls2"]
     for total in (out / ".blocks" / identity).glob("T*"):
         total.unlink()
     (cut,) = (out / ".blocks" / identity).glob("P*")
@@ -153,7 +152,7 @@ def test_a_record_beyond_reading_is_made_anew_as_told(out):
 
 
 def test_what_is_no_file_is_not_waited_for(out):
-    identity = json.loads((out / "rls2" / "run.json").read_text())["identities"]["rls2"]
+    identity = record(out / "rls2")["identities"]["rls2"]
     pipe, device = sorted((out / ".blocks" / identity).glob("*.sums"))[:2]
     pipe.unlink()
     os.mkfifo(pipe)

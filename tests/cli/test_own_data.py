@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from radarsim.app import configs, run
 from radarsim.app.configs import CaseWork
@@ -22,6 +21,7 @@ from radarsim.errors import ConfigError
 from radarsim.recorded import figures as accuracy
 from radarsim.recorded import follow, plots
 from radarsim.studies.range_doppler import track as range_doppler_plots
+from tests.program import command
 
 RUNS = {  # config, overrides, filters' tolerance in their own σ: rules that choose among models amplify a rounding
     "rls2": ((), 1e-10),
@@ -32,12 +32,6 @@ RUNS = {  # config, overrides, filters' tolerance in their own σ: rules that ch
     "sonar_missed": (("sweep.sensor.detection_probability=[0.7]",), 1e-10),
     "sonar_correlated": (("sweep.sensor.error_correlation=[0.6]",), 1e-10),
 }
-
-
-def radarsim(*arguments, code=0):
-    result = CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
-    assert result.exit_code == code, result.output
-    return result
 
 
 def loaded(config, overrides=()):
@@ -179,13 +173,13 @@ def test_a_right_accuracy_is_called_so(tmp_path):
 
 def test_the_command_tells_gaps_missing_values_and_draws(tmp_path):
     source, track, figures = tmp_path / "plots.csv", tmp_path / "track.csv", tmp_path / "figures"
-    assert "60 rows" in radarsim("simulate", "rls2", "-o", source, "--set", "scans=60").stdout
+    assert "60 rows" in command("simulate", "rls2", "-o", source, "--set", "scans=60").stdout
     rows = table_of(source)
     rows[10][2] = ""
     del rows[20:30]
     with source.open("w", newline="") as file:
         csv.writer(file).writerows(rows)
-    result = radarsim("track", "rls2", source, "-o", track, "--figures", figures)
+    result = command("track", "rls2", source, "-o", track, "--figures", figures)
     assert "plots    50 rows over 590 s, from 0 s" in result.stdout
     assert "missing  1 of velocity_mps" in result.stdout
     assert "gaps     1 of over three times the usual interval, 10 s; the longest 110 s, after 180 s" in result.stdout
@@ -200,19 +194,19 @@ def test_the_command_tells_gaps_missing_values_and_draws(tmp_path):
 
 def test_the_track_alone_goes_to_the_terminal_and_words_beside_it(tmp_path):
     source = tmp_path / "plots.csv"
-    radarsim("simulate", "rls2", "-o", source)
-    result = radarsim("track", "rls2", source)
+    command("simulate", "rls2", "-o", source)
+    result = command("track", "rls2", source)
     assert result.stdout.startswith("t_s,filter,component,unit,estimate,sigma\n0.0,r,r,m,")
     assert "rows" in result.stderr
     assert "NIS" not in result.stdout
-    assert radarsim("track", "rls2", source, "--quiet").stderr == ""
+    assert command("track", "rls2", source, "--quiet").stderr == ""
 
 
 def test_plots_may_come_through_a_pipe(tmp_path):
     """`… | radarsim track CONFIG /dev/stdin > TRACK.csv`: the same as from a file and to a file."""
     source, track = tmp_path / "plots.csv", tmp_path / "track.csv"
-    radarsim("simulate", "rls2", "-o", source)
-    radarsim("track", "rls2", source, "-o", track)
+    command("simulate", "rls2", "-o", source)
+    command("track", "rls2", source, "-o", track)
     piped = [sys.executable, "-m", "radarsim", "track", "rls2", "/dev/stdin", "--quiet"]
     plots_text = source.read_text()
     done = subprocess.run(piped, input=plots_text, capture_output=True, text=True, check=False)
@@ -230,7 +224,7 @@ def test_a_gap_in_a_pipe_is_named_by_its_row():
     with open(given, "w") as file:
         file.write(text)
     try:
-        fault = radarsim("track", "rls2", f"/dev/fd/{ready}", code=2).stderr
+        fault = command("track", "rls2", f"/dev/fd/{ready}", code=2).stderr
     finally:
         os.close(ready)
     assert fault.startswith(f"/dev/fd/{ready}: row 5 after the header: t_s: after a gap of 1e+15 s"), fault
@@ -238,7 +232,7 @@ def test_a_gap_in_a_pipe_is_named_by_its_row():
 
 @pytest.mark.parametrize("realisation", [2**62, 2**64 - 1, 2**64, 10**30])
 def test_a_realisation_that_no_run_has(tmp_path, realisation):
-    fault = radarsim("simulate", "rls2", "-i", realisation, "-o", tmp_path / "plots.csv", code=2).stderr
+    fault = command("simulate", "rls2", "-i", realisation, "-o", tmp_path / "plots.csv", code=2).stderr
     assert re.search("must be (from 0 to|<=) ", fault), fault
     assert not list(tmp_path.iterdir())
 
@@ -260,7 +254,7 @@ def test_a_realisation_that_no_run_has(tmp_path, realisation):
 )
 def test_a_wrong_file_is_told_by_line_and_column_and_no_track_is_left(tmp_path, text, expected):
     (tmp_path / "plots.csv").write_text(text)
-    result = radarsim("track", "rls2", tmp_path / "plots.csv", "-o", tmp_path / "track.csv", code=2)
+    result = command("track", "rls2", tmp_path / "plots.csv", "-o", tmp_path / "track.csv", code=2)
     assert result.stderr.splitlines() == [f"{tmp_path}/{expected}"]
     assert [path.name for path in tmp_path.iterdir()] == ["plots.csv"]
 
@@ -273,11 +267,8 @@ def test_times_are_judged_across_pieces_of_a_file(tmp_path, monkeypatch):
 
 
 def test_studies_without_plots_say_so(tmp_path):
-    for command in (
-        ("simulate", "discriminator", "-o", tmp_path / "x.csv"),
-        ("track", "discriminator", tmp_path / "x"),
-    ):
-        assert "has no filters for recorded plots" in radarsim(*command, code=2).stderr
+    for words in (("simulate", "discriminator", "-o", tmp_path / "x.csv"), ("track", "discriminator", tmp_path / "x")):
+        assert "has no filters for recorded plots" in command(*words, code=2).stderr
 
 
 def advised(fault):
@@ -287,29 +278,29 @@ def advised(fault):
 
 def test_one_of_several_cases_is_named_and_the_command_given_works(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    fault = radarsim("simulate", "rls2_manoeuvre_variance", "-o", "x.csv", code=2).stderr
+    fault = command("simulate", "rls2_manoeuvre_variance", "-o", "x.csv", code=2).stderr
     assert "got 5; choose of manoeuvre_variance = 1e-5, 0.0001, 0.001, 0.01, 0.1: " in fault
-    radarsim(*advised(fault))
-    fault = radarsim("track", "range_doppler", "PLOTS.csv", code=2).stderr
+    command(*advised(fault))
+    fault = command("track", "range_doppler", "PLOTS.csv", code=2).stderr
     assert "must be one case to track with, got 30; choose one of rls1, rls2, rls3, rls4, rls5: " in fault
     assert advised(fault) == ["track", "rls1", "PLOTS.csv"]
-    radarsim(*advised(fault))
+    command(*advised(fault))
 
 
 def test_the_choice_of_swept_mappings_and_of_configs_elsewhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    radarsim("simulate", "rls2", "-o", "a {b}.csv")
+    command("simulate", "rls2", "-o", "a {b}.csv")
     away = tmp_path / "away"
     away.mkdir()
     turn = "{kind: polynomial, coefficients: [1e5, -100]}"
     (away / "targets.yaml").write_text(f"include: [rls2]\nsweep:\n  target: [{turn}, turn]\n  scans: [12, 15]\n")
-    radarsim(*advised(radarsim("track", "away/targets.yaml", "a {b}.csv", code=2).stderr))
+    command(*advised(command("track", "away/targets.yaml", "a {b}.csv", code=2).stderr))
     configs.new("mine", "rls2")
     (tmp_path / "mine.yaml").rename(away / "mine.yaml")
     (away / "both.yaml").write_text("include: [mine, rls2]\n")
-    fault = radarsim("track", "away/both.yaml", "a {b}.csv", code=2).stderr
+    fault = command("track", "away/both.yaml", "a {b}.csv", code=2).stderr
     assert advised(fault) == ["track", "away/mine.yaml", "a {b}.csv"]
-    radarsim(*advised(fault))
+    command(*advised(fault))
 
 
 LONG = """
@@ -346,7 +337,7 @@ EXAMPLES = {"range_doppler.csv": "rls2", "multimodel.csv": "multimodel_1hz", "so
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_the_example_files_are_what_simulate_writes(tmp_path, name):
-    radarsim("simulate", EXAMPLES[name], "-o", tmp_path / name)
+    command("simulate", EXAMPLES[name], "-o", tmp_path / name)
     made, kept = (table_of(path) for path in (tmp_path / name, Path("docs/examples") / name))
     assert made[0] == kept[0]
     to_numbers = [np.array([[float(cell or "nan") for cell in row] for row in rows[1:]]) for rows in (made, kept)]
@@ -359,7 +350,7 @@ def test_the_page_names_a_config_for_every_example_file(tmp_path):
     assert set(named) == {path.name for path in Path("docs/examples").iterdir()}
     for name, config in named.items():
         first, *options = shlex.split(config)
-        radarsim("track", first, Path("docs/examples") / name, *options, "-o", tmp_path / "track.csv")
+        command("track", first, Path("docs/examples") / name, *options, "-o", tmp_path / "track.csv")
 
 
 @pytest.mark.parametrize("like", document.stems("configs"))
@@ -372,7 +363,7 @@ def test_a_config_of_ones_own_is_the_same_experiment(tmp_path, like):
 
 def test_new_comments_every_key_and_never_overwrites(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    result = radarsim("new", "mine", "--like", "rls2")
+    result = command("new", "mine", "--like", "rls2")
     assert "radarsim run mine.yaml" in result.stdout
     lines = Path("mine.yaml").read_text().splitlines()
     for line in lines[2:]:
@@ -380,21 +371,21 @@ def test_new_comments_every_key_and_never_overwrites(tmp_path, monkeypatch):
     assert any("sigma_range_m: 250" in line and "standard deviation of a measured range, m" in line for line in lines)
     assert "  name: mine " in "\n".join(lines)
     Path("mine.yaml").write_text("precious")
-    assert "never overwritten" in radarsim("new", "mine", "--like", "rls1", code=2).stderr
+    assert "never overwritten" in command("new", "mine", "--like", "rls1", code=2).stderr
     assert Path("mine.yaml").read_text() == "precious"
-    assert "must be a plain name" in radarsim("new", "../mine", "--like", "rls1", code=2).stderr
-    assert "no such config" in radarsim("new", "other", "--like", "rls9", code=2).stderr
+    assert "must be a plain name" in command("new", "../mine", "--like", "rls1", code=2).stderr
+    assert "no such config" in command("new", "other", "--like", "rls9", code=2).stderr
 
 
 @pytest.mark.parametrize("command", ["new", "simulate", "track", "import"])
 def test_help_of_ones_own_data_teaches_with_an_example(command):
-    assert f"Example\n  radarsim {command} " in radarsim(command, "--help").stdout.replace("      ", "  ").replace(
+    assert f"Example\n  radarsim {command} " in command(command, "--help").stdout.replace("      ", "  ").replace(
         "    ", "  "
     )
 
 
 def test_help_is_grouped():
-    text = radarsim("--help").stdout
+    text = command("--help").stdout
     order = [text.index(f"\n{title}:\n") for title in ("Run", "Read", "Own data", "Maintenance")]
     assert order == sorted(order)
     assert set(main.commands) == {name for names in group.SECTIONS.values() for name in names}
@@ -418,5 +409,5 @@ def test_no_colour_when_asked(tmp_path):
 
 @pytest.mark.parametrize("name", ["=1+1", "+cmd", "-x", "@sum"])
 def test_a_name_that_a_spreadsheet_would_run_is_refused(name):
-    result = radarsim("check", "rls2", "--set", f"filters.0.name={name!r}", code=2)
+    result = command("check", "rls2", "--set", f"filters.0.name={name!r}", code=2)
     assert "must not begin with = + - or @" in result.stderr

@@ -11,32 +11,19 @@ import sys
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from radarsim.cli import main
 from radarsim.cli.console import fitting
+from tests.program import command, csv_bytes, record
 
 CURVES = "case,filter,component,unit,k,t_s,n,sigma,sigma_lo,sigma_hi,bias,bias_se,spread,exact_sigma,exact_bias,n_eff"
 GAINS = "case,filter,baseline,component,k,t_s,gain_percent,gain_lo,gain_hi,exact_percent"
-
-
-def radarsim(*arguments, code=0):
-    """Run the command in this process; its result, after checking the exit code."""
-    result = CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
-    assert result.exit_code == code, result.output
-    return result
-
-
-def csv_bytes(folder):
-    """The bytes of all tables of a result folder, by name."""
-    return {path.name: path.read_bytes() for path in sorted(folder.glob("*.csv"))}
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
     """A finished run of rls2 with figures: its --out directory."""
     out = tmp_path_factory.mktemp("results")
-    radarsim("run", "rls2", "-n", "1e4", "--out", out)
+    command("run", "rls2", "-n", "1e4", "--out", out)
     return out
 
 
@@ -53,13 +40,13 @@ def test_run_writes_what_the_contract_lists(done):
 
 
 def test_run_json_tells_where_the_numbers_come_from(done):
-    record = json.loads((done / "rls2" / "run.json").read_text())
-    assert record["realisations_asked"] == record["realisations_done"] == 10_000
-    assert record["seed"] == 2017
-    assert record["stop"] == "done"
-    for path, digest in record["outputs"].items():
+    told = record(done / "rls2")
+    assert told["realisations_asked"] == told["realisations_done"] == 10_000
+    assert told["seed"] == 2017
+    assert told["stop"] == "done"
+    for path, digest in told["outputs"].items():
         assert hashlib.sha256((done / "rls2" / path).read_bytes()).hexdigest() == digest
-    assert "report.html" in record["outputs"]
+    assert "report.html" in told["outputs"]
 
 
 def test_rows_exist_only_where_there_is_an_estimate(done):
@@ -82,17 +69,16 @@ def test_rows_exist_only_where_there_is_an_estimate(done):
 @pytest.mark.parametrize("threads", [2, 3, 5])
 def test_same_bytes_for_any_number_of_threads(tmp_path, threads):
     for folder, count in (("one", 1), ("many", threads)):
-        radarsim("run", "rls3", "-n", 50_001, "--threads", count, "--no-figures", "--quiet", "--out", tmp_path / folder)
+        command("run", "rls3", "-n", 50_001, "--threads", count, "--no-figures", "--quiet", "--out", tmp_path / folder)
     assert csv_bytes(tmp_path / "one" / "rls3") == csv_bytes(tmp_path / "many" / "rls3")
 
 
 def test_same_bytes_when_extended(tmp_path):
     for n in ("1e4", "1e5"):
-        radarsim("run", "rls1", "-n", n, "--no-figures", "--quiet", "--out", tmp_path / "grown")
-    radarsim("run", "rls1", "-n", "1e5", "--no-figures", "--quiet", "--out", tmp_path / "at once")
+        command("run", "rls1", "-n", n, "--no-figures", "--quiet", "--out", tmp_path / "grown")
+    command("run", "rls1", "-n", "1e5", "--no-figures", "--quiet", "--out", tmp_path / "at once")
     assert csv_bytes(tmp_path / "grown" / "rls1") == csv_bytes(tmp_path / "at once" / "rls1")
-    record = json.loads((tmp_path / "grown" / "rls1" / "run.json").read_text())
-    assert record["realisations_from_store"] >= 8192
+    assert record(tmp_path / "grown" / "rls1")["realisations_from_store"] >= 8192
 
 
 def test_the_command_that_a_run_names_shows_the_claims_of_that_run(tmp_path):
@@ -102,38 +88,38 @@ def test_the_command_that_a_run_names_shows_the_claims_of_that_run(tmp_path):
     mine, out = tmp_path / "mine.yaml", tmp_path / "my results"
     mine.write_text((document.SHIPPED / "configs/rls2.yaml").read_text())
     for config in ("rls2", mine):
-        said = radarsim("run", config, "-n", 300, "--out", out, "--no-figures").output
+        said = command("run", config, "-n", 300, "--out", out, "--no-figures").output
         for _ in range(2):  # the command that it names, and that which this one names
             *_, named = re.findall(r"`radarsim ([^`]+)`", "".join(said))
-            said = radarsim(*shlex.split(named)).output
+            said = command(*shlex.split(named)).output
             assert "confirmed" in said
             assert "not run" not in said
-    assert shlex.quote(str(out)) in radarsim("claims", "P1.1", "--out", out).output
+    assert shlex.quote(str(out)) in command("claims", "P1.1", "--out", out).output
 
 
 def test_the_command_that_report_names_makes_what_it_lacks(tmp_path):
     """As many realisations as the last run had, whose blocks are gone."""
-    radarsim("run", "rls2", "-n", 300, "--out", tmp_path, "--no-figures")
+    command("run", "rls2", "-n", 300, "--out", tmp_path, "--no-figures")
     shutil.rmtree(tmp_path / ".blocks")
-    said = radarsim("report", "rls2", "--out", tmp_path, code=2).stderr
+    said = command("report", "rls2", "--out", tmp_path, code=2).stderr
     *_, named = re.findall(r"`radarsim ([^`]+)` computes", said)
     assert "-n 300" in named
-    radarsim(*shlex.split(named), "--no-figures")
-    held = radarsim("check", *shlex.split(named)[1:]).output
+    command(*shlex.split(named), "--no-figures")
+    held = command("check", *shlex.split(named)[1:]).output
     assert "300 of 300 realisations stored, nothing left to compute" in held
-    radarsim("report", "rls2", "--out", tmp_path, "--no-figures")
+    command("report", "rls2", "--out", tmp_path, "--no-figures")
 
 
 def test_a_smaller_run_after_a_larger_one_reports_exactly_what_was_asked(tmp_path):
-    radarsim("run", "rls1", "-n", "1e5", "--no-figures", "--quiet", "--out", tmp_path / "a")
-    radarsim("run", "rls1", "-n", "5000", "--no-figures", "--quiet", "--out", tmp_path / "a")
-    radarsim("run", "rls1", "-n", "5000", "--no-figures", "--quiet", "--out", tmp_path / "b")
+    command("run", "rls1", "-n", "1e5", "--no-figures", "--quiet", "--out", tmp_path / "a")
+    command("run", "rls1", "-n", "5000", "--no-figures", "--quiet", "--out", tmp_path / "a")
+    command("run", "rls1", "-n", "5000", "--no-figures", "--quiet", "--out", tmp_path / "b")
     assert csv_bytes(tmp_path / "a" / "rls1") == csv_bytes(tmp_path / "b" / "rls1")
 
 
 def test_range_doppler_reuses_what_its_parts_made(tmp_path):
-    radarsim("run", "rls4", "-n", 5000, "--no-figures", "--quiet", "--out", tmp_path)
-    radarsim("run", "range_doppler", "-n", 5000, "--no-figures", "--quiet", "--out", tmp_path)
+    command("run", "rls4", "-n", 5000, "--no-figures", "--quiet", "--out", tmp_path)
+    command("run", "range_doppler", "-n", 5000, "--no-figures", "--quiet", "--out", tmp_path)
     record = json.loads((tmp_path / "range_doppler" / "run.json").read_text())
     assert record["realisations_from_store"] >= 5000
 
@@ -142,18 +128,18 @@ def test_report_remakes_the_same_tables_and_computes_nothing(done):
     folder = done / "rls2"
     before = csv_bytes(folder)
     (folder / "curves.csv").unlink()
-    radarsim("report", "rls2", "-n", "1e4", "--no-figures", "--out", done)
+    command("report", "rls2", "-n", "1e4", "--no-figures", "--out", done)
     assert csv_bytes(folder) == before
     (folder / "gains.csv").unlink()
-    radarsim("report", "rls2", "--no-figures", "--out", done)
+    command("report", "rls2", "--no-figures", "--out", done)
     assert csv_bytes(folder) == before
-    result = radarsim("report", "rls2", "-n", "1e6", "--out", done, code=2)
+    result = command("report", "rls2", "-n", "1e6", "--out", done, code=2)
     assert "rls2: 8,192 of 1,000,000 realisations are stored in " in result.stderr
     assert "radarsim run" in result.stderr
 
 
 def test_check_says_what_would_run():
-    result = radarsim("check", "range_doppler", "-n", "1e7")
+    result = command("check", "range_doppler", "-n", "1e7")
     for words in ("valid", "rls1", "rls5", "10,000,000", "MB"):
         assert words in result.stdout
 
@@ -162,7 +148,7 @@ def test_faults_of_all_configs_come_at_once_and_nothing_runs(tmp_path):
     (tmp_path / "bad.yaml").write_text("study: range_doppler\nscans: true\nbogus: 1\n")
     (tmp_path / "worse.yaml").write_text("study: range_dopler\n")
     out = tmp_path / "out"
-    result = radarsim("run", "rls2", tmp_path / "bad.yaml", tmp_path / "worse.yaml", "--out", out, code=2)
+    result = command("run", "rls2", tmp_path / "bad.yaml", tmp_path / "worse.yaml", "--out", out, code=2)
     lines = result.stderr.splitlines()
     assert any(line.startswith(f"{tmp_path}/bad.yaml:2:8: scans: ") for line in lines)
     assert any("bogus" in line for line in lines)
@@ -186,7 +172,7 @@ def test_faults_of_all_configs_come_at_once_and_nothing_runs(tmp_path):
 )
 def test_wrong_input_exits_with_2_and_says_why(arguments, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    result = radarsim(*arguments, code=2)
+    result = command(*arguments, code=2)
     assert words in result.stderr
     assert "Traceback" not in result.output
     assert not list(tmp_path.iterdir())
@@ -196,20 +182,20 @@ def test_overrides_change_the_case(tmp_path):
     import pandas as pd
 
     out = tmp_path / "out"
-    radarsim("run", "rls2", "-n", 5000, "--seed", 5, "--set", "radar.sigma_range_m=300", "--no-figures", "--out", out)
+    command("run", "rls2", "-n", 5000, "--seed", 5, "--set", "radar.sigma_range_m=300", "--no-figures", "--out", out)
     curves = pd.read_csv(out / "rls2" / "curves.csv")
     assert curves["exact_sigma"].iloc[0] == 300
-    assert json.loads((out / "rls2" / "run.json").read_text())["seed"] == 5
+    assert record(out / "rls2")["seed"] == 5
 
 
 def test_an_unwritable_place_exits_with_4(tmp_path):
     (tmp_path / "out").write_text("a file where a folder should be")
-    result = radarsim("run", "rls2", "-n", 100, "--out", tmp_path / "out", code=4)
+    result = command("run", "rls2", "-n", 100, "--out", tmp_path / "out", code=4)
     assert str(tmp_path / "out") in result.stderr
 
 
 def test_claims_without_results_are_not_run_with_the_command(tmp_path):
-    result = radarsim("claims", "--out", tmp_path)
+    result = command("claims", "--out", tmp_path)
     for number in range(1, 26):
         assert f"P1.{number} " in result.stdout + " "
     assert "not run" in result.stdout
@@ -217,19 +203,19 @@ def test_claims_without_results_are_not_run_with_the_command(tmp_path):
 
 
 def test_list_names_what_is_shipped():
-    result = radarsim("list")
+    result = command("list")
     for words in ("rls1", "range_doppler", "polynomial", "observes: [range, velocity]"):
         assert words in result.stdout
 
 
 def test_schema_is_json_schema():
-    schema = json.loads(radarsim("schema").stdout)
+    schema = json.loads(command("schema").stdout)
     assert "$schema" in schema
 
 
 @pytest.mark.parametrize("command", ["run", "check", "report", "claims", "list", "schema"])
 def test_help_teaches_with_an_example(command):
-    text = radarsim(command, "--help").stdout
+    text = command(command, "--help").stdout
     assert re.search(rf"Examples?\n +radarsim {command}", text)
 
 
@@ -266,7 +252,7 @@ def test_config_outside_a_checkout_runs_by_path(tmp_path):
         .replace("target: polynomial", "target: {kind: polynomial, coefficients: [1e4]}")
     )
     (tmp_path / "own.yaml").write_text(text)
-    radarsim("run", tmp_path / "own.yaml", "-n", 100, "--no-figures", "--out", tmp_path / "r")
+    command("run", tmp_path / "own.yaml", "-n", 100, "--no-figures", "--out", tmp_path / "r")
     assert (tmp_path / "r" / "own" / "curves.csv").exists()
 
 
@@ -301,33 +287,33 @@ def test_claims_are_shown_by_name_by_paper_and_beside_those_of_a_config(tmp_path
     assert named("P4") == [claim for claim in everything if claim.startswith("P4.")]
     assert named("P1.3", "range_doppler") == named("range_doppler")
     assert named("rls2", "P4.2") == [*named("rls2"), "P4.2"]
-    radarsim("run", "discriminator_paper", "-n", 64, "--no-figures", "--out", tmp_path)
+    command("run", "discriminator_paper", "-n", 64, "--no-figures", "--out", tmp_path)
     own = claims(["P4.2"], tmp_path)
     assert own
     assert own == [row for row in claims(["discriminator_paper"], tmp_path) if row["claim"] == "P4.2"]
-    assert "P4.2" in radarsim("claims", "P4.2", "--out", tmp_path).stdout
+    assert "P4.2" in command("claims", "P4.2", "--out", tmp_path).stdout
 
 
 def test_claims_of_a_config_not_yet_run_are_listed_as_such(tmp_path):
-    result = radarsim("claims", "range_doppler", "--out", tmp_path)
+    result = command("claims", "range_doppler", "--out", tmp_path)
     assert "36 not run" in result.stdout
-    radarsim("run", "rls2", "-n", 3000, "--no-figures", "--out", tmp_path)
-    assert "P1.18" in radarsim("claims", "rls2", "--out", tmp_path).stdout
+    command("run", "rls2", "-n", 3000, "--no-figures", "--out", tmp_path)
+    assert "P1.18" in command("claims", "rls2", "--out", tmp_path).stdout
 
 
 def test_the_command_that_computes_what_is_missing_is_whole(tmp_path):
     arguments = ("rls3", "-n", 500, "--seed", 4, "--set", "radar.sigma_range_m=300", "--out", tmp_path)
-    result = radarsim("report", *arguments, code=2)
+    result = command("report", *arguments, code=2)
     assert f"radarsim run rls3 --set radar.sigma_range_m=300 -n 500 --seed 4 --out {tmp_path}`" in result.stderr
 
 
 def test_a_spoiled_table_of_claims_is_told(tmp_path):
     (tmp_path / "rls2").mkdir()
     (tmp_path / "rls2" / "claims.csv").write_text("garbage\n")
-    assert "is no table of claims" in radarsim("claims", "rls2", "--out", tmp_path, code=4).stderr
+    assert "is no table of claims" in command("claims", "rls2", "--out", tmp_path, code=4).stderr
 
 
-def command(*arguments, **options):
+def process(*arguments, **options):
     """The console script in a process of its own."""
     return subprocess.run([sys.executable, "-m", "radarsim", *arguments], capture_output=True, check=False, **options)
 
@@ -353,7 +339,7 @@ def test_errors_that_cannot_be_written_leave_the_exit_code():
 def test_streams_that_know_no_greek(tmp_path):
     environment = {**os.environ, "PYTHONIOENCODING": "latin-1"}
     arguments = ("run", "rls2", "-n", "1000", "--no-figures", "--out", str(tmp_path))
-    finished = command(*arguments, env=environment)
+    finished = process(*arguments, env=environment)
     assert (finished.returncode, finished.stderr) == (0, b"")
 
 
@@ -362,7 +348,7 @@ def test_a_path_that_is_no_text(tmp_path):
     os.mkdir(folder)
     with open(folder + b"/rls2.yaml", "wb") as file:
         file.write(Path("configs/rls2.yaml").read_bytes())
-    finished = command("run", folder + b"/rls2.yaml", "-n", "100", "--no-figures", "--quiet", "--out", str(tmp_path))
+    finished = process("run", folder + b"/rls2.yaml", "-n", "100", "--no-figures", "--quiet", "--out", str(tmp_path))
     assert (finished.returncode, finished.stderr) == (0, b"")
 
 

@@ -4,14 +4,12 @@ import json
 import re
 
 import pytest
-from click.testing import CliRunner
 from making import messages
 
 from radarsim.app import question, readings, stored
 from radarsim.app.compare import chart, described
 from radarsim.app.configs import load
 from radarsim.app.quantities import Asked
-from radarsim.cli import main
 from radarsim.language import speaking, tr
 from radarsim.report.claims import page as curve
 from radarsim.report.claims import rule
@@ -20,6 +18,7 @@ from radarsim.report.quantities import SIGMA
 from radarsim.studies.range_doppler.chart import SAID
 from radarsim.studies.range_doppler.study import exact_but_for
 from tests.language.test_russian import NAMES, shown, untranslated
+from tests.program import command
 
 CHOICE = re.compile(r"\b\w+: [^;|.]+")  # a choice of a reading, as it is typed
 
@@ -67,7 +66,7 @@ def test_the_chart_table_is_the_same(tmp_path):
 
 def test_the_list_says_what_things_are_and_leaves_their_names():
     with speaking("ru"):
-        ended = CliRunner().invoke(main, ["list"])
+        ended = command("list")
     for _, _, rows in stored.inventory():
         for row in rows:
             assert row[0] in ended.stdout

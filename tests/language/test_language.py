@@ -5,14 +5,13 @@ from string import Formatter
 from types import SimpleNamespace
 
 import pytest
-from click.testing import CliRunner
 from making import messages
 
 from radarsim import language
-from radarsim.cli import main
 from radarsim.errors import ConfigError
 from radarsim.language import listed, numeral, plural, speaking, term, tr
 from radarsim.report import tables
+from tests.program import command
 
 CODES = [code for code in language.known() if code != language.ENGLISH]
 
@@ -85,11 +84,9 @@ def test_the_option_comes_before_the_variable_and_both_before_english(monkeypatc
 def test_an_unknown_language_is_one_line_and_exit_2(monkeypatch):
     known = ", ".join(language.known())
     for arguments in (["--language", "xx", "list"], ["list", "--language", "xx"]):
-        outcome = CliRunner().invoke(main, arguments)
-        assert (outcome.exit_code, outcome.stderr) == (2, f"--language: must be one of {known}, got 'xx'\n")
+        assert command(*arguments, code=2).stderr == f"--language: must be one of {known}, got 'xx'\n"
     monkeypatch.setenv(language.VARIABLE, "xx")
-    outcome = CliRunner().invoke(main, ["list"])
-    assert (outcome.exit_code, outcome.stderr) == (2, f"RADARSIM_LANGUAGE: must be one of {known}, got 'xx'\n")
+    assert command("list", code=2).stderr == f"RADARSIM_LANGUAGE: must be one of {known}, got 'xx'\n"
     with pytest.raises(ConfigError, match="RADARSIM_LANGUAGE"):
         language.current()
 

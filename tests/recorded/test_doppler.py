@@ -5,12 +5,11 @@ import shlex
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from radarsim.app.run import load_all
-from radarsim.cli import main
 from radarsim.recorded import follow, plots
 from radarsim.recorded.fit import folding
+from tests.program import command
 
 SPAN = 60.0  # m/s: 0.1 m at 1.2 kHz
 RADAR = {"sigma_range_m": 60, "sigma_velocity_mps": 3, "scan_period_s": 4, "detection_probability": 0.9}
@@ -38,12 +37,6 @@ def folded(columns, span=SPAN):
 def flown():
     """148 plots of an approach at 250 m/s, one in ten missed."""
     return measured(loaded("scans=148", "target={kind: polynomial, coefficients: [200e3, -250]}"))
-
-
-def command(*arguments, code=0):
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 def options(*overrides):

@@ -5,13 +5,12 @@ import re
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from radarsim.app.run import load_all
-from radarsim.cli import main
 from radarsim.recorded import figures, follow
 from radarsim.recorded.plots import MOST, Path, in_plane
 from radarsim.report.drawing import Line, Note
+from tests.program import command
 
 
 def loaded(config, *overrides):
@@ -84,9 +83,7 @@ def test_places_are_thinned():
 def test_the_report_shows_what_the_terminal_says(tmp_path):
     one = loaded("sonar_smoothing")
     source = written(tmp_path / "plots <b>.csv", follow.simulated(one), track=["7"] * 40)
-    arguments = ["track", "sonar_smoothing", source, "-o", tmp_path / "track.csv", "--report", tmp_path / "out"]
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == 0, result.output
+    result = command("track", "sonar_smoothing", source, "-o", tmp_path / "track.csv", "--report", tmp_path / "out")
     page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
     assert "What do the filters of sonar_smoothing make of plots &lt;b&gt;.csv?" in page
     assert "Best: " in page
@@ -104,9 +101,7 @@ def test_nothing_is_drawn_over_the_plots(tmp_path):
     source = written(tmp_path / "figures/track.svg", follow.simulated(one))
     before = source.read_bytes()
     for arguments in (("--figures", tmp_path / "figures"), ("--report", tmp_path)):
-        command = ["track", "rls2", source, "-o", tmp_path / "t.csv", "-q", *arguments]
-        result = CliRunner().invoke(main, [str(argument) for argument in command])
-        assert result.exit_code == 2
+        result = command("track", "rls2", source, "-o", tmp_path / "t.csv", "-q", *arguments, code=2)
         assert "would be overwritten; choose another folder" in result.stderr
     assert source.read_bytes() == before
 
@@ -122,8 +117,6 @@ def test_the_bytes_are_those_of_any_number_of_threads(tmp_path, config):
         csv.writer(file).writerows([("track", *columns), *rows])
     made = []
     for threads in (1, 2, 5):
-        command = ["track", config, tmp_path / "plots.csv", "-o", tmp_path / "t.csv", "-q", "--threads", threads]
-        result = CliRunner().invoke(main, [str(argument) for argument in command])
-        assert result.exit_code == 0, result.output
+        command("track", config, tmp_path / "plots.csv", "-o", tmp_path / "t.csv", "-q", "--threads", threads)
         made.append((tmp_path / "t.csv").read_bytes())
     assert made[0] == made[1] == made[2]

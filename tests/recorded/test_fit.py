@@ -13,6 +13,7 @@ from radarsim.recorded.fit import silent
 from radarsim.studies.interface import BIAS, CORRELATION, EXPLANATIONS, OUTLIERS
 from radarsim.studies.range_doppler.track import PlotLikelihood
 from radarsim.studies.registry import study
+from tests.program import command
 
 T, SCANS = 10.0, 60
 STATED = {"radar.sigma_range_m": 250.0, "radar.sigma_velocity_mps": 15.0, "manoeuvre_variance": 1e-3}
@@ -374,16 +375,6 @@ def source(tmp_path):
     path = tmp_path / "plots.csv"
     plots.write_columns(recording(np.random.default_rng(7)), path)
     return path
-
-
-def command(*arguments, code=0):
-    from click.testing import CliRunner
-
-    from radarsim.cli import main
-
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 def test_the_command_prints_intervals_and_json(source):

@@ -6,15 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
 
 import radarsim
 from radarsim.app.result import Result
-from radarsim.cli import main
 from radarsim.config import document
 from radarsim.errors import DisagreementError
 from radarsim.report import notes, tables
 from radarsim.report.statistics import ERROR_OF_PROGRAM, Z95, Estimate, rate, root_mean_square, standard_errors
+from tests.program import command
 
 
 def test_standard_errors_of_an_even_interval():
@@ -169,12 +168,10 @@ def test_one_config_that_disagrees_does_not_stop_the_others(tmp_path, monkeypatc
         return replace(axes, exact_sigma=(1.5 if made.spec.radar.name == "RLS 2" else 1.0) * axes.exact_sigma)
 
     monkeypatch.setattr(study, "axes", wrong)
-    for command, *more in (("run", "-n", "2000"), ("report",)):
+    for verb, *more in (("run", "-n", "2000"), ("report",)):
         for folder in ("rls2", "rls3"):
             (tmp_path / folder / "report.html").unlink(missing_ok=True)
-        words = (command, "rls2", "rls3", *more, "--out", str(tmp_path), "--no-figures", "--json")
-        ended = CliRunner().invoke(main, words)
-        assert ended.exit_code == 4, ended.output
+        ended = command(verb, "rls2", "rls3", *more, "--out", tmp_path, "--no-figures", "--json", code=4)
         assert [one["config"] for one in json.loads(ended.stdout)] == ["rls2", "rls3"]
         assert ended.stderr.startswith("rls2: curves.csv: rls2, r")
         assert "rls3" not in ended.stderr

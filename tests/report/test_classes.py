@@ -7,26 +7,19 @@ import re
 from html import unescape
 
 import pytest
-from click.testing import CliRunner
 
 import radarsim
 from radarsim.app import readings, reproduce, run
 from radarsim.app import stored as stored_readings
 from radarsim.app.stored import CLASSES, classes_of, shipped_classes, stored_classes
-from radarsim.cli import main
 from radarsim.config import document as lookup
 from radarsim.errors import StoreError
 from radarsim.report import html
 from radarsim.report.claims import CLAIMED, NOT_JUDGED, judge, page, rule
+from tests.program import printed
 
 PAPERS = {claim.id: (of, claim) for of in run.papers() for claim in of.claims}
 OPEN = [(paper.readings, paper.claims) for paper in readings.papers().values()]
-
-
-def command(*words, code=0):
-    done = CliRunner().invoke(main, [str(one) for one in words], catch_exceptions=False)
-    assert done.exit_code == code, done.output
-    return done.stdout
 
 
 def as_runs_would_store(out, own):
@@ -54,10 +47,10 @@ def told(row):
 
 def agree(out):
     """Hold every rendering of the stored claims under `out` against the class in claims.csv; gives the classes."""
-    every = json.loads(command("claims", "--json", "--out", out))
+    every = json.loads(printed("claims", "--json", "--out", out))
     rows = {parts[0]["claim"]: parts[0] for parts in page.grouped(every)}
-    lines = {line.split()[0]: line for line in command("claims", "--out", out).splitlines() if line[:1] == "P"}
-    made = command("claims", "--markdown", "--out", out)
+    lines = {line.split()[0]: line for line in printed("claims", "--out", out).splitlines() if line[:1] == "P"}
+    made = printed("claims", "--markdown", "--out", out)
     marks = drawn(run.claims((), out))
     stands = dict(re.findall(r"^\| (P\d\.\w+) \| .* \| ([^|]*) \| `\w+` \|$", made, re.MULTILINE))
     assert rows.keys() == lines.keys() == stands.keys() == PAPERS.keys()
@@ -75,7 +68,7 @@ def agree(out):
     kinds = {claim: row["class"] for claim, row in rows.items()}
     counted, count = page.counted(every), sum(page.counts(every)[0].values())
     assert f"claims   {count}: {counted}" in reproduce.summary([reproduce.Done("rls2", 1.0, "")], str(out), 1.0)
-    assert command("claims", "--out", out).splitlines()[-2] == counted
+    assert printed("claims", "--out", out).splitlines()[-2] == counted
     for line in page.headline(every)[2:]:
         said, _, names = line.rpartition(": ")
         kind = kinds[re.match(r"P\d\.\w+", names)[0]]
@@ -113,16 +106,16 @@ def test_every_claim_has_one_class_wherever_it_is_said(tmp_path, own):
 
 
 def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
-    text = command("run", "rls2", "-n", 500, "--no-figures", "--out", tmp_path)
+    text = printed("run", "rls2", "-n", 500, "--no-figures", "--out", tmp_path)
     assert "1 confirmed: P1.23" in text
     assert "2 depend on what the paper leaves open: P1.18, P1.28" in text
     assert "as shipped confirmed: P1.28; refuted: P1.18" in text
-    (document,) = json.loads(command("report", "rls2", "-n", 500, "--no-figures", "--json", "--out", tmp_path))
+    (document,) = json.loads(printed("report", "rls2", "-n", 500, "--no-figures", "--json", "--out", tmp_path))
     assert document["claims"] == {"confirmed": ["P1.23"], "depends on": ["P1.18", "P1.28"]}
     assert document["claims_as_shipped"] == {"confirmed": ["P1.23", "P1.28"], "refuted": ["P1.18"]}
     phrase = "refuted as shipped; depends on shown_variance, start (true under 1 of 15 readings)"
     assert reported(tmp_path / "rls2")["P1.18"] == phrase
-    assert f"P1.18  {phrase}: RLS 2" in command("claims", "rls2", "--out", tmp_path)
+    assert f"P1.18  {phrase}: RLS 2" in printed("claims", "rls2", "--out", tmp_path)
     html.write(tmp_path)
     assert "1 confirmed, 2 depend on what the paper leaves open" in (tmp_path / "index.html").read_text()
     rows = run.claims(("rls2",), tmp_path)
@@ -160,20 +153,20 @@ def test_what_was_judged_of_other_words_is_no_class():
 
 def test_a_run_without_any_class_says_that_it_is_judged_as_shipped_alone(monkeypatch, tmp_path):
     monkeypatch.setattr(stored_readings, "shipped_classes", lambda: ())
-    text = command("run", "rls2", "-n", 60, "--no-figures", "--out", tmp_path)
+    text = printed("run", "rls2", "-n", 60, "--no-figures", "--out", tmp_path)
     assert "as shipped alone: P1.18, P1.23, P1.28; `radarsim readings P1` judges" in text
-    assert "P1.18  refuted as shipped; other readings not judged: RLS" in command("claims", "rls2", "--out", tmp_path)
+    assert "P1.18  refuted as shipped; other readings not judged: RLS" in printed("claims", "rls2", "--out", tmp_path)
 
 
 def test_classes_that_were_worked_out_beside_the_run_count(tmp_path):
-    command("run", "rls2", "-n", 300, "--no-figures", "--out", tmp_path)
-    assert "note" not in command("readings", "P1.23", "--no-figures", "--out", tmp_path)
+    printed("run", "rls2", "-n", 300, "--no-figures", "--out", tmp_path)
+    assert "note" not in printed("readings", "P1.23", "--no-figures", "--out", tmp_path)
     (own,) = stored_classes(tmp_path)
     path = tmp_path / CLASSES
     path.write_text(path.read_text().replace(f",{rule.CONFIRMED},", f",{rule.IMMATERIAL},"))
     assert own.kind == rule.CONFIRMED
-    assert f"P1.23  confirmed as shipped; {rule.IMMATERIAL} over all" in command("claims", "rls2", "--out", tmp_path)
-    command("report", "rls2", "-n", 300, "--no-figures", "--out", tmp_path)
+    assert f"P1.23  confirmed as shipped; {rule.IMMATERIAL} over all" in printed("claims", "rls2", "--out", tmp_path)
+    printed("report", "rls2", "-n", 300, "--no-figures", "--out", tmp_path)
     rows = csv.DictReader((tmp_path / "rls2/claims.csv").read_text(encoding="utf-8").splitlines())
     assert {row["class"] for row in rows if row["claim"] == "P1.23"} == {rule.IMMATERIAL}
     path.write_text("claim,class\nP1.23,certain\n")
@@ -184,10 +177,10 @@ def test_classes_that_were_worked_out_beside_the_run_count(tmp_path):
 def test_readings_tell_of_runs_that_were_written_with_other_classes(tmp_path):
     as_runs_would_store(tmp_path, rule.CONFIRMED)
     asked = ("readings", "P1.9", "P1.8", "--no-figures", "--out", tmp_path)
-    assert "radarsim report" not in command(*asked)
+    assert "radarsim report" not in printed(*asked)
     path = tmp_path / "range_doppler/claims.csv"
     path.write_text(path.read_text().replace(f",{rule.CONFIRMED},", f",{rule.REFUTED},"))
-    assert "`radarsim report range_doppler`" in command(*asked)
+    assert "`radarsim report range_doppler`" in printed(*asked)
 
 
 @pytest.mark.slow

@@ -18,8 +18,8 @@ import pytest
 from radarsim.app import run
 from radarsim.engine.cluster import Cluster
 from radarsim.report.tables import to_csv
-from tests.cli.test_run import csv_bytes
 from tests.engine.test_collect import Shuffled
+from tests.program import csv_bytes
 from tests.trust.cases import CASES, MORE
 
 ROOT = Path(__file__).parents[2]

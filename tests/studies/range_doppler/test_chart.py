@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
 
 from radarsim.app.compare import chart
-from radarsim.cli import main
 from radarsim.errors import ConfigError
 from radarsim.studies.range_doppler import chart as drawn
 from radarsim.studies.range_doppler import filters
+from tests.program import command
 from tests.studies.range_doppler import impulse
 
 
@@ -176,13 +175,11 @@ def test_the_table_on_the_wall_is_the_closed_form():
 
 
 def test_the_command(tmp_path):
-    ended = CliRunner().invoke(main, ["chart", "rls4", "--out", str(tmp_path), "--no-figures", "--json"])
-    document = json.loads(ended.stdout)
+    document = json.loads(command("chart", "rls4", "--out", tmp_path, "--no-figures", "--json").stdout)
     assert document["sentences"][0].startswith("rls4: c = 18")
     assert document["cases"][0]["component"] == "r"
     assert sorted(p.name for p in (tmp_path / "chart").iterdir()) == ["chart.csv", "chart.html"]
-    words = CliRunner().invoke(main, ["chart", "rls4", "--out", str(tmp_path), "--no-figures"]).stdout
-    assert "page     " in words
+    assert "page     " in command("chart", "rls4", "--out", tmp_path, "--no-figures").stdout
 
 
 def test_two_configs_of_one_name_could_not_be_told_apart(tmp_path):
@@ -196,8 +193,7 @@ def test_two_configs_of_one_name_could_not_be_told_apart(tmp_path):
 
 def test_a_file_in_the_place_of_the_folder_is_named_and_not_what_is_written_beside_it(tmp_path):
     (tmp_path / "file").write_text("mine")
-    ended = CliRunner().invoke(main, ["chart", "rls4", "--no-figures", "--out", str(tmp_path / "file")])
-    assert ended.exit_code == 4
+    ended = command("chart", "rls4", "--no-figures", "--out", tmp_path / "file", code=4)
     assert ended.stderr == f"{tmp_path / 'file' / 'chart' / 'chart.csv'}: cannot be written: Not a directory\n"
     assert (tmp_path / "file").read_text() == "mine"
 

@@ -1,0 +1,29 @@
+"""The command as a user types it, run in this process, and what it leaves in a folder of results."""
+
+import json
+
+from click.testing import CliRunner
+
+from radarsim.cli import main
+
+
+def command(*words, code=0):
+    """The command's result, after its exit code is checked; words are written out as in a shell."""
+    result = CliRunner().invoke(main, [str(word) for word in words], catch_exceptions=False)
+    assert result.exit_code == code, result.output
+    return result
+
+
+def printed(*words):
+    """What the command prints when all is well."""
+    return command(*words).stdout
+
+
+def csv_bytes(folder):
+    """The bytes of all tables of a result folder, by name."""
+    return {path.name: path.read_bytes() for path in sorted(folder.glob("*.csv"))}
+
+
+def record(folder):
+    """What run.json of a result folder holds."""
+    return json.loads((folder / "run.json").read_text(encoding="utf-8"))
