@@ -284,8 +284,3 @@ def test_clean_follows_no_link(out, tmp_path):
 def test_clean_refuses_what_it_does_not_know(tmp_path, monkeypatch, arguments, words):
     monkeypatch.chdir(tmp_path)
     assert words in command("clean", *arguments, code=2).stderr
-
-
-@pytest.mark.parametrize("name", ["doctor", "clean"])
-def test_help_teaches_with_an_example(name):
-    assert f"  radarsim {name}" in command(name, "--help").stdout

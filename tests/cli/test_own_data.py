@@ -377,13 +377,6 @@ def test_new_comments_every_key_and_never_overwrites(tmp_path, monkeypatch):
     assert "no such config" in command("new", "other", "--like", "rls9", code=2).stderr
 
 
-@pytest.mark.parametrize("command", ["new", "simulate", "track", "import"])
-def test_help_of_ones_own_data_teaches_with_an_example(command):
-    assert f"Example\n  radarsim {command} " in command(command, "--help").stdout.replace("      ", "  ").replace(
-        "    ", "  "
-    )
-
-
 def test_help_is_grouped():
     text = command("--help").stdout
     order = [text.index(f"\n{title}:\n") for title in ("Run", "Read", "Own data", "Maintenance")]
