@@ -2,8 +2,6 @@
 
 import math
 
-import pytest
-
 import radarsim
 from radarsim.app import readings
 from radarsim.report import claims
@@ -45,18 +43,6 @@ def test_undecided_at_the_most_is_exit_code_3(tmp_path):
     words = ("run", "discriminator_paper", "-n", "60", "--decide", "--no-figures", "-q")
     done = command(*words, "--out", tmp_path, code=3)
     assert "P4.4 not yet decided at 60 realisations; " in done.stderr
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["rls2", "--decide"], "no claim names this config; claims of its study name range_doppler"),
-        (["range_doppler", "--decide", "--precision", "1"], "--decide goes with neither --shard nor --precision"),
-        (["range_doppler", "--decide", "--shard", "1/2"], "--decide goes with neither --shard nor --precision"),
-    ],
-)
-def test_bad_input(words, said, tmp_path):
-    assert said in command("run", *words, "--out", tmp_path, code=2).stderr
 
 
 def test_an_exact_value_that_simulation_denies_is_exit_code_4_with_all_written(tmp_path, monkeypatch):

@@ -331,28 +331,6 @@ def test_the_command_gives_one_json_document():
     assert document["lo"] == document["value"] == document["hi"]
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("--equals", 30),
-        ("--gain", "r", "--sigma", "r", "--equals", 30),
-        ("--gain", "r", "--at", 60, "--at-k", 3, "--equals", 30),
-        ("--gain", "r"),
-    ],
-)
-def test_options_that_do_not_go_together(words):
-    ended = command("rls2", "radar.sigma_range_m", *words)
-    assert ended.exit_code == 2
-    assert "Error" in ended.stderr
-
-
-def test_a_rate_names_its_filter_itself():
-    words = ("--lock", "sequence", "--filter", "sequence", "--equals", 30)
-    ended = command("discriminator", "burst.noise_variance", *words)
-    assert ended.exit_code == 2
-    assert ended.stderr == "--lock names the filter itself: leave --filter out\n"
-
-
 def test_rates_of_other_studies_are_read_by_the_names_of_their_tables():
     """Folds unfolded rightly: sampled with an interval that holds the config's own rate when that is the target."""
     quantity = Wanted("right", "memory", at_k=4)
@@ -431,14 +409,6 @@ def test_a_root_at_zero_is_printed_as_zero():
     ended = command("rls2", "manoeuvre_variance", "--gain", "ar", "--at", 100, "--equals", 0, "--between", 1e-6, 1e-1)
     assert ended.exit_code == 0, ended.stderr
     assert "gain of r+Vr in ar at 100 s: 0 % (" in ended.stdout
-
-
-@pytest.mark.parametrize("equals", ["nan", "inf", "-inf"])
-def test_a_target_that_is_no_number_is_refused(equals):
-    ended = command("rls2", "radar.sigma_range_m", "--sigma", "r", "--filter", "r", "--equals", equals, "--json")
-    assert ended.exit_code == 2
-    assert ended.stdout == ""
-    assert "--equals: must be a finite number" in ended.stderr
 
 
 def test_where_the_quantity_jumps_over_the_target_it_is_said():
@@ -582,19 +552,3 @@ def test_the_run_that_a_sampled_answer_names_confirms_it(kind):
     seen, _ = quantities.sampled(checked(quantity, one), one)
     half = (seen.hi - seen.lo) / 2
     assert abs(seen.value - equals) <= 2 * math.sqrt(2) * half, (seen, found)
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (
-            ["--loss", "--filter", "nearest"],
-            "'--loss': must be followed by a NAME, of the filter itself, without --filter",
-        ),
-        (["--gain", "--filter", "r+Vr"], "'--gain': must be followed by a COMPONENT, got --filter"),
-    ],
-)
-def test_an_option_in_place_of_a_name_is_told(words, said):
-    done = command("rls2", "radar.sigma_velocity_mps", *words, "--equals", 5)
-    assert done.exit_code == 2
-    assert said in done.output

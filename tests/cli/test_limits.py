@@ -300,7 +300,6 @@ def test_check_with_a_precision_counts_what_is_stored(tmp_path):
     (case,) = document["cases"]
     assert case["realisations"] == 32_000
     assert case["stock"]["stored"] == 16_384  # the whole blocks
-    command("check", "rls2", "--precision", 1, "--shard", "1/2", code=2)
 
 
 def test_doctor_names_what_is_not_stored_before_what_is(shares, tmp_path):
@@ -317,39 +316,6 @@ def test_doctor_names_what_is_not_stored_before_what_is(shares, tmp_path):
 def test_a_share_may_be_limited_in_time(tmp_path):
     limited = ("run", "rls2", "-n", "1e9", "--shard", "2/2", "--time-limit", 0.5, "--out", tmp_path)
     assert command(*limited, code=3).stderr == "rls2: time limit of 0.5 s\n"
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--shard", "0/3"], "i/n with i from 1 to n"),
-        (["--shard", "4/3"], "i/n with i from 1 to n"),
-        (["--shard", "1/0"], "i/n with i from 1 to n"),
-        (["--shard", "two"], "i/n with i from 1 to n"),
-        (["--shard", "1/2", "--precision", "1"], "--shard and --precision do not go together"),
-        (["--precision", "0"], "must be a number > 0"),
-        (["--precision", "-1"], "must be a number > 0"),
-        (["--precision", "nan"], "must be a number > 0"),
-        (["--precision", "101"], "≤ 100"),
-        (["--of", "gain"], "--of says what a precision is of"),
-        (["--precision", "1", "--of", "speed"], "rls2: study range_doppler measures no 'speed', but sigma, gain"),
-        (["--precision", "1", "-n", "1999"], "rls2.yaml: realisations: must be at least 2000 for a precision"),
-        (["--time-limit", "0"], "must be a number > 0"),
-        (["--time-limit", "inf"], "must be a number > 0"),
-        (["--workers", "0"], "--workers"),
-        (["--workers", "2", "--scheduler", "tcp://a:1"], "do not go together"),
-        (["--workers", "2", "--threads", "2"], "do not go together"),
-        (["--scheduler", "nowhere"], "must be an address such as tcp://host:8786"),
-    ],
-)
-def test_wrong_values_and_combinations_are_refused(tmp_path, arguments, words):
-    result = command("run", "rls2", *arguments, "--out", tmp_path, code=2)
-    assert words in result.stderr
-    assert not list(tmp_path.iterdir())
-
-
-def test_check_refuses_what_a_precision_is_of_where_none_is_given():
-    assert "give --precision too" in command("check", "rls2", "--of", "gain", code=2).stderr
 
 
 def test_json_is_one_document_on_stdout(tmp_path):
@@ -398,11 +364,6 @@ def test_a_pilot_knows_that_kernels_calculate_chunks(monkeypatch, chunk):
     for pilot_s in (0.3, 0.06):
         seconds = overview.seconds_each(SimpleNamespace(block=4096), 100_000, pilot_s)
         assert seconds == pytest.approx(0.02 / chunk, rel=1e-9)
-
-
-def test_what_no_number_of_realisations_reaches_is_told():
-    text = command("check", "rls2", "-n", 4_000, "--precision", 0.5).stdout
-    assert "precision not within reach of 1 case: rls2; -n 128000 would do" in text
 
 
 def test_python_takes_a_precision_and_a_limit():

@@ -185,12 +185,6 @@ def test_blocks_of_other_sources_cannot_be_computed_again(out, monkeypatch):
     assert "the sources that compute have changed" in command("doctor", out / "rls2", "--recompute", 1, code=2).stderr
 
 
-def test_doctor_is_told_what_it_looks_at(tmp_path):
-    assert "no run.json" in command("doctor", tmp_path, code=2).stderr
-    assert "no run.json" in command("doctor", tmp_path / "nowhere", code=2).stderr
-    assert "--recompute needs a RESULT" in command("doctor", "--recompute", 1, code=2).stderr
-
-
 def altered(tables, column, change):
     """The tables with one number of the discriminator's curves changed, in a row in the middle."""
     lines = tables["curves"].decode().splitlines()
@@ -275,12 +269,3 @@ def test_clean_follows_no_link(out, tmp_path):
     os.symlink(elsewhere, out / ".blocks")
     assert "is a link" in command("clean", "--out", out, code=2).stderr
     assert (elsewhere / "T16.sums").exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [(["--out", "nowhere"], "no such directory"), (["rls7"], "no such config"), (["--seed", "1"], "need a CONFIG")],
-)
-def test_clean_refuses_what_it_does_not_know(tmp_path, monkeypatch, arguments, words):
-    monkeypatch.chdir(tmp_path)
-    assert words in command("clean", *arguments, code=2).stderr

@@ -266,11 +266,6 @@ def test_times_are_judged_across_pieces_of_a_file(tmp_path, monkeypatch):
         list(plots.chunks(path, [("t_s", "range_m", "velocity_mps")], 3))
 
 
-def test_studies_without_plots_say_so(tmp_path):
-    for words in (("simulate", "discriminator", "-o", tmp_path / "x.csv"), ("track", "discriminator", tmp_path / "x")):
-        assert "has no filters for recorded plots" in command(*words, code=2).stderr
-
-
 def advised(fault):
     """The command that a fault ends with."""
     return shlex.split(fault.strip().rpartition(": radarsim ")[2])
@@ -373,8 +368,6 @@ def test_new_comments_every_key_and_never_overwrites(tmp_path, monkeypatch):
     Path("mine.yaml").write_text("precious")
     assert "never overwritten" in command("new", "mine", "--like", "rls1", code=2).stderr
     assert Path("mine.yaml").read_text() == "precious"
-    assert "must be a plain name" in command("new", "../mine", "--like", "rls1", code=2).stderr
-    assert "no such config" in command("new", "other", "--like", "rls9", code=2).stderr
 
 
 def test_help_is_grouped():

@@ -139,12 +139,6 @@ def test_report_remakes_the_same_tables_and_computes_nothing(done):
     assert "radarsim run" in result.stderr
 
 
-def test_check_says_what_would_run():
-    result = command("check", "range_doppler", "-n", "1e7")
-    for words in ("valid", "rls1", "rls5", "10,000,000", "MB"):
-        assert words in result.stdout
-
-
 def test_faults_of_all_configs_come_at_once_and_nothing_runs(tmp_path):
     (tmp_path / "bad.yaml").write_text("study: range_doppler\nscans: true\nbogus: 1\n")
     (tmp_path / "worse.yaml").write_text("study: range_dopler\n")
@@ -155,28 +149,6 @@ def test_faults_of_all_configs_come_at_once_and_nothing_runs(tmp_path):
     assert any("bogus" in line for line in lines)
     assert any("did you mean range_doppler" in line for line in lines)
     assert not out.exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["run", "rls7"], "no such config"),
-        (["run", "rls2", "-n", "0"], "realisations"),
-        (["run", "rls2", "-n", "1e13"], "realisations"),
-        (["run", "rls2", "-n", "many"], "must be a whole number"),
-        (["run", "rls2", "--set", "radar.sigma_range_m=-1"], "radar.sigma_range_m"),
-        (["run", "rls2", "--set", "radar.sigma_rnage_m=1"], "did you mean"),
-        (["run"], "CONFIG"),
-        (["report", "rls2", "--out", "nowhere"], "not stored"),
-        (["claims", "rls7"], "no such config"),
-    ],
-)
-def test_wrong_input_exits_with_2_and_says_why(arguments, words, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    result = command(*arguments, code=2)
-    assert words in result.stderr
-    assert "Traceback" not in result.output
-    assert not list(tmp_path.iterdir())
 
 
 def test_overrides_change_the_case(tmp_path):
@@ -201,17 +173,6 @@ def test_claims_without_results_are_not_run_with_the_command(tmp_path):
         assert f"P1.{number} " in result.stdout + " "
     assert "not run" in result.stdout
     assert "radarsim run range_doppler" in result.stdout
-
-
-def test_list_names_what_is_shipped():
-    result = command("list")
-    for words in ("rls1", "range_doppler", "polynomial", "observes: [range, velocity]"):
-        assert words in result.stdout
-
-
-def test_schema_is_json_schema():
-    schema = json.loads(command("schema").stdout)
-    assert "$schema" in schema
 
 
 @pytest.mark.parametrize("name", sorted(main.commands))
