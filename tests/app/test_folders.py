@@ -117,7 +117,7 @@ def test_what_no_command_repeats_says_so(tmp_path):
         out=tmp_path,
         figures=False,
     )
-    assert record(tmp_path, result.experiment.stem)["command"].startswith("none: the run was stopped")
+    assert record(tmp_path / result.experiment.stem)["command"].startswith("none: the run was stopped")
 
 
 @pytest.mark.parametrize("name", ["index.html", "INDEX.html", "README.md"])

@@ -37,7 +37,10 @@ def test_a_number_that_is_not_known_has_no_unit():
 
 
 def test_claims_without_results_say_where_to_find_them(tmp_path):
-    *_, counted, pointer = command("claims", "--out", tmp_path / "none").stdout.splitlines()
+    *claims, counted, pointer = command("claims", "--out", tmp_path / "none").stdout.splitlines()
+    assert not {f"P1.{number}" for number in range(1, 26)} - {line.split()[0] for line in claims}
+    assert any("radarsim run range_doppler" in line for line in claims)
+    assert "36 not run" in command("claims", "range_doppler", "--out", tmp_path / "none").stdout
     assert re.fullmatch(r"\d+ not run; \d+ extensions not counted", counted.strip())
     assert "make reproduce-figures" in pointer
     assert "docs/claims.md" in pointer

@@ -52,13 +52,9 @@ def test_a_whole_result_is_told_so_and_nothing_is_changed(out):
     result = command("doctor", out / "rls2", "--recompute", 3)
     assert "all whole" in result.stdout
     assert "computed again: 3 pieces" in result.stdout
+    found = json.loads(command("doctor", out / "rls2", "--recompute", 99, "--json").stdout)
+    assert (found["realisations"], found["faults"], found["notes"]) == (50_001, [], [])
     assert contents(out) == before
-
-
-def test_every_stored_block_may_be_computed_again(out):
-    (found,) = [json.loads(command("doctor", out / "rls2", "--recompute", 99, "--json").stdout)]
-    assert found["realisations"] == 50_001
-    assert (found["faults"], found["notes"]) == ([], [])
 
 
 def test_a_hundred_of_a_hundred_damaged_files_are_named_and_come_again(out):
@@ -173,12 +169,6 @@ def test_outputs_that_a_run_is_writing_are_looked_at_again(out, monkeypatch):
     assert "all whole" in command("doctor", out / "rls2").stdout
 
 
-def test_a_result_without_blocks_stands_on_its_own(out):
-    command("clean", "--out", out)
-    result = command("doctor", out / "rls2")
-    assert "no blocks of rls2 are stored" in result.stdout
-
-
 def test_blocks_of_other_sources_cannot_be_computed_again(out, monkeypatch):
     monkeypatch.setattr(doctor.CaseWork, "identity", "ab12")
     command("doctor", out / "rls2")
@@ -252,7 +242,7 @@ def test_clean_drops_blocks_and_nothing_else(out):
     assert block_files(out) == []
     left = {str(path.relative_to(out / ".blocks")) for path in (out / ".blocks").rglob("*")}
     assert left == {"notes.txt", "ab12", "ab12/mine.txt"}
-    assert (out / "rls2" / "curves.csv").exists()
+    assert "no blocks of rls2 are stored" in command("doctor", out / "rls2").stdout  # and stands on its own
     assert "dropped 0 files" in command("clean", "--out", out).stdout
 
 

@@ -1,7 +1,6 @@
 """The command as a user meets it: what it prints, what it writes, how it fails."""
 
 import hashlib
-import json
 import os
 import re
 import shlex
@@ -67,19 +66,20 @@ def test_rows_exist_only_where_there_is_an_estimate(done):
     assert (curves["sigma_lo"] < curves["sigma"]).all()
 
 
-@pytest.mark.parametrize("threads", [2, 3, 5])
-def test_same_bytes_for_any_number_of_threads(tmp_path, threads):
-    for folder, count in (("one", 1), ("many", threads)):
-        command("run", "rls3", "-n", 50_001, "--threads", count, "--no-figures", "--quiet", "--out", tmp_path / folder)
-    assert csv_bytes(tmp_path / "one" / "rls3") == csv_bytes(tmp_path / "many" / "rls3")
+def test_same_bytes_with_more_threads_when_extended_and_of_fewer_realisations_after_more(tmp_path):
+    """Of every study and number of threads: tests/trust/test_bytes.py."""
 
+    def ran(out, n, *more):
+        command("run", "rls1", "-n", n, *more, "--no-figures", "--quiet", "--out", tmp_path / out)
+        return csv_bytes(tmp_path / out / "rls1")
 
-def test_same_bytes_when_extended(tmp_path):
-    for n in ("1e4", "1e5"):
-        command("run", "rls1", "-n", n, "--no-figures", "--quiet", "--out", tmp_path / "grown")
-    command("run", "rls1", "-n", "1e5", "--no-figures", "--quiet", "--out", tmp_path / "at once")
-    assert csv_bytes(tmp_path / "grown" / "rls1") == csv_bytes(tmp_path / "at once" / "rls1")
-    assert record(tmp_path / "grown" / "rls1")["realisations_from_store"] >= 8192
+    few, many = ran("grown", 50_001, "--threads", 1), ran("grown", "1e5", "--threads", 2)
+    assert record(tmp_path / "grown" / "rls1")["realisations_from_store"] >= 49_152
+    assert ran("at once", "1e5", "--threads", 3) == many
+    assert ran("at once", 50_001) == few
+    ran("at once", 5000)
+    command("run", "range_doppler", "-n", 5000, "--no-figures", "--quiet", "--out", tmp_path / "at once")
+    assert record(tmp_path / "at once" / "range_doppler")["realisations_from_store"] >= 5000
 
 
 def test_the_command_that_a_run_names_shows_the_claims_of_that_run(tmp_path):
@@ -109,20 +109,6 @@ def test_the_command_that_report_names_makes_what_it_lacks(tmp_path):
     held = command("check", *shlex.split(named)[1:]).output
     assert "300 of 300 realisations stored, nothing left to compute" in held
     command("report", "rls2", "--out", tmp_path, "--no-figures")
-
-
-def test_a_smaller_run_after_a_larger_one_reports_exactly_what_was_asked(tmp_path):
-    command("run", "rls1", "-n", "1e5", "--no-figures", "--quiet", "--out", tmp_path / "a")
-    command("run", "rls1", "-n", "5000", "--no-figures", "--quiet", "--out", tmp_path / "a")
-    command("run", "rls1", "-n", "5000", "--no-figures", "--quiet", "--out", tmp_path / "b")
-    assert csv_bytes(tmp_path / "a" / "rls1") == csv_bytes(tmp_path / "b" / "rls1")
-
-
-def test_range_doppler_reuses_what_its_parts_made(tmp_path):
-    command("run", "rls4", "-n", 5000, "--no-figures", "--quiet", "--out", tmp_path)
-    command("run", "range_doppler", "-n", 5000, "--no-figures", "--quiet", "--out", tmp_path)
-    record = json.loads((tmp_path / "range_doppler" / "run.json").read_text())
-    assert record["realisations_from_store"] >= 5000
 
 
 def test_report_remakes_the_same_tables_and_computes_nothing(done):
@@ -165,14 +151,6 @@ def test_an_unwritable_place_exits_with_4(tmp_path):
     (tmp_path / "out").write_text("a file where a folder should be")
     result = command("run", "rls2", "-n", 100, "--out", tmp_path / "out", code=4)
     assert str(tmp_path / "out") in result.stderr
-
-
-def test_claims_without_results_are_not_run_with_the_command(tmp_path):
-    result = command("claims", "--out", tmp_path)
-    for number in range(1, 26):
-        assert f"P1.{number} " in result.stdout + " "
-    assert "not run" in result.stdout
-    assert "radarsim run range_doppler" in result.stdout
 
 
 @pytest.mark.parametrize("name", sorted(main.commands))
@@ -253,13 +231,6 @@ def test_claims_are_shown_by_name_by_paper_and_beside_those_of_a_config(tmp_path
     assert own
     assert own == [row for row in claims(["discriminator_paper"], tmp_path) if row["claim"] == "P4.2"]
     assert "P4.2" in command("claims", "P4.2", "--out", tmp_path).stdout
-
-
-def test_claims_of_a_config_not_yet_run_are_listed_as_such(tmp_path):
-    result = command("claims", "range_doppler", "--out", tmp_path)
-    assert "36 not run" in result.stdout
-    command("run", "rls2", "-n", 3000, "--no-figures", "--out", tmp_path)
-    assert "P1.18" in command("claims", "rls2", "--out", tmp_path).stdout
 
 
 def test_the_command_that_computes_what_is_missing_is_whole(tmp_path):
