@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from radarsim.app.stored import inventory
+from radarsim.app.configs import inventory
 from radarsim.config.check import models_in
 from radarsim.config.fields import Model
 from radarsim.config.schema import Common

@@ -15,9 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, SupportsFloat, SupportsIndex
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex
 
 from radarsim import language
 from radarsim.config import document
@@ -25,11 +23,15 @@ from radarsim.config import load as reading
 from radarsim.config.experiment import Case, Experiment
 from radarsim.config.fields import Model
 from radarsim.errors import ConfigError
+from radarsim.language import term
 from radarsim.report import files
 from radarsim.studies import registry
-from radarsim.studies.identity import identity
 from radarsim.studies.interface import Plan
 from radarsim.studies.registry import study
+
+if TYPE_CHECKING:
+    import numpy as np
+
 
 # ---- configs ---------------------------------------------------------------------------------------------------------
 document.further_folders = registry.folders
@@ -82,6 +84,60 @@ def schema_json() -> str:
     from radarsim.config import schema  # pydantic's part takes a tenth of a second to load
 
     return schema.schema_json(registry)
+
+
+# ---- inventory -------------------------------------------------------------------------------------------------------
+Inventory = Sequence[tuple[str, Sequence[str], Sequence[tuple[str, ...]]]]  # title, columns, rows
+
+
+def described(file: Path | None) -> str:
+    """The first line of a YAML file's leading comment, without its own name; empty where there is no such file."""
+    if file is None:
+        return ""
+    with file.open(encoding="utf-8") as lines:
+        for line in lines:
+            words = line.lstrip("#").strip()
+            if not line.startswith("#"):
+                break
+            if not words.startswith("yaml-language-server"):
+                return words.partition(" — ")[2] or words
+    return ""
+
+
+def inventory() -> Inventory:
+    """What `radarsim list` shows: title, columns and rows of each kind of thing at hand."""
+    configs = [(stem, described(document.config_file(stem))) for stem in document.stems("configs")]
+    scenarios = [(stem, described(document.scenario_file(stem, None))) for stem in document.stems("scenarios")]
+    studies = registry.parts(lambda study: (study.about, dict(study.filters)))
+    about = [(name, words) for name, (words, _) in studies.items()]
+    about += [(name, f"cannot be used: {words}") for name, words in registry.unusable().items()]
+    filters = [(name, key, words) for name, (_, of) in studies.items() for key, words in of.items()]
+    return [
+        (term("Configs (radarsim run NAME)"), ("name", "what it is"), configs),
+        (term("Scenarios (target: NAME)"), ("name", "what it is"), scenarios),
+        (term("Studies (study: NAME)"), ("name", "paper and question"), about),
+        (term("Filters"), ("study", "keys", "what it is"), filters),
+    ]
+
+
+def selected(whole: Inventory, words: Sequence[str]) -> Inventory:
+    """Of an inventory the kinds that some words name, and the rows that hold all other words, in any case of letters.
+
+    Raises ConfigError where nothing is left.
+    """
+    kinds = {title.partition(" ")[0].lower(): title for title, _, _ in whole}
+    wanted = {kinds[word.lower()] for word in words if word.lower() in kinds} or set(kinds.values())
+    parts = [word.lower() for word in words if word.lower() not in kinds]
+    found = [
+        (title, columns, [row for row in rows if all(part in " ".join(row).lower() for part in parts)])
+        for title, columns, rows in whole
+        if title in wanted
+    ]
+    if parts and not any(rows for _, _, rows in found):
+        raise ConfigError(
+            f"{' '.join(words)}: nothing of this name; `radarsim list` shows all, or one of {', '.join(kinds)}"
+        )
+    return [(title, columns, rows) for title, columns, rows in found if rows or not parts]
 
 
 # ---- arguments -------------------------------------------------------------------------------------------------------
@@ -187,6 +243,8 @@ class CaseWork:
     @cached_property
     def identity(self) -> str:
         """See `radarsim.studies.identity`."""
+        from radarsim.studies.identity import identity
+
         return identity(self.case)
 
     @property
@@ -199,12 +257,14 @@ class CaseWork:
         """Length of the vector of sums."""
         return self.plan.layout.size
 
-    def simulate(self, first: int, count: int) -> np.ndarray:
+    def simulate(self, first: int, count: int) -> "np.ndarray":
         """Sums (size,) over realisations first … first + count - 1."""
         return study(self.case.study).simulate(self.plan, first, count)
 
     def explain(self, first: int, count: int) -> list[str]:
         """Where the sums of these realisations are not finite, one line a filter, scan and number of realisations."""
+        import numpy as np  # which `radarsim list` does without
+
         axes, layout = self.plan.axes, self.plan.layout
         bad = np.zeros((len(axes.filters), len(axes.k)), dtype=int)
         for i in range(first, first + count):

@@ -125,9 +125,9 @@ def resolved(asked: Asked, axes: Axes) -> Asked:
 
 def unit(asked: Asked, axes: Axes) -> str:
     """The unit in which a quantity is given."""
-    from radarsim.report import tables
+    from radarsim.report import wording
 
-    return tables.unit(asked.of.shown_unit(dict(axes.components).get(str(asked.component), "")))
+    return wording.unit(asked.of.shown_unit(dict(axes.components).get(str(asked.component), "")))
 
 
 def shortened(quantity: Asked, case: Case) -> Case:

@@ -34,7 +34,7 @@ from radarsim.app.configs import document as lookup
 from radarsim.config.document import one_line
 from radarsim.engine.run import Signals
 from radarsim.errors import ConfigError, Interrupted, RadarsimError, StoreError
-from radarsim.report.tables import clock, plural
+from radarsim.report.wording import clock, plural
 from radarsim.studies import registry
 
 # ---- reproduce -------------------------------------------------------------------------------------------------------

@@ -3,16 +3,12 @@
 What a finished experiment gives: tables, figures, files.
 
 From finished cases to files: tables, figures, claims, run.json and report.html of one experiment.
-
-What the commands print with --json: plain data, one document a command, with the content of their text output.
 """
 
-import json
-import math
 import os
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property, partial
 from pathlib import Path
@@ -26,23 +22,17 @@ from radarsim.engine import store
 from radarsim.engine.results import CaseResult
 from radarsim.errors import DisagreementError, RadarsimError
 from radarsim.language import tr
-from radarsim.report import claims, files, notes, rare, seen
+from radarsim.report import claims, files, notes, seen
 from radarsim.report import tables as common
-from radarsim.report.chart import spoken
 from radarsim.report.claims import page
 from radarsim.report.claims.page import OVER, with_classes
 from radarsim.report.drawing import Figure
+from radarsim.report.wording import spoken
 from radarsim.studies.registry import study
 
 if TYPE_CHECKING:
     import pandas as pd
-    from _typeshed import DataclassInstance
 
-    from radarsim.app.compare import Drawn
-    from radarsim.app.outlook import Outlook
-    from radarsim.app.question import Answer
-    from radarsim.app.run import Shares
-    from radarsim.app.stored import Inventory
     from radarsim.report.figures import Canvas
 
 
@@ -289,7 +279,7 @@ class Result:
 
     @cached_property
     def _of_intervals(self) -> list[str]:
-        return files.of_intervals(self.cases, self._tables, partial(study(self.experiment.study).answer, self.cases))
+        return notes.of_intervals(self.cases, self._tables, partial(study(self.experiment.study).answer, self.cases))
 
 
 # ---- output ----------------------------------------------------------------------------------------------------------
@@ -337,7 +327,9 @@ def case_figures(
             name: _said(figure) if name.startswith(("sigma", "gain")) else figure for name, figure in drawn.items()
         }
     if not own.draws_sweeps:
-        drawn |= rare.figures(results, common.groups(made["curves"], "case", "filter", "component"))
+        from radarsim.report import sweeps
+
+        drawn |= sweeps.figures(results, common.groups(made["curves"], "case", "filter", "component"))
     return {name: seen.crossed(figure) for name, figure in drawn.items()}
 
 
@@ -410,7 +402,7 @@ def write_files(
     drawn = time.perf_counter()
     own = study(experiment.study)
     answer = tuple(own.answer(results, made))
-    of_intervals = files.of_intervals(results, made, partial(own.answer, results))
+    of_intervals = notes.of_intervals(results, made, partial(own.answer, results))
     run = {**run, "warnings": [*run.get("warnings", ()), *of_intervals]}
     record = files.record(experiment, results, run, contents, answer, store.described())
     report = html.report_page(
@@ -437,82 +429,3 @@ def captions(described: Mapping[str, Figure]) -> str:
     """The captions of figures as Markdown: what each shows, then how it is drawn."""
     parts = [f"## {name}\n\n**{spoken(one.title)}.** {spoken(one.caption)}\n" for name, one in described.items()]
     return "\n".join([f"# {tr('Captions')}\n", *parts])
-
-
-# ---- documents -------------------------------------------------------------------------------------------------------
-def text(document: object) -> str:
-    """A document as JSON; what is not a number, or not finite, is null."""
-    return json.dumps(_plain(document), indent=2, ensure_ascii=False, allow_nan=False)
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if hasattr(value, "item"):  # NumPy's numbers
-        value = value.item()
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def fields(one: "DataclassInstance") -> dict[str, Any]:
-    """A dataclass as it is, paths as text."""
-    return {key: str(value) if isinstance(value, Path) else value for key, value in asdict(one).items()}
-
-
-def result(one: "Result") -> dict[str, Any]:
-    """A finished run or report: what was asked and done, the answer, σ at the last scan, verdicts, files."""
-    written = one.written
-    assert written is not None  # the commands write what they print
-    names = {case.name: case.count for case in one.cases}
-    return {
-        "config": one.experiment.stem,
-        "stop": one.facts["stop"],
-        "unmet": one.unmet,
-        "cases": {
-            case.name: {"asked": case.realisations, "done": names.get(case.name, 0), "seed": case.seed}
-            for case in one.experiment.cases
-        },
-        "precision": one.facts.get("precision"),
-        "answer": list(written.answer),
-        "last_scan": one.last_scan.to_dict("records"),
-        "claims": one.verdicts(),
-        "claims_as_shipped": one.verdicts("as_shipped"),
-        "folder": str(written.folder),
-        "files": list(written.files),
-        "warnings": one.warnings,
-    }
-
-
-def share_record(done: "Shares") -> dict[str, Any]:
-    """What a share came to, in realisations, by case."""
-    return {**asdict(done), "unmet": done.unmet, "warnings": done.warnings}
-
-
-def outlook(experiment: "Experiment", one: "Outlook") -> dict[str, Any]:
-    """What a run would take."""
-    return {"config": experiment.stem, "path": experiment.path, **asdict(one), "of": one.of.name}
-
-
-def answer(one: "Answer") -> dict[str, Any]:
-    """What was solved for: the value with its interval, or the limit where it is not attainable."""
-    return {**asdict(one), "quantity": one.quantity.words}
-
-
-def sensitivity(one: "DataclassInstance") -> dict[str, Any]:
-    """What each key changes, the quantities by name."""
-    made = fields(one)
-    return made | {"of": [of["name"] for of in made["of"]]}
-
-
-def drawn(one: "Drawn") -> dict[str, Any]:
-    """A chart: the sentences, the rows of chart.csv, and the files."""
-    return {"folder": str(one.folder), "sentences": one.sentences, "cases": one.rows, "files": one.files}
-
-
-def inventory(tables: "Inventory") -> dict[str, list[dict[str, str]]]:
-    """Configs, scenarios, studies and filters: lists of rows by the first word of their title."""
-    return {
-        title.split()[0].lower(): [dict(zip(columns, row, strict=True)) for row in rows]
-        for title, columns, rows in tables
-    }

@@ -21,11 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from radarsim.app import configs
-from radarsim.app import result as output
-from radarsim.app import stored as stored_claims
 from radarsim.app.configs import RESULTS, CaseWork, command, load, repeated, shipped
-from radarsim.app.result import Result, of_other_sources
-from radarsim.app.stored import classes_of
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine import run as stopping
 from radarsim.engine.executors import Executor
@@ -39,6 +35,7 @@ from radarsim.studies import registry
 from radarsim.studies.registry import study
 
 if TYPE_CHECKING:
+    from radarsim.app.result import Result
     from radarsim.report.claims import PaperClaims
     from radarsim.report.precision import Cell, Table
 
@@ -301,6 +298,8 @@ SPARE = 1.25  # for the report, for files and for what a picture of one case doe
 def seconds(experiment: Experiment, figures: bool | str | Sequence[str], width_mm: float | None) -> float:
     """An estimate of the seconds that writing takes: the tables of the first case, times the cases, and one figure of
     each kind, times their number, measured here."""
+    from radarsim.app import result as output
+
     case = experiment.cases[0]
     work = CaseWork(case)
     result = case_result(case, work, collect(work, REALISATIONS))
@@ -378,7 +377,7 @@ def run(
     width_mm: float | None = None,
     progress: Progress | None = None,
     stop: Signals | None = None,
-) -> Result:
+) -> "Result":
     """Run an experiment and give its result; nothing is written unless `out` names a directory.
 
     config is a path, the name of a shipped config, a dict as YAML would give it, or an Experiment loaded with these
@@ -490,7 +489,7 @@ def report(
     overrides: Sequence[str] = (),
     figures: bool | str | Sequence[str] = True,
     width_mm: float | None = None,
-) -> Result:
+) -> "Result":
     """Tables, figures and report of a config from what is stored; raises ConfigError where something is missing.
 
     Where overrides do not say how many realisations, it is as many as the last run reported, else as the config asks.
@@ -501,7 +500,7 @@ def report(
     return result
 
 
-def load_result(config: Config, *, out: str | os.PathLike[str] = RESULTS, overrides: Sequence[str] = ()) -> Result:
+def load_result(config: Config, *, out: str | os.PathLike[str] = RESULTS, overrides: Sequence[str] = ()) -> "Result":
     """The result of an experiment that was run into `out`, from what is stored there: computes and writes nothing.
 
     config and overrides as for `run`. Raises ConfigError where something is missing, with the command that computes it.
@@ -517,7 +516,7 @@ def load_result(config: Config, *, out: str | os.PathLike[str] = RESULTS, overri
     return from_store(experiment, out, overrides)
 
 
-def from_store(experiment: Experiment, out: str | os.PathLike[str], overrides: Sequence[str]) -> Result:
+def from_store(experiment: Experiment, out: str | os.PathLike[str], overrides: Sequence[str]) -> "Result":
     """The result from stored blocks alone; as many realisations as the last run, where overrides do not say."""
     configs.directory(out)
     asked = experiment
@@ -550,8 +549,10 @@ def lack(name: str, held: Stock, out: str | os.PathLike[str]) -> str:
     return f"{name}: {held.stored:,} of {held.asked:,} realisations are stored in {out}; missing: {missing(held)}"
 
 
-def result_of(experiment: Experiment, simulated: SimulatedCases, facts: dict[str, Any], again: str) -> Result:
+def result_of(experiment: Experiment, simulated: SimulatedCases, facts: dict[str, Any], again: str) -> "Result":
     """The result, `again` the command that repeats it; with what is to be warned of in the config."""
+    from radarsim.app.result import Result
+
     facts["warnings"] += registry.study(experiment.study).warnings(experiment)
     return Result(experiment, finished(simulated), facts | {"command": again})
 
@@ -580,6 +581,8 @@ def finished(simulated: SimulatedCases) -> list[CaseResult]:
 
 def facts_of(simulated: SimulatedCases, threads: int, seconds: float) -> dict[str, Any]:
     """The facts of a run for run.json: stop reason, threads, times, warnings, identities, the precision reached."""
+    from radarsim.app.result import of_other_sources
+
     collected = [c for _, _, c in simulated.cases]
     facts: dict[str, Any] = {
         "stop": "; ".join(simulated.unmet) or "done",
@@ -678,6 +681,7 @@ def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, 
     Each row has the columns of claims.csv and `config`. Raises ConfigError for what does not exist.
     """
     from radarsim.app import readings
+    from radarsim.app import stored as kept
     from radarsim.report.claims.judge import listed, unstored
     from radarsim.report.claims.page import with_classes
 
@@ -689,7 +693,7 @@ def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, 
     asked = load_all([name for name in names if name not in wanted])
     shown = [claim for claim in of if not names or claim in wanted or claim.partition(".")[0] in wanted]
     stems = dict.fromkeys([*(one.stem for one in asked), *(of[claim] for claim in shown)])
-    held = {stem: rows for stem in stems if (rows := stored_claims.stored(Path(out) / stem / "claims.csv")) is not None}
+    held = {stem: rows for stem in stems if (rows := kept.stored(Path(out) / stem / "claims.csv")) is not None}
     rows = []
     for one in asked:
         own = held.get(one.stem) or [row for row in listed(every, {}) if row["config"] == one.stem]
@@ -700,4 +704,4 @@ def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, 
     own = [row for row in listed(every, held) if row["claim"] in shown]
     rows += [row for row in own if (row["claim"], row["config"]) not in known]
     open_ = [(paper.readings, paper.claims) for paper in readings.papers().values()]
-    return with_classes(rows, classes_of(open_, Path(out)))
+    return with_classes(rows, kept.classes_of(open_, Path(out)))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.cli.console import command, field, say, show
 from radarsim.language import term, tr
-from radarsim.report.tables import significant_digits
+from radarsim.report.wording import significant_digits
 
 if TYPE_CHECKING:
     from radarsim.app.compare import Drawn

@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TextIO
 
 from radarsim.language import numeral, plural, term, tr
-from radarsim.report.tables import clock, labelled, printable, unbroken
+from radarsim.report.wording import clock, labelled, printable, unbroken
 
 if TYPE_CHECKING:
     from rich.console import Console

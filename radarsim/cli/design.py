@@ -120,7 +120,7 @@ def solve(
       radarsim solve sonar_clutter sensor.detection_probability --loss nearest --equals 5 --between 0.6 1 \\
           --case "sonar_clutter sensor.false_plots_per_km2=1" -n 2000
     """
-    from radarsim.app import result, run
+    from radarsim.app import documents, run
     from radarsim.app import solve as solving
     from radarsim.cli import answers, console
     from radarsim.errors import TargetUnmet
@@ -139,7 +139,7 @@ def solve(
             told=None if as_json else console.say_aside,
         )
     if as_json:
-        click.echo(result.text(result.answer(answer)))
+        click.echo(documents.text(documents.answer(answer)))
     elif answer.value is not None:
         answers.print_answer(answer)
     if answer.value is None:
@@ -178,14 +178,14 @@ def chart(
       radarsim chart                              the first paper's five radars
       radarsim chart rls2 --set radar.sigma_velocity_mps=5
     """
-    from radarsim.app import compare, result
+    from radarsim.app import compare, documents
     from radarsim.cli import answers, console
 
     with console.Progress("chart", quiet=as_json, what="figures") as progress:
         shown: dict[str, Any] = {"formats": drawing.formats, "width_mm": drawing.width_mm}
         drawn = compare.chart(configs, out, overrides=overrides, progress=progress.update, **shown)
     if as_json:
-        click.echo(result.text(result.drawn(drawn)))
+        click.echo(documents.text(documents.drawn(drawn)))
     else:
         answers.print_drawn(drawn)
 
@@ -231,7 +231,7 @@ def sensitivity(
       radarsim sensitivity rls2 --at 60 --component Vr
       radarsim sensitivity discriminator --of lock -n 2000
     """
-    from radarsim.app import result, run
+    from radarsim.app import documents, run
     from radarsim.app import sensitivity as finding
     from radarsim.cli import answers, console
 
@@ -251,6 +251,6 @@ def sensitivity(
         )
     written = finding.write(found, out, *drawing)
     if as_json:
-        click.echo(result.text(result.sensitivity(found) | {"files": written}))
+        click.echo(documents.text(documents.sensitivity(found) | {"files": written}))
     else:
         answers.print_sensitivity(found, written)

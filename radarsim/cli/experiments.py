@@ -149,7 +149,7 @@ def _compute_each(
 
     Raises DisagreementError at the end for what no chance makes, else TargetUnmet for what was not reached.
     """
-    from radarsim.app import result
+    from radarsim.app import documents
     from radarsim.app import run as simulation
     from radarsim.cli import console, outcomes
 
@@ -169,19 +169,19 @@ def _compute_each(
             continue
         except DisagreementError as error:  # all is written, and the other experiments stand by themselves
             wrong += [line if line.startswith(f"{one.stem}: ") else f"{one.stem}: {line}" for line in error.lines]
-            made.append(result.result(cast("Result", error.result)))
+            made.append(documents.result(cast("Result", error.result)))
             continue
         unmet += [f"{one.stem}: {reason}" for reason in done.unmet]
         if isinstance(done, simulation.Shares):
-            made.append(result.share_record(done))
+            made.append(documents.share_record(done))
             if not (quiet or as_json):
                 outcomes.print_share(done, out)
         else:
-            made.append(result.result(done))
+            made.append(documents.result(done))
             if not (quiet or as_json):
                 outcomes.print_result(done)
     if as_json:
-        click.echo(result.text(made))
+        click.echo(documents.text(made))
     if wrong:
         raise DisagreementError(*wrong)
     if unmet:
@@ -227,8 +227,8 @@ def check(
     """
     _refuse_together(shard, precision, None, None)
     _refuse_of_nothing(of, precision)
+    from radarsim.app import documents
     from radarsim.app import outlook as overview
-    from radarsim.app import result
     from radarsim.app import run as simulation
     from radarsim.cli import console, outcomes
 
@@ -236,11 +236,11 @@ def check(
     for one in simulation.load_all(configs, simulation.merged(overrides, realisations, seed)):
         with console.Progress(one.stem, quiet=as_json, what="cases") as bar:
             outlook = overview.outlook(one, None, precision, bar.update, of, out, shard)
-        made.append(result.outlook(one, outlook))
+        made.append(documents.outlook(one, outlook))
         if not as_json:
             outcomes.print_outlook(one, outlook)
     if as_json:
-        click.echo(result.text(made))
+        click.echo(documents.text(made))
 
 
 @group.main.command()
@@ -301,7 +301,7 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
       radarsim claims --json
       radarsim claims --figure claims.svg
     """
-    from radarsim.app import result
+    from radarsim.app import documents
     from radarsim.app import run as simulation
     from radarsim.cli import verdicts
 
@@ -309,7 +309,7 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
     if figure is not None:
         simulation.draw_claims(rows, figure)
     if as_json:
-        click.echo(result.text(rows))
+        click.echo(documents.text(rows))
     elif markdown:
         from radarsim.report.claims import page
 

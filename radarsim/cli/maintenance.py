@@ -26,14 +26,16 @@ def list_(words: tuple[str, ...], as_json: bool) -> None:
       radarsim list filters
       radarsim list --json | jq -r '.configs[].name'
     """
-    from radarsim.app import result as documents
-    from radarsim.app.stored import inventory, selected
-    from radarsim.cli import outcomes
+    from radarsim.app.configs import inventory, selected
 
     found = selected(inventory(), words)
     if as_json:
+        from radarsim.app import documents
+
         click.echo(documents.text(documents.inventory(found)))
     else:
+        from radarsim.cli import outcomes
+
         outcomes.print_inventory(found)
 
 
@@ -64,7 +66,7 @@ def compile_(configs: tuple[str, ...], as_json: bool) -> None:
       radarsim compile
       radarsim compile sonar_clutter
     """
-    from radarsim.app import result as documents
+    from radarsim.app import documents
     from radarsim.app.doctor import compiled
 
     done = []
@@ -95,8 +97,7 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
     """
     if recompute and result is None:
         raise click.UsageError("--recompute needs a RESULT: a folder such as results/rls2")
-    from radarsim.app import doctor
-    from radarsim.app import result as documents
+    from radarsim.app import doctor, documents
     from radarsim.cli import console, outcomes
 
     if result is None:
@@ -141,8 +142,7 @@ def clean(
       radarsim clean --dry-run
       radarsim clean rls2 --out results
     """
-    from radarsim.app import result as documents
-    from radarsim.app import run, stored
+    from radarsim.app import documents, run, stored
     from radarsim.cli import outcomes
 
     if not configs and (overrides or seed is not None):

@@ -7,20 +7,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.cli.console import counted_cases, field, print_warnings, say, say_aside, show
-from radarsim.cli.verdicts import print_verdicts
 from radarsim.language import few, listed, numeral, plural, term, tr
-from radarsim.report.tables import clock, known, significant_digits
-from radarsim.report.tables import unit as unit_of
+from radarsim.report.wording import clock, known, significant_digits
+from radarsim.report.wording import unit as unit_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from radarsim.app.compare import Compared
+    from radarsim.app.configs import Inventory
     from radarsim.app.doctor import Inspection
     from radarsim.app.outlook import CaseOutlook, Lacking, Need, Outlook
     from radarsim.app.result import Result
     from radarsim.app.run import Shares
-    from radarsim.app.stored import Cleaned, Inventory
+    from radarsim.app.stored import Cleaned
     from radarsim.config.experiment import Experiment
 
 MOST_BEGUN = 4  # cases of which is said what of them is stored
@@ -30,6 +30,8 @@ DROPPED = term("dropped {files} of {cases}, {size:.1f} MB in {folder}")
 
 def print_result(result: "Result") -> None:
     """The answer of a run, σ at the last scan, the verdicts, and where the files are."""
+    from radarsim.cli.verdicts import print_verdicts
+
     written = result.written
     assert written is not None  # the commands write what they print
     for line in written.answer:

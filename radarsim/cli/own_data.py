@@ -225,7 +225,7 @@ def track(
     from radarsim.recorded import advice, follow, page
     from radarsim.recorded import figures as accuracy
     from radarsim.recorded import plots as files
-    from radarsim.report import tables
+    from radarsim.report import wording
     from radarsim.report.files import Writer
 
     (loaded,) = run.load_all([config], overrides)
@@ -259,7 +259,7 @@ def track(
         console.field("figures", f"{figures} ({', '.join(drawn)})")
     if folder:
         page.write(followed, loaded, plots, judged, advised, folder, sources)
-        click.echo(tables.labelled("report", str(Path(folder) / page.NAME)), err=output is None)
+        click.echo(wording.labelled("report", str(Path(folder) / page.NAME)), err=output is None)
     console.print_warnings(run.cache_troubles())
 
 
@@ -289,7 +289,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     from radarsim.app import configs, run
     from radarsim.cli import console, verdicts
     from radarsim.recorded import fit as fitting
-    from radarsim.report import tables
+    from radarsim.report import wording
 
     (loaded,) = run.load_all([config], overrides)
     with console.Counter("fitting", "likelihoods") as counter:
@@ -301,4 +301,4 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     if options["write"]:
         path = Path(options["write"])
         made = configs.new(path.name, loaded.path or config, path.parent, fitting.settings(found))
-        click.echo(tables.labelled("config", str(made)), err=options["as_json"])
+        click.echo(wording.labelled("config", str(made)), err=options["as_json"])

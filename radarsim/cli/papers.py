@@ -25,14 +25,14 @@ def compare(sources: tuple[str, ...], out: str, drawing: group.Drawing, as_json:
       radarsim compare results/rls2 results-before/rls2
     """
     from radarsim.app import compare as comparing
-    from radarsim.app import result
+    from radarsim.app import documents
     from radarsim.cli import outcomes
 
     if len(sources) < 2:
         raise click.UsageError(f"compare takes two results or more, got {len(sources)}")
     compared = comparing.compare(sources, out, formats=drawing.formats, width_mm=drawing.width_mm)
     if as_json:
-        click.echo(result.text(result.fields(compared)))
+        click.echo(documents.text(documents.fields(compared)))
     else:
         outcomes.print_comparison(compared)
 
@@ -90,8 +90,8 @@ def readings(
 
     limit = run.time_limit(time_limit) if time_limit else None
     with run.Signals() as stop:
+        from radarsim.app import documents
         from radarsim.app import readings as app
-        from radarsim.app import result
         from radarsim.app.run import RunOptions
         from radarsim.cli import console, verdicts
 
@@ -110,7 +110,7 @@ def readings(
                 stop=stop,
             )
         if as_json:
-            click.echo(result.text(app.documents(done)))
+            click.echo(documents.text(app.documents(done)))
         elif markdown:
             click.echo(app.pages(done), nl=False)
         elif not quiet:

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any, TextIO
 from radarsim.app import configs
 from radarsim.cli.console import field, say
 from radarsim.language import listed, plural, term, tr
-from radarsim.recorded import figures, fit, page
-from radarsim.recorded.advice import Advice
-from radarsim.recorded.fit import Fit
-from radarsim.recorded.follow import Followed
-from radarsim.report.tables import interval, labelled, printable, significant_digits
+from radarsim.report.wording import interval, labelled, printable, significant_digits
 
 if TYPE_CHECKING:
     from radarsim.app.readings import Done
     from radarsim.app.result import Result
+    from radarsim.recorded.advice import Advice
+    from radarsim.recorded.figures import Judged
+    from radarsim.recorded.fit import Fit
+    from radarsim.recorded.follow import Followed
 
 
 # ---- findings --------------------------------------------------------------------------------------------------------
@@ -27,8 +27,10 @@ def echo(rows: Iterable[Sequence[str]]) -> None:
     csv.writer(sys.stdout, lineterminator="\n").writerows(rows)
 
 
-def report(followed: Followed, judged: Sequence[figures.Judged], advised: Advice | None, stderr: bool = False) -> None:
+def report(followed: "Followed", judged: "Sequence[Judged]", advised: "Advice | None", stderr: bool = False) -> None:
     """Print what was found; to stderr where the track itself goes to stdout. advised: where a likelihood is known."""
+    from radarsim.recorded import page
+
     stream = sys.stderr if stderr else sys.stdout
     for line in page.sentences(followed, judged, advised):
         write(stream, line)
@@ -42,8 +44,10 @@ def write(stream: TextIO, line: str) -> None:
         stream.write(part + "\n")
 
 
-def report_fit(found: Fit) -> None:
+def report_fit(found: "Fit") -> None:
     """Print what was fitted, and the options that put it into the config."""
+    from radarsim.recorded import fit, page
+
     tracks = plural("{count} track", "{count} tracks", found.tracks)
     told = tr("{rows} of {tracks}; filter {filter}", rows=page.counted(found.rows), tracks=tracks, filter=found.filter)
     lines = [labelled("plots", told)]

@@ -31,7 +31,7 @@ from radarsim.errors import ConfigError
 from radarsim.language import tr
 from radarsim.recorded import plots
 from radarsim.recorded.follow import by_track, one_case, recorded_of, refuse_borrowed
-from radarsim.report.tables import significant_digits
+from radarsim.report.wording import significant_digits
 from radarsim.studies import registry
 from radarsim.studies.interface import BIAS, CORRELATION, EXPLANATIONS, OUTLIERS, Likelihood
 

@@ -9,12 +9,12 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from radarsim.config.experiment import Experiment
-from radarsim.language import numeral, plural, term, tr
+from radarsim.language import numeral, plural, power_of_ten, term, tr
 from radarsim.recorded import figures as accuracy
 from radarsim.recorded import fit
 from radarsim.recorded.advice import Advice, Asked, Finding
 from radarsim.recorded.follow import Followed, drawn, put
-from radarsim.report.tables import labelled, number, power_of_ten, significant_digits, unit
+from radarsim.report.wording import labelled, number, significant_digits, unit
 from radarsim.studies.interface import BIAS, CORRELATION, OUTLIERS
 
 # ---- words -----------------------------------------------------------------------------------------------------------

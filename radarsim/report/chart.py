@@ -1,4 +1,4 @@
-"""Words of figures, with the little mathematical text that they use, for a page: marked up, and plain.
+"""Words of figures, with the little mathematical text that they use, marked up for a page.
 
 Colours, dashes and markers of a page's charts, for a light and for a dark page.
 
@@ -17,8 +17,7 @@ references and notes stand at) is kept with them and in attributes.
 """
 
 import math
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,41 +27,10 @@ from numpy.typing import ArrayLike
 
 from radarsim.language import power_of_ten, tr
 from radarsim.report.drawing import GREY, Axis, Bars, Figure, Heat, Line, Mark, Note, Panel, Reference, Style
-from radarsim.report.tables import number
+from radarsim.report.wording import number, spoken, subscripts
 
 # ---- chart text ------------------------------------------------------------------------------------------------------
-LETTERS = {
-    **{"sigma": "σ", "beta": "β", "rho": "ρ", "varphi": "φ", "varepsilon": "ε", "theta": "θ", "lambda": "λ"},
-    **{"Delta": "Δ", "times": "×", "cdot": "·", "mu": "μ", "chi": "χ", "nu": "ν"},
-}
-DOT_ABOVE, HAT_ABOVE = "\u0307", "\u0302"
-PARTS = re.compile(r"\\(dot|hat)\s*(\w)|\\([A-Za-z]+)\s?|([_^])(\{[^}]*\}|\\[A-Za-z]+|.)|([^\W\d_]+)|(.)", re.DOTALL)
 RISE = {"sub": (0.25, 0.75), "sup": (-0.4, 0.75)}  # of the size: how far down, how large
-
-
-def subscripts(text: str) -> Iterator[tuple[str, str]]:
-    """Pieces of a text with their kind: "" upright, "i" a letter of a formula, "sub", "sup"."""
-    pieces = text.replace(r"\$", "\0").split("$")
-    for n, piece in enumerate(pieces):
-        piece = piece.replace("\0", "$")
-        if n % 2 == 0:
-            yield piece, ""
-            continue
-        for accent, under, command, shift, shifted, letters, other in PARTS.findall(piece):
-            if accent:
-                yield under + {"dot": DOT_ABOVE, "hat": HAT_ABOVE}[accent], "i"
-            elif command:
-                yield LETTERS.get(command, command), "i"
-            elif shift:
-                inside = re.sub(r"\\([A-Za-z]+)", lambda m: LETTERS.get(m[1], m[1]), shifted.strip("{}"))
-                yield inside, {"_": "sub", "^": "sup"}[shift]
-            else:
-                yield letters or other, "i" if letters else ""
-
-
-def spoken(text: str) -> str:
-    """The text without marks, in one line: "σ of D_M"."""
-    return " ".join("".join({"sub": "_", "sup": "^"}.get(kind, "") + part for part, kind in subscripts(text)).split())
 
 
 def html(text: str) -> Markup:

@@ -24,7 +24,7 @@ from radarsim.report import seen, tables
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Mark, Panel, Reference, Style
 from radarsim.report.panels import MOST, left_out, letter, line, literal, time_axis, with_unit
 from radarsim.report.statistics import Estimate, difference
-from radarsim.report.tables import UNITS, interval, significant_digits
+from radarsim.report.wording import UNITS, interval, significant_digits
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -34,10 +34,10 @@ from matplotlib.transforms import ScaledTranslation
 
 from radarsim.language import tr
 from radarsim.report import chart
-from radarsim.report.chart import Scale, contrast, heat_scale, spoken, tick_text
+from radarsim.report.chart import Scale, contrast, heat_scale, tick_text
 from radarsim.report.drawing import Axis as Ends
 from radarsim.report.drawing import Bars, Figure, Heat, Line, Note, Panel, Reference, Style
-from radarsim.report.tables import number
+from radarsim.report.wording import number, spoken
 
 # ---- legends ---------------------------------------------------------------------------------------------------------
 LONGEST_AT_END = 28  # letters of a name that may stand at a line's end

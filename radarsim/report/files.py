@@ -13,7 +13,6 @@ import errno
 import hashlib
 import io
 import json
-import math
 import os
 import platform
 import stat
@@ -28,17 +27,12 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING, Any, Self
 
-import numpy as np
-
 from radarsim.config.experiment import Experiment
-from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError, StoreError
 from radarsim.language import numeral, plural, tr
-from radarsim.report import notes, rare, seen
-from radarsim.report.statistics import FEW
 
 if TYPE_CHECKING:
-    import pandas as pd
+    from radarsim.engine.results import CaseResult
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
@@ -257,13 +251,13 @@ class Writer:
 
 
 # ---- provenance ------------------------------------------------------------------------------------------------------
-MOST_SEEDS, MOST_NAMES = 5, 3  # named in a line
+MOST_SEEDS = 5  # named in a line
 PACKAGES = ("radarsim", "numpy", "numba", "llvmlite", "scipy", "pandas", "matplotlib", "pydantic", "pyyaml")
 
 
 def record(
     experiment: Experiment,
-    results: Sequence[CaseResult],
+    results: "Sequence[CaseResult]",
     run: Mapping[str, Any],
     contents: Mapping[str, bytes],
     answer: Sequence[str],
@@ -348,76 +342,6 @@ def _asked(resolved: Any) -> object:
     except (LookupError, TypeError):
         return None
     return json.loads(to_json(cases))
-
-
-def of_intervals(
-    results: Sequence[CaseResult],
-    made: "Mapping[str, pd.DataFrame]",
-    answer: "Callable[[Mapping[str, pd.DataFrame]], Sequence[str]]",
-) -> list[str]:
-    """What a reader of the answer must know of its intervals, a line at most; and whether weights are wrong.
-
-    answer makes its sentences from the tables. How many rows of which table are marked is said where these are shown.
-    """
-    return [*(few(results) or rests(results, made, answer)), *rare.warnings(made.get("rare"))]
-
-
-def few(results: Sequence[CaseResult]) -> list[str]:
-    """A line on the cases whose intervals rest on too few realisations, if any."""
-    rough = {result.name: result.count for result in results if result.count < FEW}
-    if not rough:
-        return []
-    words = tr(
-        "{cases}: intervals of {counts} realisations are rough, use at least {least}",
-        cases=_named(list(rough)),
-        counts=span(list(rough.values())),
-        least=FEW,
-    )
-    return [words]
-
-
-def rests(
-    results: Sequence[CaseResult],
-    made: "Mapping[str, pd.DataFrame]",
-    answer: "Callable[[Mapping[str, pd.DataFrame]], Sequence[str]]",
-) -> list[str]:
-    """A line on the answer's intervals that are too narrow, with the realisations that it takes, if any are."""
-    found = notes.concerned(made, answer).values()
-    if not found:
-        return []
-    count, names = sum(map(len, found)), _named(list(dict.fromkeys(name for rows in found for name in rows["filter"])))
-    needed = np.max(np.concatenate([notes.needed(rows, made, results) for rows in found]))  # not-a-number if one is
-    if np.isfinite(needed):
-        words = plural(
-            "{count} interval of the answer is too narrow, as few realisations decide it ({filters}): -n {needed} "
-            "would do",
-            "{count} intervals of the answer are too narrow, as few realisations decide them ({filters}): -n {needed} "
-            "would do",
-            count,
-            filters=names,
-            needed=roughly(float(needed)),
-        )
-    else:
-        words = plural(
-            "{count} interval of the answer may be too narrow: rare realisations decide it, and few or none were seen "
-            "({filters}); it takes more of them, -n",
-            "{count} intervals of the answer may be too narrow: rare realisations decide them, and few or none were "
-            "seen ({filters}); it takes more of them, -n",
-            count,
-            filters=names,
-        )
-    return [words]
-
-
-def roughly(count: float) -> str:
-    """A number of realisations, rounded up to one digit, as `-n` takes it."""
-    power = 10 ** math.floor(math.log10(max(count, 1.0)))
-    return f"{math.ceil(count / power) * power:.0e}".replace("e+0", "e").replace("e+", "e")
-
-
-def _named(names: Sequence[str]) -> str:
-    """A few names, and how many more; those that hold a comma are quoted."""
-    return seen.named(names, MOST_NAMES)
 
 
 def extent(record: Mapping) -> str:

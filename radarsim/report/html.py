@@ -29,14 +29,14 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.config.fields import Model
 from radarsim.config.load import as_yaml
 from radarsim.language import current, numeral, plural, term, tr
-from radarsim.report import chart, files
+from radarsim.report import chart, files, wording
 from radarsim.report import tables as common
 from radarsim.report.chart import spoken
 from radarsim.report.claims import page as claims_page
 from radarsim.report.claims import rule
 from radarsim.report.claims.judge import LOOKED
 from radarsim.report.drawing import Figure, Line
-from radarsim.report.tables import number
+from radarsim.report.wording import number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -235,7 +235,7 @@ def report_page(
 
 def in_clauses(answer: Sequence[str]) -> list[str]:
     """The sentences of an answer, a long one in its clauses."""
-    parts = [common.clauses(sentence) if len(sentence) > LONG else [sentence] for sentence in answer]
+    parts = [wording.clauses(sentence) if len(sentence) > LONG else [sentence] for sentence in answer]
     return [f"{part};" if part is not own[-1] else part for own in parts for part in own]
 
 
@@ -330,7 +330,7 @@ def cell(value: object) -> str:
     """A number for people, whole ones in full, others at four digits; text as it is, nothing for not-a-number."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return str(value)
-    return numeral(str(value)) if isinstance(value, int) else common.number(value)
+    return numeral(str(value)) if isinstance(value, int) else wording.number(value)
 
 
 @cache
@@ -341,7 +341,7 @@ def _template(name: str) -> "Template":
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     own: dict[str, Callable[..., str]] = {
         "number": cell,
-        "unit": lambda name: tr(common.unit(name)),
+        "unit": lambda name: tr(wording.unit(name)),
         "expected": claims_page.expected,
         "css": _css,
         "kept": kept,
@@ -356,7 +356,7 @@ def _template(name: str) -> "Template":
 
 def kept(words: object) -> str:
     """Text in which numbers stay with their units, and with ± before them."""
-    return common.unbroken(str(words))
+    return wording.unbroken(str(words))
 
 
 def _measured(part: Mapping[str, Any]) -> str:
@@ -420,7 +420,7 @@ def table_in_words(name: str, table: "pd.DataFrame") -> dict[str, Any]:
     if "unit" in table:
         place = list(table.columns).index("unit")
         for row in made["rows"]:
-            row[place] = tr(common.unit(row[place]))
+            row[place] = tr(wording.unit(row[place]))
     return made
 
 

@@ -31,14 +31,15 @@ A row beside which the exact value stands has none: that value is the better one
 measured of marked and of unmarked rows stands in docs/trust.md.
 """
 
+import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language import tr
-from radarsim.report import statistics, tables
+from radarsim.language import plural, tr
+from radarsim.report import files, rare, seen, statistics, tables
 from radarsim.report.statistics import ERROR_OF_PROGRAM, FEW, Z95, Estimate, Values, furthest, standard_errors
 
 if TYPE_CHECKING:
@@ -451,3 +452,77 @@ def _of_curves(rows: "pd.DataFrame", curves: "pd.DataFrame") -> tuple[np.ndarray
     """n and the fewest effective realisations of these rows in curves."""
     own = rows.merge(curves, on=SAME, how="left")
     return own["n"].to_numpy(dtype=float), own["fewest"].to_numpy(dtype=float)
+
+
+# ---- of the answer ---------------------------------------------------------------------------------------------------
+MOST_NAMES = 3  # named in a line
+
+
+def of_intervals(
+    results: Sequence[CaseResult],
+    made: "Mapping[str, pd.DataFrame]",
+    answer: "Callable[[Mapping[str, pd.DataFrame]], Sequence[str]]",
+) -> list[str]:
+    """What a reader of the answer must know of its intervals, a line at most; and whether weights are wrong.
+
+    answer makes its sentences from the tables. How many rows of which table are marked is said where these are shown.
+    """
+    return [*(few(results) or rests(results, made, answer)), *rare.warnings(made.get("rare"))]
+
+
+def few(results: Sequence[CaseResult]) -> list[str]:
+    """A line on the cases whose intervals rest on too few realisations, if any."""
+    rough = {result.name: result.count for result in results if result.count < FEW}
+    if not rough:
+        return []
+    words = tr(
+        "{cases}: intervals of {counts} realisations are rough, use at least {least}",
+        cases=_named(list(rough)),
+        counts=files.span(list(rough.values())),
+        least=FEW,
+    )
+    return [words]
+
+
+def rests(
+    results: Sequence[CaseResult],
+    made: "Mapping[str, pd.DataFrame]",
+    answer: "Callable[[Mapping[str, pd.DataFrame]], Sequence[str]]",
+) -> list[str]:
+    """A line on the answer's intervals that are too narrow, with the realisations that it takes, if any are."""
+    found = concerned(made, answer).values()
+    if not found:
+        return []
+    count, names = sum(map(len, found)), _named(list(dict.fromkeys(name for rows in found for name in rows["filter"])))
+    enough = np.max(np.concatenate([needed(rows, made, results) for rows in found]))  # not-a-number if one is
+    if np.isfinite(enough):
+        words = plural(
+            "{count} interval of the answer is too narrow, as few realisations decide it ({filters}): -n {needed} "
+            "would do",
+            "{count} intervals of the answer are too narrow, as few realisations decide them ({filters}): -n {needed} "
+            "would do",
+            count,
+            filters=names,
+            needed=roughly(float(enough)),
+        )
+    else:
+        words = plural(
+            "{count} interval of the answer may be too narrow: rare realisations decide it, and few or none were seen "
+            "({filters}); it takes more of them, -n",
+            "{count} intervals of the answer may be too narrow: rare realisations decide them, and few or none were "
+            "seen ({filters}); it takes more of them, -n",
+            count,
+            filters=names,
+        )
+    return [words]
+
+
+def roughly(count: float) -> str:
+    """A number of realisations, rounded up to one digit, as `-n` takes it."""
+    power = 10 ** math.floor(math.log10(max(count, 1.0)))
+    return f"{math.ceil(count / power) * power:.0e}".replace("e+0", "e").replace("e+", "e")
+
+
+def _named(names: Sequence[str]) -> str:
+    """A few names, and how many more; those that hold a comma are quoted."""
+    return seen.named(names, MOST_NAMES)

@@ -12,7 +12,7 @@ from radarsim.config.check import label as label_of
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import plural, power_of_ten, term, tr
-from radarsim.report import seen
+from radarsim.report import seen, wording
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.report.statistics import Z95
@@ -62,7 +62,7 @@ def number(value: object, powers: bool = False) -> str:
     A mapping of keys as "key value, key value", numbers of a list one after the other.
     """
     if isinstance(value, list | tuple) and all(isinstance(one, int | float) for one in value):
-        return common.in_a_row(map(number, value))
+        return wording.in_a_row(map(number, value))
     if isinstance(value, Mapping):
         return ", ".join(f"{literal(str(key))} {number(one)}" for key, one in value.items())
     if not isinstance(value, int | float) or isinstance(value, bool):
@@ -74,7 +74,7 @@ def number(value: object, powers: bool = False) -> str:
         and (power >= (2 if powers else LONG) or power < (0 if powers else -1))
     ):
         return power_of_ten(power)
-    return common.number(value)
+    return wording.number(value)
 
 
 def in_short(value: object, among: Sequence[object]) -> object:
@@ -113,7 +113,7 @@ def with_its_unit(result: CaseResult, key: str, value: object) -> str:
     if not isinstance(value, int | float) or isinstance(value, bool):
         return number(value)
     factor, own = in_degrees(key_label(result, key).unit)
-    shown = number(value, is_power(key)) if factor == 1.0 else common.number(factor * value, FEW_DIGITS)
+    shown = number(value, is_power(key)) if factor == 1.0 else wording.number(factor * value, FEW_DIGITS)
     return f"{shown}{own}" if own.startswith("°") else " ".join(filter(None, (shown, own.partition("(")[0])))
 
 
@@ -125,7 +125,7 @@ def key_label(result: CaseResult, key: str) -> Label:
 
 def unit_of(name: str) -> str:
     """A unit as people write it, in the language spoken."""
-    return tr(common.unit(name))
+    return tr(wording.unit(name))
 
 
 def is_power(key: str) -> bool:
@@ -507,7 +507,7 @@ def _shown_value(result: CaseResult, key: str, value: object) -> str:
     """A value of a key without its unit, as its axis has it."""
     factor = axis_factor(result, key)
     turned = factor != 1.0 and isinstance(value, int | float) and not isinstance(value, bool)
-    return common.number(factor * float(str(value)), FEW_DIGITS) if turned else number(value, is_power(key))
+    return wording.number(factor * float(str(value)), FEW_DIGITS) if turned else number(value, is_power(key))
 
 
 def family_panel(title: str, members: Sequence[CaseResult], rows: Mapping, words: str) -> Panel:

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.language import few, listed, plural, term, tr
-from radarsim.report import tables
-from radarsim.report.chart import spoken
+from radarsim.report import wording
 from radarsim.report.drawing import Figure, Heat, Line, Panel
+from radarsim.report.wording import spoken
 
 DIGITS = 3
 MOST_PANELS = 4  # told by their titles; of more it is counted
@@ -293,4 +293,4 @@ def _ending(lines: Sequence[Seen], sign: int, unit: str) -> str:
 
 
 def _valued(value: float, unit: str) -> str:
-    return " ".join(filter(None, (tables.number(float(value), DIGITS), unit)))
+    return " ".join(filter(None, (wording.number(float(value), DIGITS), unit)))

@@ -243,12 +243,12 @@ class OneFile(Study):
 
     def _sentences(self, result: "CaseResult", made: "Mapping[str, pd.DataFrame]") -> Iterator[str]:
         """σ of the leading component at the last scan, and what each filter gains."""
-        from radarsim.report import panels, tables
+        from radarsim.report import panels, tables, wording
 
         leading = self.components[0]
         last = tables.where(made["last"], case=result.name, component=leading.name).to_dict("records")
         keys: tuple[str, ...] = ("last_sigma", "last_lo", "last_hi")
-        each = [f"{row['filter']} {tables.estimate((row[key] for key in keys), tr(row['unit']))}" for row in last]
+        each = [f"{row['filter']} {wording.estimate((row[key] for key in keys), tr(row['unit']))}" for row in last]
         told = {"quantity": self._term(leading.words or leading.name), "t": float(result.axes.t_s[-1])}
         words = tr("σ of the {quantity} after {t:g} s: {filters}.", **told, filters=listed(each))
         yield panels.at_its_place(result, words)
@@ -256,7 +256,7 @@ class OneFile(Study):
         gains = gains[gains["k"] == gains["k"].max()]
         if len(gains):
             keys = ("gain_percent", "gain_lo", "gain_hi")
-            each = [f"{row['filter']} {tables.estimate((row[key] for key in keys), '%', '.3g')}"
+            each = [f"{row['filter']} {wording.estimate((row[key] for key in keys), '%', '.3g')}"
                     for row in gains.to_dict("records")]  # fmt: skip
             told = {"base": result.axes.filters[result.axes.baseline], "filters": listed(each)}
             yield panels.at_its_place(result, tr("Gain against {base} there: {filters}.", **told))

@@ -11,7 +11,7 @@ import pytest
 from radarsim.cli import console, outcomes, verdicts
 from radarsim.report import notes
 from radarsim.report.claims.judge import SAID
-from radarsim.report.tables import significant_digits
+from radarsim.report.wording import significant_digits
 from tests.program import command
 
 

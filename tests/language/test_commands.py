@@ -6,7 +6,7 @@ import re
 import pytest
 from making import messages
 
-from radarsim.app import question, readings, stored
+from radarsim.app import configs, question, readings
 from radarsim.app.compare import chart, described
 from radarsim.app.configs import load
 from radarsim.app.quantities import Asked
@@ -67,7 +67,7 @@ def test_the_chart_table_is_the_same(tmp_path):
 def test_the_list_says_what_things_are_and_leaves_their_names():
     with speaking("ru"):
         ended = command("list")
-    for _, _, rows in stored.inventory():
+    for _, _, rows in configs.inventory():
         for row in rows:
             assert row[0] in ended.stdout
             assert tr(row[-1]) == row[-1]

@@ -10,7 +10,7 @@ from making import messages
 from radarsim import language
 from radarsim.errors import ConfigError
 from radarsim.language import listed, numeral, plural, speaking, term, tr
-from radarsim.report import tables
+from radarsim.report import wording
 from tests.program import command
 
 CODES = [code for code in language.known() if code != language.ENGLISH]
@@ -30,8 +30,8 @@ def test_numbers_are_written_as_the_language_writes_them():
         assert numeral("1.72e-05") == "1,72·10⁻⁵"
         assert tr("a span of {span:.4g} m/s", span=-1.5) == "интервал однозначности −1,5 м/с"
         assert numeral("-1,234.5") == "−1\N{NARROW NO-BREAK SPACE}234,5"
-        assert tables.number(2.5e-7) == "2,5·10⁻⁷"
-        assert tables.estimate((12.3, 12.0, 12.6), "м") == "12,3 м [12; 12,6]"
+        assert wording.number(2.5e-7) == "2,5·10⁻⁷"
+        assert wording.estimate((12.3, 12.0, 12.6), "м") == "12,3 м [12; 12,6]"
         assert tr("{name}: bias", name="1.5") == "1.5: смещение"  # a name of the user's stays as it is
 
 
@@ -146,11 +146,11 @@ def forms(message):
 
 def test_names_with_commas_stay_one_name_in_a_row():
     """`cured, gated` is one filter, not two: in questions, captions and warnings."""
-    from radarsim.report import files, seen
+    from radarsim.report import notes, seen
 
     names = ["sequence", "cured", "cured, gated", "dense"]
     assert language.few(names) == seen.named(names) == "sequence, cured, “cured, gated” and dense"
-    assert files.few([SimpleNamespace(name=one, count=9) for one in names]) == [
+    assert notes.few([SimpleNamespace(name=one, count=9) for one in names]) == [
         "sequence, cured, “cured, gated” and dense: intervals of 9 realisations are rough, use at least 200"
     ]
     assert language.few(["cured, gated"]) == "cured, gated"

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radarsim.report import chart, figures, panels, rare, tables
+from radarsim.report import chart, figures, panels, sweeps, tables
 from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.studies.range_doppler import figures as range_doppler_figures
 from radarsim.studies.range_doppler import tables as range_doppler
@@ -312,7 +312,7 @@ def test_angles_given_in_radians_are_shown_in_degrees():
     result = SimpleNamespace(spec=None, swept=(("target.turn.rate_radps", 0.00873),))
     assert panels.swept(result).endswith("= 0.5°/s")
     assert panels.axis_of(result, "target.turn.rate_radps").endswith(", °/s")
-    x, axis = rare.places(result, "target.turn.rate_radps", [0.0, 0.01745])
+    x, axis = sweeps.places(result, "target.turn.rate_radps", [0.0, 0.01745])
     assert axis.label.endswith(", °/s")
     np.testing.assert_allclose(x, [0, 0.01745 * 180 / np.pi])
     assert panels.in_degrees("rad/s2")[1] == "°/s2"

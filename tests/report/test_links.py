@@ -3,7 +3,7 @@
 import pytest
 
 from radarsim import language
-from radarsim.report import html, tables
+from radarsim.report import html, wording
 
 MADE = ("curves", "gains", "locks", "detections", "consistency")
 
@@ -46,8 +46,8 @@ def test_of_an_answer_so_much_stands_above_its_figure_that_both_are_seen():
 def test_no_interval_of_an_answer_is_cut(code):
     """A decimal comma leaves intervals and rows of numbers a semicolon of their own."""
     with language.speaking(code):
-        value, in_row = tables.estimate((98.74, 97.5, 100.0), "%"), tables.in_a_row(["0.5", "1.5"])
-        one = f"{value} ({in_row}; {tables.interval('1', '2')})"
-        row = tables.in_a_row(map(tables.number, (700.5, 800.5)))
+        value, in_row = wording.estimate((98.74, 97.5, 100.0), "%"), wording.in_a_row(["0.5", "1.5"])
+        one = f"{value} ({in_row}; {wording.interval('1', '2')})"
+        row = wording.in_a_row(map(wording.number, (700.5, 800.5)))
         parts = html.in_clauses(["; ".join([one, row] * 9)])
     assert [part.removesuffix(";") for part in parts] == [one, row] * 9

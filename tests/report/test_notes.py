@@ -12,7 +12,7 @@ from radarsim.app import result as output
 from radarsim.app.configs import CaseWork, load
 from radarsim.config.document import SHIPPED
 from radarsim.engine.results import CaseResult
-from radarsim.report import files, notes
+from radarsim.report import notes
 from radarsim.report.statistics import FEW
 
 
@@ -153,13 +153,13 @@ def test_what_is_said_above_an_answer_is_of_the_intervals_that_it_gives():
     curves.loc[20, "n_eff"] = 30.0
     made = notes.noted({"curves": curves, "gains": pd.DataFrame()}, results)
     assert notes.heavy(made["curves"]).sum() == 13
-    assert not files.of_intervals(results, made, given(0, 59, 80))
-    (line,) = files.of_intervals(results, made, given(0, 14, 80))
+    assert not notes.of_intervals(results, made, given(0, 59, 80))
+    (line,) = notes.of_intervals(results, made, given(0, 14, 80))
     assert line.startswith("1 interval of the answer is too narrow")
     assert "(f): -n 2e4 would do" in line  # 5000 × 100/30
-    (line,) = files.of_intervals(results, made, given(14, 15, 26, 27))
+    (line,) = notes.of_intervals(results, made, given(14, 15, 26, 27))
     assert line.startswith("3 intervals of the answer are too narrow")
-    (line,) = files.of_intervals([SimpleNamespace(name="a", count=FEW - 1)], made, given(14))
+    (line,) = notes.of_intervals([SimpleNamespace(name="a", count=FEW - 1)], made, given(14))
     assert f"{FEW - 1} realisations are rough" in line
 
 
@@ -167,8 +167,8 @@ def test_a_note_that_begins_with_the_name_of_an_interval_is_of_that_one_alone():
     row = {"case": "a", "filter": "f", "n": 5000, "sigma_lo": 0.9, "sigma_hi": 1.1, "gain_lo": 1.0, "gain_hi": 3.0}
     made = {"stages": pd.DataFrame([row | {"note": notes.OF_GAIN + notes.HEAVY}]), "curves": pd.DataFrame()}
     results = [SimpleNamespace(name="a", count=5000)]
-    assert not files.of_intervals(results, made, lambda made: [str(made["stages"]["sigma_hi"][0])])
-    (line,) = files.of_intervals(results, made, lambda made: [str(made["stages"]["gain_hi"][0])])
+    assert not notes.of_intervals(results, made, lambda made: [str(made["stages"]["sigma_hi"][0])])
+    (line,) = notes.of_intervals(results, made, lambda made: [str(made["stages"]["gain_hi"][0])])
     assert "may be too narrow" in line
     assert "(f)" in line
 
@@ -224,4 +224,4 @@ def test_notes_say_what_their_rows_have():
 
 def test_filters_whose_names_hold_a_comma_are_told_apart():
     results = [SimpleNamespace(name=name, count=FEW - 1) for name in ("PDA", "PDA, 4 of 6")]
-    assert files.few(results)[0].startswith("PDA and “PDA, 4 of 6”: ")
+    assert notes.few(results)[0].startswith("PDA and “PDA, 4 of 6”: ")

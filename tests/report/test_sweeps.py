@@ -8,7 +8,7 @@ import pytest
 
 from radarsim.app import result as output
 from radarsim.app import run
-from radarsim.report import chart, figures, panels, rare, tables
+from radarsim.report import chart, figures, panels, sweeps, tables
 from radarsim.report.claims import page
 from radarsim.report.claims.judge import SAID
 from radarsim.report.drawing import Line
@@ -69,7 +69,7 @@ def test_every_study_of_tracks_draws_its_sweeps(config, overrides, name):
 
 
 def test_no_sweep_no_figure(expected_radar):
-    assert rare.figures([expected_radar("rls2")], {}) == {}
+    assert sweeps.figures([expected_radar("rls2")], {}) == {}
 
 
 ROW = {
@@ -169,9 +169,9 @@ def test_lists_and_long_names_at_an_axis_and_in_titles():
     first, second = result.cases[:2]
     key = first.swept[0][0]
     assert panels.swept(first) == "$F_r$ = 1000, 1200 Hz"
-    _, axis = rare.places(first, key, [dict(one.swept)[key] for one in (first, second)])
+    _, axis = sweeps.places(first, key, [dict(one.swept)[key] for one in (first, second)])
     assert [words for _, words in axis.ticks] == ["1000, 1200", "1000, 1200,\n1400"]
-    _, axis = rare.places(first, key, ["aeroballistic_gentle", "weaving"])
+    _, axis = sweeps.places(first, key, ["aeroballistic_gentle", "weaving"])
     assert [words for _, words in axis.ticks] == ["aeroballistic\ngentle", "weaving"]
 
 
@@ -182,7 +182,7 @@ def test_targets_that_are_swept_are_named_by_their_kind_and_what_sets_them_apart
     words = ["fly by, speed mps 280", "fly by, speed mps 100, sigma position m 800", "recorded"]
     assert [panels.number(panels.in_short(one, targets)) for one in targets] == words
     result = run.run("rls2", realisations=8, figures=False, overrides=["scans=4"]).cases[0]
-    x, axis = rare.places(result, "target", targets)
+    x, axis = sweeps.places(result, "target", targets)
     assert x.tolist() == [0, 1, 2]
     assert [" ".join(shown.split()) for _, shown in axis.ticks] == words
     lines = panels.lines_of(

@@ -37,7 +37,7 @@ from radarsim.report.claims.rule import (
     roughly,
 )
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
-from radarsim.report.tables import interval
+from radarsim.report.wording import interval
 
 # ---- curve -----------------------------------------------------------------------------------------------------------
 FURTHEST = 5.0  # margins: what lies further is drawn there

@@ -13,8 +13,7 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.kernels.hypotheses import COLUMNS
 from radarsim.kernels.lanes import WIDTH
 from radarsim.language import term, tr
-from radarsim.report import panels, seen, tables
-from radarsim.report import rare as sweeps
+from radarsim.report import panels, seen, sweeps, tables
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.ambiguous_doppler.kernels import records, sums
 from radarsim.studies.ambiguous_doppler.study import prepare

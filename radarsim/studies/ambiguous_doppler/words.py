@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import listed, numeral, tr
-from radarsim.report import panels, rare, tables
+from radarsim.report import panels, rare, tables, wording
 from radarsim.studies.ambiguous_doppler.tables import Result
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> list
         tr(
             "{filter} {sigma} at scan {k}",
             filter=row["filter"],
-            sigma=tables.estimate((row["sigma"], row["sigma_lo"], row["sigma_hi"]), tr("m")),
+            sigma=wording.estimate((row["sigma"], row["sigma_lo"], row["sigma_hi"]), tr("m")),
             k=row["k"],
         )
         for row in worst.to_dict("records")
@@ -159,5 +159,5 @@ def _as_good(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> s
 
 def _percent(value: float, low: float, high: float) -> str:
     """A percentage at four digits with the ends of its interval at three."""
-    ends = tables.interval(*(numeral(f"{one:.3g}") for one in (low, high)))
+    ends = wording.interval(*(numeral(f"{one:.3g}") for one in (low, high)))
     return f"{numeral(f'{value:.4g}')} % {ends}"

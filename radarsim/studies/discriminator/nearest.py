@@ -32,7 +32,6 @@ from functools import lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy import fft
 
 from radarsim.bursts.burst import Burst, balanced_inverse, sample_times
 from radarsim.bursts.estimators import World, sensitivities
@@ -73,6 +72,8 @@ class Ridge:
 
     def frequencies(self, samples: np.ndarray) -> np.ndarray:
         """Frequency in turns a burst of each stretch: the parabola through the spectrum's peak and its neighbours."""
+        from scipy import fft
+
         windowed = samples[self.stretches] * np.hanning(STRETCH)
         power = np.abs(fft.fft(windowed, PADDED, axis=1)[:, : PADDED // 2 if np.isrealobj(samples) else PADDED]) ** 2
         peak = np.clip(power.argmax(axis=1), 1, power.shape[1] - 2)

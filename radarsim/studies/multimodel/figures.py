@@ -10,7 +10,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
-from radarsim.report import panels, seen, tables
+from radarsim.report import panels, seen, tables, wording
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
 
 if TYPE_CHECKING:
@@ -307,7 +307,7 @@ def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     told = tr(
         "Fewest operations: {cheap} ({count:.0f}); least σ, {stage}: {good} ({sigma} m). ",
         **{"cheap": cheap.label, "count": float(cheap.x[0]), "stage": drawn[-1].title},
-        **{"good": good.label, "sigma": tables.number(float(good.y[0]), 3)},
+        **{"good": good.label, "sigma": wording.number(float(good.y[0]), 3)},
     )
     drawn = _beside(drawn, result, dash=None)
     caption = told + tr(

@@ -6,7 +6,7 @@ from typing import Any
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, numeral, plural, term, tr
-from radarsim.report import panels, tables
+from radarsim.report import panels, tables, wording
 
 
 def question(experiment: Experiment) -> str:
@@ -41,6 +41,6 @@ def _least(result: CaseResult, made: Mapping, component: str, quantity: str) -> 
         value, low, high = (
             numeral(f"{float(f'{best[name]:.3g}'):,.10g}") for name in ("sigma", "sigma_lo", "sigma_hi")
         )
-        ends = tables.interval(low, high)
+        ends = wording.interval(low, high)
         parts.append(f"{tr(str(stage))} {best['filter']}, {value} {panels.unit_of(best['unit'])} {ends}")
     return tr("least σ of {quantity} by stage: {stages}.", quantity=quantity, stages="; ".join(parts))

@@ -8,7 +8,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import term, tr
-from radarsim.report import panels, rare, seen, tables
+from radarsim.report import panels, seen, sweeps, tables
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.report.statistics import FEW_EVENTS
 from radarsim.studies.pulses_to_tracks.kernels.records import AGES
@@ -65,8 +65,8 @@ def _title(result: Result) -> str:
 def threshold_figure(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> dict[str, Figure]:
     """Share of bursts that locked, and σ of range at the last scan, against one swept number, for each config."""
     drawn: list[Panel] = []
-    for (_, keys), members in rare.families(results).items():
-        x, axis = rare.places(members[0], keys[0], [dict(result.swept)[keys[0]] for result in members])
+    for (_, keys), members in sweeps.families(results).items():
+        x, axis = sweeps.places(members[0], keys[0], [dict(result.swept)[keys[0]] for result in members])
         if len(keys) == 1 and not axis.ticks:
             drawn += _threshold_panels([members[i] for i in np.argsort(x)], np.sort(x), axis, made)
     if not any(panel.marks for panel in drawn):
@@ -89,7 +89,7 @@ def _threshold_panels(
     curves = tables.groups(made["curves"], "case", "filter", "component")
     for n, name in enumerate(members[0].axes.filters):
         style, words = panels.look(n, 0, 1), panels.literal(name)
-        found = np.array([rare.last(result, name, "r", curves) for result in members])
+        found = np.array([sweeps.last(result, name, "r", curves) for result in members])
         exact = found[:, 3] if np.isfinite(found[:, 3]).any() else None
         sigmas.append(Line(x, found[:, 0], words, style, found[:, 1], found[:, 2], exact))
         if members[0].axes.ideal[n] >= 0:

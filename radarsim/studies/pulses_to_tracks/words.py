@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import listed, tr
-from radarsim.report import panels, tables
+from radarsim.report import panels, tables, wording
 from radarsim.studies.pulses_to_tracks.tables import Result
 
 if TYPE_CHECKING:
@@ -74,14 +74,14 @@ def _filter(result: Result, made: "Mapping[str, pd.DataFrame]", name: str) -> st
     worst = locks.iloc[int(locks["lock_rate"].to_numpy().argmin())]
     locked = tr(
         "at least {share} of the bursts of a scan lock",
-        share=tables.estimate((100 * worst[key] for key in ("lock_rate", "lock_lo", "lock_hi")), "%"),
+        share=wording.estimate((100 * worst[key] for key in ("lock_rate", "lock_lo", "lock_hi")), "%"),
     )
     last = ideal[ideal["component"] == "r"].iloc[-1]
     keys = ("over_ideal", "over_ideal_lo", "over_ideal_hi")
     if last["over_ideal_hi"] <= ALIKE:
-        ratio = tables.estimate((last[key] for key in keys), form=".4g")
+        ratio = wording.estimate((last[key] for key in keys), form=".4g")
         words = tr("σ of the range at the last scan is that of its idealisation, {ratio} times", ratio=ratio)
     else:
-        ratio = tables.estimate((last[key] for key in keys), form=".3g")
+        ratio = wording.estimate((last[key] for key in keys), form=".3g")
         words = tr("σ of the range at the last scan is {ratio} times its idealisation's", ratio=ratio)
     return f"{locked}; {words}"

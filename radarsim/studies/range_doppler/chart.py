@@ -13,7 +13,7 @@ from radarsim.config.experiment import Case
 from radarsim.language import listed, numeral, term, tr
 from radarsim.report import html, panels, tables
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Chart, Figure, Line, Mark, Note, Panel, Reference, Style
-from radarsim.report.tables import in_a_row, significant_digits
+from radarsim.report.wording import in_a_row, significant_digits
 from radarsim.studies.range_doppler import filters
 from radarsim.studies.range_doppler.filters import Plots
 from radarsim.studies.range_doppler.study import COMPONENTS, RangeDopplerAxes, prepare

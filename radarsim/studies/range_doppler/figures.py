@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import term, tr
-from radarsim.report import panels, seen, tables
+from radarsim.report import panels, seen, tables, wording
 from radarsim.report.chart import spoken
 from radarsim.report.drawing import GREY, Axis, Figure, Line, Note, Panel, Reference, Style
 from radarsim.studies.range_doppler.tables import PERIODS, Result
@@ -111,7 +111,7 @@ def _best_settled(drawn: Sequence[Panel]) -> str:
     name = ", ".join(filter(None, (panel.title, star.name)))
     return tr(
         "Least steady σ within {periods} scan periods: {sigma} m ({name}). ",
-        **{"periods": PERIODS, "sigma": tables.number(float(star.y[0]), 3), "name": spoken(name)},
+        **{"periods": PERIODS, "sigma": wording.number(float(star.y[0]), 3), "name": spoken(name)},
     )
 
 

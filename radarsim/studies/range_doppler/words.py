@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import listed, numeral, plural, term, tr
-from radarsim.report import panels, tables
+from radarsim.report import panels, tables, wording
 from radarsim.studies.range_doppler import tuning
 from radarsim.studies.range_doppler.config import Best
 from radarsim.studies.range_doppler.tables import PERIODS, Result, follows_the_model, span_mps
@@ -352,7 +352,7 @@ def _worst(rows: "pd.DataFrame") -> str:
     )
     return tr(
         "worst σ of the range {sigma} at {t_s:g} s, largest bias {bias:.4g} m at {bias_t_s:g} s",
-        sigma=tables.estimate((worst[key] for key in SIGMA), tr("m")),
+        sigma=wording.estimate((worst[key] for key in SIGMA), tr("m")),
         t_s=worst["t_s"],
         bias=bias["bias"],
         bias_t_s=bias["t_s"],
@@ -376,7 +376,7 @@ def _gain(row: "pd.Series[Any]") -> str:
     if row["gain_lo"] <= 0 <= row["gain_hi"]:
         return tr("neither lower nor higher for certain (gain {gain})", gain=_percent(value, lo, hi))
     if value < -MANIFOLD:
-        factor = tables.estimate((1 - value / 100, 1 - hi / 100, 1 - lo / 100), form=".3g")
+        factor = wording.estimate((1 - value / 100, 1 - hi / 100, 1 - lo / 100), form=".3g")
         return tr("higher by a factor of {factor}", factor=factor)
     if value < 0:
         return tr("{percent} higher", percent=_percent(0.0 - value, 0.0 - hi, 0.0 - lo))
@@ -384,7 +384,7 @@ def _gain(row: "pd.Series[Any]") -> str:
 
 
 def _percent(value: float, low: float, high: float) -> str:
-    return tables.estimate((value, low, high), "%", ".1f")
+    return wording.estimate((value, low, high), "%", ".1f")
 
 
 def _who(row: "pd.Series[Any]", labels: dict[str, str], several: bool) -> str:
@@ -400,5 +400,5 @@ def _sigma_sentence(result: Result, curves: "pd.DataFrame") -> str:
         case=panels.plain_label(result),
         filter=row["filter"],
         t_s=row["t_s"],
-        sigma=tables.estimate((row[key] for key in SIGMA), tr("m")),
+        sigma=wording.estimate((row[key] for key in SIGMA), tr("m")),
     )

@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, tr
-from radarsim.report import panels, rare, tables
+from radarsim.report import panels, rare, tables, wording
 from radarsim.studies.sonar.clutter.config import Keys
 from radarsim.studies.sonar.clutter.filters import ClutterAxes
 from radarsim.studies.sonar.clutter.tables import ENDED, FALSE
@@ -43,7 +43,7 @@ def answer(results: Sequence[CaseResult[ClutterAxes]], made: "Mapping[str, pd.Da
 def _of_tracker(row: "pd.Series") -> str:
     said = {
         "filter": row["filter"],
-        "confirmed": tables.estimate((100 * row[key] for key in ("confirmed", "confirmed_lo", "confirmed_hi")), "%"),
+        "confirmed": wording.estimate((100 * row[key] for key in ("confirmed", "confirmed_lo", "confirmed_hi")), "%"),
         "time": _bounded(row, "time_to_confirm_s", "time", tr("s")),
         "rate": _bounded(row, "false_tracks_per_hour", "false"),
         "life": _bounded(row, "life_s", "life", tr("s")) if np.isfinite(row["life_s"]) else "",
@@ -60,7 +60,7 @@ def _of_tracker(row: "pd.Series") -> str:
 def _bounded(row: "pd.Series", name: str, stem: str, unit: str = "") -> str:
     """The value of a column with its interval, to three digits."""
     value, low, high = (numeral(f"{float(f'{row[key]:.3g}'):,.10g}") for key in (name, f"{stem}_lo", f"{stem}_hi"))
-    return f"{' '.join(filter(None, (value, unit)))} {tables.interval(low, high)}"
+    return f"{' '.join(filter(None, (value, unit)))} {wording.interval(low, high)}"
 
 
 def _by_importance(rows: "pd.DataFrame") -> str:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import term, tr
-from radarsim.report import panels, tables
+from radarsim.report import panels, tables, wording
 from radarsim.studies.sonar.manoeuvre.config import Keys
 from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes
 from radarsim.studies.sonar.manoeuvre.figures import USUAL, every_scan, last_of, usual
@@ -40,7 +40,7 @@ def _detected(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame") -> 
     if not ranked:
         return ""
     ends = [
-        f"{row['filter']} {tables.estimate((row[key] for key in ('probability', 'lo', 'hi')), form='.3g')}"
+        f"{row['filter']} {wording.estimate((row[key] for key in ('probability', 'lo', 'hi')), form='.3g')}"
         for row in ranked[:: len(ranked) - 1 or 1]
     ]
     if len(ends) == 1:
@@ -70,7 +70,7 @@ def _first_order(made: "Mapping[str, pd.DataFrame]") -> list[str]:
     rows = rows[rows["k"] == rows["k"].max()]
     ratios = []
     for row in rows.itertuples():
-        ratio = f"{tr(USES[row.component])} {tables.estimate((row.ratio, row.ratio_lo, row.ratio_hi), form='.3f')}"
+        ratio = f"{tr(USES[row.component])} {wording.estimate((row.ratio, row.ratio_lo, row.ratio_hi), form='.3f')}"
         ratios.append(tr("{ratio} (near zero)", ratio=ratio) if row.first_order == NEAR else ratio)
     return [
         tr(

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, tr
-from radarsim.report import panels, tables
+from radarsim.report import panels, tables, wording
 from radarsim.studies.sonar.config import Keys, correlation_of
 from radarsim.studies.sonar.figures import QUANTITIES
 from radarsim.studies.sonar.world import SonarAxes
@@ -57,7 +57,7 @@ def _with(row: "pd.Series") -> str:
     return " ".join(
         (
             row["filter"],
-            tables.estimate((row[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(row["unit"])),
+            wording.estimate((row[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(row["unit"])),
         )
     )
 
@@ -76,7 +76,7 @@ def _most_optimistic(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[st
         tr(
             "Most optimistic: {filter}, whose true σ is {ratio} times the one it believes ({quantity}, scan {k}).",
             filter=f"{worst['filter']} ({swept})" if swept else str(worst["filter"]),
-            ratio=tables.estimate((worst[key] for key in ("ratio", "ratio_lo", "ratio_hi")), form=".2f"),
+            ratio=wording.estimate((worst[key] for key in ("ratio", "ratio_lo", "ratio_hi")), form=".2f"),
             quantity=QUANTITIES[worst["component"]].name,
             k=worst["k"],
         )

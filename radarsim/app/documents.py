@@ -1,0 +1,97 @@
+"""What the commands print with --json: plain data, one document a command, with the content of their text output."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    from radarsim.app.compare import Drawn
+    from radarsim.app.configs import Inventory
+    from radarsim.app.outlook import Outlook
+    from radarsim.app.question import Answer
+    from radarsim.app.result import Result
+    from radarsim.app.run import Shares
+    from radarsim.config.experiment import Experiment
+
+
+def text(document: object) -> str:
+    """A document as JSON; what is not a number, or not finite, is null."""
+    return json.dumps(_plain(document), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "item"):  # NumPy's numbers
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def fields(one: "DataclassInstance") -> dict[str, Any]:
+    """A dataclass as it is, paths as text."""
+    return {key: str(value) if isinstance(value, Path) else value for key, value in asdict(one).items()}
+
+
+def result(one: "Result") -> dict[str, Any]:
+    """A finished run or report: what was asked and done, the answer, σ at the last scan, verdicts, files."""
+    written = one.written
+    assert written is not None  # the commands write what they print
+    names = {case.name: case.count for case in one.cases}
+    return {
+        "config": one.experiment.stem,
+        "stop": one.facts["stop"],
+        "unmet": one.unmet,
+        "cases": {
+            case.name: {"asked": case.realisations, "done": names.get(case.name, 0), "seed": case.seed}
+            for case in one.experiment.cases
+        },
+        "precision": one.facts.get("precision"),
+        "answer": list(written.answer),
+        "last_scan": one.last_scan.to_dict("records"),
+        "claims": one.verdicts(),
+        "claims_as_shipped": one.verdicts("as_shipped"),
+        "folder": str(written.folder),
+        "files": list(written.files),
+        "warnings": one.warnings,
+    }
+
+
+def share_record(done: "Shares") -> dict[str, Any]:
+    """What a share came to, in realisations, by case."""
+    return {**asdict(done), "unmet": done.unmet, "warnings": done.warnings}
+
+
+def outlook(experiment: "Experiment", one: "Outlook") -> dict[str, Any]:
+    """What a run would take."""
+    return {"config": experiment.stem, "path": experiment.path, **asdict(one), "of": one.of.name}
+
+
+def answer(one: "Answer") -> dict[str, Any]:
+    """What was solved for: the value with its interval, or the limit where it is not attainable."""
+    return {**asdict(one), "quantity": one.quantity.words}
+
+
+def sensitivity(one: "DataclassInstance") -> dict[str, Any]:
+    """What each key changes, the quantities by name."""
+    made = fields(one)
+    return made | {"of": [of["name"] for of in made["of"]]}
+
+
+def drawn(one: "Drawn") -> dict[str, Any]:
+    """A chart: the sentences, the rows of chart.csv, and the files."""
+    return {"folder": str(one.folder), "sentences": one.sentences, "cases": one.rows, "files": one.files}
+
+
+def inventory(tables: "Inventory") -> dict[str, list[dict[str, str]]]:
+    """Configs, scenarios, studies and filters: lists of rows by the first word of their title."""
+    return {
+        title.split()[0].lower(): [dict(zip(columns, row, strict=True)) for row in rows]
+        for title, columns, rows in tables
+    }

@@ -1,0 +1,169 @@
+"""Numbers, units and counts as they stand in sentences, and text that is safe to print. Loads no NumPy.
+
+Words of figures have a little mathematical text, `$\\sigma$ of $D_M$`; here it is read, and written plain.
+"""
+
+import math
+import re
+from collections.abc import Iterable, Iterator
+
+from radarsim.language import numeral, power_of_ten, term, tr
+
+UNITS = {
+    "m/s2": "m/s²",
+    "rad/s2": "rad/s²",
+    "°/s2": "°/s²",
+    "m/s3": "m/s³",
+    "hz": "Hz",
+}  # of tables, as people write them
+SAID = (  # units that a language may write otherwise
+    *(term("m"), term("s"), term("m/s"), term("m/s²"), term("rad"), term("rad/s"), term("rad/s²")),
+    *(term("Hz"), term("Hz/s"), term("Hz/s²"), term("Hz/s³"), term("Hz/s⁴"), term("km"), term("°/s"), term("°/s²")),
+)
+NBSP = "\N{NO-BREAK SPACE}"
+KEPT = re.compile(  # the space between a number and its unit, in any language spoken here; and around ±
+    r"(?<=\d) (?=(?:%|°|k?m|к?м|m?s|м?с|[kM]?Hz|[кМ]?Гц|dB|дБ|rad|рад)(?:[/²³]\S*)?(?:\W|$))"
+    r"|(?<=\S) (?=± )|(?<=±) (?=\d)"
+)
+SPACES = "\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}"  # which a language may put into numbers
+PLAIN = 6  # digits before the point that are still written out
+
+
+LABELS = (  # of lines
+    *(term("claims"), term("tables"), term("figures"), term("report"), term("removed"), term("note"), term("table")),
+    *(term("page"), term("total"), term("share"), term("blocks"), term("attains"), term("slope"), term("also at")),
+    *(term("check"), term("config"), term("package"), term("plots"), term("track"), term("tracks"), term("passed")),
+    *(term("missing"), term("no rows"), term("gaps"), term("best"), term("advice")),
+    *(term("no effect"), term("no estimate"), term("not paired"), term("left out"), term("files")),
+)
+LONG = 8  # letters of an English label from which it does not set the width of all
+
+
+def labelled(label: str, text: str) -> str:
+    """A line under a label; without one it stands under the line before."""
+    said, width = tr(label), max(len(tr(one)) for one in LABELS if len(one) < LONG) + 2
+    return f"{said:<{width}}{text}" if len(said) <= width - 2 else f"{said}  {text}"
+
+
+def clock(seconds: float) -> str:
+    """Seconds as h:mm:ss."""
+    whole = round(seconds)
+    return f"{whole // 3600}:{whole // 60 % 60:02}:{whole % 60:02}"
+
+
+def plural(count: int, noun: str) -> str:
+    """1 case, 2 cases."""
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number for people at so many digits: 25600, 0.00012, 1.2·10⁻⁷, ∞; nothing for not-a-number.
+
+    >>> [number(one) for one in (25600.0, 1e10, 2.56e7, -0.00005, 0.25)]
+    ['25600', '10¹⁰', '2.56·10⁷', '−5·10⁻⁵', '0.25']
+    """
+    if math.isnan(value):
+        return ""
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    if value == 0 or -4 <= int(exponent) < PLAIN:
+        return numeral(f"{float(f'{value:.{digits}g}') + 0.0:.10g}")
+    short = f"{float(mantissa):g}"
+    raised = power_of_ten(int(exponent))
+    return raised if short == "1" else f"−{raised}" if short == "-1" else f"{numeral(short)}·{raised}"
+
+
+def interval(low: str, high: str) -> str:
+    """The ends of an interval in brackets, parted by what the language puts between decimal numbers."""
+    return tr("[{low}, {high}]", low=low, high=high)
+
+
+def estimate(values: Iterable[float], unit: str = "", form: str = ".4g") -> str:
+    """A value with its unit and its 95 % interval, from the value and the two ends: 12.3 m [12, 12.6]."""
+    said, lo, hi = (numeral(format(one, form)) for one in values)
+    return f"{' '.join(filter(None, (said, unit)))} {interval(lo, hi)}"
+
+
+def unit(name: str) -> str:
+    """A unit of a table as people write it: m/s² of m/s2."""
+    return UNITS.get(name, name)
+
+
+def unbroken(words: str) -> str:
+    """Text in which a unit stays with its number, and a number with a ± before it.
+
+    >>> unbroken("at 60 s: 12 % ± 3 m/s").replace(NBSP, "_")
+    'at 60_s: 12_%_±_3_m/s'
+    """
+    return KEPT.sub(NBSP, words)
+
+
+def printable(text: str) -> str:
+    """Text without control characters: what a config names must not steer the terminal."""
+    return "".join(c if c.isprintable() or c in SPACES else "�" for c in text)
+
+
+def in_a_row(numbers: Iterable[str]) -> str:
+    """Numbers one after the other, parted by semicolons where the language writes a decimal comma."""
+    return (", " if numeral("0.5") == "0.5" else f";{NBSP}").join(numbers)
+
+
+def clauses(sentence: str) -> list[str]:
+    """A sentence's parts between semicolons; one within brackets or between numbers (`in_a_row`) parts nothing.
+
+    >>> clauses("locked in 12 % [11; 13] (of 5; 6 lost); lost in 88 %")
+    ['locked in 12 % [11; 13] (of 5; 6 lost)', 'lost in 88 %']
+    """
+    found: list[str] = []
+    for part in sentence.split("; "):
+        if found and any(found[-1].count(begin) > found[-1].count(end) for begin, end in ("[]", "()")):
+            found[-1] += f"; {part}"
+        else:
+            found.append(part)
+    return found
+
+
+def significant_digits(value: float, form: str = "#.4g") -> str:
+    """A number in a form, of four figures, as sentences have it: no point at its end, no zero below zero, a minus."""
+    text = format(value, form).removesuffix(".")
+    return numeral(text if float(text) else text.removeprefix("-"))
+
+
+def known(value: float, form: str = "#.4g", after: str = "") -> str:
+    """`figures` of a number and what follows it, or nothing for not-a-number."""
+    return significant_digits(value, form) + after if value == value else ""
+
+
+# ---- mathematical text -----------------------------------------------------------------------------------------------
+LETTERS = {
+    **{"sigma": "σ", "beta": "β", "rho": "ρ", "varphi": "φ", "varepsilon": "ε", "theta": "θ", "lambda": "λ"},
+    **{"Delta": "Δ", "times": "×", "cdot": "·", "mu": "μ", "chi": "χ", "nu": "ν"},
+}
+DOT_ABOVE, HAT_ABOVE = "\u0307", "\u0302"
+PARTS = re.compile(r"\\(dot|hat)\s*(\w)|\\([A-Za-z]+)\s?|([_^])(\{[^}]*\}|\\[A-Za-z]+|.)|([^\W\d_]+)|(.)", re.DOTALL)
+
+
+def subscripts(text: str) -> Iterator[tuple[str, str]]:
+    """Pieces of a text with their kind: "" upright, "i" a letter of a formula, "sub", "sup"."""
+    pieces = text.replace(r"\$", "\0").split("$")
+    for n, piece in enumerate(pieces):
+        piece = piece.replace("\0", "$")
+        if n % 2 == 0:
+            yield piece, ""
+            continue
+        for accent, under, command, shift, shifted, letters, other in PARTS.findall(piece):
+            if accent:
+                yield under + {"dot": DOT_ABOVE, "hat": HAT_ABOVE}[accent], "i"
+            elif command:
+                yield LETTERS.get(command, command), "i"
+            elif shift:
+                inside = re.sub(r"\\([A-Za-z]+)", lambda m: LETTERS.get(m[1], m[1]), shifted.strip("{}"))
+                yield inside, {"_": "sub", "^": "sup"}[shift]
+            else:
+                yield letters or other, "i" if letters else ""
+
+
+def spoken(text: str) -> str:
+    """The text without marks, in one line: "σ of D_M"."""
+    return " ".join("".join({"sub": "_", "sup": "^"}.get(kind, "") + part for part, kind in subscripts(text)).split())
