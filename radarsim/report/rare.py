@@ -5,7 +5,7 @@ laws: the mean of w over those with the event is its probability, whatever the l
 drawn from the law itself, so that no weight is over one divided by it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np

@@ -154,17 +154,21 @@ def test_sampled_it_has_limits_and_keys_without_effect():
 
 
 def covered(seeds, realisations, quantity, equals, overrides=(), **given):
-    """How many 95 % intervals of seeds 0, 1, … hold the exact root, lie under it, and over it."""
+    """How many 95 % intervals of seeds 0, 1, … hold the exact root, lie under it, and over it; and how many samples
+    have large errors that leave every value of the key possible, so that `solve` answers nothing."""
     key = "radar.sigma_velocity_mps"
     exact = solve("rls2", key, quantity, equals, overrides=overrides, **given)
     assert exact.exact
     assert not exact.others
-    counts = np.zeros(3, dtype=int)
+    counts = np.zeros(4, dtype=int)
     for seed in range(seeds):
         seeded = [*overrides, f"seed={seed}"]
         found = solve("rls2", key, quantity, equals, overrides=seeded, sampled=True, realisations=realisations, **given)
-        assert found.lo is not None, f"seed {seed}: no answer"
-        counts += (found.lo <= exact.value <= found.hi, found.hi < exact.value, found.lo > exact.value)
+        if found.lo is None:
+            assert found.value is None, f"seed {seed}: a value without an interval"
+            counts[3] += 1
+        else:
+            counts[:3] += (found.lo <= exact.value <= found.hi, found.hi < exact.value, found.lo > exact.value)
     return counts
 
 
@@ -178,10 +182,15 @@ KNOWN = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", KNOWN)
 def test_the_interval_covers_a_known_root(name):
-    """Of 200 seeds the 95 % interval holds the exact root in as many as a binomial number of 0.95 allows (4 σ)."""
+    """Of 200 seeds the 95 % interval holds the exact root in as many as a binomial number of 0.95 allows (4 σ).
+
+    Where plots are missed a rare error may leave nothing to say, in one seed of a hundred.
+    """
     quantity, equals, overrides = KNOWN[name]
     seeds = 200
-    inside, under, over = covered(seeds, 1000, quantity, equals, overrides, between=(4, 40))
+    inside, under, over, silent = covered(seeds, 1000, quantity, equals, overrides, between=(4, 40))
+    assert silent <= (0 if name == "every plot" else seeds // 100)
+    seeds -= silent
     assert abs(inside - 0.95 * seeds) <= 4 * math.sqrt(seeds * 0.95 * 0.05), (under, over)
 
 

@@ -49,7 +49,7 @@ const radar = (() => {
     return { one, two, gain };
   }
 
-  // ---- the closed form (radarsim/studies/range_doppler/steady.py) ----
+  // ---- the closed form (radarsim/studies/range_doppler/filters.py) ----
   function variances(c) {
     let A = 2 + Math.SQRT2 * c ** 0.25;
     for (let n = 0; n < 60; n++) A -= (A ** 4 - 8 * A - 4 * c) / (4 * A ** 3 - 8);
