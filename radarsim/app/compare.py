@@ -151,6 +151,8 @@ def _sides(run: Run) -> list[Side]:
     made = []
     for name, counts in run.record["cases"].items():
         own = {key: rows[rows["case"] == name] for key, rows in tables.items()}
+        if len(gains := own.get("gains", ())):  # of several baselines the first
+            own["gains"] = gains[gains["baseline"] == gains["baseline"].iloc[0]]
         if len(own.get("curves", ())):
             made.append(Side(run.label, name, name, _noise(run, name), int(counts["done"]), own))
     return made

@@ -11,7 +11,7 @@ import math
 import operator
 import os
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -241,6 +241,11 @@ class CaseWork:
         return study(self.case.study).prepare(self.case)
 
     @cached_property
+    def plans(self) -> tuple[Plan, ...]:
+        """The plan, and that of each further baseline; their sums lie one after the other."""
+        return (self.plan, *(study(self.case.study).prepare(one) for one in self.case.companions))
+
+    @cached_property
     def identity(self) -> str:
         """See `radarsim.studies.identity`."""
         from radarsim.studies.identity import identity
@@ -255,11 +260,18 @@ class CaseWork:
     @property
     def size(self) -> int:
         """Length of the vector of sums."""
-        return self.plan.layout.size
+        return sum(plan.layout.size for plan in self.plans)
 
     def simulate(self, first: int, count: int) -> "np.ndarray":
         """Sums (size,) over realisations first … first + count - 1."""
-        return study(self.case.study).simulate(self.plan, first, count)
+        made = [study(self.case.study).simulate(plan, first, count) for plan in self.plans]
+        return made[0] if len(made) == 1 else np.concatenate(made)
+
+    def unpacked(self, values: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
+        """The named sums of each plan, of all sums (size,)."""
+        for plan in self.plans:
+            yield plan.layout.unpack(values)
+            values = values[plan.layout.size :]
 
     def explain(self, first: int, count: int) -> list[str]:
         """Where the sums of these realisations are not finite, one line a filter, scan and number of realisations."""

@@ -259,6 +259,7 @@ class Curve:
         return quantities.sampled(self.quantity, result)
 
     def _result(self, case: Case, realisations: int) -> CaseResult:
+        case = replace(case, against=())  # a question is of gains against the first
         work = CaseWork(case)
         return case_result(case, work, collect(work, realisations, threads=self.threads))
 

@@ -7,7 +7,7 @@ From finished cases to files: tables, figures, claims, run.json and report.html 
 
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property, partial
@@ -28,6 +28,7 @@ from radarsim.report.claims import page
 from radarsim.report.claims.page import OVER, with_classes
 from radarsim.report.drawing import Figure
 from radarsim.report.wording import spoken
+from radarsim.studies.interface import Study
 from radarsim.studies.registry import study
 
 if TYPE_CHECKING:
@@ -130,7 +131,7 @@ class Result:
         >>> radarsim.run("rls2", realisations=2000).answer[0].split(":")[0]
         'Range'
         """
-        return tuple(study(self.experiment.study).answer(self.cases, self._tables))
+        return answered(self.cases, self._tables)
 
     @property
     def tables(self) -> dict:
@@ -174,7 +175,12 @@ class Result:
         """
         keys = ["case", "filter", "component"]
         last = self.curves.groupby(keys, sort=False).tail(1)
-        gains = self.gains.groupby(keys, sort=False).tail(1).rename(columns={"note": "gain_note"})
+        gains = (
+            common.against_own(self.gains, self.cases)
+            .groupby(keys, sort=False)
+            .tail(1)
+            .rename(columns={"note": "gain_note"})
+        )
         return last.merge(gains, on=[*keys, "k", "t_s"], how="left")
 
     @cached_property
@@ -279,7 +285,7 @@ class Result:
 
     @cached_property
     def _of_intervals(self) -> list[str]:
-        return notes.of_intervals(self.cases, self._tables, partial(study(self.experiment.study).answer, self.cases))
+        return notes.of_intervals(self.cases, self._tables, partial(answered, self.cases))
 
 
 # ---- output ----------------------------------------------------------------------------------------------------------
@@ -311,7 +317,62 @@ def measured(results: Sequence[CaseResult]) -> dict:
     """The tables of what was measured alone: curves, gains, and the study's own."""
     own = study(results[0].study).tables(results)
     shared = {"curves": common.curves, "gains": common.gains}
-    return {name: own[name] if name in own else table(results) for name, table in shared.items()} | own
+    made = {name: own[name] if name in own else table(results) for name, table in shared.items()} | own
+    if any(result.against for result in results):
+        made["gains"] = _against_all(results, lambda one: measured([one])["gains"])
+    return made
+
+
+def gains_of(own: Study) -> "Callable[[Sequence[CaseResult]], pd.DataFrame]":
+    """The gains of a study's results alone, against all their baselines."""
+
+    def made(results: Sequence[CaseResult]) -> "pd.DataFrame":
+        several = any(result.against for result in results)
+        return _against_all(results, lambda one: own.gains([one])) if several else own.gains(results)
+
+    return made
+
+
+def _against_all(results: Sequence[CaseResult], gains: "Callable[[CaseResult], pd.DataFrame]") -> "pd.DataFrame":
+    """The gains of each case against its first baseline, then against the others."""
+    every = [replace(one, against=()) for result in results for one in (result, *result.against)]
+    return common.below([gains(one) for one in every])
+
+
+def against_first(made: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]) -> Mapping[str, "pd.DataFrame"]:
+    """The tables with gains against the first baseline of each case alone."""
+    if not any(result.against for result in results):
+        return made
+    return {**made, "gains": common.against_own(made["gains"], results)}
+
+
+MOST_FURTHER = 6  # sentences on further baselines
+
+
+def answered(results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"]) -> tuple[str, ...]:
+    """The answer of an experiment: the study's, and the gains at the last scan against further baselines."""
+    own = study(results[0].study).answer(results, against_first(made, results))
+    further = [_gained(one, made["gains"]) for result in results for one in result.against]
+    more = [tr("Further gains stand in gains.csv.")] if len(further) > MOST_FURTHER else []
+    return (*own, *filter(None, further[:MOST_FURTHER]), *more)
+
+
+def _gained(result: CaseResult, gains: "pd.DataFrame") -> str:
+    """What each filter gains against the baseline of a result, at the last scan that both have."""
+    last = common.against_own(gains, [result])
+    last = last.groupby(["filter", "component"], sort=False).tail(1)
+    keys = ("gain_percent", "gain_lo", "gain_hi")
+    each = []
+    for name, rows in common.groups(last, "filter").items():
+        parts = [
+            f"{row['component']} {common.estimate((row[key] for key in keys), '%', '.3g')}"
+            for row in rows.to_dict("records")
+        ]
+        each.append(f"{name[0] if isinstance(name, tuple) else name} {', '.join(parts)}")
+    if not each:
+        return ""
+    told = {"case": result.name, "base": result.baseline, "t": float(last["t_s"].max()), "filters": "; ".join(each)}
+    return tr("{case}, gain against {base} at {t:g} s: {filters}.", **told)
 
 
 def case_figures(
@@ -319,7 +380,12 @@ def case_figures(
 ) -> dict[str, Figure]:
     """The figures of an experiment, described, by the stem of their file: the study's own, and of sweeps."""
     own = study(results[0].study)
-    drawn = dict(own.figures(results, _banded(made), experiment))
+    banded = _banded(made)
+    drawn = dict(own.figures(results, against_first(banded, results), experiment))
+    for n in range(max(len(result.against) for result in results)):
+        others = [result.against[n] for result in results if len(result.against) > n]
+        found = own.figures(others, {**banded, "gains": common.against_own(banded["gains"], others)}, experiment)
+        drawn |= {f"{name}_{n + 2}": figure for name, figure in found.items() if name.startswith("gain_")}
     if (judged := page.figure(made["claims"].to_dict("records"))) is not None:
         drawn["claims"] = judged
     if any(notes.heavy(made[name]).any() for name in ("curves", "gains")):
@@ -401,8 +467,8 @@ def write_files(
         contents["figures/captions.md"] = captions(described).encode()
     drawn = time.perf_counter()
     own = study(experiment.study)
-    answer = tuple(own.answer(results, made))
-    of_intervals = notes.of_intervals(results, made, partial(own.answer, results))
+    answer = answered(results, made)
+    of_intervals = notes.of_intervals(results, made, partial(answered, results))
     run = {**run, "warnings": [*run.get("warnings", ()), *of_intervals]}
     record = files.record(experiment, results, run, contents, answer, store.described())
     report = html.report_page(

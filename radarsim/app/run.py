@@ -183,7 +183,10 @@ def table_of(case: Case, of: Quantity) -> "Table":
     """The table of a case's study that holds a quantity, from results; empty where it makes none."""
     from radarsim.report import tables
 
-    return lambda results: tables.frame({}) if (made := study(case.study).table(of.table, results)) is None else made
+    own = study(case.study)
+    if of.table == "gains":
+        return output.gains_of(own)
+    return lambda results: tables.frame({}) if (made := own.table(of.table, results)) is None else made
 
 
 def _collected(
@@ -280,14 +283,14 @@ def shared(
 
 def case_result(case: Case, work: CaseWork, collected: Collected) -> CaseResult:
     """A case with its sums and the labels that say what these are; display names are the case's own."""
-    plan = work.plan
-    # Cases that differ in display names alone share their work.
-    axes = plan.axes if work.case == case else study(case.study).relabelled(plan.axes, case)
     values = collected.values.view()
     values.flags.writeable = False  # tables and figures are made of them when they are asked for
-    sums = plan.layout.unpack(values)
-    seconds = collected.kernel_seconds
-    return CaseResult(case.name, case.study, case.spec, case.swept, collected.count, sums, axes, seconds)
+    count, seconds, found = collected.count, collected.kernel_seconds, []
+    for plan, of, sums in zip(work.plans, (case, *case.companions), work.unpacked(values), strict=True):
+        # Cases that differ in display names alone share their work.
+        axes = plan.axes if work.case == case else study(case.study).relabelled(plan.axes, of)
+        found.append(CaseResult(of.name, of.study, of.spec, of.swept, count, sums, axes, seconds))
+    return replace(found[0], against=tuple(found[1:]))
 
 
 # ---- writing ---------------------------------------------------------------------------------------------------------

@@ -243,7 +243,7 @@ class Look:
         return np.array(values).reshape(len(self.kinds), len(self.axes.filters), len(self.parts))
 
     def _sampled(self, case: Case) -> Seen:
-        work, each = CaseWork(case), max(2, self.realisations // BATCHES)
+        work, each = CaseWork(replace(case, against=())), max(2, self.realisations // BATCHES)
         batches = [work.simulate(batch * each, each) for batch in range(BATCHES)]
         total, others = np.sum(batches, axis=0), (BATCHES - 1) * each
         but_one = [self._of_sums(case, work, total - sums, others) for sums in batches]

@@ -462,6 +462,7 @@ class Expander:
         model = self.studies.keys(draft.study)
         document = scenarios_inlined(draft.document, model, self.read, self.faults)
         document = data_files_found(document, model, self.faults)
+        document, against = self._baselines(document, model)
         spec = check(model, document, self.faults, also=COMMON_KEYS)
         if draft.realisations is None:
             self.faults.add(document.origin(()), ("realisations",), "required key is missing")
@@ -469,7 +470,21 @@ class Expander:
             return None
         name = " ".join([draft.stem, *(f"{key}={in_name(value)}" for key, value in draft.swept)])
         seed = 1 if draft.seed is None else draft.seed
-        return Case(name, draft.stem, draft.study, spec, draft.swept, draft.realisations, seed)
+        return Case(name, draft.stem, draft.study, spec, draft.swept, draft.realisations, seed, against=against)
+
+    def _baselines(self, document: Document, model: type[Study]) -> tuple[Document, tuple[str, ...]]:
+        """The document with the first of several baselines alone, and the others, each checked as if it stood alone."""
+        path: KeyPath = ("baseline",)
+        names = document.get(path)
+        if not isinstance(names, list) or "baseline" not in model.model_fields or not names:
+            return document, ()
+        each = [document.graft(path, name, document.origin((*path, i))) for i, name in enumerate(names)]
+        for i, name in enumerate(names[1:], 1):
+            if name in names[:i]:
+                self.faults.add(document.origin((*path, i)), (*path, i), "stands there already", name)
+            elif not self.faults:
+                check(model, each[i], self.faults, also=COMMON_KEYS)
+        return each[0], tuple(map(str, names[1:]))
 
     def _refuse_twins(self, cases: list[Case], document: Document) -> None:
         seen: set[str] = set()

@@ -6,7 +6,7 @@ What a checked config is: an experiment of cases.
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -83,6 +83,8 @@ class Case:
     name is the stem of its config with ` key=value` for each swept key. spec holds the study's own keys, an object of
     its subclass of `radarsim.config.fields.Study`. noise_of, where given, are the keys of another case, whose noise
     this one shares although its world is another: common random numbers.
+    against: names of further filters that gains are against, beside the spec's `baseline`; of each there is a
+    companion, the same case but for that key, computed on the same noise.
     asked_from_k: exact σ and gains are asked for from this scan on, counted from 1; 0: every exact value. roughly: what
     is long to compute may be off by a thousandth, as where a search only looks about.
     """
@@ -97,11 +99,25 @@ class Case:
     noise_of: Any = None
     asked_from_k: int = 0
     roughly: bool = False
+    against: tuple[str, ...] = ()
+
+    @property
+    def companions(self) -> "tuple[Case, ...]":
+        """The case with each further baseline in place of its own."""
+        return tuple(
+            replace(self, spec=self.spec.model_copy(update={"baseline": name}), against=()) for name in self.against
+        )
+
+    @property
+    def keys(self) -> dict[str, Any]:
+        """Its keys as plain data, names too: all baselines where there are several."""
+        several = {"baseline": [self.spec.baseline, *self.against]} if self.against else {}
+        return complete(self.spec) | several
 
     def resolved(self) -> dict[str, Any]:
         """The case as plain JSON-able data, names included."""
         common = {"case": self.name, "swept": dict(self.swept), "realisations": self.realisations, "seed": self.seed}
-        return common | complete(self.spec)
+        return common | self.keys
 
 
 @dataclass(frozen=True)

@@ -521,7 +521,7 @@ def keys_of(parts: Mapping[str, type[Model]], filters: type[Member], most_scans:
         "filters": (Members[filters], key("filters", "the filters; all see the same world")),  # type: ignore[valid-type]
         "baseline": (
             Baseline,
-            key("baseline filter", "name of the filter that gains are against; default: the first", None),
+            key("baseline filter", "filter that gains are against, or a list of several; default: the first", None),
         ),
         "scans": (Annotated[int, Whole(2, most_scans), Design()], key("number of scans", "number of plots")),
     }

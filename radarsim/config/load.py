@@ -32,7 +32,7 @@ from radarsim.config.document import (
     one_line,
     short,
 )
-from radarsim.config.experiment import Experiment, complete
+from radarsim.config.experiment import Experiment
 from radarsim.config.fields import DEEPEST, Model, NotFinite, from_python, from_text, in_radians
 from radarsim.config.schema import COMMON_KEYS, Common, Studies
 from radarsim.errors import ConfigError
@@ -424,7 +424,7 @@ def new(
     data = copy.deepcopy(dict(document.data))
     if values and "include" in data and len(experiment.cases) == 1:  # values have their places in the whole
         (case,) = experiment.cases
-        data = {"study": case.study, **complete(case.spec), "realisations": case.realisations, "seed": case.seed}
+        data = {"study": case.study, **case.keys, "realisations": case.realisations, "seed": case.seed}
     for key, value in values.items():
         _put(data, key, value)
     return f"{name}.yaml", starter(data, studies.keys(experiment.study), name, experiment.stem)

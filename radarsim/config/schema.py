@@ -95,11 +95,17 @@ def schema(studies: Studies) -> dict[str, Any]:
 def _experiment(name: str, study: dict[str, Any], common: dict[str, Any]) -> dict[str, Any]:
     """A config of one study: the common keys and its own."""
     kept = {key: value for key, value in common.items() if key not in ("study", "include")}
+    properties = dict(study["properties"])
+    if "baseline" in properties:
+        one = {key: value for key, value in properties["baseline"].items() if key not in ("title", "description")}
+        several = {"type": "array", "items": one, "minItems": 1, "uniqueItems": True}
+        said = {key: value for key, value in properties["baseline"].items() if key in ("title", "description")}
+        properties["baseline"] = {"anyOf": [one, several], **said}
     about = {"const": name, "description": study.get("description", name)}  # of a docstring, which -OO leaves out
     return {
         **study,
         "title": name,
-        "properties": {"study": about, **study["properties"], **kept},
+        "properties": {"study": about, **properties, **kept},
         "required": ["study", *study.get("required", []), "realisations"],
     }
 

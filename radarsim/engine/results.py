@@ -93,6 +93,8 @@ class CaseResult(Generic[A_co]):
 
     A study's own tables take results with its own axes, `CaseResult[RangeDopplerAxes]`; a plain `CaseResult` is any.
 
+    against holds the same case with the sums and axes of each further baseline.
+
     `error` (F, K, C, 4) holds the sums of e, e², e³, e⁴; `paired` (F, K, C) those of e²·e² with the baseline's error; a
     study adds its own.
     """
@@ -105,6 +107,12 @@ class CaseResult(Generic[A_co]):
     sums: Mapping[str, np.ndarray]
     axes: A_co
     seconds: float = 0.0
+    against: "tuple[CaseResult[A_co], ...]" = ()
+
+    @property
+    def baseline(self) -> str:
+        """The name of the filter that gains are against."""
+        return self.axes.filters[self.axes.baseline]
 
 
 @dataclass(frozen=True)

@@ -144,7 +144,8 @@ def needed(
 
 def grown(result: CaseResult, n: int) -> CaseResult:
     """A case with its sums in proportion to n realisations."""
-    return replace(result, count=n, sums={name: sums * (n / result.count) for name, sums in result.sums.items()})
+    sums = {name: sums * (n / result.count) for name, sums in result.sums.items()}
+    return replace(result, count=n, sums=sums, against=tuple(grown(one, n) for one in result.against))
 
 
 def gaussian(result: CaseResult) -> CaseResult:

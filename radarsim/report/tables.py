@@ -236,6 +236,19 @@ def _gains(result: CaseResult) -> Columns:
     }
 
 
+def against_own(gains: "pd.DataFrame", results: Sequence[CaseResult]) -> "pd.DataFrame":
+    """The rows of gains that are against the baselines of these results, not against further ones of their cases."""
+    own = {(result.name, result.baseline) for result in results}
+    return gains[[pair in own for pair in zip(gains["case"], gains["baseline"], strict=True)]]
+
+
+def below(parts: "Sequence[pd.DataFrame]") -> "pd.DataFrame":
+    """Tables of the same columns set one below the other; a note is empty where one has none."""
+    if any("note" in part for part in parts):
+        parts = [part if "note" in part else part.assign(note="") for part in parts]
+    return joined({str(name): part[name].to_numpy() for name in part} for part in parts)
+
+
 def to_csv(table: "pd.DataFrame") -> bytes:
     """A table as UTF-8 CSV: shortest numbers that read back the same, '\\n' ends, an empty cell for not-a-number.
 

@@ -38,6 +38,9 @@ def identity(case: Case) -> str:
         "seed": case.seed,
         "random_layout": random.LAYOUT,
     }
+    if case.against:
+        names = [member.name for member in case.spec.members]
+        question["against"] = [names.index(name) for name in case.against]
     return digest(question)[:QUESTION] + sources(case.study)[:QUESTION]
 
 

@@ -69,16 +69,8 @@ def gain_change(
 
 
 def ratio(seen: Evidence, case: Any, filter: str, over: str, component: str, at: int | None = None) -> Estimate:
-    """σ of a filter over that of another one: paired where one of the two is the baseline."""
-    axes = seen.case(case).axes
-    base = axes.filters[axes.baseline]
-    if over == base != filter:
-        of = gain(seen, case, filter, component, at)
-        return Estimate(*(1 - value / 100 for value in (of.value, of.hi, of.lo)))
-    if filter == base != over:
-        of = gain(seen, case, over, component, at)
-        return Estimate(*(1 / (1 - value / 100) for value in of))
-    return claims.ratio(sigma(seen, case, filter, component, at), sigma(seen, case, over, component, at))
+    """σ of a filter over that of another one: paired where one of the two is a baseline."""
+    return _at(seen.ratio(case, filter, over, component), at)
 
 
 def limit(seen: Evidence, case: Any, filter: str, component: str) -> float:

@@ -187,9 +187,10 @@ class Evidence:
         return other
 
     def _grouped(self, table: str) -> Mapping:
-        """The rows of curves or gains by case, filter and component."""
+        """The rows of curves by case, filter and component; of gains by their baseline too."""
         if table not in self._groups:
-            self._groups[table] = tables.groups(self.tables[table], "case", "filter", "component")
+            columns = ("case", "filter", "component", *(("baseline",) if table == "gains" else ()))
+            self._groups[table] = tables.groups(self.tables[table], *columns)
         return self._groups[table]
 
     def members(self, result: CaseResult, key: str = "filters") -> list[tuple[int, Any]]:
@@ -208,12 +209,17 @@ class Evidence:
         return self._series("curves", key, filter_name, component, ("sigma", "sigma_lo", "sigma_hi", "exact_sigma"))
 
     def gain(self, key: Any, filter_name: str, component: str) -> Series:
-        """Relative gain of a filter of a case against its baseline, %."""
-        names = ("gain_percent", "gain_lo", "gain_hi", "exact_percent")
-        return self._series("gains", key, filter_name, component, names)
+        """Relative gain of a filter of a case against its baseline, the first of several, %."""
+        return self._gain(key, filter_name, component, self.case(key).baseline)
 
-    def _series(self, table: str, key: Any, filter_name: str, component: str, names: tuple[str, ...]) -> Series:
-        rows = self._grouped(table).get((self.case(key).name, filter_name, component))
+    def _gain(self, key: Any, filter_name: str, component: str, base: str) -> Series:
+        names = ("gain_percent", "gain_lo", "gain_hi", "exact_percent")
+        return self._series("gains", key, filter_name, component, names, base)
+
+    def _series(
+        self, table: str, key: Any, filter_name: str, component: str, names: tuple[str, ...], *base: str
+    ) -> Series:
+        rows = self._grouped(table).get((self.case(key).name, filter_name, component, *base))
         self.looked.add((table, component))
         if rows is None:
             raise Missing(key)
@@ -223,6 +229,26 @@ class Evidence:
                 raise Missing("not known exactly")
             value = lo = hi = exact
         return Series(rows["k"].to_numpy(), rows["t_s"].to_numpy(), value, lo, hi)
+
+    def ratio(self, key: Any, filter_name: str, over: str, component: str) -> Series:
+        """σ of a filter over that of another one of the case: paired where one of the two is a baseline of it.
+
+        Otherwise it is that of independent estimates, whose interval is wider than common noise would make it.
+        """
+        case = self.case(key)
+        baselines = {one.baseline for one in (case, *case.against)}
+        if over in baselines and filter_name != over:
+            of = self._gain(key, filter_name, component, over)
+            value, lo, hi = (1 - part / 100 for part in (of.value, of.hi, of.lo))
+            return Series(of.k, of.t, value, lo, hi)
+        if filter_name in baselines and filter_name != over:
+            of = self._gain(key, over, component, filter_name)
+            value, lo, hi = (1 / (1 - part / 100) for part in (of.value, of.lo, of.hi))
+            return Series(of.k, of.t, value, lo, hi)
+        own, other = (self.curve(key, name, component) for name in (filter_name, over))
+        own, other = own.where(np.isin(own.k, other.k)), other.where(np.isin(other.k, own.k))
+        found = ratio(Estimate(own.value, own.lo, own.hi), Estimate(other.value, other.lo, other.hi))
+        return Series(own.k, own.t, found.value, found.lo, found.hi)
 
     def row(self, table: str, **equal: object) -> Mapping[str, Any]:
         """The one row of a table with these values; raises Missing."""

@@ -283,7 +283,9 @@ class Keys(Study):
         "prior", "what the filters know before the first plot", Prior.model_validate({})
     )
     filters: Members[Filter] = key("filters", "the filters; all see the same plots")
-    baseline: Baseline = key("baseline filter", "name of the filter that gains are against; default: the first", None)
+    baseline: Baseline = key(
+        "baseline filter", "filter that gains are against, or a list of several; default: the first", None
+    )
     scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = key("number of scans", "number of scans")
     rare: Annotated[RareFolds | None, Design(), Added()] = key(
         "rare wrong folds",

@@ -260,7 +260,9 @@ class Keys(Study):
     filters: Annotated[
         tuple[Filter, ...], Field(min_length=1, max_length=32), AfterValidator(unique_names), Design()
     ] = key("filters", "the filters; all see the same plots")
-    baseline: Baseline = key("baseline filter", "name of the filter that gains are against; default: the first", None)
+    baseline: Baseline = key(
+        "baseline filter", "filter that gains are against, or a list of several; default: the first", None
+    )
     start_acceleration_mps2: Annotated[NonNegative, Design()] = key(
         "σ of the acceleration at the start of a track",
         "spread of the acceleration that the start of a track allows for, m/s²",

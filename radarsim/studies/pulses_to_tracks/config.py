@@ -272,7 +272,9 @@ class Keys(Lasting):
     target: Annotated[Target, Scenario()] = key("target", "the target: a scenario's stem, or inline")
     prior: Prior = key("designation", "what is known when the track begins")
     filters: Members[Filter] = key("filters", "the filters; all see the same ranges and bursts")
-    baseline: Baseline = key("baseline", "name of the filter that gains are against; default: the first", None)
+    baseline: Baseline = key(
+        "baseline", "filter that gains are against, or a list of several; default: the first", None
+    )
     scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = key(
         "scans", "number of scans; or give duration_s", None
     )

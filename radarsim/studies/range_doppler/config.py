@@ -193,7 +193,9 @@ class Keys(Lasting):
     radar: Radar = key("radar", "the radar")
     target: Annotated[Target, Scenario()] = key("target", "the target: a scenario's stem, or inline")
     filters: Members[Filter] = key("filters", "the filters; all see the same plots")
-    baseline: Baseline = key("baseline filter", "name of the filter that gains are against; default: the first", None)
+    baseline: Baseline = key(
+        "baseline filter", "filter that gains are against, or a list of several; default: the first", None
+    )
     scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = key(
         "number of scans", "number of scans; or give duration_s", None
     )

@@ -300,7 +300,7 @@ class Keys(Study):
         "filters", "the filters; all of them process the same plots"
     )
     baseline: Baseline = key(
-        "baseline filter", "name of the filter that gains are measured against; default: the first", None
+        "baseline filter", "filter that gains are against, or a list of several; default: the first", None
     )
     scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = key("number of scans", "number of scans of the first sonar")
 

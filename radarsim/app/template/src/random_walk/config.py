@@ -57,5 +57,7 @@ class Keys(Study):
     target: Target = key("target", "the target")
     # Design(): cases that differ in nothing else have the same noise, so that their comparison is paired.
     filters: Members[Filter] = key("filters", "the filters; all see the same plots")
-    baseline: Baseline = key("baseline filter", "name of the filter that gains are against; default: the first", None)
+    baseline: Baseline = key(
+        "baseline filter", "filter that gains are against, or a list of several; default: the first", None
+    )
     scans: Annotated[int, Whole(1, MOST_SCANS), Design()] = key("number of scans", "number of plots")
