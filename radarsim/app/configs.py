@@ -264,10 +264,12 @@ class CaseWork:
 
     def simulate(self, first: int, count: int) -> "np.ndarray":
         """Sums (size,) over realisations first … first + count - 1."""
+        import numpy as np
+
         made = [study(self.case.study).simulate(plan, first, count) for plan in self.plans]
         return made[0] if len(made) == 1 else np.concatenate(made)
 
-    def unpacked(self, values: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
+    def unpacked(self, values: "np.ndarray") -> "Iterator[dict[str, np.ndarray]]":
         """The named sums of each plan, of all sums (size,)."""
         for plan in self.plans:
             yield plan.layout.unpack(values)

@@ -27,7 +27,7 @@ from radarsim.report import tables as common
 from radarsim.report.claims import page
 from radarsim.report.claims.page import OVER, with_classes
 from radarsim.report.drawing import Figure
-from radarsim.report.wording import spoken
+from radarsim.report.wording import estimate, spoken
 from radarsim.studies.interface import Study
 from radarsim.studies.registry import study
 
@@ -365,8 +365,7 @@ def _gained(result: CaseResult, gains: "pd.DataFrame") -> str:
     each = []
     for name, rows in common.groups(last, "filter").items():
         parts = [
-            f"{row['component']} {common.estimate((row[key] for key in keys), '%', '.3g')}"
-            for row in rows.to_dict("records")
+            f"{row['component']} {estimate((row[key] for key in keys), '%', '.3g')}" for row in rows.to_dict("records")
         ]
         each.append(f"{name[0] if isinstance(name, tuple) else name} {', '.join(parts)}")
     if not each:

@@ -185,7 +185,9 @@ def table_of(case: Case, of: Quantity) -> "Table":
 
     own = study(case.study)
     if of.table == "gains":
-        return output.gains_of(own)
+        from radarsim.app.result import gains_of
+
+        return gains_of(own)
     return lambda results: tables.frame({}) if (made := own.table(of.table, results)) is None else made
 
 
