@@ -51,6 +51,10 @@ class DisagreementError(StoreError):
     result: object = None
 
 
+class StudyError(RadarsimError):
+    """The code of an installed package failed where its study was asked for something."""
+
+
 class NonFiniteError(RadarsimError):
     """A filter gave numbers that are not finite."""
 

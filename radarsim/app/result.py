@@ -448,14 +448,23 @@ def write_files(
 
     run holds the facts of the run for run.json: see provenance.record; made the tables, where they are at hand; formats
     those of the figures' files, width_mm their width in place of their own. Outputs of an earlier run that this one
-    does not write (figures without `draw`) are removed, so that nothing stale stands beside new numbers.
+    does not write (figures without `draw`) are removed, so that nothing stale stands beside new numbers. Where a
+    package's figures or words fail the tables alone are written.
     """
     from radarsim.report import html
 
     made = case_tables(results, stem=experiment.stem) if made is None else made
     contents = {f"{name}.csv": common.to_csv(table) for name, table in made.items() if len(table) or name in ALWAYS}
-    began = time.perf_counter()
-    described = case_figures(results, made, experiment) if draw else {}
+    own, began = study(experiment.study), time.perf_counter()
+    try:
+        described = case_figures(results, made, experiment) if draw else {}
+        answer = answered(results, made)
+        question = own.question(experiment)
+    except RadarsimError:
+        raise
+    except Exception:  # of a package's figures or words: the tables do not depend on them
+        files.replace_all(folder, contents, stale=files.outputs)
+        raise
     if draw:
         from radarsim.report.figures import save  # Matplotlib
 
@@ -465,8 +474,6 @@ def write_files(
             contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
         contents["figures/captions.md"] = captions(described).encode()
     drawn = time.perf_counter()
-    own = study(experiment.study)
-    answer = answered(results, made)
     of_intervals = notes.of_intervals(results, made, partial(answered, results))
     run = {**run, "warnings": [*run.get("warnings", ()), *of_intervals]}
     record = files.record(experiment, results, run, contents, answer, store.described())
@@ -476,7 +483,7 @@ def write_files(
         list(described.values()),
         record,
         answer,
-        own.question(experiment),
+        question,
         inputs=own.inputs(results),
         cost=own.cost(made, run),
         agreement=notes.agreement(made["curves"]) if own.exact_errors else None,

@@ -513,8 +513,13 @@ class Member(Model):
     name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
 
 
-def keys_of(parts: Mapping[str, type[Model]], filters: type[Member], most_scans: int) -> type[Study]:
-    """The keys of a study of these parts, by name, and of `filters`, `baseline` and `scans` with their marks."""
+def keys_of(
+    name: str, module: str, parts: Mapping[str, type[Model]], filters: type[Member], most_scans: int
+) -> type[Study]:
+    """The keys of a study of these parts, by name, and of `filters`, `baseline` and `scans` with their marks.
+
+    The class is called so, and is to be found in this module.
+    """
     about = {name: (one.__doc__ or name).strip().partition("\n")[0].rstrip(".") for name, one in parts.items()}
     own: Any = {name: (one, key(name.replace("_", " "), about[name])) for name, one in parts.items()}
     own |= {
@@ -525,7 +530,7 @@ def keys_of(parts: Mapping[str, type[Model]], filters: type[Member], most_scans:
         ),
         "scans": (Annotated[int, Whole(2, most_scans), Design()], key("number of scans", "number of plots")),
     }
-    made: type[Study] = create_model("Keys", __base__=Study, __module__=filters.__module__, **own)
+    made: type[Study] = create_model(name, __base__=Study, __module__=module, **own)
     return made
 
 

@@ -109,19 +109,24 @@ class OneFile(Study):
     extra_figures: tuple[str, ...] = ()
 
     # ---- what is asked -------------------------------------------------------------------------------------------
-    def keys(self) -> "type[Keys]":
-        return self._keys
+    key_class: "type[Keys]"
 
-    @cached_property
-    def _keys(self) -> "type[Keys]":
+    def __init_subclass__(cls) -> None:
+        """Makes the class of the keys, where nothing is missing. Other processes find it by its name in the module."""
+        super().__init_subclass__()
+        if not any(True for _ in cls.missing()):
+            name = f"{cls.__name__}Keys"
+            cls.key_class = keys_of(name, cls.__module__, cls.parts, cls.Filter, cls.most_scans)
+            shown = (f"{kind}_{one.name}" for one in cls.components for kind in ("sigma", "gain", "dynamic"))
+            cls.key_class.figure_names = (*shown, *cls.extra_figures)
+            setattr(sys.modules[cls.__module__], name, cls.key_class)
+
+    def keys(self) -> "type[Keys]":
         if faults := [f"{self.place}: {fault}" for fault in self.missing()]:
             raise ConfigError(*faults)
         if self.claims_yaml:
             _ = self._written  # a claim that names what is not there is known before anything runs
-        made = keys_of(self.parts, self.Filter, self.most_scans)
-        shown = (f"{kind}_{one.name}" for one in self.components for kind in ("sigma", "gain", "dynamic"))
-        made.figure_names = (*shown, *self.extra_figures)
-        return made
+        return self.key_class
 
     @property
     def place(self) -> str:
@@ -131,32 +136,34 @@ class OneFile(Study):
         except (OSError, TypeError):  # made by a call
             return str(sys.modules[type(self).__module__].__file__)
 
-    def missing(self) -> Iterator[str]:
+    @classmethod
+    def missing(cls) -> Iterator[str]:
         """What the class lacks, or has of the wrong kind: a line each."""
-        for name, (kind, words) in NEEDED.items():
-            value = getattr(self, name, None)
-            if not isinstance(value, kind) or not value:
-                got = "nothing" if value is None else repr(value)[:40]
-                yield f"{type(self).__name__}.{name} must be given: {words}; got {got}"
-        for one in getattr(self, "components", ()):
+        given = {name: getattr(cls, name, None) for name in NEEDED}
+        if wrong := {name: one for name, one in given.items() if not isinstance(one, NEEDED[name][0]) or not one}:
+            for name, one in wrong.items():
+                got = "nothing" if one is None else repr(one)[:40]
+                yield f"{cls.__name__}.{name} must be given: {NEEDED[name][1]}; got {got}"
+            return
+        for one in cls.components:
             if not isinstance(one, Component) or not (one.name and one.unit):
                 yield f"components: {one!r} must be Component(name, unit, symbol, words), with a unit"
-        for name, part in (*dict(getattr(self, "parts", {})).items(), ("Filter", getattr(self, "Filter", Member))):
+        for name, part in (*cls.parts.items(), ("Filter", cls.Filter)):
             base = Member if name == "Filter" else Model
             if not (isinstance(part, type) and issubclass(part, base)):
                 yield f"{name} must be a subclass of radarsim.config.fields.{base.__name__}, got {part!r}"
-        keys = {"scan_period": (getattr(self, "scan_period", ""),)} | {
-            one.column: one.sigma_keys for one in self.measured
-        }
+                return
+        keys = {"scan_period": (cls.scan_period,)} | {one.column: one.sigma_keys for one in cls.measured}
         for name, every in keys.items():
-            yield from (f"{name}: there is no key {key}" for key in every if key and not self._has(key))
+            yield from (f"{name}: there is no key {key}" for key in every if key and not cls._has(key))
 
-    def _has(self, key: str) -> bool:
+    @classmethod
+    def _has(cls, key: str) -> bool:
         """Whether a dotted name is a key, or a property, of the parts; a bare one is of the filters."""
         part, _, own = key.partition(".")
         if part in ("filters", "scans", "baseline"):
             return True
-        model, first = self.parts.get(part, Model) if own else self.Filter, (own or part).partition(".")[0]
+        model, first = cls.parts.get(part, Model) if own else cls.Filter, (own or part).partition(".")[0]
         return first in model.model_fields or isinstance(getattr(model, first, None), property)
 
     # ---- numbers -------------------------------------------------------------------------------------------------

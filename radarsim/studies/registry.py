@@ -5,6 +5,9 @@ its target the declared object, see `radarsim.studies.interface.Study`. A packag
 where its study is asked for: lists of all studies leave it out, and `unusable` says why.
 """
 
+import os
+import re
+import traceback
 from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import import_module
@@ -16,13 +19,14 @@ from typing import TypeVar
 from radarsim.config.experiment import Case
 from radarsim.config.fields import Study as Keys
 from radarsim.config.schema import COMMON_KEYS
-from radarsim.errors import ConfigError, RadarsimError
+from radarsim.errors import ConfigError, RadarsimError, StudyError
 from radarsim.report.quantities import Quantity
 from radarsim.studies.interface import Study
 
 Part = TypeVar("Part")
 
 GROUP = "radarsim.studies"
+COMPILING = re.compile(r"Failed in |-+$|\[\d\] |During: ")  # lines of a compiler's message that say where it was
 SHIPPED = {  # in the order of the papers, then what goes beyond them
     "range_doppler": "radarsim.studies.range_doppler",
     "multimodel": "radarsim.studies.multimodel",
@@ -195,9 +199,32 @@ def package(name: str) -> str | None:
 
 
 def described(error: Exception) -> str:
-    """An exception in one line: its kind and the first line of its message."""
-    lines = str(error).strip().splitlines()
-    return f"{type(error).__name__}: {lines[0]}" if lines else type(error).__name__
+    """An exception in one line: its kind, the first line of its message that says something, and its place.
+
+    That is the last line of an installed package that offers studies; of what the compiler refuses, the one it names.
+    """
+    lines = [line.strip() for line in str(error).splitlines() if line.strip() and not COMPILING.match(line)]
+    said = ": ".join([type(error).__name__, *lines[:1]])
+    found = re.search(r'File "([^"]+)", line (\d+)', str(error))
+    place = f"{found[1]}:{found[2]}" if found else blamed(error)
+    return f"{said} ({place})" if place else said
+
+
+def blamed(error: BaseException) -> str:
+    """The last line of code of an installed package that offers studies, `file:line`, among those that led to an error;
+    nothing where there is none."""
+    specs = [spec for name in packages() if (spec := find_spec(name)) is not None]
+    homes = tuple(
+        os.path.realpath(one) for spec in specs for one in spec.submodule_search_locations or [spec.origin or ""]
+    )
+    places = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
+    own = [f"{file}:{line}" for file, line in places if homes and os.path.realpath(file).startswith(homes)]
+    return own[-1] if own else ""
+
+
+def fault_of(error: Exception) -> StudyError | None:
+    """What an error that nobody has caught says, where the code of an installed package is to blame; else None."""
+    return StudyError(f"a study of an installed package fails: {described(error)}") if blamed(error) else None
 
 
 def _fault(name: str, words: str) -> ConfigError:

@@ -27,7 +27,7 @@ class Sensor(Model):
     noise: Positive = key("process noise", "its density, m²/s³", 1.0)
 
 
-class Filter(Member):
+class Believing(Member):
     """A filter that may be wrong."""
 
     wrong: Literal["", "F", "Q", "H", "R", "x"] = key("wrong", "what it believes otherwise than it is", "")
@@ -58,7 +58,7 @@ def study_of(n, D):
 
         name, about, filters, asks = "chain", "A chain.", {"wrong": "what is wrong"}, "How well?"
         components = tuple(Component(NAMES[i], "m") for i in range(n))
-        parts = {"sensor": Sensor}  # noqa: RUF012
+        parts, Filter = {"sensor": Sensor}, Believing
         scan_period, detection, fitted = (
             "sensor.scan_period_s",
             "sensor.probability",
@@ -95,7 +95,6 @@ def study_of(n, D):
                 return np.full((spec.scans, D, n), 0.25) * np.eye(D, n)
             return self.steady_gains(spec, one) if one.gain == "steady" else None
 
-    Study.Filter = Filter
     return Study()
 
 

@@ -1,0 +1,146 @@
+"""The studies in `examples/` are packages of their own: installed, run by every command, tested by their own tests.
+
+What their code may do wrong is one line, and never the numbers that are computed already.
+"""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from radarsim.studies import registry
+from tests.studies import outside
+
+EXAMPLES = outside.ROOT / "examples"
+N = 5000  # a whole block and a partial one
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder with all examples installed in its folder `site`."""
+    folder = tmp_path_factory.mktemp("examples")
+    for example in sorted(EXAMPLES.iterdir()):
+        if (example / "pyproject.toml").is_file():
+            outside.installed(example, folder / "site")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def radarsim(place):
+    """The real command, beside the installed packages."""
+    yield from outside.forking(place / "site", place)
+
+
+def csv_bytes(folder):
+    return {file.name: file.read_bytes() for file in sorted(folder.glob("*.csv"))}
+
+
+@pytest.mark.parametrize("name", ["chirp"])
+def test_its_own_tests_pass(radarsim, name):
+    done = radarsim("-q", "-p", "no:cacheprovider", cwd=EXAMPLES / name, module="pytest")
+    assert " passed" in done.stdout
+
+
+@pytest.mark.parametrize("name", ["chirp"])
+def test_its_file_is_short(name):
+    text = (EXAMPLES / name / "src" / name / "__init__.py").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 120
+
+
+@pytest.mark.slow
+def test_the_chirps_run_is_the_same_by_any_means(radarsim, tmp_path):
+    radarsim("run", "chirp", "-n", N, "--out", tmp_path / "one")
+    wanted = csv_bytes(tmp_path / "one/chirp")
+    assert wanted.keys() == {"curves.csv", "gains.csv", "last.csv", "claims.csv"}
+    assert {"sigma_r.svg", "gain_v.svg"} <= {file.name for file in (tmp_path / "one/chirp/figures").iterdir()}
+    radarsim("run", "chirp", "-n", N, "--workers", 2, "--no-figures", "--out", tmp_path / "workers")
+    assert csv_bytes(tmp_path / "workers/chirp") == wanted
+    for share in ("1/2", "2/2"):
+        radarsim("run", "chirp", "-n", N, "--shard", share, "--out", tmp_path / "shares")
+    radarsim("report", "chirp", "-n", N, "--no-figures", "--out", tmp_path / "shares")
+    assert csv_bytes(tmp_path / "shares/chirp") == wanted
+
+
+@pytest.mark.slow
+def test_the_chirps_missed_plots_readings_and_precision(radarsim, tmp_path):
+    run = ("run", "chirp_missed", "-n", 2000, "--no-figures", "--out", tmp_path)
+    radarsim(*run)
+    (row,) = [one for one in (tmp_path / "chirp_missed/last.csv").read_text().splitlines() if ",up,r," in one]
+    assert row.endswith(",,")  # neither an exact value nor a limit
+    said = radarsim("readings", "chirp", "-n", 2000, "--out", tmp_path).stdout
+    assert "chirp.4 confirmed                    holds in 4 of 4 readings" in said
+    assert "chirp.5 confirmed                    holds in 2 of 2 readings" in said
+    done = json.loads(radarsim("run", "chirp", "--precision", 3, "--no-figures", "--out", tmp_path, "--json").stdout)
+    assert 2000 <= done[0]["cases"]["chirp"]["done"] <= 100_000
+
+
+@pytest.mark.slow
+def test_the_chirps_questions_and_recorded_plots(radarsim, tmp_path):
+    ask = ("solve", "chirp", "radar.slope_hz_per_s", "--sigma", "r", "--filter", "up", "--equals", 27, "--json")
+    solved = json.loads(radarsim(*ask).stdout)
+    curve = ("run", "chirp", "-n", 100, "--no-figures", "--out", tmp_path, "--set")
+    radarsim(*curve, f"radar.slope_hz_per_s={solved['value']!r}")
+    up = [line for line in (tmp_path / "chirp/last.csv").read_text().splitlines() if line.startswith("chirp,up,r,")]
+    assert float(up[0].split(",")[-2]) == pytest.approx(27, rel=1e-6)
+    assert "radar.slope_hz_per_s" in radarsim("sensitivity", "chirp", "--out", tmp_path).stdout
+    for arguments in (
+        ("new", "own", "--like", "chirp"),
+        ("check", "own.yaml"),
+        ("simulate", "own.yaml", "-o", "plots.csv"),
+        ("track", "own.yaml", "plots.csv", "-o", "track.csv"),
+    ):
+        radarsim(*arguments, cwd=tmp_path)
+    assert (tmp_path / "plots.csv").read_text().startswith("t_s,z_down_m,z_up_m,z_alternating_m,z_none_m,true_r_m,")
+    said = radarsim("fit", "own.yaml", "plots.csv", "--filter", "up", cwd=tmp_path).stdout
+    assert "radar.sigma_range_m: " in said
+    assert "chirp" in json.loads(radarsim("schema").stdout)["$defs"]
+    russian = radarsim("run", "chirp", "-n", 100, "--no-figures", "--out", tmp_path, "--language", "ru").stdout
+    assert "Выигрыш относительно down" in russian
+
+
+FAULTS = {  # what is put into the file: what is said, and whether the tables are written
+    "words": (
+        "    def question(self, experiment):\n        return self.aks\n",
+        "AttributeError: 'Chirp' object has",
+        True,
+    ),
+    "numbers": ("    def own_gains(self, spec, one):\n        return {}[one.gain]\n", "KeyError: 'kalman'", False),
+}
+
+
+@pytest.mark.parametrize("what", FAULTS)
+def test_what_its_code_does_wrong_is_one_line_with_its_place(tmp_path, what):
+    text, said, written = FAULTS[what]
+    shutil.copytree(EXAMPLES / "chirp", tmp_path / "chirp")
+    outside.installed(tmp_path / "chirp", tmp_path / "site")
+    file = tmp_path / "chirp/src/chirp/__init__.py"
+    before, after = file.read_text(encoding="utf-8").split("\n\nSTUDY = ")
+    file.write_text(f"{before}\n{text}\n\nSTUDY = {after}", encoding="utf-8")
+    run = ("run", "chirp", "-n", 100, "--no-figures", "--out", "results")
+    (line,) = outside.command(*run, site=tmp_path / "site", cwd=tmp_path, code=1).stderr.splitlines()
+    assert line.startswith(f"a study of an installed package fails: {said}")
+    assert line.endswith(f"/chirp/__init__.py:{before.count(chr(10)) + 3})")
+    assert (tmp_path / "results/chirp/curves.csv").exists() == written
+
+
+def test_what_the_compiler_refuses_is_its_reason_and_the_line_that_it_names():
+    from numba import njit
+
+    @njit
+    def unnamed(x):
+        return x + yy  # noqa: F821
+
+    @njit
+    def untyped(x):
+        return x.nothing
+
+    said = []
+    for wrong in (unnamed, untyped):
+        with pytest.raises(Exception, match="nothing" if wrong is untyped else "yy") as caught:
+            wrong(1.0)
+        said.append(registry.described(caught.value))
+    assert said[0] == "TypingError: NameError: name 'yy' is not defined"
+    assert said[1].startswith("TypingError: No implementation of function Function(<built-in function add>)")
+    line = int(said[1].rpartition(":")[2].rstrip(")"))
+    assert "x.nothing" in Path(__file__).read_text(encoding="utf-8").splitlines()[line - 1]
