@@ -18,8 +18,9 @@ from radarsim.errors import ConfigError
 from radarsim.report import compare as sides
 from radarsim.report import files
 from radarsim.report import tables as common
-from radarsim.report.compare import SERIES, Side
+from radarsim.report.compare import Side
 from radarsim.report.drawing import Chart
+from radarsim.report.quantities import COMMON, Quantity
 from radarsim.studies import registry
 
 if TYPE_CHECKING:
@@ -44,7 +45,8 @@ class Run:
 class Compared:
     """What was written: the folder and its files; the sentences, what to know beside them, and comparison.csv's rows.
 
-    last are the rows at the last common time.
+    last are the rows at the last common time; told the quantities that the terminal shows, as rows name them, and their
+    words.
     """
 
     folder: Path
@@ -54,6 +56,7 @@ class Compared:
     warnings: tuple[str, ...]
     rows: tuple[dict[Hashable, Any], ...]
     last: tuple[dict[Hashable, Any], ...]
+    told: tuple[tuple[str, str], ...]
 
 
 def compare(
@@ -80,7 +83,9 @@ def compare(
     if not len(made):
         raise ConfigError(f"{' and '.join(run.label for run in runs)} share no filter and component to compare")
     folder = Path(out) / FOLDER
-    sentences, notes = sides.sentences(made), [*sides.pairings(made), *alone]
+    shared = sides.shared(side for run in every for side in run)
+    sentences = sides.sentences(made, shared)
+    notes = [*sides.pairings(made), *alone]
     warnings = [line for run in runs for line in _stale(run)] + _replaced(folder, runs)
     described = sides.figures([side for run in _labelled(every) for side in run], made)
     contents = {"comparison.csv": common.to_csv(made)}
@@ -97,9 +102,10 @@ def compare(
     ).encode()
     contents["compare.json"] = files.to_json(_record(runs, contents))
     files.replace_all(folder, contents, stale=_earlier)
-    last = sides.at_the_end(made)
-    kept = (tuple(rows.to_dict("records")) for rows in (made, last))
-    return Compared(folder, tuple(sorted(contents)), tuple(sentences), tuple(notes), tuple(warnings), *kept)
+    rows, last = (tuple(table.to_dict("records")) for table in (made, sides.at_the_end(made)))
+    told = tuple((of.value, of.words) for of in sides.told(made, shared))
+    written = folder, tuple(sorted(contents)), tuple(sentences), tuple(notes), tuple(warnings)
+    return Compared(*written, rows, last, told)
 
 
 def _found(sources: Sequence[str | os.PathLike[str]], out: Path) -> list[Run]:
@@ -145,7 +151,8 @@ def _named(runs: Sequence[Run]) -> list[Run]:
 
 def _sides(run: Run) -> list[Side]:
     """The cases of a result that are there, with their rows."""
-    wanted = {one.table for one in SERIES}
+    measured = _measured(str(run.record.get("study")))
+    wanted = {one.table for one in measured}
     outputs = run.record["outputs"]
     tables = {name: rows for name in sorted(wanted) if (rows := stored.table(run.folder, name, outputs)) is not None}
     made = []
@@ -154,8 +161,16 @@ def _sides(run: Run) -> list[Side]:
         if len(gains := own.get("gains", ())):  # of several baselines the first
             own["gains"] = gains[gains["baseline"] == gains["baseline"].iloc[0]]
         if len(own.get("curves", ())):
-            made.append(Side(run.label, name, name, _noise(run, name), int(counts["done"]), own))
+            made.append(Side(run.label, name, name, _noise(run, name), int(counts["done"]), own, measured))
     return made
+
+
+def _measured(study: str) -> tuple[Quantity, ...]:
+    """What a study measures; of one that is no longer there σ and gain."""
+    try:
+        return registry.part(study, lambda one: one.quantities())
+    except (ConfigError, KeyError):
+        return COMMON
 
 
 def _noise(run: Run, name: str) -> str | None:

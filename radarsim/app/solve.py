@@ -50,7 +50,7 @@ def by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> A
     known = [one for one in scanned if not math.isnan(one[1])]
     if not known:
         raise question.nowhere(asked, curve)
-    question.refuse_without_effect(asked, [y for _, y in known])
+    question.refuse_without_effect(asked, [y + asked.equals for _, y in known])
     apart = unpaired(asked, curve)
     if apart:
         told("; ".join(apart))

@@ -24,7 +24,7 @@ SILENT_S = 0.7  # a run shorter than this shows no progress
 PIPED_WIDTH = 10_000  # whatever reads it wraps it, or not
 COLUMNS = (  # of tables
     *(term("case"), term("filter"), term("component"), term("at"), term("sigma"), term("exact"), term("gain")),
-    *(term("95 % of gain"), term("of"), term("σ against"), term("change"), term("filters"), term("scans")),
+    *(term("95 % of gain"), term("of"), term("change"), term("filters"), term("scans")),
     *(term("realisations"), term("one thread"), term("known from"), term("last to get there"), term("claim")),
     *(term("statement"), term("place"), term("measured and expected"), term("class"), term("config"), term("key")),
     *(term("value"), term("name"), term("what it is"), term("paper and question"), term("study"), term("keys")),

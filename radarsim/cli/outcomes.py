@@ -76,28 +76,26 @@ def print_comparison(compared: "Compared") -> None:
     """What stored results differ by at the last common time, and where the files are."""
     from radarsim.report import compare
 
-    rows = [
-        (
-            f"{row['label']}, {row['filter']}",
-            *(row["component"] or str(row["model"]), tr("{t_s:g} s", t_s=row["t_s"])),
-            *(f"{compare.value(row[key])} {tr(unit_of(row['unit']))}" for key in ("value", "against")),
-            compare.change(row),
-        )
-        for row in compared.last
-        if row["quantity"] == compared.last[0]["quantity"]
-    ]
-    if len(rows) <= MOST_ROWS:
-        against = {row["against_label"] for row in compared.last}
-        columns = (
-            "",
-            "of",
-            "at",
-            "σ",
-            tr("σ of {name}", name=against.pop()) if len(against) == 1 else "σ against",
-            "change",
-        )
-        show("", columns, rows, right=columns[2:5], spare=("at",))
-    for line in compared.sentences if len(rows) > MOST_ROWS else ():
+    counted = [row for row in compared.last if row["quantity"] in dict(compared.told)]
+    against = {row["against_label"] for row in compared.last}
+    for quantity, words in compared.told if len(counted) <= MOST_ROWS else ():
+        rows = [
+            (
+                f"{row['label']}, {row['filter']}",
+                *(
+                    row["component"] or str(row["model"]),
+                    "" if row["t_s"] != row["t_s"] else f"{row['t_s']:g} {tr('s')}",
+                ),
+                *(f"{compare.value(row[key])} {tr(unit_of(row['unit']))}".rstrip() for key in ("value", "against")),
+                compare.change(row),
+            )
+            for row in counted
+            if row["quantity"] == quantity
+        ]
+        name = tr("{quantity} of {symbol}", quantity=tr(words), symbol=next(iter(against)))
+        other = name if len(against) == 1 else tr("{quantity} against", quantity=tr(words))
+        show("", ("", "of", "at", words, other, "change"), rows, right=("at", words, other), spare=("at",))
+    for line in compared.sentences if len(counted) > MOST_ROWS else ():
         say(line)
     for line in compared.notes:
         field("note", line)

@@ -13,7 +13,7 @@ What a comparison says in sentences.
 Figures of a comparison: each quantity of all sides on common axes, and beside it the differences.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,6 +23,7 @@ from radarsim.language import plural, term, tr
 from radarsim.report import seen, tables
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Mark, Panel, Reference, Style
 from radarsim.report.panels import MOST, left_out, letter, line, literal, time_axis, with_unit
+from radarsim.report.quantities import COMMON, SIGMA, Quantity
 from radarsim.report.statistics import Estimate, difference
 from radarsim.report.wording import UNITS, interval, significant_digits
 
@@ -31,25 +32,6 @@ if TYPE_CHECKING:
 
 
 # ---- sides -----------------------------------------------------------------------------------------------------------
-class Series(NamedTuple):
-    """A measured quantity of a stored table: its columns, that of exact values; whether it is compared in per cent."""
-
-    table: str
-    value: str
-    lo: str
-    hi: str
-    exact: str
-    words: str
-    unit: str
-    ratio: bool
-
-
-SERIES = (
-    Series("curves", "sigma", "sigma_lo", "sigma_hi", "exact_sigma", "σ", "", True),
-    Series("gains", "gain_percent", "gain_lo", "gain_hi", "exact_percent", "gain", "%", False),
-    Series("locks", "lock_rate", "lock_lo", "lock_hi", "", term("rate of locks"), "", False),
-    Series("probabilities", "probability", "probability_lo", "probability_hi", "", "probability", "", False),
-)
 LABELS = ("filter", "component", "model")  # that say which line a row is of; the time says where on it
 
 
@@ -58,7 +40,7 @@ class Side:
     """One case of one stored result.
 
     label is what it is called here; noise what its random numbers and its world depend on, None where that is not
-    known; count its realisations; tables its rows of the stored tables, by name.
+    known; count its realisations; tables its rows of the stored tables, by name; measured what its study measures.
     """
 
     run: str
@@ -67,6 +49,7 @@ class Side:
     noise: str | None
     count: int
     tables: "Mapping[str, pd.DataFrame]" = field(repr=False)
+    measured: tuple[Quantity, ...] = COMMON
 
     def rest(self) -> str:
         """The name of the case without its config's: the swept keys."""
@@ -122,8 +105,14 @@ DIGITS = 9  # of a time, by which rows find one another
 
 def compared(pairs: Sequence[Pair]) -> "pd.DataFrame":
     """A row for each value of a side that the other side has too."""
-    parts = [part for pair in pairs for series in SERIES if (part := _part(pair, series)) is not None]
+    parts = [part for pair in pairs for of in shared(pair) if (part := _part(pair, of)) is not None]
     return tables.joined(parts, COLUMNS)
+
+
+def shared(sides: Iterable[Side]) -> list[Quantity]:
+    """The quantities that are measured by two sides or more; what a share leaves of 1 differs as that does."""
+    found = [one for side in sides for one in side.measured if not one.rest]
+    return [one for one in dict.fromkeys(found) if found.count(one) > 1]
 
 
 def filters_of(side: Side) -> list[str]:
@@ -131,10 +120,11 @@ def filters_of(side: Side) -> list[str]:
     return list(dict.fromkeys(side.tables["curves"]["filter"])) if "curves" in side.tables else []
 
 
-def _part(pair: Pair, series: Series) -> dict[str, Any] | None:
+def _part(pair: Pair, of: Quantity) -> dict[str, Any] | None:
     """The columns of one quantity of one pair; None where they share no row."""
-    a, b = (side.tables.get(series.table) for side in pair)
-    if a is None or b is None or not len(a) or not len(b):
+    found = [side.tables.get(of.table) for side in pair]
+    a, b = (None if table is None or not len(table) else _rows(table, of) for table in found)
+    if a is None or b is None:
         return None
     own, other = filters_of(pair.side), filters_of(pair.against)
     alone = len(own) == len(other) == 1 and own != other  # two lone filters answer to one another by any name
@@ -146,15 +136,32 @@ def _part(pair: Pair, series: Series) -> dict[str, Any] | None:
     if not set(a["at"]) & set(b["at"]):  # no common time: the ends of both
         a, b = (rows.groupby(keys, sort=False).tail(1).assign(at=np.nan) for rows in (a, b))
     rows = a.merge(b, on=[*keys, "at"], suffixes=("", "_b"))
-    return _columns(pair, series, rows) if len(rows) else None
+    return _columns(pair, of, rows) if len(rows) else None
 
 
-def _columns(pair: Pair, series: Series, rows: "pd.DataFrame") -> dict[str, Any]:
+def _rows(table: "pd.DataFrame", of: Quantity) -> "pd.DataFrame":
+    """Rows of a quantity's table with the columns of `LABELS`, `unit`, `t_s`, `value`, `lo`, `hi` and `exact`.
+
+    The first ones as far as it has them; without times these are not-a-number.
+    """
+    values, exact = of.read(table)
+    labels = {"filter": "filter", of.per if of.per in LABELS else "component": of.per, "unit": "unit"}
+    return tables.frame(
+        {
+            **{name: table[column].to_numpy() for name, column in labels.items() if column in table},
+            "t_s": table["t_s"].to_numpy(dtype=float) if "t_s" in table else np.full(len(table), np.nan),
+            **tables.interval_columns("value", values, ""),
+            "exact": exact,
+        }
+    )
+
+
+def _columns(pair: Pair, of: Quantity, rows: "pd.DataFrame") -> dict[str, Any]:
     n = len(rows)
     empty, blank = np.full(n, np.nan), np.full(n, "", dtype=object)
-    unit = np.full(n, series.unit, dtype=object)
-    measured, other = (_estimate(rows, series, end) for end in ("", "_b"))
-    rho, pairing = correlation(pair, series, rows)
+    unit = np.full(n, of.unit, dtype=object)
+    measured, other = (_estimate(rows, end) for end in ("", "_b"))
+    rho, pairing = correlation(pair, of, rows)
     same = pairing == SAME
 
     def apart_of(one: Estimate, two: Estimate) -> Estimate:
@@ -162,15 +169,16 @@ def _columns(pair: Pair, series: Series, rows: "pd.DataFrame") -> dict[str, Any]
         return Estimate(apart.value, *(np.where(same, apart.value, end) for end in apart[1:]))
 
     apart = apart_of(measured, other)
-    exact, against_exact = (_column(rows, f"{series.exact}{end}", empty) for end in ("", "_b"))
+    exact, against_exact = (rows[f"exact{end}"].to_numpy() for end in ("", "_b"))
     percent, exact_percent = Estimate(empty, empty, empty), empty
-    if series.ratio:
+    if of.kind == "size":
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = apart_of(*(Estimate(*map(np.log, of)) for of in (measured, other)))
-            percent = Estimate(*(100 * np.expm1(end) for end in ratio))
+            ratio = apart_of(*(Estimate(*map(np.log, side)) for side in (measured, other)))
+            known = np.isfinite(ratio.value)  # not where either was never seen
+            percent = Estimate(*(np.where(known, 100 * np.expm1(end), np.nan) for end in ratio))
             exact_percent = 100 * (exact / against_exact - 1)
     return {
-        "quantity": np.full(n, series.value, dtype=object),
+        "quantity": np.full(n, of.value, dtype=object),
         **{name: _column(rows, name, blank) for name in LABELS},
         "unit": _column(rows, "unit", unit),
         "t_s": rows["t_s"].to_numpy(dtype=float),
@@ -197,19 +205,19 @@ def _column(rows: "pd.DataFrame", name: str, absent: np.ndarray) -> np.ndarray:
     return rows[name].to_numpy() if name in rows else absent
 
 
-def _estimate(rows: "pd.DataFrame", series: Series, end: str) -> Estimate:
-    return Estimate(*(rows[f"{name}{end}"].to_numpy(dtype=float) for name in (series.value, series.lo, series.hi)))
+def _estimate(rows: "pd.DataFrame", end: str) -> Estimate:
+    return Estimate(*(rows[f"{name}{end}"].to_numpy(dtype=float) for name in ("value", "lo", "hi")))
 
 
-def correlation(pair: Pair, series: Series, rows: "pd.DataFrame") -> tuple[np.ndarray, np.ndarray]:
+def correlation(pair: Pair, of: Quantity, rows: "pd.DataFrame") -> tuple[np.ndarray, np.ndarray]:
     """Of each row the correlation of both estimates, as bad as it can be, and in a word what is known of it."""
     n = len(rows)
     if not pair.common_noise:
         return np.zeros(n), np.full(n, INDEPENDENT, dtype=object)
-    a, b = (_estimate(rows, series, end) for end in ("", "_b"))
+    a, b = (_estimate(rows, end) for end in ("", "_b"))
     same = np.all([x == y for x, y in zip(a, b, strict=True)], axis=0)
     rho = np.full(n, -1.0)
-    if series.ratio and pair.side.count == pair.against.count:
+    if of == SIGMA and pair.side.count == pair.against.count:
         one = _with_baseline(pair.side, rows, "filter")
         two = _with_baseline(pair.against, rows, "against_filter")
         linked = _same_baseline(pair, rows)
@@ -265,16 +273,14 @@ def _same_baseline(pair: Pair, rows: "pd.DataFrame") -> np.ndarray:
 MOST_SENTENCES = 12  # sentences; the table has all
 
 
-def sentences(made: "pd.DataFrame") -> list[str]:
-    """At the last common time, of the first component of each quantity: both values, and by how much they differ."""
+def sentences(made: "pd.DataFrame", measured: Iterable[Quantity] = COMMON) -> list[str]:
+    """At the last common time, of the first component of what is told: both values, and by how much they differ."""
     last = at_the_end(made)
-    lines = []
-    for quantity, rows in last.groupby("quantity", sort=False):
-        series = next(one for one in SERIES if one.value == quantity)
+    lines: list[str] = []
+    for of in told(made, measured):
+        rows = last[last["quantity"] == of.value]
         first = tables.where(rows, component=rows["component"].iloc[0], model=rows["model"].iloc[0])
-        lines += [_sentence(series.words, row) for row in first.to_dict("records")]
-        if series.ratio:
-            break  # gains and shares of the same filters stand in the table
+        lines += [_sentence(of.words, row) for row in first.to_dict("records")]
     left = len(lines) - MOST_SENTENCES
     return lines[:MOST_SENTENCES] + (
         [
@@ -289,6 +295,12 @@ def sentences(made: "pd.DataFrame") -> list[str]:
     )
 
 
+def told(made: "pd.DataFrame", measured: Iterable[Quantity]) -> list[Quantity]:
+    """What is spoken of: the first one, and what follows neither from it, as gains do, nor is one of many shares."""
+    found = [of for of in measured if (made["quantity"] == of.value).any()]
+    return [of for n, of in enumerate(found) if not n or (not of.paired and of.per in ("", "component"))]
+
+
 def at_the_end(made: "pd.DataFrame") -> "pd.DataFrame":
     """The rows of the last common time of each line."""
     keys = ["quantity", "label", "against_label", "filter", "component", "model"]
@@ -299,12 +311,14 @@ def _sentence(words: str, row: dict[Any, Any]) -> str:
     of = str(row["component"] or row["model"])
     unit = tr(UNITS.get(row["unit"], row["unit"]))
     other = f"{row['against_label']}" + ("" if row["against_filter"] == row["filter"] else f", {row['against_filter']}")
+    what = tr("{quantity} of {symbol}", quantity=tr(words), symbol=of) if of else tr(words)
+    if row["t_s"] == row["t_s"]:
+        what = tr("{what} at {t_s:g} s", what=what, t_s=row["t_s"])
     return tr(
-        "{label}, {filter}: {what} at {t_s:g} s {value} against {against} of {other}: {change}.",
+        "{label}, {filter}: {what} {value} against {against} of {other}: {change}.",
         label=row["label"],
         filter=row["filter"],
-        what=tr("{quantity} of {symbol}", quantity=tr(words), symbol=of) if of else tr(words),
-        t_s=row["t_s"],
+        what=what,
         value=f"{value(row['value'])} {unit}".rstrip(),
         against=f"{value(row['against'])} {unit}".rstrip(),
         other=other,
@@ -360,40 +374,37 @@ def figures(sides: Sequence[Side], made: "pd.DataFrame") -> dict[str, Figure]:
 
     made is table.compared's. Of more than eight sides the first eight are drawn, and the caption says so.
     """
-    drawn = {}
+    drawn, measured = {}, {one.value: one for one in shared(sides)}
     for (quantity, component, model), rows in made.groupby(["quantity", "component", "model"], sort=False):
-        series = next(one for one in SERIES if one.value == quantity)
+        of = measured[str(quantity)]
         component, model = str(component), str(model)
         if rows["t_s"].nunique() < 2:
             continue
-        parts = [series.value.removesuffix("_percent"), component, f"model{model}" if model else ""]
+        parts = [of.value.removesuffix("_percent"), component, f"model{model}" if model else ""]
         name = "_".join(filter(None, parts))
-        drawn[name] = _figure(name, series, sides, rows, component, model)
+        drawn[name] = _figure(name, of, sides, rows, component, model)
     return drawn
 
 
-def _figure(
-    name: str, series: Series, sides: Sequence[Side], rows: "pd.DataFrame", component: str, model: str
-) -> Figure:
+def _figure(name: str, of: Quantity, sides: Sequence[Side], rows: "pd.DataFrame", component: str, model: str) -> Figure:
     taking_part = {*rows["label"], *rows["against_label"]}
     every = [side for side in sides if side.label in taking_part]
     some = every[:MOST]
     filters = list(dict.fromkeys(f for side in some for f in filters_of(side)))
     unit = rows["unit"].iloc[0]
     symbol = letter(component) if component else model
-    what = f"{tr(series.words)} {symbol}".strip()
-    if series.value in ("sigma", "gain_percent"):
-        words = {"sigma": term("$\\sigma$ of {symbol}"), "gain_percent": term("gain in $\\sigma$ of {symbol}")}
-        what = tr(words[series.value], symbol=symbol)
-    values = [mark for n, side in enumerate(some) for mark in _values(series, side, n, filters, component, model)]
-    apart = _apart(series, some, rows, filters)
+    what = tr(of.axis, symbol=symbol) if of.axis else f"{tr(of.words)} {symbol}".strip()
+    values = [mark for n, side in enumerate(some) for mark in _values(of, side, n, filters, component, model)]
+    apart = _apart(of, some, rows, filters)
     keys = [(literal(side.label), Style(n, 0)) for n, side in enumerate(some)]
     keys += [(literal(f), Style(0, n, n)) for n, f in enumerate(filters)] if len(filters) > 1 else []
-    low = None if series.value == "gain_percent" else 0.0
+    low = None if of.kind == "signed" else 0.0
     y = Axis(with_unit(what, unit), limits=(low, None))
-    of = term("change") if series.ratio else term("difference")
+    apart_by = term("change") if of.kind == "size" else term("difference")
     against = rows["against_label"].iloc[0] if rows["against_label"].nunique() == 1 else tr("the first")
-    difference = Axis(with_unit(tr("{of} against {name}", of=of, name=literal(against)), "%" if series.ratio else unit))
+    difference = Axis(
+        with_unit(tr("{of} against {name}", of=apart_by, name=literal(against)), "%" if of.kind == "size" else unit)
+    )
     panels = (
         Panel(time_axis(), y, tuple(values), direct=False, legend="none"),
         Panel(time_axis(), difference, (Reference(0), *apart), keys=tuple(keys), legend="right"),
@@ -402,9 +413,9 @@ def _figure(
         tr(
             "Left: {words} of {value} on common axes. Right: the {of} against {against} at common times. "
             "Bands: 95 % intervals.",
-            words=series.words,
+            words=term(of.words),
             value=", ".join(side.label for side in some),
-            of=of,
+            of=apart_by,
             against=against,
         )
     ) + left_out([side.label for side in every], [side.label for side in some])
@@ -413,24 +424,25 @@ def _figure(
     return seen.crossed(seen.begun(figure, tr("Right: {told}", told=told[0].lower() + told[1:]) if told else ""))
 
 
-def _values(series: Series, side: Side, n: int, filters: Sequence[str], component: str, model: str) -> list[Mark]:
+def _values(of: Quantity, side: Side, n: int, filters: Sequence[str], component: str, model: str) -> list[Mark]:
     """A line for each filter of a side."""
-    table, marks = side.tables.get(series.table), list[Mark]()
+    table, marks = side.tables.get(of.table), list[Mark]()
     if table is None:
         return marks
+    rows = _rows(table, of)
     for i, f in enumerate(filters):
-        own = table[table["filter"] == f]
+        own = rows[rows["filter"] == f]
         own = own[own["component"] == component] if component else own
         own = own[own["model"] == model] if "model" in own and model else own
         if len(own):
-            columns = ["t_s", series.value, series.lo, series.hi, *([series.exact] if series.exact else [])]
+            columns = ("t_s", "value", "lo", "hi", "exact")
             marks.append(line(own, columns, "", Style(n, i, i), f"{literal(side.label)}, {literal(f)}"))
     return marks
 
 
-def _apart(series: Series, sides: Sequence[Side], rows: "pd.DataFrame", filters: Sequence[str]) -> list[Mark]:
+def _apart(of: Quantity, sides: Sequence[Side], rows: "pd.DataFrame", filters: Sequence[str]) -> list[Mark]:
     """A line for each filter of each side that is compared with another."""
-    value, exact = ("percent", "exact_percent") if series.ratio else ("difference", "")
+    value, exact = ("percent", "exact_percent") if of.kind == "size" else ("difference", "")
     numbers, marks = {side.label: n for n, side in enumerate(sides)}, list[Mark]()
     several = rows["against_label"].nunique() > 1
     for key, own in rows.groupby(["label", "against_label", "filter"], sort=False):

@@ -1,0 +1,188 @@
+"""Quantities that only a study of an installed package declares: asked for by every command that asks for one."""
+
+import json
+
+import pandas as pd
+import pytest
+
+from radarsim.app.quantities import Wanted
+from radarsim.app.solve import solve
+from tests.studies import outside
+
+STUDY = '''
+from radarsim.report.quantities import Quantity
+from radarsim.studies.folder import StudyFolder
+
+QUANTITIES = (
+    Quantity("area", "mean square error", "areas", "area", per="component", unit="m2"),
+    Quantity("worst_case", "largest error", "worst", "worst|most", unit="m"),
+    Quantity("inside", "share within 100 m", "worst", "inside", kind="share", more_is_better=True),
+    Quantity("limit", "smallest error", "limits", "limit", unit="m"),
+)
+
+
+class Areas(StudyFolder):
+    """Range and Doppler again, with tables of its own: squares of sigma, and its largest one without scans."""
+
+    def tables(self, results):
+        curves = self.curves(results)
+        names = {"sigma": "area", "sigma_lo": "area_lo", "sigma_hi": "area_hi", "exact_sigma": "exact_area"}
+        areas = curves[["case", "filter", "component", "k", "t_s"]].assign(
+            **{new: curves[old] ** 2 for old, new in names.items()}
+        )
+        rows = curves[(curves["component"] == "r") & (curves["k"] >= 5)]
+        worst = rows.loc[rows.groupby(["case", "filter"], sort=False)["sigma"].idxmax()]
+        worst = worst.rename(columns={"sigma": "worst", "sigma_lo": "most_lo", "sigma_hi": "most_hi"})
+        worst = worst[["case", "filter", "worst", "most_lo", "most_hi"]]
+        share = {f"inside{end}": 100 / worst[of] for end, of in (("", "worst"), ("_lo", "most_hi"), ("_hi", "most_lo"))}
+        least = rows.groupby(["case", "filter"], sort=False)["exact_sigma"].min().rename("limit").reset_index()
+        return {"areas": areas, "worst": worst.assign(**share), "limits": least}
+
+    def answer(self, results, made):
+        return ["Areas."]
+
+
+STUDY = Areas(
+    package="radarsim.studies.range_doppler",
+    name="areas",
+    about="Range and Doppler, by areas.",
+    filters={"observes: [range]": "Kalman filter on range"},
+    own_quantities=QUANTITIES,
+)
+'''
+CONFIG = """
+study: areas
+radar: {wavelength_m: 0.15, sigma_range_m: 250, sigma_velocity_mps: 15, scan_period_s: 10}
+target: {kind: polynomial, coefficients: [100e3, -250, 4]}
+filters:
+  - {name: r, observes: [range], manoeuvre_variance: 1e-3}
+  - {name: r+Vr, observes: [range, velocity], manoeuvre_variance: 1e-3}
+scans: 9
+realisations: 8000
+"""
+KEY = "radar.sigma_velocity_mps"
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder with two configs, a.yaml and b.yaml, of the study of a package in its folder `site`."""
+    folder = tmp_path_factory.mktemp("quantities")
+    (folder / "site/areas_of").mkdir(parents=True)
+    (folder / "site/areas_of/__init__.py").write_text(STUDY)
+    outside.metadata(folder / "site", "areas-of", "1.0", {"areas": "areas_of:STUDY"})
+    (folder / "a.yaml").write_text(CONFIG)
+    (folder / "b.yaml").write_text(CONFIG.replace("sigma_velocity_mps: 15", "sigma_velocity_mps: 5"))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def radarsim(place):
+    """The real command, beside the installed package."""
+    yield from outside.forking(place / "site", place)
+
+
+def solved(radarsim, *words):
+    return json.loads(radarsim("solve", "a.yaml", KEY, *words, "--json").stdout)
+
+
+def test_help_lists_them_with_their_units(radarsim):
+    said = " ".join(radarsim("solve", "--help").stdout.split())
+    assert "--area COMPONENT Mean square error, m2 (areas)." in said
+    assert "--worst-case NAME Largest error, m (areas)." in said
+    assert "--inside NAME Share within 100 m, % (areas)." in said
+
+
+def test_solve_finds_the_root_of_an_exact_one(radarsim):
+    """The square of σ is 10⁴ m² where σ is 100 m; the latter by the shipped study."""
+    found = solved(radarsim, "--area", "r", "--filter", "r+Vr", "--at-k", 9, "--equals", 1e4)
+    known = solve("rls2", KEY, Wanted("sigma", "r+Vr", "r", at_k=9), 100.0, overrides=["scans=9"])
+    assert found["exact"]
+    assert found["value"] == pytest.approx(known.value, rel=1e-9)
+    assert (found["quantity"], found["quantity_unit"]) == ("mean square error of r+Vr in r at k = 9", "m2")
+
+
+def test_solve_takes_one_from_a_table_of_exact_values_alone(radarsim):
+    """A limit over all scans: no interval, and no scan to be asked at."""
+    least = solved(radarsim, "--limit", "r+Vr", "--equals", 100)
+    known = solve("rls2", KEY, Wanted("sigma", "r+Vr", "r"), 100.0, overrides=["scans=9"])
+    assert least["exact"]
+    assert least["value"] == pytest.approx(known.value, rel=1e-9)
+
+
+def test_solve_samples_one_without_exact_values(radarsim):
+    found = solved(radarsim, "--worst-case", "r+Vr", "--equals", 150, "-n", 300, "--between", 5, 60)
+    assert not found["exact"]
+    assert found["lo"] < found["value"] < found["hi"]
+    share = solved(radarsim, "--inside", "r+Vr", "--equals", 100 * 100 / 150, "-n", 300, "--between", 5, 60)
+    assert share["value"] == pytest.approx(found["value"], rel=0.01)  # the same function in per cent
+    assert share["quantity_unit"] == "%"
+
+
+def test_a_run_ends_at_its_precision(radarsim, tmp_path):
+    """A square is known half as well as its root: 4.4 % at 4000 realisations, 3.1 % at 8000."""
+    words = ("--no-figures", "--json", "--out", tmp_path)
+    for of, components, done in (("area", {"r", "Vr", "ar"}, 8000), ("worst_case", {""}, 2000), ("inside", {""}, 2000)):
+        (document,) = json.loads(radarsim("run", "a.yaml", "--precision", 4, "--of", of, *words).stdout)
+        assert document["cases"]["a"]["done"] == done
+        widest = document["precision"]["widest"]["a"]
+        assert widest["of"] == of
+        assert widest["component"] in components
+        assert widest["percent"] < 4
+    missed = radarsim("run", "a.yaml", "--precision", 1, "--of", "area", *words, code=3).stderr
+    assert ": mean square error ± 3." in missed
+    need = json.loads(radarsim("check", "a.yaml", "--precision", 4, "--of", "area", "--json").stdout)
+    assert need[0]["of"] == "area"
+    assert need[0]["cases"][0]["need"]["realisations"] == 8000
+
+
+def test_sensitivity_is_of_it(radarsim, tmp_path):
+    """To first order a square changes by twice as much; exactly by the square of the factor."""
+    words = ("--at-k", 9, "--out", tmp_path, "--format", "svg", "--json")
+    area, sigma = (
+        json.loads(radarsim("sensitivity", "a.yaml", *of, *words).stdout)
+        for of in (("--of", "area"), ("--of", "sigma"))
+    )
+    assert (area["of"], area["leading"]) == (["area"], "r")
+    for one, other in zip(area["rows"], sorted(sigma["rows"], key=sigma["rows"].index), strict=True):
+        factor = 1 + other["sigma_change_percent"] / 100
+        assert one["area_change_percent"] == pytest.approx(100 * (factor**2 - 1), abs=1e-7)
+    said = radarsim("sensitivity", "a.yaml", "--of", "inside", "-n", 400, "--out", tmp_path).stdout.splitlines()
+    assert said[0] == "a: change of share within 100 m at the last scan for +10 %"
+    assert "share within 100 m of r, points" in said[1]
+    rows = pd.read_csv(tmp_path / "sensitivity/a/sensitivity.csv")
+    assert {"inside_percent", "inside_change_points", "inside_change_lo"} <= set(rows)
+    assert set(rows["unit"]) == {"%"}
+    assert (tmp_path / "sensitivity/a/tornado.svg").exists()
+
+
+def test_compare_puts_them_side_by_side(radarsim, tmp_path):
+    for name in "ab":
+        radarsim("run", f"{name}.yaml", "-n", 400, "--no-figures", "--out", tmp_path)
+    said = radarsim("compare", "b.yaml", "a.yaml", "--format", "svg", "--out", tmp_path).stdout
+    made = pd.read_csv(tmp_path / "compare/comparison.csv")
+    assert {"sigma", "gain_percent", "area", "worst", "inside", "limit"} == set(made["quantity"])
+    areas, sigmas = (
+        made[(made["quantity"] == name) & (made["component"] == "r")].reset_index() for name in ("area", "sigma")
+    )
+    assert areas["exact_percent"].to_numpy() == pytest.approx(100 * ((1 + sigmas["exact_percent"] / 100) ** 2 - 1))
+    assert set(made.loc[made["quantity"] == "area", "unit"]) == {"m2"}
+    assert ["of", "at", "largest", "error", "largest", "error", "of", "b", "change"] in map(
+        str.split, said.splitlines()
+    )
+    assert "nan" not in said
+    figures = {path.stem for path in (tmp_path / "compare/figures").glob("*.svg")}
+    assert {"area_r", "area_Vr", "sigma_r"} <= figures
+    assert "mean square error" in (tmp_path / "compare/figures/captions.md").read_text(encoding="utf-8")
+
+
+def test_what_a_study_does_not_measure_is_refused_with_what_it_does(radarsim, tmp_path):
+    lacking = "study areas measures no 'lock', but sigma, gain, area, worst_case, inside, limit\n"
+    for words in (
+        ("solve", "a.yaml", KEY, "--lock", "r", "--equals", 1),
+        ("run", "a.yaml", "--precision", 1, "--of", "lock", "--out", tmp_path),
+        ("sensitivity", "a.yaml", "--of", "lock", "--out", tmp_path),
+    ):
+        assert radarsim(*words, code=2).stderr == f"a: {lacking}"
+    named = radarsim("solve", "a.yaml", KEY, "--area", "q", "--filter", "r", "--equals", 1, code=2).stderr
+    assert named == "no component 'q'; there are: r, Vr, ar\n"
+    assert radarsim("solve", "rls2", KEY, "--area", "r", "--equals", 1, code=2).stderr.endswith("but sigma, gain\n")
