@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 import radarsim
 from radarsim.app.configs import load
@@ -272,7 +272,7 @@ def test_wrong_folds_are_those_of_plain_realisations(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_wrong_folds_are_those_of_plain_realisations_on_twenty_seeds(name):
-    """At 10⁻³ and 10⁻⁴: every difference within three standard errors, and these no wider than they are."""
+    """At 10⁻³ and 10⁻⁴: in one try of a hundred any difference is beyond the bound; means are not shifted."""
     one, keys = CASES[name]
     case = case_of(one, 10, **keys)
     plan, z = study.prepare(case), []
@@ -280,7 +280,7 @@ def test_wrong_folds_are_those_of_plain_realisations_on_twenty_seeds(name):
         mean, error = rate(reseeded(plan, seed), 20_000)
         plain, plain_error = brute(case, 100 + seed, 200_000)
         z.append((mean - plain) / math.hypot(error, plain_error))
-    assert np.abs(z).max() < 3
+    assert np.abs(z).max() < ndtri(1 - 0.005 / (20 * len(CASES)))
     assert abs(np.mean(z)) < 3 / math.sqrt(20)
 
 
