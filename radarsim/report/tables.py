@@ -183,7 +183,8 @@ def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
     sigma ± [unit]: root of the mean squared error: sigma² = bias² + spread²
     bias, bias_se [unit]: mean error, and its standard error
     spread [unit]: standard deviation of the errors
-    n_eff: realisations that stand behind σ where a few large errors decide, n/(κ − 1)
+    n_eff: realisations that stand behind σ where a few large errors decide: n/(κ − 1), κ the fourth moment over the
+        squared second; half of n for Gaussian errors
     """
     return joined(map(_curves, results))
 

@@ -224,7 +224,7 @@ def _motion(result: CaseResult) -> common.Columns:
     band: metre, decimetre or centimetre
     wavelength_m: its wavelength
     at: beginning or middle of the burst
-    sigma_velocity_mps, sigma_acceleration_mps2: spread of radial velocity and acceleration there
+    sigma_velocity_mps, sigma_acceleration_mps2: potential σ of the radial velocity and acceleration there
     """
     axes, rows = result.axes, []
     covariance, duration = axes.potential_covariance, axes.burst_s

@@ -77,7 +77,7 @@ def steady(results: Sequence[Result]) -> "pd.DataFrame":
     last_sigma ± last [unit]: σ measured at the last scan
     settling_periods, settling_s [scan periods, s]: time from which on the exact σ stays within 5 % of its steady value
         to the end of the run; `inf` if it does not
-    under_10_periods: whether it settles within ten scan periods
+    under_10_periods: whether it settles in under ten scan periods
     best: whether its steady σ is the least of those that do, among the D_M tried for one radar
     """
     rows = [row for result in results if follows_the_model(result) and result.axes.plain for row in _steady(result)]
