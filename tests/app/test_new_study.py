@@ -4,18 +4,15 @@ That the package works is tested by tests/studies/test_outside.py.
 """
 
 import pytest
-from click.testing import CliRunner
 
 from radarsim.app import reproduce
-from radarsim.cli import main
 from radarsim.errors import ConfigError, StoreError
+from tests.program import command
 
 
 def test_the_command_writes_a_package_under_its_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(main, ["new-study", "my_paper"])
-    assert done.exit_code == 0, done.output
-    assert "pip install -e my_paper" in done.output
+    assert "pip install -e my_paper" in command("new-study", "my_paper").output
     written = [file for file in sorted((tmp_path / "my_paper").rglob("*")) if file.is_file()]
     assert len(written) == len(reproduce.files())
     assert (tmp_path / "my_paper/src/my_paper/shipped/configs/my_paper.yaml").is_file()
