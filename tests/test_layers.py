@@ -38,6 +38,7 @@ ROOMS = {
     "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "report.quantities", "studies.interface"),
     "studies.onefile": ("errors", "language", *CASE, *DATA, "report", "studies.interface", "studies.judged"),
     "studies.linear": (*("errors", "kernels", *CASE, *DATA, "studies.interface", "studies.noise"), "studies.onefile"),
+    "studies.stepwise": ("errors", *CASE, *DATA, "kernels", "report", "studies.noise", "studies.onefile"),
     "studies.judged": ("errors", "config", *DATA, "report"),  # claims and readings of studies in one file
     "studies.registry": ("errors", "config", "report.quantities", "studies.interface"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry"),

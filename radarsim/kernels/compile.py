@@ -209,11 +209,13 @@ def rests_on(function: Callable) -> str:
 
 
 def described(value: object) -> str:
-    """Numbers and texts of a value as they are, functions by their names; of anything else nothing."""
+    """Numbers and texts of a value as they are, functions and programs by their names; of anything else nothing."""
     if isinstance(value, list | tuple):
         return f"({', '.join(map(described, value))})"
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
+    if isinstance(made := getattr(value, "made_of", None), str):  # what runs a program of `kernels.traced`
+        return made
     value = getattr(value, "__wrapped__", value)
     if isinstance(value, FunctionType):
         return f"{value.__module__}.{value.__qualname__}"

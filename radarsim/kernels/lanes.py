@@ -20,10 +20,12 @@ from numba.core.typing.templates import ConcreteTemplate, infer_global, make_int
 from numba.extending import intrinsic, lower_builtin, models, register_model
 from numba.np.arrayobj import make_array
 
+from radarsim.kernels import traced
 from radarsim.kernels.compile import inline
 from radarsim.kernels.formula import Formula
 
 WIDTH = 8
+ROOT_HALF = 0x3FE6A09E667F3BCD  # √½ as its bits: a number is m 2**e with m from there to √2
 VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 INTEGERS = ir.VectorType(ir.IntType(64), WIDTH)
 
@@ -57,6 +59,15 @@ def _spread(builder, number):
     first = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
     everywhere = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
     return builder.shuffle_vector(first, ir.Constant(VECTOR, ir.Undefined), everywhere)
+
+
+def _everywhere(number):
+    return ir.Constant(INTEGERS, [number] * WIDTH)
+
+
+def _power_of_two(builder, x):
+    exponent = builder.add(builder.fptosi(x, INTEGERS), _everywhere(1023))
+    return builder.bitcast(builder.shl(exponent, _everywhere(52)), VECTOR)
 
 
 def _called(builder, name, value):
@@ -97,7 +108,7 @@ def for_arrays(plain):
     return decorated
 
 
-@for_arrays(lambda x, y, yes, no: np.where(x > y, yes, no))
+@for_arrays(lambda x, y, yes, no: traced.where(x > y, yes, no))
 @intrinsic
 def where_greater(typingctx, x, y, yes, no):
     """Lane by lane: yes where x > y, else no. Every choice (maximum, minimum, a merging rule) is made of it."""
@@ -126,6 +137,7 @@ def full(typingctx, number):
     return lanes(types.float64), lambda context, builder, sig, args: _spread(builder, args[0])
 
 
+@for_arrays(traced.sqrt)
 @intrinsic
 def root(typingctx, x):
     """Square root, lane by lane."""
@@ -136,6 +148,7 @@ def root(typingctx, x):
     return lanes(lanes), generate
 
 
+@for_arrays(traced.nearest)
 @intrinsic
 def nearest(typingctx, x):
     """The nearest whole number, ties to even, lane by lane."""
@@ -146,16 +159,13 @@ def nearest(typingctx, x):
     return lanes(lanes), generate
 
 
+@for_arrays(traced.power_of_two)
 @intrinsic
 def power_of_two(typingctx, x):
     """2**x for whole numbers x from -1022 to 1023, written into the exponent."""
 
     def generate(context, builder, sig, args):
-        def everywhere(number):
-            return ir.Constant(INTEGERS, [number] * WIDTH)
-
-        exponent = builder.add(builder.fptosi(args[0], INTEGERS), everywhere(1023))
-        return builder.bitcast(builder.shl(exponent, everywhere(52)), VECTOR)
+        return _power_of_two(builder, args[0])
 
     return lanes(lanes), generate
 
@@ -346,3 +356,63 @@ def lane3(pointer, first):
 def put_lane3(pointer, first, x):
     """Write three plain numbers of one lane."""
     pointer[first * WIDTH], pointer[(first + 1) * WIDTH], pointer[(first + 2) * WIDTH] = x
+
+
+# ---- programs ------------------------------------------------------------------------------------------------------
+def emitted(program: traced.Program):
+    """An intrinsic that runs a program on eight realisations: its arrays are given by their addresses, as a tuple."""
+
+    @intrinsic
+    def run(typingctx, arrays):
+        def generate(context, builder, sig, args):
+            pointers, made = cgutils.unpack_tuple(builder, args[0]), []
+            for op, *of in program.ops:
+                if op in ("row", "plain"):
+                    made.append(_read(builder, op, pointers[of[0]], of[1]))
+                elif op == "number":
+                    made.append(ir.Constant(VECTOR, [of[0]] * WIDTH))
+                else:
+                    made.append(_operation(builder, op, [made[at] for at in of]))
+            for array, number, at in program.outputs:
+                where = _row_pointer(builder, pointers[array], ir.Constant(ir.IntType(64), number))
+                builder.store(made[at], where).align = 8
+            return context.get_dummy_value()
+
+        return types.none(arrays), generate
+
+    run.made_of = program.digest  # what a kernel with it in it is kept by
+    return run
+
+
+def _read(builder, op, pointer, number):
+    index = ir.Constant(ir.IntType(64), number)
+    if op == "plain":
+        return _spread(builder, builder.load(builder.gep(pointer, [index])))
+    value = builder.load(_row_pointer(builder, pointer, index))
+    value.align = 8
+    return value
+
+
+CALLED = {"sqrt": "llvm.sqrt.v8f64", "nearest": "llvm.rint.v8f64"}
+
+
+def _operation(builder, op, values):
+    if op in traced.ARITHMETIC.values():
+        return getattr(builder, op)(*values)
+    if op in traced.COMPARED.values():
+        return builder.fcmp_ordered(op, *values)
+    if op in CALLED:
+        return _called(builder, CALLED[op], *values)
+    if op == "where":
+        return builder.select(*values)
+    if op in ("and", "or"):
+        return getattr(builder, f"{op}_")(*values)
+    if op == "not":
+        return builder.not_(*values)
+    if op == "power_of_two":
+        return _power_of_two(builder, *values)
+    bits = builder.bitcast(values[0], INTEGERS)
+    power = builder.ashr(builder.sub(bits, _everywhere(ROOT_HALF)), _everywhere(52))
+    if op == "exponent":
+        return builder.sitofp(power, VECTOR)
+    return builder.bitcast(builder.sub(bits, builder.shl(power, _everywhere(52))), VECTOR)

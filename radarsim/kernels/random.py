@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from radarsim.kernels.compile import inline, kernel
-from radarsim.kernels.lanes import address, get, put
+from radarsim.kernels.lanes import ROOT_HALF, address, get, put
 
 LAYOUT = 2
 LANE_BITS = 3
@@ -64,14 +64,19 @@ def threefry(x0, x1, k0, k1):
 
 @inline
 def log_polynomial(x):
-    """Natural logarithm of a positive normal number, to 3 units in the last place.
-
-    x = m 2^e with m from √½ to √2, and log m = 2 atanh s = s (2 + q p(q)) with s = (m - 1) / (m + 1), q = s². p is the
-    polynomial of least greatest error (Remez's algorithm in 50 digits): 1.2e-18 of the logarithm.
-    """
+    """Natural logarithm of a positive normal number, to 3 units in the last place."""
     b = np.float64(x).view(np.int64)
-    e = (b - np.int64(0x3FE6A09E667F3BCD)) >> np.int64(52)
-    m = np.int64(b - (e << np.int64(52))).view(np.float64)
+    e = (b - np.int64(ROOT_HALF)) >> np.int64(52)
+    return log_series(np.int64(b - (e << np.int64(52))).view(np.float64), np.float64(e))
+
+
+@inline
+def log_series(m, e):
+    """Natural logarithm of m 2^e with m from √½ to √2.
+
+    log m = 2 atanh s = s (2 + q p(q)) with s = (m - 1) / (m + 1), q = s². p is the polynomial of least greatest error
+    (Remez's algorithm in 50 digits): 1.2e-18 of the logarithm.
+    """
     s = (m - 1.0) / (m + 1.0)
     q = s * s
     p = q * 0.1479594981044202 + 0.15314050542046614
@@ -80,7 +85,7 @@ def log_polynomial(x):
     p = p * q + 0.28571428742387633
     p = p * q + 0.39999999999414676
     p = p * q + 0.6666666666666734
-    return np.float64(e) * 0.69314718055994531 + s * (p * q + 2.0)
+    return e * 0.69314718055994531 + s * (p * q + 2.0)
 
 
 @inline

@@ -517,6 +517,26 @@ def family_panel(title: str, members: Sequence[CaseResult], rows: Mapping, words
     return keyed(Panel(time_axis(), fitting_axis(words, marks), (Reference(1), *marks), title), members)
 
 
+NEES = term("NEES per component\n(1 = consistent, below = pessimistic)")
+
+
+def nees_panels(results: Sequence[CaseResult], rows: Mapping) -> list[Panel]:
+    """NEES against time, a panel for each config; rows by case, filter and `nees`."""
+    every = [family_panel(title, members, rows, tr(NEES)) for title, members in by_panel(results).items()]
+    return [panel for panel in every if len(panel.marks) > 1]
+
+
+def nees_figure(drawn: Sequence[Panel], left_out: str) -> Figure:
+    """The figure `consistency` of such panels; what is left out of them goes into its caption."""
+    caption = tr(
+        "Mean of the normalised squared error eᵀP⁻¹e per estimated component, P the covariance that "
+        "the filter believes; one (dotted) for a filter that is right about itself, more for an "
+        "optimistic one, less for a pessimistic one."
+    )
+    title = tr("What the filters believe of themselves")
+    return in_columns(Figure("consistency", title, caption + left_out, tuple(drawn)))
+
+
 def keyed(panel: Panel, members: Sequence[CaseResult], baseline: bool = True) -> Panel:
     """A panel whose legend explains dashes by filter and colours by swept value; few lines are named at their ends.
 

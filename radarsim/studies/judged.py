@@ -11,6 +11,8 @@ from dataclasses import replace
 from operator import attrgetter
 from typing import Any
 
+import numpy as np
+
 from radarsim.config.check import check
 from radarsim.config.document import Document, Faults, Origin
 from radarsim.config.experiment import Case
@@ -20,7 +22,8 @@ from radarsim.errors import ConfigError
 from radarsim.report import claims
 from radarsim.report.claims.declared import Claim, Series
 from radarsim.report.claims.over import Choice, PaperReadings, Reading, Unreadable
-from radarsim.report.statistics import Estimate, difference
+from radarsim.report.statistics import Estimate, difference, mean
+from radarsim.report.tables import realisations
 
 CLOSE = 1e-9  # relative: one number written in two ways
 
@@ -71,6 +74,29 @@ def gain_change(
 def ratio(seen: Evidence, case: Any, filter: str, over: str, component: str, at: int | None = None) -> Estimate:
     """σ of a filter over that of another one: paired where one of the two is a baseline."""
     return _at(seen.ratio(case, filter, over, component), at)
+
+
+def bias(seen: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
+    """The mean error of a filter about the truth."""
+    found = seen.case(case)
+    place = _place(found, filter, component, at)
+    total, square = np.asarray(found.sums["error"])[place][:2]
+    return mean(total, square, realisations(found)[place])
+
+
+def over_believed(seen: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
+    """σ of a filter over the one that it believes; where the study has the table `believed`."""
+    found = seen.case(case)
+    k = int(found.axes.k[_place(found, filter, component, at)[1]])
+    row = seen.row("believed", case=found.name, filter=filter, component=component, k=k)
+    return Estimate(row["ratio"], row["ratio_lo"], row["ratio_hi"])
+
+
+def _place(found: CaseResult, filter: str, component: str, at: int | None) -> tuple[int, int, int]:
+    """Where the sums of an error stand."""
+    axes = found.axes
+    k = list(axes.k).index(at) if at is not None else -1
+    return axes.filters.index(filter), k, [name for name, _ in axes.components].index(component)
 
 
 def limit(seen: Evidence, case: Any, filter: str, component: str) -> float:

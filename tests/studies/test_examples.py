@@ -36,16 +36,19 @@ def csv_bytes(folder):
     return {file.name: file.read_bytes() for file in sorted(folder.glob("*.csv"))}
 
 
-@pytest.mark.parametrize("name", ["chirp"])
+LINES = {"chirp": 120, "bearings": 200}  # at most, of its file
+
+
+@pytest.mark.parametrize("name", LINES)
 def test_its_own_tests_pass(radarsim, name):
     done = radarsim("-q", "-p", "no:cacheprovider", cwd=EXAMPLES / name, module="pytest")
     assert " passed" in done.stdout
 
 
-@pytest.mark.parametrize("name", ["chirp"])
+@pytest.mark.parametrize("name", LINES)
 def test_its_file_is_short(name):
     text = (EXAMPLES / name / "src" / name / "__init__.py").read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= 120
+    assert len(text.splitlines()) <= LINES[name]
 
 
 @pytest.mark.slow
@@ -97,6 +100,35 @@ def test_the_chirps_questions_and_recorded_plots(radarsim, tmp_path):
     assert "chirp" in json.loads(radarsim("schema").stdout)["$defs"]
     russian = radarsim("run", "chirp", "-n", 100, "--no-figures", "--out", tmp_path, "--language", "ru").stdout
     assert "Выигрыш относительно down" in russian
+
+
+@pytest.mark.slow
+def test_the_bearings_run_is_the_same_by_any_means(radarsim, tmp_path):
+    radarsim("run", "bearings", "-n", 1500, "--threads", 1, "--out", tmp_path / "one")
+    wanted = csv_bytes(tmp_path / "one/bearings")
+    assert wanted.keys() >= {"curves.csv", "gains.csv", "last.csv", "believed.csv", "consistency.csv", "claims.csv"}
+    assert (tmp_path / "one/bearings/figures/consistency.svg").is_file()
+    radarsim("run", "bearings", "-n", 1500, "--workers", 2, "--no-figures", "--out", tmp_path / "workers")
+    assert csv_bytes(tmp_path / "workers/bearings") == wanted
+    for share in ("2/2", "1/2"):
+        radarsim("run", "bearings", "-n", 1500, "--threads", 2, "--shard", share, "--out", tmp_path / "shares")
+    radarsim("report", "bearings", "-n", 1500, "--no-figures", "--out", tmp_path / "shares")
+    assert csv_bytes(tmp_path / "shares/bearings") == wanted
+
+
+@pytest.mark.slow
+def test_the_bearings_questions_and_recorded_plots(radarsim, tmp_path):
+    radarsim("simulate", "bearings", "-o", "plots.csv", cwd=tmp_path)
+    radarsim("track", "bearings", "plots.csv", "-o", "track.csv", cwd=tmp_path)
+    header = (tmp_path / "plots.csv").read_text().splitlines()[0]
+    assert header == "t_s,bearing_rad,own_x_m,own_y_m,own_vx_mps,own_vy_mps,true_r_m,true_vx_mps,true_vy_mps"
+    assert len((tmp_path / "track.csv").read_text().splitlines()) == 1 + 3 * 3 * 26
+    asked = ("--filter", "modified polar", "--sigma", "r", "--json", "-n", 4096)
+    found = json.loads(radarsim("solve", "bearings", "observer.sigma_bearing_rad", "--equals", 400, *asked).stdout)
+    assert 0.005 < found["value"] < 0.012
+    precise = ("--precision", 4, "--of", "sigma", "--out", tmp_path, "--no-figures")
+    radarsim("run", "bearings", "-n", 6000, *precise, code=3)
+    assert "speed_mps" in radarsim("sensitivity", "bearings", "-n", 512, "--out", tmp_path).stdout
 
 
 FAULTS = {  # what is put into the file: what is said, and whether the tables are written

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.config.experiment import Experiment
-from radarsim.language import term, tr
+from radarsim.language import tr
 from radarsim.report import panels, seen, tables, wording
 from radarsim.report.chart import spoken
 from radarsim.report.drawing import GREY, Axis, Figure, Line, Note, Panel, Reference, Style
@@ -46,22 +46,13 @@ def consistency_figure(results: Sequence[Result], table: "pd.DataFrame", left_ou
     rows = tables.groups(table, "case", "filter")
     if any(result.swept for result in results):
         nees = {(*key, "nees"): own for key, own in rows.items()}
-        every = panels.by_panel(results)
-        drawn = [panels.family_panel(title, members, nees, tr(NEES)) for title, members in every.items()]
-        drawn = [panel for panel in drawn if len(panel.marks) > 1]
+        drawn = panels.nees_panels(results, nees)
     else:
         names = list(dict.fromkeys(name for result in results for name in result.axes.filters))
         drawn = [_consistency_panel(results, rows, name) for name in names]
-    caption = tr(
-        "Mean of the normalised squared error eᵀP⁻¹e per estimated component, P the covariance that "
-        "the filter believes; one (dotted) for a filter that is right about itself, more for an "
-        "optimistic one, less for a pessimistic one."
-    )
-    figure = Figure("consistency", tr("What the filters believe of themselves"), caption + left_out, tuple(drawn))
-    return panels.in_columns(figure)
+    return panels.nees_figure(drawn, left_out)
 
 
-NEES = term("NEES per component\n(1 = consistent, below = pessimistic)")
 BEST = 7  # marker of the best manoeuvre variance
 MOST_NAMED = 2  # cases that are named at the ends of lines in half a page
 
@@ -71,7 +62,7 @@ def _consistency_panel(results: Sequence[Result], rows: dict[Any, Any], name: st
     for i, result in enumerate(results):
         if (result.name, name) in rows:
             marks.append(panels.line(rows[result.name, name], ("t_s", "nees"), panels.label(result), i))
-    y, title = panels.fitting_axis(tr(NEES), marks), panels.literal(name)
+    y, title = panels.fitting_axis(tr(panels.NEES), marks), panels.literal(name)
     return Panel(panels.time_axis(), y, tuple(marks), title, direct=len(results) <= MOST_NAMED)
 
 

@@ -1,0 +1,95 @@
+"""A block of realisations of a study that is written as the step of one: truth and plots, then each filter over them.
+
+The steps come as programs (`radarsim.kernels.traced`), so a kernel holds the study's own formulas and no call. All
+arrays are flat; rows are eights of realisations. Of `groups` eights and K scans:
+
+    known     (K · width,)               numbers known at a scan; its first is the time since the scan before, s
+    numbers   (n,)                       numbers of a case, or of a filter
+    plots     (groups · K · PLOT) rows   of a scan 1 where there is a plot, else 0; the numbers of the plot; the truth
+    errors    (groups · K · C) rows      errors of the components; zero beyond the block's last realisation
+
+Layout of the noise: the normals 2 j and 2 j + 1 of scan k are those of pair `pairs` · k + j of the stream of plots;
+whether there is one, the uniform number k of the stream of detections.
+"""
+
+import numpy as np
+
+from radarsim.kernels.compile import kernel
+from radarsim.kernels.lanes import WIDTH, add_totals, address, emitted, full, get, put, row, total, where_greater
+from radarsim.kernels.random import U, fill_normal_strip, fill_uniform_pairs
+from radarsim.kernels.traced import Program
+
+STRIP = 16  # scans whose noise is drawn at once
+# Arrays of a program of the world, and of one of a filter.
+STATE, KNOWN, NUMBERS, FIRST_NORMALS, SECOND_NORMALS, PLOT = range(6)
+COUNTED, ERRORS, TESTED = 3, 4, 6
+
+
+def world(first: Program, following: Program, pairs: int, rows: int):
+    """The kernel that draws truth and plots, from the programs of the first scan and of those that follow."""
+    begin, move = emitted(first), emitted(following)
+
+    @kernel
+    def draw(keys, start, groups, known, width, numbers, detection, state, a, b, u, plots):
+        scans = known.size // width
+        for g in range(groups):
+            for k in range(scans):
+                if k % STRIP == 0:
+                    fill_normal_strip(keys[0], start + g * WIDTH, U(k * pairs), a, b)
+                if detection < 1.0 and k & 1 == 0:
+                    fill_uniform_pairs(keys[1], start + g * WIDTH, U(k >> 1), u[:WIDTH], u[WIDTH:])
+                to = row(address(plots), (g * scans + k) * rows)
+                there = full(1.0)
+                if detection < 1.0 and k > 0:
+                    drawn = get(address(u), k & 1)
+                    there = where_greater(full(detection), drawn, there, full(0.0))
+                put(to, 0, there)
+                noise = (k % STRIP) * pairs
+                at = row(address(known), k * width // WIDTH)
+                places = address(state), at, address(numbers), row(address(a), noise), row(address(b), noise), to
+                if k == 0:
+                    begin(places)
+                else:
+                    move(places)
+
+    return draw
+
+
+def follower(first: Program, following: Program, rows: int, components: int, tested: bool):
+    """The kernel that runs a filter over plots of `rows` rows a scan, and adds up its errors.
+
+    error (K, C, 4) takes the sums of e … e⁴, paired (K, C) those of e² times the baseline's e²; where tested, believed
+    (K, C) takes those of the variances that the filter believes, nees (K, 2) those of e' P⁻¹ e and its square.
+    """
+    begin, step = emitted(first), emitted(following)
+
+    @kernel
+    def follow(groups, count, known, width, numbers, plots, state, errors, base, error, paired, believed, nees):
+        scans = known.size // width
+        sums, products, variances, squares = address(error), address(paired), address(believed), address(nees)
+        counted, extra = np.empty(WIDTH), np.zeros((components + 1) * WIDTH)
+        for g in range(groups):
+            for lane in range(WIDTH):
+                counted[lane] = 1.0 if g * WIDTH + lane < count else 0.0
+            for k in range(scans):
+                n = g * scans + k
+                own, other = row(address(errors), n * components), row(address(base), n * components)
+                at, seen = row(address(known), k * width // WIDTH), row(address(plots), n * rows)
+                places = address(state), at, address(numbers), address(counted), own, seen, address(extra)
+                if k == 0:
+                    begin(places)
+                else:
+                    step(places)
+                for c in range(components):
+                    e, b = get(own, c), get(other, c)
+                    square = e * e
+                    add_totals(sums, (k * components + c) * 4, e, square, e * square, square * square)
+                    products[k * components + c] += total(square * (b * b))
+                if tested:
+                    for c in range(components):
+                        variances[k * components + c] += total(get(address(extra), c))
+                    q = get(address(extra), components)
+                    squares[2 * k] += total(q)
+                    squares[2 * k + 1] += total(q * q)
+
+    return follow

@@ -1,0 +1,456 @@
+"""A study in one file whose filters are not linear: the step of one realisation, from which eight are computed at once.
+
+    class Turning(StepStudy):                       # beside what `radarsim.studies.onefile` asks
+        known_columns = ("own_x_m", "own_y_m")      # what is known at each scan, as columns of recorded plots
+        kinds = {"ekf": Ekf, "pseudo_linear": Pseudo}  # the filters' steps, by their key `kind`
+        normals = 4, 0, 1                           # unit normals: of the first state, of a move, of a plot
+
+        def world(self, spec): …                    # the numbers of a case that its truth and plots need, a record
+        def known(self, spec, t_s): …               # what is known at times t_s (K,), columns (K,)
+        def begin(self, c, w): …                    # the first state, of the world's numbers c and normals w
+        def move(self, x, dt, c, w): …              # the state after dt seconds
+        def plot(self, x, u, c, w): …               # the numbers of a plot; u: what is known at the scan
+        def truth(self, x, u, c): …                 # the components of the state; where not given, the state itself
+
+    class Ekf(Steps):
+        def design(spec, one): …                    # the numbers of a filter by its keys, a record
+        def start(z, u, c): …                       # its state after the first plot
+        def predict(s, dt, u, c): …                 # its state before a plot, or in place of one that is missed
+        def update(s, z, u, c): …                   # its state after a plot
+        def estimate(s, u, c): …                    # the components that it believes
+        def covariance(s, u, c): …                  # their packed covariance, or None
+
+These are plain functions of numbers, tuples and named records; numbers of a realisation are calculated with by what is
+in `radarsim.kernels.traced` (`sqrt`, `atan2`, `where`, …). A state, a plot, a record is any tuple of numbers or of
+such; its shape stays the same. The same text runs on eight realisations at a time, compiled, and on floats over
+recorded plots. Branches by keys are Python's: text, truth values and whole numbers of a record are no numbers of a
+realisation, and a kernel of its own is made for each.
+
+The first plot is always there; of later ones `detection` is the probability. Where a filter gives a covariance the
+tables `believed` and `consistency` say how it agrees with the errors. A study that knows σ exactly gives `exact_sigma`.
+"""
+
+import math
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from radarsim.engine.results import Axes, CaseResult, Layout, Track
+from radarsim.errors import ConfigError
+from radarsim.kernels import traced
+from radarsim.studies.noise import noise_key
+from radarsim.studies.onefile import OneFile
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from radarsim.config.experiment import Case, Experiment
+    from radarsim.report.drawing import Figure
+
+BLOCK = 512  # realisations in a block
+ROOM = 20_000  # rows of plots and errors at once, 1.3 MB: what a processor keeps near
+OURS = Path(__file__).parents[1]
+
+
+class Steps:
+    """A filter of one realisation; see the head of the module. Its functions have no self."""
+
+    design: Callable[[Any, Any], Any]
+    start: Callable[[Any, Any, Any], Any]
+    predict: Callable[[Any, Any, Any, Any], Any]
+    update: Callable[[Any, Any, Any, Any], Any]
+    estimate: Callable[[Any, Any, Any], tuple[Any, ...]]
+    covariance: Callable[[Any, Any, Any], tuple[Any, ...]] | None = None
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A filter of a case: its kernel, numbers (n,), rows of its state, whether it tells its covariance."""
+
+    kernel: Callable[..., None]
+    numbers: np.ndarray
+    rows: int
+    tested: bool
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that a block needs; see `radarsim.kernels.stepped` for the arrays."""
+
+    layout: Layout
+    axes: Axes
+    keys: np.ndarray
+    detection: float
+    known: np.ndarray
+    width: int
+    draw: Callable[..., None]
+    numbers: np.ndarray
+    shape: tuple[int, int, int]  # rows of the state and of a plot, pairs of normals of a scan
+    filters: tuple[Followed, ...]
+    block: int = BLOCK
+    gaussian = False
+
+
+class StepStudy(OneFile):
+    """A study by the steps of one realisation; what a subclass gives is said at the head of this module."""
+
+    kinds: Mapping[str, type[Steps]]
+    normals: tuple[int, int, int]
+    known_columns: tuple[str, ...] = ()
+    extra_figures = ("consistency",)
+
+    world: Callable[..., Any]
+    begin: Callable[..., Any]
+    move: Callable[..., Any]
+    plot: Callable[..., Any]
+
+    def known(self, spec: Any, t_s: np.ndarray) -> Sequence[np.ndarray]:
+        """What is known at times t_s (K,) s: columns (K,), in the order of `known_columns`. Default: nothing."""
+        return ()
+
+    def truth(self, x: Any, u: Any, c: Any) -> tuple[Any, ...]:
+        """The components of a true state. Default: the state."""
+        return tuple(x)
+
+    def detection(self, spec: Any) -> float:
+        """The probability of a plot after the first. Default: certain."""
+        return 1.0
+
+    def exact_sigma(self, spec: Any) -> np.ndarray | None:
+        """The exact σ (F, K, C) of a case about the truth, not-a-number where it is not known. Default: not known."""
+        return None
+
+    @classmethod
+    def missing(cls) -> Iterator[str]:
+        yield from super().missing()
+        for needed in ("kinds", "normals", "world", "begin", "move", "plot"):
+            if not hasattr(cls, needed):
+                yield f"{cls.__name__}.{needed} must be given; see radarsim.studies.stepwise"
+        for kind, steps in getattr(cls, "kinds", {}).items():
+            for needed in ("design", "start", "predict", "update", "estimate"):
+                if not callable(getattr(steps, needed, None)):
+                    yield f"{cls.__name__}.kinds: {kind}: {needed} must be given; see radarsim.studies.stepwise"
+
+    # ---- numbers -------------------------------------------------------------------------------------------------
+    def prepare(self, case: "Case") -> Plan:
+        from radarsim.kernels import stepped
+
+        spec = case.spec
+        axes, sums = self.axes(spec, self.exact_sigma(spec)), self.sums(spec)
+        known = self._known(spec, axes.t_s)
+        world, detection = self.world(spec), float(self.detection(spec))
+        scene = self._scene(world)
+        filters = tuple(self._followed(spec, one, scene, detection < 1) for one in spec.filters)
+        if any(one.tested for one in filters):
+            f, k, c = sums.shapes["paired"]
+            sums = Layout(**sums.shapes, believed=(f, k, c), nees=(f, k, 2))
+        keys = np.stack([noise_key(case, "plots"), noise_key(case, "detections")])
+        draw = kernel(stepped.world, scene.first, scene.following, scene.shape[2], scene.shape[1])
+        given = known.ravel(), known.shape[1], draw, plain(world)
+        return Plan(sums, axes, keys, detection, *given, scene.shape, filters)
+
+    def _known(self, spec: Any, t_s: np.ndarray) -> np.ndarray:
+        """The time since the scan before, and what is known at each, (K, whole eights)."""
+        columns = [np.diff(t_s, prepend=t_s[0]), *self.known(spec, t_s)]
+        known = np.zeros((t_s.size, -(-len(columns) // 8) * 8))
+        known[:, : len(columns)] = np.transpose(columns)
+        return known
+
+    def _scene(self, world: Any) -> "Scene":
+        """The programs of truth and plots."""
+        from radarsim.kernels import stepped
+
+        first, move, plot = self.normals
+        programs = []
+        state: Any = None
+        for count in (first, move):
+            trace = traced.Trace()
+            c, dt, u = trace.plain(stepped.NUMBERS, world), *self._at_a_scan(trace)
+            w = [noise(trace, n) for n in range(count + plot)]
+            own, error = tuple(w[:count]), tuple(w[count:])
+            if state is None:
+                x = said(self.begin, c, own)
+            else:
+                x = said(self.move, trace.rows(stepped.STATE, state), dt, c, own)
+                same_shape(self.move, x, state)
+            state = x
+            z, true = said(self.plot, x, u, c, error), said(self.truth, x, u, c)
+            of_length(self.plot, z, len(self.measured), "measured")
+            of_length(self.truth, true, len(self.components), "components")
+            trace.write(stepped.STATE, x)
+            trace.write(stepped.PLOT, (z, true), 1)
+            programs.append(trace.program())
+        pairs = -(-(max(first, move) + plot) // 2)
+        shape = traced.count(state), 1 + len(self.measured) + len(self.components), pairs
+        return Scene(programs[0], programs[1], shape)
+
+    def _at_a_scan(self, trace: traced.Trace) -> tuple[Any, tuple[Any, ...]]:
+        """The time since the scan before, and what is known at a scan."""
+        from radarsim.kernels import stepped
+
+        dt, *u = trace.plain(stepped.KNOWN, (0.0,) * (1 + len(self.known_columns)))
+        return dt, tuple(u)
+
+    def _followed(self, spec: Any, one: Any, scene: "Scene", missed: bool) -> Followed:
+        """A filter's kernel and numbers."""
+        from radarsim.kernels import stepped
+
+        steps = self.kinds[one.kind]
+        numbers = steps.design(spec, one)
+        first, following, rows = self._filter_programs(steps, numbers, scene, missed)
+        tested, rows_of_plot = steps.covariance is not None, scene.shape[1]
+        made = kernel(stepped.follower, first, following, rows_of_plot, len(self.components), tested)
+        return Followed(made, plain(numbers), rows, tested)
+
+    def _filter_programs(self, steps: type[Steps], numbers: Any, scene: "Scene", missed: bool) -> tuple[Any, Any, int]:
+        """The programs of a filter's first scan and of those that follow, and the rows of its state."""
+        from radarsim.kernels import stepped
+
+        made, state = [], None
+        for begins in (True, False):
+            trace = traced.Trace()
+            c, dt, u = trace.plain(stepped.NUMBERS, numbers), *self._at_a_scan(trace)
+            z = trace.rows(stepped.PLOT, (0.0,) * len(self.measured), 1)
+            if begins:
+                s = said(steps.start, z, u, c)
+            else:
+                before = said(steps.predict, trace.rows(stepped.STATE, state), dt, u, c)
+                same_shape(steps.predict, before, state)
+                s = said(steps.update, before, z, u, c)
+                same_shape(steps.update, s, state)
+                if missed:
+                    s = traced.where(trace.rows(stepped.PLOT, 0.0) > 0.5, s, before)
+            state = s
+            trace.write(stepped.STATE, s)
+            components = (0.0,) * len(self.components)
+            true = trace.rows(stepped.PLOT, components, 1 + len(self.measured))
+            estimate = said(steps.estimate, s, u, c)
+            of_length(steps.estimate, estimate, len(components), "components")
+            e = tuple(a - b for a, b in zip(estimate, true, strict=True))
+            counts = trace.rows(stepped.COUNTED, 0.0) > 0.5
+            trace.write(stepped.ERRORS, traced.where(counts, e, (0.0,) * len(e)))
+            if steps.covariance is not None:
+                P = said(steps.covariance, s, u, c)
+                n = len(components)
+                of_length(steps.covariance, P, n * (n + 1) // 2, "elements of a packed covariance")
+                found = (*(traced.row_of(P, n, i)[i] for i in range(n)), traced.normalised(P, e))
+                trace.write(stepped.TESTED, traced.where(counts, found, (0.0,) * (n + 1)))
+            made.append(trace.program())
+        return made[0], made[1], traced.count(state)
+
+    def simulate(self, plan: Plan, first: int, count: int) -> np.ndarray:
+        from radarsim.kernels.compile import aligned_zeros
+        from radarsim.kernels.lanes import WIDTH
+
+        values = np.zeros(plan.layout.size)
+        sums, nothing = plan.layout.unpack(values), np.zeros((1, 2))
+        scans, components = plan.axes.k.size, len(plan.axes.components)
+        most = max(1, ROOM // (scans * (plan.shape[1] + 2 * components)))
+        work = aligned_zeros(max(one.rows for one in plan.filters) * WIDTH)
+        base, own = (aligned_zeros(most * scans * components * WIDTH) for _ in range(2))
+        order = sorted(range(len(plan.filters)), key=lambda f: f != plan.axes.baseline)
+        for start in range(0, count, most * WIDTH):
+            many = min(most * WIDTH, count - start)
+            groups = -(-many // WIDTH)
+            plots = drawn(plan, first + start, groups)
+            for f in order:
+                one, errors = plan.filters[f], base if f == plan.axes.baseline else own
+                tested = [sums[name][f] if one.tested else nothing for name in ("believed", "nees")]
+                of = sums["error"][f], sums["paired"][f], *tested
+                one.kernel(groups, many, plan.known, plan.width, one.numbers, plots, work, errors, base, *of)
+        return values
+
+    # ---- what is shown -------------------------------------------------------------------------------------------
+    def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
+        from radarsim.report import tables
+
+        made = super().tables(results)
+        if any("nees" in result.sums for result in results):
+            told = [result for result in results if "nees" in result.sums]
+            made["believed"] = tables.joined(map(self._believed, told))
+            made["consistency"] = tables.joined(map(self._consistency, told))
+        return made
+
+    def _believed(self, result: CaseResult) -> Mapping[str, Any]:
+        """The σ that filters with a covariance believe, the root of its mean variance, beside the true one."""
+        from radarsim.report import notes
+
+        sigma = np.sqrt(np.asarray(result.sums["believed"]) / result.count)
+        told = np.array([self.kinds[one.kind].covariance is not None for one in result.spec.filters])
+        axes = replace(result.axes, available=result.axes.available & told[:, None, None])
+        return notes.believed(replace(result, axes=axes), sigma)
+
+    def _consistency(self, result: CaseResult) -> Mapping[str, Any]:
+        """Mean NEES of all components by scan, per degree of freedom, with bounds and verdict."""
+        from radarsim.report import notes, statistics, tables
+
+        told = [f for f, one in enumerate(result.spec.filters) if self.kinds[one.kind].covariance is not None]
+        scans, freedom, n = result.axes.k.size, len(self.components), result.count
+        sums = np.asarray(result.sums["nees"])[told].reshape(-1, 2) / [freedom, freedom**2]
+        bounds = notes.bounds_from_spread(sums[:, 0], sums[:, 1], n, len(sums))
+        means = [statistics.mean_square(total, square, n) for total, square in sums]
+        return {
+            **tables.leading(result, np.repeat(told, scans), np.tile(np.arange(scans), len(told))),
+            "n": np.full(len(sums), n),
+            **notes.normalised("nees", statistics.Estimate(*np.transpose(means)), bounds),
+        }
+
+    def figures(
+        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+    ) -> "dict[str, Figure]":
+        from radarsim.report import panels, seen, tables
+
+        drawn = super().figures(results, made, experiment)
+        if "consistency" not in made:
+            return drawn
+        rows = {(*key, "nees"): own for key, own in tables.groups(made["consistency"], "case", "filter").items()}
+        some, left_out = panels.shown_families(results, panels.named(experiment, "consistency"))
+        figure = panels.nees_figure(panels.nees_panels(some, rows), left_out)
+        begun = seen.all_begun({"consistency": figure}, {"consistency": seen.extremes})
+        return drawn | {name: one for name, one in begun.items() if one}
+
+    # ---- recorded plots ------------------------------------------------------------------------------------------
+    def columns(self, spec: Any, one: Any) -> tuple[str, ...]:
+        return (*super().columns(spec, one), *self.known_columns)
+
+    def realisation(self, case: "Case", i: int) -> "tuple[Mapping[str, np.ndarray], np.ndarray]":
+        plan = self.prepare(case)
+        scans, numbers = plan.axes.k.size, len(self.measured)
+        plots = drawn(plan, i, 1).reshape(scans, plan.shape[1], -1)[..., 0]
+        z = np.where(plots[:, :1] > 0.5, plots[:, 1 : 1 + numbers], np.nan)
+        named = dict(zip((one.column for one in self.measured), z.T, strict=True))
+        known = plan.known.reshape(scans, -1)[:, 1 : 1 + len(self.known_columns)]
+        return named | dict(zip(self.known_columns, known.T, strict=True)), plots[:, 1 + numbers :]
+
+    def tracker(self, case: "Case") -> "Tracker":
+        return Tracker(self, case.spec)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The programs of truth and plots, and `Plan.shape`."""
+
+    first: traced.Program
+    following: traced.Program
+    shape: tuple[int, int, int]
+
+
+@cache
+def kernel(make: Callable[..., Any], *of: Any) -> Callable[..., None]:
+    """What a function of `radarsim.kernels.stepped` makes of programs, once."""
+    return make(*of)
+
+
+def drawn(plan: Plan, first: int, groups: int) -> np.ndarray:
+    """Truth and plots (groups × K × rows × 8, flat) of realisations from `first` on, see `radarsim.kernels.stepped`."""
+    from radarsim.kernels.compile import aligned_zeros
+    from radarsim.kernels.lanes import WIDTH
+    from radarsim.kernels.stepped import STRIP
+
+    state, rows, pairs = plan.shape
+    room = [aligned_zeros(n * WIDTH) for n in (state, STRIP * pairs, STRIP * pairs, 2)]
+    plots = aligned_zeros(groups * plan.axes.k.size * rows * WIDTH)
+    plan.draw(plan.keys, first, groups, plan.known, plan.width, plan.numbers, plan.detection, *room, plots)
+    return plots
+
+
+def noise(trace: traced.Trace, n: int) -> traced.Lane:
+    """The unit normal n of a scan."""
+    from radarsim.kernels import stepped
+
+    array = (stepped.FIRST_NORMALS, stepped.SECOND_NORMALS)[n % 2]
+    lane: traced.Lane = trace.rows(array, 0.0, n // 2)
+    return lane
+
+
+def plain(numbers: Any) -> np.ndarray:
+    """The numbers (n,) of a record and a zero, so that there is one."""
+    return np.array([*traced.leaves(numbers), 0.0], dtype=float)
+
+
+# ---- faults of an author's formulas ----------------------------------------------------------------------------------
+def said(function: Callable[..., Any], *arguments: Any) -> Any:
+    """What an author's function gives; ConfigError with its file and line where it fails."""
+    try:
+        return traced.numbered(function(*arguments))
+    except ConfigError:
+        raise
+    except Exception as error:
+        frames = [one for one in traceback.extract_tb(error.__traceback__) if not within(one.filename)]
+        line = str(error).strip().partition("\n")[0] or type(error).__name__
+        words = line if isinstance(error, traced.OneForAll) else f"{type(error).__name__}: {line}"
+        if not frames:
+            raise fault(function, words) from error
+        raise ConfigError(f"{frames[-1].filename}:{frames[-1].lineno}: {frames[-1].name}: {words}") from error
+
+
+def within(file: str) -> bool:
+    """Whether a file is one of radarsim's own, or of a library's."""
+    return Path(file).is_relative_to(OURS) or "site-packages" in file
+
+
+def fault(function: Callable[..., Any], words: str) -> ConfigError:
+    """An error that names a function by its file and line."""
+    code = function.__code__
+    return ConfigError(f"{code.co_filename}:{code.co_firstlineno}: {code.co_name}: {words}")
+
+
+def of_length(function: Callable[..., Any], given: Any, wanted: int, what: str) -> None:
+    """Raises ConfigError where a function gives other than so many numbers."""
+    if not isinstance(given, tuple) or traced.count(given) != wanted or len(given) != wanted:
+        raise fault(function, f"must give a tuple of {wanted} numbers ({what}), got {shape(given)}")
+
+
+def same_shape(function: Callable[..., Any], given: Any, wanted: Any) -> None:
+    """Raises ConfigError where a state is of another shape than the one before."""
+    if shape(given) != shape(wanted):
+        raise fault(function, f"gives a state of the shape {shape(given)}, the one before has {shape(wanted)}")
+
+
+def shape(value: Any) -> str:
+    """A structure with its numbers left out: ((·, ·), ·)."""
+    if isinstance(value, tuple):
+        return f"({', '.join(map(shape, value))})"
+    return "·" if traced.is_number(value) else repr(value)
+
+
+# ---- recorded plots --------------------------------------------------------------------------------------------------
+class Tracker:
+    """The filters of a case over recorded plots, in plain Python, chunk by chunk: each begins with the first plot."""
+
+    most_rows: int | None = None
+    several = False
+
+    def __init__(self, study: StepStudy, spec: Any):
+        self.study, self.names = study, tuple(one.name for one in spec.filters)
+        self.filters = [(study.kinds[one.kind], study.kinds[one.kind].design(spec, one)) for one in spec.filters]
+        self.states: list[Any] = [None] * len(self.filters)
+        self.last = math.nan
+
+    def feed(self, columns: "Mapping[str, np.ndarray]") -> Track:
+        study, t = self.study, columns["t_s"]
+        plots = np.transpose([columns[one.column] for one in study.measured])
+        known = np.reshape([columns[name] for name in study.known_columns], (-1, t.size)).T
+        found = np.full((len(self.filters), t.size, 2, len(study.components)), np.nan)
+        for n in range(t.size):
+            z, u = tuple(map(float, plots[n])), tuple(map(float, known[n]))
+            for f, (steps, c) in enumerate(self.filters):
+                s = self.states[f]
+                if s is not None:
+                    s = said(steps.predict, s, float(t[n] - self.last), u, c)
+                if not any(map(math.isnan, z)):
+                    s = said(steps.start, z, u, c) if s is None else said(steps.update, s, z, u, c)
+                self.states[f] = s
+                if s is not None:
+                    found[f, n, 0] = said(steps.estimate, s, u, c)
+                    if steps.covariance is not None:
+                        P, m = said(steps.covariance, s, u, c), len(study.components)
+                        found[f, n, 1] = np.sqrt([traced.row_of(P, m, i)[i] for i in range(m)])
+            self.last = float(t[n])
+        components = tuple((one.name, one.unit) for one in study.components)
+        return Track(self.names, components, t, found[:, :, 0], found[:, :, 1])

@@ -1,0 +1,139 @@
+"""Programs of eight: what plain Python does with one number, done with eight; and what it may not do."""
+
+import math
+import traceback
+
+import numpy as np
+import pytest
+
+from radarsim.kernels import traced
+from radarsim.kernels.compile import kernel
+from radarsim.kernels.lanes import WIDTH, address, emitted, row, rows
+from radarsim.kernels.traced import OneForAll, Trace, where
+
+
+def in_lanes(function, *columns):
+    """A function of numbers run by lanes over columns (n,) of a multiple of eight numbers; its results, columns too."""
+    trace = Trace()
+    found = function(*trace.rows(0, (0.0,) * len(columns)))
+    wide = isinstance(found, tuple)
+    trace.write(1, found)
+    many, results = columns[0].size // WIDTH, traced.count(found)
+    run = emitted(trace.program())
+    inputs = len(columns)
+
+    @kernel
+    def calculate(x, out, many):
+        for n in range(many):
+            run((row(address(x), n * inputs), row(address(out), n * results)))
+
+    x, out = rows(many * inputs), rows(many * results)
+    x.reshape(many, inputs, WIDTH)[:] = np.moveaxis(np.reshape(columns, (inputs, many, WIDTH)), 0, 1)
+    calculate(x, out, many)
+    made = np.moveaxis(out.reshape(many, results, WIDTH), 1, 0).reshape(results, -1)
+    return made if wide else made[0]
+
+
+RNG = np.random.default_rng(7)
+SMALL = RNG.normal(size=8000)
+WIDE = np.concatenate([RNG.uniform(-1e5, 1e5, 8000), np.arange(-4000, 4000) * (math.pi / 4)])
+LARGE = np.exp(RNG.uniform(-600, 600, 8000))
+
+
+def test_functions_are_those_of_the_library():
+    """To the precision that each states."""
+    assert np.max(np.abs(in_lanes(traced.exp, 100 * SMALL) / np.exp(100 * SMALL) - 1)) < 4.5e-16
+    near_one = np.concatenate([LARGE, 1 + 1e-3 * SMALL])
+    assert np.max(np.abs(in_lanes(traced.log, near_one) / np.log(near_one) - 1)) < 6.7e-16
+    assert np.array_equal(in_lanes(traced.sqrt, LARGE), np.sqrt(LARGE))
+    sine, cosine = in_lanes(traced.sine_cosine, WIDE)
+    assert max(np.max(np.abs(sine - np.sin(WIDE))), np.max(np.abs(cosine - np.cos(WIDE)))) < 2.3e-16
+    assert np.array_equal(in_lanes(traced.nearest, WIDE), np.rint(WIDE))
+
+
+def test_angles_are_those_of_the_library():
+    turns = np.concatenate([RNG.uniform(-math.pi, math.pi, 8000), np.arange(-8, 8) * (math.pi / 8)])
+    size = np.exp(RNG.uniform(-100, 100, turns.size))
+    x, y = size * np.cos(turns), size * np.sin(turns)
+    found, wanted = in_lanes(traced.atan2, y, x), np.arctan2(y, x)
+    assert np.max(np.abs(found / np.where(wanted == 0, 1, wanted) - np.where(wanted == 0, 0, 1))) < 4.5e-16
+    zero = np.zeros(8)
+    edges = in_lanes(traced.atan2, np.r_[0.0, 0, 1, -1, 0, 2, -2, 2], np.r_[1.0, -1, 0, 0, 0, 2, 2, -2])
+    assert np.allclose(
+        edges, np.r_[0, math.pi, math.pi / 2, -math.pi / 2, 0, math.pi / 4, -math.pi / 4, 0.75 * math.pi]
+    )
+    assert np.array_equal(in_lanes(traced.wrapped, zero + 0.5), zero + 0.5)
+    assert np.allclose(in_lanes(traced.wrapped, zero + 7), 7 - math.tau)
+
+
+def branching(x, y):
+    """Whatever a step may do, one text for floats and lanes."""
+    pair = where((x > 0.0) & ~(y > 1.0), (x, -y), (y, 1))
+    inside = where((x >= -1.0) | (y != y), abs(x) ** 3, 2.0)
+    return (*pair, inside, traced.least(x, y), traced.greatest(x, 0), 3 / (2 + x * x) - (+y))
+
+
+def test_branches_are_taken_lane_by_lane():
+    x, y = SMALL, RNG.normal(size=SMALL.size)
+    wanted = np.transpose([branching(float(a), float(b)) for a, b in zip(x, y, strict=True)])
+    np.testing.assert_allclose(in_lanes(branching, x, y), wanted, rtol=4e-15, atol=1e-15)
+
+
+@pytest.mark.parametrize("n", [2, 4])
+def test_small_matrices_are_those_of_the_textbook(n):
+    A = RNG.normal(size=(n, n))
+    P, J, h, x = A @ A.T + np.eye(n), RNG.normal(size=(n, n)), RNG.normal(size=n), RNG.normal(size=n)
+    upper = np.triu_indices(n)
+
+    def unpacked(packed):
+        return np.array([traced.row_of(packed, n, i) for i in range(n)])
+
+    packed = tuple(P[upper])
+    np.testing.assert_allclose(unpacked(traced.congruent(J, packed)), J @ P @ J.T, rtol=1e-12)
+    assert traced.normalised(packed, tuple(x)) == pytest.approx(x @ np.linalg.solve(P, x), rel=1e-10)
+    K = P @ h / (h @ P @ h + 0.3)
+    mean, shrunk = traced.updated(tuple(x), packed, tuple(h), 1.7, 0.3)
+    np.testing.assert_allclose(mean, x + 1.7 * K, rtol=1e-12)
+    np.testing.assert_allclose(unpacked(shrunk), P - np.outer(K, h @ P), rtol=1e-10, atol=1e-12)
+
+
+def branches_by_python(x):
+    if x > 0.0:  # the line that is meant
+        return x
+    return -x
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        branches_by_python,
+        lambda x: max(x, 1.0),
+        lambda x: 0.0 < x < 1.0,
+        lambda x: math.sin(x),
+        lambda x: x % 2.0,
+        lambda x: x**0.5,
+        lambda x: not x,
+    ],
+)
+def test_what_needs_one_value_is_refused_with_its_line(function):
+    with pytest.raises(OneForAll) as caught:
+        function(Trace().rows(0, 0.0))
+    frames = traceback.extract_tb(caught.value.__traceback__)
+    own = [frame for frame in frames if frame.filename == __file__][-1]
+    assert own.lineno == function.__code__.co_firstlineno + (function is branches_by_python)
+
+
+def test_a_number_of_numpy_leaves_arithmetic_to_the_lane():
+    assert isinstance(np.float64(2.0) * Trace().rows(0, 0.0), traced.Lane)
+
+
+def test_what_is_done_twice_stands_once_and_words_change_no_program():
+    def made(function):
+        trace = Trace()
+        trace.write(1, function(trace.rows(0, 0.0)))
+        return trace.program()
+
+    program = made(lambda x: (x + 1.0) * (x + 1.0))
+    assert len(program.ops) == 4
+    assert program.digest == made(lambda y: (y + 1) * (y + 1)).digest
+    assert program.digest != made(lambda x: (x + 1.0) * (x + 1.0000001)).digest

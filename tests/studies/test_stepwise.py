@@ -1,0 +1,231 @@
+"""A study by the steps of one realisation: against what is known exactly; what an author gets wrong, a line each."""
+
+import inspect
+from collections import namedtuple
+from types import SimpleNamespace
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from radarsim.config.fields import Member, Model, Positive, Probability, key
+from radarsim.errors import ConfigError
+from radarsim.kernels.traced import where
+from radarsim.studies.onefile import Component, Measured
+from radarsim.studies.stepwise import Steps, StepStudy
+
+STEP, SIGMA, SCANS = 0.5, 1.0, 12
+
+
+class Sensor(Model):
+    """A gauge."""
+
+    sigma_x_m: Positive = key("σ", "of a plot, m", default=SIGMA)
+    detection_probability: Probability = key("detection", "of a plot, no unit", default=1.0)
+    scan_period_s: Positive = key("period", "s", default=2.0)
+
+
+class Gain(Member):
+    """A filter of a walk."""
+
+    kind: Literal["kalman", "halves"] = key("kind", "its gain", default="kalman")
+
+
+World = namedtuple("World", "sigma step unit")
+
+
+class Kalman(Steps):
+    """The Kalman filter of a random walk; dt is in the noise."""
+
+    def design(spec, one):
+        return World(spec.sensor.sigma_x_m, STEP, "m")
+
+    def start(z, u, c):
+        return z[0], c.sigma**2
+
+    def predict(s, dt, u, c):
+        return s[0], s[1] + c.step**2 * dt / 2
+
+    def update(s, z, u, c):
+        K = s[1] / (s[1] + c.sigma**2)
+        return s[0] + K * (z[0] - s[0]), where(c.unit == "m", s[1] - K * s[1], 0)
+
+    def estimate(s, u, c):
+        return (s[0],)
+
+    def covariance(s, u, c):
+        return (s[1],)
+
+
+class Halves(Kalman):
+    """Half of every innovation, whose covariance it does not tell."""
+
+    covariance = None
+
+    def update(s, z, u, c):
+        return 0.5 * (s[0] + z[0]), s[1]
+
+
+class Walk(StepStudy):
+    name, about, asks = "walk", "A walk.", "How?"
+    filters = {"kind": "kalman"}  # noqa: RUF012
+    components = (Component("x", "m"),)
+    parts, Filter = {"sensor": Sensor}, Gain
+    scan_period = "sensor.scan_period_s"
+    measured = (Measured("x_m", "m", ("sensor.sigma_x_m",)),)
+    kinds, normals = {"kalman": Kalman, "halves": Halves}, (1, 1, 1)
+    known_columns = ("drift_m",)
+
+    def world(self, spec):
+        return World(spec.sensor.sigma_x_m, STEP, "m")
+
+    def detection(self, spec):
+        return spec.sensor.detection_probability
+
+    def known(self, spec, t_s):
+        return (0 * t_s + 7,)
+
+    def begin(self, c, w):
+        return (10 * w[0],)
+
+    def move(self, x, dt, c, w):
+        return (x[0] + c.step * w[0],)
+
+    def plot(self, x, u, c, w):
+        return (x[0] + c.sigma * w[0] + 0 * u[0],)
+
+
+def case_of(study, names=("kalman", "halves"), **sensor):
+    spec = study.keys().model_validate(
+        {"sensor": sensor, "filters": [{"name": n, "kind": n} for n in names], "scans": SCANS}
+    )
+    return SimpleNamespace(spec=spec, seed=5, study="walk", noise_of=None)
+
+
+def added(study, case, count, step=512):
+    plan = study.prepare(case)
+    values = sum(study.simulate(plan, i, min(step, count - i)) for i in range(0, count, step))
+    return plan, plan.layout.unpack(values)
+
+
+def exact_variances(gains):
+    """Of the errors of a filter with these gains, from the first plot on."""
+    P = [SIGMA**2]
+    for K in gains:
+        P.append((1 - K) ** 2 * (P[-1] + STEP**2) + K**2 * SIGMA**2)
+    return np.array(P)
+
+
+def kalman_gains():
+    gains, P = [], SIGMA**2
+    for _ in range(SCANS - 1):
+        K = (P + STEP**2) / (P + STEP**2 + SIGMA**2)
+        gains.append(K)
+        P = K * SIGMA**2
+    return gains
+
+
+def test_errors_are_the_exact_ones():
+    n = 20_480
+    _, sums = added(Walk(), case_of(Walk()), n)
+    for f, gains in enumerate((kalman_gains(), [0.5] * (SCANS - 1))):
+        wanted = exact_variances(gains)
+        assert np.all(np.abs(sums["error"][f, :, 0, 1] / n / wanted - 1) < 4.5 * np.sqrt(2 / n))
+        assert np.all(np.abs(sums["error"][f, :, 0, 0] / n) < 4.5 * np.sqrt(wanted / n))
+    np.testing.assert_allclose(sums["believed"][0, :, 0] / n, exact_variances(kalman_gains()), rtol=1e-12)
+    assert np.all(np.abs(sums["nees"][0, :, 0] / n - 1) < 4.5 * np.sqrt(2 / n))
+    assert not sums["believed"][1].any()
+    np.testing.assert_allclose(sums["paired"][0], sums["error"][0, ..., 3], rtol=1e-12)
+
+
+def test_a_realisation_is_itself_in_any_block():
+    study = Walk()
+    case = case_of(study, detection_probability=0.7)
+    _, together = added(study, case, 40, step=40)
+    _, apart = added(study, case, 40, step=3)
+    for name, sums in together.items():
+        np.testing.assert_allclose(sums, apart[name], rtol=1e-12)
+
+
+def test_the_baseline_is_whichever_is_named():
+    study = Walk()
+    case = case_of(study)
+    _, first = added(study, case, 100)
+    case.spec = case.spec.model_copy(update={"baseline": "halves"})
+    _, other = added(study, case, 100)
+    np.testing.assert_array_equal(first["error"], other["error"])
+    np.testing.assert_allclose(other["paired"][0], first["paired"][1], rtol=1e-13)
+
+
+@pytest.mark.parametrize("sensor", [{}, {"detection_probability": 0.6}], ids=["all plots", "missed plots"])
+def test_the_plots_of_a_realisation_followed_in_plain_python_are_what_the_run_made(sensor):
+    study = Walk()
+    case, i = case_of(study, **sensor), 1029
+    plots = study.recorded().simulated(case, i)
+    assert list(plots) == ["t_s", "x_m", "drift_m", "true_x_m"]
+    missed = np.isnan(plots["x_m"])
+    assert not missed[0]
+    assert missed.any() == bool(sensor)
+    track = study.tracker(case).feed(plots)
+    plan = study.prepare(case)
+    sums = plan.layout.unpack(study.simulate(plan, i, 1))
+    np.testing.assert_allclose(track.estimate[..., 0] - plots["true_x_m"], sums["error"][..., 0, 0], atol=1e-12)
+    np.testing.assert_allclose(track.sigma[0, :, 0] ** 2, sums["believed"][0, :, 0], rtol=1e-12)
+    assert np.isnan(track.sigma[1]).all()
+
+
+def test_missed_plots_are_missed_as_often_as_stated():
+    study = Walk()
+    case = case_of(study, detection_probability=0.6)
+    missed = [np.isnan(study.recorded().simulated(case, i)["x_m"][1:]).mean() for i in range(0, 400, 4)]
+    assert abs(np.mean(missed) - 0.4) < 4.5 * np.sqrt(0.24 / (100 * (SCANS - 1)))
+
+
+# ---- what an author gets wrong -------------------------------------------------------------------------------------
+def branching(s, z, u, c):
+    e = z[0] - s[0]
+    if e > 3.0:
+        e = 3.0
+    return s[0] + 0.5 * e, s[1]
+
+
+def of_another_shape(s, dt, u, c):
+    return (*s, 0.0)
+
+
+def misspelt(s, z, u, c):
+    return z[0] * c.sgima, s[1]
+
+
+def too_many(s, u, c):
+    return s
+
+
+FAULTS = [
+    ("update", branching, 2, r"branching: .* has no one value: write where\(condition, yes, no\)"),
+    ("predict", of_another_shape, 0, r"gives a state of the shape \(·, ·, ·\), the one before has \(·, ·\)"),
+    ("update", misspelt, 1, "misspelt: AttributeError: .*sgima"),
+    ("estimate", too_many, 0, r"must give a tuple of 1 numbers \(components\), got \(·, ·\)"),
+]
+
+
+@pytest.mark.parametrize(("step", "function", "line", "words"), FAULTS, ids=[one[1].__name__ for one in FAULTS])
+def test_a_fault_is_one_line_with_its_place(step, function, line, words):
+    study = Walk()
+    study.kinds = {"kalman": type("Wrong", (Kalman,), {step: function})}
+    place = f"{__file__}:{inspect.getsourcelines(function)[1] + line}: "
+    with pytest.raises(ConfigError, match=words) as caught:
+        study.prepare(case_of(study, names=["kalman"]))
+    assert len(caught.value.lines) == 1
+    assert caught.value.lines[0].startswith(place)
+
+
+def test_what_a_class_lacks_is_said_at_once():
+    class Bare(Walk):
+        normals = None
+        kinds = {"kalman": type("Half", (Steps,), {"start": Kalman.start})}  # noqa: RUF012
+
+    del Bare.normals
+    assert any("kinds: kalman: predict must be given" in line for line in Bare().missing())
+    with pytest.raises(ConfigError, match="kinds: kalman: update must be given"):
+        Bare().keys()
