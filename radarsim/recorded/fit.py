@@ -351,12 +351,19 @@ def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name
     if folding and found is not None and VELOCITY in found.by_number(np.asarray(found.stated)):
         raise ConfigError(f"{source}: {said(folding, source, case)}")
     if found is None:
-        asked = f"filter {filter_name}" if filter_name else f"no filter of {case.name}"
-        raise ConfigError(
-            f"{asked}: {'has' if filter_name is None else 'has no'} likelihood of recorded plots to fit by: "
-            "its kind has no model of the target's motion"
-        )
+        raise ConfigError(unlikely(case, filter_name, [name for name in names if of.likelihood(case, name, long)]))
     return found
+
+
+def unlikely(case: Case, filter_name: str | None, others: Sequence[str]) -> str:
+    """That there is nothing to fit by; others: the filters of which the study says how likely recorded plots are."""
+    if filter_name is not None and others:
+        known = ", ".join(others)
+        return f"filter: {filter_name} does not say how likely plots are, which fit needs; must be one of {known}"
+    return (
+        f"{case.name}: study {case.study} does not say how likely recorded plots are under "
+        f"{'these filters' if filter_name is None else filter_name}, which fit needs; track takes them"
+    )
 
 
 def _tracks(

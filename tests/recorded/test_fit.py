@@ -428,7 +428,9 @@ def test_a_filter_without_a_likelihood_says_so(tmp_path):
     path = tmp_path / "plots.csv"
     (sonar,) = load_all(["sonar_smoothing"], ())
     plots.write_columns(follow.simulated(sonar), path)
-    with pytest.raises(ConfigError, match="filter window 5: has no likelihood of recorded plots to fit by: its kind"):
+    with pytest.raises(
+        ConfigError, match="filter: window 5 does not say how likely plots are, which fit needs; must be one of "
+    ):
         fit.fit(sonar, path, "window 5")
 
 

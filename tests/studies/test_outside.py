@@ -126,6 +126,10 @@ def test_recorded_plots_and_a_config_of_ones_own(radarsim, tmp_path):
     assert "standard deviation of a measured position, m" in (tmp_path / "own.yaml").read_text(encoding="utf-8")
     assert (tmp_path / "plots.csv").read_text().startswith("t_s,x_m,true_x_m\n")
     assert len((tmp_path / "track.csv").read_text().splitlines()) == 1 + 2 * 30
+    for chosen, whose in (((), "these filters"), (("--filter", "kalman"), "kalman")):
+        said = radarsim("fit", "own.yaml", "plots.csv", *chosen, cwd=tmp_path, code=2).stderr
+        reason = f"study fifth does not say how likely recorded plots are under {whose}, which fit needs"
+        assert said == f"own: {reason}; track takes them\n"
 
 
 def test_the_tab_key_completes_its_configs(radarsim, tmp_path):
