@@ -7,7 +7,7 @@ From finished cases to files: tables, figures, claims, run.json and report.html 
 
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property, partial
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from radarsim.app import configs
 from radarsim.app.configs import load
 from radarsim.app.stored import classes_of
-from radarsim.config.experiment import Case, Experiment
+from radarsim.config.experiment import Case, Experiment, matches
 from radarsim.engine import store
 from radarsim.engine.results import CaseResult
 from radarsim.errors import DisagreementError, RadarsimError
@@ -475,7 +475,7 @@ def write_files(
         contents["figures/captions.md"] = captions(described).encode()
     drawn = time.perf_counter()
     of_intervals = notes.of_intervals(results, made, partial(answered, results))
-    run = {**run, "warnings": [*run.get("warnings", ()), *of_intervals]}
+    run = {**run, "warnings": [*run.get("warnings", ()), *of_intervals, *unnamed(own, described)]}
     record = files.record(experiment, results, run, contents, answer, store.described())
     report = html.report_page(
         experiment,
@@ -495,6 +495,23 @@ def write_files(
     files.replace_all(folder, contents, stale=files.outputs)
     seconds = {"drawing": drawn - began, "writing": time.perf_counter() - drawn}
     return Written(folder, tuple(sorted(contents)), tuple(removed), made, answer, seconds)
+
+
+DRAWN_FOR_ALL = ("claims", "sweep")  # figures that no study names, and begin so
+
+
+def unnamed(own: Study, described: Iterable[str]) -> list[str]:
+    """A line on the figures that are drawn but are not among those that the study's keys name, if any.
+
+    What is drawn several times has something behind that name: `gain_r_2`.
+    """
+    known = own.keys().figure_names
+    if known is None:
+        return []
+    every = (*known, *DRAWN_FOR_ALL)
+    found = [name for name in described if not any(matches(name, one) or name.startswith(f"{one}_") for one in every)]
+    names = ", ".join(found)
+    return [f"study {own.name}: draws {names}, which its `figure_names` lacks: {', '.join(known)}"] if found else []
 
 
 def captions(described: Mapping[str, Figure]) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from radarsim.app import configs
 from radarsim.cli.console import field, say
 from radarsim.language import listed, plural, term, tr
-from radarsim.report.wording import interval, labelled, printable, significant_digits
+from radarsim.report.wording import interval, known, labelled, printable, significant_digits
 
 if TYPE_CHECKING:
     from radarsim.app.readings import Done
@@ -185,7 +185,7 @@ def _print_claim(parts: Sequence[Mapping[str, Any]], detailed: bool, into: str) 
         if page.number(row["measured"]) is not None:
             said.append(page.measured(row) + tr("; expected {words}", words=page.expected(row["expected"])))
         if (exact := page.number(row["exact"])) is not None:
-            said.append(tr("exactly {value}", value=page.plain(exact)))
+            said.append(tr("exactly {value}", value=page.plain(exact) if exact == round(exact) else known(exact)))
         if (missed := page.number(row["miss"])) is not None and missed:
             said.append(tr("off by {miss:.3g} margins", miss=missed))
         if row["verdict"] == NOT_JUDGED:

@@ -326,6 +326,13 @@ class Followed:
         """The filters of the config that never had an estimate."""
         return [one.name for one in self.case.spec.members if one.name not in self.estimating]
 
+    @property
+    def without_plots(self) -> dict[str, list[str]]:
+        """The filters that took no plot, as the file has none of their columns, with these."""
+        of, spec = recorded_of(self.case), self.case.spec
+        wanted = {one.name: list(of.columns_of(spec, one)) for one in spec.members}
+        return {name: names for name, names in wanted.items() if names and self.head.keys().isdisjoint(names)}
+
     def _gaps(self, t: np.ndarray) -> None:
         if self.rows == 0:
             self.first_s = self.last_s = float(t[0])

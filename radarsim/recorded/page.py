@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from radarsim.config.experiment import Experiment
-from radarsim.language import numeral, plural, power_of_ten, term, tr
+from radarsim.language import listed, numeral, plural, power_of_ten, term, tr
 from radarsim.recorded import figures as accuracy
 from radarsim.recorded import fit
 from radarsim.recorded.advice import Advice, Asked, Finding
@@ -45,6 +45,9 @@ def rows(followed: Followed) -> list[str]:
     missing = [tr("{count} of {name}", count=count, name=name) for name, count in followed.missing.items() if count]
     if missing:
         lines.append(labelled("missing", ", ".join(missing)))
+    for name, columns in followed.without_plots.items():
+        told = {"name": name, "columns": listed(columns)}
+        lines.append(labelled("missing", tr("{name} took no plot, as it needs {columns}: predictions alone", **told)))
     if followed.silent:
         names = ", ".join(followed.silent)
         lines.append(labelled("no rows", tr("{names}: never an estimate from these plots", names=names)))

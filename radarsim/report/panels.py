@@ -677,8 +677,8 @@ def dynamic_figure(
     if not drawn:
         return None
     caption = tr(
-        "Errors of the {quantity} where the target leaves the filters' model: mean error (dynamic, bias) and standard "
-        "deviation (fluctuation, spread) of {realisations}; σ² is the sum of their squares.",
+        "Errors of the {quantity} in cases whose mean error somewhere exceeds the spread: mean error (dynamic, bias) "
+        "and standard deviation (fluctuation, spread) of {realisations}; σ² is the sum of their squares.",
         quantity=of.name,
         realisations=realisations(results),
     )

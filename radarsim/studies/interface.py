@@ -132,6 +132,10 @@ class RecordedPlots(ABC):
     def columns(self, spec: Any) -> Sequence[Sequence[str]]:
         """The columns that are read, `t_s` first; the first of these choices that a file has is taken."""
 
+    def columns_of(self, spec: Any, one: Any) -> Sequence[str]:
+        """The columns without which a filter takes no plot. Default: none, each takes what is read."""
+        return ()
+
     @abstractmethod
     def sigmas(self, spec: Any) -> Mapping[str, Sequence[str]]:
         """The keys of the standard deviations that stand behind each number that is measured."""

@@ -39,6 +39,7 @@ import inspect
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from itertools import chain, combinations
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -78,6 +79,7 @@ class Measured(NamedTuple):
     sigma_keys: tuple[str, ...] = ()
 
 
+MOST_TOLD_APART = 6  # sets of columns of which a file may have any; of more, all or one
 NEEDED: Mapping[str, tuple[type, str]] = {
     "name": (str, "the value of `study:` in YAML"),
     "about": (str, "one line for `radarsim list`"),
@@ -340,8 +342,12 @@ class Recorded(RecordedPlots):
 
     def columns(self, spec: Any) -> Sequence[Sequence[str]]:
         each = list(dict.fromkeys(self.study.columns(spec, one) for one in spec.filters))
-        every = tuple(dict.fromkeys(name for names in each for name in names))
-        return [("t_s", *names) for names in dict.fromkeys((every, *each))]
+        counts = range(len(each), 0, -1) if len(each) <= MOST_TOLD_APART else (len(each), 1)
+        some = [tuple(dict.fromkeys(chain(*part))) for n in counts for part in combinations(each, n)]
+        return [("t_s", *names) for names in dict.fromkeys(some)]
+
+    def columns_of(self, spec: Any, one: Any) -> Sequence[str]:
+        return self.study.columns(spec, one)
 
     def sigmas(self, spec: Any) -> Mapping[str, Sequence[str]]:
         pairs = [zip(self.study.columns(spec, one), self.study.measured, strict=False) for one in spec.filters]

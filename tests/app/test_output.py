@@ -12,8 +12,10 @@ from markupsafe import escape
 from radarsim.app import result as output
 from radarsim.app import run
 from radarsim.app.configs import load
+from radarsim.app.result import unnamed
 from radarsim.errors import StoreError
 from radarsim.report import files, html
+from radarsim.studies.registry import study
 
 TABLES = {"curves.csv", "gains.csv", "steady.csv", "believed.csv", "consistency.csv", "radar.csv"}
 TABLES |= {"claims.csv"}
@@ -215,3 +217,11 @@ def test_figures_have_the_width_asked_for_their_captions_and_what_they_were_made
     kept = run.report(first.experiment, out=tmp_path, figures=("pdf",)).written
     assert "figures/sigma_r.svg" in kept.removed
     assert not (folder / "figures" / "sigma_r.svg").exists()
+
+
+def test_a_figure_that_the_keys_do_not_name_is_complained_of():
+    own = study("range_doppler")
+    known = ", ".join(own.keys().figure_names)
+    line = f"study range_doppler: draws sigma_rr, which its `figure_names` lacks: {known}"
+    assert unnamed(own, ["sigma_r", "gain_r_2", "claims", "sweep_sigma_r", "sigma_rr"]) == [line]
+    assert unnamed(own, ["sigma_r"]) == []

@@ -51,6 +51,20 @@ def test_its_file_is_short(name):
     assert len(text.splitlines()) <= LINES[name]
 
 
+def test_a_filter_whose_column_a_file_lacks_is_named(radarsim, tmp_path):
+    radarsim("simulate", "chirp", "-o", "plots.csv", cwd=tmp_path)
+    head, *rows = [line.split(",") for line in (tmp_path / "plots.csv").read_text().splitlines()]
+    at = head.index("z_up_m")
+    lines = [",".join(one[n] for n in (0, at)) for one in (head, *rows)]
+    (tmp_path / "up.csv").write_text("\n".join(lines) + "\n")
+    said = radarsim("track", "chirp", "up.csv", "-o", "track.csv", cwd=tmp_path)
+    words = said.stdout + said.stderr
+    assert "down took no plot, as it needs z_down_m: predictions alone" in words
+    assert "up took no plot" not in words
+    whole = radarsim("track", "chirp", "plots.csv", "-o", "track.csv", cwd=tmp_path)
+    assert "took no plot" not in whole.stdout + whole.stderr
+
+
 @pytest.mark.slow
 def test_the_chirps_run_is_the_same_by_any_means(radarsim, tmp_path):
     radarsim("run", "chirp", "-n", N, "--out", tmp_path / "one")
