@@ -143,7 +143,7 @@ class StepStudy(OneFile):
         spec = case.spec
         axes, sums = self.axes(spec, self.exact_sigma(spec)), self.sums(spec)
         known = self._known(spec, axes.t_s)
-        world, detection = self.world(spec), float(self.detection(spec))
+        world, detection = record(self.world, spec), float(self.detection(spec))
         scene = self._scene(world)
         filters = tuple(self._followed(spec, one, scene, detection < 1) for one in spec.filters)
         if any(one.tested for one in filters):
@@ -156,7 +156,10 @@ class StepStudy(OneFile):
 
     def _known(self, spec: Any, t_s: np.ndarray) -> np.ndarray:
         """The time since the scan before, and what is known at each, (K, whole eights)."""
-        columns = [np.diff(t_s, prepend=t_s[0]), *self.known(spec, t_s)]
+        given = said(self.known, spec, t_s)
+        if len(given) != len(self.known_columns):
+            raise fault(self.known, f"gives {len(given)} columns, known_columns has {len(self.known_columns)}")
+        columns = [np.diff(t_s, prepend=t_s[0]), *given]
         known = np.zeros((t_s.size, -(-len(columns) // 8) * 8))
         known[:, : len(columns)] = np.transpose(columns)
         return known
@@ -174,12 +177,12 @@ class StepStudy(OneFile):
             w = [noise(trace, n) for n in range(count + plot)]
             own, error = tuple(w[:count]), tuple(w[count:])
             if state is None:
-                x = said(self.begin, c, own)
+                x = numbers_of(self.begin, c, own)
             else:
-                x = said(self.move, trace.rows(stepped.STATE, state), dt, c, own)
+                x = numbers_of(self.move, trace.rows(stepped.STATE, state), dt, c, own)
                 same_shape(self.move, x, state)
             state = x
-            z, true = said(self.plot, x, u, c, error), said(self.truth, x, u, c)
+            z, true = numbers_of(self.plot, x, u, c, error), numbers_of(self.truth, x, u, c)
             of_length(self.plot, z, len(self.measured), "measured")
             of_length(self.truth, true, len(self.components), "components")
             trace.write(stepped.STATE, x)
@@ -201,7 +204,7 @@ class StepStudy(OneFile):
         from radarsim.kernels import stepped
 
         steps = self.kinds[one.kind]
-        numbers = steps.design(spec, one)
+        numbers = record(steps.design, spec, one)
         first, following, rows = self._filter_programs(steps, numbers, scene, missed)
         tested, rows_of_plot = steps.covariance is not None, scene.shape[1]
         made = kernel(stepped.follower, first, following, rows_of_plot, len(self.components), tested)
@@ -217,11 +220,11 @@ class StepStudy(OneFile):
             c, dt, u = trace.plain(stepped.NUMBERS, numbers), *self._at_a_scan(trace)
             z = trace.rows(stepped.PLOT, (0.0,) * len(self.measured), 1)
             if begins:
-                s = said(steps.start, z, u, c)
+                s = numbers_of(steps.start, z, u, c)
             else:
-                before = said(steps.predict, trace.rows(stepped.STATE, state), dt, u, c)
+                before = numbers_of(steps.predict, trace.rows(stepped.STATE, state), dt, u, c)
                 same_shape(steps.predict, before, state)
-                s = said(steps.update, before, z, u, c)
+                s = numbers_of(steps.update, before, z, u, c)
                 same_shape(steps.update, s, state)
                 if missed:
                     s = traced.where(trace.rows(stepped.PLOT, 0.0) > 0.5, s, before)
@@ -229,13 +232,13 @@ class StepStudy(OneFile):
             trace.write(stepped.STATE, s)
             components = (0.0,) * len(self.components)
             true = trace.rows(stepped.PLOT, components, 1 + len(self.measured))
-            estimate = said(steps.estimate, s, u, c)
+            estimate = numbers_of(steps.estimate, s, u, c)
             of_length(steps.estimate, estimate, len(components), "components")
             e = tuple(a - b for a, b in zip(estimate, true, strict=True))
             counts = trace.rows(stepped.COUNTED, 0.0) > 0.5
             trace.write(stepped.ERRORS, traced.where(counts, e, (0.0,) * len(e)))
             if steps.covariance is not None:
-                P = said(steps.covariance, s, u, c)
+                P = numbers_of(steps.covariance, s, u, c)
                 n = len(components)
                 of_length(steps.covariance, P, n * (n + 1) // 2, "elements of a packed covariance")
                 found = (*(traced.row_of(P, n, i)[i] for i in range(n)), traced.normalised(P, e))
@@ -377,7 +380,7 @@ def plain(numbers: Any) -> np.ndarray:
 def said(function: Callable[..., Any], *arguments: Any) -> Any:
     """What an author's function gives; ConfigError with its file and line where it fails."""
     try:
-        return traced.numbered(function(*arguments))
+        return function(*arguments)
     except ConfigError:
         raise
     except Exception as error:
@@ -387,6 +390,19 @@ def said(function: Callable[..., Any], *arguments: Any) -> Any:
         if not frames:
             raise fault(function, words) from error
         raise ConfigError(f"{frames[-1].filename}:{frames[-1].lineno}: {frames[-1].name}: {words}") from error
+
+
+def numbers_of(function: Callable[..., Any], *arguments: Any) -> Any:
+    """What a step gives; whole numbers in it are numbers of a realisation like others."""
+    return traced.numbered(said(function, *arguments))
+
+
+def record(function: Callable[..., Any], *arguments: Any) -> Any:
+    """The numbers that an author's function makes of keys; ConfigError where it gives no tuple or named record."""
+    given = said(function, *arguments)
+    if not isinstance(given, tuple):
+        raise fault(function, f"must give a tuple or a named record, got {type(given).__name__}")
+    return given
 
 
 def within(file: str) -> bool:
@@ -442,14 +458,14 @@ class Tracker:
             for f, (steps, c) in enumerate(self.filters):
                 s = self.states[f]
                 if s is not None:
-                    s = said(steps.predict, s, float(t[n] - self.last), u, c)
+                    s = numbers_of(steps.predict, s, float(t[n] - self.last), u, c)
                 if not any(map(math.isnan, z)):
-                    s = said(steps.start, z, u, c) if s is None else said(steps.update, s, z, u, c)
+                    s = numbers_of(steps.start, z, u, c) if s is None else numbers_of(steps.update, s, z, u, c)
                 self.states[f] = s
                 if s is not None:
-                    found[f, n, 0] = said(steps.estimate, s, u, c)
+                    found[f, n, 0] = numbers_of(steps.estimate, s, u, c)
                     if steps.covariance is not None:
-                        P, m = said(steps.covariance, s, u, c), len(study.components)
+                        P, m = numbers_of(steps.covariance, s, u, c), len(study.components)
                         found[f, n, 1] = np.sqrt([traced.row_of(P, m, i)[i] for i in range(m)])
             self.last = float(t[n])
         components = tuple((one.name, one.unit) for one in study.components)

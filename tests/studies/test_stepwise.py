@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from radarsim.config.fields import Member, Model, Positive, Probability, key
+from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.kernels.traced import where
+from radarsim.studies import judged, stepwise
 from radarsim.studies.onefile import Component, Measured
 from radarsim.studies.stepwise import Steps, StepStudy
 
@@ -138,9 +140,10 @@ def test_errors_are_the_exact_ones():
     np.testing.assert_allclose(sums["paired"][0], sums["error"][0, ..., 3], rtol=1e-12)
 
 
-def test_a_realisation_is_itself_in_any_block():
+def test_a_realisation_is_itself_in_any_block(monkeypatch):
     study = Walk()
     case = case_of(study, detection_probability=0.7)
+    monkeypatch.setattr(stepwise, "ROOM", 130)  # two eights at once
     _, together = added(study, case, 40, step=40)
     _, apart = added(study, case, 40, step=3)
     for name, sums in together.items():
@@ -155,6 +158,29 @@ def test_the_baseline_is_whichever_is_named():
     _, other = added(study, case, 100)
     np.testing.assert_array_equal(first["error"], other["error"])
     np.testing.assert_allclose(other["paired"][0], first["paired"][1], rtol=1e-13)
+    assert np.all(first["paired"][1] > 0)
+
+
+def test_what_the_study_knows_exactly_and_what_its_filters_believe_stands_in_tables():
+    class Known(Walk):
+        def exact_sigma(self, spec):
+            return np.sqrt([exact_variances(kalman_gains()), exact_variances([0.5] * (SCANS - 1))])[..., None]
+
+    study, n = Known(), 4096
+    case = case_of(study)
+    plan, sums = added(study, case, n)
+    np.testing.assert_allclose(plan.axes.exact_sigma[0, :, 0], np.sqrt(sums["believed"][0, :, 0] / n), rtol=1e-12)
+    result = CaseResult("walk", "walk", case.spec, (), n, sums, plan.axes)
+    made = study.tables([result])
+    assert set(made["believed"]["filter"]) == set(made["consistency"]["filter"]) == {"kalman"}
+    assert set(made["consistency"]["nees_verdict"]) == {"consistent"}
+    seen = judged.Evidence([result], made, {})
+    for at, place in ((None, -1), (3, 2)):
+        found = judged.bias(seen, "walk", "halves", "x", at)
+        assert found.value == sums["error"][1, place, 0, 0] / n
+        assert found.hi - found.value == pytest.approx(1.96 * plan.axes.exact_sigma[1, place, 0] / np.sqrt(n), rel=0.1)
+        ratio = np.sqrt(sums["error"][0, place, 0, 1] / sums["believed"][0, place, 0])
+        assert judged.over_believed(seen, "walk", "kalman", "x", at).value == pytest.approx(ratio)
 
 
 @pytest.mark.parametrize("sensor", [{}, {"detection_probability": 0.6}], ids=["all plots", "missed plots"])
@@ -218,6 +244,20 @@ def test_a_fault_is_one_line_with_its_place(step, function, line, words):
         study.prepare(case_of(study, names=["kalman"]))
     assert len(caught.value.lines) == 1
     assert caught.value.lines[0].startswith(place)
+
+
+def not_a_record(spec, one):
+    return {"sigma": 1.0}
+
+
+def test_numbers_are_a_record_and_what_is_known_has_its_columns():
+    study = Walk()
+    study.kinds = {"kalman": type("Wrong", (Kalman,), {"design": not_a_record})}
+    with pytest.raises(ConfigError, match="not_a_record: must give a tuple or a named record, got dict"):
+        study.prepare(case_of(study, names=["kalman"]))
+    study.kinds, study.known = Walk.kinds, lambda spec, t_s: (t_s, t_s)
+    with pytest.raises(ConfigError, match="gives 2 columns, known_columns has 1"):
+        study.prepare(case_of(study))
 
 
 def test_what_a_class_lacks_is_said_at_once():

@@ -141,4 +141,8 @@ def test_the_claims_are_confirmed():
     result = radarsim.run("bearings", realisations=20_000)
     claims = result.tables["claims"]
     assert dict(zip(claims["claim"], claims["overall"], strict=True)) == dict.fromkeys(claims["claim"], "confirmed")
+    first = result.tables["consistency"].iloc[0]  # where the filter is right about itself, of three degrees of freedom
+    half = 1.96 * np.sqrt(2 / (3 * 20_000))
+    assert abs(first["nees"] - 1) < 2.5 * half
+    assert (first["nees_hi"] - first["nees_lo"]) / 2 == pytest.approx(half, rel=0.1)
     assert result.figure("consistency").axes[0].lines
