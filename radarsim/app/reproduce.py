@@ -7,8 +7,8 @@ name are mostly of one study, and the two would compile its kernels at the same 
 
 `radarsim new-study`: a package with a small whole study, written once and never over anything.
 
-It is a copy of radarsim/app/template under another name. The template is a package that works as it stands: the same
-linter reads it as all else, and tests run it.
+It is a copy of radarsim/app/one_file, or of radarsim/app/template, under another name. These are packages that work as
+they stand: the same linter reads them as all else, and tests run them.
 """
 
 import json
@@ -254,14 +254,14 @@ def _stages(done: Sequence[Done]) -> list[str]:
 
 
 # ---- new study -------------------------------------------------------------------------------------------------------
-TEMPLATE = Path(__file__).parent / "template"
-MODULE = "random_walk"  # the name that the template has
+ONE_FILE, TEMPLATE = (Path(__file__).parent / name for name in ("one_file", "template"))
+MODULE = "random_walk"  # the name that the templates have
 SUFFIXES = (".md", ".py", ".toml", ".yaml")
 PLAIN = re.compile(r"[a-z][a-z0-9_]{0,39}")
 
 
-def new_study(name: str, folder: str | os.PathLike = ".") -> Path:
-    """Write the package folder/NAME with a study called NAME; its path.
+def new_study(name: str, folder: str | os.PathLike = ".", several: bool = False) -> Path:
+    """Write the package folder/NAME with a study called NAME, in one file or in several; its path.
 
     Raises ConfigError for a name that cannot be a new module's, and where there is anything of that name already;
     StoreError where it cannot be written.
@@ -275,8 +275,9 @@ def new_study(name: str, folder: str | os.PathLike = ".") -> Path:
         raise ConfigError(f"{path}: is there already and is never overwritten; choose another name") from None
     except OSError as error:
         raise StoreError(f"{path}: cannot be written: {error.strerror}") from error
-    for file in files():
-        _write(path / renamed(file.relative_to(TEMPLATE).as_posix(), name), renamed(file.read_text("utf-8"), name))
+    template = TEMPLATE if several else ONE_FILE
+    for file in files(template):
+        _write(path / renamed(file.relative_to(template).as_posix(), name), renamed(file.read_text("utf-8"), name))
     return path
 
 
@@ -293,9 +294,9 @@ def unfit(name: str) -> str | None:
     return None
 
 
-def files() -> list[Path]:
-    """The files of the template, in order."""
-    return sorted(file for file in TEMPLATE.rglob("*") if file.suffix in SUFFIXES)
+def files(template: Path) -> list[Path]:
+    """The files of a template, in order."""
+    return sorted(file for file in template.rglob("*") if file.suffix in SUFFIXES)
 
 
 def renamed(text: str, name: str) -> str:

@@ -44,12 +44,14 @@ def new(name: str, like: str) -> None:
 
 @main.command(name="new-study")
 @click.argument("name", metavar="NAME")
-def new_study(name: str) -> None:
+@click.option("--folder", "several", is_flag=True, help="A study in a folder of files, for what no base derives.")
+def new_study(name: str, several: bool) -> None:
     """A package with a small whole study, to be made one's own: ./NAME.
 
-    It compares two filters on a random walk: keys, kernel, exact values, tables, figures, a claim, recorded plots,
-    configs and a test, and in each file a comment `Yours: …` where one's own goes. Installed beside radarsim it is a
-    study like those shipped here. Nothing is ever overwritten.
+    It compares two filters on a random walk: one file with keys, matrices, claims and a reading, from which kernel,
+    exact values, tables, figures and recorded plots follow; a config; a test. With --folder each of these is a file of
+    its own. A comment `Yours: …` says where one's own goes. Installed beside radarsim it is a study like those shipped
+    here. Nothing is ever overwritten.
 
     \b
     Example
@@ -60,10 +62,11 @@ def new_study(name: str) -> None:
     from radarsim.app.reproduce import new_study as write
     from radarsim.cli import console
 
-    path = write(name)
+    path = write(name, several=several)
+    guide = path / "README.md" if several else path / "src" / name / "__init__.py"
     console.field("package", str(path))
-    told = {"path": str(path), "name": name, "readme": str(path / "README.md")}
-    console.field("", tr("`pip install -e {path}`, then `radarsim run {name}`; {readme} says what is where", **told))
+    told = {"path": str(path), "name": name, "guide": str(guide)}
+    console.field("", tr("`pip install -e {path}`, then `radarsim run {name}`; {guide} says what goes where", **told))
 
 
 @main.command()

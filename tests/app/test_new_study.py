@@ -9,21 +9,31 @@ from radarsim.app import reproduce
 from radarsim.errors import ConfigError, StoreError
 from tests.program import command
 
+LARGE = (reproduce.TEMPLATE, ("--folder",))
 
-def test_the_command_writes_a_package_under_its_name(tmp_path, monkeypatch):
+
+@pytest.mark.parametrize(("template", "options"), [(reproduce.ONE_FILE, ()), LARGE])
+def test_the_command_writes_a_package_under_its_name(tmp_path, monkeypatch, template, options):
     monkeypatch.chdir(tmp_path)
-    assert "pip install -e my_paper" in command("new-study", "my_paper").output
+    assert "pip install -e my_paper" in command("new-study", "my_paper", *options).output
     written = [file for file in sorted((tmp_path / "my_paper").rglob("*")) if file.is_file()]
-    assert len(written) == len(reproduce.files())
+    assert len(written) == len(reproduce.files(template))
     assert (tmp_path / "my_paper/src/my_paper/shipped/configs/my_paper.yaml").is_file()
     text = "".join(file.read_text(encoding="utf-8") for file in written)
     assert "random_walk" not in text
-    assert 'name="my_paper"' in text
+    assert '"my_paper"' in text
 
 
-def test_every_file_says_what_goes_there():
-    silent = [file.name for file in reproduce.files() if "Yours:" not in file.read_text(encoding="utf-8")]
-    assert silent == ["__init__.py", "random_walk_step.yaml"]
+def test_a_study_in_one_file_is_one_file_with_a_config_and_a_test():
+    files = reproduce.files(reproduce.ONE_FILE)
+    assert [file.suffix for file in files] == [".toml", ".py", ".yaml", ".py"]
+    assert len(files[1].read_text(encoding="utf-8").splitlines()) <= 120
+
+
+@pytest.mark.parametrize("template", [reproduce.ONE_FILE, reproduce.TEMPLATE])
+def test_every_file_says_what_goes_there(template):
+    silent = [file.name for file in reproduce.files(template) if "Yours:" not in file.read_text(encoding="utf-8")]
+    assert silent == ["__init__.py", "random_walk_step.yaml"] * (template == reproduce.TEMPLATE)
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ def place(tmp_path_factory):
     """A folder with the package `fifth`, installed in its folder `site`."""
     folder = tmp_path_factory.mktemp("outside")
     (folder / "site").mkdir()
-    outside.command("new-study", "fifth", site=folder / "site", cwd=folder)
+    outside.command("new-study", "fifth", "--folder", site=folder / "site", cwd=folder)
     outside.installed(folder / "fifth", folder / "site")
     page = (outside.ROOT / "docs/howto/translate.md").read_text(encoding="utf-8")
     (folder / "fifth/src/fifth/language").mkdir()
@@ -166,7 +166,7 @@ def test_its_kernels_are_compiled_once(ran, radarsim, tmp_path):
 def test_blocks_from_before_an_edit_are_taken_over_where_their_bytes_are_the_same(tmp_path):
     site = tmp_path / "site"
     site.mkdir()
-    outside.command("new-study", "edited", site=site, cwd=tmp_path)
+    outside.command("new-study", "edited", "--folder", site=site, cwd=tmp_path)
     outside.installed(tmp_path / "edited", site)
     source = tmp_path / "edited/src/edited"
 
@@ -188,11 +188,18 @@ def test_its_own_tests_pass(place, radarsim):
     assert "6 passed" in done.stdout
 
 
+def test_what_new_study_writes_in_one_file_passes_its_own_tests(tmp_path):
+    outside.command("new-study", "short", site=tmp_path, cwd=tmp_path)
+    outside.installed(tmp_path / "short", tmp_path / "site")
+    ran = {"site": tmp_path / "site", "cwd": tmp_path / "short"}
+    assert "2 passed" in outside.command("-q", "-p", "no:cacheprovider", module="pytest", **ran).stdout
+
+
 def test_a_wrong_number_in_kernel_or_exact_value_ends_the_run_in_exit_code_4(tmp_path):
     """A walk 5 % longer than the filters are told, in a config without claims; then a bias that there is not."""
     site = tmp_path / "site"
     site.mkdir()
-    outside.command("new-study", "wrong", site=site, cwd=tmp_path)
+    outside.command("new-study", "wrong", "--folder", site=site, cwd=tmp_path)
     outside.installed(tmp_path / "wrong", site)
     run = ("run", "wrong", "-n", 100_000, "--set", "sensor.sigma_x_m=1.1", "--no-figures", "--out")
 
@@ -210,7 +217,7 @@ def test_a_wrong_number_in_kernel_or_exact_value_ends_the_run_in_exit_code_4(tmp
     assert "exactly 0.02: " in said
     assert "sigma measured" not in said
     edited("study.py", "exact_bias=np.full(shape, 0.02)", "exact_bias=np.zeros(shape)")
-    edited("kernels/walk.py", "x += step * w", "x += 1.05 * step * w")
+    edited("kernels/walk.py", "x[i] += step * noise[i]", "x[i] += 1.05 * step * noise[i]")
     said = outside.command(*run, "longer", site=site, cwd=tmp_path, code=4).stderr
     assert "curves.csv: wrong, fixed, x, k = " in said
     assert "sigma measured " in said
