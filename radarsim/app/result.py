@@ -175,12 +175,8 @@ class Result:
         """
         keys = ["case", "filter", "component"]
         last = self.curves.groupby(keys, sort=False).tail(1)
-        gains = (
-            common.against_own(self.gains, self.cases)
-            .groupby(keys, sort=False)
-            .tail(1)
-            .rename(columns={"note": "gain_note"})
-        )
+        gains = against_first({"gains": self.gains}, self.cases)["gains"]
+        gains = gains.groupby(keys, sort=False).tail(1).rename(columns={"note": "gain_note"})
         return last.merge(gains, on=[*keys, "k", "t_s"], how="left")
 
     @cached_property

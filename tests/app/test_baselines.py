@@ -12,6 +12,7 @@ from radarsim.app.configs import CaseWork, load
 from radarsim.app.result import gains_of, recorded_case
 from radarsim.app.run import RunOptions, case_result, check_precision, simulate
 from radarsim.errors import ConfigError
+from radarsim.report import tables
 from radarsim.report.claims.declared import Evidence
 from radarsim.studies.identity import identity
 from radarsim.studies.registry import study
@@ -86,6 +87,13 @@ def test_figures_answer_and_last_scan(both):
     assert f"slow r {row.iloc[0]['gain_percent']:.3g} % [" in further
     assert len(both.last_scan) == 9
     assert set(both.last_scan["baseline"].dropna()) == {"r+Vr"}
+
+
+def test_a_case_without_gains_has_a_last_scan():
+    assert len(radarsim.run("discriminator", realisations=40).last_scan)
+    rows = tables.against_own(tables.gains([]), radarsim.run(THREE, realisations=40).cases)
+    assert len(rows) == 0
+    assert "baseline" in rows
 
 
 def test_a_ratio_is_paired_where_either_is_a_baseline(both):
