@@ -32,20 +32,8 @@ COMMANDS = {
 KEPT = NAMES | {  # what a user types and names of the config's own
     *("radarsim", "run", "check", "claims", "rls", "track", "plots", "mine", "yaml", "results", "new", "study"),
     *("must", "got"),  # faults of a config are told in English
-    *(
-        "target",
-        "sonar",
-        "with",
-        "start",
-        "set",
-        "between",
-        "make",
-        "reproduce",
-        "figures",
-        "compare",
-        "chart",
-        "blocks",
-    ),
+    *("target", "sonar", "with", "start", "set", "between", "make", "reproduce", "figures", "compare"),
+    *("chart", "blocks"),
 }
 
 

@@ -19,23 +19,8 @@ ALL = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
 # Names, symbols, file formats and what a user types: the same in every language.
 NAMES = {
     *("r", "Vr", "ar", "CSV", "YAML", "SI", "sha", "run", "json", "csv", "report", "html", "curves", "config"),
-    *(
-        "radarsim",
-        "figures",
-        "NEES",
-        "NIS",
-        "IMM",
-        "imm",
-        "MMA",
-        "GPB",
-        "PDA",
-        "Tab",
-        "exp",
-        "var",
-        "cov",
-        "max",
-        "min",
-    ),
+    *("radarsim", "figures", "NEES", "NIS", "IMM", "imm", "MMA", "GPB", "PDA", "Tab", "exp", "var", "cov"),
+    *("max", "min"),
     *("RLS", "IEEE", "Std", "asin", "combined", "modified", "moment", "best", "samples", "sinc"),
     *("python", "numpy", "numba", "llvmlite", "scipy", "pandas", "matplotlib", "pydantic", "pyyaml"),
 }

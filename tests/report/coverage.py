@@ -24,19 +24,8 @@ from radarsim.studies import registry
 # What tells the rows of a table apart; `plots` and `m` are settings where they stand, but in gates.csv.
 LABELS = (
     *("case", "filter", "baseline", "component", "model", "order", "k", "stage", "phase", "shift", "event", "delay_s"),
-    *(
-        "truth",
-        "duration_s",
-        "threshold_k",
-        "threshold",
-        "association",
-        "m",
-        "of",
-        "what",
-        "degree",
-        "frame",
-        "range_m",
-    ),
+    *("truth", "duration_s", "threshold_k", "threshold", "association", "m", "of", "what", "degree"),
+    *("frame", "range_m"),
     *("bin_lo", "plots", "ideal", "since_loss"),
 )
 MEASURED = {("gates", "plots")}
