@@ -173,8 +173,8 @@ def _orders(result: Result) -> common.Columns:
 
     order: of the member's model, from 0
     weight ±: its probability, its share (of several members the sum; it may be negative), or how often it is chosen
-    best_order_sigma_r [m]: exact, for one who knows the target, all folds right: σ of the best member at each scan
-    best_combination_sigma_r [m]: the same of the best linear combination of the members
+    best_order_sigma_r, best_combination_sigma_r [m]: exact σ, for one who knows the target, all folds right: of the
+        best member at each scan, and of the best linear combination of the members
     """
     axes, given = result.axes, [set(one.orders) for one in result.spec.filters]
     own = np.array([[axes.combines[f] and order in given[f] for order in range(3)] for f in range(len(given))])

@@ -85,11 +85,10 @@ def _at_windows(result: CaseResult) -> tuple[np.ndarray, np.ndarray]:
 def _locks(result: CaseResult) -> common.Columns:
     """How many bursts lock, at each window; with the key `rare` by the weights of `rare.csv`.
 
-    lock_rate ± lock: share within five potential σ
-    lock_rate_3sigma: within three
+    lock_rate ± lock, lock_rate_3sigma: share within five and within three potential σ
     posterior_rate, posterior_rate_3sigma: within as many σ with the prior
-    always_rate_3sigma ± always: within three at this and all earlier windows
-    always_posterior_rate_3sigma ± always_posterior: within as many σ with the prior
+    always_rate_3sigma ± always: within three potential σ at this and all earlier windows
+    always_posterior_rate_3sigma ± always_posterior: within three σ with the prior at all of these
     energy_ratio: μ of the window
     """
     f, k = _at_windows(result)
@@ -221,8 +220,7 @@ def _is_whole(result: CaseResult, f: int, k: int) -> bool:
 def _motion(result: CaseResult) -> common.Columns:
     """What the spreads mean for a target: λ/2 of those of f₀ and f₁.
 
-    band: metre, decimetre or centimetre
-    wavelength_m: its wavelength
+    band, wavelength_m: metre, decimetre or centimetre, and the wavelength
     at: beginning or middle of the burst
     sigma_velocity_mps, sigma_acceleration_mps2: potential σ of the radial velocity and acceleration there
     """

@@ -128,11 +128,8 @@ def _consistency(result: CaseResult) -> common.Columns:
 def _operations(result: "CaseResult[FlightAxes]") -> common.Columns:
     """Arithmetic operations of one update of one realisation, counted: mean over each stage, and the whole flight.
 
-    family: family of the filter
-    merge: its rule of merging
-    models: number of its models
-    merged: number of hypotheses that go into merges of more than one
-    merges: number of these merges
+    family, merge, models: family of the filter, its rule of merging, and number of its models
+    merged, merges: number of hypotheses that go into merges of more than one, and of these merges
     operations: number of operations
     """
     rows, scans = [], result.axes.stage_scans

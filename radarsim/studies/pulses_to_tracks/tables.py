@@ -82,8 +82,7 @@ def _scans(result: Result, shown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _locks(result: Result) -> common.Columns:
     """How many bursts lock, by scan.
 
-    lock_rate ± lock: share whose estimate is within five Fisher bounds of the truth in all that is taken of it
-    lock_rate_3sigma: within three
+    lock_rate ± lock, lock_rate_3sigma: share within five, or three, Fisher bounds of the truth in all that is taken
     taken: share taken into the track; of a mixture the mean weight
     wrong_fold ±: share taken in a fold that is not the truth's
     """

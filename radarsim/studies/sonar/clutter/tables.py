@@ -150,8 +150,7 @@ def _tracking(result: CaseResult[ClutterAxes]) -> Columns:
     wrong_share ± wrong: share of the plots in the target's track that are not the target's
     false_confirmed ±: probability that a track begun by a false plot is confirmed
     false_tracks_per_hour ± false [1/h]: rate of confirmed false tracks over the sector
-    false_tracks_at_once: mean number of these at a time
-    false_life_s: mean life of one
+    false_tracks_at_once, false_life_s: mean number of these at a time, and mean life of one
     """
     return of_rows([_summary(result, f) for f in trackers(result)])
 

@@ -141,8 +141,7 @@ def _classes(result: CaseResult[ManoeuvreAxes]) -> Columns:
     """Tracks classed by their alarms: called manoeuvring if there was one in a phase, of which k is the last scan.
 
     truth: the track's phase: steady, or manoeuvre
-    duration_s: time since the phase began
-    called_manoeuvring: share of tracks called so
+    duration_s, called_manoeuvring: time since the phase began, and share of tracks called so
     error_probability: that a steady track is called manoeuvring, or a manoeuvring one steady
     """
     delays = _delays(result)
