@@ -107,13 +107,14 @@ def named(name: str, names: Sequence[str], what: str = "filter") -> None:
 def resolved(asked: Asked, axes: Axes) -> Asked:
     """The same with its filter, found where there is but one. ConfigError for names that the case has not."""
     names, chosen = list(axes.filters), asked.filter
+    gain = asked.of.paired and planned(asked.of)
     if chosen is None:
-        others = [name for i, name in enumerate(names) if not asked.of.paired or i != axes.baseline]
+        others = [name for i, name in enumerate(names) if not gain or i != axes.baseline]
         if len(others) != 1:
             raise ConfigError(f"--filter: name one of {', '.join(names)}")
         chosen = others[0]
     named(chosen, names)
-    if asked.of.paired and chosen == names[axes.baseline]:
+    if gain and chosen == names[axes.baseline]:
         words = asked.of.words
         raise ConfigError(
             f"filter {chosen!r} is the baseline, against which {words}s are: its {words} is 0 % at any value"
@@ -179,7 +180,7 @@ def sampled(asked: Asked, result: CaseResult) -> tuple[Estimate, float]:
 
 def table_of(of: Quantity, result: CaseResult) -> "pd.DataFrame":
     """The table of a case that holds a quantity. Raises ConfigError where the study makes none."""
-    made = registry.study(result.study).table(of.table, [result])
+    made = registry.study(result.study).table(of.table, [result], of.value)
     if made is None:
         raise ConfigError(f"{result.name}: no {of.words}: study {result.study} makes no {of.table}.csv")
     return made
@@ -205,8 +206,8 @@ def noted(quantity: Asked, result: CaseResult) -> str:
     from radarsim.report import notes
 
     study, name = registry.study(result.study), quantity.of.table
-    made = {key: table for key in {"curves", name} if (table := study.table(key, [result])) is not None}
-    table = notes.noted(made, [result], exact=False)[name]
+    tables = {"curves": study.curves([result]), name: table_of(quantity.of, result)}
+    table = notes.noted(tables, [result], exact=False, declared=study.quantities(result.spec))[name]
     if "note" not in table:
         return ""
     rows = table[table["filter"] == quantity.filter]

@@ -233,7 +233,7 @@ class Result:
         own, made = study(self.experiment.study), self._tables
         nearly = [case.name for case in self.experiment.cases if own.exact_but_for(case)]
         bounds = ("claims",) if own.exact_errors else ("claims", "curves", "gains")
-        return (*notes.faults(made, nearly, bounds), *claims.errors(made["claims"]))
+        return (*notes.faults(made, nearly, bounds, own.quantities()), *claims.errors(made["claims"]))
 
     def check(self) -> None:
         """Raises DisagreementError where there are `faults`."""
@@ -295,7 +295,7 @@ def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
     made = measured(results)
     verdicts = claims.judged(of.claims(), results, made, configs.shipped, stem)
     made["claims"] = over_readings(verdicts, results[0].study)
-    return notes.noted(made, results, of.exact_errors)
+    return notes.noted(made, results, of.exact_errors, of.quantities(results[0].spec))
 
 
 def over_readings(verdicts: "pd.DataFrame", name: str, out: Path | None = None) -> "pd.DataFrame":

@@ -30,7 +30,7 @@ from radarsim.engine.run import Collected, Shared, Signals, Stop, collect, share
 from radarsim.engine.store import Stock, available_cores, stock
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.report import files
-from radarsim.report.quantities import SIGMA, Quantity
+from radarsim.report.quantities import GAIN, SIGMA, Quantity
 from radarsim.studies import registry
 from radarsim.studies.registry import study
 
@@ -184,11 +184,11 @@ def table_of(case: Case, of: Quantity) -> "Table":
     from radarsim.report import tables
 
     own = study(case.study)
-    if of.table == "gains":
+    if of == GAIN:
         from radarsim.app.result import gains_of
 
         return gains_of(own)
-    return lambda results: tables.frame({}) if (made := own.table(of.table, results)) is None else made
+    return lambda results: tables.frame({}) if (made := own.table(of.table, results, of.value)) is None else made
 
 
 def _collected(

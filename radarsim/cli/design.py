@@ -65,7 +65,7 @@ def _option(by_study: "Mapping[str, Quantity]", everywhere: bool) -> click.Optio
     unit = one.shown_unit() or "in the component's unit"
     where = "" if everywhere else f" ({', '.join(by_study)})"
     words = one.words[0].upper() + one.words[1:] if one.words[0].isascii() else one.words
-    text = f"{words}{' against the baseline' * one.paired}, {unit}{where}."
+    text = f"{words}, {unit}{where}."
     return click.Option([one.option, f"{OF}{one.name}"], type=Named(metavar), metavar=metavar, help=text)
 
 

@@ -40,6 +40,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.language import plural, tr
 from radarsim.report import files, rare, seen, statistics, tables
+from radarsim.report.quantities import COMMON, Quantity
 from radarsim.report.statistics import ERROR_OF_PROGRAM, FEW, Z95, Estimate, Values, furthest, standard_errors
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ ROUNDING = 1e-9  # of a value
 UNSEEN = 18.0  # realisations of n that are all missing in one sample of 6·10⁷
 STRAYS = 5.0  # standard errors by which κ of Gaussian errors may lie off theirs
 PLACE = ("case", "filter", "component")
-SQUARES = ("sigma", "nees", "nis")  # measured columns of means of squares
+SQUARES = ("sigma", "nees", "nis")  # measured columns of means of squares, in any table
 
 
 class Beside(NamedTuple):
@@ -87,7 +88,13 @@ def measured(table: "pd.DataFrame", of: Beside) -> Estimate:
     return Estimate(value, value - Z95 * lo, value + Z95 * hi) if of.lo == of.hi else Estimate(value, lo, hi)
 
 
-def distances(made: "Mapping[str, pd.DataFrame]", name: str, of: Beside, nearly: Collection[str] = ()) -> np.ndarray:
+def distances(
+    made: "Mapping[str, pd.DataFrame]",
+    name: str,
+    of: Beside,
+    nearly: Collection[str] = (),
+    declared: Sequence[Quantity] = (),
+) -> np.ndarray:
     """Standard errors (rows,) by which the measured values of a column lie off the exact ones.
 
     made: all tables; nearly: the cases of which exact values are right to `ALMOST`. 0 where the sample may lack as
@@ -95,14 +102,18 @@ def distances(made: "Mapping[str, pd.DataFrame]", name: str, of: Beside, nearly:
     """
     table = made[name]
     (value, lo, hi), exact = measured(table, of), table[of.exact].to_numpy(dtype=float)
-    size, lacking, squares = np.abs(exact), np.zeros(len(table)), of.value in SQUARES
+    size, lacking, squares = (
+        np.abs(exact),
+        np.zeros(len(table)),
+        [(one.table, one.value) for one in declared if one.squares],
+    )
     if of.value == "bias":
         size = np.fmax(size, table["sigma"].to_numpy(dtype=float))
         lacking = size * np.sqrt(UNSEEN / np.fmax(table["n"].to_numpy(dtype=float), 1.0))  # n = 0: no row is judged
     elif of.value.endswith("_percent"):  # of a ratio of two σ
         size = np.abs(100 - exact)
         lacking[:] = np.inf
-    elif squares:
+    elif of.value in SQUARES or (name, of.value) in squares:
         lacking[value < exact] = np.inf
     room = size * np.where(table["case"].isin(list(nearly)), ALMOST, ROUNDING)
     room = room + np.where(_gaussian(made, table), 0.0, lacking)
@@ -135,14 +146,18 @@ def _gaussian(made: "Mapping[str, pd.DataFrame]", table: "pd.DataFrame") -> np.n
 
 
 def faults(
-    made: "Mapping[str, pd.DataFrame]", nearly: Collection[str] = (), bounds: Collection[str] = ("claims",)
+    made: "Mapping[str, pd.DataFrame]",
+    nearly: Collection[str] = (),
+    bounds: Collection[str] = ("claims",),
+    declared: Sequence[Quantity] = (),
 ) -> list[str]:
     """A line for each column that lies further off its exact values than chance takes any: the furthest row of it.
 
-    made, nearly: as for `distances`; bounds: tables that hold no exact values of what was measured, whatever they say.
+    made, nearly: as for `distances`; bounds: tables that hold no exact values of what was measured, whatever they say;
+    declared: what the study measures.
     """
     found = {
-        (name, of): distances(made, name, of, nearly)
+        (name, of): distances(made, name, of, nearly, declared)
         for name, table in made.items()
         if name not in bounds and "case" in table and len(table)
         for of in beside(table)
@@ -278,7 +293,6 @@ INDEPENDENT = 0.1
 # Of every row of a table: what its interval is of, not that it rests on too little. What is computed at an estimate has
 # a spread of its own: ratios of `sonar_manoeuvre` cover 93 %, one in twenty 31.
 VARIES = "interval of sigma alone: the believed one varies from one realisation to the next"
-PAIRED = {"gain": -1, "above_oracle": 1}  # columns NAME_percent, and the sign with which it adds to the baseline's σ
 # Tables that bring all their notes, and one whose mean squares are of several components and bounded: unmarked or
 # marked by these rules, rows of NEES and NIS cover 95 … 97 %.
 OWN = ("rare", "consistency")
@@ -287,20 +301,30 @@ OF_GAIN = "gain: "  # a note that begins with the name of an interval is of that
 
 
 def noted(
-    made: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult], exact: bool = True
+    made: Mapping[str, "pd.DataFrame"],
+    results: Sequence[CaseResult],
+    exact: bool = True,
+    declared: Sequence[Quantity] = COMMON,
 ) -> "dict[str, pd.DataFrame]":
     """The tables by name, those with intervals and with a row to be noted having the column.
 
     A table may bring notes of its own on rows that have no other. exact: whether the columns `exact_…` hold exact
-    values, in place of bounds that the measured ones reach or not (`Study.exact_errors`).
+    values, in place of bounds that the measured ones reach or not (`Study.exact_errors`). declared: what the study
+    measures.
 
     note: why a row rests on too few realisations or events for its interval; only in tables that have such a row
     """
-    return {name: _noted(name, table, made, results, exact) for name, table in made.items()}
+    paired = {name: [one for one in declared if one.paired and one.table == name] for name in made}
+    return {name: _noted(name, table, made, results, exact, paired[name]) for name, table in made.items()}
 
 
 def _noted(
-    name: str, table: "pd.DataFrame", made: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult], exact: bool
+    name: str,
+    table: "pd.DataFrame",
+    made: Mapping[str, "pd.DataFrame"],
+    results: Sequence[CaseResult],
+    exact: bool,
+    paired: Sequence[Quantity],
 ) -> "pd.DataFrame":
     if not len(table) or "case" not in table or not any(str(column).endswith("_lo") for column in table):
         return table
@@ -309,8 +333,8 @@ def _noted(
     notes = brought
     if name not in OWN:
         notes = notes_on(*behind(table, made, results))
-        if name == "gains":
-            notes = np.where((notes == "") & _alike(table, made["curves"]), ALIKE, notes)
+        if paired:
+            notes = np.where((notes == "") & _alike(table, made["curves"], paired), ALIKE, notes)
         notes = np.where(notes == "", brought, notes)
         notes = np.where(known(table) & exact, "", notes)
     return table.assign(note=notes) if any(notes) else table
@@ -406,21 +430,19 @@ def nearby(curves: "pd.DataFrame") -> np.ndarray:
     return fewest
 
 
-def _alike(gains: "pd.DataFrame", curves: "pd.DataFrame") -> np.ndarray:
-    """Which rows (rows,) compare filters that err nearly alike."""
+def _alike(gains: "pd.DataFrame", curves: "pd.DataFrame", paired: Sequence[Quantity]) -> np.ndarray:
+    """Which rows (rows,) compare filters that err nearly alike, by quantities in per cent of the baseline's σ."""
     ends = ["sigma", "sigma_lo", "sigma_hi"]
     own = gains[SAME].merge(curves[[*SAME, *ends]], on=SAME, how="left")
     sigma, low, high = (own[end].to_numpy(dtype=float) for end in ends)
     with np.errstate(invalid="ignore", divide="ignore"):
         independent = np.sqrt(2) * (high - low) / sigma
     found = np.full(len(gains), False)
-    for name, sign in PAIRED.items():
-        if f"{name}_percent" in gains:
-            low, high = (gains[f"{name}_{end}"].to_numpy(dtype=float) for end in ("lo", "hi"))
-            share = 100 + sign * gains[f"{name}_percent"].to_numpy(dtype=float)
-            with np.errstate(invalid="ignore", divide="ignore"):  # a gain of 100 % leaves nothing to be alike
-                width = (high - low) / share
-            found |= (width < INDEPENDENT * independent) & (width > ROUNDING)
+    for of in paired:
+        (value, low, high), _ = of.read(gains)
+        with np.errstate(invalid="ignore", divide="ignore"):  # a gain of 100 % leaves nothing to be alike
+            width = (high - low) / (100 - value if of.more_is_better else 100 + value)
+        found |= (width < INDEPENDENT * independent) & (width > ROUNDING)
     return found
 
 

@@ -35,8 +35,8 @@ class Quantity:
     for the component's letter; by default its words and that.
 
     last: its precision is that at the last scan or window of each filter. squares: it is made of squared errors, which
-    rare large ones decide. paired: it is against the baseline filter, which has none itself. rest: it is what the
-    column leaves of 1.
+    rare large ones decide. paired: it is a change of σ in per cent of that of another filter, which has none itself.
+    rest: it is what the column leaves of 1.
     """
 
     name: str

@@ -273,11 +273,11 @@ class Study(ABC):
 
         return tables.gains(results)
 
-    def table(self, name: str, results: "Sequence[CaseResult]") -> "pd.DataFrame | None":
-        """The table of a name; None where it makes none."""
-        if name in ("curves", "gains"):
-            return self.gains(results) if name == "gains" else self.curves(results)
-        return self.tables(results).get(name)
+    def table(self, name: str, results: "Sequence[CaseResult]", column: str = "") -> "pd.DataFrame | None":
+        """The table of a name, with this column; None where it makes none. `curves` and `gains` alone where they do."""
+        common = {"curves": self.curves, "gains": self.gains}.get(name)
+        made = None if common is None else common(results)
+        return self.tables(results).get(name) if made is None or (column and column not in made) else made
 
     @abstractmethod
     def figures(

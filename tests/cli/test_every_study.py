@@ -104,11 +104,8 @@ def test_studies_declare_the_quantities_that_their_tables_hold(study):
     work = CaseWork(case)
     study_of, result = registry.study(case.study), case_result(case, work, collect(work, 2, threads=1))
     tables = study_of.tables([result])
-    made = tables | {"curves": study_of.curves([result]), "gains": study_of.gains([result])}
     quantities = study_of.quantities(case.spec)
     for one in quantities:
-        value, exact = one.read(made[one.table])
-        assert len(exact) == len(value.value) == len(made[one.table])
-        assert one.per == "" or one.per in made[one.table]
-        assert set(one.ends) <= set(made[one.table])
+        made = study_of.table(one.table, [result], one.value)
+        assert {"filter", one.value, *one.ends, *filter(None, [one.per])} <= set(made)
     assert {one.table for one in quantities} >= set(tables) & {"locks", "folds", "tracking", "probabilities"}

@@ -188,7 +188,8 @@ def _tables(experiment: Experiment, works: list[CaseWork], sums: list[np.ndarray
         CaseResult(case.name, case.study, case.spec, case.swept, n, work.plan.layout.unpack(own), work.plan.axes)
         for case, work, own in zip(experiment.cases, works, sums, strict=True)
     ]
-    return notes.noted(result.measured(results), results, exact=False)
+    declared = registry.study(experiment.study).quantities()
+    return notes.noted(result.measured(results), results, exact=False, declared=declared)
 
 
 def _index(name: str, table: pd.DataFrame) -> pd.MultiIndex:

@@ -1,9 +1,19 @@
 """Folded Doppler velocity: filters that unfold it by hypotheses, with memory and without (the wish that ends P1)."""
 
-from radarsim.report.quantities import RIGHT, WRONG
+from radarsim.language import term
+from radarsim.report.quantities import RIGHT, WRONG, Quantity
 from radarsim.studies.folder import StudyFolder
 from radarsim.studies.interface import Paper
 
+COLUMN = "above_oracle_percent|above_oracle"  # against the filter that is given the true folds
+ABOVE_ORACLE = Quantity(
+    *("above_oracle", term("σ above the oracle's"), "gains", COLUMN, "exact_above_oracle"),
+    per="component",
+    kind="signed",
+    unit="%",
+    squares=True,
+    paired=True,
+)
 STUDY = StudyFolder(
     package=__name__,
     name="ambiguous_doppler",
@@ -16,5 +26,5 @@ STUDY = StudyFolder(
     },
     paper=Paper("Gorshkov & Zavizhenets 2017, conclusion", page="ambiguous_doppler"),
     offers=("inputs", "recorded", "warnings"),
-    own_quantities=(RIGHT, WRONG),
+    own_quantities=(ABOVE_ORACLE, RIGHT, WRONG),
 )

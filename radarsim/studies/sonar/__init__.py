@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from radarsim.studies.sonar.study import RealisationPlan
 
 TRACKING = (  # of a tracker among false plots
-    Quantity("loss", term("ends of a track an hour"), "tracking", "ends_per_hour|ends", unit="/h"),
-    Quantity("false_tracks", term("false tracks an hour"), "tracking", "false_tracks_per_hour|false", unit="/h"),
+    Quantity("loss", term("ends of a track an hour"), "tracking", "ends_per_hour|ends", unit=term("/h")),
+    Quantity("false_tracks", term("false tracks an hour"), "tracking", "false_tracks_per_hour|false", unit=term("/h")),
 )
 CaseOrResult = TypeVar("CaseOrResult", "Case", "CaseResult")
 
