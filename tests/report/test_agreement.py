@@ -12,6 +12,7 @@ from radarsim.app.result import Result
 from radarsim.config import document
 from radarsim.errors import DisagreementError
 from radarsim.report import notes, tables
+from radarsim.report.quantities import Quantity
 from radarsim.report.statistics import ERROR_OF_PROGRAM, Z95, Estimate, rate, root_mean_square, standard_errors
 from tests.program import command
 
@@ -118,6 +119,18 @@ def test_errors_that_are_not_gaussian_are_held_against_being_too_large_alone():
         assert told(curves([1, 1], [1, 0.7], kurtosis)) == [SECOND + "sigma"]
     assert told(curves([1, 1], [1, 1.05], (3.05, 2.95))) == [SECOND + "sigma"]
     assert told(curves([1, 1], [1, 0.95], (3.05, 2.95))) == [SECOND + "sigma"]
+
+
+def test_a_mean_of_squares_that_a_study_declares_is_held_likewise():
+    """Too small by what a sample lacks is no fault of it; too large is."""
+    area = Quantity("area", "area", "areas", "area", squares=True)
+    made = curves([1, 1], [1, 1], (3, 100))
+    for value, faults in ((0.5, 0), (1.5, 1)):
+        own = made[["case", "filter", "component", "k", "n"]].assign(area=[1, value])
+        own = own.assign(area_lo=own["area"] - 0.01, area_hi=own["area"] + 0.01, exact_area=1.0)
+        both = {"curves": made, "areas": own}
+        assert len(notes.faults(both, declared=[area])) == faults
+        assert len(notes.faults(both)) == 1
 
 
 def test_a_bias_may_lack_what_eighteen_realisations_make():

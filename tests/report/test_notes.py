@@ -13,6 +13,7 @@ from radarsim.app.configs import CaseWork, load
 from radarsim.config.document import SHIPPED
 from radarsim.engine.results import CaseResult
 from radarsim.report import notes
+from radarsim.report.quantities import Quantity
 from radarsim.report.statistics import FEW
 
 
@@ -64,6 +65,18 @@ def test_gains_of_filters_that_err_nearly_alike_are_marked(half, exact, alike):
     gain = {"gain_percent": 0.0, "gain_lo": -half, "gain_hi": half, "exact_percent": exact}
     gains = pd.DataFrame([{**row, "filter": "one", "baseline": "two", **gain}]).drop(columns="n")
     noted = notes.noted({"curves": curves, "gains": gains}, [])["gains"]
+    assert list(noted.get("note", [""])) == [notes.ALIKE if alike else ""]
+
+
+@pytest.mark.parametrize(("value", "alike"), [(0.0, True), (-95.0, False), (95.0, True)])
+def test_a_paired_quantity_that_a_study_declares_is_marked_likewise(value, alike):
+    """As wide as ± 0.3 % of the other's σ: of a σ that is a twentieth of it that is wide, of twice as much it is not."""
+    row = {"case": "a", "component": "x", "k": 1, "n": 5000, "sigma": 1.0, "sigma_lo": 0.96, "sigma_hi": 1.04}
+    curves = pd.DataFrame([{**row, "filter": name, "n_eff": 2500.0} for name in ("one", "two")])
+    above = {"above_percent": value, "above_lo": value - 0.3, "above_hi": value + 0.3}
+    table = pd.DataFrame([{**row, "filter": "one", **above}]).drop(columns="n")
+    declared = Quantity("above", "above", "apart", "above_percent|above", kind="signed", unit="%", paired=True)
+    noted = notes.noted({"curves": curves, "apart": table}, [], declared=[declared])["apart"]
     assert list(noted.get("note", [""])) == [notes.ALIKE if alike else ""]
 
 
