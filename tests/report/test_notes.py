@@ -70,7 +70,7 @@ def test_gains_of_filters_that_err_nearly_alike_are_marked(half, exact, alike):
 
 @pytest.mark.parametrize(("value", "alike"), [(0.0, True), (-95.0, False), (95.0, True)])
 def test_a_paired_quantity_that_a_study_declares_is_marked_likewise(value, alike):
-    """As wide as ± 0.3 % of the other's σ: of a σ that is a twentieth of it that is wide, of twice as much it is not."""
+    """As wide as ± 0.3 % of the other σ: wide of a σ that is a twentieth of it, not of one that is twice as much."""
     row = {"case": "a", "component": "x", "k": 1, "n": 5000, "sigma": 1.0, "sigma_lo": 0.96, "sigma_hi": 1.04}
     curves = pd.DataFrame([{**row, "filter": name, "n_eff": 2500.0} for name in ("one", "two")])
     above = {"above_percent": value, "above_lo": value - 0.3, "above_hi": value + 0.3}
