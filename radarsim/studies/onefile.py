@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from radarsim.report.claims.declared import Claim
     from radarsim.report.claims.over import Choice, PaperReadings
     from radarsim.report.drawing import Figure
+    from radarsim.report.quantities import Quantity
 
 
 class Component(NamedTuple):
@@ -203,6 +204,12 @@ class OneFile(Study):
     def limits(self, spec: Any) -> "np.ndarray | None":
         """The σ (F, C) that the errors of a config tend to, not-a-number where there is none; None: not known."""
         return None
+
+    def quantities(self, spec: Any = None) -> "tuple[Quantity, ...]":
+        from radarsim.report.quantities import COMMON, Quantity
+
+        limit = Quantity("limit", term("limit of σ"), "last", "steady_sigma", per="component")
+        return COMMON if type(self).limits is OneFile.limits else (*COMMON, limit)
 
     # ---- what is shown -------------------------------------------------------------------------------------------
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":

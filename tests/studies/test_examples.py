@@ -100,6 +100,8 @@ def test_the_chirps_questions_and_recorded_plots(radarsim, tmp_path):
     radarsim(*curve, f"radar.slope_hz_per_s={solved['value']!r}")
     up = [line for line in (tmp_path / "chirp/last.csv").read_text().splitlines() if line.startswith("chirp,up,r,")]
     assert float(up[0].split(",")[-2]) == pytest.approx(27, rel=1e-6)
+    ask = ("solve", "chirp", "radar.slope_hz_per_s", "--limit", "r", "--filter", "up", "--equals", 27, "--json")
+    assert json.loads(radarsim(*ask).stdout)["value"] == pytest.approx(solved["value"], rel=1e-5)  # long settled
     assert "radar.slope_hz_per_s" in radarsim("sensitivity", "chirp", "--out", tmp_path).stdout
     for arguments in (
         ("new", "own", "--like", "chirp"),

@@ -83,7 +83,7 @@ def study_of(n, D):
                 case "Q":
                     return Motion(F, lambda t: 0.2 * Q(t), mean, P)
                 case "x":
-                    return Motion(F, Q, mean + 2, P)
+                    return Motion(F, Q, mean + 20, P)
             return Motion(F, Q, mean, P)
 
         def assumed_plot(self, spec, one, k):
@@ -139,7 +139,9 @@ def test_the_kernel_is_the_textbooks_filter_over_its_own_plots(n, D, probability
         columns, truth = study.realisation(case, i)
         z = np.stack([columns[f"z{d}_m"] for d in range(D)], axis=1)
         assert np.isnan(z).any() == (probability < 1)
-        error = plan.layout.unpack(study.simulate(plan, i, 1))["error"]
+        sums = plan.layout.unpack(study.simulate(plan, i, 1))
+        error = sums["error"]
+        np.testing.assert_allclose(sums["paired"], error[..., 1] * error[:1, ..., 1], rtol=1e-9)
         for f, one in enumerate(case.spec.filters):
             x, _ = textbook(study, case.spec, one, z, plan.axes.t_s, study.own_gains(case.spec, one))
             np.testing.assert_allclose(error[f, :, :, 0], x - truth, atol=1e-9 * np.abs(x).max())
@@ -170,11 +172,16 @@ def test_exact_values_are_those_of_the_kernel_of_wrong_filters_too(n, D):
 
 
 def test_with_missed_plots_exact_values_are_known_of_gains_that_do_not_depend_on_them():
+    """Of a biased filter too, whose error is a mixture with means apart."""
     study, count = study_of(2, 1), 40_000
-    plan = study.prepare(case_of(study, FILTERS, probability=0.7))
-    assert np.isnan(plan.axes.exact_sigma[:6]).all()
-    e2, e4 = (plan.layout.unpack(study.simulate(plan, 0, count))["error"][6:, ..., p] / count for p in (1, 3))
-    assert (abs(e2 - plan.axes.exact_sigma[6:] ** 2) < 5.5 * np.sqrt((e4 - e2**2) / count)).all()
+    plan = study.prepare(
+        case_of(study, [{}, {"gain": "half"}, {"gain": "steady"}, {"gain": "half", "wrong": "x"}], probability=0.7)
+    )
+    assert np.isnan(plan.axes.exact_sigma[0]).all()
+    sums = plan.layout.unpack(study.simulate(plan, 0, count))["error"][1:] / count
+    e1, e2, _, e4 = np.moveaxis(sums, -1, 0)
+    assert (abs(e2 - plan.axes.exact_sigma[1:] ** 2) < 5.5 * np.sqrt((e4 - e2**2) / count)).all()
+    assert (abs(e1 - plan.axes.exact_bias[1:]) < 5.5 * np.sqrt((e2 - e1**2) / count)).all()
     assert not plan.gaussian
 
 

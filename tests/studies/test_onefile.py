@@ -146,6 +146,12 @@ def test_the_table_of_the_last_scan_holds_what_was_measured_and_what_is_exact(ma
     assert list(last["exact_last_sigma"]) == [one for r in results for one in r.axes.exact_sigma[:, -1, 0]]
 
 
+def test_the_limit_is_a_quantity_of_a_study_that_knows_it():
+    (*_, limit), bare = Walk().quantities(), type("Bare", (Walk,), {"limits": OneFile.limits, "__module__": __name__})
+    assert (limit.option, limit.table, limit.value) == ("--limit", "last", "steady_sigma")
+    assert [one.name for one in bare().quantities()] == ["sigma", "gain"]
+
+
 def test_question_answer_and_figures(made):
     study, results, every = made
     experiment = Experiment("walk", "walk", None, (case_of(study, 0.1), case_of(study)), N, 1)
