@@ -195,7 +195,7 @@ def _gates(result: CaseResult[ClutterAxes]) -> Columns:
 
     The exact share, the gate's probability, holds for a filter that knows the target's plots and has the target's
     model. The expected number of false plots is density times area, π γ √|S| times the range, over the gates as they
-    were; the edges of the sector are neglected.
+    were, as far as these lie within the sector.
 
     plots: number of the target's plots
     inside ±: share of these in the gate

@@ -1,6 +1,7 @@
 """Trackers among false plots: against a textbook twin on the same plots, against the plain filter to the last bit."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from radarsim.studies.sonar.clutter import filters as design
 from radarsim.studies.sonar.clutter import track
 from radarsim.studies.sonar.clutter.filters import tracker_specs
 from radarsim.studies.sonar.clutter.kernels import tracker as places
-from tests.studies.sonar.clutter import naive as naive
+from tests.studies.sonar.clutter import naive
 
 T, SIGMA = 5.0, np.array([30.0, np.radians(1)])
 
@@ -142,3 +143,43 @@ def test_cells_have_draws_of_their_own():
             random.fill_words(key, 0, (scan * 10 + cell) << 12, x, y)
             words.add(int(x[0]))
     assert len(words) == 30
+
+
+# ---- the area of a gate within the sector ----------------------------------------------------------------------------
+def gate_and_sector(seed):
+    """A gate of any size and slant about a sector from 1 to 15 km, over its edges or not; every fifth is a circle."""
+    rng = np.random.default_rng(seed)
+    half, ring = (math.pi, True) if seed % 5 == 0 else (rng.uniform(0.2, 1.0), False)
+    cells = places.Cells(0.5e6, (0.5 * 15e3**2 - 0.5e6) / 20, 20, 0.3 - half, half / 5, 10, ring, 1e-6)
+    sigma, rho = np.array([rng.uniform(30, 3000), rng.uniform(0.01, 0.9)]), rng.uniform(-0.95, 0.95)
+    S = sigma[0] ** 2, rho * sigma[0] * sigma[1], sigma[1] ** 2
+    place = rng.uniform(500, 16e3), 0.3 + rng.uniform(-1.2, 1.2) * half + 2 * math.pi * rng.integers(-1, 2)
+    return places.Gate(*place, S, True), cells, rng.uniform(1, 20)
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_the_area_of_a_gate_within_the_sector_is_that_of_its_points(seed):
+    """Points of equal area in the gate's disc; those along its edges, of n² about 8 n, may count to either side."""
+    n = 700
+    (r, b, S, _), cells, threshold = gate_and_sector(seed)
+    root = np.linalg.cholesky(threshold * np.array([[S[0], S[1]], [S[1], S[2]]]))
+    radius, angle = np.sqrt((np.arange(n) + 0.5) / n)[:, None], 2 * np.pi * (np.arange(n) + 0.5) / n
+    u, v = radius * np.cos(angle), radius * np.sin(angle)
+    off = b - 0.3 if not cells.ring else 0.0
+    bearing = off - 2 * np.pi * np.round(off / (2 * np.pi)) + root[1, 0] * u + root[1, 1] * v
+    ranges, half = r + root[0, 0] * u, 0.5 * cells.nb * cells.db
+    inside = (np.abs(bearing) <= half) & (ranges >= 1e3) & (ranges <= 15e3)
+    scale = math.pi * root[0, 0] * root[1, 1]
+    det = S[0] * S[2] - S[1] ** 2
+    found = places.area_within.py_func(places.Gate(r, b, S, True), det, threshold, cells)
+    assert found == pytest.approx(scale * (ranges * inside).mean(), abs=8 / n * scale * (r + root[0, 0]))
+
+
+def test_a_gate_within_the_sector_has_its_own_area_and_an_open_one_the_sectors():
+    _, cells, _ = gate_and_sector(1)
+    small = places.Gate(8e3, 0.3, (900.0, 0.0, 3e-4), True)
+    assert places.area_within.py_func(small, 900.0 * 3e-4, 9.0, cells) == pytest.approx(
+        8e3 * math.pi * 9 * math.sqrt(0.27), rel=1e-14
+    )
+    whole = places.area_within.py_func(small, 0.27, places.OPEN, cells)
+    assert whole == pytest.approx(0.5 * (15e3**2 - 1e6) * cells.nb * cells.db, rel=1e-12)

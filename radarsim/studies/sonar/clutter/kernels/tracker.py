@@ -754,6 +754,66 @@ def with_false_plots(gated, draws, realisation, scan, gate, threshold):
 
 
 @part
+def area_within(gate, det, threshold, cells):
+    """Area in m² of a gate's part within the sector; det is |S|.
+
+    A gate that reaches over an edge is integrated as the unit disc u² + v² ≤ 1, with r = r₀ + s u, b = b₀ + c u + h v:
+    over u between the edges in range, the weight is r, and v runs from the arc or an edge in bearing to the other.
+    """
+    s, high = math.sqrt(threshold * gate.S[0]), math.sqrt(threshold * gate.S[2])
+    least, most = math.sqrt(2.0 * cells.q0), math.sqrt(2.0 * (cells.q0 + cells.dq * cells.nq))
+    half, off = 0.5 * cells.nb * cells.db, 0.0  # the gate's middle from that of the sector, less whole turns
+    if not cells.ring:
+        off = gate.b - cells.b0 - half
+        off -= TURN * np.floor(off / TURN + 0.5)
+    if gate.r - s >= least and gate.r + s <= most and abs(off) + high <= half:
+        return gate.r * np.pi * threshold * math.sqrt(det)
+    c, h = s * gate.S[1] / gate.S[0], math.sqrt(threshold * det / gate.S[0])
+    begin, end = (least - gate.r) / s, (most - gate.r) / s
+    furthest = 0.0
+    for side in (begin, end):
+        for edge in (-half - off, half - off):
+            furthest = max(furthest, side**2 + ((edge - c * side) / h) ** 2)
+    if furthest <= 1.0:  # an ellipse that holds the corners holds the sector
+        return cells.dq * cells.nq * cells.db * cells.nb
+    area, u, end = 0.0, max(begin, -1.0), min(end, 1.0)
+    while u < end:  # to where an edge in bearing next cuts the circle
+        to = end
+        for edge in (-half - off, half - off):
+            root = high * high - edge * edge
+            if root > 0.0:
+                for sign in (-1.0, 1.0):
+                    cut = (edge * c + sign * h * math.sqrt(root)) / (high * high)
+                    to = cut if u < cut < to else to
+        middle = 0.5 * (u + to)
+        arc = math.sqrt(1.0 - middle * middle)
+        low, top = (-half - off - c * middle) / h, (half - off - c * middle) / h
+        if top > -arc and low < arc:
+            weight = (gate.r, s, u, to)
+            area += arc_moment(weight) if top > arc else line_moment(weight, (half - off) / h, -c / h)
+            area += arc_moment(weight) if low < -arc else line_moment(weight, (half + off) / h, c / h)
+        u = to
+    return h * s * area
+
+
+@inline
+def arc_moment(weight):
+    """∫ (r + s u) √(1 − u²) du from begin to end; weight = (r, s, begin, end)."""
+    r, s, begin, end = weight
+    a, b = math.sqrt(1.0 - begin * begin), math.sqrt(1.0 - end * end)
+    turned = end * b - begin * a + math.asin(end) - math.asin(begin)
+    return 0.5 * r * turned + s * (a * a * a - b * b * b) / 3.0
+
+
+@inline
+def line_moment(weight, at, slope):
+    """∫ (r + s u) (at + slope u) du, likewise."""
+    r, s, begin, end = weight
+    first, second, third = end - begin, (end**2 - begin**2) / 2.0, (end**3 - begin**3) / 3.0
+    return r * at * first + (r * slope + s * at) * second + s * slope * third
+
+
+@part
 def even_places(key, field, first, n, z):
     """Write positions drawn uniformly over the sector, one a realisation from `first` on, to z (2, ≥ n)."""
     q0, dq, nq, b0, db, nb, _, _ = field.cells
@@ -889,9 +949,8 @@ def associate_track(draws, rule, realisation, k, plot, gate, counts):
     if cells.density > 0.0:
         among_false = with_false_plots(gated, draws, realisation, k, gate, rule.gate)
         if gate.settled:
-            sector = cells.dq * cells.nq * cells.db * cells.nb
             counts[FALSE] += among_false.false_count
-            counts[EXPECTED] += cells.density * min(max(gate.r, 0.0) * np.pi * rule.gate * np.sqrt(det), sector)
+            counts[EXPECTED] += cells.density * area_within(gate, det, rule.gate, cells)
         gated = gated if known else among_false
     if gate.settled:
         counts[LOOKED] += 1.0
