@@ -11,7 +11,8 @@ from tests.docs.test_links import PAGES, ROOT
 NAME = re.compile(r"`([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+)(?:\([^`]*\))?`|(?<![\w/.])([\w/]+\.py)\b")
 FILES = r"\.(?:ast|bin|blocks|csv|html|json|md|pdf|png|po|pyc?|svg|toml|txt|typed|cff|yaml|yml)$"
 FOREIGN = ("concurrent", "csv", "dask", "json", "math", "np", "numpy", "os", "pd", "pydantic", "scipy", "Security")
-OTHERS = ("STUDY.filters", "claims.CLAIMS", "result.unmet", "docs/making/measured_STUDY.py", "w2_c.py")
+OTHERS = ("STUDY.filters", "claims.CLAIMS", "docs/making/measured_STUDY.py", "w2_c.py")
+OF = {"result": "Result", "seen": "Evidence"}  # classes of what pages call so
 SOURCES = sorted(path for room in ("radarsim", "tests", "docs", "benchmarks") for path in (ROOT / room).rglob("*.py"))
 TEXTS = [page for page in PAGES if page.name != "CHANGELOG.md"]  # which says how things were called
 TEXTS += [path for path in SOURCES if path.relative_to(ROOT).parts[0] in ("radarsim", "docs")]
@@ -49,6 +50,7 @@ def stands(name: str) -> bool:
     of, _, last = name.rpartition(".")
     if re.search(FILES, name) or name.split(".")[0] in FOREIGN or all(f'"{key}"' in keys() for key in name.split(".")):
         return True
+    of = OF.get(of, of)
     owner = of.rpartition(".")[2]
     return name in bound() or last in bound().get(owner if owner[0].isupper() else of, ())
 
