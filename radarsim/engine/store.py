@@ -382,25 +382,37 @@ def _gives_the_same(folder: Path, work: Work) -> bool:
     if files[0].exists() or _unkept.get(files[0]) is not None:
         return _unkept.get(files[0], False)
     marks, stored = _marked(folder, work)
-    again, seconds, same = 0, 0.0, bool(marks) and not audited(folder).astray
+    looked: list[tuple[int, int]] = []
+    seconds, same = 0.0, bool(marks) and not audited(folder).astray
     for piece in sorted(marks if same else {}, key=marks.__getitem__):
-        if again == 0:
+        if not looked:
             work.simulate(piece.realisations(work.block)[0], 1)  # compiles
         elif seconds > PROOF_S:
             break
         started = time.thread_time()
         sums = simulated(work, piece)
         seconds += time.thread_time() - started
-        again += sums.count
+        looked.append(piece.realisations(work.block))
         if mark_of(sums) != marks[piece]:
             same = False
             break
+    again = _distinct(looked)
     settled.append(Settled(work.identity, same, again, stored))
     try:
         put(files[same], json.dumps({"computed_again": again, "stored": stored}).encode())
     except OSError:  # a store that may only be read
         _unkept[files[0]] = same
     return same
+
+
+def _distinct(looked: Collection[tuple[int, int]]) -> int:
+    """How many realisations some tasks are of, each its first and how many: the end of a run may lie in a task of
+    a longer one."""
+    found = reached = 0
+    for first, count in sorted(looked):
+        found += max(first + count - max(first, reached), 0)
+        reached = max(reached, first + count)
+    return found
 
 
 def _marked(folder: Path, work: Work) -> tuple[dict[Node | Partial, str], int]:

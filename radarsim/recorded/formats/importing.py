@@ -53,7 +53,6 @@ FOLD_COLUMNS = ("t_s", "range_m", "velocity_mps")
 PLACED = ("range_m", "bearing_rad", "velocity_mps")
 LOCAL = ("x_m", "y_m", "z_m")
 SPEEDS = ("vx_mps", "vy_mps", "vz_mps")
-ANGLES = ("elevation_rad", "azimuth_rad")
 
 
 @dataclass(frozen=True)
