@@ -61,7 +61,7 @@ class Asked:
     @property
     def words(self) -> str:
         """`gain of r+Vr in r at 60 s`."""
-        component = f" in {self.component}" if self.component else ""
+        component = f" in {self.of.place(self.component)}" if self.component else ""
         at = f" at {self.at_s:g} s" if self.at_s is not None else ""
         at = f" at k = {self.at_k}" if self.at_k is not None else at
         return f"{self.of.words} of {self.filter}{component}{at}"
@@ -69,7 +69,8 @@ class Asked:
     @property
     def said(self) -> str:
         """The same in the language spoken."""
-        told = {"kind": term(self.of.words), "filter": self.filter, "component": self.component or ""}
+        told = {"kind": term(self.of.words), "filter": self.filter}
+        told["component"] = self.of.place(self.component or "", tr)
         what = tr("{kind} of {filter} in {component}", **told) if self.component else tr("{kind} of {filter}", **told)
         if self.at_k is not None:
             return tr("{what} at k = {k}", what=what, k=str(self.at_k))

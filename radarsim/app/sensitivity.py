@@ -339,7 +339,7 @@ def tornado(found: Sensitivity) -> Figure:
         made.append(Panel(Axis(words), y_axis, tuple(marks), keys=styles, direct=False, legend="right"))
     what = listed([tr(of.words) for of in kinds])
     if found.leading:
-        what = tr("{quantity} of {symbol}", quantity=what, symbol=found.leading)
+        what = tr("{quantity} of {symbol}", quantity=what, symbol=found.of[0].place(found.leading, tr))
     caption = tr(
         "Change of {quantity} {when} for a tenth more of each key, the largest first.", quantity=what, when=found.at
     )

@@ -89,7 +89,7 @@ def print_sensitivity(found: "Sensitivity", written: "Sequence[str]") -> None:
         cells.append(line)
     heads = [(tr("{kind} of {filter}", kind=of.words, filter=one), of.changed_unit) for of, one in shown]
     columns = ["key", "value", *(head if unit == "%" else f"{head}, {tr(unit)}" for head, unit in heads)]
-    what = found.leading or tr(found.of[0].words)
+    what = found.of[0].place(found.leading, tr) or tr(found.of[0].words)
     title = tr("{stem}: change of {component} {when} for +10 %", stem=found.stem, component=what, when=found.at)
     show(title, columns, cells, right=columns[1:], spare=columns[:1:-1])
     if found.without_effect:

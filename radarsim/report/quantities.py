@@ -5,6 +5,7 @@ what `compare` puts side by side, their words, units and axes. `Study.quantities
 are those that several studies measure.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -99,6 +100,10 @@ class Quantity:
     def shown_unit(self, of_component: str = "") -> str:
         """The unit in which people read it, of a component with a unit."""
         return "%" if self.kind == "share" else self.unit or of_component
+
+    def place(self, part: str, say: Callable[[str], str] = str) -> str:
+        """One of several values of a filter as sentences have it: `r`, `model 2`."""
+        return part if self.per == "component" or not part else f"{say(self.per)} {part}"
 
     def complement(self, name: str, words: str) -> "Quantity":
         """What a share leaves of 1."""

@@ -146,7 +146,7 @@ def test_sensitivity_is_of_it(radarsim, tmp_path):
     for one, other in zip(area["rows"], sorted(sigma["rows"], key=sigma["rows"].index), strict=True):
         factor = 1 + other["sigma_change_percent"] / 100
         assert one["area_change_percent"] == pytest.approx(100 * (factor**2 - 1), abs=1e-7)
-    said = radarsim("sensitivity", "a.yaml", "--of", "inside", "-n", 400, "--out", tmp_path).stdout.splitlines()
+    said = radarsim("sensitivity", "a.yaml", "--of", "inside", "-n", 200, "--out", tmp_path).stdout.splitlines()
     assert said[0] == "a: change of share within 100 m at the last scan for +10 %"
     assert "share within 100 m of r, points" in said[1]
     rows = pd.read_csv(tmp_path / "sensitivity/a/sensitivity.csv")

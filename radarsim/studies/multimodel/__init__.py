@@ -23,6 +23,6 @@ STUDY = StudyFolder(
     ),
     offers=("cost", "readings", "seconds_per_update", "recorded"),
     own_quantities=(
-        Quantity("probability", term("probability"), "probabilities", "probability", per="model", kind="share"),
+        Quantity("probability", term("probability"), "probabilities", "probability", per=term("model"), kind="share"),
     ),
 )
