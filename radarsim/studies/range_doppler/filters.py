@@ -125,8 +125,9 @@ def scans(errors: Errors, observes: int, plots: Plots, Q: Any, defect: np.ndarra
         E, inputs, of_scans = E.ravel().tolist(), inputs.ravel().tolist(), defect.reshape(-1, 3).tolist()
     R, settled = [float(sigma) ** 2 for sigma in plots.sigma[:observes]], False
     gains: list[Any] = []
+    add, forward = add_scaled.function, predicted.function  # a call less in each of many scans
     for of_scan in of_scans:
-        E = add_scaled(predicted(E, F), 1.0, of_scan)
+        E = add(forward(E, F), 1.0, of_scan)
         if not settled:
             before, gains = (P, S), []
             P, S = predicted_covariance(P, F, Q), predicted_covariance(S, F, NO_NOISE)
@@ -136,7 +137,7 @@ def scans(errors: Errors, observes: int, plots: Plots, Q: Any, defect: np.ndarra
                 gains.append(gain)
             settled = alone and before == (P, S)  # to the last bit, and so they stay
         for m, gain in enumerate(gains):
-            E = add_scaled(E, inputs[m] - E[m], gain)
+            E = add(E, inputs[m] - E[m], gain)
         yield Errors(P, S, E)
 
 
@@ -507,9 +508,10 @@ def error_recursion(
     S[:begun, 3] = plots.sigma[1] ** 2 if observes > 1 else 0.0
     start = started(one.weights, one.believed[begun], plots, defect, dt)
     E[begun], S[begun] = start.E[:, :, 0], start.S
-    further = scans(start, observes, plots, one.noise, defect[one.start :], dt)
-    for k, errors in enumerate(further, one.start):
-        E[k], S[k] = np.reshape(errors.E, (3, -1)), errors.S
+    further = list(scans(start, observes, plots, one.noise, defect[one.start :], dt))
+    if further:
+        E[one.start :] = np.array([errors.E for errors in further]).reshape(len(further), 3, -1)
+        S[one.start :] = [errors.S for errors in further]
     return E, unpack(S.T)
 
 
