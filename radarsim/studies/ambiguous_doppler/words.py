@@ -158,6 +158,11 @@ def _as_good(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> s
 
 
 def _percent(value: float, low: float, high: float) -> str:
-    """A percentage at four digits with the ends of its interval at three."""
-    ends = wording.interval(*(numeral(f"{one:.3g}") for one in (low, high)))
+    """A percentage at four digits with the ends of its interval at three, or at as many as tell them apart.
+
+    >>> _percent(99.99, 99.985, 99.994), _percent(94.123, 93.9, 94.3)
+    ('99.99 % [99.98, 99.99]', '94.12 % [93.9, 94.3]')
+    """
+    digits = next((n for n in (3, 4, 5) if f"{low:.{n}g}" != f"{high:.{n}g}"), 3)
+    ends = wording.interval(*(numeral(f"{one:.{digits}g}") for one in (low, high)))
     return f"{numeral(f'{value:.4g}')} % {ends}"
