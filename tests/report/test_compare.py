@@ -1,11 +1,14 @@
 """Comparisons of stored results: which cases answer to one another, and what the intervals of differences are worth."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from radarsim.report import compare, statistics, tables
 from radarsim.report.compare import Side
 from radarsim.report.drawing import Line
+from radarsim.report.quantities import SIGMA, Quantity
 
 TIMES = 3000  # each is an experiment of its own
 COUNT = 400
@@ -126,6 +129,23 @@ def test_figures_have_all_sides_on_common_axes_and_sentences_the_exact_change(er
     assert len(looks) == 4
     assert compare.sentences(made)[1].endswith("], exactly 0 %.")
     assert compare.percent(2886.76) == "29.9 times"
+
+
+def test_a_quantity_that_both_studies_measure_has_figures_of_its_own(errors):
+    """Its axis has its words and its unit; a share that is measured by one side alone has none."""
+    area = Quantity("area", "mean square error", "areas", "area", per="component", unit="m2")
+    share = Quantity("inside", "share inside", "areas", "inside", kind="share")
+    sides = []
+    for name, measured in (("a", (SIGMA, area, share)), ("b", (SIGMA, area))):
+        one = side(name, errors, ["base", "one"], noise=name)
+        columns = {new: one.tables["curves"][f"sigma{new[4:]}"] ** 2 for new in ("area", "area_lo", "area_hi")}
+        areas = one.tables["curves"][["case", "filter", "component", "t_s"]].assign(inside=0.5, **columns)
+        sides.append(replace(one, tables={**one.tables, "areas": areas}, measured=measured))
+    drawn = compare.figures(sides, compare.compared([compare.Pair(sides[1], sides[0])]))
+    assert set(drawn) == {"sigma_r", "area_r"}
+    values, apart = drawn["area_r"].panels
+    assert (values.y.label, apart.y.label) == ("mean square error $r$, m2", "change against a, %")
+    assert [mark.name for mark in values.marks] == ["a, base", "a, one", "b, base", "b, one"]
 
 
 def test_tables_read_back_as_they_were_written():

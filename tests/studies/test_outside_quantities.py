@@ -137,7 +137,7 @@ def test_a_run_ends_at_its_precision(radarsim, tmp_path):
 
 def test_sensitivity_is_of_it(radarsim, tmp_path):
     """To first order a square changes by twice as much; exactly by the square of the factor."""
-    words = ("--at-k", 9, "--out", tmp_path, "--format", "svg", "--json")
+    words = ("--at-k", 9, "--out", tmp_path, "--no-figures", "--json")
     area, sigma = (
         json.loads(radarsim("sensitivity", "a.yaml", *of, *words).stdout)
         for of in (("--of", "area"), ("--of", "sigma"))
@@ -146,7 +146,9 @@ def test_sensitivity_is_of_it(radarsim, tmp_path):
     for one, other in zip(area["rows"], sorted(sigma["rows"], key=sigma["rows"].index), strict=True):
         factor = 1 + other["sigma_change_percent"] / 100
         assert one["area_change_percent"] == pytest.approx(100 * (factor**2 - 1), abs=1e-7)
-    said = radarsim("sensitivity", "a.yaml", "--of", "inside", "-n", 200, "--out", tmp_path).stdout.splitlines()
+    said = radarsim(
+        "sensitivity", "a.yaml", "--of", "inside", "-n", 200, "--out", tmp_path, "--format", "svg"
+    ).stdout.splitlines()
     assert said[0] == "a: change of share within 100 m at the last scan for +10 %"
     assert "share within 100 m of r, points" in said[1]
     rows = pd.read_csv(tmp_path / "sensitivity/a/sensitivity.csv")
@@ -158,7 +160,7 @@ def test_sensitivity_is_of_it(radarsim, tmp_path):
 def test_compare_puts_them_side_by_side(radarsim, tmp_path):
     for name in "ab":
         radarsim("run", f"{name}.yaml", "-n", 400, "--no-figures", "--out", tmp_path)
-    said = radarsim("compare", "b.yaml", "a.yaml", "--format", "svg", "--out", tmp_path).stdout
+    said = radarsim("compare", "b.yaml", "a.yaml", "--no-figures", "--out", tmp_path).stdout
     made = pd.read_csv(tmp_path / "compare/comparison.csv")
     assert {"sigma", "gain_percent", "area", "worst", "inside", "limit"} == set(made["quantity"])
     areas, sigmas = (
@@ -170,9 +172,6 @@ def test_compare_puts_them_side_by_side(radarsim, tmp_path):
         str.split, said.splitlines()
     )
     assert "nan" not in said
-    figures = {path.stem for path in (tmp_path / "compare/figures").glob("*.svg")}
-    assert {"area_r", "area_Vr", "sigma_r"} <= figures
-    assert "mean square error" in (tmp_path / "compare/figures/captions.md").read_text(encoding="utf-8")
 
 
 def test_what_a_study_does_not_measure_is_refused_with_what_it_does(radarsim, tmp_path):
