@@ -77,10 +77,6 @@ ROLES = {
     "chart": ((*GROUND, *DATA, "report", "language"), READ),
     "track": ((*GROUND, *DATA, "studies.noise", "studies.interface"), (*SUMS, "track")),
     "map": ((*GROUND, *DATA), (*SUMS, "track")),  # one realisation followed as recorded plots are, for a figure
-    "part": (
-        (*GROUND, *DATA, "report", "studies.interface", "studies.folder"),
-        (*READ, "track"),
-    ),  # of several: their type
     "__init__": (
         (
             *CASE,
@@ -92,10 +88,9 @@ ROLES = {
             "report.drawing",
             "report.quantities",
         ),
-        (*READ, "track", "part", "__init__"),
+        (*READ, "track", "__init__"),
     ),
 }
-ALSO = {"schema": "config"}  # the keys of a study of several parts
 
 LIBRARIES = {  # library: the files and rooms that may import it
     "yaml": {"config/load.py"},
@@ -107,7 +102,7 @@ LIBRARIES = {  # library: the files and rooms that may import it
     "jinja2": {"report/html.py"},
     "numba": {"kernels/compile.py", "kernels/lanes.py"},
     "llvmlite": {"kernels/compile.py", "kernels/lanes.py"},
-    "pydantic": {"config", "studies/*/config.py", "studies/*/*/config.py", "studies/*/schema.py"},
+    "pydantic": {"config", "studies/*/config.py"},
     "pydantic_core": {"config/check.py", "config/fields.py", "config/load.py"},
     "pandas": {"report/tables.py", "report/precision.py", "app/own_data.py"},
 }
@@ -139,7 +134,7 @@ def place(module: str) -> Place:
 def role(inner: list[str]) -> str:
     """The role of a module by its path inside a study or a variant of one."""
     name = inner[0] if inner else "__init__"
-    return ALSO.get(name, name if name in ROLES else "design")
+    return name if name in ROLES else "design"
 
 
 def under(module: str, homes) -> bool:
@@ -166,7 +161,7 @@ def fault(importing: str, imported: str) -> str:
     return "" if there.role in own else f"a study's {here.role} stands on its {', '.join(own)}"
 
 
-CHOOSE = {"studies.sonar", "studies.sonar.schema"}  # where the variants of a study are chosen
+CHOOSE = {"studies.sonar"}  # where the variants of a study are chosen
 
 
 def modules() -> dict[str, Path]:
@@ -334,8 +329,7 @@ def at_home(file: str, homes: set[str]) -> bool:
     [
         ("config/load.py", "yaml", True),
         ("config/check.py", "yaml", False),
-        ("studies/sonar/clutter/config.py", "pydantic", True),
-        ("studies/sonar/schema.py", "pydantic", True),
+        ("studies/sonar/config.py", "pydantic", True),
         ("studies/sonar/study.py", "pydantic", False),
         ("cli/group.py", "click", True),
         ("app/run.py", "click", False),
@@ -357,7 +351,7 @@ PARTS = {
     if isinstance(node, ast.FunctionDef | ast.AnnAssign)
 } - {"name"}
 READ_SOURCES = {"studies.identity"}  # which sources there are, not what they can do
-LOAD_BY_NAME = {"__init__", "studies.registry", "studies.folder", "studies.sonar.part"}
+LOAD_BY_NAME = {"__init__", "studies.registry", "studies.folder", "studies.sonar"}
 
 
 def probes(module: str, text: str) -> list[str]:

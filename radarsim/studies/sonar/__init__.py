@@ -1,12 +1,18 @@
-"""P3 (Butyrskiy): smoothing and extrapolation of sonar plots, missed plots, correlated errors."""
+"""P3 (Butyrskiy): smoothing and extrapolation of sonar plots, missed plots, correlated errors.
+
+Its three parts are the paper's three questions. The files of this folder answer the first, smoothing, and hold what all
+parts have; the folders `manoeuvre` and `clutter` have files of the same names as those of
+`radarsim.studies.folder`, for cases that ask their questions. A table may have no rows, a figure be None.
+"""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from functools import partial
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from radarsim.language import term
 from radarsim.report.quantities import COMMON, Quantity
 from radarsim.studies.interface import Plan, RecordedPlots, Study
-from radarsim.studies.sonar.part import SonarPart
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,11 +23,11 @@ if TYPE_CHECKING:
     from radarsim.report.claims import PaperClaims
     from radarsim.report.claims.over import PaperReadings
     from radarsim.report.drawing import Figure
-    from radarsim.studies.sonar.clutter.study import Plan as ClutterPlan
-    from radarsim.studies.sonar.schema import Sonar as AllKeys
-    from radarsim.studies.sonar.smoothing.study import SharedPlan
-    from radarsim.studies.sonar.study import RealisationPlan
+    from radarsim.studies.sonar.config import Keys
 
+BASE = "smoothing"
+# A part comes after those whose questions are asked of its cases too.
+PARTS = {BASE: __name__, "manoeuvre": f"{__name__}.manoeuvre", "clutter": f"{__name__}.clutter"}
 TRACKING = (  # of a tracker among false plots
     Quantity("loss", term("ends of a track an hour"), "tracking", "ends_per_hour|ends", unit=term("/h")),
     Quantity("false_tracks", term("false tracks an hour"), "tracking", "false_tracks_per_hour|false", unit=term("/h")),
@@ -48,55 +54,55 @@ class Sonar(Study):
         "kind: imm": "two interacting Kalman filters, steady and manoeuvring",
     }
 
-    def keys(self) -> "type[AllKeys]":
-        from radarsim.studies.sonar import schema
+    def keys(self) -> "type[Keys]":
+        from radarsim.studies.sonar.config import Keys
 
-        return schema.Sonar
+        return Keys
 
-    def prepare(self, case: "Case") -> Plan:
-        return part_of(case.spec).file("study").prepare(case)
-
-    def quantities(self, spec: "AllKeys | None" = None) -> tuple[Quantity, ...]:
+    def quantities(self, spec: "Keys | None" = None) -> tuple[Quantity, ...]:
         return COMMON + TRACKING if spec is None or "clutter" in spec.parts else COMMON
 
-    def simulate(self, plan: "RealisationPlan | SharedPlan | ClutterPlan", first: int, count: int) -> "np.ndarray":
-        return plan.simulate(first, count)
+    def prepare(self, case: "Case") -> Plan:
+        plan: Plan = file_of(case.spec.parts[-1], "study").prepare(case)
+        return plan
+
+    def simulate(self, plan: Any, first: int, count: int) -> "np.ndarray":
+        sums: np.ndarray = plan.simulate(first, count)
+        return sums
 
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
-        from radarsim.studies.sonar import tables
-
-        made = tables.tables(results)
+        made: dict[str, pd.DataFrame] = file_of(BASE, "tables").tables(results)
         for part, chosen in by_part(results):
-            made |= part.tables(chosen)
+            made |= file_of(part, "tables").tables(chosen) if part != BASE else {}
         return {name: table for name, table in made.items() if len(table)}
 
     def figures(
         self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
-        from radarsim.studies.sonar import figures
-
-        common: dict[str, Figure | None] = {**figures.figures(results, made, experiment)}
         drawn: dict[str, Figure | None] = {}
         for part, chosen in reversed(by_part(results)):  # first what answers the question, which is the last part's
-            own = part.figures(chosen, made)
-            drawn |= common | own if part.answers_with_sigma else own | common
+            drawn |= file_of(part, "figures").figures(chosen, made) if part != BASE else {}
+        drawn |= file_of(BASE, "figures").figures(results, made, experiment)
         return {name: figure for name, figure in drawn.items() if figure}
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
-        return {name: tables for part in parts().values() for name, tables in part.drawn_from().items()}
+        return {name: tables for part in PARTS for name, tables in file_of(part, "figures").DRAWN_FROM.items()}
 
     def question(self, experiment: "Experiment") -> str:
         part, cases = by_part(experiment.cases)[-1]
-        return part.question([case.spec for case in cases])
+        question: str = file_of(part, "words").question([case.spec for case in cases])
+        return question
 
     def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> list[str]:
-        return [sentence for part, chosen in reversed(by_part(results)) for sentence in part.answer(chosen, made)]
+        answers = (file_of(part, "words").answer(chosen, made) for part, chosen in reversed(by_part(results)))
+        return [sentence for answer in answers for sentence in answer]
 
     def claims(self) -> "PaperClaims":
         from radarsim.report.claims import PaperClaims
+        from radarsim.report.claims.over import claims_of
         from radarsim.studies.sonar.measures import Evidence
 
-        claims = [claim for part in parts().values() for claim in part.claims()]
+        claims = [claim for part in (BASE, "manoeuvre") for claim in claims_of(partial(file_of, part))]
         claims.sort(key=lambda claim: int(claim.id.partition(".")[2]))
         of_smoothing = tuple(claim.id for claim in claims if claim.config == "sonar_smoothing")
         held_too = {"sonar_fluctuating": of_smoothing}  # which includes its cases
@@ -110,25 +116,18 @@ class Sonar(Study):
     def recorded(self) -> RecordedPlots:
         from radarsim.studies.sonar.track import Recorded
 
-        return Recorded(part_of)
+        return Recorded(lambda spec: file_of(spec.parts[-1], "track"))
 
 
 # ---- which part -----------------------------------------------------------------------------------------------------
-def parts() -> Mapping[str, SonarPart]:
-    """The parts by name; a part comes after those whose questions are asked of its cases too."""
-    from radarsim.studies.sonar import clutter, manoeuvre, smoothing
-
-    return {"smoothing": smoothing.PART, "manoeuvre": manoeuvre.PART, "clutter": clutter.PART}
+def file_of(part: str, name: str) -> Any:
+    """A module of a part, by the name of its file."""
+    return import_module(f"{PARTS[part]}.{name}")
 
 
-def part_of(spec: "AllKeys") -> SonarPart:
-    """The part that computes a case."""
-    return parts()[spec.parts[-1]]
-
-
-def by_part(cases: Sequence[CaseOrResult]) -> list[tuple[SonarPart, list[CaseOrResult]]]:
+def by_part(cases: Sequence[CaseOrResult]) -> list[tuple[str, list[CaseOrResult]]]:
     """The cases, or results, of each part whose questions some of them ask."""
-    chosen = [(part, [case for case in cases if name in case.spec.parts]) for name, part in parts().items()]
+    chosen = [(part, [case for case in cases if part in case.spec.parts]) for part in PARTS]
     return [(part, members) for part, members in chosen if members]
 
 

@@ -1,14 +1,19 @@
-"""Figures that all parts of P3 have: σ of each component against time; and lines of figures, from rows of tables."""
+"""P3's figures: σ of each component against time, lines from rows of tables; and what is asked of smoothing.
+
+Of filters that know their plots: gain of each plot, gains, believed and true σ, misses, conversion.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.language import term, tr
+from radarsim.language import numeral, term, tr
 from radarsim.report import panels, seen, tables
-from radarsim.report.drawing import Figure, Line, Panel
-from radarsim.studies.sonar.world import SonarAxes
+from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.studies.sonar.world import GivenPlotsAxes, SonarAxes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,10 +40,24 @@ QUANTITIES = {
 }
 
 
+WHAT = {  # of the position or motion, by its name in the table
+    "smoothed": term("smoothed"),
+    "extrapolated": term("extrapolated"),
+    "acceleration": term("acceleration"),
+}
+DRAWN_FROM = {"missed": ("curves",), "believed": ("believed", "consistency")}
+
+
+SEEN = {
+    **{"plots": seen.extremes, "smoothing_gains": seen.at_the_end, "conversion": seen.extremes},
+    **{"believed": seen.extremes, "missed": seen.extremes},
+}
+
+
 def figures(
     results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]", experiment: Experiment
-) -> dict[str, Figure]:
-    """sigma_<component> of every component that some case has."""
+) -> dict[str, Figure | None]:
+    """sigma_<component> of every component that some case has; and the figures of filters that know their plots."""
     curves = tables.groups(made["curves"], "case", "filter", "component")
     drawn: dict[str, Figure | None] = {}
     for component in QUANTITIES:
@@ -47,7 +66,12 @@ def figures(
         chosen, left_out = panels.shown(having, panels.named(experiment, name))
         if chosen:
             drawn[name] = sigma_figure(name, chosen, curves, component, left_out)
-    return {name: figure for name, figure in drawn.items() if figure}
+    known: Any = [result for result in results if isinstance(result.axes, GivenPlotsAxes)]
+    of_tables = {"plots": plots_figure, "smoothing_gains": gains_figure, "conversion": conversion_figure}
+    own = {name: draw(made[name]) for name, draw in of_tables.items() if name in made}
+    own["believed"] = believed_figure(known, made["believed"], made["consistency"])
+    own["missed"] = missed_figure(known, made["curves"])
+    return drawn | seen.all_begun(own, SEEN)
 
 
 def case_lines(
@@ -88,3 +112,152 @@ def sigma_figure(
     )
     figure = panels.in_columns(Figure(name, tr("σ of the {name}", name=quantity.name), caption, tuple(drawn)))
     return seen.begun(figure, seen.at_the_end(figure))
+
+
+# ---- smoothing -----------------------------------------------------------------------------------------------------
+def plots_figure(table: "pd.DataFrame") -> Figure | None:
+    """σ per σ of a plot against the number of plots with the paper's formulas, and the gain of each further plot."""
+    rows = table[(table["component"] == table["component"].iloc[0]) & (table["degree"] == 1) & (table["plots"] <= 20)]
+    if rows.empty:
+        return None
+    accuracy: list[Mark] = [Reference(1.0, label=tr("one plot"))]
+    bought: list[Mark] = []
+    for n, (what, part) in enumerate(rows.groupby("what", sort=False)):
+        accuracy.append(
+            panels.line(part, ("plots", "ratio", "ratio_lo", "ratio_hi", "formula"), tr(WHAT[str(what)]), n)
+        )
+        x, measured, formula = (
+            part[key].to_numpy(dtype=float)[1:] for key in ("plots", "bought_percent", "formula_bought_percent")
+        )
+        bought.append(Line(x, measured, tr(WHAT[str(what)]), Style(n, n, n), exact=formula))
+    x_axis = panels.counts(tr("plots n"), float(rows["plots"].max()))
+    left = Axis(tr("$\\sigma$ / $\\sigma$ of a plot"), limits=(0, None))
+    right = Axis(tr("bought by the n-th plot, %"), limits=(0, None))
+    drawn = (
+        Panel(x_axis, left, tuple(accuracy), key_title=tr("measured"), direct=False, crosses=tr("the paper's formula")),
+        Panel(x_axis, right, tuple(bought), direct=False, crosses=tr("the paper's formula")),
+    )
+    caption = tr(
+        "Left: σ of the position at the last plot (smoothed) and one scan ahead (extrapolated) in σ "
+        "of a single plot, growing memory of degree 1. Right: by how "
+        "much the n-th plot lowers that σ."
+    )
+    return Figure("plots", tr("What each further plot buys"), caption, drawn, 2, PAGE_MM)
+
+
+def gains_figure(table: "pd.DataFrame") -> Figure:
+    """A_n and B_n as measured and by the closed forms."""
+    first = table.iloc[0]
+    rows = tables.where(table, filter=first["filter"], component=first["component"])
+    marks = [
+        panels.line(rows, ("plots", key, f"{key}_lo", f"{key}_hi", f"{key}_formula"), f"${key}_n$", n)
+        for n, key in enumerate(("A", "B"))
+    ]
+    caption = tr(
+        "Weights of the residual in position and velocity of growing memory, from the measured "
+        "errors (var r / σ² and T₀ cov(r, v) / σ²). They go to zero: new "
+        "plots count less and less."
+    )
+    if table["case"].nunique() > 1:
+        caption += tr(" Case: {case}.", case=first["case"])
+    x = panels.counts(tr("plots n"), float(rows["plots"].max()))
+    panel = Panel(x, Axis(tr("gain"), "log"), tuple(marks), crosses=tr("the paper's (14)"))
+    return Figure("smoothing_gains", tr("Gains of growing memory"), caption, (panel,))
+
+
+def believed_figure(
+    results: Sequence[CaseResult[GivenPlotsAxes]], believed: "pd.DataFrame", consistency: "pd.DataFrame"
+) -> Figure | None:
+    """True and believed σ, and the normalised error, against the correlation of the errors."""
+    cases = [r for r in results if isinstance(r.spec.sensor.error_correlation, float) and r.spec.frame == "polar"]
+    cases.sort(key=lambda r: r.spec.sensor.error_correlation)
+    if len({r.spec.sensor.error_correlation for r in cases}) < 3 or len(cases) > len({r.name for r in cases}):
+        return None
+    rho = np.array([r.spec.sensor.error_correlation for r in cases])
+    sigma = cases[0].axes.sigma[0]
+    last, component = int(cases[0].axes.k[-1]), cases[0].axes.components[0][0]
+    true_rows, consistency_rows = (
+        tables.where(table, k=last, component=component).set_index(["case", "filter"])
+        for table in (believed, consistency)
+    )
+    left: list[Mark] = []
+    right: list[Mark] = [Reference(1.0, label=tr("consistent"))]
+    for n, f in enumerate(cases[0].axes.filters):
+        places = [(r.name, f) for r in cases]
+        rows = true_rows.loc[places]
+        true, claimed = rows["sigma"].to_numpy() / sigma, rows["believed_sigma"].to_numpy() / sigma
+        ends = ((rows[key] * rows["believed_sigma"]).to_numpy() / sigma for key in ("ratio_lo", "ratio_hi"))
+        left.append(Line(rho, true, f, Style(n, n, n), *ends))
+        if np.max(np.abs(claimed / true - 1)) > 0.05:
+            left.append(Line(rho, claimed, tr("{f}: believed", f=f), Style(n, None, n)))
+        rows = consistency_rows.loc[places].assign(rho=rho)
+        right.append(panels.line(rows, ("rho", "nees", "nees_lo", "nees_hi", "exact_nees"), f, n))
+    caption = tr(
+        "Left: σ of the {name} at plot {last} in σ of a plot, true (lines) and as the filter "
+        "believes it (markers alone, where they differ by over 5 %). Right: normalised squared error "
+        "per component, 1 for a consistent filter.",
+        name=QUANTITIES[component].name,
+        last=last,
+    )
+    x, y = (
+        Axis(tr("correlation $\\rho$ of neighbouring errors")),
+        Axis(tr("$\\sigma$ / $\\sigma$ of a plot"), limits=(0, 1.75)),
+    )
+    drawn = (
+        Panel(x, y, tuple(left), direct=False, legend="upper left"),
+        Panel(x, Axis(tr("normalised squared error"), "log"), tuple(right), direct=False),
+    )
+    return Figure("believed", tr("What a filter believes of itself"), caption, drawn, 2, PAGE_MM)
+
+
+def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.DataFrame") -> Figure | None:
+    """σ of the first coordinate against time: a panel for each filter, a line for each detection probability."""
+    cases = [r for r in results if r.spec.frame == "polar"]
+    if len({r.spec.sensor.detection_probability for r in cases}) < 2:
+        return None
+    component, unit = cases[0].axes.components[0]
+    groups = tables.groups(curves[curves["component"] == component], "case", "filter")
+    y = Axis(panels.sigma_of(QUANTITIES[component].symbol, unit), limits=(0, None))
+    drawn = []
+    for f in cases[0].axes.filters:
+        marks = []
+        for n, result in enumerate(cases):
+            if (result.name, f) in groups:
+                probability = numeral(f"{result.spec.sensor.detection_probability:g}")
+                style = Style(n / max(1, len(cases) - 1), n, n)
+                marks.append(
+                    panels.line(groups[result.name, f], panels.SIGMA, probability, style, f"$P_D$ = {probability}")
+                )
+        drawn.append(Panel(panels.time_axis(), y, tuple(marks), f, key_title="$P_D$", direct=False))
+    gap = cases[0].spec.sensor.missed_scans
+    caption = tr(
+        "σ of the {name} for several detection probabilities (legend), one panel a filter, of "
+        "{count:,} realisations. Exact values are means over all patterns of misses, where "
+        "these can be enumerated.",
+        name=QUANTITIES[component].name,
+        count=cases[0].count,
+    ) + (tr(" Scans {scans} never give a plot.", scans=", ".join(map(str, gap))) if gap else "")
+    columns = min(3, len(drawn))
+    return Figure("missed", tr("What missed plots cost"), caption, tuple(drawn), columns, PAGE_MM, 54)
+
+
+def conversion_figure(table: "pd.DataFrame") -> Figure | None:
+    """Bias of the converted plot against range × bearing error, in σ of the range."""
+    if len(table) < 3:
+        return None
+    marks: list[Mark] = [Reference(-1.0, label=tr("one σ of the range"))]
+    names = ("bias_m", "bias_lo", "bias_hi", "formula_m")
+    for n, (frame, rows) in enumerate(table.groupby("frame", sort=False)):
+        rows = rows.sort_values("across_m")
+        rows = rows.assign(**{name: rows[name] / rows["sigma_range_m"] for name in names})
+        label = tr("plain") if frame == "cartesian" else tr("unbiased")
+        marks.append(panels.line(rows, ("across_m", *names), label, n))
+    caption = tr(
+        "Mean error of the converted plot along the line of sight, in σ of the range, over range × σ "
+        "of the bearing. Bands: 95 % intervals. Exact: (exp(−σ²/2) − 1) r, and zero. The plain "
+        "conversion pulls the target in."
+    )
+    x, y = Axis(tr("range × σ of the bearing, m"), limits=(0, None)), Axis(tr("bias / σ of the range"))
+    return Figure(
+        "conversion", tr("Bias of the conversion to x, y"), caption, (Panel(x, y, tuple(marks), direct=False),)
+    )

@@ -1,4 +1,4 @@
-"""P3 (Butyrskiy): what its parts compute in common: arrays for the kernels, labels and exact values, sums of errors.
+"""P3 (Butyrskiy): smoothing, and what all parts compute: arrays for the kernels, labels, exact values, sums of errors.
 
 Sums of F filters over K scans and components (for each coordinate: value, rate and, where a filter has it,
 acceleration): `error`, `paired`, `estimates` as in every study; `believed` Σ of the variances that the filter believes.
@@ -21,7 +21,7 @@ from radarsim.studies.sonar.exact import exact_values
 from radarsim.studies.sonar.kernels import detector
 from radarsim.studies.sonar.kernels import patterns as pattern_kernels
 from radarsim.studies.sonar.kernels import shared_gains as kernels
-from radarsim.studies.sonar.scene import Scene, third_coordinate
+from radarsim.studies.sonar.scene import Scene, build_scene, filter_specs, third_coordinate
 from radarsim.studies.sonar.world import GivenPlotsAxes, conversion_bias, step_correlations
 
 BLOCK = 4096
@@ -214,4 +214,51 @@ def realisation_plan(
         bank=filters.per_realisation_bank(specs, scene.t, scene.period, scene.nominal, detectors),
         detectors=detectors,
         kept=np.zeros(0, dtype=np.int64),
+    )
+
+
+# ---- smoothing -----------------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class SharedPlan:
+    """A plan of filters whose gains all realisations share; believed (F, K, C, 3) are their variances."""
+
+    layout: Layout
+    axes: GivenPlotsAxes
+    world: kernels.World
+    bank: kernels.SharedBank
+    believed: np.ndarray
+    block: int = BLOCK
+    gaussian = True
+
+    def simulate(self, first: int, count: int) -> np.ndarray:
+        """The sums of one block, in the order of the layout."""
+        sums = empty_sums(*self.bank.known.shape)
+        kernels.simulate_block(self.world, self.bank, first, count, self.axes.baseline, sums)
+        sums.believed[:] = count * self.believed
+        sums.estimates[:] = count * (self.bank.known[..., None] > np.arange(3))
+        return packed(self.layout, sums)
+
+
+def prepare(case: Case) -> SharedPlan | RealisationPlan:
+    """Design the filters of a case and compute the exact values of its errors."""
+    scene, specs = build_scene(case), filter_specs(case.spec)
+    if case.spec.frame == "polar" and (scene.certain >= 0).all():
+        return _shared_plan(case, scene, specs)
+    K, C = scene.sigma.shape
+    return realisation_plan(case, scene, specs, filters.detector_arrays([], [], np.zeros(K, dtype=np.int64), C))
+
+
+def _shared_plan(case: Case, scene: Scene, specs: list[filters.FilterSpec]) -> SharedPlan:
+    size = max(one.size for one in specs)
+    designed = designs(specs, scene, np.maximum(scene.certain, 0)[None])
+    bank = filters.shared_bank(specs, designed)
+    F, K, C = bank.known.shape
+    covariance = np.array([[design.covariance[0] for design in row] for row in designed])
+    values = exact_values(scene, designed, np.ones(1), size)
+    return SharedPlan(
+        layout=Layout(**shapes(F, K, C, size)),
+        axes=axes(case.spec, scene, specs, values, bank.known),
+        world=world(case, scene),
+        bank=bank,
+        believed=np.diagonal(covariance, axis1=3, axis2=4).transpose(0, 2, 1, 3),
     )

@@ -1,4 +1,4 @@
-"""Tables of any part of P3."""
+"""Tables of any part of P3, and of filters that know their plots."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -8,8 +8,8 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import notes, statistics
 from radarsim.report import tables as common
-from radarsim.report.tables import Columns, leading
-from radarsim.studies.sonar import scene
+from radarsim.report.tables import Columns, leading, stacked
+from radarsim.studies.sonar import exact, scene
 from radarsim.studies.sonar.world import GivenPlotsAxes, SonarAxes
 
 if TYPE_CHECKING:
@@ -95,6 +95,127 @@ def _operations(results: Sequence[CaseResult[SonarAxes]]) -> "pd.DataFrame":
     names = ("algorithm", "numbers_kept", "products", "sums", "operations")
     columns = zip(*((name, kept, of.products, of.sums, of.total) for name, kept, of in rows), strict=True)
     return common.frame(dict(zip(names, columns, strict=True)))
+
+
+# ---- smoothing -----------------------------------------------------------------------------------------------------
+def textbook(result: CaseResult[GivenPlotsAxes]) -> bool:
+    """Whether the paper's closed forms apply: known plots, equal intervals and weights, white errors, none missed."""
+    sensor, target = result.spec.sensor, result.spec.target
+    complete = sensor.detection_probability == 1 and not sensor.missed_scans and not sensor.further
+    polynomial = target.kind == "polynomial" and result.spec.frame == target.frame == "polar"
+    straight = polynomial and not any(any(c[2:]) for c in (target.range_m, target.bearing_rad))
+    known = isinstance(result.axes, GivenPlotsAxes)
+    return known and complete and straight and not target.fluctuation_mps2 and not result.axes.rho.any()
+
+
+def _width(result: CaseResult[GivenPlotsAxes]) -> int:
+    """Components of a coordinate."""
+    return len(result.axes.components) // len(result.axes.coordinates)
+
+
+@table("plots", textbook)
+def _plots(result: CaseResult[GivenPlotsAxes]) -> Columns:
+    """What each further plot buys to growing memory.
+
+    degree: of the polynomial
+    what: smoothed, extrapolated by one scan, or for degree 2 the acceleration
+    plots: number in memory
+    ratio ±: σ over σ of a plot
+    formula: the paper's for degree 1, and its (3) for the acceleration
+    bought_percent, formula_bought_percent: reduction by the last of these plots
+    """
+    return stacked(
+        [
+            _bought(result, f, c, what)
+            for f, member in enumerate(result.spec.filters)
+            if member.kind == "growing_memory"
+            for c in range(len(result.axes.coordinates))
+            for what in ("smoothed", "extrapolated", "acceleration")[: member.degree + 1]
+        ]
+    )
+
+
+def _bought(result: CaseResult[GivenPlotsAxes], f: int, c: int, what: str) -> Columns:
+    axes, member = result.axes, result.spec.filters[f]
+    n = np.arange(member.degree + 1, len(axes.k) + (what != "extrapolated"))
+    formula: np.ndarray = np.full(len(n), np.nan)
+    if what == "acceleration":
+        unit, formula = axes.sigma[c] / axes.scan_period_s**2, np.asarray(exact.sigma_acceleration(n, 1.0))
+        moments = result.sums["error"][f, n - 1, _width(result) * c + 2]
+    elif what == "extrapolated":
+        unit, moments = axes.sigma[c], result.sums["ahead"][f, n - 1, c]
+    else:
+        unit, moments = axes.sigma[c], result.sums["error"][f, n - 1, _width(result) * c]
+    if member.degree == 1:
+        known = exact.sigma_smoothed if what == "smoothed" else exact.sigma_extrapolated
+        formula = np.asarray(known(n))
+    of = statistics.root_mean_square(moments[:, 1], moments[:, 3], result.count)
+    return {
+        **leading(result, np.full(len(n), f)),
+        "degree": np.full(len(n), member.degree),
+        "component": np.full(len(n), axes.coordinates[c][0], dtype=object),
+        "what": np.full(len(n), what, dtype=object),
+        "plots": n,
+        "ratio": statistics.Estimate(*(part / unit for part in of)),
+        "formula": formula,
+        "bought_percent": np.append(np.nan, 100 * (1 - of.value[1:] / of.value[:-1])),
+        "formula_bought_percent": np.append(np.nan, 100 * (1 - formula[1:] / formula[:-1])),
+    }
+
+
+@table("smoothing_gains", textbook)
+def _gains(result: CaseResult[GivenPlotsAxes]) -> Columns:
+    """A_n and B_n of (14), by filters of degree 1 without process noise: var r/σ² and T₀ cov(r, v)/σ².
+
+    plots: their number n
+    A ±, B ±: as measured
+    A_formula, B_formula: by the paper
+    """
+    axes = result.axes
+    parts: list[Columns] = []
+    n = np.arange(2, len(axes.k) + 1)
+    A_formula, B_formula = exact.gains_closed(n)
+    for f, member in enumerate(result.spec.filters):
+        plain = member.kind in ("growing_memory", "kalman") and not member.manoeuvre_variance and member.degree == 1
+        for c, (name, _) in enumerate(axes.coordinates) if plain else ():
+            unit = axes.sigma[c] ** 2
+            square, fourth = result.sums["error"][f, 1:, _width(result) * c, 1::2].T
+            of = statistics.root_mean_square(square, fourth, result.count)
+            joint = result.sums["joint"][f, 1:, c]
+            both = statistics.mean(joint[:, 2], joint[:, 3], result.count)
+            A = statistics.Estimate(*(part**2 / unit for part in of))
+            B = statistics.Estimate(*(part * axes.scan_period_s / unit for part in both))
+            columns = leading(result, np.full(len(n), f), component=np.full(len(n), name, dtype=object)) | {"plots": n}
+            parts.append(columns | {"A": A, "A_formula": A_formula, "B": B, "B_formula": B_formula})
+    return stacked(parts)
+
+
+@table("conversion", lambda result: result.spec.frame != "polar")
+def _conversion(result: CaseResult[GivenPlotsAxes]) -> Columns:
+    """Errors of a first plot that is converted to another frame.
+
+    frame: what it is converted to
+    range_m: its range
+    sigma_range_m, sigma_bearing_rad: σ of its measurement
+    across_m: error across the line of sight, range × bearing error
+    bias_m ± bias: mean error along the line of sight
+    formula_m: the same by formula
+    bias_to_sigma_range: the mean error over σ of the range
+    """
+    axes, sensor = result.axes, result.spec.sensor
+    r, b = axes.polar[0, :2, 0]
+    of = statistics.errors(result.sums["error"][0, 0, [0, _width(result)]], result.count)
+    along = np.array([np.cos(b), np.sin(b)])
+    bias, half = float(along @ of.bias), statistics.Z95 * float(np.hypot(*(along * of.bias_se)))
+    row = {
+        **{"case": result.name, "frame": result.spec.frame, "range_m": float(r)},
+        **{"sigma_range_m": sensor.sigma_range_m, "sigma_bearing_rad": sensor.sigma_bearing_rad},
+        "across_m": float(r * sensor.sigma_bearing_rad),
+        "bias_m|bias": statistics.Estimate(bias, bias - half, bias + half),
+        "formula_m": float(axes.conversion_bias),
+        "bias_to_sigma_range": bias / sensor.sigma_range_m,
+    }
+    return common.of_rows([row])
 
 
 tables = table.made

@@ -15,9 +15,9 @@ from radarsim.studies.interface import OUTLIERS, RecordedPlots, true_column
 from radarsim.studies.sonar import filters, world
 from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.config import Keys
+from radarsim.studies.sonar.kernels import detector, steps
 from radarsim.studies.sonar.kernels import patterns as pattern_kernels
 from radarsim.studies.sonar.kernels import shared_gains as kernels
-from radarsim.studies.sonar.responding import estimate_recorded
 from radarsim.studies.sonar.scene import build_scene, filter_specs, lateral_scale, third_coordinate
 
 MOST_ROWS = 200_000  # of a file: designs of all rows are kept in memory
@@ -175,6 +175,44 @@ def _estimated(
                 x[f, :, c], P[f, :, c] = filters.apply_filter(one, c, plots[c], z[c])
             known[f, :, c] = np.arange(3) < np.minimum(plots[c].moments()[0], one.size)[:, None]
     return x, P, known
+
+
+def estimate_recorded(
+    specs: Sequence[filters.FilterSpec],
+    t: np.ndarray,
+    period: float,
+    sigma: np.ndarray,
+    z: np.ndarray,
+    weight: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Estimates (F, n, C, 3) and covariances (F, n, C, 3, 3) of filters that respond to manoeuvres.
+
+    From plots z (C, n) of weights (C, n), zero where missing, by the kernels of the simulation: they process a chunk of
+    realisations, here all the same track. t (n,) in s; sigma (C,) of a plot of weight one. A detector that tests every
+    so many scans counts the rows.
+    """
+    F, C, n = len(specs), len(z), len(t)
+    detectors = filters.detector_arrays([], filters.needed_tests(specs), np.zeros(n, dtype=np.int64), C)
+    bank = filters.per_realisation_bank(specs, t, period, sigma, detectors)
+    x, Y, further = (np.zeros((F, C, rows, steps.CHUNK)) for rows in (4, 8, detector.ROWS))
+    memory = steps.Filters(x, Y, further, np.empty((6, steps.CHUNK)))
+    recent, T = np.zeros((C, 3, bank.memory, steps.ROW)), np.zeros((len(detectors.plots), C + 1, steps.CHUNK))
+    count = np.zeros((C, steps.CHUNK))
+    estimates, covariances = np.zeros((F, n, C, 3)), np.zeros((F, n, C, 3, 3))
+    scale = period ** -np.arange(3.0)
+    packed = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
+    for k, dt in enumerate(np.diff(t, prepend=t[0])):
+        plot, w = (np.repeat(values[:, k : k + 1], steps.CHUNK, axis=1) for values in (z, weight))
+        before, count = count, count + (w > 0)
+        for c in range(C if bank.memory else 0):
+            steps.remember(recent[c], plot[c], w[c], dt / period)
+        detector.detector_statistics(detectors, k, recent, sigma, count, w, T)
+        plots = steps.Plots(plot, w, before, count, recent, T)
+        for f, c in np.ndindex(F, C):
+            pattern_kernels.filter_scan(bank, f, c, k, dt, memory, plots)
+            estimates[f, k, c] = x[f, c, :3, 0]
+            covariances[f, k, c] = memory.P[packed, 0] * sigma[c] ** 2 * np.outer(scale, scale)
+    return estimates, covariances
 
 
 def measured(spec: Keys, columns: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -337,19 +375,24 @@ def likelihood(
 
 
 class Recorded(RecordedPlots):
-    """Recorded plots of all parts, for `radarsim track` and `radarsim simulate`; part_of: the part of a case's keys."""
+    """Recorded plots of all parts, for `radarsim track` and `radarsim simulate`.
+
+    file: of keys, the `track` of their part.
+    """
 
     rows_asked = 1000
     columns, sigmas, likelihood = staticmethod(columns), staticmethod(sigmas), staticmethod(likelihood)
 
-    def __init__(self, part_of: Callable[[Any], Any]):
-        self.part_of = part_of
+    def __init__(self, file: Callable[[Any], Any]):
+        self.file = file
 
     def scan_period_s(self, spec: Keys) -> float:
         return spec.sensor.scan_period_s
 
     def simulated(self, case: Case, realisation: int) -> Mapping[str, np.ndarray]:
-        return self.part_of(case.spec).simulated(case, realisation)
+        made: Mapping[str, np.ndarray] = self.file(case.spec).simulated(case, realisation)
+        return made
 
     def tracker(self, case: Case) -> interface.Tracker:
-        return self.part_of(case.spec).tracker(case)
+        tracker: interface.Tracker = self.file(case.spec).Tracker(case)
+        return tracker

@@ -10,14 +10,14 @@ import pytest
 import radarsim
 from radarsim.app.configs import load
 from radarsim.engine.results import Axes
-from radarsim.studies.sonar import STUDY, parts
+from radarsim.studies.sonar import PARTS, STUDY
 from radarsim.studies.sonar.clutter.filters import ClutterAxes
 from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes
 from radarsim.studies.sonar.world import GivenPlotsAxes, SonarAxes
 from tests.studies.sonar.clutter.test_study import config as clutter_config
 from tests.studies.sonar.clutter.test_study import tracker
 from tests.studies.sonar.manoeuvre.test_kernels import config as manoeuvre_config
-from tests.studies.sonar.smoothing.test_study import config as smoothing_config
+from tests.studies.sonar.test_study import config as smoothing_config
 
 PACKAGE = "radarsim.studies.sonar"
 FOLDER = Path(radarsim.__file__).parent / "studies" / "sonar"
@@ -27,13 +27,13 @@ SHIPPED = {
     "clutter": ("sonar_clutter", "sonar_clutter_gate", "sonar_clutter_rare", "sonar_clutter_ends"),
 }
 CASES = [(part, stem) for part, stems in SHIPPED.items() for stem in stems]
-TOGETHER = ("__init__.py", "schema.py")  # the declared study, and the schema that puts the keys of the parts together
+TOGETHER = ("__init__.py",)  # the declared study
 
 
 def part_of(module):
     """The part that a module lies in; None for the base and what is no sonar's."""
     rest = module.removeprefix(f"{PACKAGE}.").partition(".")[0]
-    return rest if module.startswith(f"{PACKAGE}.") and rest in parts() else None
+    return rest if module.startswith(f"{PACKAGE}.") and rest in PARTS else None
 
 
 def imported(path):
@@ -50,7 +50,7 @@ def test_the_base_knows_no_part_and_a_part_no_other(path):
     own = path.relative_to(FOLDER).parts[0]
     if own not in TOGETHER:
         found = {part_of(name) for name in imported(path)} - {None}
-        assert found <= ({own} if own in parts() else set())
+        assert found <= ({own} if own in PARTS else set())
 
 
 @pytest.mark.parametrize(("part", "stem"), CASES)

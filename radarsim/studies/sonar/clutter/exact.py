@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from radarsim.studies.sonar.clutter.config import Sector
 from radarsim.studies.sonar.clutter.filters import Conditions, TrackerSpec, gate_threshold
+from radarsim.studies.sonar.config import Sector
 
 
 def confirmed_by(probability: np.ndarray, m: int, n: int) -> np.ndarray:

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from radarsim.studies.sonar.clutter.config import Keys, Sector
 from radarsim.studies.sonar.clutter.kernels.tracker import KNOWN, NEAREST, OPEN, PDA, Cells, Field, Trackers
+from radarsim.studies.sonar.config import Keys, Sector
 from radarsim.studies.sonar.kernels.patterns import Detections
 from radarsim.studies.sonar.kernels.shared_gains import World
 from radarsim.studies.sonar.scene import lateral_scale

@@ -35,11 +35,11 @@ from radarsim.engine.results import Layout
 from radarsim.studies.noise import noise_key
 from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.clutter import exact, filters
-from radarsim.studies.sonar.clutter.config import Keys, Sector
 from radarsim.studies.sonar.clutter.filters import ClutterAxes, Conditions, TrackerSpec, gate_threshold
 from radarsim.studies.sonar.clutter.kernels import rare, tracker
 from radarsim.studies.sonar.clutter.kernels.ends import KINDS, Ends, EndSums, simulate_ends
 from radarsim.studies.sonar.clutter.kernels.tracker import Field, Trackers, workspace
+from radarsim.studies.sonar.config import Keys, Sector
 from radarsim.studies.sonar.exact import exact_values
 from radarsim.studies.sonar.kernels.patterns import Detections
 from radarsim.studies.sonar.scene import Scene, build_scene, filter_specs

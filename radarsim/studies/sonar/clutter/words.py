@@ -8,9 +8,9 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, tr
 from radarsim.report import panels, rare, tables, wording
-from radarsim.studies.sonar.clutter.config import Keys
 from radarsim.studies.sonar.clutter.filters import ClutterAxes
 from radarsim.studies.sonar.clutter.tables import ENDED, FALSE
+from radarsim.studies.sonar.config import Keys
 
 if TYPE_CHECKING:
     import pandas as pd

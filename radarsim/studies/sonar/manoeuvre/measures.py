@@ -8,7 +8,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report.claims import Missing, Series, ratio
 from radarsim.report.statistics import Z95, Estimate
-from radarsim.studies.sonar.manoeuvre.config import Filter
+from radarsim.studies.sonar.config import Filter
 from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes
 from radarsim.studies.sonar.measures import FOUND, Evidence, Key
 

@@ -14,7 +14,7 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Layout
 from radarsim.studies.sonar import study as base
-from radarsim.studies.sonar.config import Accelerating, Target, Turning
+from radarsim.studies.sonar.config import RESPONDING_KINDS, Accelerating, Detector, Filter, Keys, Target, Turning, Uses
 from radarsim.studies.sonar.filters import (
     AdaptiveRule,
     DetectorTest,
@@ -26,7 +26,6 @@ from radarsim.studies.sonar.filters import (
 )
 from radarsim.studies.sonar.kernels.detector import Detectors
 from radarsim.studies.sonar.manoeuvre import exact
-from radarsim.studies.sonar.manoeuvre.config import RESPONDING_KINDS, Detector, Filter, Keys, Uses
 from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes, UsesAxes
 from radarsim.studies.sonar.scene import Scene, build_scene, courses, filter_specs, lateral_scale
 from radarsim.studies.sonar.world import error_covariance

@@ -7,6 +7,8 @@ from radarsim.studies.sonar.filters import FilterSpec
 from radarsim.studies.sonar.manoeuvre import study
 from radarsim.studies.sonar.manoeuvre.exact import QUANTITIES
 
+simulated = base.simulated
+
 
 class Tracker(base.Tracker):
     """The filters of a case over recorded plots, with the quantities that `uses` of the config asks for."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from radarsim.engine.results import CaseResult
 from radarsim.language import term, tr
 from radarsim.report import panels, tables, wording
-from radarsim.studies.sonar.manoeuvre.config import Keys
+from radarsim.studies.sonar.config import Keys
 from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes
 from radarsim.studies.sonar.manoeuvre.figures import USUAL, every_scan, last_of, usual
 from radarsim.studies.sonar.manoeuvre.tables import NEAR
