@@ -1,4 +1,4 @@
-"""Laws of the detector of manoeuvres: known values, each law against another way to it."""
+"""Laws of manoeuvres: known values, each law against another way to it, by search or by plain simulation."""
 
 import numpy as np
 import pytest
@@ -51,3 +51,113 @@ def test_a_random_push_adds_to_the_variance():
 
 def test_first_of_independent_tests():
     assert exact.by_then(np.array([0.5, 0.0, 0.5])) == pytest.approx([0.5, 0.5, 0.75])
+
+
+# ---- the degree of a window switched by the detector -----------------------------------------------------------------
+DT, SIGMA = 5.0, 10.0
+
+
+def course(acceleration):
+    """Range of the shipped accelerating target: 10 m/s towards the sonar, faster from 100 s to 140 s."""
+    t = np.arange(45) * DT
+    pushed = np.clip(t - 100, 0, 40)
+    return 9000 - 10 * t - acceleration * (pushed**2 / 2 + 40 * np.clip(t - 140, 0, None))
+
+
+@pytest.mark.parametrize(("memory", "plots", "rate"), [(6, 5, 0.3), (6, 6, 0.01), (5, 4, 0.05)])
+def test_by_plain_simulation(memory, plots, rate):
+    truth, n = course(0.4), 20_000
+    k = stats.chi2.isf(rate, 1)
+    of = exact.switched_window(truth, SIGMA, DT, memory, plots, k)
+    z = truth + SIGMA * np.random.default_rng(8).standard_normal((n, len(truth)))
+    t, s = DT * np.arange(1 - memory, 1), DT * np.arange(1 - plots, 1)
+    fits = [np.linalg.pinv(t[:, None] ** np.arange(d + 1))[0] for d in (1, 2)]
+    bend = 2 * np.linalg.pinv(s[:, None] ** np.arange(3))[2]
+    for i in range(memory - 1, len(truth)):
+        window = z[:, i + 1 - memory : i + 1]
+        line, parabola = (window @ fit - truth[i] for fit in fits)
+        alarm = (window[:, memory - plots :] @ bend) ** 2 > k * SIGMA**2 * bend @ bend
+        switched = np.where(alarm, parabola, line)
+        for sampled, law in zip((line, parabola, switched), of, strict=True):
+            square = sampled**2
+            wide = 5.85 * square.std() / np.sqrt(n)
+            assert abs(square.mean() - law[i - memory + 1] ** 2) < wide
+
+
+def test_what_the_papers_own_six_plots_give():
+    found = []
+    for acceleration in (0.1, 0.8):  # the weakest and the strongest shipped manoeuvre
+        of = exact.switched_window(course(acceleration), SIGMA, DT, 6, 6, stats.chi2.isf(0.01, 1))
+        rms = [np.sqrt(np.mean(one**2)) for one in of]
+        found += [rms[0] / rms[2], rms[1] / rms[2]]
+    assert found == pytest.approx([0.975, 1.19, 1.87, 1.10], abs=0.005)
+
+
+# ---- course, speed, position ahead, closest approach -----------------------------------------------------------------
+OWN = np.array([200.0, -100.0, 3.0, 4.0])
+POLAR = np.array([[[5000.0, -8.0], [0.4, 0.001]], [[3000.0, 2.0], [-2.0, -0.003]]])
+P = np.array([[[100.0, 5.0, 1.0], [1e-4, 1e-6, 4e-8]], [[25.0, -1.0, 0.5], [4e-5, -1e-7, 1e-8]]])
+
+
+def test_flat_states_move_as_their_rates_say():
+    dt = 1e-4
+    later = POLAR + np.stack([POLAR[..., 1] * dt, np.zeros((2, 2))], axis=-1)
+    now, then = (exact.flat(state, True) for state in (POLAR, later))
+    assert (then - now)[:, :2] / dt == pytest.approx(now[:, 2:], rel=1e-5)
+    assert exact.flat(np.array([[1.0, 2.0], [3.0, 4.0]]), False) == pytest.approx([1.0, 3.0, 2.0, 4.0])
+
+
+def test_closest_approach_is_the_least_distance():
+    track = exact.flat(POLAR, True)
+    found = exact.uses(track, OWN, 60.0)
+    t = np.linspace(-3000, 3000, 6_000_001)
+    for one, row in zip(track, found, strict=True):
+        apart = one - OWN
+        distance = np.hypot(apart[0] + t * apart[2], apart[1] + t * apart[3])
+        assert row[4] == pytest.approx(distance.min(), rel=1e-6)
+        assert row[5] == pytest.approx(t[distance.argmin()], abs=2e-3)
+        assert row[:2] == pytest.approx([np.arctan2(one[3], one[2]), np.hypot(one[2], one[3])])
+        assert row[2:4] == pytest.approx(one[:2] + 60 * one[2:])
+
+
+def test_gradients_are_derivatives():
+    track = exact.flat(POLAR, True)
+    found = exact.gradients(track, OWN, 60.0)
+    for i, step in enumerate((1e-2, 1e-2, 1e-5, 1e-5)):
+        shift = step * np.eye(4)[i]
+        change = exact.uses(track + shift, OWN, 60.0) - exact.uses(track - shift, OWN, 60.0)
+        assert found[..., i] == pytest.approx(change / (2 * step), rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("polar", [True, False])
+def test_spread_is_that_of_samples(polar):
+    state = POLAR if polar else np.array([[[5e3, -8.0], [2e3, 1.0]], [[-3e3, 5.0], [1e3, 2.0]]])
+    spread = P if polar else np.broadcast_to(np.array([[100.0, 1.0, 0.02], [400.0, -2.0, 0.04]]), (2, 2, 3))
+    if polar:
+        spread = spread * 1e-2  # small errors: the first order is all there is
+    n, rng = 200_000, np.random.default_rng(5)
+    found = exact.variances(state, spread, polar, OWN, 60.0)
+    for i in range(2):
+        xx, xv, vv = np.moveaxis(spread[i], -1, 0)
+        factor = np.linalg.cholesky(np.stack([np.stack([xx, xv], -1), np.stack([xv, vv], -1)], -2))
+        drawn = state[i] + np.einsum("cij,ncj->nci", factor, rng.standard_normal((n, 2, 2)))
+        true = exact.uses(exact.flat(state[i], polar), OWN, 60.0)
+        e = exact.errors(exact.uses(exact.flat(drawn, polar), OWN, 60.0), true)
+        assert e.std(axis=0) == pytest.approx(np.sqrt(found[i]), rel=0.012)
+
+
+def test_the_first_order_fails_on_a_collision_course():
+    """Aimed at the own ship the distance is |normal|: its rms is σ, but it is never below zero, its mean above it."""
+    state = np.array([[5000.0, -10.0], [0.0, 0.0]])
+    n, rng = 200_000, np.random.default_rng(6)
+    drawn = state + np.array([[10.0, 0.1], [1e-3, 1e-5]]) * rng.standard_normal((n, 2, 2))
+    spread = np.array([[100.0, 0.0, 0.01], [1e-6, 0.0, 1e-10]])
+    cpa = exact.uses(exact.flat(drawn, True), np.zeros(4), 60.0)[:, 4]
+    sigma = np.sqrt(exact.variances(state, spread, True, np.zeros(4), 60.0)[4])
+    assert np.sqrt((cpa**2).mean()) == pytest.approx(sigma, rel=0.02)
+    assert cpa.mean() == pytest.approx(sigma * np.sqrt(2 / np.pi), rel=0.02)
+
+
+def test_courses_differ_by_half_a_turn_at_most():
+    off = exact.errors(np.array([[3.1, 0, 0, 0, 0, 0]]), np.array([[-3.1, 0, 0, 0, 0, 0]]))
+    assert off[0, 0] == pytest.approx(6.2 - 2 * np.pi)
