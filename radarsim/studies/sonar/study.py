@@ -73,6 +73,23 @@ def designs(
     ]
 
 
+def drawn_plots(
+    world: kernels.World, detections: pattern_kernels.Detections, realisation: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Plot, error, and deviation of value and rate (K, C, 4) of one realisation; whether each scan gives a plot (K,).
+
+    C is the world's padded number of coordinates.
+    """
+    K, C = world.fresh.shape
+    plots, detected = np.zeros((C, 4, 1)), np.empty(1)
+    drawn, there = np.empty((K, C, 4)), np.empty(K, dtype=bool)
+    for k in range(K):
+        kernels.move_and_measure(world, realisation, k, plots)
+        pattern_kernels.detect(detections, realisation, k, detected)
+        drawn[k], there[k] = plots[..., 0], detected[0] > 0
+    return drawn, there
+
+
 # ---- labels -------------------------------------------------------------------------------------------------------
 def coordinates(spec: Keys) -> tuple[tuple[str, str], ...]:
     """Names and units of the coordinates that the filters work in."""

@@ -17,7 +17,6 @@ from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.config import Keys
 from radarsim.studies.sonar.kernels import detector, steps
 from radarsim.studies.sonar.kernels import patterns as pattern_kernels
-from radarsim.studies.sonar.kernels import shared_gains as kernels
 from radarsim.studies.sonar.scene import build_scene, filter_specs, lateral_scale, third_coordinate
 
 MOST_ROWS = 200_000  # of a file: designs of all rows are kept in memory
@@ -53,13 +52,8 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     """
     spec, scene = case.spec, build_scene(case)
     K, C = scene.sigma.shape
-    kernel_world, detections = base.world(case, scene), base.detections(case, scene)
-    plots, detected = np.zeros((kernel_world.truth.shape[1], 4, 1)), np.empty(1)
-    drawn, there = np.empty((K, C, 4)), np.empty(K, dtype=bool)  # plot, error, deviation of value and rate
-    for k in range(K):
-        kernels.move_and_measure(kernel_world, realisation, k, plots)
-        pattern_kernels.detect(detections, realisation, k, detected)
-        drawn[k], there[k] = plots[:C, :, 0], detected[0] > 0
+    drawn, there = base.drawn_plots(base.world(case, scene), base.detections(case, scene), realisation)
+    drawn = drawn[:, :C]
     truth = scene.truth.copy()
     truth[..., :2] += drawn[..., 2:]
     if spec.frame == "polar":

@@ -34,7 +34,7 @@ from radarsim.config.fields import PLAIN_SHARE
 from radarsim.engine.results import Layout
 from radarsim.studies.noise import noise_key
 from radarsim.studies.sonar import study as base
-from radarsim.studies.sonar.clutter import exact, filters
+from radarsim.studies.sonar.clutter import filters
 from radarsim.studies.sonar.clutter.filters import ClutterAxes, Conditions, TrackerSpec, gate_threshold
 from radarsim.studies.sonar.clutter.kernels import rare, tracker
 from radarsim.studies.sonar.clutter.kernels.ends import KINDS, Ends, EndSums, simulate_ends
@@ -279,9 +279,9 @@ def initiation_laws(
         if one.association == "known":
             continue
         if given.density == 0 and one.gate_probability == 1:
-            confirmed[f] = exact.confirmed_by(probability, one.m, one.n)
+            confirmed[f] = filters.confirmed_by(probability, one.m, one.n)
         if one.m == 2 and spec.sensor.sector:
-            begun[f] = exact.false_pairs(spec.sensor.sector, given, one, len(probability))
+            begun[f] = filters.false_pairs(spec.sensor.sector, given, one, len(probability))
     return confirmed, begun
 
 

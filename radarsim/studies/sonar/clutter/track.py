@@ -216,15 +216,8 @@ def target_plots(
     world: sonar_kernels.World, detections: pattern_kernels.Detections, realisation: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Plots (K, 2) of the target in one realisation, NaN where missed, and its true positions (K, 2)."""
-    K, plots, detected = len(world.dt), np.zeros((2, 4, 1)), np.empty(1)
-    z, true = np.full((K, 2), np.nan), world.truth[:, :2, 0].copy()
-    for k in range(K):
-        sonar_kernels.move_and_measure(world, realisation, k, plots)
-        pattern_kernels.detect(detections, realisation, k, detected)
-        true[k] += plots[:, 2, 0]
-        if detected[0]:
-            z[k] = plots[:, 0, 0]
-    return z, true
+    drawn, there = base.drawn_plots(world, detections, realisation)
+    return np.where(there[:, None], drawn[..., 0], np.nan), world.truth[..., 0] + drawn[..., 2]
 
 
 def false_plots(field: Field, realisation: int, scan: int) -> np.ndarray:

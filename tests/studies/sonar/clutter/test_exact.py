@@ -6,8 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radarsim.studies.sonar.clutter import exact
-from radarsim.studies.sonar.clutter.filters import Conditions
+from radarsim.studies.sonar.clutter import filters
 
 
 def enumerated(chance, m, n):
@@ -32,7 +31,7 @@ def enumerated(chance, m, n):
 @pytest.mark.parametrize(("m", "n"), [(2, 2), (2, 3), (3, 4), (3, 5), (4, 5), (3, 3)])
 def test_m_of_n_is_the_sum_over_all_patterns(m, n):
     chance = np.array([0.8, 0.7, 0.0, 1.0, 0.6, 0.9, 0.5, 0.8, 0.8, 0.3])
-    assert exact.confirmed_by(chance, m, n) == pytest.approx(enumerated(chance, m, n), abs=1e-12)
+    assert filters.confirmed_by(chance, m, n) == pytest.approx(enumerated(chance, m, n), abs=1e-12)
 
 
 def test_pairs_of_false_plots_far_from_any_edge():
@@ -40,7 +39,7 @@ def test_pairs_of_false_plots_far_from_any_edge():
     sigma, rule = np.array([30.0, 0.0175]), SimpleNamespace(n=3, speed=10.0, gate_probability=0.99)
     near, far = 9000.0, 9000.001
     ring = SimpleNamespace(range_m=(near - 2e3, far + 2e3), bearing_rad=(-np.pi, np.pi))
-    found = exact.false_pairs(ring, Conditions(5.0, sigma, 0.9, 1e-6), rule, 10)
+    found = filters.false_pairs(ring, filters.Conditions(5.0, sigma, 0.9, 1e-6), rule, 10)
     r = np.sqrt(np.linspace((near - 2e3) ** 2, (far + 2e3) ** 2, 20_001))  # evenly in area
     gate, none, wanted = -2 * np.log(0.01), 1.0, []
     for k in (1, 2):
@@ -58,6 +57,6 @@ def test_pairs_of_false_plots_far_from_any_edge():
 def test_quadrature_has_converged():
     sigma, rule = np.array([30.0, 0.0175]), SimpleNamespace(n=4, speed=10.0, gate_probability=0.99)
     sector = SimpleNamespace(range_m=(7e3, 11e3), bearing_rad=(0.1, 0.7))
-    given = (sector, Conditions(5.0, sigma, 0.9, 1e-6), rule, 6)
-    coarse, fine = exact.false_pairs(*given), exact.false_pairs(*given, nodes=120)
+    given = (sector, filters.Conditions(5.0, sigma, 0.9, 1e-6), rule, 6)
+    coarse, fine = filters.false_pairs(*given), filters.false_pairs(*given, nodes=120)
     assert coarse == pytest.approx(fine, rel=1e-3)
