@@ -320,11 +320,30 @@ def alike():
     return {f"{how} {name}": np.nan_to_num(getattr(one, name)) for how, one in made.items() for name in names}
 
 
+def matrices():
+    """Sums of studies that are given by their matrices, of filters right and wrong, with gains of their own and without."""
+    from tests.studies.test_linear import case_of, study_of
+
+    filters = [{"name": "right"}, {"name": "half", "gain": "half"}, {"name": "wrong", "wrong": "H"}]
+    made = {}
+    for n, D, probability in ((2, 1, 1.0), (3, 2, 1.0), (3, 2, 0.7), (4, 1, 0.7)):
+        study = study_of(n, D)
+        case = case_of(study, filters, 5, probability=probability)
+        plan = study.prepare(case)
+        sums = plan.layout.unpack(study.simulate(plan, 8, 9))
+        recorded = study.recorded().simulated(case, 3)
+        sums["plots"] = np.nan_to_num(np.stack(list(recorded.values())))
+        sums["track"] = study.tracker(case).feed(recorded).estimate
+        made |= {f"{n} states, {D} numbers, {probability}/{name}": array for name, array in sums.items()}
+    return made
+
+
 def numbers():
     """All arrays: {run/name: array}."""
     made = {f"random/{name}": array for name, array in words().items()}
     made |= {f"tracks/{name}": array for name, array in tracks().items()}
     made |= {f"patterns/{name}": array for name, array in alike().items()}
+    made |= {f"matrices of {name}": array for name, array in matrices().items()}
     made |= bursts(*RUNS["discriminator on block sums"])
     for run, arguments in RUNS.items():
         made |= {f"{run}/{name}": array for name, array in sums(*arguments).items()}

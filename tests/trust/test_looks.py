@@ -23,6 +23,7 @@ from radarsim.report.claims import rule
 from radarsim.report.claims.declared import Claim, Evidence, Missing, PaperClaims, Part
 from radarsim.report.claims.rule import Judged, Range
 from radarsim.report.precision import FIRST, FLOOR, FLOOR_OF_TAILS, MOST, looks
+from radarsim.report.quantities import LOST, SIGMA
 from radarsim.studies import registry
 
 Z = rule.level(1) * rule.Z95
@@ -216,7 +217,13 @@ class Synthetic:
         axes = Axes(("only",), *labels, 0, nothing, nothing)
         layout = Layout(error=(*shape, 4), paired=shape)
         self.plan = SimpleNamespace(gaussian=gaussian, axes=axes, layout=layout)
-        self.case = SimpleNamespace(name="case", realisations=most, study="synthetic", spec=None, swept={})
+        self.plans = (self.plan,)
+        self.case = SimpleNamespace(
+            name="case", realisations=most, study="synthetic", spec=None, swept={}, companions=()
+        )
+
+    def unpacked(self, values):
+        return (self.plan.layout.unpack(values),)
 
     def run(self, rng, monkeypatch, percent, of="sigma", tables=None):
         """σ with its interval where a precision ends, at how many realisations, and the sums there."""
@@ -240,10 +247,16 @@ class Synthetic:
                 kept_as=None,
             )
 
-        study = SimpleNamespace(curves=curves, tables=tables, relabelled=lambda axes, case: axes)
+        study = SimpleNamespace(
+            curves=curves,
+            table=lambda name, results, column: curves(results) if name == "curves" else tables(results)[name],
+            relabelled=lambda axes, case: axes,
+            quantities=lambda spec: (SIGMA, LOST),
+        )
         monkeypatch.setattr(run, "CaseWork", lambda case: self)
         monkeypatch.setattr(run, "collect", collect)
         monkeypatch.setattr(run, "study", lambda name: study)
+        monkeypatch.setattr(registry, "study", lambda name: study)
         experiment = SimpleNamespace(cases=(self.case,), study="synthetic")
         found = run.simulate(experiment, RunOptions(out="nowhere"), precision=percent, of=of)
         ((_, _, done),) = found.cases
@@ -345,8 +358,8 @@ def test_where_a_run_ends_is_foretold(monkeypatch):
         pilot = run.CaseResult(
             "case", "synthetic", None, {}, 16_000, synthetic.plan.layout.unpack(values), synthetic.plan.axes, 0.0
         )
-        told = [needed(pilot, percent, curves, "sigma", MOST, curves) for percent in (30.0, 3.0, 0.3)]
+        told = [needed(pilot, percent, curves, SIGMA, MOST, curves) for percent in (30.0, 3.0, 0.3)]
         ends = [synthetic.run(np.random.default_rng(3), monkeypatch, percent)[1] for percent in (30.0, 3.0, 0.3)]
         assert told[:2] == ends[:2] == [floor, floor]
         assert 0.5 <= told[2] / ends[2] <= 2
-        assert needed(pilot, 30.0, curves, "sigma", 10_000, curves) == 10_000
+        assert needed(pilot, 30.0, curves, SIGMA, 10_000, curves) == 10_000
