@@ -321,7 +321,7 @@ def alike():
 
 
 def matrices():
-    """Sums of studies that are given by their matrices, of filters right and wrong, with gains of their own and without."""
+    """Sums of studies by their matrices, of filters right and wrong, with gains of their own and without."""
     from tests.studies.test_linear import case_of, study_of
 
     filters = [{"name": "right"}, {"name": "half", "gain": "half"}, {"name": "wrong", "wrong": "H"}]
