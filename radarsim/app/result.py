@@ -458,7 +458,7 @@ def write_files(
         question = own.question(experiment)
     except RadarsimError:
         raise
-    except Exception:  # of a package's figures or words: the tables do not depend on them
+    except (Exception, SystemExit):  # of a package's figures or words: the tables do not depend on them
         files.replace_all(folder, contents, stale=files.outputs)
         raise
     if draw:

@@ -65,7 +65,7 @@ class Commands(click.Group):
             sys.stdout = open(os.devnull, "w")  # noqa: SIM115
             what = f"{error.filename}: cannot be read or written" if error.filename else "output: cannot be written"
             fail(StoreError(f"{what}: {error.strerror or error}"))
-        except Exception as error:
+        except (Exception, SystemExit) as error:  # a study may call sys.exit
             from radarsim.studies.registry import fault_of
 
             if (fault := fault_of(error)) is None:

@@ -58,6 +58,8 @@ def attempted(work: Work, piece: Node | Partial) -> Outcome:
         result = simulated(work, piece)
     except Exception as error:
         result = error
+    except SystemExit as error:  # it would end this thread alone, and the run would wait for its outcome
+        result = RuntimeError(f"SystemExit: {error}").with_traceback(error.__traceback__)
     return Outcome(piece, result, time.perf_counter() - started, platform_name())
 
 

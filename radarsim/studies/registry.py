@@ -82,7 +82,9 @@ def _loaded(name: str) -> Study | ConfigError:
     (entry,) = packages.values()
     try:
         found = entry.load()
-    except Exception as error:  # a package may fail in any way of its own
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # a package may fail in any way of its own, also by sys.exit
         return _fault(name, f"cannot be loaded: {described(error)}")
     if not isinstance(found, Study):
         return _fault(name, f"must offer a radarsim.studies.interface.Study, got {type(found).__name__}")
@@ -106,9 +108,9 @@ def part(name: str, take: Callable[[Study], Part]) -> Part:
         return take(one)
     try:
         return take(one)
-    except RadarsimError:
+    except (RadarsimError, KeyboardInterrupt):
         raise
-    except Exception as error:
+    except BaseException as error:
         raise _fault(name, f"fails: {described(error)}") from error
 
 
@@ -198,7 +200,7 @@ def package(name: str) -> str | None:
     return f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.value
 
 
-def described(error: Exception) -> str:
+def described(error: BaseException) -> str:
     """An exception in one line: its kind, the first line of its message that says something, and its place.
 
     That is the last line of an installed package that offers studies; of what the compiler refuses, the one it names.
@@ -222,7 +224,7 @@ def blamed(error: BaseException) -> str:
     return own[-1] if own else ""
 
 
-def fault_of(error: Exception) -> StudyError | None:
+def fault_of(error: BaseException) -> StudyError | None:
     """What an error that nobody has caught says, where the code of an installed package is to blame; else None."""
     return StudyError(f"a study of an installed package fails: {described(error)}") if blamed(error) else None
 

@@ -383,7 +383,7 @@ def said(function: Callable[..., Any], *arguments: Any) -> Any:
         return function(*arguments)
     except ConfigError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         frames = [one for one in traceback.extract_tb(error.__traceback__) if not within(one.filename)]
         line = str(error).strip().partition("\n")[0] or type(error).__name__
         words = line if isinstance(error, traced.OneForAll) else f"{type(error).__name__}: {line}"

@@ -20,6 +20,9 @@ STUDY = Whole()
 PACKAGES = {  # study: source of its module, what is said
     "absent": (None, "cannot be loaded: ModuleNotFoundError: No module named 'module_of_absent'"),
     "failing": ("raise RuntimeError('first line\\nsecond')", "cannot be loaded: RuntimeError: first line"),
+    "leaving": ("raise SystemExit(0)", "cannot be loaded: SystemExit: 0"),
+    "quitting": ("import sys\nsys.exit('no licence')", "cannot be loaded: SystemExit: no licence"),
+    "ending": (WHOLE.format(name="ending", keys="import sys; sys.exit()"), "fails: SystemExit ("),
     "typed": ("STUDY = 7", "must offer a radarsim.studies.interface.Study, got int"),
     "partial": (
         "from radarsim.studies.interface import Study\nclass S(Study): pass\nSTUDY = S()\n",

@@ -154,6 +154,7 @@ FAULTS = {  # what is put into the file: what is said, and whether the tables ar
         True,
     ),
     "numbers": ("    def own_gains(self, spec, one):\n        return {}[one.gain]\n", "KeyError: 'kalman'", False),
+    "end": ("    def own_gains(self, spec, one):\n        raise SystemExit\n", "SystemExit", False),
 }
 
 
