@@ -112,6 +112,13 @@ def inventory() -> Inventory:
     about = [(name, words) for name, (words, _) in studies.items()]
     about += [(name, f"cannot be used: {words}") for name, words in registry.unusable().items()]
     filters = [(name, key, words) for name, (_, of) in studies.items() for key, words in of.items()]
+    added, unusable = registry.filters()
+    filters += [
+        (name, f"kind: {kind}", keys.model_fields["kind"].description or "")
+        for name, of in added.items()
+        for kind, keys in of.items()
+    ]
+    filters += [("", f"kind: {kind}", f"cannot be used: {words}") for kind, words in unusable.items()]
     return [
         (term("Configs (radarsim run NAME)"), ("name", "what it is"), configs),
         (term("Scenarios (target: NAME)"), ("name", "what it is"), scenarios),

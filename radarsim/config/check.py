@@ -86,7 +86,7 @@ class _Found:
         """One, or one for each fault that the cross-checks of a mapping found."""
         kind, context = error["type"], dict(error.get("ctx", {}))
         path = path_in(document.data, error["loc"], keep_last=kind in ("missing", "extra_forbidden"))
-        if kind in ("union_tag_invalid", "union_tag_not_found"):
+        if kind in ("union_tag_invalid", "union_tag_not_found", "no_such_kind"):
             path = (*path, context["discriminator"].strip("'"))
             kind = kind if document.get(path) is not ABSENT else "missing"
         if kind == "at":
@@ -298,9 +298,9 @@ def _chosen(candidates: list[type[Model]], data: object) -> type[Model] | None:
 
 def _fits(model: type[Model], data: object) -> bool:
     """Whether the fields with one allowed value, which distinguish a choice's members, have it in the data."""
-    fields = [(name, info.annotation) for name, info in model.model_fields.items()]
-    tags = [(name, get_args(a)[0]) for name, a in fields if get_origin(a) is Literal and len(get_args(a)) == 1]
-    return isinstance(data, dict) and all(data.get(name) == tag for name, tag in tags)
+    fields = [(name, info) for name, info in model.model_fields.items() if get_origin(info.annotation) is Literal]
+    tags = [(name, get_args(i.annotation)[0], i.default) for name, i in fields if len(get_args(i.annotation)) == 1]
+    return isinstance(data, dict) and all(data.get(name, default) == tag for name, tag, default in tags)
 
 
 def refuse_both_units(document: Document, faults: Faults, path: KeyPath = ()) -> None:

@@ -19,6 +19,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass
 from functools import cache
 from types import FunctionType
@@ -32,6 +33,8 @@ from typing import (
     Protocol,
     Self,
     TypeVar,
+    Union,
+    cast,
     get_args,
     get_origin,
 )
@@ -39,12 +42,15 @@ from typing import (
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
+    Discriminator,
     Field,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     Strict,
     StringConstraints,
+    Tag,
     TypeAdapter,
     ValidationError,
     WithJsonSchema,
@@ -479,6 +485,58 @@ class Study(Model):
                     if getattr(self, field) not in names:
                         one = mark.field.removesuffix("s")
                         yield at(field, f"must be the name of a {one}: {', '.join(names)}")
+
+
+def kinds_of(keys: type[Model]) -> tuple[str, ...]:
+    """The kinds that a model's key `kind` allows; of a study's keys those of its members."""
+    if issubclass(keys, Study):
+        members = [one for one in _parts(keys.model_fields[keys.bare_keys].annotation) if _is_model(one)]
+        return tuple(kind for one in members for kind in kinds_of(one))
+    return get_args(keys.model_fields["kind"].annotation) if "kind" in keys.model_fields else ()
+
+
+def _is_model(part: Any) -> bool:
+    return isinstance(part, type) and issubclass(part, Model)
+
+
+def widened(
+    keys: type[Study],
+    further: Mapping[str, type[Model]],
+    why_not: Mapping[str, str],
+    again: tuple[Callable[[str], type[Study]], str],
+) -> type[Study]:
+    """The keys of a study whose members may be of further kinds too; a kind that is not given is the study's own.
+
+    why_not: of kinds that cannot be used the reason. again: a function and what it takes to give these keys again, by
+    which a config travels between processes.
+    """
+    info = keys.model_fields[keys.bare_keys]
+    (own, _) = get_args(info.annotation)
+    kinds = dict.fromkeys(kinds_of(own), own) | dict(further)
+    first = next(iter(kinds))
+
+    def kind_of(data: Any) -> Any:
+        return data.get("kind", first) if isinstance(data, dict) else getattr(data, "kind", first)
+
+    def known(data: Any) -> Any:
+        if (kind := kind_of(data)) not in list(kinds):  # which compares what may be no text
+            reason = f"; {why_not[kind]}" if isinstance(kind, str) and kind in why_not else ""
+            told = {"kinds": ", ".join(kinds), "reason": reason, "discriminator": "kind"}
+            raise PydanticCustomError("no_such_kind", "must be one of {kinds}{reason}", told)
+        return data
+
+    tagged: Any = Union[tuple(Annotated[one, Tag(f"kind: {kind}")] for kind, one in kinds.items())]  # noqa: UP007
+    choice: Any = Annotated[tagged, Discriminator(lambda data: f"kind: {kind_of(data)}"), BeforeValidator(known)]
+    members: Any = (tuple[choice, ...], copy(info))
+    made: Any = create_model(
+        keys.__name__, __base__=keys, __module__=keys.__module__, __doc__=keys.__doc__, **{keys.bare_keys: members}
+    )
+    made.__reduce__ = lambda self: (_again, (*again, dict(self), self.model_fields_set))
+    return cast(type[Study], made)
+
+
+def _again(find: Callable[..., type[Study]], name: str, values: dict[str, Any], given: set[str]) -> Study:
+    return find(name).model_construct(given, **values)
 
 
 class Named(Protocol):

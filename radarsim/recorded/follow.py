@@ -30,6 +30,7 @@ from radarsim.errors import ConfigError, PlotFault
 from radarsim.recorded import plots
 from radarsim.recorded.plots import Path as Places
 from radarsim.studies.interface import RecordedPlots, Tracker, true_column
+from radarsim.studies.registry import module as home_of
 from radarsim.studies.registry import study
 
 if TYPE_CHECKING:
@@ -140,6 +141,8 @@ def borrowed(case: Case, part: Part) -> list[str]:
     of = recorded_of(case)
     module = getattr(of, part).__module__
     if module == RecordedPlots.__module__ or of.of_any_keys:  # nobody's: it does nothing
+        return []
+    if f"{module}.".startswith(f"{home_of(case.study)}."):  # of the study itself
         return []
     packages = module.split(".")
     return unknown_to(case.spec, ".".join(packages[:3] if packages[0] == "radarsim" else packages[:1]))

@@ -26,6 +26,7 @@ A study that follows this declares an object and writes no class:
 | `readings`, if offered | an object of the class `readings.Readings` |
 | `recorded`, if offered | an object of the class `track.Recorded` |
 | `chart`, if offered | the function of `chart` |
+| `own_filters`, if offered | the function of `given` |
 | `shipped`, if offered | the folder `shipped` |
 
 A file is imported when a part of it is first asked for, so that `radarsim list` loads no kernels.
@@ -113,6 +114,7 @@ class StudyFolder(Study):
     inputs, cost = part("tables"), part("tables")
     figures, chart = part("figures"), part("chart")
     question, answer, warnings = part("words"), part("words"), part("words")
+    own_filters = part("given")
     readings, recorded = part("readings", "Readings"), part("track", "Recorded")
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:

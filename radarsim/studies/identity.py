@@ -5,8 +5,9 @@ and the study's `model`. Realisations, limits, threads, output, file and display
 
 Its second half is a hash of files, which an edit of any kind changes, of words too: of radarsim's own studies those of
 the study, of the rooms that it stands on and of what runs it, but for what shows numbers; of a study from another
-package all files of that, and the versions of what is installed. It is a quick answer alone. Where it differs, stored
-blocks are computed again in part and taken over if their bytes are the same; see radarsim.engine.store.
+package all files of that, and the versions of what is installed; so of filters from another package. It is a quick answer
+alone. Where it differs, stored blocks are computed again in part and taken over if their bytes are the same; see
+radarsim.engine.store.
 """
 
 import hashlib
@@ -18,6 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from radarsim.config.experiment import Case, canonical, digest, world
+from radarsim.config.fields import Model
 from radarsim.engine.blocks import QUESTION
 from radarsim.studies.registry import SHIPPED, module, study
 
@@ -41,22 +43,36 @@ def identity(case: Case) -> str:
     if case.against:
         names = [member.name for member in case.spec.members]
         question["against"] = [names.index(name) for name in case.against]
-    return digest(question)[:QUESTION] + sources(case.study)[:QUESTION]
+    return digest(question)[:QUESTION] + sources(case.study, packages(case))[:QUESTION]
+
+
+def packages(case: Case) -> tuple[str, ...]:
+    """The packages but radarsim that compute a case's numbers: of its study, and of its filters' keys and gains."""
+    of_study = () if case.study in SHIPPED else (module(case.study),)
+    kinds = [
+        one
+        for member in getattr(case.spec, case.spec.bare_keys, ())
+        for one in type(member).__mro__
+        if issubclass(one, Model)
+    ]
+    tops = (one.partition(".")[0] for one in (*of_study, *(kind.__module__ for kind in kinds)))
+    return tuple(sorted(set(tops) - {__package__.partition(".")[0]}))
 
 
 @cache
-def sources(name: str) -> str:
-    """SHA-256 of the files that may compute a study's numbers."""
+def sources(name: str, outside: tuple[str, ...] = ()) -> str:
+    """SHA-256 of the files that may compute numbers of a study, and those of packages from outside."""
     found = hashlib.sha256()
     places = [(PACKAGE / room, files(PACKAGE / room)) for room in ROOMS]
     places.append((PACKAGE / "studies", (PACKAGE / "studies").glob("*.py")))
     if name in SHIPPED:
         own = PACKAGE.joinpath(*module(name).split(".")[1:])
         places.append((own, (path for path in files(own) if path.stem not in SHOW)))
-    else:
-        spec = find_spec(module(name).partition(".")[0])
+    for package in outside:
+        spec = find_spec(package)
         own_places = [] if spec is None else spec.submodule_search_locations or [spec.origin or ""]
         places += [(Path(own), files(Path(own))) for own in own_places]
+    if outside:
         found.update(repr(sorted({(one.name, one.version) for one in distributions()})).encode())
     for place, every in places:
         for path in sorted(every):

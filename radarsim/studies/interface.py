@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from radarsim.config.experiment import Case, Experiment
+    from radarsim.config.fields import Model
     from radarsim.config.fields import Study as Keys
     from radarsim.engine.results import Axes, CaseResult, Layout, Track
     from radarsim.report.claims import PaperClaims
@@ -185,7 +186,7 @@ class Paper(NamedTuple):
     held_too: Mapping[str, tuple[str, ...]] = MappingProxyType({})
 
 
-Beside = Literal["readings", "recorded", "shipped", "chart", "shortened"]
+Beside = Literal["readings", "recorded", "shipped", "chart", "shortened", "own_filters"]
 Costs = Literal["cost", "seconds_per_update", "seconds_at_most"]
 OptionalPart = Literal["curves", "gains", "inputs", Costs, "warnings", "exact_but_for", "costly", Beside]
 
@@ -204,6 +205,13 @@ class Study(ABC):
     @abstractmethod
     def keys(self) -> "type[Keys]":
         """The YAML keys: a subclass of `radarsim.config.fields.Study`."""
+
+    def own_filters(self) -> "type[Model] | None":
+        """What keys of filters from other packages are derived from, see `radarsim.studies.registry.filters`.
+
+        Default: nothing, the study takes no such filters.
+        """
+        return None
 
     # ---- numbers -------------------------------------------------------------------------------------------------
     @abstractmethod

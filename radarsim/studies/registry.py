@@ -1,8 +1,11 @@
-"""The studies there are: those shipped here, and those that installed packages offer.
+"""The studies there are: those shipped here, and those that installed packages offer; and filters that packages add.
 
 A package offers a study by an entry point of the group `radarsim.studies`: its name is the value of `study:` in YAML,
 its target the declared object, see `radarsim.studies.interface.Study`. A package that cannot be used is an error only
 where its study is asked for: lists of all studies leave it out, and `unusable` says why.
+
+A package adds a filter to a study that takes such by an entry point of the group `radarsim.filters`: its name is the
+value of `kind:` of a filter in YAML, its target a class of keys, derived from what `Study.own_filters` gives.
 """
 
 import os
@@ -13,11 +16,13 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
+from inspect import isabstract
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from radarsim.config.experiment import Case
 from radarsim.config.fields import Study as Keys
+from radarsim.config.fields import kinds_of, widened
 from radarsim.config.schema import COMMON_KEYS
 from radarsim.errors import ConfigError, RadarsimError, StudyError
 from radarsim.report.quantities import Quantity
@@ -25,7 +30,7 @@ from radarsim.studies.interface import Study
 
 Part = TypeVar("Part")
 
-GROUP = "radarsim.studies"
+GROUP, FILTERS = "radarsim.studies", "radarsim.filters"
 COMPILING = re.compile(r"Failed in |-+$|\[\d\] |During: ")  # lines of a compiler's message that say where it was
 SHIPPED = {  # in the order of the papers, then what goes beyond them
     "range_doppler": "radarsim.studies.range_doppler",
@@ -38,10 +43,10 @@ SHIPPED = {  # in the order of the papers, then what goes beyond them
 
 
 @cache
-def entries() -> Mapping[str, Mapping[str, EntryPoint]]:
-    """What installed packages offer: by the study's name, and of each name by the package's."""
+def entries(group: str = GROUP) -> Mapping[str, Mapping[str, EntryPoint]]:
+    """What installed packages offer in a group: by the entry's name, and of each name by the package's."""
     found: dict[str, dict[str, EntryPoint]] = {}
-    for entry in sorted(entry_points(group=GROUP)):
+    for entry in sorted(entry_points(group=group)):
         found.setdefault(entry.name, {}).setdefault(entry.dist.name if entry.dist else entry.value, entry)
     return found
 
@@ -159,7 +164,13 @@ def _ships(name: str, stem: str) -> bool:
 
 
 def keys(name: str) -> type[Keys]:
-    """The schema of a study's YAML keys. Raises as `study`."""
+    """The schema of a study's YAML keys, with those of filters of packages. Raises as `study`."""
+    found = own_keys(name)
+    return _with_filters(name) if entries(FILTERS) and study(name).own_filters() else found
+
+
+def own_keys(name: str) -> type[Keys]:
+    """The schema of the YAML keys that a study itself has. Raises as `study`."""
     found = part(name, lambda one: one.keys())
     if not (isinstance(found, type) and issubclass(found, Keys)):
         raise _fault(name, "must give keys that are a subclass of radarsim.config.fields.Study")
@@ -196,7 +207,10 @@ def package(name: str) -> str | None:
     """The installed package that offers a study, with its version; None for one that is shipped here."""
     if name in SHIPPED:
         return None
-    entry = next(iter(entries()[name].values()))
+    return _package(next(iter(entries()[name].values())))
+
+
+def _package(entry: EntryPoint) -> str:
     return f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.value
 
 
@@ -231,3 +245,61 @@ def fault_of(error: BaseException) -> StudyError | None:
 
 def _fault(name: str, words: str) -> ConfigError:
     return ConfigError(f"study {name}: the package {package(name) or 'radarsim'} {words}")
+
+
+# ---- filters of packages ---------------------------------------------------------------------------------------------
+class Filters(NamedTuple):
+    """Filters of installed packages: the keys of each by study and kind, and by kind why others cannot be used."""
+
+    usable: Mapping[str, Mapping[str, Any]]
+    unusable: Mapping[str, str]
+
+
+@cache
+def filters() -> Filters:
+    """The filters of all installed packages, which are imported for it."""
+    usable: dict[str, dict[str, Any]] = {}
+    unusable: dict[str, str] = {}
+    for kind, packages in entries(FILTERS).items():
+        of: dict[str, dict[str, Any]] = {}
+        faults = []
+        for package, entry in packages.items():
+            found, fault = _filter(kind, entry)
+            if fault:
+                faults.append(f"the package {_package(entry)} offers the filter {kind}, {fault}")
+            else:
+                of.setdefault(found.study, {})[package] = found
+        for name, several in of.items():
+            if len(several) > 1:
+                every = " and ".join(sorted(several))
+                faults.append(f"filter {kind} of {name}: offered by the packages {every}: uninstall all but one")
+            else:
+                usable.setdefault(name, {})[kind] = next(iter(several.values()))
+        if faults:
+            unusable[kind] = "; ".join(faults)
+    return Filters(usable, unusable)
+
+
+def _filter(kind: str, entry: EntryPoint) -> tuple[Any, str]:
+    """The keys of a filter that a package offers, and what is wrong with it; nothing, if it can be used."""
+    try:
+        found = entry.load()
+    except Exception as error:  # a package may fail in any way of its own
+        return None, f"which cannot be loaded: {described(error)}"
+    name = str(getattr(found, "study", None))
+    base = study(name).own_filters() if name in SHIPPED else None
+    if base is None:
+        takes = " and ".join(one for one in SHIPPED if study(one).own_filters())
+        return None, f"for the study {name}, which takes no filters of packages: {takes} does"
+    if not (isinstance(found, type) and issubclass(found, base)) or isabstract(found):
+        return None, f"which must be a class derived from {base.__module__}.{base.__name__}, with all that it asks for"
+    if kind in kinds_of(own_keys(name)):
+        return None, f"which {name} has itself: that of the package is not used"
+    if kinds_of(found) != (kind,):
+        return None, f"whose key kind must be Literal[{kind!r}]"
+    return found, ""
+
+
+@cache
+def _with_filters(name: str) -> type[Keys]:
+    return widened(own_keys(name), filters().usable.get(name, {}), filters().unusable, (keys, name))

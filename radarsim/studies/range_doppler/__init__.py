@@ -10,6 +10,7 @@ STUDY = StudyFolder(
     filters={
         "observes: [range]": "Kalman filter of the second order on range, started by least squares on three scans",
         "observes: [range, velocity]": "the same on range and radial velocity, started on two scans",
+        "kind: NAME": "a filter of an installed package (entry points radarsim.filters), by its gains at every scan",
     },
     paper=Paper(
         "Gorshkov & Zavizhenets 2017",
@@ -31,5 +32,6 @@ STUDY = StudyFolder(
         "exact_but_for",
         "costly",
         "seconds_at_most",
+        "own_filters",
     ),
 )

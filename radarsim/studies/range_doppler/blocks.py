@@ -5,6 +5,7 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Layout
 from radarsim.kernels import linear
+from radarsim.kernels.algebra import pack
 from radarsim.studies.noise import noise_key
 from radarsim.studies.range_doppler import filters
 from radarsim.studies.range_doppler.kernels import missed
@@ -57,6 +58,9 @@ def own_gains(case: Case, made: Designed, baseline: int) -> missed.Problem:
         start=np.array([d.start for d in made.filters]),
         Q=np.array([d.noise for d in made.filters]),
         baseline=baseline,
+        given=np.array([d.given for d in made.filters]),
+        gains=np.stack([d.gains for d in made.filters]),
+        believed=np.stack(pack(np.stack([d.believed for d in made.filters])), axis=-1),
     )
 
 

@@ -72,7 +72,8 @@ def chart(cases: Sequence[Case], references: Sequence[Case]) -> Chart:
 def placed(case: Case) -> Place | None:
     """Where a case lies, by its first filter of the range and its first of range and velocity; None without both."""
     axes: RangeDopplerAxes = prepare(case).axes
-    kinds = [np.flatnonzero(axes.observes == observes) for observes in (1, 2)]
+    shipped = np.array([form != "" for form in axes.process_noise])  # not of a package
+    kinds = [np.flatnonzero(shipped & (axes.observes == observes)) for observes in (1, 2)]
     if not all(len(kind) for kind in kinds):
         return None
     base, own = (int(kind[0]) for kind in kinds)
@@ -146,7 +147,7 @@ def aside(case: Case) -> str:
     """What of a case the chart leaves out of account, as a further sentence; nothing where there is nothing."""
     left = [] if case.spec.radar.as_the_papers else [tr("missed plots and biases")]
     left += [] if case.spec.target.kind == "polynomial" else [tr("the target's manoeuvre")]
-    usual = all(one.process_noise == "random_jerk" for one in case.spec.filters)
+    usual = {getattr(one, "process_noise", "random_jerk") for one in case.spec.filters} == {"random_jerk"}
     left += [] if usual else [tr("another process noise")]
     return tr(" Left out of account in the long run: {what}.", what=", ".join(left)) if left else ""
 

@@ -1,5 +1,6 @@
 """Keys of the range_doppler study (P1): a radar, a target in range, linear filters with and without the velocity."""
 
+import math
 from collections.abc import Iterator
 from typing import Annotated, Literal, Self
 
@@ -138,29 +139,18 @@ class Best(Model):
     from_k: Annotated[int, Whole(1, MOST_SCANS)] = key("first scan that counts", "first scan that counts", 3)
 
 
-class Filter(Model):
-    """A second-order Kalman filter started by least squares."""
+class FilterKeys(Model):
+    """What every filter has, those of packages too: what it observes, and a start by least squares."""
 
     name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
+    kind: str = key("kind", "which filter it is")
     observes: tuple[Literal["range", "velocity"], ...] = key(
         "observed quantities", "what it measures: [range] or [range, velocity]"
-    )
-    manoeuvre_variance: Positive | Best = key(
-        "manoeuvre variance",
-        "variance of the random jerk it allows for, (m/s³)²: D_M; or what it is to make least",
-        symbol="D_M",
-        unit="(m/s³)²",
     )
     initial_scans: Annotated[int, Whole(2, MOST_SCANS)] | None = key(
         "plots in the initialisation",
         "plots in its least-squares start; default and least: 3 for range, 2 with velocity",
         None,
-    )
-    process_noise: Noise = key(
-        "process noise",
-        "how the allowed manoeuvre lies within a scan: a constant jerk (the paper's), white jerk, or a step of the "
-        "acceleration; each lets its variance grow by D_M times the period squared a scan",
-        "random_jerk",
     )
 
     @cross_check
@@ -179,6 +169,29 @@ class Filter(Model):
     def plots_to_start(self) -> int:
         """Scans in the least-squares start, given or by default."""
         return self.initial_scans or PLOTS_NEEDED[len(self.observes)]
+
+
+class Filter(FilterKeys):
+    """A second-order Kalman filter started by least squares."""
+
+    kind: Annotated[Literal["kalman"], Added()] = key("kind", "the Kalman filter of the study", "kalman")
+    manoeuvre_variance: Positive | Best = key(
+        "manoeuvre variance",
+        "variance of the random jerk it allows for, (m/s³)²: D_M; or what it is to make least",
+        symbol="D_M",
+        unit="(m/s³)²",
+    )
+    process_noise: Noise = key(
+        "process noise",
+        "how the allowed manoeuvre lies within a scan: a constant jerk (the paper's), white jerk, or a step of the "
+        "acceleration; each lets its variance grow by D_M times the period squared a scan",
+        "random_jerk",
+    )
+
+
+def variance_of(one: FilterKeys) -> float | Best:
+    """A filter's D_M, (m/s³)²; not-a-number where it has none, as one of a package may."""
+    return getattr(one, "manoeuvre_variance", math.nan)
 
 
 class Keys(Lasting):
@@ -217,10 +230,23 @@ class Keys(Lasting):
             yield at(which, f"must be >= {plots}{many} for the initialisation of filter {slowest}")
         yield from of_each(self.filters, self._counts_from)
 
-    def _counts_from(self, i: int, one: Filter) -> Iterator[At]:
-        best = one.manoeuvre_variance
-        if isinstance(best, Best) and best.from_k > self.plots:
+    def _counts_from(self, i: int, one: FilterKeys) -> Iterator[At]:
+        best = variance_of(one)
+        if isinstance(best, Best) and not isinstance(one, Filter):
+            yield at(
+                f"filters.{i}.manoeuvre_variance", f"must be a number: the best one of kind {one.kind} is not known"
+            )
+        elif isinstance(best, Best) and best.from_k > self.plots:
             yield at(f"filters.{i}.manoeuvre_variance.from_k", f"must be <= the number of scans, {self.plots}")
+
+    @cross_check
+    def _of_every_plot(self) -> Iterator[At]:
+        yield from of_each(self.filters, self._sees_every_plot)
+
+    def _sees_every_plot(self, i: int, one: FilterKeys) -> Iterator[At]:
+        if not isinstance(one, Filter) and self.radar.detection_probability < 1:
+            words = f"must be 1 with filter {one.name}: gains of kind {one.kind} are made for a plot at every scan"
+            yield at("radar.detection_probability", words)
 
     @cross_check
     def _accuracies_in_proportion(self) -> Iterator[At]:
@@ -239,15 +265,16 @@ class Keys(Lasting):
         if not any(True for _ in self._accuracies_in_proportion()):  # else that is the fault
             yield from of_each(self.filters, self._in_proportion)
 
-    def _in_proportion(self, i: int, one: Filter) -> Iterator[At]:
-        if isinstance(one.manoeuvre_variance, Best):
+    def _in_proportion(self, i: int, one: FilterKeys) -> Iterator[At]:
+        variance = variance_of(one)
+        if isinstance(variance, Best) or math.isnan(variance):
             return
         radar, dt = self.radar, self.radar.scan_period_s
         name = f"filters.{i}.manoeuvre_variance"
-        if not 1e-28 <= one.manoeuvre_variance * dt**6 / radar.sigma_range_m**2 <= 1e12:
+        if not 1e-28 <= variance * dt**6 / radar.sigma_range_m**2 <= 1e12:
             ratio = "manoeuvre_variance scan_period_s⁶ / sigma_range_m²"
             yield at(name, f"out of proportion: {ratio} must be from 1e-28 to 1e12")
-        elif "velocity" in one.observes and one.manoeuvre_variance * dt**4 / radar.sigma_velocity_mps**2 > 1e12:
+        elif "velocity" in one.observes and variance * dt**4 / radar.sigma_velocity_mps**2 > 1e12:
             ratio = "manoeuvre_variance scan_period_s⁴ / sigma_velocity_mps²"
             yield at(name, f"out of proportion: {ratio} must be <= 1e12")
 

@@ -270,6 +270,7 @@ class LinearFilter:
     observes is 1 (range) or 2 (range and velocity); start is the scan, from 1, of the first least-squares estimate;
     weights (3, 2, start) make it from the plots so far; gains (K, 3, 2) are zero up to it. believed (K, 3, 3) is the
     covariance that the filter claims, and available (K, 3) says which components it estimates; noise is its Q, packed.
+    given: its gains are those of a package, not the Kalman filter's of this Q.
     """
 
     observes: int
@@ -279,6 +280,7 @@ class LinearFilter:
     believed: np.ndarray
     available: np.ndarray
     noise: tuple[float, ...]
+    given: bool = False
 
 
 def observation(observes: int) -> np.ndarray:
@@ -340,7 +342,7 @@ def design(
     is the form of the process noise, see `physics.process_noise`.
     """
     F, Q = constant_acceleration(dt), tuple(map(float, pack(process_noise(noise, manoeuvre_variance, dt))))
-    R_range, R_velocity = map(float, sigma**2)
+    R, there = tuple(map(float, sigma**2)), (True, observes == 2)
     weights, covariance = least_squares_start(observes, start, sigma, dt)
     gains, believed = np.zeros((scans, 3, 2)), np.zeros((scans, 6))
     available = np.ones((scans, 3), dtype=bool)
@@ -350,15 +352,23 @@ def design(
     believed[start - 1] = P
     for k in range(start, scans):
         before = P
-        P, gain, _ = take_value(predicted_covariance(P, F, Q), R_range, 1.0)
-        if observes == 2:  # taken after the range, so that it moves what that makes of the estimate
-            P, of_velocity, _ = take_rate(P, R_velocity, 1.0)
-            gains[k, :, 1], gain = of_velocity, add_scaled(gain, -gain[1], of_velocity)
-        gains[k, :, 0], believed[k] = gain, P
+        P, gains[k, :, 0], gains[k, :, 1] = updated(P, F, Q, R, there)
+        believed[k] = P
         if before == P:  # stationary to the last bit, and so it stays
             gains[k:], believed[k:] = gains[k], P
             break
     return LinearFilter(observes, start, weights, gains, unpack(believed.T), available, Q)
+
+
+def updated(P: Any, F: Any, Q: Any, R: Any, there: Any) -> tuple[Any, Any, Any]:
+    """A covariance after a scan, packed, and its gains (3,) on range and velocity, of which there are some; R (2,)."""
+    P, of_range, of_velocity = predicted_covariance(P, F, Q), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if there[0]:
+        P, of_range, _ = take_value(P, R[0], 1.0)
+    if there[1]:  # taken after the range, so that it moves what that makes of the estimate
+        P, of_velocity, _ = take_rate(P, R[1], 1.0)
+        of_range = add_scaled(of_range, -of_range[1], of_velocity)
+    return P, of_range, of_velocity
 
 
 # ---- closed form -----------------------------------------------------------------------------------------------------

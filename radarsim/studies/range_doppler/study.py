@@ -8,8 +8,8 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Axes, Layout
-from radarsim.studies.range_doppler import filters
-from radarsim.studies.range_doppler.config import Best, Keys
+from radarsim.studies.range_doppler import filters, given
+from radarsim.studies.range_doppler.config import Filter, Keys
 from radarsim.studies.range_doppler.tuning import Designed, designed
 
 if TYPE_CHECKING:
@@ -27,9 +27,10 @@ class RangeDopplerAxes(Axes):
     where plots may be missed, as then it differs from realisation to realisation. exact_nees (F, K) is the expectation
     of eᵀP⁻¹e per estimated component, no unit; exact_gain (F, K, 3) the gain in per cent against the baseline, where
     both have an estimate. observes (F,) is 1 for filters of the range, 2 for those of range and velocity;
-    manoeuvre_variance (F,) their D_M in (m/s³)²; process_noise the forms of their Q. sigma (2,) holds the standard
-    deviations of the plots, m and m/s; C_theta is σ_r²/(Δt²σ_V²) (eq. 11), no unit. speed_mps is the target's greatest
-    radial speed at a scan. plain: every scan has its plot, which errs by noise alone, as in the paper.
+    manoeuvre_variance (F,) their D_M in (m/s³)²; process_noise the forms of their Q, "" of a filter of a package, of
+    which settled_gain (F, 3, 2) is the gain in the long run, not-a-number where there is none. sigma (2,) holds the
+    standard deviations of the plots, m and m/s; C_theta is σ_r²/(Δt²σ_V²) (eq. 11), no unit. speed_mps is the target's
+    greatest radial speed at a scan. plain: every scan has its plot, which errs by noise alone, as in the paper.
     """
 
     believed: np.ndarray
@@ -38,6 +39,7 @@ class RangeDopplerAxes(Axes):
     observes: np.ndarray
     manoeuvre_variance: np.ndarray
     process_noise: tuple[str, ...]
+    settled_gain: np.ndarray
     sigma: np.ndarray
     scan_period_s: float
     C_theta: float
@@ -92,8 +94,8 @@ def shortened(case: Case, at_s: float | None, at_k: int | None) -> Case:
     """The case up to a time (s) or scan: what comes later changes no error there, but by a D_M that is looked for."""
     spec: Keys = case.spec
     filters.true_motion(case)
-    if any(isinstance(f.manoeuvre_variance, Best) for f in spec.filters):
-        return case
+    if not all(isinstance(f, Filter) and isinstance(f.manoeuvre_variance, float) for f in spec.filters):
+        return case  # gains of a package may depend on how many scans there are
     until = spec.plots
     if at_k is not None and at_k > 0:
         until = min(at_k, until)
@@ -145,7 +147,8 @@ def axes(made: Designed) -> RangeDopplerAxes:
         exact_gain=known.gain,
         observes=made.observes,
         manoeuvre_variance=np.array(made.variances),
-        process_noise=tuple(f.process_noise for f in spec.filters),
+        process_noise=tuple(f.process_noise if isinstance(f, Filter) else "" for f in spec.filters),
+        settled_gain=np.stack([given.settled(d) for d in made.filters]),
         sigma=made.plots.sigma,
         scan_period_s=made.dt,
         C_theta=float(made.plots.sigma[0] ** 2 / (made.dt**2 * made.plots.sigma[1] ** 2)),
@@ -169,7 +172,10 @@ class Known:
 
 def exact_values(made: Designed, baseline: int) -> Known:
     """Of filters that get every plot."""
-    errors = [filters.error_recursion(d, made.plots, made.x, made.dt, made.drawn) for d in made.filters]
+    errors = [
+        (given if d.given else filters).error_recursion(d, made.plots, made.x, made.dt, made.drawn)
+        for d in made.filters
+    ]
     lasting, covariance = np.stack([E for E, _ in errors]), np.stack([S for _, S in errors])
     bias, further = lasting[..., 0], lasting[..., 1:]
     covariance = covariance + np.einsum("fkic,fkjc->fkij", further, further)

@@ -12,7 +12,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import notes, panels, statistics
 from radarsim.report import tables as common
-from radarsim.studies.range_doppler import filters
+from radarsim.studies.range_doppler import filters, given
 from radarsim.studies.range_doppler.study import RangeDopplerAxes
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def steady(results: Sequence[Result]) -> "pd.DataFrame":
     """Steady σ against settling, both exact, of every case, filter and component; and σ measured at the last scan.
 
     Cases whose target breaks the filters' model have no steady error and no rows; nor have those whose plots may be
-    missed or are biased.
+    missed or are biased, nor a filter of a package whose gains still change at the end.
 
     manoeuvre_variance [(m/s³)²]: D_M of the filter's model
     steady_sigma [unit]: σ in steady state, exact
@@ -99,7 +99,12 @@ def _steady(result: Result) -> list[tuple]:
     t, period, rows = np.asarray(axes.t_s, dtype=float), axes.scan_period_s, []
     for f, name in enumerate(axes.filters):
         variance = float(axes.manoeuvre_variance[f])
-        _, true = filters.steady_state(int(axes.observes[f]), variance, axes.sigma, period, axes.process_noise[f])
+        if axes.process_noise[f]:
+            _, true = filters.steady_state(int(axes.observes[f]), variance, axes.sigma, period, axes.process_noise[f])
+        elif (steady := given.steady_state(axes.settled_gain[f], axes.sigma, period)) is not None:
+            true = steady
+        else:
+            continue
         for c, (component, unit) in enumerate(axes.components):
             at = np.flatnonzero(axes.available[f, :, c])
             if not at.size:
@@ -225,7 +230,7 @@ def inputs(results: Sequence[Result]) -> "pd.DataFrame":
             radars.setdefault((panels.stem(result), panels.plain(panels.device(result)), *given), []).append(result)
     rows = []
     for (_, *radar), members in radars.items():
-        tried = sorted({float(v) for result in members for v in result.axes.manoeuvre_variance})
+        tried = sorted({float(v) for result in members for v in result.axes.manoeuvre_variance if not np.isnan(v)})
         scans = sorted({result.spec.scans for result in members})
         rows.append((*radar, ", ".join(panels.number(v, powers=True) for v in tried), ", ".join(map(str, scans))))
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(INPUTS)})

@@ -15,8 +15,9 @@ from radarsim.kernels.algebra import pack, unpack
 from radarsim.kernels.hypotheses import lasting, log_likelihood
 from radarsim.physics import transition
 from radarsim.studies.interface import EXPLANATIONS, RecordedPlots, Turning, true_column
-from radarsim.studies.range_doppler.config import Filter, Keys, Turn
+from radarsim.studies.range_doppler.config import MOST_SCANS, Filter, FilterKeys, Keys, Turn, variance_of
 from radarsim.studies.range_doppler.filters import least_squares, noise_by_time, observation
+from radarsim.studies.range_doppler.given import GivenGains, Scans, followed
 from radarsim.studies.range_doppler.kernels import missed, rows
 from radarsim.studies.range_doppler.study import COMPONENTS, prepare
 from radarsim.studies.range_doppler.tuning import designed
@@ -49,8 +50,8 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
 def variances_of(case: Case) -> Sequence[float]:
     """D_M of each filter, (m/s³)²: as given, or the best on the config's target."""
     spec: Keys = case.spec
-    given = [f.manoeuvre_variance for f in spec.filters if isinstance(f.manoeuvre_variance, float)]
-    return given if len(given) == len(spec.filters) else designed(case).variances
+    stated = [variance for variance in map(variance_of, spec.filters) if isinstance(variance, float)]
+    return stated if len(stated) == len(spec.filters) else designed(case).variances
 
 
 class Tracker:
@@ -59,21 +60,24 @@ class Tracker:
     A filter starts by least squares as soon as it has taken as many plots as the config's `initial_scans` says and
     these determine range, velocity and acceleration; before, its estimates are the plots. Then the Kalman filter of the
     study goes from row to row, its gains computed for the interval and for what the row holds. Where the config leaves
-    the manoeuvre variance to be looked for, it is the best one on the config's target.
+    the manoeuvre variance to be looked for, it is the best one on the config's target. A filter of a package makes its
+    gains for the times of the whole recording and for what each row holds.
     """
 
-    most_rows: int | None = None
     several = False
 
     def __init__(self, case: Case):
         spec: Keys = case.spec
         self.names = tuple(f.name for f in spec.filters)
         self.sigma = np.array([spec.radar.sigma_range_m, spec.radar.sigma_velocity_mps])
-        noises = [
-            noise_by_time(f.process_noise, variance, spec.radar.scan_period_s)
+        period = spec.radar.scan_period_s
+        self.filters = [
+            _One(f, noise_by_time(f.process_noise, variance, period), self.sigma)
+            if isinstance(f, Filter)
+            else _Given(f, self.sigma)
             for f, variance in zip(spec.filters, variances_of(case), strict=True)
         ]
-        self.filters = [_One(f, noise, self.sigma) for f, noise in zip(spec.filters, noises, strict=True)]
+        self.most_rows = None if all(isinstance(f, Filter) for f in spec.filters) else MOST_SCANS
 
     def feed(self, recorded: Mapping[str, np.ndarray]) -> Track:
         """The estimates over the next rows: columns (n,), not-a-number where a value is missing."""
@@ -84,6 +88,9 @@ class Tracker:
         taken = np.arange(2) < np.array([one.observes for one in self.filters])[:, None]
         # A number that was taken in has drawn the estimate to itself; of another the errors add.
         spread = self.sigma**2 + np.where(taken[:, None], -1.0, 1.0) * sigma[..., :2] ** 2
+        for of, one in zip(spread, self.filters, strict=True):
+            if isinstance(one, _Given):
+                of[len(t) - len(one.left) :] = one.left
         believed = np.where(np.isfinite(residual), np.sqrt(np.maximum(spread, 0.0)), np.nan)
         labels = (("range_m", "m"), ("velocity_mps", "m/s"))
         return Track(
@@ -91,12 +98,11 @@ class Tracker:
         )
 
 
-class _One:
-    """One filter: its state, and before the start the plots that it is to be started from."""
+class _Starting:
+    """A filter before its start: the plots that it is to be started from; then its state and covariance."""
 
-    def __init__(self, options: Filter, noise: np.ndarray, sigma: np.ndarray):
-        self.observes, self.needed = len(options.observes), options.plots_to_start
-        self.noise, self.sigma = noise, sigma
+    def __init__(self, options: FilterKeys, sigma: np.ndarray):
+        self.observes, self.needed, self.sigma = len(options.observes), options.plots_to_start, sigma
         self.x: np.ndarray | None = None
         self.P = np.zeros(6)
         self.last = 0.0
@@ -117,16 +123,15 @@ class _One:
                 estimate[k], sigma[k] = self.x, np.sqrt(self.P[[0, 3, 5]])
             k += 1
         if k < n:
-            dt = np.diff(t[k:], prepend=self.last if k == 0 else t[k - 1])
-            detected = taken[k:].astype(float)
-            found = np.full((n - k, 2), np.nan)
-            rows.filter_rows(
-                *(self.x, self.P, dt, np.where(taken[k:], z[k:], 0.0), detected, self.sigma**2, self.noise),
-                *(estimate[k:], sigma[k:], found),
-            )
-            nis[k:] = found
+            estimate[k:], sigma[k:], nis[k:] = self.after(k, t, z, taken)
         self.last = t[-1]
         return estimate, sigma, nis
+
+    def after(
+        self, k: int, t: np.ndarray, z: np.ndarray, taken: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What `feed` gives of the rows from k on, before which the filter has started; taken: the numbers it takes."""
+        raise NotImplementedError
 
     def _begin(self, t: float, z: np.ndarray) -> None:
         """Take one more plot, and start from all so far where they suffice."""
@@ -141,6 +146,40 @@ class _One:
             weights, covariance = found
             self.x, self.P = np.einsum("ijk,kj->i", weights, np.nan_to_num(values)), np.array(pack(covariance))
             self.held = []
+
+
+class _One(_Starting):
+    """A filter of the study: chunk by chunk."""
+
+    def __init__(self, options: Filter, noise: np.ndarray, sigma: np.ndarray):
+        super().__init__(options, sigma)
+        self.noise = noise
+
+    def after(
+        self, k: int, t: np.ndarray, z: np.ndarray, taken: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        dt = np.diff(t[k:], prepend=self.last if k == 0 else t[k - 1])
+        n = len(dt)
+        made = np.empty((n, 3)), np.empty((n, 3)), np.full((n, 2), np.nan)
+        given = self.x, self.P, dt, np.where(taken, z, 0.0)[k:], taken[k:].astype(float), self.sigma**2, self.noise
+        rows.filter_rows(*given, *made)
+        return made
+
+
+class _Given(_Starting):
+    """A filter of a package, over a whole recording at once; left (n, 2): variances of what plots differ by from it."""
+
+    def __init__(self, options: GivenGains, sigma: np.ndarray):
+        super().__init__(options, sigma)
+        self.options, self.left = options, np.empty((0, 2))
+
+    def after(
+        self, k: int, t: np.ndarray, z: np.ndarray, taken: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        assert self.x is not None  # it has started
+        scans = Scans(t, taken, self.sigma, k, unpack(self.P))
+        estimate, sigma, nis, self.left = followed(self.options, scans, self.x, z)
+        return estimate, sigma, nis
 
 
 def in_a_turn(case: Case, filter_name: str, variance: float) -> Turning:
@@ -173,6 +212,13 @@ def in_a_turn(case: Case, filter_name: str, variance: float) -> Turning:
     return Turning(*COMPONENTS[0], TURN_G, *worst.tolist())
 
 
+def likely(spec: Keys, filter_name: str | None) -> Filter | None:
+    """The filter of a name, where there is one, else the one that takes most of a plot; None: it is of a package."""
+    named = [f for f in spec.filters if f.name == filter_name]
+    own = [f for f in named or spec.filters if isinstance(f, Filter)]
+    return max(own, key=lambda one: len(one.observes), default=None)
+
+
 class PlotLikelihood:
     """How likely tracks are under a filter's model: range and velocity of independent errors, acceleration that the
     filter's process noise changes. The state before the first plot is taken as unknown, whatever start the config
@@ -181,10 +227,8 @@ class PlotLikelihood:
     explains: tuple[str, ...] = EXPLANATIONS
 
     def __init__(self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]):
-        most = max(len(f.observes) for f in case.spec.filters)
-        (options,) = [f for f in case.spec.filters if f.name == filter_name] or [
-            f for f in case.spec.filters if len(f.observes) == most
-        ][:1]
+        options = likely(case.spec, filter_name)
+        assert options is not None
         self.filter, self.tracks = options.name, len(tracks)
         variance = variances_of(case)[case.spec.filters.index(options)]
         self.rows = sum(len(columns["t_s"]) for columns in tracks)
@@ -263,7 +307,11 @@ class Recorded(RecordedPlots):
     """The study's part in `radarsim track` and `radarsim simulate`."""
 
     simulated, tracker = staticmethod(simulated), staticmethod(Tracker)
-    likelihood = staticmethod(PlotLikelihood)
+
+    def likelihood(
+        self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]
+    ) -> PlotLikelihood | None:
+        return PlotLikelihood(case, filter_name, tracks) if likely(case.spec, filter_name) else None
 
     def columns(self, spec: Keys) -> Sequence[Sequence[str]]:
         return (("t_s", "range_m", "velocity_mps"),)

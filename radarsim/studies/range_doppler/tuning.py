@@ -17,8 +17,8 @@ from radarsim.config.experiment import Case
 from radarsim.errors import ConfigError
 from radarsim.kernels.algebra import pack
 from radarsim.physics import process_noise
-from radarsim.studies.range_doppler import filters
-from radarsim.studies.range_doppler.config import Best, Filter, Keys
+from radarsim.studies.range_doppler import filters, given
+from radarsim.studies.range_doppler.config import Best, Filter, Keys, variance_of
 from radarsim.studies.range_doppler.filters import Plots, defects, least_squares_start, scans, started
 
 # ---- tuning ----------------------------------------------------------------------------------------------------------
@@ -40,10 +40,11 @@ class Seen(NamedTuple):
 
 
 def manoeuvre_variances(filters: tuple[Filter, ...], seen: Seen) -> tuple[float, ...]:
-    """D_M of each filter, (m/s³)²: as given, or the best on what is seen."""
+    """D_M of each filter, (m/s³)²: as given, or the best on what is seen; not-a-number where it has none."""
     return tuple(
-        best(one, one.manoeuvre_variance, seen) if isinstance(one.manoeuvre_variance, Best) else one.manoeuvre_variance
+        best(one, wanted, seen) if isinstance(wanted, Best) else wanted
         for one in filters
+        for wanted in (variance_of(one),)
     )
 
 
@@ -171,6 +172,8 @@ def designed(case: Case) -> Designed:
         raise ConfigError(f"{case.name}: filters: manoeuvre_variance: {error}") from None
     made = (
         filters.design(len(f.observes), f.plots_to_start, variance, plots.sigma, dt, len(t), f.process_noise)
+        if isinstance(f, Filter)
+        else given.designed(f, plots.sigma, t)
         for f, variance in zip(spec.filters, variances, strict=True)
     )
     return Designed(spec, t, x, drawn, plots, variances, tuple(made), case.asked_from_k, case.roughly)

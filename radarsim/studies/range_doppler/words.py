@@ -9,7 +9,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.language import listed, numeral, plural, term, tr
 from radarsim.report import panels, tables, wording
 from radarsim.studies.range_doppler import tuning
-from radarsim.studies.range_doppler.config import Best
+from radarsim.studies.range_doppler.config import Best, variance_of
 from radarsim.studies.range_doppler.tables import PERIODS, Result, follows_the_model, span_mps
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def _loss(every: "pd.DataFrame", sentences: "pd.Series[Any]", labels: dict[str, 
 def _baseline(results: Sequence[Result]) -> str:
     """Than what a gain is: range alone only where the baseline filter observes no more."""
     bases = [result.spec.filters[result.axes.baseline] for result in results]
-    given = {base.manoeuvre_variance for base in bases if isinstance(base.manoeuvre_variance, float)}
+    given = {one for one in map(variance_of, bases) if isinstance(one, float)}
     if all(base.observes == ("range",) for base in bases):
         if len(given) > 1:
             return tr("than with range alone at the same D_M")
@@ -162,7 +162,8 @@ def _best_sentences(results: Sequence[Result], made: Made) -> list[str]:
     for members in panels.families(results).values():
         rows = table[table["case"].isin([r.name for r in members]) & (table["component"] == "r")]
         if rows.groupby("filter")["manoeuvre_variance"].nunique().max() > 1:
-            chosen = [_best(rows[rows["filter"] == name], name) for name in members[0].axes.filters]
+            tried = rows[rows["manoeuvre_variance"].notna()]  # a filter of a package may have none
+            chosen = [_best(own, str(name)) for name, own in tried.groupby("filter", sort=False)]
             sentences.append(f"{panels.plain(panels.device(members[0]))}: {'; '.join(chosen)}.")
     if not sentences:
         return []
@@ -223,7 +224,8 @@ def _best_of_broken(results: Sequence[Result], made: Made) -> list[str]:
     rows = rows.assign(error=tables.exact_first(rows, "sigma", "exact_sigma"))
     for name, members in _tried_on(results).items():
         own = rows[rows["case"].isin([member.name for member in members])]
-        words = [_least_worst(own[own["filter"] == one], members, one) for one in members[0].axes.filters]
+        names = zip(members[0].axes.filters, members[0].axes.manoeuvre_variance, strict=True)
+        words = [_least_worst(own[own["filter"] == one], members, one) for one, D_M in names if not np.isnan(D_M)]
         sentences.append(f"{panels.plain(name)}: {'; '.join(words)}.")
     if not sentences:
         return []
@@ -283,9 +285,7 @@ def _tuned(result: Result) -> list[tuple[str, Best, float]]:
     """The filters whose D_M was looked for: name, what was to be least, what was found."""
     found = zip(result.spec.filters, result.axes.manoeuvre_variance, strict=True)
     return [
-        (one.name, one.manoeuvre_variance, float(variance))
-        for one, variance in found
-        if isinstance(one.manoeuvre_variance, Best)
+        (one.name, wanted, float(variance)) for one, variance in found if isinstance(wanted := variance_of(one), Best)
     ]
 
 

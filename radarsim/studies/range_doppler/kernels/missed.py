@@ -18,6 +18,7 @@ from radarsim.studies.range_doppler.kernels.steps import (
     OWN,
     PAIRED,
     advance,
+    advance_given,
     count_plots,
     displace,
     displace_plots,
@@ -49,6 +50,9 @@ class Problem(NamedTuple):
     start        (F,)          plots in its least-squares start
     Q            (F, 6)        covariance that a scan adds, packed
     baseline                   the filter that others are compared with
+    given        (F,)          1: its gains are given, and every scan has its plot; else 0
+    gains        (F, K, 3, 2)  of such a filter, not read of others
+    believed     (F, K, 6)     the covariance that it believes with them, packed
     """
 
     keys: np.ndarray
@@ -64,6 +68,9 @@ class Problem(NamedTuple):
     start: np.ndarray
     Q: np.ndarray
     baseline: int
+    given: np.ndarray
+    gains: np.ndarray
+    believed: np.ndarray
 
     def plain(self) -> "Problem":
         """The same with arrays and numbers as the kernels take them."""
@@ -82,6 +89,9 @@ class Problem(NamedTuple):
             plain(self.start, filters, dtype=np.int64),
             plain(self.Q, filters, 6),
             int(self.baseline),
+            plain(self.given, filters, dtype=np.int64),
+            plain(self.gains, filters, scans, 3, 2),
+            plain(self.believed, filters, scans, 6),
         )
 
 
@@ -141,7 +151,7 @@ def begin_chunk(keys, first, made, bias, sigma_bias, sigma_flight):
 def add_block(made, first, count, problem, found):
     """`simulate_block` for a plain problem, with the work arrays of one chunk, into found (F, K, OWN + PAIRED)."""
     keys, truth, sigma, bias, sigma_bias, sigma_flight, flight, detection, dt = problem[:9]
-    observes, start, Q, baseline = problem[9:]
+    observes, start, Q, baseline, given, gains, believed = problem[9:]
     filters, scans, R, at, sums = observes.size, truth.shape[0], sigma * sigma, places(made), address(found)
     detected, other, next_word = made.detected, made.other, np.empty(CHUNK, np.uint64)
     running = np.zeros(filters, dtype=np.bool_)  # filters that have started in every realisation of the chunk
@@ -162,7 +172,9 @@ def add_block(made, first, count, problem, found):
                 fill_uniform_pairs(keys[1], first + done, k // 2, detected, other)
             count_plots(at, k, detection, n)
             for f in range(filters):
-                if k > 0:
+                if k > 0 and given[f] == 1:
+                    advance_given(at, f, dt, gains[f, k], believed[f, k])
+                elif k > 0:
                     advance(at, f, dt, (observes[f], Q[f]), R)
                 if not running[f]:
                     weights = 1.0 / R[0], 1.0 / (R[1] * dt * dt) if observes[f] == 2 else 0.0

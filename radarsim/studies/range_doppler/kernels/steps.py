@@ -198,6 +198,19 @@ def advance(at, f, dt, design, R):
         scan_range_velocity(x, p, at.plots, at.detected, dt, Q, R)
 
 
+@part
+def advance_given(at, f, dt, gain, believed):
+    """The same of a filter whose gain (3, 2), and packed covariance (6,) after it, are given."""
+    x, p, F = of_filter(at.x, f, 3), of_filter(at.p, f, 6), constant_acceleration(dt)
+    of_range, of_velocity = (gain[0, 0], gain[1, 0], gain[2, 0]), (gain[0, 1], gain[1, 1], gain[2, 1])
+    P = full(believed[0]), full(believed[1]), full(believed[2]), full(believed[3]), full(believed[4]), full(believed[5])
+    for i in range(EIGHTS):
+        state = predicted(get3(x, i, EIGHTS), F)
+        r, v = get(at.plots, i) - state[0], get(at.plots, EIGHTS + i) - state[1]
+        put3(x, i, add_scaled(add_scaled(state, r, of_range), v, of_velocity), EIGHTS)
+        put6(p, i, P, EIGHTS)
+
+
 # ---- draws -----------------------------------------------------------------------------------------------------------
 @part
 def count_plots(at, k, detection, n):
