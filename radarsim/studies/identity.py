@@ -5,8 +5,8 @@ and the study's `model`. Realisations, limits, threads, output, file and display
 
 Its second half is a hash of files, which an edit of any kind changes, of words too: of radarsim's own studies those of
 the study, of the rooms that it stands on and of what runs it, but for what shows numbers; of a study from another
-package all files of that, and the versions of what is installed; so of filters from another package. It is a quick answer
-alone. Where it differs, stored blocks are computed again in part and taken over if their bytes are the same; see
+package all files of that, and the versions of what is installed; so of filters from another package. It is a quick
+answer alone. Where it differs, stored blocks are computed again in part and taken over if their bytes are the same; see
 radarsim.engine.store.
 """
 

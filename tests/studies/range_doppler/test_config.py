@@ -186,7 +186,7 @@ RADAR = (
     "name, band, wavelength_m, sigma_range_m, sigma_velocity_mps, scan_period_s, repetition_rate_hz, "
     "detection_probability, bias_range_m, bias_velocity_mps, sigma_bias_range_m, sigma_bias_velocity_mps"
 )
-FILTER = "name, observes, manoeuvre_variance, initial_scans, process_noise"
+FILTER = "name, kind, observes, initial_scans, manoeuvre_variance, process_noise"
 TOP = "radar, target, filters, baseline, scans, duration_s, study, include, sweep, realisations, seed, figures"
 UNKNOWN = [
     ("radar.sigma_rnge_m", f"unknown key; did you mean sigma_range_m? allowed: {RADAR}"),
