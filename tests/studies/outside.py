@@ -1,4 +1,4 @@
-"""Packages that offer studies, installed as pip leaves them: a folder on the path with the package's metadata."""
+"""Packages that offer studies or filters, as pip leaves them: a folder on the path with the package's metadata."""
 
 import os
 import subprocess
@@ -15,19 +15,19 @@ ROOT = Path(__file__).parents[2]
 def installed(package: Path, site: Path) -> None:
     """Make the package in a folder with pyproject.toml and src/ known, in the folder `site`, which is on the path."""
     project = tomllib.loads((package / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    offers = project["entry-points"]["radarsim.studies"]
-    metadata(site, project["name"], project["version"], offers)
+    for group, offers in project["entry-points"].items():
+        metadata(site, project["name"], project["version"], offers, group)
     for inner in (package / "src").iterdir():
         (site / inner.name).symlink_to(inner)
 
 
-def metadata(site: Path, name: str, version: str, offers: dict[str, str]) -> None:
-    """The metadata of a package that offers studies: {name: where it is}."""
+def metadata(site: Path, name: str, version: str, offers: dict[str, str], group: str = "radarsim.studies") -> None:
+    """The metadata of a package that offers studies, or filters: {name: where it is}."""
     folder = site / f"{name.replace('-', '_')}-{version}.dist-info"
     folder.mkdir(parents=True)
     (folder / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
     lines = [f"{key} = {value}" for key, value in offers.items()]
-    (folder / "entry_points.txt").write_text("\n".join(["[radarsim.studies]", *lines, ""]))
+    (folder / "entry_points.txt").write_text("\n".join([f"[{group}]", *lines, ""]))
 
 
 def forking(site: Path, place: Path):
