@@ -350,13 +350,15 @@ def design(
     believed[: start - 1, [0, 3][:observes]] = sigma[:observes] ** 2
     P = tuple(map(float, pack(covariance)))
     believed[start - 1] = P
-    for k in range(start, scans):
+    after: list[tuple[float, ...]] = []
+    while len(after) < scans - start:
         before = P
-        P, gains[k, :, 0], gains[k, :, 1] = updated(P, F, Q, R, there)
-        believed[k] = P
+        P, of_range, of_velocity = updated(P, F, Q, R, there)
+        after.append(P + of_range + of_velocity)
         if before == P:  # stationary to the last bit, and so it stays
-            gains[k:], believed[k:] = gains[k], P
-            break
+            after += [after[-1]] * (scans - start - len(after))
+    found = np.array(after).reshape(-1, 12)
+    believed[start:], gains[start:] = found[:, :6], found[:, 6:].reshape(-1, 2, 3).swapaxes(1, 2)
     return LinearFilter(observes, start, weights, gains, unpack(believed.T), available, Q)
 
 
