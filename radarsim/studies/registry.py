@@ -165,8 +165,8 @@ def _ships(name: str, stem: str) -> bool:
 
 def keys(name: str) -> type[Keys]:
     """The schema of a study's YAML keys, with those of filters of packages. Raises as `study`."""
-    found = own_keys(name)
-    return _with_filters(name) if entries(FILTERS) and study(name).own_filters() else found
+    takes = name in SHIPPED and entries(FILTERS) and study(name).own_filters()
+    return _with_filters(name) if takes else own_keys(name)
 
 
 def own_keys(name: str) -> type[Keys]:
@@ -199,8 +199,9 @@ def folders() -> tuple[Path, ...]:
 
 
 def packages() -> tuple[str, ...]:
-    """The outermost modules of the packages that offer studies, none of which this imports."""
-    return tuple(dict.fromkeys(module(name).partition(".")[0] for name in offered()))
+    """The outermost modules of the packages that offer studies or filters, none of which this imports."""
+    added = (entry.module for of in entries(FILTERS).values() for entry in of.values())
+    return tuple(dict.fromkeys(one.partition(".")[0] for one in (*map(module, offered()), *added)))
 
 
 def package(name: str) -> str | None:
