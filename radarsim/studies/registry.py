@@ -228,8 +228,8 @@ def described(error: BaseException) -> str:
 
 
 def blamed(error: BaseException) -> str:
-    """The last line of code of an installed package that offers studies, `file:line`, among those that led to an error;
-    nothing where there is none."""
+    """The last line of code of an installed package with studies or filters, `file:line`, among those that led to an
+    error; nothing where there is none."""
     specs = [spec for name in packages() if (spec := find_spec(name)) is not None]
     homes = tuple(
         os.path.realpath(one) for spec in specs for one in spec.submodule_search_locations or [spec.origin or ""]
@@ -241,7 +241,7 @@ def blamed(error: BaseException) -> str:
 
 def fault_of(error: BaseException) -> StudyError | None:
     """What an error that nobody has caught says, where the code of an installed package is to blame; else None."""
-    return StudyError(f"a study of an installed package fails: {described(error)}") if blamed(error) else None
+    return StudyError(f"the code of an installed package fails: {described(error)}") if blamed(error) else None
 
 
 def _fault(name: str, words: str) -> ConfigError:

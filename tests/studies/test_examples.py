@@ -168,7 +168,7 @@ def test_what_its_code_does_wrong_is_one_line_with_its_place(tmp_path, what):
     file.write_text(f"{before}\n{text}\n\nSTUDY = {after}", encoding="utf-8")
     run = ("run", "chirp", "-n", 100, "--no-figures", "--out", "results")
     (line,) = outside.command(*run, site=tmp_path / "site", cwd=tmp_path, code=1).stderr.splitlines()
-    assert line.startswith(f"a study of an installed package fails: {said}")
+    assert line.startswith(f"the code of an installed package fails: {said}")
     assert line.endswith(f"/chirp/__init__.py:{before.count(chr(10)) + 3})")
     assert (tmp_path / "results/chirp/curves.csv").exists() == written
 
