@@ -75,7 +75,7 @@ def rows(folder, table, name):
 
 
 def test_its_own_tests_pass(place, radarsim):
-    assert "6 passed" in radarsim("-q", "-p", "no:cacheprovider", cwd=place / "frozen", module="pytest").stdout
+    assert "7 passed" in radarsim("-q", "-p", "no:cacheprovider", cwd=place / "frozen", module="pytest").stdout
 
 
 def test_it_is_in_list_and_schema_and_checked(radarsim):

@@ -51,15 +51,15 @@ def textbook(t, z, last):
         yield x
 
 
-@pytest.mark.parametrize("uneven", [False, True])
-def test_recorded_plots_are_filtered_as_a_textbook_does(uneven):
+@pytest.mark.parametrize(("uneven", "last"), [(False, 4), (True, 4), (True, 15)])
+def test_recorded_plots_are_filtered_as_a_textbook_does(uneven, last):
     plots = radarsim.simulate(CONFIG)
     if uneven:
         plots["t_s"] += np.sin(np.arange(len(plots)))
         plots.loc[plots.index[5::7], "velocity_mps"] = np.nan
         plots.loc[plots.index[9::11], "range_m"] = np.nan
-    own = of(radarsim.track(CONFIG, plots), "frozen")
-    wanted = np.array(list(textbook(plots["t_s"].to_numpy(), plots[["range_m", "velocity_mps"]].to_numpy(), 4)))
+    own = of(radarsim.track(CONFIG, plots, [f"filters.2.freeze_after={last}"]), "frozen")
+    wanted = np.array(list(textbook(plots["t_s"].to_numpy(), plots[["range_m", "velocity_mps"]].to_numpy(), last)))
     for c, name in enumerate(("r", "Vr", "ar")):
         made = own[own["component"] == name]
         made = made[made["t_s"] > plots["t_s"].iloc[1]]
