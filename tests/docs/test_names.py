@@ -11,9 +11,17 @@ from tests.docs.test_links import PAGES, ROOT
 NAME = re.compile(r"`([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+)(?:\([^`]*\))?`|(?<![\w/.])([\w/]+\.py)\b")
 FILES = r"\.(?:ast|bin|blocks|csv|html|json|md|pdf|png|po|pyc?|svg|toml|txt|typed|cff|yaml|yml)$"
 FOREIGN = ("concurrent", "csv", "dask", "json", "math", "np", "numpy", "os", "pd", "pydantic", "scipy", "Security")
-OTHERS = ("STUDY.filters", "claims.CLAIMS", "docs/making/measured_STUDY.py", "w2_c.py")
+OTHERS = (
+    "radarsim.filters",
+    "scans.errors",
+    "STUDY.filters",
+    "claims.CLAIMS",
+    "docs/making/measured_STUDY.py",
+    "w2_c.py",
+)
 OF = {"result": "Result", "seen": "Evidence"}  # classes of what pages call so
-SOURCES = sorted(path for room in ("radarsim", "tests", "docs", "benchmarks") for path in (ROOT / room).rglob("*.py"))
+ROOMS = "radarsim", "tests", "docs", "benchmarks", "examples"
+SOURCES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
 TEXTS = [page for page in PAGES if page.name != "CHANGELOG.md"]  # which says how things were called
 TEXTS += [path for path in SOURCES if path.relative_to(ROOT).parts[0] in ("radarsim", "docs")]
 
