@@ -19,7 +19,11 @@ from typing import Any
 import numpy as np
 
 
-class OneForAll(TypeError):
+class Unfit(TypeError):
+    """What no formula of a realisation may hold; its message is for the author of the formula."""
+
+
+class OneForAll(Unfit):
     """Python asked for the one value of what has eight."""
 
 
@@ -113,16 +117,43 @@ class Program:
 
 
 class Trace:
-    """What a function does with lanes, in order; what is done twice stands once."""
+    """What a function does with lanes, in order; what is done twice stands once.
+
+    The compiler takes all numbers as finite, so of what it finds to be none it makes anything: such a formula is Unfit.
+    """
 
     def __init__(self) -> None:
         self.known: dict[tuple, int] = {}
         self.outputs: list[tuple[int, int, int]] = []
+        self.always: dict[int, float] = {}  # the value of operations whatever the case
+        self.stated: dict[int, float] = {}  # these, and by the keys of this case
 
     def put(self, op: str, *operands: Any) -> Lane:
-        """An operation on lanes and numbers."""
-        places = tuple(one.at if isinstance(one, Lane) else self._at("number", float(one)) for one in operands)
-        return (Mask if op in COMPARED.values() or op in ("and", "or", "not") else Lane)(self, self._at(op, *places))
+        """An operation on lanes and numbers. Raises Unfit where it can give no number."""
+        places = tuple(self.place(one) for one in operands)
+        if op in ("==", "!=") and places[0] == places[1]:
+            raise Unfit("a test for NaN cannot be made; test what would make it, e.g. where(z >= 0, …)")
+        value = _value(op, places, self.always)
+        in_this_case = value if value is not None else _value(op, places, self.stated)
+        if value is not None and not math.isfinite(value):
+            raise Unfit(f"gives {value:g} in every realisation: it divides by zero, or goes beyond all numbers")
+        at = self._at(op, *places)
+        if value is not None:
+            self.always[at] = value
+        if in_this_case is not None:
+            self.stated[at] = in_this_case
+        return (Mask if op in COMPARED.values() or op in ("and", "or", "not") else Lane)(self, at)
+
+    def place(self, one: Any) -> int:
+        """The number of the operation that a lane comes from, or that of a constant. Raises Unfit where it is none."""
+        if isinstance(one, Lane):
+            return one.at
+        number = float(one)
+        if not math.isfinite(number):
+            raise Unfit(f"{number} is not finite, and no number to calculate with")
+        at = self._at("number", number)
+        self.always[at] = self.stated[at] = number
+        return at
 
     def _at(self, *operation: Any) -> int:
         return self.known.setdefault(operation, len(self.known))
@@ -132,20 +163,58 @@ class Trace:
         places = iter(range(first, first + count(like)))
         return mapped(lambda _: Lane(self, self._at("row", array, next(places))), like)
 
-    def plain(self, array: int, like: Any) -> Any:
-        """A structure like another, whose numbers stand in an array, the same for all realisations."""
+    def plain(self, array: int, like: Any, stated: bool = False) -> Any:
+        """A structure like another, whose numbers stand in an array, the same for all realisations.
+
+        stated: those of the other are the numbers of this case.
+        """
         places = iter(range(count(like)))
-        return mapped(lambda _: Lane(self, self._at("plain", array, next(places))), like)
+
+        def lane(number: Any) -> Lane:
+            at = self._at("plain", array, next(places))
+            if stated:
+                self.stated[at] = float(number)
+            return Lane(self, at)
+
+        return mapped(lane, like)
 
     def write(self, array: int, value: Any, first: int = 0) -> None:
         """The numbers of a structure into the rows of an array, from `first` on."""
         for row, one in enumerate(leaves(value), first):
-            at = one.at if isinstance(one, Lane) else self._at("number", float(one))
-            self.outputs.append((array, row, at))
+            self.outputs.append((array, row, self.place(one)))
 
     def program(self) -> Program:
         """All that was recorded."""
         return Program(tuple(self.known), tuple(self.outputs))
+
+
+CALCULATED: dict[str, Callable] = {
+    **{instruction: getattr(np, {"truediv": "true_divide", "sub": "subtract", "mul": "multiply"}.get(op, op))
+       for op, instruction in ARITHMETIC.items()},
+    "sqrt": np.sqrt,
+}  # fmt: skip
+
+
+def _value(op: str, places: tuple[int, ...], of: dict[int, float]) -> float | None:
+    """The value of an operation where it has but one, whatever its other operands, by those of earlier ones."""
+    values = [of.get(at) for at in places]
+    if op == "fsub" and places[0] == places[1]:
+        return 0.0
+    if op == "fdiv" and values[1] == 0:
+        return math.nan
+    if (op == "fmul" and 0 in values) or (op == "fdiv" and values[0] == 0):
+        return 0.0
+    if op not in CALCULATED or None in values:
+        return None
+    with np.errstate(all="ignore"):
+        return float(CALCULATED[op](*values))
+
+
+def stated(x: Any) -> float | None:
+    """The value of a number where it is the same in all realisations of a case and is known, else None."""
+    if isinstance(x, Lane):
+        return x.trace.stated.get(x.at)
+    return float(x) if isinstance(x, int | float) else None
 
 
 # ---- structures: tuples and named records of numbers; text, None, truth values and whole numbers are none --------
@@ -326,6 +395,9 @@ def congruent(J: Sequence[Sequence[Any]], P: Sequence[Any]) -> tuple[Any, ...]:
 
 def updated(x: Sequence[Any], P: Sequence[Any], h: Sequence[Any], e: Any, R: Any) -> tuple[tuple, tuple]:
     """A state and its packed covariance after a number with row h, innovation e and an error of variance R."""
+    variance = stated(R)
+    if variance is not None and variance <= 0:
+        raise Unfit(f"updated: R, the variance of the error of a number, must be positive, got {variance:g}")
     g = times(P, h)
     S = dot(h, g) + R
     n = len(x)

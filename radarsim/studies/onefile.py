@@ -37,7 +37,8 @@ Whatever a class lacks, or has of the wrong kind, is one line of a ConfigError w
 
 import inspect
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import chain, combinations
 from operator import attrgetter
@@ -80,6 +81,7 @@ class Measured(NamedTuple):
     sigma_keys: tuple[str, ...] = ()
 
 
+OURS = Path(__file__).parents[1]
 MOST_TOLD_APART = 6  # sets of columns of which a file may have any; of more, all or one
 NEEDED: Mapping[str, tuple[type, str]] = {
     "name": (str, "the value of `study:` in YAML"),
@@ -336,6 +338,37 @@ class OneFile(Study):
     def shipped(self) -> Path | None:
         folder = Path(str(sys.modules[type(self).__module__].__file__)).parent / "shipped"
         return folder if folder.is_dir() else None
+
+
+# ---- faults of an author's functions ---------------------------------------------------------------------------------
+def said(function: Callable[..., Any], *arguments: Any) -> Any:
+    """What an author's function gives; ConfigError with its file and line where it fails."""
+    from radarsim.kernels.traced import Unfit
+
+    try:
+        return function(*arguments)
+    except ConfigError:
+        raise
+    except (Exception, SystemExit) as error:
+        frames = [one for one in traceback.extract_tb(error.__traceback__) if not within(one.filename)]
+        line = str(error).strip().partition("\n")[0] or type(error).__name__
+        words = line if isinstance(error, Unfit) else f"{type(error).__name__}: {line}"
+        if "__array_ufunc__" in line:
+            words = "a number of a realisation is none of NumPy's: radarsim.kernels.traced has sqrt, exp, sin, … for it"
+        if not frames:
+            raise fault(function, words) from error
+        raise ConfigError(f"{frames[-1].filename}:{frames[-1].lineno}: {frames[-1].name}: {words}") from error
+
+
+def within(file: str) -> bool:
+    """Whether a file is one of radarsim's own, or of a library's."""
+    return Path(file).is_relative_to(OURS) or "site-packages" in file
+
+
+def fault(function: Callable[..., Any], words: str, name: str = "") -> ConfigError:
+    """An error that names a function by its file and line."""
+    code = function.__code__
+    return ConfigError(f"{code.co_filename}:{code.co_firstlineno}: {name or code.co_name}: {words}")
 
 
 class Recorded(RecordedPlots):

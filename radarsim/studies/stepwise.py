@@ -31,11 +31,9 @@ tables `believed` and `consistency` say how it agrees with the errors. A study t
 """
 
 import math
-import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,7 +42,7 @@ from radarsim.engine.results import Axes, CaseResult, Layout, Track
 from radarsim.errors import ConfigError
 from radarsim.kernels import traced
 from radarsim.studies.noise import noise_key
-from radarsim.studies.onefile import OneFile
+from radarsim.studies.onefile import OneFile, fault, said
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,9 +50,10 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case, Experiment
     from radarsim.report.drawing import Figure
 
+ANOTHER = "gives another formula each time"
+ROUNDED = 1e-9  # of the largest truth: what plain Python and the kernel may differ by
 BLOCK = 512  # realisations in a block
 ROOM = 20_000  # rows of plots and errors at once, 1.3 MB: what a processor keeps near
-OURS = Path(__file__).parents[1]
 
 
 class Steps:
@@ -92,6 +91,8 @@ class Plan:
     numbers: np.ndarray
     shape: tuple[int, int, int]  # rows of the state and of a plot, pairs of normals of a scan
     filters: tuple[Followed, ...]
+    case: "Case"
+    checked: dict[str, np.ndarray] = field(default_factory=dict)
     block: int = BLOCK
     gaussian = False
 
@@ -143,7 +144,7 @@ class StepStudy(OneFile):
         spec = case.spec
         axes, sums = self.axes(spec, self.exact_sigma(spec)), self.sums(spec)
         known = self._known(spec, axes.t_s)
-        world, detection = record(self.world, spec), float(self.detection(spec))
+        world, detection = record(self.world, spec), self._probability(spec)
         scene = self._scene(world)
         filters = tuple(self._followed(spec, one, scene, detection < 1) for one in spec.filters)
         if any(one.tested for one in filters):
@@ -152,11 +153,20 @@ class StepStudy(OneFile):
         keys = np.stack([noise_key(case, "plots"), noise_key(case, "detections")])
         draw = kernel(stepped.world, scene.first, scene.following, scene.shape[2], scene.shape[1])
         given = known.ravel(), known.shape[1], draw, plain(world)
-        return Plan(sums, axes, keys, detection, *given, scene.shape, filters)
+        return Plan(sums, axes, keys, detection, *given, scene.shape, filters, case)
+
+    def _probability(self, spec: Any) -> float:
+        """The probability of a plot."""
+        given = said(self.detection, spec)
+        if not isinstance(given, int | float) or not 0 <= given <= 1:
+            raise fault(self.detection, f"must give a probability, from 0 to 1, got {given!r}"[:200])
+        return float(given)
 
     def _known(self, spec: Any, t_s: np.ndarray) -> np.ndarray:
         """The time since the scan before, and what is known at each, (K, whole eights)."""
         given = said(self.known, spec, t_s)
+        if not np.array_equal(given, said(self.known, spec, t_s)):
+            raise fault(self.known, f"{ANOTHER}: draw in begin, move and plot, by normals")
         if len(given) != len(self.known_columns):
             raise fault(self.known, f"gives {len(given)} columns, known_columns has {len(self.known_columns)}")
         columns = [np.diff(t_s, prepend=t_s[0]), *given]
@@ -173,16 +183,16 @@ class StepStudy(OneFile):
         state: Any = None
         for count in (first, move):
             trace = traced.Trace()
-            c, dt, u = trace.plain(stepped.NUMBERS, world), *self._at_a_scan(trace)
+            c, dt, u = trace.plain(stepped.NUMBERS, world, stated=True), *self._at_a_scan(trace)
             w = [noise(trace, n) for n in range(count + plot)]
             own, error = tuple(w[:count]), tuple(w[count:])
             if state is None:
-                x = numbers_of(self.begin, c, own)
+                x = recorded(self.begin, c, own)
             else:
-                x = numbers_of(self.move, trace.rows(stepped.STATE, state), dt, c, own)
+                x = recorded(self.move, trace.rows(stepped.STATE, state), dt, c, own)
                 same_shape(self.move, x, state)
             state = x
-            z, true = numbers_of(self.plot, x, u, c, error), numbers_of(self.truth, x, u, c)
+            z, true = recorded(self.plot, x, u, c, error), recorded(self.truth, x, u, c)
             of_length(self.plot, z, len(self.measured), "measured")
             of_length(self.truth, true, len(self.components), "components")
             trace.write(stepped.STATE, x)
@@ -217,14 +227,14 @@ class StepStudy(OneFile):
         made, state = [], None
         for begins in (True, False):
             trace = traced.Trace()
-            c, dt, u = trace.plain(stepped.NUMBERS, numbers), *self._at_a_scan(trace)
+            c, dt, u = trace.plain(stepped.NUMBERS, numbers, stated=True), *self._at_a_scan(trace)
             z = trace.rows(stepped.PLOT, (0.0,) * len(self.measured), 1)
             if begins:
-                s = numbers_of(steps.start, z, u, c)
+                s = recorded(steps.start, z, u, c)
             else:
-                before = numbers_of(steps.predict, trace.rows(stepped.STATE, state), dt, u, c)
+                before = recorded(steps.predict, trace.rows(stepped.STATE, state), dt, u, c)
                 same_shape(steps.predict, before, state)
-                s = numbers_of(steps.update, before, z, u, c)
+                s = recorded(steps.update, before, z, u, c)
                 same_shape(steps.update, s, state)
                 if missed:
                     s = traced.where(trace.rows(stepped.PLOT, 0.0) > 0.5, s, before)
@@ -232,13 +242,13 @@ class StepStudy(OneFile):
             trace.write(stepped.STATE, s)
             components = (0.0,) * len(self.components)
             true = trace.rows(stepped.PLOT, components, 1 + len(self.measured))
-            estimate = numbers_of(steps.estimate, s, u, c)
+            estimate = recorded(steps.estimate, s, u, c)
             of_length(steps.estimate, estimate, len(components), "components")
             e = tuple(a - b for a, b in zip(estimate, true, strict=True))
             counts = trace.rows(stepped.COUNTED, 0.0) > 0.5
             trace.write(stepped.ERRORS, traced.where(counts, e, (0.0,) * len(e)))
             if steps.covariance is not None:
-                P = numbers_of(steps.covariance, s, u, c)
+                P = recorded(steps.covariance, s, u, c)
                 n = len(components)
                 of_length(steps.covariance, P, n * (n + 1) // 2, "elements of a packed covariance")
                 found = (*(traced.row_of(P, n, i)[i] for i in range(n)), traced.normalised(P, e))
@@ -266,7 +276,24 @@ class StepStudy(OneFile):
                 tested = [sums[name][f] if one.tested else nothing for name in ("believed", "nees")]
                 of = sums["error"][f], sums["paired"][f], *tested
                 one.kernel(groups, many, plan.known, plan.width, one.numbers, plots, work, errors, base, *of)
+        if (never := sums["error"][..., 1] == 0).any():
+            sums["error"][never & ~self._free_of_error(plan)] = np.nan
         return values
+
+    def _free_of_error(self, plan: Plan) -> np.ndarray:
+        """Where (F, K, C) estimates are the truth in plain Python too, in realisation 0.
+
+        What is compiled takes all numbers as finite: an error that is none may be stored as zero.
+        """
+        if "free" not in plan.checked:
+            plots, truth = self.realisation(plan.case, 0)
+            try:
+                with np.errstate(all="ignore"):
+                    found = self.tracker(plan.case).feed({"t_s": plan.axes.t_s, **plots}).estimate
+            except ConfigError:  # a division by zero
+                found = np.full_like(plan.axes.exact_sigma, np.nan)
+            plan.checked["free"] = np.abs(found - truth) <= ROUNDED * np.abs(truth).max(axis=0)
+        return plan.checked["free"]
 
     # ---- what is shown -------------------------------------------------------------------------------------------
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
@@ -377,43 +404,36 @@ def plain(numbers: Any) -> np.ndarray:
 
 
 # ---- faults of an author's formulas ----------------------------------------------------------------------------------
-def said(function: Callable[..., Any], *arguments: Any) -> Any:
-    """What an author's function gives; ConfigError with its file and line where it fails."""
-    try:
-        return function(*arguments)
-    except ConfigError:
-        raise
-    except (Exception, SystemExit) as error:
-        frames = [one for one in traceback.extract_tb(error.__traceback__) if not within(one.filename)]
-        line = str(error).strip().partition("\n")[0] or type(error).__name__
-        words = line if isinstance(error, traced.OneForAll) else f"{type(error).__name__}: {line}"
-        if not frames:
-            raise fault(function, words) from error
-        raise ConfigError(f"{frames[-1].filename}:{frames[-1].lineno}: {frames[-1].name}: {words}") from error
-
-
 def numbers_of(function: Callable[..., Any], *arguments: Any) -> Any:
     """What a step gives; whole numbers in it are numbers of a realisation like others."""
     return traced.numbered(said(function, *arguments))
 
 
+def recorded(function: Callable[..., Any], *arguments: Any) -> Any:
+    """What a step does with numbers of a realisation, which is the same whenever it is asked."""
+    made, again = (numbers_of(function, *arguments) for _ in range(2))
+    for numbers in (made, again):
+        if wrong := [
+            one for one in traced.leaves(numbers) if not isinstance(one, traced.Lane) and not math.isfinite(one)
+        ]:
+            raise fault(function, f"gives {wrong[0]:g}, which is no number to calculate with")
+    formulas = ([getattr(one, "at", one) for one in traced.leaves(numbers)] for numbers in (made, again))
+    if next(formulas) != next(formulas):
+        raise fault(function, f"{ANOTHER}: draw by normals")
+    return made
+
+
 def record(function: Callable[..., Any], *arguments: Any) -> Any:
     """The numbers that an author's function makes of keys; ConfigError where it gives no tuple or named record."""
-    given = said(function, *arguments)
+    given, again = said(function, *arguments), said(function, *arguments)
     if not isinstance(given, tuple):
         raise fault(function, f"must give a tuple or a named record, got {type(given).__name__}")
+    numbers = [float(one) for one in traced.leaves(given)]
+    if not np.isfinite(numbers).all():
+        raise fault(function, f"must give finite numbers, got {given!r}"[:200])
+    if numbers != [float(one) for one in traced.leaves(again)]:
+        raise fault(function, f"{ANOTHER}: draw in begin, move and plot, by normals")
     return given
-
-
-def within(file: str) -> bool:
-    """Whether a file is one of radarsim's own, or of a library's."""
-    return Path(file).is_relative_to(OURS) or "site-packages" in file
-
-
-def fault(function: Callable[..., Any], words: str) -> ConfigError:
-    """An error that names a function by its file and line."""
-    code = function.__code__
-    return ConfigError(f"{code.co_filename}:{code.co_firstlineno}: {code.co_name}: {words}")
 
 
 def of_length(function: Callable[..., Any], given: Any, wanted: int, what: str) -> None:

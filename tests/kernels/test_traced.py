@@ -70,7 +70,7 @@ def test_angles_are_those_of_the_library():
 def branching(x, y):
     """Whatever a step may do, one text for floats and lanes."""
     pair = where((x > 0.0) & ~(y > 1.0), (x, -y), (y, 1))
-    inside = where((x >= -1.0) | (y != y), abs(x) ** 3, 2.0)
+    inside = where((x >= -1.0) | (y != x), abs(x) ** 3, 2.0)
     return (*pair, inside, traced.least(x, y), traced.greatest(x, 0), 3 / (2 + x * x) - (+y))
 
 

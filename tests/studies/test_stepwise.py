@@ -1,6 +1,7 @@
 """A study by the steps of one realisation: against what is known exactly; what an author gets wrong, a line each."""
 
 import inspect
+import random
 from collections import namedtuple
 from types import SimpleNamespace
 from typing import Literal
@@ -11,7 +12,7 @@ import pytest
 from radarsim.config.fields import Member, Model, Positive, Probability, key
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
-from radarsim.kernels.traced import where
+from radarsim.kernels.traced import sqrt, updated, where
 from radarsim.studies import judged, stepwise
 from radarsim.studies.onefile import Component, Measured
 from radarsim.studies.stepwise import Steps, StepStudy
@@ -227,11 +228,58 @@ def too_many(s, u, c):
     return s
 
 
+def of_no_number(s, z, u, c):
+    return float("nan") + z[0], s[1]
+
+
+def nothing_over_nothing(s, z, u, c):
+    x = z[0] - s[0]
+    return 0 * x / (0.0 * x), s[1]
+
+
+def divided_by_nothing(s, z, u, c):
+    return z[0] + 1 / (s[1] - s[1]), s[1]
+
+
+def root_of_minus_one(s, z, u, c):
+    return z[0] + sqrt(0 * s[1] - 1), s[1]
+
+
+def a_constant(s, u, c):
+    return (float("inf"),)
+
+
+def compared_with_itself(s, z, u, c):
+    return where(z[0] != z[0], s[0], z[0]), s[1]
+
+
+def by_numpy(s, z, u, c):
+    return np.sqrt(z[0]), s[1]
+
+
+def drawn_by_python(s, z, u, c):
+    return z[0] + random.gauss(0, 1), s[1]
+
+
+def of_negative_variance(s, z, u, c):
+    x, P = updated((s[0],), (s[1],), (1.0,), z[0] - s[0], -(c.sigma**2))
+    return x[0], P[0]
+
+
 FAULTS = [
     ("update", branching, 2, r"branching: .* has no one value: write where\(condition, yes, no\)"),
     ("predict", of_another_shape, 0, r"gives a state of the shape \(·, ·, ·\), the one before has \(·, ·\)"),
     ("update", misspelt, 1, "misspelt: AttributeError: .*sgima"),
     ("estimate", too_many, 0, r"must give a tuple of 1 numbers \(components\), got \(·, ·\)"),
+    ("update", of_no_number, 1, "of_no_number: nan is not finite, and no number to calculate with"),
+    ("update", nothing_over_nothing, 2, "nothing_over_nothing: gives nan in every realisation"),
+    ("update", divided_by_nothing, 1, "divided_by_nothing: gives nan in every realisation"),
+    ("update", root_of_minus_one, 1, "root_of_minus_one: gives nan in every realisation"),
+    ("estimate", a_constant, 0, "a_constant: gives inf, which is no number to calculate with"),
+    ("update", compared_with_itself, 1, r"a test for NaN cannot be made; test what would make it, e\.g\. where"),
+    ("update", by_numpy, 1, r"by_numpy: .* radarsim\.kernels\.traced has sqrt"),
+    ("update", drawn_by_python, 0, "gives another formula each time: draw by normals"),
+    ("update", of_negative_variance, 1, "R, the variance of the error of a number, must be positive, got -1"),
 ]
 
 
@@ -244,6 +292,36 @@ def test_a_fault_is_one_line_with_its_place(step, function, line, words):
         study.prepare(case_of(study, names=["kalman"]))
     assert len(caught.value.lines) == 1
     assert caught.value.lines[0].startswith(place)
+
+
+@pytest.mark.parametrize("given", [1.5, "detection_probability", float("nan")])
+def test_a_detection_is_a_probability(given):
+    study = Walk()
+    study.detection = lambda spec: given
+    with pytest.raises(ConfigError, match="must give a probability, from 0 to 1, got"):
+        study.prepare(case_of(study))
+
+
+@pytest.mark.parametrize("by", ["sigma", "step"])
+def test_an_error_that_only_the_compiler_takes_for_a_number_is_no_result(by):
+    """a·b - b·a is zero to the compiler alone, which then makes anything of what is divided by it."""
+    error = lambda s, z, c: z[0] + getattr(c, by) / (z[0] * s[0] - s[0] * z[0])  # noqa: E731
+    study = Walk()
+    study.kinds = {"kalman": type("Wrong", (Kalman,), {"update": lambda s, z, u, c: (error(s, z, c), s[1])})}
+    _, sums = added(study, case_of(study, names=["kalman"]), 16)
+    assert not np.isfinite(sums["error"]).all()
+
+
+def test_errors_that_are_zero_indeed_are_a_result():
+    class Known(Walk):
+        def plot(self, x, u, c, w):
+            return (x[0] + 0 * w[0],)
+
+    study = Known()
+    steps = {"start": lambda z, u, c: (z[0], 1.0), "update": lambda s, z, u, c: (z[0], s[1]), "covariance": None}
+    study.kinds = {"kalman": type("Taken", (Kalman,), steps)}
+    _, sums = added(study, case_of(study, names=["kalman"]), 16)
+    assert not sums["error"].any()
 
 
 def not_a_record(spec, one):
