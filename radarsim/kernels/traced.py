@@ -20,7 +20,9 @@ import numpy as np
 
 
 class Unfit(TypeError):
-    """What no formula of a realisation may hold; its message is for the author of the formula."""
+    """What no formula of a realisation may hold; its message says all to the author of the formula."""
+
+    for_the_author = True
 
 
 class OneForAll(Unfit):

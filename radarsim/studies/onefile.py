@@ -343,8 +343,6 @@ class OneFile(Study):
 # ---- faults of an author's functions ---------------------------------------------------------------------------------
 def said(function: Callable[..., Any], *arguments: Any) -> Any:
     """What an author's function gives; ConfigError with its file and line where it fails."""
-    from radarsim.kernels.traced import Unfit
-
     try:
         return function(*arguments)
     except ConfigError:
@@ -352,7 +350,7 @@ def said(function: Callable[..., Any], *arguments: Any) -> Any:
     except (Exception, SystemExit) as error:
         frames = [one for one in traceback.extract_tb(error.__traceback__) if not within(one.filename)]
         line = str(error).strip().partition("\n")[0] or type(error).__name__
-        words = line if isinstance(error, Unfit) else f"{type(error).__name__}: {line}"
+        words = line if getattr(error, "for_the_author", False) else f"{type(error).__name__}: {line}"
         if "__array_ufunc__" in line:
             words = "a number of a realisation is none of NumPy's: radarsim.kernels.traced has sqrt, exp, sin, … for it"
         if not frames:
