@@ -55,6 +55,12 @@ class StudyError(RadarsimError):
     """The code of an installed package failed where its study was asked for something."""
 
 
+class MeasureError(StudyError):
+    """The measure of a claim failed, or gave no number; the tables do not depend on it."""
+
+    result: object = None
+
+
 class NonFiniteError(RadarsimError):
     """A filter gave numbers that are not finite."""
 

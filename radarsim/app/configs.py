@@ -42,9 +42,19 @@ def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Iterable
     """The experiment that a config describes, all of it checked.
 
     source is a path, the stem of a config (here, in ./configs, or shipped), or a mapping as YAML would give it;
-    overrides are texts `dotted.key=value`, the value in YAML. Raises ConfigError, one line for each fault of the whole.
+    overrides are texts `dotted.key=value`, the value in YAML. Raises ConfigError, one line for each fault of the whole,
+    and of the claims of a study of an installed package.
     """
-    return reading.load(source, overrides, registry)
+    experiment = reading.load(source, overrides, registry)
+    if experiment.study not in registry.SHIPPED and (faults := _claim_faults(experiment.study)):
+        raise ConfigError(*faults)
+    return experiment
+
+
+@cache
+def _claim_faults(name: str) -> Sequence[str]:
+    """What claims of a package's study name and nothing has."""
+    return registry.part(name, lambda one: tuple(dict.fromkeys(one.claim_faults(shipped))))
 
 
 @cache
@@ -56,7 +66,7 @@ def shipped(stem: str) -> tuple[Model, ...] | None:
     for folder in (document.SHIPPED, *registry.folders()):
         file = folder / "configs" / f"{stem}.yaml"
         if stem and file.is_file():
-            return tuple(case.spec for case in load(file).cases)
+            return tuple(case.spec for case in reading.load(file, (), registry).cases)
     return None
 
 

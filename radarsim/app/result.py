@@ -20,7 +20,7 @@ from radarsim.app.stored import classes_of
 from radarsim.config.experiment import Case, Experiment, matches
 from radarsim.engine import store
 from radarsim.engine.results import CaseResult
-from radarsim.errors import DisagreementError, RadarsimError
+from radarsim.errors import DisagreementError, MeasureError, RadarsimError
 from radarsim.language import tr
 from radarsim.report import claims, files, notes, seen
 from radarsim.report import tables as common
@@ -236,11 +236,15 @@ class Result:
         return (*notes.faults(made, nearly, bounds, own.quantities()), *claims.errors(made["claims"]))
 
     def check(self) -> None:
-        """Raises DisagreementError where there are `faults`."""
+        """Raises DisagreementError where there are `faults`, else MeasureError where the measure of a claim failed."""
         if self.faults:
             error = DisagreementError(*self.faults)
             error.result = self
             raise error
+        if failed := claims.failed(self._tables["claims"]):
+            unmeasured = MeasureError(*failed)
+            unmeasured.result = self
+            raise unmeasured
 
     def verdicts(self, column: str = "class") -> dict[str, list[str]]:
         """The claims of a class over all readings that their papers allow, or `as_shipped`; empty where there are none.

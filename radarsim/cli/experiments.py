@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 import click
 
 from radarsim.cli import group
-from radarsim.errors import ClusterError, DisagreementError, TargetUnmet
+from radarsim.errors import ClusterError, DisagreementError, MeasureError, TargetUnmet
 
 if TYPE_CHECKING:
     from radarsim.app.result import Result
@@ -147,7 +147,8 @@ def _compute_each(
 ) -> None:
     """Compute experiments one by one, each after a look at it, and print what came of it.
 
-    Raises DisagreementError at the end for what no chance makes, else TargetUnmet for what was not reached.
+    Raises DisagreementError at the end for what no chance makes, else MeasureError where the measure of a claim failed,
+    else TargetUnmet for what was not reached.
     """
     from radarsim.app import documents
     from radarsim.app import run as simulation
@@ -156,6 +157,7 @@ def _compute_each(
     made: list[dict[str, Any]] = []
     unmet: list[str] = []
     wrong: list[str] = []
+    unmeasured: list[str] = []
     for one in loaded:
         if look is not None:
             look(one)
@@ -171,6 +173,9 @@ def _compute_each(
             wrong += [line if line.startswith(f"{one.stem}: ") else f"{one.stem}: {line}" for line in error.lines]
             made.append(documents.result(cast("Result", error.result)))
             continue
+        except MeasureError as error:  # all is written
+            unmeasured += error.lines
+            done = cast("Result", error.result)
         unmet += [f"{one.stem}: {reason}" for reason in done.unmet]
         if isinstance(done, simulation.Shares):
             made.append(documents.share_record(done))
@@ -184,6 +189,8 @@ def _compute_each(
         click.echo(documents.text(made))
     if wrong:
         raise DisagreementError(*wrong)
+    if unmeasured:
+        raise MeasureError(*unmeasured)
     if unmet:
         raise TargetUnmet(*unmet)
 

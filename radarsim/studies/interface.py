@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from radarsim.config.fields import Study as Keys
     from radarsim.engine.results import Axes, CaseResult, Layout, Track
     from radarsim.report.claims import PaperClaims
+    from radarsim.report.claims.declared import Shipped
     from radarsim.report.claims.over import PaperReadings
     from radarsim.report.drawing import Chart, Figure
     from radarsim.report.quantities import Quantity
@@ -319,6 +320,10 @@ class Study(ABC):
     def cost(self, made: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":
         """A table of what the filters cost, for the report; run is as in run.json. Default: none."""
         return None
+
+    def claim_faults(self, shipped: "Shipped") -> Sequence[str]:
+        """What its claims and readings name and no shipped config has, a line each. `shipped` as of `claims.judged`."""
+        return ()
 
     def claims(self) -> "PaperClaims | None":
         """The paper's claims. Default: none."""

@@ -6,7 +6,7 @@ the last one.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from operator import attrgetter
 from typing import Any
@@ -16,15 +16,16 @@ import numpy as np
 from radarsim.config.check import check
 from radarsim.config.document import Document, Faults, Origin
 from radarsim.config.experiment import Case
-from radarsim.config.fields import from_python
+from radarsim.config.fields import Model, from_python
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.report import claims
-from radarsim.report.claims.declared import Claim, Series
-from radarsim.report.claims.over import Choice, PaperReadings, Reading, Unreadable
+from radarsim.report.claims.declared import Claim, Series, Shipped
+from radarsim.report.claims.over import Call, Choice, PaperReadings, Reading, Unreadable
 from radarsim.report.statistics import Estimate, difference, mean
 from radarsim.report.tables import realisations
 
+NOWHERE = object()
 CLOSE = 1e-9  # relative: one number written in two ways
 
 
@@ -34,17 +35,30 @@ class Evidence(claims.Evidence):
     def case(self, key: Any) -> CaseResult:
         if not isinstance(key, Mapping):
             return super().case(key)
+        if unknown := _unknown(key, [result.spec for result in self.results]):
+            raise ConfigError(f"of: {unknown}: there is no such key")
         for result in self.results:
-            if all(_equal(_value(result.spec, path), value) for path, value in key.items()):
+            if _is(result.spec, key):
                 return result
         raise claims.Missing(key)
 
 
 def _value(spec: Any, path: str) -> Any:
+    """A key of a case, by its dotted name; NOWHERE where it has none such."""
     try:
         return attrgetter(path)(spec)
     except AttributeError:
-        raise ConfigError(f"claims: of: {path}: there is no such key") from None
+        return NOWHERE
+
+
+def _unknown(key: Mapping[str, Any], specs: Sequence[Any]) -> str:
+    """The first dotted name that no case has."""
+    return next((path for path in key if all(_value(spec, path) is NOWHERE for spec in specs)), "")
+
+
+def _is(spec: Any, key: Mapping[str, Any]) -> bool:
+    """Whether it is the case of these keys."""
+    return all(_equal(_value(spec, path), value) for path, value in key.items())
 
 
 def _equal(one: Any, other: Any) -> bool:
@@ -119,6 +133,63 @@ class Readings(PaperReadings):
         return replace(case, spec=_with(case.spec, self.sets(reading)))
 
 
+# ---- faults ----------------------------------------------------------------------------------------------------------
+def faults(
+    every: Sequence[Claim],
+    choices: Sequence[Choice],
+    components: Sequence[str],
+    shipped: Shipped,
+    configs: Sequence[str],
+) -> Iterator[str]:
+    """What claims and choices name and nothing has, a line each with its place: known without a run.
+
+    components: of the study; configs: the stems that its package ships.
+    """
+    for claim in every:
+        if (specs := shipped(claim.config)) is None:
+            there = ", ".join(configs) or "none"
+            yield f"{claim.source}: config: no such config {claim.config!r} is shipped; there are {there}"
+            continue
+        for part in claim.parts:
+            if isinstance(part.measure, Call):
+                yield from (f"{part.measure.source}: {fault}" for fault in _names(part.measure, specs, components))
+    for choice in choices:
+        configs_of = dict.fromkeys(claim.config for claim in every if choice.bears_on(claim.id))
+        specs = [spec for config in configs_of for spec in shipped(config) or ()]
+        for one in choice.alternatives:
+            if why := next(filter(None, (_kept_from(spec, one.sets) for spec in specs)), ""):
+                yield f"{one.source}: choices: {choice.key}: {one.name!r} cannot be set: {why}"
+
+
+def _names(measure: Call, specs: Sequence[Model], components: Sequence[str]) -> Iterator[str]:
+    """Which case, filter or component of a measure is not there; names alone that are arguments of functions here."""
+    of: list[Any] = []
+    for key in (key for key in measure.cases if isinstance(key, Mapping)):
+        if unknown := _unknown(key, specs):
+            yield f"of: {unknown}: there is no such key"
+        elif not (found := [spec for spec in specs if _is(spec, key)]):
+            yield f"of: no case has {', '.join(f'{path} {value}' for path, value in key.items())}"
+        else:
+            of.append(found[0])
+    if measure.function is None or measure.function.__module__ != __name__:
+        return
+    for argument in ("filter", "over", "component"):
+        kind = "component" if argument == "component" else "filter"
+        for spec in of if argument in measure.arguments else ():
+            known = components if kind == "component" else [one.name for one in spec.filters]
+            if (name := measure.arguments[argument]) not in known:
+                yield f"no {kind} {name!r}; there are {', '.join(known)}"
+
+
+def _kept_from(spec: Model, values: Mapping[str, Any]) -> str:
+    """Why a case cannot have these values; nothing where it can."""
+    try:
+        _with(spec, values)
+    except Unreadable as error:
+        return str(error)
+    return ""
+
+
 def _with(spec: Any, values: Mapping[str, Any]) -> Any:
     """A config's keys with other values of some; raises Unreadable where they do not go together."""
     origin, faults = Origin("reading"), Faults()
@@ -126,10 +197,15 @@ def _with(spec: Any, values: Mapping[str, Any]) -> Any:
     for path, value in values.items():
         *above, last = path.split(".")
         places = [data] if path.partition(".")[0] in type(spec).model_fields else data[type(spec).bare_keys]
-        for step in above:
-            places = [place[int(step)] if isinstance(place, list) else place.setdefault(step, {}) for place in places]
-        for place in places:
-            place[last] = value
+        try:
+            for step in above:
+                places = [
+                    place[int(step)] if isinstance(place, list) else place.setdefault(step, {}) for place in places
+                ]
+            for place in places:
+                place[last] = value
+        except (LookupError, TypeError, ValueError, AttributeError):
+            raise Unreadable(f"{path}: there is no such key") from None
     changed = check(type(spec), Document(data, "reading", None, {(): origin}), faults)
     try:
         faults.raise_if_any()

@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import Axes, CaseResult, Layout
     from radarsim.report.claims import PaperClaims
-    from radarsim.report.claims.declared import Claim
+    from radarsim.report.claims.declared import Claim, Shipped
     from radarsim.report.claims.over import Choice, PaperReadings
     from radarsim.report.drawing import Figure
     from radarsim.report.quantities import Quantity
@@ -303,6 +303,16 @@ class OneFile(Study):
 
         evidence = getattr(sys.modules[type(self).__module__], "Evidence", judged.Evidence)
         return PaperClaims(self._written[0], evidence, *self.paper)
+
+    def claim_faults(self, shipped: "Shipped") -> Sequence[str]:
+        if self.paper is None or not self.claims_yaml:
+            return ()
+        from radarsim.studies import judged
+
+        folder = self.shipped()
+        configs = sorted(file.stem for file in folder.glob("configs/*.yaml")) if folder else []
+        components = [one.name for one in self.components]
+        return tuple(judged.faults(*self._written, components, shipped, configs))
 
     def readings(self) -> "PaperReadings | None":
         if self.paper is None or not self.claims_yaml or not self._written[1]:

@@ -173,6 +173,26 @@ def test_what_its_code_does_wrong_is_one_line_with_its_place(tmp_path, what):
     assert (tmp_path / "results/chirp/curves.csv").exists() == written
 
 
+def test_a_claims_fault_is_found_before_the_run_and_its_measures_after_the_tables_are_written(tmp_path):
+    shutil.copytree(EXAMPLES / "chirp", tmp_path / "chirp")
+    outside.installed(tmp_path / "chirp", tmp_path / "site")
+    file = tmp_path / "chirp/src/chirp/__init__.py"
+    whole = file.read_text(encoding="utf-8")
+    run = ("run", "chirp", "-n", 100, "--no-figures", "--out", "results")
+    file.write_text(whole.replace("{gain: {filter: up,", "{gain: {filter: upp,", 1), encoding="utf-8")
+    for asked in (run, ("check", "chirp")):
+        (line,) = outside.command(*asked, site=tmp_path / "site", cwd=tmp_path, code=2).stderr.splitlines()
+        assert "/chirp/__init__.py:" in line
+        assert ": no filter 'upp'; there are " in line
+    assert not (tmp_path / "results").exists()
+    measure = "def own(seen, case):\n    return None\n\n\n"
+    other = whole.replace("{gain: {filter: up, component: r}}", "own", 1).replace("\n\nSTUDY", f"\n\n{measure}STUDY")
+    file.write_text(other, encoding="utf-8")
+    line = outside.command(*run, site=tmp_path / "site", cwd=tmp_path, code=1).stderr.splitlines()[-1]
+    assert line.endswith(": own: must give an Estimate or a number, got nothing")
+    assert "confirmed" in (tmp_path / "results/chirp/claims.csv").read_text(encoding="utf-8")
+
+
 def test_what_the_compiler_refuses_is_its_reason_and_the_line_that_it_names():
     from numba import njit
 

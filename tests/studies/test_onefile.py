@@ -1,6 +1,7 @@
 """The frame of studies in one file: what follows from the class, and what is said of one that lacks something."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,7 +12,9 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.config.fields import Member, Model, NonNegative, Positive, key
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
-from radarsim.report import tables
+from radarsim.report import claims, tables
+from radarsim.report.claims import over
+from radarsim.studies import judged
 from radarsim.studies.interface import Paper
 from radarsim.studies.noise import noise_key
 from radarsim.studies.onefile import Component, Measured, OneFile
@@ -188,8 +191,6 @@ def test_claims_find_a_case_by_its_keys_and_readings_set_keys(made):
 def test_a_ratio_is_paired_where_one_of_the_two_is_the_baseline(made):
     study, results, every = made
     seen = study.claims().evidence(results, every, {result.name: {"filters": {0, 1}} for result in results})
-    from radarsim.studies import judged
-
     at = {"target.sigma_step_m": 2}
     one = judged.ratio(seen, at, "quick", "slow", "x")
     other = judged.ratio(seen, at, "slow", "quick", "x")
@@ -227,6 +228,75 @@ def test_a_key_that_no_reading_can_set_is_one_line():
     text = Walk.claims_yaml.replace("sensor.sigma_x_m: 0.5", "sensor.sigma: 1")
     with pytest.raises(ConfigError, match=r"choices: sets: there is no key sensor\.sigma"):
         type("Wrong", (Walk,), {"claims_yaml": text, "__module__": __name__})().keys()
+
+
+UNKNOWN = {  # in the text: what stands there instead, and what is said of it
+    "filter: quick": ("filter: quikc", "no filter 'quikc'; there are slow, quick"),
+    "component: x": ("component: y", "no component 'y'; there are x"),
+    "target.sigma_step_m: 2": ("target.step: 2", "of: target.step: there is no such key"),
+    "{target.sigma_step_m: 2}": ("{target.sigma_step_m: 7}", "of: no case has target.sigma_step_m 7"),
+    "config: walk": ("config: walkk", "config: no such config 'walkk' is shipped; there are none"),
+    "gain: 0.3": ("gain: -1", "choices: noise: 'a half of it' cannot be set: reading: filters.0.gain: must be > 0"),
+    "sensor.sigma_x_m: 0.5": ("filters.7.gain: 1", "'a half of it' cannot be set: filters.7.gain: there is no such"),
+}
+
+
+@pytest.mark.parametrize("what", UNKNOWN)
+def test_what_a_claim_names_and_is_not_there_is_known_without_a_run(what):
+    text, said = UNKNOWN[what]
+    written = Walk.claims_yaml.replace(what, text)
+    study = type("Wrong", (Walk,), {"claims_yaml": written, "__module__": __name__})()
+    specs = {"walk": (case_of(Walk(), 0.1).spec, case_of(Walk()).spec)}
+    assert not Walk().claim_faults(specs.get)
+    (line,) = set(study.claim_faults(specs.get))
+    assert said in line
+    number = int(re.match(r".*test_onefile\.py:(\d+):\d+: ", line)[1])
+    lines = written.splitlines()  # a text that is not in the file: its own lines
+    assert text in " ".join(lines[number - 1 : number + 1])
+
+
+def failing(what):
+    """A measure that gives this, or raises it."""
+
+    def measure(seen):
+        if isinstance(what, BaseException):
+            raise what
+        return what
+
+    return over.Call("own", measure, (), {}, "file.py:7:1")
+
+
+@pytest.mark.parametrize(
+    ("what", "said"),
+    [
+        (None, "must give an Estimate or a number, got nothing"),
+        ("fast", "must give an Estimate or a number, got 'fast'"),
+        (ValueError("boom"), "ValueError: boom \\("),
+        (SystemExit(0), "SystemExit: 0 \\("),
+    ],
+)
+def test_a_measure_that_fails_is_one_line_and_the_other_claims_are_judged(made, what, said):
+    study, results, every = made
+    papers = study.claims()
+    (claim,) = papers.claims
+    part = replace(claim.parts[0], measure=failing(what), cases=())
+    both = replace(papers, claims=(replace(claim, id="walk.0", parts=(part,)), claim))
+    shipped = {"walk": [result.spec for result in results]}
+    table = claims.judged(both, results, every, shipped.get, "walk")
+    assert table["class"].tolist() == ["not judged here", "confirmed"]
+    (line,) = claims.failed(table)
+    assert re.match(f"file\\.py:7:1: own: {said}", line)
+
+
+def test_a_name_that_a_measure_of_ones_own_looks_for_in_vain_is_the_reason(made):
+    study, results, every = made
+    seen = study.claims().evidence(results, every, {result.name: {"filters": {0, 1}} for result in results})
+    with pytest.raises(claims.Missing, match="no filter 'quikc'; there are slow, quick"):
+        seen.curve({}, "quikc", "x")
+    with pytest.raises(claims.Missing, match="no component 'y'; there are x"):
+        seen.row("last", filter="quick", component="y")
+    with pytest.raises(ConfigError, match="no table 'believed'; there are last, curves, gains"):
+        judged.over_believed(seen, {}, "quick", "x")
 
 
 class Misnamed(Walk):

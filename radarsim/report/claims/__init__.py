@@ -25,6 +25,7 @@ from radarsim.report.claims.judge import (
     NUMBERS,
     UNCLEAR,
     errors,
+    failed,
     first_rows,
     judged,
     listed,

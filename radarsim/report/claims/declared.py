@@ -21,6 +21,7 @@ import numpy as np
 from radarsim.config.experiment import canonical
 from radarsim.config.fields import Model, NameIn
 from radarsim.engine.results import CaseResult
+from radarsim.errors import ConfigError
 from radarsim.report import tables
 from radarsim.report.claims.rule import Range
 from radarsim.report.statistics import Estimate, difference
@@ -204,6 +205,14 @@ class Evidence:
                 return result
         raise Missing(key)
 
+    def _lacking(self, result: CaseResult, filter_name: str, component: str, *base: str) -> Missing:
+        """Which name a case does not have, of one that is there; of names that it has, that there is no such curve."""
+        filters, components = result.axes.filters, tuple(name for name, _ in result.axes.components)
+        for kind, name, known in (("filter", filter_name, filters), ("component", component, components)):
+            if name not in known:
+                return Missing(f"no {kind} {name!r}; there are {', '.join(known)}")
+        return Missing((result.name, filter_name, component, *base))
+
     def curve(self, key: Any, filter_name: str, component: str) -> Series:
         """σ(k) of a filter of a case."""
         return self._series("curves", key, filter_name, component, ("sigma", "sigma_lo", "sigma_hi", "exact_sigma"))
@@ -219,10 +228,11 @@ class Evidence:
     def _series(
         self, table: str, key: Any, filter_name: str, component: str, names: tuple[str, ...], *base: str
     ) -> Series:
-        rows = self._grouped(table).get((self.case(key).name, filter_name, component, *base))
+        result = self.case(key)
+        rows = self._grouped(table).get((result.name, filter_name, component, *base))
         self.looked.add((table, component))
         if rows is None:
-            raise Missing(key)
+            raise self._lacking(result, filter_name, component, *base)
         value, lo, hi, exact = (rows[name].to_numpy(dtype=float) for name in names)
         if self._exact:
             if np.isnan(exact).any():
@@ -251,10 +261,14 @@ class Evidence:
         return Series(own.k, own.t, found.value, found.lo, found.hi)
 
     def row(self, table: str, **equal: object) -> Mapping[str, Any]:
-        """The one row of a table with these values; raises Missing."""
+        """The one row of a table with these values; raises Missing, ConfigError where there is no such table."""
+        if not isinstance(self.tables, Hidden) and table not in self.tables:
+            raise ConfigError(f"this study has no table {table!r}; there are {', '.join(self.tables)}")
         rows = self.tables[table]
         self.looked.add((table, str(equal.get("component", ""))))
         for name, value in equal.items():
+            if name in ("filter", "component") and not (rows[name] == value).any():
+                raise Missing(f"no {name} {value!r}; there are {', '.join(dict.fromkeys(rows[name].astype(str)))}")
             rows = rows[rows[name] == value]
         if not len(rows):
             raise Missing(equal)
@@ -425,6 +439,7 @@ class Claim:
     unstated: str = ""
     joint: bool = False
     internal: bool = False
+    source: str = field(default="", compare=False)  # where its config is named, for messages
 
     @property
     def paper(self) -> str:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from radarsim.engine.results import CaseResult
+from radarsim.errors import MeasureError
 from radarsim.report import tables
 from radarsim.report.claims import rule
 from radarsim.report.claims.declared import (
@@ -179,6 +180,8 @@ def _tried(part: Part, seen: Evidence | None, changed: str) -> _Tried:
         other = NOT_THE_PAPERS.format(changed=changed) if changed else "a case that it needs is not there"
         reason = missing.why or other
         return _Tried(part, why=reason)
+    except MeasureError as error:
+        return _Tried(part, why=f"{FAILED}: {error.lines[0]}")
     closer = {table for table, component in seen.looked if component}
     looked = tuple(sorted(one for one in seen.looked if one[1] or one[0] not in closer))
     of = replace(of, exact=exact(part, seen, measured))
@@ -229,6 +232,7 @@ def disagreement(part: Part, of: Judged) -> str:
 
 
 ROUNDING = 1e-3  # of a margin, in values that have no width: identities hold to the last bits
+FAILED = "its measure fails"
 ERROR = f"exact value and simulation differ by more than {ERROR_OF_PROGRAM} standard errors"
 
 
@@ -236,6 +240,12 @@ def errors(rows: "pd.DataFrame") -> list[str]:
     """A line for each part whose own exact value and simulation disagree: errors of the program."""
     own = rows[rows["why"].astype(str).str.startswith(ERROR)]
     return [f"{row['claim']}: {row['what']} ({row['case']}): {row['why']}" for _, row in own.iterrows()]
+
+
+def failed(rows: "pd.DataFrame") -> list[str]:
+    """A line for each measure that failed, with its place: errors of who wrote the claims."""
+    every = dict.fromkeys(rows["why"].astype(str))
+    return [why.removeprefix(f"{FAILED}: ") for why in every if why.startswith(FAILED)]
 
 
 def _row(claim: Claim, paper: str, one: _Tried, outcome: Outcome | None, many: int) -> dict[str, Any]:

@@ -36,6 +36,7 @@ rounds to, under the granular one if it lies within the margin of its words.
 import inspect
 import itertools
 import math
+import traceback
 from abc import ABC
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -49,11 +50,12 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin
 import numpy as np
 
 from radarsim.config.check import check
-from radarsim.config.document import Document, Faults, did_you_mean
+from radarsim.config.document import Document, Faults, did_you_mean, shown
 from radarsim.config.document import KeyPath as Keys
 from radarsim.config.fields import Anything, Flag, Model, Name, Stem
 from radarsim.config.load import parse, read
 from radarsim.engine.results import CaseResult
+from radarsim.errors import ConfigError, MeasureError, RadarsimError
 from radarsim.language import term, tr
 from radarsim.report.claims import rule
 from radarsim.report.claims.declared import Claim, Evidence, Missing, PaperClaims, Part, certain
@@ -83,6 +85,7 @@ class Alternative:
     kind: str
     reason: str
     sets: Mapping[str, Any] = field(default_factory=dict, compare=False)
+    source: str = field(default="", compare=False)  # where it is written, for messages
 
 
 @dataclass(frozen=True)
@@ -455,14 +458,36 @@ class Call:
     function: Callable[..., Any] | None
     cases: tuple
     arguments: Mapping[str, Any]
+    source: str = field(default="", compare=False)  # where it is written, for messages
 
     def __call__(self, seen: Any) -> Estimate:
-        """What it measures; a plain number is without noise."""
-        if self.function is None:
-            found = getattr(seen, self.name)(*self.cases, **self.arguments)
-        else:
-            found = self.function(seen, *self.cases, **self.arguments)
-        return found if isinstance(found, Estimate) else certain(found)
+        """What it measures; a plain number is without noise. Raises MeasureError where the function fails."""
+        try:
+            if self.function is None:
+                found = getattr(seen, self.name)(*self.cases, **self.arguments)
+            else:
+                found = self.function(seen, *self.cases, **self.arguments)
+        except (Missing, Unreadable):
+            raise
+        except (Exception, SystemExit) as error:
+            if isinstance(error, RadarsimError) and not isinstance(error, ConfigError):
+                raise
+            said = error.lines[0] if isinstance(error, ConfigError) else f"{type(error).__name__}: {error}"
+            raise MeasureError(f"{self.source}: {self.name}: {said}{self._place(error)}") from error
+        if isinstance(found, Estimate):
+            return found
+        with suppress(TypeError, ValueError):
+            if not isinstance(found, str | bytes):
+                return certain(found)
+        raise MeasureError(f"{self.source}: {self.name}: must give an Estimate or a number, got {shown(found)}")
+
+    def _place(self, error: BaseException) -> str:
+        """The last line of the function's own file that led to an error, in brackets."""
+        if self.function is None or self.function.__module__.startswith("radarsim."):
+            return ""
+        file = self.function.__code__.co_filename
+        own = [one.lineno for one in traceback.extract_tb(error.__traceback__) if one.filename == file]
+        return f" ({file}:{own[-1]})" if own else ""
 
     def number(self, seen: Any) -> float:
         """Its value alone."""
@@ -561,6 +586,7 @@ class _Reader:
             for j, part in enumerate(one.parts):
                 own += self._parts(part, names, ("claims", i, "parts", j))
             given = one.model_dump(exclude={"id", "config", "parts", "parts_of"})
+            given["source"] = self._source(("claims", i, "config") if one.config else ("config",))
             yield Claim(f"{keys.paper}.{one.id}", parts=tuple(own), config=one.config or keys.config, **given)
 
     def choices(self, keys: ChoicesKeys | FileKeys) -> Iterator[Choice]:
@@ -571,7 +597,10 @@ class _Reader:
             every = [own for each in claims for own in (each if isinstance(each, tuple) else (each,))]
             yield Choice(
                 *(one.key, one.asks, one.original, one.english or one.original),
-                tuple(Alternative(**each.model_dump()) for each in one.alternatives),
+                tuple(
+                    Alternative(**each.model_dump(), source=self._source(("choices", i, "alternatives", j)))
+                    for j, each in enumerate(one.alternatives)
+                ),
                 tuple(f"{keys.paper}.{own}" for own in every),
                 one.contradicts,
             )
@@ -672,7 +701,11 @@ class _Reader:
             if wanted:
                 self._add((*path, key), f"must be {wanted}", one)
                 raise _Unknown
-        return Call(name, self.functions.get(name) if known is self.measures else function, cases, given)
+        used = self.functions.get(name) if known is self.measures else function
+        return Call(name, used, cases, given, self._source(path))
+
+    def _source(self, path: Keys) -> str:
+        return str(self.document.origin(path))
 
     def _add(self, path: Keys, message: str, got: object) -> None:
         self.faults.add(self.document.origin(path), path, message, got)

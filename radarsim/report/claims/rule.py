@@ -424,6 +424,9 @@ WHOLE = (  # `changed` is made of differences, case by case
         "exact value and simulation differ by more than {errors} standard errors: exact {exact}, simulated {simulated} "
         "[{lo}, {hi}]"
     ),
+    term("its measure fails: {error}"),
+    term("no filter {name}; there are {names}"),
+    term("no component {name}; there are {names}"),
 )
 DIFFERENCES = (
     term("{missing} of the paper's {count} {key} changed or not there"),
