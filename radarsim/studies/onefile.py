@@ -158,6 +158,10 @@ class OneFile(Study):
             if not (isinstance(part, type) and issubclass(part, base)):
                 yield f"{name} must be a subclass of radarsim.config.fields.{base.__name__}, got {part!r}"
                 return
+        if bare := [one for one in cls.measured if isinstance(one.sigma_keys, str)]:
+            for one in bare:
+                yield f"{one.column}: sigma_keys must be a tuple, ({one.sigma_keys!r},); got {one.sigma_keys!r}"
+            return
         keys = {"scan_period": (cls.scan_period,)} | {one.column: one.sigma_keys for one in cls.measured}
         for name, every in keys.items():
             yield from (f"{name}: there is no key {key}" for key in every if key and not cls._has(key))
@@ -257,7 +261,9 @@ class OneFile(Study):
         from radarsim.report import panels
 
         shown, others = panels.reported(results)
-        return [*(sentence for result in shown for sentence in self._sentences(result, made)), *others]
+        several = len(panels.families(results)) > 1  # configs of an `include`
+        each = ((f"{panels.stem(one)}: " if several else "", one) for one in shown)
+        return [*(f"{name}{sentence}" for name, one in each for sentence in self._sentences(one, made)), *others]
 
     def _sentences(self, result: "CaseResult", made: "Mapping[str, pd.DataFrame]") -> Iterator[str]:
         """σ of the leading component at the last scan, and what each filter gains."""

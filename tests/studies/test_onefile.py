@@ -162,6 +162,11 @@ def test_question_answer_and_figures(made):
     answer = study.answer(results, every)
     assert answer[2].startswith("σ_w = 2 m: σ of the position after 78 s: slow ")
     assert answer[3].startswith("σ_w = 2 m: Gain against slow there: quick ")
+    other = [replace(one, name=name, swept=()) for one, name in zip(results, ("walk", "stroll"), strict=True)]
+    tables_of = {name: table.replace({one.name: own.name for one, own in zip(results, other, strict=True)})
+                 for name, table in every.items()}  # fmt: skip
+    heads = [sentence.partition(": ")[0] for sentence in study.answer(other, tables_of)]
+    assert heads == ["walk", "walk", "stroll", "stroll"]
     drawn = study.figures(results, every, experiment)
     assert set(drawn) == {"sigma_x", "gain_x"}
     assert "position" in drawn["sigma_x"].title
@@ -208,6 +213,7 @@ WRONG = {
     "Filter": (Sensor, r"Filter must be a subclass of radarsim\.config\.fields\.Member, got .*Sensor"),
     "scan_period": ("sensor.period_s", r"scan_period: there is no key sensor\.period_s"),
     "measured": ((Measured("x_m", "m", ("sensor.sigma",)),), r"x_m: there is no key sensor\.sigma"),
+    "measured ": ((Measured("x_m", "m", "sensor.sigma_x_m"),), r"x_m: sigma_keys must be a tuple, \('sensor"),
     "claims_yaml": (
         Walk.claims_yaml.replace("{gain: {filter", "{gian: {filter"),
         r"test_onefile\.py:\d+:\d+: claims\.0\.parts\.0\.measure: must be one of them; did you mean gain\?",
@@ -218,7 +224,7 @@ WRONG = {
 @pytest.mark.parametrize("name", WRONG)
 def test_what_is_missing_is_one_line(name):
     value, said = WRONG[name]
-    Wrong = type("Wrong", (Walk,), {name: value, "__module__": __name__})
+    Wrong = type("Wrong", (Walk,), {name.strip(): value, "__module__": __name__})
     with pytest.raises(ConfigError, match=said) as caught:
         Wrong().keys()
     assert len(caught.value.lines) == 1
