@@ -8,6 +8,7 @@ import functools
 import importlib
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
@@ -338,12 +339,37 @@ def matrices():
     return made
 
 
+def given():
+    """Sums of a filter of a package, whose gains are given, beside one whose covariance is each realisation's own."""
+    from radarsim.physics import process_noise
+    from radarsim.studies.range_doppler import study
+    from radarsim.studies.range_doppler.given import GivenGains
+
+    class Own(GivenGains):
+        """The Kalman filter's gains, given."""
+
+        def noise(self, dt_s):
+            return process_noise("random_jerk", 1e-3, dt_s)
+
+        def gains(self, scans):
+            return scans.kalman(self.noise)
+
+    case = work("rls2", ["scans=9", "radar.sigma_bias_range_m=20"]).case
+    filters = (
+        *case.spec.filters,
+        Own.model_construct(**case.spec.filters[-1].model_dump() | {"name": "given", "kind": "given"}),
+    )
+    plan = study.prepare(replace(case, spec=case.spec.model_copy(update={"filters": filters})))
+    return plan.layout.unpack(study.simulate(plan, 8, 11))
+
+
 def numbers():
     """All arrays: {run/name: array}."""
     made = {f"random/{name}": array for name, array in words().items()}
     made |= {f"tracks/{name}": array for name, array in tracks().items()}
     made |= {f"patterns/{name}": array for name, array in alike().items()}
     made |= {f"matrices of {name}": array for name, array in matrices().items()}
+    made |= {f"given gains/{name}": array for name, array in given().items()}
     made |= bursts(*RUNS["discriminator on block sums"])
     for run, arguments in RUNS.items():
         made |= {f"{run}/{name}": array for name, array in sums(*arguments).items()}

@@ -23,7 +23,7 @@ from tests.trust.faults import FAULTS
 
 config, realisations, store, fault = sys.argv[1], int(sys.argv[2]), Path(sys.argv[3]), sys.argv[4]
 if fault:
-    identity.sources = lambda study, other=hashlib.sha256(fault.encode()).hexdigest(): other
+    identity.sources = lambda *_: hashlib.sha256(fault.encode()).hexdigest()
 if fault in FAULTS:
     FAULTS[fault].plant()
 work = CaseWork(load(config).cases[0])
