@@ -73,7 +73,8 @@ IN_NAMES = {"m/s": "mps", "m/s2": "mps2", "rad/s": "radps", "rad/s2": "radps2"} 
 
 def true_column(component: str, unit: str) -> str:
     """The column of plots that holds the truth of a component of the state: `true_Vr_mps`."""
-    return f"{TRUE}{component}_{IN_NAMES.get(unit, unit)}"
+    plain = unit.translate(str.maketrans("²³⁴⁵", "2345"))
+    return f"{TRUE}{component}_{IN_NAMES.get(plain, plain.replace('/', 'p'))}"
 
 
 OUTLIERS, BIAS, CORRELATION = EXPLANATIONS = ("outliers", "bias", "correlation")

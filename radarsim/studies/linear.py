@@ -11,8 +11,7 @@ independent errors. Where plots may be missed, the gains of a Kalman filter depe
 limits are not known then; those of a filter with gains of its own are.
 """
 
-from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from operator import attrgetter
@@ -23,7 +22,7 @@ import numpy as np
 from radarsim.engine.results import Axes, Layout, Track
 from radarsim.errors import ConfigError
 from radarsim.studies.interface import CORRELATION, OUTLIERS, Tracker
-from radarsim.studies.onefile import OneFile
+from radarsim.studies.onefile import OneFile, said
 
 if TYPE_CHECKING:
     from radarsim.config.experiment import Case
@@ -33,6 +32,7 @@ BLOCK = 4096
 CLOSE = 1e-14  # relative change of a limit that has settled
 DOUBLINGS = 60
 LONGEST_PERIOD = 64  # scans after which plots repeat themselves, looked for up to here
+ROUNDED = 1e-9  # of the largest element, or eigenvalue, of a covariance: what rounding may leave
 LEAST = 1e-6  # of a stated key that is fitted, which counts as zero
 
 
@@ -83,17 +83,27 @@ class LinearStudy(OneFile):
     detection: str = ""
     fitted: tuple[str, ...] = ()
 
+    @classmethod
+    def missing(cls) -> Iterator[str]:
+        yield from super().missing()
+        for name, what in (("motion", "how the truth moves"), ("plot", "what a filter sees at scan k")):
+            if getattr(cls, name) is getattr(LinearStudy, name):
+                yield f"{cls.__name__}.{name} must be given: {what}"
+        for name, keys in (("detection", (cls.detection,)), ("fitted", cls.fitted)):
+            if isinstance(getattr(cls, "parts", None), Mapping):
+                yield from (f"{name}: there is no key {key}" for key in keys if key and not cls._has(str(key)))
+
     # ---- the model ---------------------------------------------------------------------------------------------------
-    @abstractmethod
     def motion(self, spec: Any) -> Motion:
         """How the truth moves. Its first components are those of the study."""
+        raise NotImplementedError
 
-    @abstractmethod
     def plot(self, spec: Any, one: Any, k: int) -> tuple[Any, Any]:
         """What filter `one` sees at scan k, from 0: the rows H (D, n), and the standard deviations (D,) of its numbers.
 
         A single number may be given as (n,) and a float.
         """
+        raise NotImplementedError
 
     def assumed_motion(self, spec: Any, one: Any) -> Motion:
         """How the state moves as a filter believes. Default: as it does."""
@@ -121,56 +131,90 @@ class LinearStudy(OneFile):
         return float(attrgetter(self.detection)(spec)) if self.detection else 1.0
 
     # ---- from matrices to arrays ---------------------------------------------------------------------------------
+    def _fault(self, what: str, words: str) -> ConfigError:
+        """An error with the line of the method that `what` begins with."""
+        name = what.partition(":")[0]
+        code = getattr(getattr(self, name, None), "__code__", None)
+        own = code is not None and code.co_filename != __file__
+        place = f"{code.co_filename}:{code.co_firstlineno}" if own else self.place
+        return ConfigError(f"{place}: {what}: {words}"[:400])
+
     def _array(self, what: str, given: Any, *shape: int) -> np.ndarray:
         """A matrix that the study gives, of this shape; raises ConfigError."""
         try:
             found = np.asarray(given, dtype=float)
         except (TypeError, ValueError):
-            raise ConfigError(f"{self.place}: {what}: must be numbers, got {given!r}"[:200]) from None
+            raise self._fault(what, f"must be numbers, got {given!r}"[:150]) from None
         if found.shape != shape or not np.isfinite(found).all():
             size = " × ".join(map(str, shape)) or "a number"
             got = "numbers that are not finite" if found.shape == shape else " × ".join(map(str, found.shape)) or "one"
-            raise ConfigError(f"{self.place}: {what}: must be {size}, got {got}")
+            raise self._fault(what, f"must be {size}, got {got}")
+        return found
+
+    def _covariance(self, what: str, given: Any, n: int) -> np.ndarray:
+        """A covariance (n, n) that the study gives; raises ConfigError."""
+        found = self._array(what, given, n, n)
+        values, size = np.linalg.eigvalsh(found), np.abs(found).max()
+        if np.abs(found - found.T).max() > ROUNDED * size or values[0] < -ROUNDED * np.abs(values).max():
+            raise self._fault(what, f"must be symmetric and not negative, got {found.tolist()}")
         return found
 
     def _moved(self, what: str, of: Motion, dt: float) -> tuple[np.ndarray, ...]:
         """F, Q, mean and covariance over a time."""
         if not isinstance(of, Motion):
-            raise ConfigError(f"{self.place}: {what}: must give Motion(F, Q, mean, covariance), got {of!r}"[:200])
+            raise self._fault(what, f"must give Motion(F, Q, mean, covariance), got {of!r}"[:150])
         n = np.size(of.mean)
         if n < len(self.components):
-            raise ConfigError(f"{self.place}: {what}: mean: must be of the {len(self.components)} components, got {n}")
-        every = {"F(dt)": of.F(dt), "Q(dt)": of.Q(dt), "covariance": of.covariance}
-        F, Q, P = (self._array(f"{what}: {name}", one, n, n) for name, one in every.items())
+            raise self._fault(what, f"mean: must be of the {len(self.components)} components, got {n}")
+        for name, one in (("F", of.F), ("Q", of.Q)):
+            if not callable(one):
+                raise self._fault(what, f"{name}: must be a function of dt, got {one!r}"[:150])
+            if not np.array_equal(np.asarray(said(one, dt)), np.asarray(said(one, dt)), equal_nan=False):
+                self._array(f"{what}: {name}(dt)", said(one, dt), n, n)
+                raise self._fault(what, f"{name}(dt): gives another formula each time: draw by normals")
+        F = self._array(f"{what}: F(dt)", said(of.F, dt), n, n)
+        Q = self._covariance(f"{what}: Q(dt)", said(of.Q, dt), n)
+        P = self._covariance(f"{what}: covariance", of.covariance, n)
         return F, Q, self._array(f"{what}: mean", of.mean, n), P
 
     def _rows(self, what: str, given: Callable[[int], tuple[Any, Any]], scans: int, n: int) -> tuple[np.ndarray, ...]:
         """Rows H (K, D, n) and standard deviations (K, D) of what is given for each scan."""
-        D = len(self.measured) or len(np.atleast_2d(given(0)[0]))
-        every = [given(k) for k in range(scans)]
+        every = [said(given, k) for k in range(scans)]
+        for one in every:
+            if not isinstance(one, tuple | list) or len(one) != 2:
+                raise self._fault(what, f"must give rows and standard deviations, H, sigma, got {one!r}"[:150])
+        D = len(self.measured) or len(np.atleast_2d(every[0][0]))
         H = np.stack([self._array(f"{what}: H", np.atleast_2d(row), D, n) for row, _ in every])
         sigma = np.stack([self._array(f"{what}: sigma", np.atleast_1d(one), D) for _, one in every])
+        if not (sigma > 0).all():
+            raise self._fault(what, f"sigma: must be positive, got {sigma.min():g}")
+        again = said(given, 0)
+        if not (np.array_equal(np.atleast_2d(again[0]), H[0]) and np.array_equal(np.atleast_1d(again[1]), sigma[0])):
+            raise self._fault(what, "gives another formula each time: the noise of a plot is added to it")
         return H, sigma
 
     def _believed(self, spec: Any, one: Any) -> Matrices:
         """The Kalman filter of what a filter believes."""
-        F, Q, x, P = self._moved("assumed_motion", self.assumed_motion(spec, one), self.scan_period_s(spec))
+        F, Q, x, P = self._moved("assumed_motion", said(self.assumed_motion, spec, one), self.scan_period_s(spec))
         see, sigma = self._rows("plot", lambda k: self.plot(spec, one, k), spec.scans, x.size)
         H, R = self._rows("assumed_plot", lambda k: self.assumed_plot(spec, one, k), spec.scans, x.size)
         return Matrices(F, Q, x, P, H, R**2, see, sigma, kalman(F, Q, P, H, R**2), False)
 
     def matrices(self, spec: Any, one: Any) -> Matrices:
         """A filter of a config."""
-        of, own = self._believed(spec, one), self.own_gains(spec, one)
+        of, own = self._believed(spec, one), said(self.own_gains, spec, one)
         if own is None:
             return of
-        gains = self._array("gains", own, *of.H.shape)
+        gains = self._array("own_gains", own, *of.H.shape)
         return Matrices(of.F, of.Q, of.x, of.P, of.H, of.R, of.see, of.sigma, gains, True)
 
     # ---- numbers -------------------------------------------------------------------------------------------------
     def prepare(self, case: "Case") -> Plan:
         spec = case.spec
-        truth, probability = self._moved("motion", self.motion(spec), self.scan_period_s(spec)), self.probability(spec)
+        truth, probability = (
+            self._moved("motion", said(self.motion, spec), self.scan_period_s(spec)),
+            self.probability(spec),
+        )
         every = [self.matrices(spec, one) for one in spec.filters]
         shown = len(self.components)
         known = [exact(truth, of, probability) if of.own or probability == 1 else None for of in every]
@@ -191,7 +235,10 @@ class LinearStudy(OneFile):
         return plan.layout.pack(**sums)
 
     def limits(self, spec: Any) -> np.ndarray:
-        truth, probability = self._moved("motion", self.motion(spec), self.scan_period_s(spec)), self.probability(spec)
+        truth, probability = (
+            self._moved("motion", said(self.motion, spec), self.scan_period_s(spec)),
+            self.probability(spec),
+        )
         every = [self.matrices(spec, one) for one in spec.filters]
         found = [limit(truth, of, probability) if of.own or probability == 1 else of.x * np.nan for of in every]
         return np.stack(found)[:, : len(self.components)]

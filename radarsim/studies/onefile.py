@@ -36,6 +36,7 @@ Whatever a class lacks, or has of the wrong kind, is one line of a ConfigError w
 """
 
 import inspect
+import re
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -82,6 +83,7 @@ class Measured(NamedTuple):
 
 
 OURS = Path(__file__).parents[1]
+RESERVED = "filters", "baseline", "scans"
 MOST_TOLD_APART = 6  # sets of columns of which a file may have any; of more, all or one
 NEEDED: Mapping[str, tuple[type, str]] = {
     "name": (str, "the value of `study:` in YAML"),
@@ -162,6 +164,16 @@ class OneFile(Study):
             for one in bare:
                 yield f"{one.column}: sigma_keys must be a tuple, ({one.sigma_keys!r},); got {one.sigma_keys!r}"
             return
+        names = [one.name for one in cls.components if isinstance(one, Component)]
+        for name in dict.fromkeys(names):
+            if not re.fullmatch(r"[A-Za-z0-9_]+", name):
+                yield f"components: {name!r} must be of letters, digits and _"
+            if names.count(name) > 1:
+                yield f"components: {name} is there twice"
+        if cls.paper is not None and not isinstance(cls.paper, Paper):
+            yield f"paper: must be Paper(…), got {cls.paper!r}"[:120]
+        yield from (f"parts: {name} is added to the keys of every study" for name in RESERVED if name in cls.parts)
+        yield from ("measured: t_s is the time of a plot" for one in cls.measured if one.column == "t_s")
         keys = {"scan_period": (cls.scan_period,)} | {one.column: one.sigma_keys for one in cls.measured}
         for name, every in keys.items():
             yield from (f"{name}: there is no key {key}" for key in every if key and not cls._has(key))

@@ -282,6 +282,7 @@ def test_the_likelihood_is_that_of_all_plots_together():
         assert sum(found.by_number(np.array([sigma, noise])).values()) == pytest.approx(wanted, rel=1e-10)
 
 
+RNG = np.random.default_rng(1)
 WRONG = {
     "motion": ("motion", lambda spec: Motion(lambda t: [[1, t]], lambda t: np.eye(2), [0, 0], np.eye(2)),
                r"motion: F\(dt\): must be 2 × 2, got 1 × 2"),
@@ -292,7 +293,21 @@ WRONG = {
     "H": ("plot", lambda spec, one, k: ([1, 0, 0], 1.0), "plot: H: must be 1 × 2, got 1 × 3"),
     "sigma": ("plot", lambda spec, one, k: ([1, 0], "wide"), "plot: sigma: must be numbers, got"),
     "nan": ("plot", lambda spec, one, k: ([1, np.nan], 1.0), "plot: H: must be 1 × 2, got numbers that are not finite"),
-    "gains": ("own_gains", lambda spec, one: np.zeros((3, 2)), "gains: must be 25 × 1 × 2, got 3 × 2"),
+    "Q turned": ("motion", lambda spec: Motion(lambda t: np.eye(2), lambda t: [[1, 2], [0, 1]], [0, 0], np.eye(2)),
+                 r"motion: Q\(dt\): must be symmetric and not negative, got"),
+    "Q negative": ("motion", lambda spec: Motion(lambda t: np.eye(2), lambda t: -np.eye(2), [0, 0], np.eye(2)),
+                   r"motion: Q\(dt\): must be symmetric and not negative, got"),
+    "covariance negative": ("assumed_motion", lambda spec, one: Motion(
+        lambda t: np.eye(2), lambda t: np.eye(2), [0, 0], [[1, 2], [2, 1]]),
+        "assumed_motion: covariance: must be symmetric and not negative, got"),
+    "F": ("motion", lambda spec: Motion(np.eye(2), lambda t: np.eye(2), [0, 0], np.eye(2)), "F: must be a function"),
+    "F drawn": ("motion", lambda spec: Motion(lambda t: RNG.normal(size=(2, 2)), lambda t: np.eye(2), [0, 0],
+                                              np.eye(2)), r"F\(dt\): gives another formula each time"),
+    "nothing": ("plot", lambda spec, one, k: None, "plot: must give rows and standard deviations, H, sigma, got None"),
+    "zero": ("plot", lambda spec, one, k: ([1, 0], 0.0), "plot: sigma: must be positive, got 0"),
+    "drawn": ("plot", lambda spec, one, k: ([1, RNG.normal()], 1.0), "plot: gives another formula each time"),
+    "boom": ("plot", lambda spec, one, k: 1 / 0, "ZeroDivisionError: division by zero"),
+    "gains": ("own_gains", lambda spec, one: np.zeros((3, 2)), "own_gains: must be 25 × 1 × 2, got 3 × 2"),
 }  # fmt: skip
 
 
@@ -306,3 +321,14 @@ def test_a_wrong_shape_is_one_line_with_the_classs_file(what):
         study.prepare(case)
     assert len(caught.value.lines) == 1
     assert "test_linear.py:" in caught.value.lines[0]
+
+
+def test_keys_and_methods_that_are_not_there_are_a_line_each():
+    Study = study_of(2, 1).__class__
+    given = {"detection": "sensor.detektion", "fitted": ("sensor.nois",), "plot": LinearStudy.plot}
+    Wrong = type("Wrong", (Study,), given | {"__module__": __name__})
+    assert list(Wrong.missing()) == [
+        "Wrong.plot must be given: what a filter sees at scan k",
+        "detection: there is no key sensor.detektion",
+        "fitted: there is no key sensor.nois",
+    ]

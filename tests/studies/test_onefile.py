@@ -15,7 +15,7 @@ from radarsim.errors import ConfigError
 from radarsim.report import claims, tables
 from radarsim.report.claims import over
 from radarsim.studies import judged
-from radarsim.studies.interface import Paper
+from radarsim.studies.interface import Paper, true_column
 from radarsim.studies.noise import noise_key
 from radarsim.studies.onefile import Component, Measured, OneFile
 
@@ -210,6 +210,7 @@ def test_a_ratio_is_paired_where_one_of_the_two_is_the_baseline(made):
 WRONG = {
     "asks": (None, r"test_onefile\.py: Wrong\.asks must be given: the question, one sentence; got nothing"),
     "components": ((Component("x", ""),), "components: .* must be Component.*, with a unit"),
+    "paper": ("Kalman", r"paper: must be Paper\(…\), got 'Kalman'"),
     "Filter": (Sensor, r"Filter must be a subclass of radarsim\.config\.fields\.Member, got .*Sensor"),
     "scan_period": ("sensor.period_s", r"scan_period: there is no key sensor\.period_s"),
     "measured": ((Measured("x_m", "m", ("sensor.sigma",)),), r"x_m: there is no key sensor\.sigma"),
@@ -325,3 +326,23 @@ def test_a_fault_of_a_claim_has_its_file_and_line():
         Misnamed().keys()
     line = re.match(r".*test_onefile\.py:(\d+):", caught.value.lines[0])[1]
     assert "gian: {filter: quick" in Path(__file__).read_text(encoding="utf-8").splitlines()[int(line) - 1]
+
+
+WRONG_NAMES = {
+    "components": ((Component("a b", "m"),), "'a b' must be of letters, digits and _"),
+    "twice": ((Component("x", "m"), Component("x", "m")), "components: x is there twice"),
+    "measured": ((Measured("t_s", "s"),), "measured: t_s is the time of a plot"),
+    "parts": ({"sensor": Sensor, "scans": Target}, "parts: scans is added to the keys of every study"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_NAMES)
+def test_names_that_cannot_be_are_one_line(name):
+    given, said = WRONG_NAMES[name]
+    Wrong = type("Wrong", (Walk,), {name.replace("twice", "components"): given, "__module__": __name__})
+    assert any(said in line for line in Wrong.missing())
+
+
+def test_columns_of_the_truth_have_units_of_letters():
+    assert [true_column("a", unit) for unit in ("m/s²", "m/s2", "rad/s²", "m", "m²/s³")] == [
+        "true_a_mps2", "true_a_mps2", "true_a_radps2", "true_a_m", "true_a_m2ps3"]  # fmt: skip
