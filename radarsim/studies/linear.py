@@ -135,8 +135,9 @@ class LinearStudy(OneFile):
         """An error with the line of the method that `what` begins with."""
         name = what.partition(":")[0]
         code = getattr(getattr(self, name, None), "__code__", None)
-        own = code is not None and code.co_filename != __file__
-        place = f"{code.co_filename}:{code.co_firstlineno}" if own else self.place
+        place = self.place
+        if code is not None and code.co_filename != __file__:
+            place = f"{code.co_filename}:{code.co_firstlineno}"
         return ConfigError(f"{place}: {what}: {words}"[:400])
 
     def _array(self, what: str, given: Any, *shape: int) -> np.ndarray:
