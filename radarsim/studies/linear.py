@@ -86,9 +86,10 @@ class LinearStudy(OneFile):
     @classmethod
     def missing(cls) -> Iterator[str]:
         yield from super().missing()
-        for name, what in (("motion", "how the truth moves"), ("plot", "what a filter sees at scan k")):
-            if getattr(cls, name) is getattr(LinearStudy, name):
-                yield f"{cls.__name__}.{name} must be given: {what}"
+        if cls.motion is LinearStudy.motion:
+            yield f"{cls.__name__}.motion must be given: how the truth moves"
+        if cls.plot is LinearStudy.plot:
+            yield f"{cls.__name__}.plot must be given: what a filter sees at scan k"
         for name, keys in (("detection", (cls.detection,)), ("fitted", cls.fitted)):
             if isinstance(getattr(cls, "parts", None), Mapping):
                 yield from (f"{name}: there is no key {key}" for key in keys if key and not cls._has(str(key)))
