@@ -208,7 +208,7 @@ def noted(quantity: Asked, result: CaseResult) -> str:
 
     study, name = registry.study(result.study), quantity.of.table
     tables = {"curves": study.curves([result]), name: table_of(quantity.of, result)}
-    table = notes.noted(tables, [result], exact=False, declared=study.quantities(result.spec))[name]
+    table = notes.noted(tables, [result], exact=False, declared=registry.quantities(result.study, result.spec))[name]
     if "note" not in table:
         return ""
     rows = table[table["filter"] == quantity.filter]
@@ -239,12 +239,15 @@ def at(quantity: Asked, series: Series) -> Estimate:
     k, t_s, values = series
     if not len(k):
         return UNKNOWN
+    if not k.any() and (quantity.at_s, quantity.at_k) != (None, None):
+        option = "--at" if quantity.at_k is None else "--at-k"
+        raise ConfigError(f"{option}: the {quantity.of.words} has one value, not one a scan: leave it out")
     if quantity.at_k is not None:
         if quantity.at_k > k[-1] or quantity.at_k < 1:
             raise ConfigError(f"--at-k: must be from 1 to {k[-1]}, the last scan, got {quantity.at_k}")
         found = np.flatnonzero(k == quantity.at_k)
         return Estimate(*(float(part[found[0]]) for part in values)) if len(found) else UNKNOWN
-    if quantity.at_s is None or not k.any():
+    if quantity.at_s is None:
         return Estimate(*(float(part[-1]) for part in values))
     if not 0 <= quantity.at_s <= t_s[-1] * (1 + 1e-12):
         raise ConfigError(f"--at: must be from 0 to {t_s[-1]:g} s, the last scan's time, got {quantity.at_s:g}")

@@ -206,8 +206,10 @@ class Curve:
             return True
         if quantities.planned(self.quantity.of):
             return False
-        _, known = self._sampled(case, 1)
-        self.from_tables = not math.isnan(known)
+        result = self._result(case, 1)
+        _, known = quantities.sampled(self.quantity, result)
+        without_ends = self.quantity.of.ends[0] not in quantities.table_of(self.quantity.of, result)
+        self.from_tables = without_ends or not math.isnan(known)
         return self.from_tables
 
     def exactly(self, value: float | None) -> float:

@@ -29,7 +29,7 @@ from radarsim.report.claims.page import OVER, with_classes
 from radarsim.report.drawing import Figure
 from radarsim.report.wording import estimate, spoken
 from radarsim.studies.interface import Study
-from radarsim.studies.registry import study
+from radarsim.studies.registry import quantities, study
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -233,7 +233,7 @@ class Result:
         own, made = study(self.experiment.study), self._tables
         nearly = [case.name for case in self.experiment.cases if own.exact_but_for(case)]
         bounds = ("claims",) if own.exact_errors else ("claims", "curves", "gains")
-        return (*notes.faults(made, nearly, bounds, own.quantities()), *claims.errors(made["claims"]))
+        return (*notes.faults(made, nearly, bounds, quantities(own.name, self.cases[0].spec)), *claims.errors(made["claims"]))
 
     def check(self) -> None:
         """Raises DisagreementError where there are `faults`, else MeasureError where the measure of a claim failed."""
@@ -299,7 +299,7 @@ def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
     made = measured(results)
     verdicts = claims.judged(of.claims(), results, made, configs.shipped, stem)
     made["claims"] = over_readings(verdicts, results[0].study)
-    return notes.noted(made, results, of.exact_errors, of.quantities(results[0].spec))
+    return notes.noted(made, results, of.exact_errors, quantities(results[0].study, results[0].spec))
 
 
 def over_readings(verdicts: "pd.DataFrame", name: str, out: Path | None = None) -> "pd.DataFrame":

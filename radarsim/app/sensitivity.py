@@ -58,7 +58,7 @@ def _value(of: Quantity) -> str:
 class Sensitivity:
     """What was found: one row a key, filter and component, by falling effect of the key on the component that leads.
 
-    of are the quantities, the first of which decides; leading is empty where that has no components. at says when;
+    of are the quantities, the first of which decides; leading is empty where that has no components. at says when, empty where it has no scans;
     without_effect are keys that change nothing, left_out those that cannot be raised, with the reason. without_estimate
     are filters that no row is about, as they have no estimate there. not_paired are sampled keys that change when the
     scans are. labels: what people call each key of the rows, with its symbol and unit.
@@ -95,11 +95,13 @@ def sensitivity(
     """
     cases = Cases(config, tuple(overrides), case)
     study = registry.study(cases.base.study)
-    every = study.quantities(cases.base.spec)
+    every = registry.quantities(cases.base.study, cases.base.spec)
     kinds = tuple(one for one in every if quantities.planned(one)) or every[:1]
     kinds = kinds if of is None else (registry.quantity(of, cases.base),)
     first = quantities.labels(Asked(kinds[0], at_k=1), cases.base)
-    parts = tuple(first.components) if quantities.planned(kinds[0]) else _parts(kinds[0], cases.base)
+    scans, parts = True, tuple(first.components)
+    if not quantities.planned(kinds[0]):
+        scans, parts = _parts(kinds[0], cases.base)
     leading = parts[0][0] if component is None else component
     quantities.named(leading, [name for name, _ in parts], kinds[0].per or "component")
     axes = study.prepare(cases.base).axes
@@ -128,19 +130,20 @@ def sensitivity(
     labels = {str(row["key"]): named(cases.base.spec, str(row["key"])) for row in shown}
     silent = [name for name, own in zip(axes.filters, base.whole[0], strict=True) if not np.isfinite(own).any()]
     return Sensitivity(
-        *(cases.base.stem, kinds, leading, when(asked), tuple(shown), tuple(idle), tuple(silent), tuple(apart)),
+        *(cases.base.stem, kinds, leading, when(asked) if scans else "", tuple(shown), tuple(idle), tuple(silent), tuple(apart)),
         *(left_out, labels),
     )
 
 
-def _parts(of: Quantity, case: Case) -> tuple[tuple[str, str], ...]:
-    """The components, or what else a quantity has several values of a filter by, with their units, from its table."""
+def _parts(of: Quantity, case: Case) -> tuple[bool, tuple[tuple[str, str], ...]]:
+    """Whether a quantity's table has scans; the components, or what else there are several values of a filter by, with
+    their units."""
     work = CaseWork(case)
     table = quantities.table_of(of, case_result(case, work, collect(work, 1)))
     if not of.per:
-        return (("", of.shown_unit()),)
+        return "k" in table, (("", of.shown_unit()),)
     units = table["unit"] if "unit" in table else [of.shown_unit()] * len(table)
-    return tuple(dict(zip(table[of.per].astype(str), units, strict=True)).items())
+    return "k" in table, tuple(dict(zip(table[of.per].astype(str), units, strict=True)).items())
 
 
 TARGET = "target"  # the key whose own keys are called like others: a duration, a range
@@ -224,12 +227,14 @@ class Look:
     def of(self, case: Case) -> Seen:
         """What a case shows. Raises ConfigError."""
         axes = quantities.labels(self.asked, case)
-        known = self._each(lambda asked: quantities.exact(asked, case, axes))
+        known, without_ends = self._each(lambda asked: quantities.exact(asked, case, axes)), False
         if not quantities.planned(self.asked.of):
             work = CaseWork(case)
-            known = self._of_result(case_result(case, work, collect(work, 1)), exactly=True)
+            result = case_result(case, work, collect(work, 1))
+            known = self._of_result(result, exactly=True)
+            without_ends = self.asked.of.ends[0] not in quantities.table_of(self.asked.of, result)
         # Of some filters alone, the others would seem to change nothing.
-        exact = np.isfinite(known[0]).any(axis=1).all()
+        exact = without_ends or np.isfinite(known[0]).any(axis=1).all()
         return Seen(known, known[:, None], np.asarray(axes.t_s)) if exact else self._sampled(case)
 
     def _each(self, of: Callable[[Asked], float]) -> np.ndarray:
@@ -341,7 +346,8 @@ def tornado(found: Sensitivity) -> Figure:
     if found.leading:
         what = tr("{quantity} of {symbol}", quantity=what, symbol=found.of[0].place(found.leading, tr))
     caption = tr(
-        "Change of {quantity} {when} for a tenth more of each key, the largest first.", quantity=what, when=found.at
+        "Change of {quantity} for a tenth more of each key, the largest first.",
+        quantity=" ".join(filter(None, (what, found.at))),
     )
     if not all(row["exact"] for row in rows):
         caption += " " + tr("Thin lines: 95 % intervals.")

@@ -90,7 +90,8 @@ def print_sensitivity(found: "Sensitivity", written: "Sequence[str]") -> None:
     heads = [(tr("{kind} of {filter}", kind=of.words, filter=one), of.changed_unit) for of, one in shown]
     columns = ["key", "value", *(head if unit == "%" else f"{head}, {tr(unit)}" for head, unit in heads)]
     what = found.of[0].place(found.leading, tr) or tr(found.of[0].words)
-    title = tr("{stem}: change of {component} {when} for +10 %", stem=found.stem, component=what, when=found.at)
+    what = " ".join(filter(None, (what, found.at)))
+    title = tr("{stem}: change of {component} for +10 %", stem=found.stem, component=what)
     show(title, columns, cells, right=columns[1:], spare=columns[:1:-1])
     if found.without_effect:
         field("no effect", ", ".join(found.without_effect))

@@ -71,6 +71,10 @@ class Commands(click.Group):
             if (fault := fault_of(error)) is None:
                 raise
             fail(fault)
+        finally:
+            for line in language.faults:
+                click.echo(line, err=True)
+            language.faults.clear()
 
 
 @contextlib.contextmanager

@@ -121,6 +121,14 @@ def _twin(path: KeyPath, model: type[Study]) -> str:
     return twin or model.in_place_of.get(".".join(map(str, path)), "").rpartition(".")[2]
 
 
+def _with_twins(paths: Iterable[KeyPath], model: type[Study]) -> Iterator[KeyPath]:
+    """The paths, and of each that has one its twin's: who changes the one takes the other away."""
+    for path in paths:
+        yield path
+        if path and (twin := _twin(path, model)):
+            yield *path[:-1], twin
+
+
 def overlaid(document: Document, model: type[Study], over: Document, read: Read, faults: Faults) -> Document:
     """The document of an included config with the keys that stand beside `include` laid over it.
 
@@ -416,22 +424,25 @@ class Expander:
         if key.split(".")[0] in COMMON_KEYS:
             self.faults.add(origin, ("sweep", key), "cannot be swept")
             return False
+        models = {draft.study: self.studies.keys(draft.study) for draft in drafts}
         try:
             swept = {
-                path for draft in drafts for path in key_paths(draft.document, self.studies.keys(draft.study), key)
+                path
+                for draft in drafts
+                for path in _with_twins(key_paths(draft.document, models[draft.study], key), models[draft.study])
             }
         except NoSuchKey as error:
             self.faults.add(origin, ("sweep", key), str(error))
             return False
         for draft in drafts:
             for other in (*(swept_key for swept_key, _ in draft.swept), *before):
-                others = key_paths(draft.document, self.studies.keys(draft.study), other, missing_ok=True)
+                others = key_paths(draft.document, models[draft.study], other, missing_ok=True)
                 if any(overlap(path, one) for path in others for one in swept):
                     self.faults.add(origin, ("sweep", key), f"sweeps what {other} sweeps as well")
                     return False
         for setting in self.settings:
             for draft in drafts:
-                set_here = key_paths(draft.document, self.studies.keys(draft.study), setting.key, missing_ok=True)
+                set_here = key_paths(draft.document, models[draft.study], setting.key, missing_ok=True)
                 if any(path[: len(s)] == s for path in set_here for s in swept):
                     self.faults.add(setting.origin, (), f"the config sweeps it: set sweep.{key}=[...] instead")
                     return False

@@ -58,6 +58,7 @@ def no_packages() -> tuple[str, ...]:
 
 packages: Callable[[], tuple[str, ...]] = no_packages
 _chosen: list[str] = []  # the last one counts
+faults: list[str] = []  # a line for each catalogue of a package that cannot be read
 
 
 @cache
@@ -89,27 +90,34 @@ def speaking(code: str) -> Iterator[None]:
         _chosen.pop()
 
 
-@cache
 def messages(code: str, package: str = OURS) -> tuple[catalogue.Entry, ...]:
     """The catalogue of a package, which is imported, in a language; English needs none, another package may have none.
 
-    Raises ConfigError where the file is no catalogue.
+    Raises ConfigError where radarsim's file is no catalogue; another package's is then left out, as `faults` says.
     """
-    folders = getattr(sys.modules.get(package), "__path__", ())
-    files = [file for folder in folders if (file := Path(folder, "language", f"{code}.po")).is_file()]
-    if code == ENGLISH or not files:
-        return ()
-    try:
-        return tuple(catalogue.entries(files[0].read_text(encoding="utf-8")))
-    except (OSError, ValueError, SyntaxError) as error:
-        raise ConfigError(f"{files[0]}: {error}") from error
+    return _read(code, package)[0]
+
+
+def translations(code: str, package: str = OURS) -> NullTranslations:
+    """The same as the standard library reads it."""
+    return _read(code, package)[1]
 
 
 @cache
-def translations(code: str, package: str = OURS) -> NullTranslations:
-    """The catalogue of a package in a language, as the standard library reads it."""
-    found = messages(code, package)
-    return GNUTranslations(catalogue.compiled(found)) if found else NullTranslations()
+def _read(code: str, package: str) -> tuple[tuple[catalogue.Entry, ...], NullTranslations]:
+    folders = getattr(sys.modules.get(package), "__path__", ())
+    files = [file for folder in folders if (file := Path(folder, "language", f"{code}.po")).is_file()]
+    if code == ENGLISH or not files:
+        return (), NullTranslations()
+    try:
+        found = tuple(catalogue.entries(files[0].read_text(encoding="utf-8")))
+        return found, GNUTranslations(catalogue.compiled(found))
+    except (OSError, ValueError, LookupError) as error:  # the last one of an unknown character set
+        words = (error.strerror if isinstance(error, OSError) else "") or str(error)
+        if package == OURS:
+            raise ConfigError(f"{files[0]}: {words}") from error
+        faults.append(f"package {package} speaks English: {files[0]}: {words}")
+        return (), NullTranslations()
 
 
 def term(message: str, package: str = "") -> Term:

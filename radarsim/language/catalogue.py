@@ -35,25 +35,29 @@ class Entry:
 
 def entries(text: str) -> list[Entry]:
     """The entries of a catalogue, the header among them. Raises ValueError, with the line, where it is none."""
-    found: list[Entry] = []
-    for block in re.split(r"\n[ \t]*\n", text.strip()):
-        entry = _entry(block)
-        if entry is not None:
-            found.append(entry)
-    return found
+    blocks: list[list[tuple[int, str]]] = [[]]
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.strip():
+            blocks[-1].append((number, line))
+        elif blocks[-1]:
+            blocks.append([])
+    return [entry for block in blocks if (entry := _entry(block)) is not None]
 
 
-def _entry(block: str) -> Entry | None:
+def _entry(block: Iterable[tuple[int, str]]) -> Entry | None:
     made, last, empty = Entry(), "", True
-    for line in block.splitlines():
+    for number, line in block:
         if line.startswith("#"):
             made.notes.append(line)
             continue
         found = LINE.fullmatch(line.strip())
         if found is None:
-            raise ValueError(f"no line of a catalogue: {line}")
+            raise ValueError(f"line {number}: no line of a catalogue: {line}")
         last, empty = found[1] or last, False
-        piece = ast.literal_eval(found[3])
+        try:
+            piece = ast.literal_eval(found[3])
+        except SyntaxError as error:
+            raise ValueError(f"line {number}: {error.msg}: {line}") from error
         if last == "msgctxt":
             made.context += piece
         elif last == "msgid":

@@ -279,6 +279,8 @@ def sentences(made: "pd.DataFrame", measured: Iterable[Quantity] = COMMON) -> li
     lines: list[str] = []
     for of in told(made, measured):
         rows = last[last["quantity"] == of.value]
+        if not len(rows):
+            continue
         first = tables.where(rows, component=rows["component"].iloc[0], model=rows["model"].iloc[0])
         lines += [_sentence(of.words, row) for row in first.to_dict("records")]
     left = len(lines) - MOST_SENTENCES
@@ -302,9 +304,10 @@ def told(made: "pd.DataFrame", measured: Iterable[Quantity]) -> list[Quantity]:
 
 
 def at_the_end(made: "pd.DataFrame") -> "pd.DataFrame":
-    """The rows of the last common time of each line."""
+    """The rows of the last common time of each line, of those that both sides have a value of there."""
     keys = ["quantity", "label", "against_label", "filter", "component", "model"]
-    return made.groupby(keys, sort=False).tail(1)
+    last = made.groupby(keys, sort=False).tail(1)
+    return last[last["value"].notna() & last["against"].notna()]
 
 
 def _sentence(words: str, row: dict[Any, Any]) -> str:
@@ -332,6 +335,8 @@ def change(row: dict[Any, Any]) -> str:
         text = f"{signed(row['difference'])} {tr(UNITS.get(row['unit'], row['unit']))}".rstrip()
         return f"{text} {interval(signed(row['difference_lo']), signed(row['difference_hi']))}"
     exact = row["exact_percent"]
+    if row["value_lo"] == row["value_hi"] and row["against_lo"] == row["against_hi"] and exact == exact:
+        return percent(exact)  # of a table of exact values: there is no interval
     known = tr(", exactly {value}", value=percent(exact)) if exact == exact else ""
     return f"{percent(row['percent'])} {interval(percent(row['percent_lo']), percent(row['percent_hi']))}{known}"
 

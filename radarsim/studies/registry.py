@@ -186,10 +186,15 @@ def usable() -> tuple[str, ...]:
 
 def quantity(name: str, case: Case) -> Quantity:
     """The quantity of a name that a case measures. Raises ConfigError where there is none such."""
-    measured = {one.name: one for one in part(case.study, lambda one: one.quantities(case.spec))}
+    measured = {one.name: one for one in quantities(case.study, case.spec)}
     if name not in measured:
         raise ConfigError(f"{case.name}: study {case.study} measures no {name!r}, but {', '.join(measured)}")
     return measured[name]
+
+
+def quantities(name: str, spec: Keys) -> tuple[Quantity, ...]:
+    """What the study of a name measures of a case with these keys. Raises as `part`."""
+    return tuple(part(name, lambda one: one.quantities(spec)))
 
 
 def folders() -> tuple[Path, ...]:

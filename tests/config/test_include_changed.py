@@ -120,6 +120,27 @@ def test_what_the_included_config_sweeps_cannot_be_changed_beside_it(folder, sai
     assert said("c") == [f"configs/c.yaml:3:3: target.coefficients: {said_of}"]
 
 
+@pytest.mark.parametrize(
+    ("base", "swept", "beside"),
+    [
+        ("sonar_manoeuvre", "sensor.sigma_bearing_deg: [1, 2]", "sensor: {sigma_bearing_rad: 0.5}"),
+        ("sonar_manoeuvre", "sensor.sigma_bearing_rad: [0.1, 0.2]", "sensor: {sigma_bearing_deg: 5}"),
+        ("mine", "scans: [10, 12]", "duration_s: 100"),
+    ],
+)
+def test_nor_can_its_twin_in_another_unit_or_said_another_way(folder, said, base, swept, beside):
+    folder("configs/swept.yaml", f"include: [{base}]\nsweep: {{{swept}}}\n")
+    folder("configs/c.yaml", f"include: [swept]\n{beside}\n")
+    (line,) = said("c")
+    assert line.startswith("configs/c.yaml:2:")
+    assert line.endswith("swept.yaml, which is included, sweeps it; sweep it here instead, and not there")
+    key, value = beside.replace("sensor: {", "sensor.").strip("}").split(": ")
+    with pytest.raises(ConfigError, match=r"the config sweeps it: set sweep"):
+        load("swept", [f"{key}={value}"])
+    folder("configs/twice.yaml", f"include: [swept]\nsweep: {{{key}: [{value}, 0.1]}}\n")
+    assert any("as well" in one for one in said("twice"))
+
+
 def test_one_of_ones_own_after_a_config_that_changes_another(folder):
     folder("configs/other.yaml", "include: [mine]\nradar: {sigma_range_m: 80}\n")
     name, text = new("third", "other", registry)

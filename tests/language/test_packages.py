@@ -4,10 +4,11 @@ import importlib
 import sys
 
 import pytest
+from click.testing import CliRunner
 
 from radarsim import language
+from radarsim.cli import main
 from radarsim.config.check import label
-from radarsim.errors import ConfigError
 from radarsim.language import speaking, term, tr
 from radarsim.studies import registry
 
@@ -61,10 +62,10 @@ def packages(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(language, "packages", lambda: ("speaks", "silent", "not_imported"))
     made = [importlib.import_module(name) for name in ("speaks", "silent")]
-    for kept in (language.messages, language.translations, language._translated):
+    for kept in (language._read, language._translated):
         kept.cache_clear()
     yield made
-    for kept in (language.messages, language.translations, language._translated):
+    for kept in (language._read, language._translated):
         kept.cache_clear()
     for name in ("speaks", "silent"):
         del sys.modules[name]
@@ -105,8 +106,31 @@ def test_keys_are_called_by_the_catalogue_of_their_schemas_package(packages):
         assert tr(label(speaks.Keys, "filters.0.name").text) == tr(label(registry.keys("range_doppler"), "name").text)
 
 
-def test_a_file_that_is_no_catalogue_is_named(packages, tmp_path):
+@pytest.mark.parametrize(
+    ("content", "fault"),
+    [
+        ("# ours\n\nrange: диапазон\n".encode(), "line 3: no line of a catalogue: range: диапазон"),
+        (b'msgid "a"\nmsgstr "\\x"\n', "line 2: "),
+        (b"\xff\xfe", "'utf-8' codec can't decode"),
+        (b'msgid ""\nmsgstr "Content-Type: text/plain; charset=none\\n"\n', "unknown encoding: none"),
+    ],
+)
+def test_a_file_that_is_no_catalogue_harms_its_package_alone(packages, tmp_path, monkeypatch, content, fault):
+    monkeypatch.setattr(language, "faults", [])
     (tmp_path / "silent" / "language").mkdir()
-    (tmp_path / "silent" / "language" / "ru.po").write_text("range: диапазон\n", encoding="utf-8")
-    with speaking("ru"), pytest.raises(ConfigError, match=r"silent.language.ru.po: no line of a catalogue: range: "):
-        packages[1].says("range")
+    file = tmp_path / "silent" / "language" / "ru.po"
+    file.write_bytes(content)
+    with speaking("ru"):
+        assert [packages[1].says("range") for _ in range(2)] == ["range"] * 2
+        assert tr("range") == "дальность"
+        assert tr("no message of anybody") == "no message of anybody"
+        assert packages[0].says("range") == "диапазон"
+    (line,) = language.faults
+    assert line.startswith(f"package silent speaks English: {file}: {fault}")
+
+
+def test_a_command_says_once_which_catalogue_it_leaves_out(packages, monkeypatch):
+    monkeypatch.setattr(language, "faults", ["package silent speaks English: its file"])
+    done = [CliRunner().invoke(main, ["list"]) for _ in range(2)]
+    assert [one.exit_code for one in done] == [0, 0]
+    assert [one.stderr for one in done] == ["package silent speaks English: its file\n", ""]
