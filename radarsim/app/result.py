@@ -233,7 +233,10 @@ class Result:
         own, made = study(self.experiment.study), self._tables
         nearly = [case.name for case in self.experiment.cases if own.exact_but_for(case)]
         bounds = ("claims",) if own.exact_errors else ("claims", "curves", "gains")
-        return (*notes.faults(made, nearly, bounds, quantities(own.name, self.cases[0].spec)), *claims.errors(made["claims"]))
+        return (
+            *notes.faults(made, nearly, bounds, quantities(own.name, self.cases[0].spec)),
+            *claims.errors(made["claims"]),
+        )
 
     def check(self) -> None:
         """Raises DisagreementError where there are `faults`, else MeasureError where the measure of a claim failed."""

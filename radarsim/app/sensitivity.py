@@ -58,10 +58,11 @@ def _value(of: Quantity) -> str:
 class Sensitivity:
     """What was found: one row a key, filter and component, by falling effect of the key on the component that leads.
 
-    of are the quantities, the first of which decides; leading is empty where that has no components. at says when, empty where it has no scans;
-    without_effect are keys that change nothing, left_out those that cannot be raised, with the reason. without_estimate
-    are filters that no row is about, as they have no estimate there. not_paired are sampled keys that change when the
-    scans are. labels: what people call each key of the rows, with its symbol and unit.
+    of are the quantities, the first of which decides; leading is empty where that has no components. at says when,
+    empty where it has no scans; without_effect are keys that change nothing, left_out those that cannot be raised, with
+    the reason. without_estimate are filters that no row is about, as they have no estimate there. not_paired are
+    sampled keys that change when the scans are. labels: what people call each key of the rows, with its symbol and
+    unit.
     """
 
     stem: str
@@ -130,7 +131,16 @@ def sensitivity(
     labels = {str(row["key"]): named(cases.base.spec, str(row["key"])) for row in shown}
     silent = [name for name, own in zip(axes.filters, base.whole[0], strict=True) if not np.isfinite(own).any()]
     return Sensitivity(
-        *(cases.base.stem, kinds, leading, when(asked) if scans else "", tuple(shown), tuple(idle), tuple(silent), tuple(apart)),
+        *(
+            cases.base.stem,
+            kinds,
+            leading,
+            when(asked) if scans else "",
+            tuple(shown),
+            tuple(idle),
+            tuple(silent),
+            tuple(apart),
+        ),
         *(left_out, labels),
     )
 

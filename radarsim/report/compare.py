@@ -335,7 +335,7 @@ def change(row: dict[Any, Any]) -> str:
         text = f"{signed(row['difference'])} {tr(UNITS.get(row['unit'], row['unit']))}".rstrip()
         return f"{text} {interval(signed(row['difference_lo']), signed(row['difference_hi']))}"
     exact = row["exact_percent"]
-    if row["value_lo"] == row["value_hi"] and row["against_lo"] == row["against_hi"] and exact == exact:
+    if row["lo"] == row["hi"] and row["against_lo"] == row["against_hi"] and exact == exact:
         return percent(exact)  # of a table of exact values: there is no interval
     known = tr(", exactly {value}", value=percent(exact)) if exact == exact else ""
     return f"{percent(row['percent'])} {interval(percent(row['percent_lo']), percent(row['percent_hi']))}{known}"

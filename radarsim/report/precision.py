@@ -36,6 +36,7 @@ class Cell:
     """The 95 % half-width of a quantity, in its `half_width_unit` (infinite where not known), and which one that is.
 
     component is empty and k zero where the quantity has none. below bounds a rate of events that were never seen.
+    against is the filter that a gain is against, where the case has several such.
     """
 
     percent: float
@@ -46,6 +47,7 @@ class Cell:
     count: int
     of: Quantity = SIGMA
     below: float | None = None
+    against: str = ""
 
     def __str__(self) -> str:
         width = f"± {self.percent:.3g} {self.of.half_width_unit}" if math.isfinite(self.percent) else "not known"
@@ -56,11 +58,13 @@ class Cell:
     def place(self) -> str:
         """Filter, component and scan, as far as it has them."""
         component = f", component {self.component}" if self.component else ""
-        return f"{self.filter!r}{component}" + (f", k = {self.k}" if self.k else "")
+        against = f" against {self.against!r}" if self.against else ""
+        return f"{self.filter!r}{against}{component}" + (f", k = {self.k}" if self.k else "")
 
     def last(self) -> str:
         """The same in short."""
-        return ", ".join(filter(None, (self.filter, self.component, f"k = {self.k}" if self.k else "")))
+        name = f"{self.filter} against {self.against}" if self.against else self.filter
+        return ", ".join(filter(None, (name, self.component, f"k = {self.k}" if self.k else "")))
 
 
 def looks(most: int, first: int = FIRST) -> Iterator[int]:
@@ -111,7 +115,9 @@ def worst(result: CaseResult, table: Table, of: Quantity = SIGMA) -> Cell | None
     row = made.iloc[first]
     component, k = str(row.get(of.per, "")), int(row.get("k", 0))
     below = float(hi[first]) if value[first] == 0 and math.isinf(percent[first]) else None
-    return Cell(float(percent.max()), str(row["case"]), str(row["filter"]), component, k, result.count, of, below)
+    against = str(row.get("baseline", "")) if result.against else ""
+    names = str(row["case"]), str(row["filter"]), component
+    return Cell(float(percent.max()), *names, k, result.count, of, below, against)
 
 
 def needed(

@@ -1,6 +1,7 @@
 """Several baselines of one case: each gain is paired on the common noise, as if its baseline stood alone."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +15,8 @@ from radarsim.app.run import RunOptions, case_result, check_precision, simulate
 from radarsim.errors import ConfigError
 from radarsim.report import tables
 from radarsim.report.claims.declared import Evidence
+from radarsim.report.precision import worst
+from radarsim.report.quantities import GAIN
 from radarsim.studies.identity import identity
 from radarsim.studies.registry import study
 
@@ -159,3 +162,14 @@ def test_faults(tmp_path, monkeypatch, baseline, line):
     with pytest.raises(ConfigError) as caught:
         load("two.yaml")
     assert caught.value.lines == (line,)
+
+
+def test_a_gains_precision_says_against_which(both):
+    (case,) = both.cases
+    table = gains_of(study("range_doppler"))
+    found, alone = worst(case, table, GAIN), worst(replace(case, against=()), table, GAIN)
+    assert found is not None
+    assert found.against in ("r+Vr", "r")
+    assert f"filter {found.filter!r} against {found.against!r}, component " in str(found)
+    assert alone is not None
+    assert " against " not in str(alone)

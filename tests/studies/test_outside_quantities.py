@@ -7,6 +7,8 @@ import pytest
 
 from radarsim.app.quantities import Wanted
 from radarsim.app.solve import solve
+from radarsim.errors import ConfigError
+from radarsim.studies import registry
 from tests.studies import outside
 
 STUDY = '''
@@ -36,6 +38,7 @@ class Areas(StudyFolder):
         worst = worst[["case", "filter", "worst", "most_lo", "most_hi"]]
         share = {f"inside{end}": 100 / worst[of] for end, of in (("", "worst"), ("_lo", "most_hi"), ("_hi", "most_lo"))}
         least = rows.groupby(["case", "filter"], sort=False)["exact_sigma"].min().rename("limit").reset_index()
+        least["limit"] = least["limit"].where(least["filter"] != "r")
         return {"areas": areas, "worst": worst.assign(**share), "limits": least}
 
     def answer(self, results, made):
@@ -107,6 +110,19 @@ def test_solve_takes_one_from_a_table_of_exact_values_alone(radarsim):
     known = solve("rls2", KEY, Wanted("sigma", "r+Vr", "r"), 100.0, overrides=["scans=9"])
     assert least["exact"]
     assert least["value"] == pytest.approx(known.value, rel=1e-9)
+    for option, value in (("--at", 3), ("--at-k", 2)):
+        words = ("solve", "a.yaml", KEY, "--limit", "r+Vr", "--equals", 100, option, value)
+        refused = f"{option}: the smallest error has one value, not one a scan: leave it out\n"
+        assert radarsim(*words, code=2).stderr == refused
+
+
+def test_one_that_is_exact_is_so_where_a_filter_has_no_value(radarsim, tmp_path):
+    """`r` has no limit: nothing is simulated for it, and no change of the other's has an interval."""
+    said = radarsim("solve", "a.yaml", KEY, "--limit", "r", "--equals", 100, code=2).stderr
+    assert said == f"smallest error of r: there is no estimate there, whatever {KEY} is\n"
+    made = radarsim("sensitivity", "a.yaml", "--of", "limit", "--out", tmp_path, "--no-figures").stdout
+    assert made.startswith("a: change of smallest error for +10 %")
+    assert "[" not in made
 
 
 def test_solve_samples_one_without_exact_values(radarsim):
@@ -149,7 +165,7 @@ def test_sensitivity_is_of_it(radarsim, tmp_path):
     said = radarsim(
         "sensitivity", "a.yaml", "--of", "inside", "-n", 200, "--out", tmp_path, "--format", "svg"
     ).stdout.splitlines()
-    assert said[0] == "a: change of share within 100 m at the last scan for +10 %"
+    assert said[0] == "a: change of share within 100 m for +10 %"
     assert "share within 100 m of r, points" in said[1]
     rows = pd.read_csv(tmp_path / "sensitivity/a/sensitivity.csv")
     assert {"inside_percent", "inside_change_points", "inside_change_lo"} <= set(rows)
@@ -185,3 +201,14 @@ def test_what_a_study_does_not_measure_is_refused_with_what_it_does(radarsim, tm
     named = radarsim("solve", "a.yaml", KEY, "--area", "q", "--filter", "r", "--equals", 1, code=2).stderr
     assert named == "no component 'q'; there are: r, Vr, ar\n"
     assert radarsim("solve", "rls2", KEY, "--area", "r", "--equals", 1, code=2).stderr.endswith("but sigma, gain\n")
+
+
+def test_a_study_that_takes_no_spec_is_one_line(monkeypatch):
+    class Odd:
+        def quantities(self):
+            return ()
+
+    monkeypatch.setattr(registry, "_loaded", lambda name: Odd())
+    monkeypatch.setattr(registry, "package", lambda name: "odd 1.0")
+    with pytest.raises(ConfigError, match=r"^study odd: the package odd 1\.0 fails: TypeError: .*quantities"):
+        registry.quantities("odd", None)
