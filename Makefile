@@ -54,27 +54,25 @@ smoke: $(VENV)/installed
 reproduce-figures: $(VENV)/installed
 	$(BIN)/python -m radarsim.cli.reproduce results
 
-# docs/readings_p1.md …, every claim under every reading: from stored blocks where they are there, else run.
-# READINGS=--decide: longer, until claims are decided; some that are left (exit code 3) are no fault of the page.
-# Their classes are what radarsim ships, and says of a claim wherever it speaks of it.
+# Every claim under every reading: from stored blocks where they are there, else run. READINGS=--decide: longer, until
+# claims are decided; some that are left (exit code 3) are no fault. The built pages show what is left in results, and
+# the classes are what radarsim ships, and says of a claim wherever it speaks of it.
 READINGS ?=
 readings-pages: $(VENV)/installed
-	for p in 1 2 3 4; do $(RADARSIM) readings P$$p $(READINGS) --out results --markdown > docs/readings_p$$p.md.new; \
-	code=$$?; test $$code -eq 0 -o $$code -eq 3 && mv docs/readings_p$$p.md.new docs/readings_p$$p.md || exit 1; done
+	mkdir -p results/readings
+	for p in P1 P2 P3 P4; do $(RADARSIM) readings $$p $(READINGS) --out results --markdown > results/readings/$$p.new; \
+	code=$$?; test $$code -eq 0 -o $$code -eq 3 && mv results/readings/$$p.new results/readings/$$p.md || exit 1; done
 	cp results/readings/classes.csv radarsim/app/classes.csv
 
-# docs/claims.md, from what reproduce-figures left.
+# What each claim came to, from what reproduce-figures left: the data of the page of claims that `make docs` builds.
 claims-page: $(VENV)/installed
-	$(RADARSIM) claims --out results --markdown > docs/claims.md.new
-	mv docs/claims.md.new docs/claims.md
-	$(RADARSIM) claims --out results --figure docs/claims.svg > /dev/null
+	PYTHONPATH=docs $(BIN)/python -m making.claims results
 
 bench: $(VENV)/installed
 	$(BIN)/python benchmarks/w1.py
 
 schema: $(VENV)/installed
 	$(RADARSIM) schema > docs/schema.json
-	PYTHONPATH=docs $(BIN)/python -m making.keys
 
 # The tables that `radarsim doctor` compares with: made anew after a change that is meant to change numbers.
 known: $(VENV)/installed

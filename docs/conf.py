@@ -9,7 +9,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from making import chart, contents, formulas, generated, modules
+from making import chart, claims, contents, formulas, generated, modules
 
 import radarsim
 
@@ -71,4 +71,5 @@ def setup(app):
     app.connect("autodoc-process-docstring", modules.plain)
     app.connect("build-finished", contents.front_page)
     app.connect("build-finished", chart.drawn)
+    app.connect("build-finished", claims.drawn)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,12 +1,17 @@
 """Parts of pages that are read off the program while building: `<!-- generated: NAME -->` on a line of its own."""
 
 import re
+from functools import partial
 from pathlib import Path
 
-from making import commands, modules, tables
+from making import claims, commands, keys, modules, readings, tables
 
 MARK = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
-PARTS = {"commands": commands.markdown, "modules": modules.markdown, "tables": tables.markdown}
+PARTS = {
+    **{"claims": claims.markdown, "commands": commands.markdown, "keys": keys.markdown},
+    **{"modules": modules.markdown, "tables": tables.markdown},
+    **{f"readings_{paper.lower()}": partial(readings.markdown, paper) for paper in readings.PAPERS},
+}
 
 
 def filled(page: str) -> str:

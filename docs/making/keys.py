@@ -1,18 +1,12 @@
-"""Every YAML key as Markdown, from the schema that the configs are checked by; `make schema` writes it into its page.
-
-It stands there between `<!-- keys -->` and `<!-- end -->`, so that the page can be read as the file that it is.
-"""
+"""Every YAML key as Markdown, from the schema that the configs are checked by."""
 
 import re
-from pathlib import Path
 
 from radarsim.config.fields import in_degrees
 from radarsim.config.schema import schema
 from radarsim.studies import registry
 
 COMMON = ("include", "sweep", "realisations", "seed", "figures")
-PAGE = Path(__file__).parents[1] / "reference" / "yaml.md"
-MARK = re.compile(r"(?<=^<!-- keys -->\n).*?(?=^<!-- end -->$)", re.MULTILINE | re.DOTALL)
 BOUNDS = {"minimum": "≥ {}", "exclusiveMinimum": "> {}", "maximum": "≤ {}", "exclusiveMaximum": "< {}"}
 
 
@@ -27,11 +21,6 @@ def markdown() -> str:
         parts += [f"## study: {study}", kind["description"], table(own, definitions, required(kind))]
         parts += mappings(own, definitions, set())
     return "\n\n".join(parts)
-
-
-def filled(page: str) -> str:
-    """A page with the keys of today between its marks."""
-    return MARK.sub(lambda _: f"\n{markdown()}\n\n", page)
 
 
 def mappings(properties: dict, definitions: dict, seen: set[str]) -> list[str]:
@@ -127,7 +116,3 @@ def written(value: object) -> str:
         case int() if value >= 2**32 and value & (value + 1) == 0:
             return f"2^{value.bit_length()} − 1"
     return str(value)
-
-
-if __name__ == "__main__":
-    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

@@ -287,7 +287,7 @@ def report(
 @click.argument("names", nargs=-1, metavar="[CONFIG | CLAIM | PAPER …]", shell_complete=group.completed)
 @group.out_option
 @group.json_option
-@click.option("--markdown", is_flag=True, help="The page docs/claims.md on stdout in place of text.")
+@click.option("--markdown", is_flag=True, help="The page of claims in Markdown on stdout in place of text.")
 @click.option("--parts", is_flag=True, help="What was measured of each.")
 @click.option("--figure", metavar="FILE", help="Also draw them, in margins of what the papers say, to this file.")
 def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figure: str | None, parts: bool) -> None:

@@ -1,38 +1,81 @@
-"""docs/claims.md is in step with the claims: the same, in the same order and words, all of them run."""
+"""The built pages of claims and readings: every claim, its class as shipped, and what it came to at full size."""
 
+import csv
 import re
-from pathlib import Path
+
+import pytest
+from making import claims, readings
 
 from radarsim.app.run import papers
 from radarsim.app.stored import shipped_classes
-from radarsim.report import claims
-from radarsim.report.claims import page, rule
+from radarsim.report.claims import NOT_RUN, page
 
-TEXT = (Path(__file__).parents[2] / "docs/claims.md").read_text(encoding="utf-8")
-LINE = re.compile(r"^\| (P\d\.\w+) \| (.*?) \| .* \| ([^|]*) \| `(\w+)` \|$", re.MULTILINE)
-
-
-def test_the_page_has_all_claims_in_their_words():
-    rows = claims.listed(papers(), {})
-    wanted = [(row["claim"], page.page([row], {})) for row in rows]
-    stands = {found[1]: found for found in LINE.finditer(TEXT)}
-    assert list(stands) == [claim for claim, _ in wanted]
-    lines = set(TEXT.splitlines())
-    for claim, alone in wanted:
-        (made,) = LINE.finditer(alone)
-        assert (stands[claim][2], stands[claim][4]) == (made[2], made[4])
-        assert [line for line in alone.splitlines() if line.startswith(f"| {claim} ")][1] in lines  # in the original
+LINE = re.compile(r"^\| (P\d\.\w+) \| <details><summary>(.*?)</summary>(.*?)</details> \| (.*) \| `(\w+)` \|$", re.M)
+DECLARED = {claim.id: claim for of in papers() for claim in of.claims}
 
 
-def test_every_claim_was_run_and_has_the_class_that_is_shipped():
-    verdicts = {found[1]: found[3].partition(" (")[0].strip("*") for found in LINE.finditer(TEXT)}
-    over = {claim: said.partition("; ")[2] or said for claim, said in verdicts.items()}
-    kinds = {claim: next(kind for kind in rule.CLASSES if said.startswith(kind)) for claim, said in over.items()}
-    shipped = {one.claim: one.kind for one in shipped_classes()}
-    assert {claim: kinds[claim] for claim in shipped} == shipped
-    parts = re.findall(r"^\| (P\d\.\w+) \|(?: [^|]* \|){7}$", TEXT, re.MULTILINE)
-    assert list(dict.fromkeys(parts)) == list(verdicts)
+@pytest.fixture(scope="module")
+def text(tmp_path_factory):
+    """The page as it is built where no results are."""
+    return claims.markdown(tmp_path_factory.mktemp("results"))
 
 
-def test_the_head_is_the_one_that_the_command_writes():
-    assert TEXT.startswith(page.HEAD)
+def test_the_page_has_a_row_a_claim_in_its_words(text):
+    rows = {found[1]: found for found in LINE.finditer(text)}
+    assert list(rows) == list(DECLARED)
+    for claim, found in rows.items():
+        words, at = found[2].replace("&lt;", "<").replace("\\|", "|"), found[5]
+        assert (words, at) == (DECLARED[claim].statement, DECLARED[claim].config)
+        assert DECLARED[claim].place.replace("<", "&lt;").replace("|", "\\|") in found[3]
+
+
+def test_every_claim_was_run_and_has_the_class_that_is_shipped(tmp_path):
+    rows, whole = claims.rows(tmp_path)
+    assert not whole
+    found = {row["claim"]: row for row in rows}
+    assert NOT_RUN not in {row["class"] for row in rows}
+    assert {one.claim: one.kind for one in shipped_classes()}.items() <= {
+        claim: row["class"] for claim, row in found.items()
+    }.items()
+
+
+def test_what_is_kept_is_a_part_of_its_claim():
+    """Where it is none `make claims-page` was not called since the claim was changed."""
+    with claims.FILE.open(encoding="utf-8", newline="") as file:
+        kept = {row["claim"]: row for row in csv.DictReader(file)}
+    assert list(kept) == list(DECLARED)
+    for claim, row in kept.items():
+        what = row["what"].rpartition("`: ")[2]
+        parts = [part for part in DECLARED[claim].parts if part.what == what and part.unit == row["unit"]]
+        assert parts or not row["measured"], claim
+        ends = {part.expected.words for part in parts}
+        assert row["expected"] in ends or not parts, (claim, ends, row["expected"])
+
+
+def test_a_full_reproduction_is_shown_with_every_part(tmp_path, text, monkeypatch):
+    rows = claims.kept()
+    monkeypatch.setattr(claims.run, "claims", lambda names, out: [*rows, rows[0] | {"what": "another part"}])
+    full = claims.markdown(tmp_path)
+    assert "| P1.1 | another part |" in full
+    assert "another part" not in text
+
+
+def test_the_figure_is_drawn_beside_the_page():
+    assert {mark.label for panel in page.figure(claims.kept()).panels for mark in panel.marks} >= {
+        "confirmed",
+        "refuted",
+    }
+
+
+@pytest.mark.parametrize("paper", readings.PAPERS)
+def test_the_page_of_readings_has_every_class_and_choice(paper, tmp_path):
+    made = readings.markdown(paper, tmp_path)
+    for one in shipped_classes():
+        if one.claim.startswith(f"{paper}."):
+            assert re.search(rf"^\| {re.escape(one.claim)} \| .* \| {one.holds} of {one.of} \|$", made, re.M), one.claim
+    choices = readings.readings.papers()[paper].readings.choices
+    assert [f"### `{choice.key}`" for choice in choices] == re.findall("^### .*$", made, re.M)
+    whole = tmp_path / "readings" / f"{paper}.md"
+    whole.parent.mkdir()
+    whole.write_text("# Title\n\nEverything.\n")
+    assert readings.markdown(paper, tmp_path) == "Everything."

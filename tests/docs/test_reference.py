@@ -86,18 +86,11 @@ def test_arrays_are_told_with_their_shapes():
 
 
 def test_reference_holds_every_key_and_every_command():
-    text = keys.PAGE.read_text(encoding="utf-8")
+    text = keys.markdown()
     assert not [key for _, key in KEYS if f"`{key}`" not in text]
+    assert text.count("\n## study: ") == len(registry.names())
     made = commands.markdown()
     assert not [name for name in main.commands if f"## radarsim {name}\n" not in made]
-
-
-def test_the_page_of_keys_is_that_of_todays_schema():
-    """`make schema` writes it."""
-    text = keys.PAGE.read_text(encoding="utf-8")
-    assert keys.filled(text) == text
-    assert text.count("\n## study: ") == len(registry.names())
-    assert keys.filled("a\n<!-- keys -->\nold\n<!-- end -->\nz") != "a\n<!-- keys -->\nold\n<!-- end -->\nz"
 
 
 def test_marks_are_replaced_and_unknown_ones_refused():
@@ -106,6 +99,12 @@ def test_marks_are_replaced_and_unknown_ones_refused():
     assert "## radarsim run" in source[0]
     with pytest.raises(KeyError):
         generated.fill(None, "page", ["<!-- generated: nothing -->"])
+
+
+def test_every_part_that_is_generated_stands_in_a_page():
+    pages = [page for page in (ROOT / "docs").rglob("*.md") if "_build" not in page.parts]
+    found = [name for page in pages for name in generated.MARK.findall(page.read_text(encoding="utf-8"))]
+    assert sorted(found) == sorted(generated.PARTS)
 
 
 # As few small cases as write every table and column that any shipped config writes.

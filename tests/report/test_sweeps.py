@@ -101,15 +101,15 @@ def test_the_page_of_claims():
     text = page.page([ROW, counted, never, *parts], {ROW["paper"]: "range_doppler"})
     lines = [line for line in text.split("\n") if line.startswith("| P1")]
     words, measured = "a \\| b &lt; c", "gain | −1.235 [−1.300, −1.200] %"
+
+    def row(claim, inner, verdict):
+        return f"| {claim} | <details><summary>{words}</summary>«а» (table){inner}</details> | {verdict} | `rls2` |"
+
     assert lines == [
-        f"| P1.1 | {words} | gain: −1.25 % exactly; expected &lt; 0 % | **confirmed** | `rls2` |",
-        f"| P1.2 | {words} | operations: 7; expected &lt; 0 | **confirmed** | `rls2` |",
-        f"| P1.3 | {words} |  | not run | `rls2` |",
-        f"| P1.4 | {words} | `rls0`: gain: 2.5 % exactly; expected &lt; 0 % | **refuted** | `rls2` |",  # the worst
-        "| P1.1 | «а» | table |  |",
-        "| P1.2 | «а» | table |  |",
-        "| P1.3 | «а» | table | so |",
-        "| P1.4 | «а» | table |  |",
+        row("P1.1", "<br>Came out: gain: −1.25 % exactly; expected &lt; 0 %.", "**confirmed**"),
+        row("P1.2", "<br>Came out: operations: 7; expected &lt; 0.", "**confirmed**"),
+        row("P1.3", "<br>Read as: so.", "not run"),
+        row("P1.4", "<br>Came out: `rls0`: gain: 2.5 % exactly; expected &lt; 0 %.", "**refuted**"),  # the worst
         f"| P1.1 | {measured} | −1.25 | &lt; 0 % | 0 | **confirmed** | confirmed |",
         "| P1.2 | operations | 7 |  | &lt; 0 | 0 | **confirmed** | confirmed |",
         f"| P1.4 | `rls0`: {measured} | 2.5 | &lt; 0 % | 2.5 | **refuted** | confirmed |",
@@ -119,7 +119,8 @@ def test_the_page_of_claims():
         ),
     ]
     assert "* **2 confirmed**, true as stated: P1.1, P1.2\n* **1 refuted**" in text
-    assert text.count("<details>") == text.count("</details>") == 1
+    assert text.count("<details>") == text.count("</details>") == 5
+    assert "part by part" not in page.page([ROW], {}, parts=False)
 
 
 def test_measured_values_are_written_to_two_figures_of_their_half_width():

@@ -5,7 +5,7 @@ The class of a claim over all readings that its paper allows, beside the one tha
 It is worked out in one place, `over.Over.outcome`, when `radarsim readings` judges a claim under each of them, and
 kept as a row of classes.csv. Everything else that shows a class looks it up.
 
-docs/claims.md: all claims of the papers in a table each, and every part of them below, made from stored results.
+The page of claims: all of a paper in a table, and every part of them below, made from stored results.
 
 The forest plot of claims: of each the worst part, its interval and exact value, in margins of what the words say.
 """
@@ -236,19 +236,14 @@ def words(kind: str, own: str, depends_on: str = "", say: Callable[..., str] = s
 
 
 # ---- page ------------------------------------------------------------------------------------------------------------
-HEAD = """# The papers' claims
-
-Made from results by `make claims-page`, never by hand, by [one rule](verdicts.md) that was written down before anything
-was measured. Of each claim a line: what the paper says; the part of it that lies furthest from these words, measured
-with the interval that is judged or exactly, and what the words leave; how far the claim stands; the config that shows
-it (`radarsim run CONFIG`, then `radarsim claims CONFIG`). The class is over all readings that the paper allows, where
-it leaves anything open (`radarsim readings`): "refuted as shipped; depends on start" is false with the choices that
-the config takes, and true with another start. Below, to be opened: every claim in the original and how it was read,
-and every part: what was measured, the exact value where it is known, which then decides, the values that the words
-leave, and by how many margins it misses them. Extensions are ours, or what a paper only reports of others, and are not
-counted.
-
-![All claims, in margins of what their papers say](claims.svg)
+TITLE = "# The papers' claims"
+HEAD = """A row a claim: what the paper says, how far it stands, and the config that shows it (`radarsim run
+CONFIG`, then `radarsim claims CONFIG`). All are judged by [one rule](verdicts.md), which was written before
+anything was measured. Where the paper leaves something open the class is over all readings that it allows
+(`radarsim readings`): "refuted as shipped; depends on start" is false with the choices that the config takes, and
+true with another start. Open a claim for its words in the original, how they were read, and the part of it that
+lies furthest from them: measured, with the interval that is judged, or exactly, and what the words leave.
+Extensions are ours, or what a paper only reports of others, and are not counted.
 """
 MARKS = (CONFIRMED, REFUTED)  # in bold
 ORDER = (*CLASSES, NOT_JUDGED, NOT_RUN)
@@ -263,25 +258,25 @@ WORDS = {  # of each class, for the headline
 }
 
 
-def page(rows: Sequence[Mapping], pages: Mapping[str, str]) -> str:
-    """The page, from the rows of `claims.listed`; pages holds the stem of a paper's page, by the paper."""
-    text = [HEAD, *headline(rows), ""]
+def page(rows: Sequence[Mapping], pages: Mapping[str, str], parts: bool = True) -> str:
+    """The page, from the rows of `claims.listed`; pages holds the stem of a paper's page, by the paper.
+
+    parts: whether every part that was measured follows, in a table to be opened.
+    """
+    text = [TITLE, "", HEAD, *headline(rows), ""]
     for paper in dict.fromkeys(row["paper"] for row in rows):
         own = [row for row in rows if row["paper"] == paper]
         key = own[0]["claim"].partition(".")[0]
         link = f" Equations and decisions: [{key}]({pages[paper]}.md)." if pages.get(paper) else ""
         claims = [[row for row in own if row["claim"] == claim] for claim in dict.fromkeys(row["claim"] for row in own)]
         text += [f"## {key} {paper}", "", f"{counted(own)}.{link}", ""]
-        text += [
-            "| claim | what the paper says | what came out | how far it stands | config |",
-            "|---|---|---|---|---|",
-        ]
-        text += [*map(_line, claims), "", "<details>", f"<summary>{key} in the original, part by part</summary>", ""]
-        text += ["| claim | in the original | place | read as |", "|---|---|---|---|", *map(_original, claims), ""]
-        text += ["| claim | part | measured | exact | expected | miss, margins | verdict | rule of 0.1 |"]
-        text += ["|---|---|---|---|---|---|---|---|"]
-        text += [line for parts in claims for line in _parts(parts)]
-        text += ["", "</details>", ""]
+        text += ["| claim | what the paper says | how far it stands | config |", "|---|---|---|---|"]
+        text += [*map(_line, claims), ""]
+        lines = [line for every in claims for line in _parts(every)] if parts else []
+        if lines:
+            text += ["<details>", f"<summary>{key} part by part</summary>", ""]
+            text += ["| claim | part | measured | exact | expected | miss, margins | verdict | rule of 0.1 |"]
+            text += ["|---|---|---|---|---|---|---|---|", *lines, "", "</details>", ""]
     return "\n".join(text)
 
 
@@ -382,18 +377,16 @@ def number(value: Any) -> float | None:
 
 
 def _line(parts: Sequence[Mapping]) -> str:
-    """A claim: its words, the part that is furthest from them, its class."""
+    """A claim: its words; to be opened, the original, how it was read and the part furthest from it; its class."""
     first, found = parts[0], worst(parts)
-    came = "" if found is None else f"{_named(found, parts)}: {shown(found)}; expected {_expected(found)}"
-    cells = (first["claim"], first["statement"], came, verdict_of(parts))
-    return "| " + " | ".join(map(_cell, cells)) + f" | `{first['config']}` |"
-
-
-def _original(parts: Sequence[Mapping]) -> str:
-    """A claim as its paper has it, and how it was read."""
-    first = parts[0]
     original = f"«{first['original']}»" if first["original"] else ""
-    return "| " + " | ".join(map(_cell, (first["claim"], original, first["place"], first["reading"]))) + " |"
+    inner = [" ".join(filter(None, (original, f"({first['place']})")))]
+    if first["reading"]:
+        inner.append(f"Read as: {first['reading']}.")
+    if found is not None:
+        inner.append(f"Came out: {named(found, parts)}: {shown(found)}; expected {_expected(found)}.")
+    said = f"<details><summary>{_cell(first['statement'])}</summary>{'<br>'.join(map(_cell, inner))}</details>"
+    return f"| {first['claim']} | {said} | {_cell(verdict_of(parts))} | `{first['config']}` |"
 
 
 def _expected(row: Mapping) -> str:
@@ -440,7 +433,7 @@ def _parts(parts: Sequence[Mapping]) -> list[str]:
             verdict += " (extension)"
         exact, missed = number(row["exact"]), number(row["miss"])
         cells = (
-            *(row["claim"], _named(row, parts), measured(row) if number(row["measured"]) is not None else ""),
+            *(row["claim"], named(row, parts), measured(row) if number(row["measured"]) is not None else ""),
             *("" if exact is None else plain(exact), _expected(row)),
             *("" if missed is None else f"{missed:.3g}", verdict, row["old_verdict"]),
         )
@@ -448,8 +441,8 @@ def _parts(parts: Sequence[Mapping]) -> list[str]:
     return lines
 
 
-def _named(row: Mapping, parts: Sequence[Mapping]) -> str:
-    """What a part measures, with its case where the words alone are those of another part too."""
+def named(row: Mapping, parts: Sequence[Mapping]) -> str:
+    """What a part of a claim measures, with its case where the words alone are those of another part too."""
     alike = sum(other["what"] == row["what"] for other in parts)
     return row["what"] if alike == 1 else f"`{row['case']}`: {row['what']}"
 

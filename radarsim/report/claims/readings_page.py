@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from radarsim.language import Term, current, numeral, plural, term, tr
-from radarsim.report.claims.over import Joint, Key, Over, PaperReadings, Search, Together
+from radarsim.report.claims.over import Choice, Joint, Key, Over, PaperReadings, Search, Together
 from radarsim.report.claims.page import expected, plain, words
 from radarsim.report.claims.rule import said
 
@@ -47,15 +47,17 @@ def page(of: PaperReadings, cited: str, over: Sequence[Over], counted: Search | 
     else:
         numbers, windows = _numbers(counted), _windows(counted)
     parts += [tr("## Printed numbers by reading"), numbers, tr("## Where each number comes out"), windows]
-    parts += [
-        tr("## What the paper leaves open"),
-        tr(KINDS),
-        *(_choice(of, number) for number in range(len(of.choices))),
-    ]
+    parts += [*left_open(of)]
     return "\n\n".join(parts) + "\n"
 
 
-def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def left_open(of: PaperReadings) -> list[str]:
+    """The choices that the paper leaves open, each with its alternatives and their reasons: paragraphs of Markdown."""
+    return [tr("## What the paper leaves open"), tr(KINDS), *map(_choice, of.choices)]
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table; terms among the columns in the language spoken."""
     lines = [
         "| " + " | ".join(tr(one) if isinstance(one, Term) else one for one in columns) + " |",
         "|" + "---|" * len(columns),
@@ -75,7 +77,7 @@ def _claims(over: Sequence[Over]) -> str:
         said = words(found.kind, found.kind, ", ".join(found.depends_on), tr) if found else tr("not judged")
         verdict = "; ".join(filter(None, (said, one.still_open())))
         rows.append((one.claim.id, tr(one.claim.statement), verdict, holds))
-    return _table((term("claim"), term("statement"), term("verdict"), term("holds in")), rows)
+    return table((term("claim"), term("statement"), term("verdict"), term("holds in")), rows)
 
 
 def _changed(over: Sequence[Over]) -> str:
@@ -85,7 +87,7 @@ def _changed(over: Sequence[Over]) -> str:
         for reading in one.against_print
         if reading.outcome is not None
     ]
-    return _table((term("claim"), term("reading"), term("comes out")), rows) if rows else ""
+    return table((term("claim"), term("reading"), term("comes out")), rows) if rows else ""
 
 
 def _impossible(over: Sequence[Over]) -> str:
@@ -94,7 +96,7 @@ def _impossible(over: Sequence[Over]) -> str:
         for reading in one.impossible:
             reasons.setdefault((one.claim.id, reading.why), []).append(reading.name)
     rows = [(claim, str(len(names)), names[0], said(why)) for (claim, why), names in reasons.items()]
-    return _table((term("claim"), term("readings"), term("such as"), term("why not")), rows) if rows else ""
+    return table((term("claim"), term("readings"), term("such as"), term("why not")), rows) if rows else ""
 
 
 def _best(of: Joint) -> str:
@@ -112,7 +114,7 @@ def _best(of: Joint) -> str:
         *(term("reading"), term("kind"), term("to the print"), term("within margins"), term("undecided")),
         *(term("claims that hold"), term("which")),
     )
-    return f"{tr(COUNTED)}\n\n{_table(columns, rows)}"
+    return f"{tr(COUNTED)}\n\n{table(columns, rows)}"
 
 
 def _printed(of: Joint) -> str:
@@ -128,7 +130,7 @@ def _printed(of: Joint) -> str:
         printed = f"{expected(number.words)} {tr(number.unit)}".strip()
         rows.append((number.claim, tr(number.what), printed, *(_came(one, key) for one in places.values())))
     words = [f"*{tr(name)}*: {one.name}." for name, one in places.items() if one != of.shipped]
-    return "\n\n".join([_table((*PRINTED, *places), rows), *words])
+    return "\n\n".join([table((*PRINTED, *places), rows), *words])
 
 
 def _came(of: Together, key: Key) -> str:
@@ -151,7 +153,7 @@ def _alternatives(of: Joint) -> str:
         if any(own[key] not in ("all", "none") for own in kept.values())
     ]
     words = tr("Values of one choice, all others as shipped, with which a number comes out to the print.")
-    return f"{words}\n\n{_table((*PRINTED[:2], *kept), rows)}"
+    return f"{words}\n\n{table((*PRINTED[:2], *kept), rows)}"
 
 
 def _numbers(search: Search) -> str:
@@ -170,7 +172,7 @@ def _numbers(search: Search) -> str:
         counts = [str(int(search.count(rule)[place])) for place in places.values()]
         rows.append(("", name, str(len(search.printed)), *counts))
     words = [f"*{tr(name)}*: {search.words(place)}." for name, place in places.items() if place != search.place]
-    return "\n\n".join([*([tr(search.read_as)] if search.read_as else []), _table((*PRINTED, *places), rows), *words])
+    return "\n\n".join([*([tr(search.read_as)] if search.read_as else []), table((*PRINTED, *places), rows), *words])
 
 
 def _value(search: Search, number: int, place: tuple[int, ...]) -> str:
@@ -196,7 +198,7 @@ def _windows(search: Search) -> str:
     never = int(np.sum(~search.strict.reshape(len(search.printed), -1).any(axis=1)))
     if never:
         words += plural(" {count} comes out under no combination.", " {count} come out under no combination.", never)
-    return f"{words}\n\n{_table((*PRINTED[:2], *kept), rows)}"
+    return f"{words}\n\n{table((*PRINTED[:2], *kept), rows)}"
 
 
 def _listed(window: str) -> str:
@@ -208,8 +210,7 @@ def _listed(window: str) -> str:
     return numeral(window) if RANGES.fullmatch(window) else window
 
 
-def _choice(of: PaperReadings, number: int) -> str:
-    choice = of.choices[number]
+def _choice(choice: Choice) -> str:
     rows = [(one.name, one.kind, tr(one.reason)) for one in choice.alternatives]
     on = tr(" Bears on {claims}.", claims=", ".join(choice.claims)) if choice.claims else ""
     quoted = (
@@ -222,6 +223,6 @@ def _choice(of: PaperReadings, number: int) -> str:
             f"### `{choice.key}`",
             f"{tr(choice.asks)}.{on}",
             f"> {quoted}",
-            _table((term("value"), term("kind"), term("why")), rows),
+            table((term("value"), term("kind"), term("why")), rows),
         ]
     )

@@ -1,0 +1,42 @@
+"""The pages of readings, made while building: what a paper leaves open, and its claims over all that it allows.
+
+The classes are those that radarsim ships. Where `make readings-pages` has left its pages in results/readings they are
+shown whole: with the printed numbers by reading, and where each of them comes out.
+"""
+
+from pathlib import Path
+
+from radarsim.app import readings, stored
+from radarsim.report.claims import page, readings_page
+
+PAPERS = ("P1", "P2", "P3", "P4")
+RESULTS = Path(__file__).parents[2] / "results"
+HERE = (
+    "The printed numbers by reading, and where each of them comes out, are what `radarsim readings {paper} --markdown` "
+    "adds, from stored runs or new ones; every number under every reading is then in `results/readings/readings.csv`, "
+    "and beside it a specification curve a claim."
+)
+
+
+def markdown(paper: str, results: Path = RESULTS) -> str:
+    """The page of a paper without its title: as results hold it, else what is known without any."""
+    made = results / "readings" / f"{paper}.md"
+    return made.read_text(encoding="utf-8").partition("\n")[2].strip() if made.is_file() else shipped(paper)
+
+
+def shipped(paper: str) -> str:
+    """The claims of a paper with their classes over all readings, and what the paper leaves open."""
+    of = readings.papers()[paper]
+    known = stored.classes_of([(of.readings, of.claims)], None)
+    rows = []
+    for claim in of.claims.claims:
+        if (found := known.get(claim.id)) is not None:
+            said = page.words(found.kind, found.kind, found.depends_on)
+            rows.append((claim.id, claim.statement, said, f"{found.holds} of {found.of}"))
+    parts = [
+        f"{of.claims.paper}. {HERE.format(paper=paper)}",
+        "## Claims over all readings",
+        readings_page.table(("claim", "statement", "verdict", "holds in"), rows),
+        *readings_page.left_open(of.readings),
+    ]
+    return "\n\n".join(parts)
