@@ -92,8 +92,8 @@ def report_fit(found: "Fit") -> None:
 # ---- verdicts --------------------------------------------------------------------------------------------------------
 SHORT = 12  # words of a claim in a list
 NOTHING_RUN = term(
-    "nothing is run here: `make reproduce-figures` runs it all; docs/claims.md, which `make docs` builds, has the results "
-    "at full size"
+    "nothing is run here: `make reproduce-figures` runs it all; docs/claims.md, which `make docs` builds, has the "
+    "results at full size"
 )
 
 
