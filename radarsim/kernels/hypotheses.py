@@ -131,17 +131,14 @@ INNOVATION, NEAR, FALL = 0, 1, 2  # columns of e, near and c behind the two list
 
 
 class Lists(NamedTuple):
-    """Room for hypotheses, by addresses (`room`, `most`: numbers per column).
+    """Room for hypotheses, by addresses (`room`, `most`: numbers per column)."""
 
-    columns    two lists of four columns, `room` numbers each, the last of them w; then e, near and c of the list that
-               is branched
-    children   logarithms of weights and innovations of what branches, then a copy of the weights; `most` numbers each
-    parents    of which hypothesis each is a branch
-    """
-
+    #: two lists of four columns, `room` numbers each, the last of them w; then e, near and c of the list that is
+    #: branched
     columns: np.ndarray
+    #: logarithms of weights and innovations of what branches, then a copy of the weights; `most` numbers each
     children: np.ndarray
-    parents: np.ndarray
+    parents: np.ndarray  #: of which hypothesis each is a branch
     room: int
     most: int
 

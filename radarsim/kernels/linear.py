@@ -24,28 +24,18 @@ CROSSED = ((0, 1), (0, 2), (1, 2))  # the pairs of components whose products `Su
 
 
 class Problem(NamedTuple):
-    """What is simulated: the truth and its plots over K scans, and the F filters that see them.
+    """What is simulated: the truth and its plots over K scans, and the F filters that see them."""
 
-    key       (2,)            of the noise's stream
-    truth     (K, 3)          value, rate and second rate
-    sigma     (2,), (K, 2)    standard deviations of the plots' value and rate
-    dt        (), (K,)        time since the scan before; the first is not read
-    observes  (F,)            1: the filter observes the value alone; 2: value and rate
-    start     (F,)            scan, counted from 1, at which its least-squares start ends
-    weights   (F, 3, 2, S)    that start is the sum of weights times plots over the first `start` scans; S >= all starts
-    gains     (F, K, 3, 2)    of every scan after the start; not read up to it
-    baseline                  the filter that others are compared with
-    """
-
-    key: np.ndarray
-    truth: np.ndarray
-    sigma: np.ndarray
-    dt: np.ndarray | float
-    observes: np.ndarray
-    start: np.ndarray
+    key: np.ndarray  #: (2,) of the noise's stream
+    truth: np.ndarray  #: (K, 3) value, rate and second rate
+    sigma: np.ndarray  #: (2,), (K, 2) standard deviations of the plots' value and rate
+    dt: np.ndarray | float  #: (), (K,) time since the scan before; the first is not read
+    observes: np.ndarray  #: (F,) 1: the filter observes the value alone; 2: value and rate
+    start: np.ndarray  #: (F,) scan, counted from 1, at which its least-squares start ends
+    #: (F, 3, 2, S) that start is the sum of weights times plots over the first `start` scans; S >= all starts
     weights: np.ndarray
-    gains: np.ndarray
-    baseline: int = 0
+    gains: np.ndarray  #: (F, K, 3, 2) of every scan after the start; not read up to it
+    baseline: int = 0  #: the filter that others are compared with
 
     def plain(self) -> "Problem":
         """The same with arrays as the kernels take them, sigma (K, 2) and dt (K,); itself where they are so."""
@@ -64,16 +54,11 @@ class Problem(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """Sums over realisations of the errors e = estimate - truth, of the components that a filter has at that scan.
+    """Sums over realisations of the errors e = estimate - truth, of the components that a filter has at that scan."""
 
-    error   (F, K, 3, 4)   e, e², e³, e⁴
-    paired  (F, K, 3)      e² times the baseline's e², where both have an estimate
-    cross   (F, K, 3)      the products of two components' errors, CROSSED
-    """
-
-    error: np.ndarray
-    paired: np.ndarray
-    cross: np.ndarray
+    error: np.ndarray  #: (F, K, 3, 4) e, e², e³, e⁴
+    paired: np.ndarray  #: (F, K, 3) e² times the baseline's e², where both have an estimate
+    cross: np.ndarray  #: (F, K, 3) the products of two components' errors, CROSSED
 
 
 def shapes(filters: int, scans: int) -> Mapping[str, tuple[int, ...]]:

@@ -1,5 +1,6 @@
 """What the reference pages are read off: descriptions of keys with units, docstrings, columns of result files."""
 
+import inspect
 import re
 from collections import defaultdict
 from pathlib import Path
@@ -80,7 +81,8 @@ def test_arrays_are_told_with_their_shapes():
                 for name, thing in modules.public(module):
                     hints = getattr(thing, "__annotations__", {})
                     has_arrays = any(np.ndarray is hint for hint in hints.values())
-                    if has_arrays and not re.search(r"\([^)]*,[^)]*\)|any shape|per |×|\[|see `", thing.__doc__):
+                    text = thing.__doc__ + " ".join(re.findall("#: .*", inspect.getsource(thing)))  # of fields
+                    if has_arrays and not re.search(r"\([^)]*,[^)]*\)|any shape|per |×|\[|see `", text):
                         silent.append(f"{module.__name__}.{name}")
     assert silent == []
 

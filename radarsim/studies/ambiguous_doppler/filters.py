@@ -33,23 +33,16 @@ from radarsim.studies.ambiguous_doppler.kernels import records
 # ---- axes ------------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True, kw_only=True)
 class FoldedAxes(Axes):
-    """Labels of the sums, F filters over K scans, components r, Vr, ar.
+    """Labels of the sums, F filters over K scans, components r, Vr, ar; not-a-number where a value is not known."""
 
-    spans (K,) are those of velocity, m/s. folded (F,) says which filters unfold, remembers (F,) which of them keep
-    several hypotheses, combines (F,) which combine orders. exact_right (F, K) is the probability that all folds are
-    right; oracle_sigma (F, K, 3) the exact σ of the same filter with unfolded velocity. Of a filter that combines
-    members best_order and best_combination (F, K, 3) are the exact σ of the best member at each scan, and of the best
-    linear combination, for those who know the truth. Not-a-number where a value is not known.
-    """
-
-    spans: np.ndarray
-    folded: np.ndarray
-    remembers: np.ndarray
-    combines: np.ndarray
-    exact_right: np.ndarray
-    oracle_sigma: np.ndarray
-    best_order: np.ndarray
-    best_combination: np.ndarray
+    spans: np.ndarray  #: (K,) of velocity, m/s
+    folded: np.ndarray  #: (F,) whether a filter unfolds
+    remembers: np.ndarray  #: (F,) whether it keeps several hypotheses
+    combines: np.ndarray  #: (F,) whether it combines orders
+    exact_right: np.ndarray  #: (F, K) probability that all folds are right
+    oracle_sigma: np.ndarray  #: (F, K, 3) exact σ of the same filter with unfolded velocity
+    best_order: np.ndarray  #: (F, K, 3) exact σ of the best member at each scan, for those who know the truth
+    best_combination: np.ndarray  #: (F, K, 3) that of the best linear combination of the members
 
 
 # ---- lattice ---------------------------------------------------------------------------------------------------------
@@ -318,19 +311,14 @@ NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(12)  # over one standard d
 
 @dataclass(frozen=True)
 class Gains:
-    """A filter's gains over K scans without missed plots, of innovations that are taken range first, velocity after.
+    """A filter's gains over K scans without missed plots, of innovations that are taken range first, velocity after."""
 
-    F (3, 3) its motion; range (K, 3) and velocity (K, 3) the gains, the range's of the first scan zero, velocity's zero
-    where it takes none; variance (K,) of the velocity's innovation, (m/s)²; believed (K, 3, 3) the covariance after the
-    plot, in m, m/s, m/s².
-    """
-
-    F: np.ndarray
-    range: np.ndarray
-    velocity: np.ndarray
-    variance: np.ndarray
-    range_variance: np.ndarray
-    believed: np.ndarray
+    F: np.ndarray  #: (3, 3) its motion
+    range: np.ndarray  #: (K, 3) zero at the first scan
+    velocity: np.ndarray  #: (K, 3) zero where it takes none
+    variance: np.ndarray  #: (K,) of the velocity's innovation, (m/s)²
+    range_variance: np.ndarray  #: (K,) of the range's, m²; one at the first scan
+    believed: np.ndarray  #: (K, 3, 3) covariance after the plot, in m, m/s, m/s²
 
 
 def gains(one: Member, prior: Any, sigma: np.ndarray, dt: float, scans: int) -> Gains:

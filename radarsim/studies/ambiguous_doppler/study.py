@@ -47,14 +47,11 @@ class NotFound(ValueError):
 
 @dataclass(frozen=True)
 class Linear:
-    """Whitened innovations (K, 2) of range and velocity, as ν = b + L z + A m.
+    """Whitened innovations (K, 2) of range and velocity, as ν = b + L z + A m."""
 
-    constant b (K, 2); normals L (K, 2, 2 + 2K); folds A (K, 2, K), of one span at each scan.
-    """
-
-    constant: np.ndarray
-    normals: np.ndarray
-    folds: np.ndarray
+    constant: np.ndarray  #: b (K, 2)
+    normals: np.ndarray  #: L (K, 2, 2 + 2K)
+    folds: np.ndarray  #: A (K, 2, K), of one span at each scan
 
     def until(self, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """b (2k,), L (2k, 2 + 2K) and A (2k, k) of the first k scans."""

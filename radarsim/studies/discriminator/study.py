@@ -186,27 +186,21 @@ SEARCH_MARGIN = 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class DiscriminatorAxes(Axes):
-    """Labels of P4's sums, and what its tables need beside them: F estimators, K windows, C components of θ.
-
-    Of each window, not-a-number where an estimator has none: duration_s (F, K) its length in s, energy_ratio (F, K) its
-    μ, no unit, posterior_sigma (F, K, C) the bounds with the prior, in the components' units; pulses holds the lengths
-    in pulses, a tuple for each estimator. Of the whole burst, burst_s long: prior_sigma (C,) and the potential
-    standard deviations in closed form, potential_closed_form (C,), in the components' units, and their covariance
-    potential_covariance (C, C). shortest_window_s is T_min (17) in s; model_error_turns (turns) and model_error_hz (Hz)
-    are the rms differences between the true phase and frequency and those of the fitted parameters.
+    """Labels of P4's sums, and what its tables need beside them: F estimators, K windows, C components of θ in their
+    units.
     """
 
-    duration_s: np.ndarray
-    pulses: tuple[tuple[int, ...], ...]
-    posterior_sigma: np.ndarray
-    prior_sigma: np.ndarray
-    potential_closed_form: np.ndarray
-    potential_covariance: np.ndarray
-    energy_ratio: np.ndarray
-    burst_s: float
-    shortest_window_s: float
-    model_error_turns: float
-    model_error_hz: float
+    duration_s: np.ndarray  #: (F, K) length of a window; not-a-number where an estimator has none
+    pulses: tuple[tuple[int, ...], ...]  #: the same in pulses
+    posterior_sigma: np.ndarray  #: (F, K, C) bounds with the prior; not-a-number likewise
+    prior_sigma: np.ndarray  #: (C,) of the forecast
+    potential_closed_form: np.ndarray  #: (C,) potential standard deviations of the whole burst
+    potential_covariance: np.ndarray  #: (C, C) their covariance
+    energy_ratio: np.ndarray  #: (F, K) a window's μ, no unit; not-a-number likewise
+    burst_s: float  #: length of the whole burst
+    shortest_window_s: float  #: T_min (17)
+    model_error_turns: float  #: rms difference between the true phase and that of the fitted parameters
+    model_error_hz: float  #: the same of the frequency
 
 
 @dataclass(frozen=True)

@@ -28,15 +28,11 @@ RULES = {
 
 @dataclass(frozen=True, kw_only=True)
 class FlightAxes(Axes):
-    """Labels of the sums, and what tables and figures need of the flight; stages and banks are described by the case.
+    """Labels of the sums, and what tables and figures need of the flight; the case describes stages and banks."""
 
-    truth (K', 9)       true states x, vx, ax, y, vy, ay, z, vz, az (m, m/s, m/s²) at the reported scans
-    stage (K',)         stage of each reported scan
-    stage_scans (S,)    scans of each stage that its means are of: from the third scan of the track on, reported or not
-    """
-
-    truth: np.ndarray
-    stage: np.ndarray
+    truth: np.ndarray  #: (K', 9) true states x, vx, ax, y, vy, ay, z, vz, az (m, m/s, m/s²) at the reported scans
+    stage: np.ndarray  #: (K',) stage of each reported scan
+    #: (S,) scans of each stage that its means are of: from the third scan of the track on, reported or not
     stage_scans: np.ndarray
 
 

@@ -265,22 +265,16 @@ def displaced(path: np.ndarray, shifts: np.ndarray, t: np.ndarray) -> np.ndarray
 # ---- filters ---------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class LinearFilter:
-    """One designed filter over K scans.
+    """One designed filter over K scans."""
 
-    observes is 1 (range) or 2 (range and velocity); start is the scan, from 1, of the first least-squares estimate;
-    weights (3, 2, start) make it from the plots so far; gains (K, 3, 2) are zero up to it. believed (K, 3, 3) is the
-    covariance that the filter claims, and available (K, 3) says which components it estimates; noise is its Q, packed.
-    given: its gains are those of a package, not the Kalman filter's of this Q.
-    """
-
-    observes: int
-    start: int
-    weights: np.ndarray
-    gains: np.ndarray
-    believed: np.ndarray
-    available: np.ndarray
-    noise: tuple[float, ...]
-    given: bool = False
+    observes: int  #: 1 (range) or 2 (range and velocity)
+    start: int  #: scan, from 1, of the first least-squares estimate
+    weights: np.ndarray  #: (3, 2, start) make it from the plots so far
+    gains: np.ndarray  #: (K, 3, 2) zero up to the start
+    believed: np.ndarray  #: (K, 3, 3) covariance that the filter claims
+    available: np.ndarray  #: (K, 3) which components it estimates
+    noise: tuple[float, ...]  #: its Q, packed
+    given: bool = False  #: whether its gains are those of a package, not the Kalman filter's of this Q
 
 
 def observation(observes: int) -> np.ndarray:

@@ -44,20 +44,15 @@ class Design(NamedTuple):
 
 @dataclass(frozen=True)
 class Mixture:
-    """Means over the patterns, by scan K and component.
+    """Means over the patterns, by scan K and component; not-a-number where no pattern has an estimate."""
 
-    started (K,) is the probability that the filter has started; available (K, 3) that it has an estimate. bias, moment
-    (the mean of e²) and believed (of the variance that it believes), all (K, 3), are means over the patterns with an
-    estimate, not-a-number where there is none; nees (K,) is the expectation of eᵀP⁻¹e / 3 over those that have started.
-    beside (G, K, 3) is the mean of e² over the patterns in which one of G other filters has an estimate as well.
-    """
-
-    started: np.ndarray
-    available: np.ndarray
-    bias: np.ndarray
-    moment: np.ndarray
-    believed: np.ndarray
-    nees: np.ndarray
+    started: np.ndarray  #: (K,) probability that the filter has started
+    available: np.ndarray  #: (K, 3) probability that it has an estimate
+    bias: np.ndarray  #: (K, 3) over the patterns with an estimate
+    moment: np.ndarray  #: (K, 3) mean of e² over them
+    believed: np.ndarray  #: (K, 3) of the variance that it believes
+    nees: np.ndarray  #: (K,) expectation of eᵀP⁻¹e / 3 over those that have started
+    #: (G, K, 3) mean of e² over the patterns in which one of G other filters has an estimate as well
     beside: np.ndarray
 
     @classmethod

@@ -21,32 +21,23 @@ BLOCK = 4096  # 8 chunks of 512; 0.4 ms with two filters and 15 scans
 
 @dataclass(frozen=True, kw_only=True)
 class RangeDopplerAxes(Axes):
-    """Labels of P1's sums, and what its tables need beside them: F filters, K scans, components r, Vr, ar.
+    """Labels of P1's sums, and what its tables need beside them: F filters, K scans, components r, Vr, ar."""
 
-    believed (F, K, 3, 3) is the covariance that a filter believes, in m, m/s, m/s²; zero where it has no estimate, and
-    where plots may be missed, as then it differs from realisation to realisation. exact_nees (F, K) is the expectation
-    of eᵀP⁻¹e per estimated component, no unit; exact_gain (F, K, 3) the gain in per cent against the baseline, where
-    both have an estimate. observes (F,) is 1 for filters of the range, 2 for those of range and velocity;
-    manoeuvre_variance (F,) their D_M in (m/s³)²; process_noise the forms of their Q, "" of a filter of a package, of
-    which settled_gain (F, 3, 2) is the gain in the long run, not-a-number where there is none. sigma (2,) holds the
-    standard deviations of the plots, m and m/s; C_theta is σ_r²/(Δt²σ_V²) (eq. 11), no unit. speed_mps is the target's
-    greatest radial speed at a scan. plain: every scan has its plot, which errs by noise alone, as in the paper.
-    """
-
+    #: (F, K, 3, 3) covariance that a filter believes, m, m/s, m/s²; zero without an estimate, or if plots may be missed
     believed: np.ndarray
-    exact_nees: np.ndarray
-    exact_gain: np.ndarray
-    observes: np.ndarray
-    manoeuvre_variance: np.ndarray
-    process_noise: tuple[str, ...]
-    settled_gain: np.ndarray
-    sigma: np.ndarray
+    exact_nees: np.ndarray  #: (F, K) expectation of eᵀP⁻¹e per estimated component, no unit
+    exact_gain: np.ndarray  #: (F, K, 3) gain in per cent against the baseline, where both have an estimate
+    observes: np.ndarray  #: (F,) 1: filters of the range, 2: of range and velocity
+    manoeuvre_variance: np.ndarray  #: (F,) D_M in (m/s³)²
+    process_noise: tuple[str, ...]  #: forms of their Q; "" of a filter of a package
+    settled_gain: np.ndarray  #: (F, 3, 2) a package's gain in the long run; not-a-number where there is none
+    sigma: np.ndarray  #: (2,) standard deviations of the plots, m and m/s
     scan_period_s: float
-    C_theta: float
+    C_theta: float  #: σ_r²/(Δt²σ_V²) (eq. 11), no unit
     wavelength_m: float
     repetition_rate_hz: float
-    speed_mps: float
-    plain: bool
+    speed_mps: float  #: the target's greatest radial speed at a scan
+    plain: bool  #: every scan has its plot, which errs by noise alone, as in the paper
 
     @property
     def exact_gains(self) -> np.ndarray:

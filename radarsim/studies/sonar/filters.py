@@ -30,17 +30,13 @@ from radarsim.studies.sonar.world import step_correlations
 
 # ---- detectors -------------------------------------------------------------------------------------------------------
 class AdaptiveRule(NamedTuple):
-    """How an adaptive filter responds to its detector.
+    """How an adaptive filter responds to its detector."""
 
-    threshold (C,) of the statistic; every: scans from one test to the next; joint: one test of all coordinates. raises:
-    an alarm raises the degree, else it keeps the memory short; quiet tests without an alarm end the manoeuvre.
-    """
-
-    threshold: np.ndarray
-    every: int
-    joint: bool
-    raises: bool
-    quiet: int
+    threshold: np.ndarray  #: (C,) of the statistic
+    every: int  #: scans from one test to the next
+    joint: bool  #: one test of all coordinates
+    raises: bool  #: an alarm raises the degree, else it keeps the memory short
+    quiet: int  #: tests without an alarm that end the manoeuvre
 
 
 class ModelPair(NamedTuple):
@@ -85,16 +81,12 @@ def detector_arrays(
 # ---- filters ---------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Plots:
-    """Times and weights of the plots of one coordinate, for M patterns of missed plots.
+    """Times and weights of the plots of one coordinate, for M patterns of missed plots."""
 
-    t (K,) in s; weight (M, K) = (sigma / σ of the plot)², zero where it is missed; period T₀ in s, in which lags of the
-    correlation are counted too; sigma of a nominal plot.
-    """
-
-    t: np.ndarray
-    weight: np.ndarray
-    period: float
-    sigma: float
+    t: np.ndarray  #: (K,) in s
+    weight: np.ndarray  #: (M, K) (sigma / σ of the plot)², zero where it is missed
+    period: float  #: T₀ in s, in which lags of the correlation are counted too
+    sigma: float  #: of a nominal plot
 
     def step(self, k: int) -> float:
         """The interval before scan k, in periods."""
@@ -205,18 +197,14 @@ KINDS = {
 
 @dataclass(frozen=True)
 class FilterSpec:
-    """A configured filter: kind, size of the state, length in plots of a window, of a least-squares start or of a test.
-
-    variance (C,) of a manoeuvre and correlation rho (C,) in each coordinate; response: the rule or the models of a
-    filter that responds to manoeuvres.
-    """
+    """A configured filter."""
 
     kind: str
-    size: int
-    length: int
-    variance: np.ndarray
-    rho: np.ndarray
-    response: AdaptiveRule | ModelPair | None = None
+    size: int  #: of the state
+    length: int  #: in plots of a window, of a least-squares start or of a test
+    variance: np.ndarray  #: (C,) of a manoeuvre in each coordinate
+    rho: np.ndarray  #: (C,) correlation in each coordinate
+    response: AdaptiveRule | ModelPair | None = None  #: the rule or the models of a filter that responds to manoeuvres
 
 
 def recursive_design(spec: FilterSpec, c: int, plots: Plots) -> Design:
@@ -239,16 +227,13 @@ def recursive_design(spec: FilterSpec, c: int, plots: Plots) -> Design:
 
 @dataclass(frozen=True)
 class FilterDesign:
-    """A filter designed for the plots of one coordinate.
-
-    covariance (M, K, 3, 3) that it believes for M patterns of plots; its recursion, or for a window at every scan the
-    first scan in it and the weights (M, 3, n) of the plots from there on.
-    """
+    """A filter designed for the plots of one coordinate."""
 
     spec: FilterSpec
     plots: Plots
-    covariance: np.ndarray
+    covariance: np.ndarray  #: (M, K, 3, 3) that it believes for M patterns of plots
     recursion: Design | None = None
+    #: of a window, at every scan: the first scan in it and the weights (M, 3, n) of the plots from there on
     window_rows: tuple[tuple[int, np.ndarray], ...] = ()
 
     @property

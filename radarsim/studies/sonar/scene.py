@@ -170,22 +170,16 @@ MOST_OPEN = 9  # scans that may be missed up to which all patterns are enumerate
 
 @dataclass(frozen=True)
 class Scene:
-    """What is observed at K times in C coordinates.
+    """What is observed at K times in C coordinates."""
 
-    t (K,) in s; truth (K, C, 3) in the frame of the filters; polar (K, C, 3) as measured; sigma (K, C) of the plots,
-    infinite where a coordinate is not measured; nominal (C,) σ of a plot in the frame of the filters; rho (C,); walk
-    (C,) the standard deviation of a random acceleration; certain (K,) is 1 where a scan always gives a plot, 0 where it
-    never does, else -1.
-    """
-
-    t: np.ndarray
-    truth: np.ndarray
-    polar: np.ndarray
-    sigma: np.ndarray
-    nominal: np.ndarray
-    rho: np.ndarray
-    walk: np.ndarray
-    certain: np.ndarray
+    t: np.ndarray  #: (K,) in s
+    truth: np.ndarray  #: (K, C, 3) in the frame of the filters
+    polar: np.ndarray  #: (K, C, 3) as measured
+    sigma: np.ndarray  #: (K, C) of the plots, infinite where a coordinate is not measured
+    nominal: np.ndarray  #: (C,) σ of a plot in the frame of the filters
+    rho: np.ndarray  #: (C,)
+    walk: np.ndarray  #: (C,) standard deviation of a random acceleration
+    certain: np.ndarray  #: (K,) 1 where a scan always gives a plot, 0 where it never does, else -1
     period: float
     probability: float
 

@@ -37,78 +37,50 @@ BINS = 10  # of the best hypothesis's probability
 
 
 class World(NamedTuple):
-    """What is observed.
+    """What is observed."""
 
-    keys    (3, 2)   of the streams of plots, detections, and of what a target draws
-    truth   (K, 3)   mean range, velocity, acceleration
-    t       (K,)     times of the scans, s
-    spread  (2,)     standard deviations of the velocity and of the acceleration that each realisation adds
-    sigma   (2,)     of the plots: m, m/s
-    spans   (K,)     of velocity at each scan, m/s
-    turn    (K,)     which of the R repetition rates a scan has
-    joint   (R, R)   span in which two rates together are unambiguous, m/s; zero where no filter asks for it
-    detection        probability of a plot
-    """
-
-    keys: np.ndarray
-    truth: np.ndarray
-    t: np.ndarray
-    spread: np.ndarray
-    sigma: np.ndarray
-    spans: np.ndarray
-    turn: np.ndarray
-    joint: np.ndarray
-    detection: float
+    keys: np.ndarray  #: (3, 2) of the streams of plots, detections, and of what a target draws
+    truth: np.ndarray  #: (K, 3) mean range, velocity, acceleration
+    t: np.ndarray  #: (K,) times of the scans, s
+    spread: np.ndarray  #: (2,) standard deviations of the velocity and of the acceleration that each realisation adds
+    sigma: np.ndarray  #: (2,) of the plots: m, m/s
+    spans: np.ndarray  #: (K,) of velocity at each scan, m/s
+    turn: np.ndarray  #: (K,) which of the R repetition rates a scan has
+    joint: np.ndarray  #: (R, R) span in which two rates together are unambiguous, m/s; zero where no filter asks for it
+    detection: float  #: probability of a plot
 
 
 class Banks(NamedTuple):
-    """The filters.
+    """The filters."""
 
-    designs  (D, DESIGN)  see above
-    kind     (B,)         NONE … CHOOSES
-    parts    (B, MEMBERS) a bank's design; INTERACTS: its designs; WEIGHS, CHOOSES: banks before it
-    orders   (B, MEMBERS) of the parts of a bank that combines
-    size     (B,)         how many parts there are
-    most     (B,)         hypotheses kept
-    deepest  (B,)         logarithm of the largest ratio of the best hypothesis's probability to a kept one's
-    reads    (B,)         WEIGHS, CHOOSES: MEAN or BEST of the parts
-    stay     (B,)         INTERACTS: probability that an order lasts from scan to scan
-    unfolding (B,)        INTERACTS: what it does about the folds
-    shares   (B, K, MEMBERS, 3)  WEIGHS: the parts' shares in each component; CHOOSES: half widths of their intervals,
-                          zero of a part that does not estimate the component
-    bank     (F,)         of each filter
-    place    (F,)         MEAN or BEST
-    baseline, oracle      numbers of filters; oracle -1: there is none
-    """
-
-    designs: np.ndarray
-    kind: np.ndarray
-    parts: np.ndarray
-    orders: np.ndarray
-    size: np.ndarray
-    most: np.ndarray
-    deepest: np.ndarray
-    reads: np.ndarray
-    stay: np.ndarray
-    unfolding: np.ndarray
+    designs: np.ndarray  #: (D, DESIGN) see above
+    kind: np.ndarray  #: (B,) NONE … CHOOSES
+    parts: np.ndarray  #: (B, MEMBERS) a bank's design; INTERACTS: its designs; WEIGHS, CHOOSES: banks before it
+    orders: np.ndarray  #: (B, MEMBERS) of the parts of a bank that combines
+    size: np.ndarray  #: (B,) how many parts there are
+    most: np.ndarray  #: (B,) hypotheses kept
+    deepest: np.ndarray  #: (B,) logarithm of the largest ratio of the best hypothesis's probability to a kept one's
+    reads: np.ndarray  #: (B,) WEIGHS, CHOOSES: MEAN or BEST of the parts
+    stay: np.ndarray  #: (B,) INTERACTS: probability that an order lasts from scan to scan
+    unfolding: np.ndarray  #: (B,) INTERACTS: what it does about the folds
+    #: (B, K, MEMBERS, 3) WEIGHS: the parts' shares in each component; CHOOSES: half widths of their intervals, zero of
+    #: a part that does not estimate the component
     shares: np.ndarray
-    bank: np.ndarray
-    place: np.ndarray
-    baseline: int
-    oracle: int
+    bank: np.ndarray  #: (F,) of each filter
+    place: np.ndarray  #: (F,) MEAN or BEST
+    baseline: int  #: number of the filter that gains are against
+    oracle: int  #: number of the filter with unfolded velocities; -1: there is none
 
 
 class Memory(NamedTuple):
-    """Work arrays for a group of eight realisations.
-
-    normals (2 + 2 K rows), plots (K × PLOT), gains (D × K × GAINS), out (B × K × OUTPUT), and room for hypotheses, see
-    `kernels.hypotheses.Lists` and `together`.
+    """Work arrays for a group of eight realisations; those from `listed` on: see `kernels.hypotheses.Lists` and
+    `together`.
     """
 
-    normals: np.ndarray
-    plots: np.ndarray
-    gains: np.ndarray
-    out: np.ndarray
+    normals: np.ndarray  #: 2 + 2 K rows
+    plots: np.ndarray  #: K × PLOT
+    gains: np.ndarray  #: D × K × GAINS
+    out: np.ndarray  #: B × K × OUTPUT
     counted: np.ndarray
     listed: np.ndarray
     children: np.ndarray
@@ -120,26 +92,19 @@ class Memory(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """Sums over realisations; e = estimate - truth of the components.
+    """Sums over realisations; e = estimate - truth of the components."""
 
-    error       (F, K, 3, 4)        e, e², e³, e⁴
-    paired      (F, K, 3)           e² times the baseline's
-    oracle      (F, K, 3)           e² times the oracle's; zero where there is none
-    estimates   (F, K, 3)           realisations that have an estimate
-    folds       (F, K, FOLD_SUMS)   the best hypothesis has all folds right; the list holds the right one; hypotheses;
-                                    the velocity's error is over half the span
-    calibration (F, K, BINS, 3)     by the probability of the best hypothesis: realisations, those where it is right,
-                                    and the sum of these probabilities
-    orders      (F, K, 3, 2)        weights of the orders 0, 1, 2 and their squares, of filters that combine orders
-    """
-
-    error: np.ndarray
-    paired: np.ndarray
-    oracle: np.ndarray
-    estimates: np.ndarray
+    error: np.ndarray  #: (F, K, 3, 4) e, e², e³, e⁴
+    paired: np.ndarray  #: (F, K, 3) e² times the baseline's
+    oracle: np.ndarray  #: (F, K, 3) e² times the oracle's; zero where there is none
+    estimates: np.ndarray  #: (F, K, 3) realisations that have an estimate
+    #: (F, K, FOLD_SUMS) the best hypothesis has all folds right; the list holds the right one; hypotheses; the
+    #: velocity's error is over half the span
     folds: np.ndarray
+    #: (F, K, BINS, 3) by the probability of the best hypothesis: realisations, those where it is right, and the sum of
+    #: these probabilities
     calibration: np.ndarray
-    orders: np.ndarray
+    orders: np.ndarray  #: (F, K, 3, 2) weights of the orders 0, 1, 2 and their squares, of filters that combine orders
 
 
 def shapes(filters: int, scans: int) -> Mapping[str, tuple[int, ...]]:

@@ -212,29 +212,19 @@ WRONG, BEYOND, FULL, EVENTS = 0, 1, 2, 3
 
 
 class Mixture(NamedTuple):
-    """A mixture of M shifted laws beside the plain one, over a realisation's normals as `steps.fill_normals` has them.
+    """A mixture of M shifted laws beside the plain one, over normals as `steps.fill_normals` has them."""
 
-    key (2,)              of the stream that says which part a realisation is drawn from
-    cumulative (M + 1,)   running sums of the shares α, the plain one first; the last is 1
-    shift (M,)            s_m
-    units (M, 2 + 2K)     u_m
-    """
-
-    key: np.ndarray
-    cumulative: np.ndarray
-    shift: np.ndarray
-    units: np.ndarray
+    key: np.ndarray  #: (2,) of the stream that says which part a realisation is drawn from
+    cumulative: np.ndarray  #: (M + 1,) running sums of the shares α, the plain one first; the last is 1
+    shift: np.ndarray  #: (M,) s_m
+    units: np.ndarray  #: (M, 2 + 2K) u_m
 
 
 class Losses(NamedTuple):
-    """Weighted sums over realisations.
+    """Weighted sums over realisations."""
 
-    events (F, K, EVENTS, 4)   Σw, Σw², the number, and Σw⁴ of the realisations that have it
-    drawn  (3,)                realisations that are plain, and Σw, Σw² of all
-    """
-
-    events: np.ndarray
-    drawn: np.ndarray
+    events: np.ndarray  #: (F, K, EVENTS, 4) Σw, Σw², the number, and Σw⁴ of the realisations that have it
+    drawn: np.ndarray  #: (3,) realisations that are plain, and Σw, Σw² of all
 
 
 @part

@@ -60,20 +60,13 @@ FAR = 1e300
 
 
 class Orders(NamedTuple):
-    """The filters of one bank that are made into one.
+    """The filters of one bank that are made into one."""
 
-    designs   address of the designs of all banks
-    parts     address of the numbers of its members' designs, or of the banks that it reads
-    orders    address of its members' orders
-    size      how many they are
-    stay      probability that an order stays what it is, over a scan
-    """
-
-    designs: Any
-    parts: Any
-    orders: Any
-    size: int
-    stay: float
+    designs: Any  #: address of the designs of all banks
+    parts: Any  #: address of the numbers of its members' designs, or of the banks that it reads
+    orders: Any  #: address of its members' orders
+    size: int  #: how many they are
+    stay: float  #: probability that an order stays what it is, over a scan
 
 
 @part

@@ -30,20 +30,13 @@ LOCKS = ("lock", "three", "posterior", "posterior_three", "always_three", "alway
 
 
 class Sums(NamedTuple):
-    """Sums over bursts of F estimators, K windows and C components of θ, with their shapes.
+    """Sums over bursts of F estimators, K windows and C components of θ, with their shapes."""
 
-    error (F, K, C, 4)         Σe … Σe⁴ of the locked bursts, in units of the potential bound of the window
-    error_all (F, K, C, 4)     the same of all bursts
-    locks (F, K, 6)            counted bursts, see LOCKS
-    residuals (F, K, C, BINS)  histograms of |e| over the posterior bound
-    passes (F, 2)              passes over the data, and their squares
-    """
-
-    error: np.ndarray
-    error_all: np.ndarray
-    locks: np.ndarray
-    residuals: np.ndarray
-    passes: np.ndarray
+    error: np.ndarray  #: (F, K, C, 4) Σe … Σe⁴ of the locked bursts, in units of the potential bound of the window
+    error_all: np.ndarray  #: (F, K, C, 4) the same of all bursts
+    locks: np.ndarray  #: (F, K, 6) counted bursts, see LOCKS
+    residuals: np.ndarray  #: (F, K, C, BINS) histograms of |e| over the posterior bound
+    passes: np.ndarray  #: (F, 2) passes over the data, and their squares
 
 
 @inline
@@ -145,22 +138,14 @@ def accumulate_losses(errors, options, potential, posterior, weights, losses):
 
 # ---- rare ------------------------------------------------------------------------------------------------------------
 class Mixture(NamedTuple):
-    """A mixture of M directions beside the plain law, over the normals of the forecast and of B blocks.
+    """A mixture of M directions beside the plain law, over the normals of the forecast and of B blocks."""
 
-    cumulative (M + 1,)   running sums of the shares α, the plain one first; the last is 1
-    shift (M,)            s_m
-    forecast (M, 6)       u_m's part in the forecast's normals, times their σ: turns over the burst
-    weight (M, 6)         u_m's part over these σ, zero where one is zero
-    first (M, 2B)         u_m's part in the first normals of the draws, and
-    second (M, 2B)        in the second ones
-    """
-
-    cumulative: np.ndarray
-    shift: np.ndarray
-    forecast: np.ndarray
-    weight: np.ndarray
-    first: np.ndarray
-    second: np.ndarray
+    cumulative: np.ndarray  #: (M + 1,) running sums of the shares α, the plain one first; the last is 1
+    shift: np.ndarray  #: (M,) s_m
+    forecast: np.ndarray  #: (M, 6) u_m's part in the forecast's normals, times their σ: turns over the burst
+    weight: np.ndarray  #: (M, 6) u_m's part over these σ, zero where one is zero
+    first: np.ndarray  #: (M, 2B) u_m's part in the first normals of the draws, and
+    second: np.ndarray  #: (M, 2B) in the second ones
 
 
 @kernel

@@ -96,63 +96,40 @@ class Rules(NamedTuple):
 
 
 class World(NamedTuple):
-    """What all filters of a case share.
+    """What all filters of a case share."""
 
-    keys (2, 2)               streams of the plots' noise and of detections
-    frame (FRAME,)            the sensor
-    plot_truth (K, PLOT_TRUTH), truth (K, 9)   what plots are made of, and the true state
-    intervals (K,), times (U,)                 number of each scan's interval since the last one; the intervals, s
-    reported, place (K,)      1 where a scan is reported, and its place among those
-    stage (K,)                stage of a scan
-    lengths (S, 2)            scans of a stage from the third on, and the reported ones of these
-    weights (9,)              the start of a track: a, b, g of `strip.start`
-    """
-
-    keys: np.ndarray
-    frame: np.ndarray
-    plot_truth: np.ndarray
-    truth: np.ndarray
-    intervals: np.ndarray
-    times: np.ndarray
-    reported: np.ndarray
-    place: np.ndarray
-    stage: np.ndarray
-    lengths: np.ndarray
-    weights: np.ndarray
+    keys: np.ndarray  #: (2, 2) streams of the plots' noise and of detections
+    frame: np.ndarray  #: (FRAME,) the sensor
+    plot_truth: np.ndarray  #: (K, PLOT_TRUTH) what plots are made of
+    truth: np.ndarray  #: (K, 9) the true state
+    intervals: np.ndarray  #: (K,) number of each scan's interval since the last one
+    times: np.ndarray  #: (U,) the intervals, s
+    reported: np.ndarray  #: (K,) 1 where a scan is reported
+    place: np.ndarray  #: (K,) its place among those
+    stage: np.ndarray  #: (K,) stage of a scan
+    lengths: np.ndarray  #: (S, 2) scans of a stage from the third on, and the reported ones of these
+    weights: np.ndarray  #: (9,) the start of a track: a, b, g of `strip.start`
 
 
 class Banks(NamedTuple):
-    """The filters; the rows of each array are padded to multiples of eight numbers.
+    """The filters; the rows of each array are padded to multiples of eight numbers."""
 
-    numbers (F, 8)          FAMILY, MERGE, OUTPUT_RULE, AT_PREDICTION, SIZE
-    models (F, 16)          MODEL_NUMBERS of each model
-    transitions (F, …)      transition probabilities (U, M, M) over each different interval, columns: from
-    probabilities (F, 8)    of the models at the start of a track
-    """
-
-    numbers: np.ndarray
-    models: np.ndarray
-    transitions: np.ndarray
-    probabilities: np.ndarray
+    numbers: np.ndarray  #: (F, 8) FAMILY, MERGE, OUTPUT_RULE, AT_PREDICTION, SIZE
+    models: np.ndarray  #: (F, 16) MODEL_NUMBERS of each model
+    transitions: np.ndarray  #: (F, …) transition probabilities (U, M, M) over each different interval, columns: from
+    probabilities: np.ndarray  #: (F, 8) of the models at the start of a track
 
 
 class Sums(NamedTuple):
-    """Sums over realisations, as a block of results holds them.
+    """Sums over realisations, as a block of results holds them."""
 
-    error (F, K', 9, 4)             Σ e, Σ e², Σ e³, Σ e⁴ of the estimate's errors
-    paired (F, K', 9)               Σ e² e₀², with the error of the baseline filter
-    probability (F, K', MOST, 2)    Σ p, Σ p² of the models' probabilities
-    believed (F, K', 2)             Σ q, Σ q² of q = e' P⁻¹ e of the position
-    stage (F, S, MEANS, 2)          Σ m, Σ m² of each mean over a stage: nine squared errors, NEES, NIS, MERGED, MERGES
-    pairs (F, F, S, 9)              Σ m n of the mean squared errors of two filters
-    """
-
-    error: np.ndarray
-    paired: np.ndarray
-    probability: np.ndarray
-    believed: np.ndarray
+    error: np.ndarray  #: (F, K', 9, 4) Σ e, Σ e², Σ e³, Σ e⁴ of the estimate's errors
+    paired: np.ndarray  #: (F, K', 9) Σ e² e₀², with the error of the baseline filter
+    probability: np.ndarray  #: (F, K', MOST, 2) Σ p, Σ p² of the models' probabilities
+    believed: np.ndarray  #: (F, K', 2) Σ q, Σ q² of q = e' P⁻¹ e of the position
+    #: (F, S, MEANS, 2) Σ m, Σ m² of each mean over a stage: nine squared errors, NEES, NIS, MERGED, MERGES
     stage: np.ndarray
-    pairs: np.ndarray
+    pairs: np.ndarray  #: (F, F, S, 9) Σ m n of the mean squared errors of two filters
 
 
 def shapes(filters: int, reported: int, stages: int) -> dict[str, tuple[int, ...]]:

@@ -230,16 +230,11 @@ def fill_plots(keys, frame, truth, certain, first, random, plots):
 
 # ---- strip -----------------------------------------------------------------------------------------------------------
 class Filter(NamedTuple):
-    """A filter, by addresses.
+    """A filter, by addresses."""
 
-    rules          what it is, see `records.Rules`
-    models         (size * 3,): moves, accelerates (0 or 1), sigma of the acceleration per step in m/s²
-    transitions    (U * size * size,): T over each different interval between scans, row by row
-    """
-
-    rules: Rules
-    models: np.ndarray
-    transitions: np.ndarray
+    rules: Rules  #: what it is, see `records.Rules`
+    models: np.ndarray  #: (size * 3,): moves, accelerates (0 or 1), sigma of the acceleration per step in m/s²
+    transitions: np.ndarray  #: (U * size * size,): T over each different interval between scans, row by row
 
 
 class Memory(NamedTuple):
@@ -251,18 +246,13 @@ class Memory(NamedTuple):
 
 
 class Scans(NamedTuple):
-    """The scans first … stop - 1 of a strip.
-
-    intervals      address, (scans,): number of each scan's interval since the last one
-    times          address, (U,): the intervals, s
-    reported       address, (scans,): 1 where covariances are wanted
-    """
+    """The scans first … stop - 1 of a strip."""
 
     first: int
     stop: int
-    intervals: np.ndarray
-    times: np.ndarray
-    reported: np.ndarray
+    intervals: np.ndarray  #: address, (scans,): number of each scan's interval since the last one
+    times: np.ndarray  #: address, (U,): the intervals, s
+    reported: np.ndarray  #: address, (scans,): 1 where covariances are wanted
 
 
 @inline
@@ -456,22 +446,16 @@ def start_strip(work, numbers, plots, weights, probabilities):
 
 # ---- sums ------------------------------------------------------------------------------------------------------------
 class SumsMemory(NamedTuple):
-    """Memory of one thread for eight realisations: rows, and whole numbers.
+    """Memory of one thread for eight realisations: rows, and whole numbers."""
 
-    works      WORK rows of each filter; numbers (F, 8), listed (MOST,): its whole numbers, see `strip.Memory`
-    random     RANDOM rows; plots: PLOT rows a scan of a strip; out: OUTPUT rows a filter and scan of a strip
-    stages     STAGE rows a filter and stage
-    counted    one row
-    """
-
-    works: np.ndarray
-    random: np.ndarray
-    plots: np.ndarray
-    out: np.ndarray
-    stages: np.ndarray
-    counted: np.ndarray
-    numbers: np.ndarray
-    listed: np.ndarray
+    works: np.ndarray  #: WORK rows of each filter
+    random: np.ndarray  #: RANDOM rows
+    plots: np.ndarray  #: PLOT rows a scan of a strip
+    out: np.ndarray  #: OUTPUT rows a filter and scan of a strip
+    stages: np.ndarray  #: STAGE rows a filter and stage  #: STAGE rows a filter and stage
+    counted: np.ndarray  #: one row  #: one row
+    numbers: np.ndarray  #: (F, 8) whole numbers of each filter, see `Memory`
+    listed: np.ndarray  #: (MOST,) likewise
 
 
 class ScanSums(NamedTuple):

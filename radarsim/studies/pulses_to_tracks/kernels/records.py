@@ -44,85 +44,50 @@ FILTER = np.dtype(
 
 
 class World(NamedTuple):
-    """What is observed.
+    """What is observed."""
 
-    keys     (4, 2)           of the streams of ranges, bursts, the designation, fixed forecasts
-    missed   (K, 3)           see `filters.defects`
-    motion   (5,)             F, as `kernels.algebra` has it
-    sigma_r                   of a range, m
-    prior    (2,)             standard deviations of the designation
-    span                      of velocity, m/s
-    physics  (K,)             bursts, see `bursts.kernels.scoring.PHYSICS`
-    law      (K,)             of which law
-    mean     (blocks, 4)      of the sums drawn
-    factor   (S, blocks, 10)  roots of their covariances
-    tables   two flat arrays, see `bursts.burst.Tables`
-    to_turns (2, 2)           of a forecast's errors of velocity and acceleration b₁ and b₂ in turns over the burst
-    measured (2, 6)           of an estimate in turns over the burst velocity and acceleration at its middle
-    offset   (K,)             of the true Doppler frequency from the spectrum's lines, in lines
-    twiddle  (M / 2, 2)       cosines and sines of the transform of M points
-    reversed (M,)             its order
-    """
-
-    keys: np.ndarray
-    missed: np.ndarray
-    motion: np.ndarray
-    sigma_r: float
-    prior: np.ndarray
-    span: float
-    physics: np.ndarray
-    law: np.ndarray
-    mean: np.ndarray
-    factor: np.ndarray
-    tables: tuple[np.ndarray, np.ndarray]
+    keys: np.ndarray  #: (4, 2) of the streams of ranges, bursts, the designation, fixed forecasts
+    missed: np.ndarray  #: (K, 3) see `filters.defects`
+    motion: np.ndarray  #: (5,) F, as `kernels.algebra` has it
+    sigma_r: float  #: of a range, m
+    prior: np.ndarray  #: (2,) standard deviations of the designation
+    span: float  #: of velocity, m/s
+    physics: np.ndarray  #: (K,) bursts, see `bursts.kernels.scoring.PHYSICS`
+    law: np.ndarray  #: (K,) of which law
+    mean: np.ndarray  #: (blocks, 4) of the sums drawn
+    factor: np.ndarray  #: (S, blocks, 10) roots of their covariances
+    tables: tuple[np.ndarray, np.ndarray]  #: two flat arrays, see `bursts.burst.Tables`
+    #: (2, 2) of a forecast's errors of velocity and acceleration b₁ and b₂ in turns over the burst
     to_turns: np.ndarray
-    measured: np.ndarray
-    offset: np.ndarray
-    twiddle: np.ndarray
-    reversed: np.ndarray
+    measured: np.ndarray  #: (2, 6) of an estimate in turns over the burst velocity and acceleration at its middle
+    offset: np.ndarray  #: (K,) of the true Doppler frequency from the spectrum's lines, in lines
+    twiddle: np.ndarray  #: (M / 2, 2) cosines and sines of the transform of M points
+    reversed: np.ndarray  #: (M,) its order
 
 
 class Filters(NamedTuple):
-    """The filters.
+    """The filters."""
 
-    filters (F,)        see FILTER
-    options (F,)        of their sequences, see `bursts.kernels.sequence.OPTIONS`
-    last    (F,)        of the last step, which is without forecast
-    windows (W,)        of all designs, see `bursts.kernels.sequence.WINDOW`
-    first   (F, K, E)   where those of an entry of the menu begin
-    count   (F, K, E)   how many there are
-    free    (F, K)      the whole burst without forecast
-    sigma   (F, K, 2)   Fisher bounds of velocity and acceleration
-    baseline            the filter that gains are against
-    """
-
-    filters: np.ndarray
-    options: np.ndarray
-    last: np.ndarray
-    windows: np.ndarray
-    first: np.ndarray
-    count: np.ndarray
-    free: np.ndarray
-    sigma: np.ndarray
-    baseline: int
+    filters: np.ndarray  #: (F,) see FILTER
+    options: np.ndarray  #: (F,) of their sequences, see `bursts.kernels.sequence.OPTIONS`
+    last: np.ndarray  #: (F,) of the last step, which is without forecast
+    windows: np.ndarray  #: (W,) of all designs, see `bursts.kernels.sequence.WINDOW`
+    first: np.ndarray  #: (F, K, E) where those of an entry of the menu begin
+    count: np.ndarray  #: (F, K, E) how many there are
+    free: np.ndarray  #: (F, K) the whole burst without forecast
+    sigma: np.ndarray  #: (F, K, 2) Fisher bounds of velocity and acceleration
+    baseline: int  #: the filter that gains are against
 
 
 class Hypotheses(NamedTuple):
-    """Up to H hypotheses of each of n realisations, H a whole number of lanes.
+    """Up to H hypotheses of each of n realisations, H a whole number of lanes."""
 
-    states  (n, H, 9)  see `chain.state_of`
-    weights (n, H)     logarithms, the best one's 0
-    count   (n,)       how many there are
-    right   (n, H)     1 of those that have taken no velocity in a wrong fold, else 0
-    fresh   (H, 10)    room for states, and whether they are right
-    columns, children, parents  see `kernels.hypotheses.Lists`
-    """
-
-    states: np.ndarray
-    weights: np.ndarray
-    count: np.ndarray
-    right: np.ndarray
-    fresh: np.ndarray
+    states: np.ndarray  #: (n, H, 9) see `chain.state_of`
+    weights: np.ndarray  #: (n, H) logarithms, the best one's 0
+    count: np.ndarray  #: (n,) how many there are
+    right: np.ndarray  #: (n, H) 1 of those that have taken no velocity in a wrong fold, else 0
+    fresh: np.ndarray  #: (H, 10) room for states, and whether they are right
+    #: columns, children, parents: see `kernels.hypotheses.Lists`
     columns: np.ndarray
     children: np.ndarray
     parents: np.ndarray
@@ -145,49 +110,31 @@ def hypotheses(realisations: int, most: int) -> Hypotheses:
 
 
 class Work(NamedTuple):
-    """Work arrays for n realisations.
+    """Work arrays for n realisations."""
 
-    tracks    (n, 9)  states and covariances, see `chain.state_of`; of several hypotheses the best before the burst
-    forecasts (n, 2)  errors of the forecasts of velocity and acceleration
-    entries   (n,)    of the menu
-    measured  (n, 2)  the bursts' velocity and acceleration, less the truth
-    ages      (n,)    scans since the last burst that was lost
-    passes    (n,)    passes over a window's data so far
-    room              see `chain.room_for`
-    held              of filters that keep several
-    """
-
+    #: (n, 9) states and covariances, see `chain.state_of`; of several hypotheses the best before the burst
     tracks: np.ndarray
-    forecasts: np.ndarray
-    entries: np.ndarray
-    measured: np.ndarray
-    ages: np.ndarray
-    passes: np.ndarray
-    room: tuple[np.ndarray, ...]
-    held: Hypotheses
+    forecasts: np.ndarray  #: (n, 2) errors of the forecasts of velocity and acceleration
+    entries: np.ndarray  #: (n,) of the menu
+    measured: np.ndarray  #: (n, 2) the bursts' velocity and acceleration, less the truth
+    ages: np.ndarray  #: (n,) scans since the last burst that was lost
+    passes: np.ndarray  #: (n,) passes over a window's data so far
+    room: tuple[np.ndarray, ...]  #: see `chain.room_for`
+    held: Hypotheses  #: of filters that keep several
 
 
 class Sums(NamedTuple):
-    """Sums over realisations; e = estimate − truth.
+    """Sums over realisations; e = estimate − truth."""
 
-    error    (F, K, 3, 4)        e, e², e³, e⁴ of range, velocity, acceleration
-    paired   (F, K, 3)           e² times the baseline's
-    measured (F, K, 2, 2, 2)     of the burst's velocity and acceleration e², e⁴: of those that locked, of all
-    locks    (F, K, COUNTS)      see above
-    ages     (F, K, AGES)        realisations by the scans since the last burst that was lost
-    losses   (F, K, AGES, 3, 2)  e², e⁴ of these
-    passes   (F, 2)              passes over a window's data of all bursts of a realisation, and their squares
-    folds    (F, K, FOLDS)       see above
-    """
-
-    error: np.ndarray
-    paired: np.ndarray
+    error: np.ndarray  #: (F, K, 3, 4) e, e², e³, e⁴ of range, velocity, acceleration
+    paired: np.ndarray  #: (F, K, 3) e² times the baseline's
+    #: (F, K, 2, 2, 2) of the burst's velocity and acceleration e², e⁴: of those that locked, of all
     measured: np.ndarray
-    locks: np.ndarray
-    ages: np.ndarray
-    losses: np.ndarray
-    passes: np.ndarray
-    folds: np.ndarray
+    locks: np.ndarray  #: (F, K, COUNTS) see above
+    ages: np.ndarray  #: (F, K, AGES) realisations by the scans since the last burst that was lost
+    losses: np.ndarray  #: (F, K, AGES, 3, 2) e², e⁴ of these
+    passes: np.ndarray  #: (F, 2) passes over a window's data of all bursts of a realisation, and their squares
+    folds: np.ndarray  #: (F, K, FOLDS) see above
 
 
 def shapes(filters: int, scans: int) -> dict[str, tuple[int, ...]]:

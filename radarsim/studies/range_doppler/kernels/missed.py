@@ -34,43 +34,27 @@ ROWS = (OWN + PAIRED) // WIDTH  # of what is found of a filter and scan
 
 
 class Problem(NamedTuple):
-    """What is simulated: the truth and its plots over K scans, and the F filters that see them.
+    """What is simulated: the truth and its plots over K scans, and the F filters that see them."""
 
-    keys         (3, 2)        of the streams of noise, of misses, and of what is drawn once a realisation
-    truth        (K, 3)        range, radial velocity and acceleration
-    sigma        (2,)          standard deviations of the plots' range and velocity
-    bias         (2,)          their mean errors
-    sigma_bias   (2,)          standard deviations of the errors that are drawn once a realisation
-    sigma_flight (6,)          standard deviations of x, y, z and of vx, vy, vz at the first scan of a flight in space,
-                               drawn once a realisation
-    flight       (K or 0, 9)   that flight, (x, vx, ax, y, …), of which truth is the motion in range; none: not drawn
-    detection                  probability that a scan has its plot
-    dt                         scan period, s
-    observes     (F,)          1: the filter observes the range alone; 2: range and velocity
-    start        (F,)          plots in its least-squares start
-    Q            (F, 6)        covariance that a scan adds, packed
-    baseline                   the filter that others are compared with
-    given        (F,)          1: its gains are given, and every scan has its plot; else 0
-    gains        (F, K, 3, 2)  of such a filter, not read of others
-    believed     (F, K, 6)     the covariance that it believes with them, packed
-    """
-
-    keys: np.ndarray
-    truth: np.ndarray
-    sigma: np.ndarray
-    bias: np.ndarray
-    sigma_bias: np.ndarray
+    keys: np.ndarray  #: (3, 2) of the streams of noise, of misses, and of what is drawn once a realisation
+    truth: np.ndarray  #: (K, 3) range, radial velocity and acceleration
+    sigma: np.ndarray  #: (2,) standard deviations of the plots' range and velocity
+    bias: np.ndarray  #: (2,) their mean errors
+    sigma_bias: np.ndarray  #: (2,) standard deviations of the errors that are drawn once a realisation
+    #: (6,) standard deviations of x, y, z and of vx, vy, vz at the first scan of a flight in space, drawn once a
+    #: realisation
     sigma_flight: np.ndarray
+    #: (K or 0, 9) that flight, (x, vx, ax, y, …), of which truth is the motion in range; none: not drawn
     flight: np.ndarray
-    detection: float
-    dt: float
-    observes: np.ndarray
-    start: np.ndarray
-    Q: np.ndarray
-    baseline: int
-    given: np.ndarray
-    gains: np.ndarray
-    believed: np.ndarray
+    detection: float  #: probability that a scan has its plot
+    dt: float  #: scan period, s
+    observes: np.ndarray  #: (F,) 1: the filter observes the range alone; 2: range and velocity
+    start: np.ndarray  #: (F,) plots in its least-squares start
+    Q: np.ndarray  #: (F, 6) covariance that a scan adds, packed
+    baseline: int  #: the filter that others are compared with
+    given: np.ndarray  #: (F,) 1: its gains are given, and every scan has its plot; else 0
+    gains: np.ndarray  #: (F, K, 3, 2) of such a filter, not read of others
+    believed: np.ndarray  #: (F, K, 6) the covariance that it believes with them, packed
 
     def plain(self) -> "Problem":
         """The same with arrays and numbers as the kernels take them."""
@@ -96,24 +80,15 @@ class Problem(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """Sums over realisations of the errors e = estimate − truth, where a filter has an estimate.
+    """Sums over realisations of the errors e = estimate − truth, where a filter has an estimate."""
 
-    error      (F, K, 3, 4)  e, e², e³, e⁴
-    estimates  (F, K, 3)     how many there are
-    cross      (F, K, 3)     the products of two components' errors, as in `kernels.linear`
-    paired     (F, K, 3)     e² times the baseline's e², where both have an estimate
-    both       (F, K, 3, 5)  where both have one: how many, e², e⁴, and the same two of the baseline
-    believed   (F, K, 3)     the variances that the filter believes
-    nees       (F, K, 3)     where it has started: their number, q = eᵀP⁻¹e / 3, q²
-    """
-
-    error: np.ndarray
-    estimates: np.ndarray
-    cross: np.ndarray
-    paired: np.ndarray
-    both: np.ndarray
-    believed: np.ndarray
-    nees: np.ndarray
+    error: np.ndarray  #: (F, K, 3, 4) e, e², e³, e⁴
+    estimates: np.ndarray  #: (F, K, 3) how many there are
+    cross: np.ndarray  #: (F, K, 3) the products of two components' errors, as in `kernels.linear`
+    paired: np.ndarray  #: (F, K, 3) e² times the baseline's e², where both have an estimate
+    both: np.ndarray  #: (F, K, 3, 5) where both have one: how many, e², e⁴, and the same two of the baseline
+    believed: np.ndarray  #: (F, K, 3) the variances that the filter believes
+    nees: np.ndarray  #: (F, K, 3) where it has started: their number, q = eᵀP⁻¹e / 3, q²
 
 
 def shapes(filters: int, scans: int) -> dict[str, tuple[int, ...]]:

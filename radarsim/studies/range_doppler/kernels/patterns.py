@@ -59,32 +59,25 @@ OF_BITS, ONE_S_BITS = 2.0**-52, 0x3FF0000000000000
 
 
 class Room(NamedTuple):
-    """Work arrays for N patterns, N a multiple of 8, in blocks of L rows, and for V that have not started.
+    """Work arrays for N patterns, N a multiple of 8, in blocks of L rows, and for V that have not started."""
 
-    rows, spare        (N L,)        blocks of patterns
-    places             (7 N,)        where each P lies, in blocks as well, and then the patterns' probabilities
-    bits               (7 N,)        the same memory as whole numbers
-    group              (N,)          of each pattern
-    lighter            (N,)          how much less probable it is than the most probable, in powers of 2 ** LIGHTER
-    table, owner       (T,)          cells and their groups, T a power of two
-    waiting, following (V, 9 + 3 C)  information (6) packed, its products Y (3 C), probability, plots, whether one came
-    pieces             (D M,)        blocks of the patterns that are followed to the end piece by piece, D pieces
-    size, scan         (D,)          how many patterns a piece has, after which scan
-    """
-
-    rows: np.ndarray
-    spare: np.ndarray
-    places: np.ndarray
-    bits: np.ndarray
-    group: np.ndarray
-    lighter: np.ndarray
-    table: np.ndarray
-    owner: np.ndarray
+    rows: np.ndarray  #: (N L,) blocks of patterns
+    spare: np.ndarray  #: (N L,) likewise
+    #: (7 N,) where each P lies, in blocks as well, and then the patterns' probabilities
+    places: np.ndarray  #: (7 N,) where each P lies, in blocks as well, and then the patterns' probabilities
+    bits: np.ndarray  #: (7 N,) the same memory as whole numbers  #: (7 N,) the same memory as whole numbers
+    group: np.ndarray  #: (N,) of each pattern  #: (N,) of each pattern
+    #: (N,) how much less probable it is than the most probable, in powers of 2 ** LIGHTER
+    lighter: np.ndarray  #: (N,) how much less probable it is than the most probable, in powers of 2 ** LIGHTER
+    table: np.ndarray  #: (T,) cells, T a power of two
+    owner: np.ndarray  #: (T,) their groups
+    #: (V, 9 + 3 C) information (6) packed, its products Y (3 C), probability, plots, whether one came
     waiting: np.ndarray
-    following: np.ndarray
-    pieces: np.ndarray
-    size: np.ndarray
-    scan: np.ndarray
+    following: np.ndarray  #: (V, 9 + 3 C) likewise
+    #: (D M,) blocks of the patterns that are followed to the end piece by piece, D pieces
+    pieces: np.ndarray  #: (D M,) blocks of the patterns that are followed to the end piece by piece, D pieces
+    size: np.ndarray  #: (D,) how many patterns a piece has
+    scan: np.ndarray  #: (D,) after which scan
 
 
 def room(most: int, columns: int, waiting: int, scans: int) -> Room:
@@ -237,38 +230,22 @@ FIRST = 11  # of the probabilities of a plot alone
 
 
 class World(NamedTuple):
-    """What a filter sees over K scans, and what is asked of it.
+    """What a filter sees over K scans, and what is asked of it."""
 
-    defect     (K, 3, C)  of the truth at every scan from the one before, as `filters.defects` has it
-    Q          (6,)       covariance that a scan adds, packed
-    R          (2,)       variances of the plots
-    inputs     (2, C)     what the plots add to the columns of E
-    of_plot    (2, 2)     mean error and mean square error of a plot alone, of range and velocity
-    others     (G, 2)     of G filters beside it: what they observe, plots in their starts
-    detection             probability that a scan has its plot
-    dt                    scan period, s
-    observes              1: the filter observes the range alone; 2: range and velocity
-    start                 plots in its least-squares start
-    enough                plots with which all filters have started
-    most                  patterns that are kept, or
-    whole                 beyond which they are followed to the end piece by piece, none merged
-    from_k                scan, counted from 1, from which means are taken
-    """
-
-    defect: np.ndarray
-    Q: np.ndarray
-    R: np.ndarray
-    inputs: np.ndarray
-    of_plot: np.ndarray
-    others: np.ndarray
-    detection: float
-    dt: float
-    observes: int
-    start: int
-    enough: int
-    most: int
-    whole: bool
-    from_k: int
+    defect: np.ndarray  #: (K, 3, C) of the truth at every scan from the one before, as `filters.defects` has it
+    Q: np.ndarray  #: (6,) covariance that a scan adds, packed
+    R: np.ndarray  #: (2,) variances of the plots
+    inputs: np.ndarray  #: (2, C) what the plots add to the columns of E
+    of_plot: np.ndarray  #: (2, 2) mean error and mean square error of a plot alone, of range and velocity
+    others: np.ndarray  #: (G, 2) of G filters beside it: what they observe, plots in their starts
+    detection: float  #: probability that a scan has its plot
+    dt: float  #: scan period, s
+    observes: int  #: 1: the filter observes the range alone; 2: range and velocity
+    start: int  #: plots in its least-squares start
+    enough: int  #: plots with which all filters have started
+    most: int  #: patterns that are kept, or
+    whole: bool  #: beyond which they are followed to the end piece by piece, none merged
+    from_k: int  #: scan, counted from 1, from which means are taken
 
 
 @part

@@ -55,29 +55,21 @@ EIGHTS = CHUNK // WIDTH
 
 
 class Work(NamedTuple):
-    """Arrays of one chunk of n realisations, or, inside the kernels, their addresses.
+    """Arrays of one chunk of n realisations, or, inside the kernels, their addresses."""
 
-    plots (2, n) range and velocity; detected (n,) 1 where the scan has a plot; other (n,) for the pair of numbers drawn
-    with it; count (n,) plots so far; first (n,) the scan of the first; offset (2, n) the biases; state (3, n) the drawn
-    difference of the truth, moved on; shift (6, n) the displacement that is drawn of a flight; x (F, 3, n) and
-    p (F, 6, n) of filters that have started; normal (F, 9, n) the sums of the starts in the making, six of the matrix
-    and three of the right-hand side; e (F, 3, n) errors, zero where there is no estimate; has (F, 3, n) 1 where there
-    is one.
-    """
-
-    plots: np.ndarray
-    detected: np.ndarray
-    other: np.ndarray
-    count: np.ndarray
-    first: np.ndarray
-    offset: np.ndarray
-    state: np.ndarray
-    shift: np.ndarray
-    x: np.ndarray
-    p: np.ndarray
-    normal: np.ndarray
-    e: np.ndarray
-    has: np.ndarray
+    plots: np.ndarray  #: (2, n) range and velocity
+    detected: np.ndarray  #: (n,) 1 where the scan has a plot
+    other: np.ndarray  #: (n,) for the pair of numbers drawn with it
+    count: np.ndarray  #: (n,) plots so far
+    first: np.ndarray  #: (n,) scan of the first
+    offset: np.ndarray  #: (2, n) biases
+    state: np.ndarray  #: (3, n) drawn difference of the truth, moved on
+    shift: np.ndarray  #: (6, n) displacement that is drawn of a flight
+    x: np.ndarray  #: (F, 3, n) states of filters that have started
+    p: np.ndarray  #: (F, 6, n) their covariances
+    normal: np.ndarray  #: (F, 9, n) sums of the starts in the making: six of the matrix, three of the right-hand side
+    e: np.ndarray  #: (F, 3, n) errors, zero where there is no estimate
+    has: np.ndarray  #: (F, 3, n) 1 where there is one
 
 
 def work(filters: int) -> Work:

@@ -15,24 +15,15 @@ Curve = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class RealisationMap:
-    """Realisation 0 as seen by one tracker; positions are (north, east) in m, curves are pairs of arrays.
+    """Realisation 0 as seen by one tracker; positions are (north, east) in m, curves are pairs of arrays."""
 
-    Attributes:
-        tracker: name of the tracker; empty if all filters know the target's plots.
-        truth: the target's course, K points.
-        plots: the target's plots.
-        false: the false plots of all scans near the course.
-        tracks: the confirmed tracks, one curve each.
-        gates: edges of their gates at every `EVERY`-th scan, one curve each.
-        window: southern and northern, western and eastern edge of the map.
-    """
-
-    tracker: str
-    truth: Curve
-    plots: Curve
-    false: Curve
-    tracks: list[Curve]
-    gates: list[Curve]
+    tracker: str  #: name of the tracker; empty if all filters know the target's plots.
+    truth: Curve  #: the target's course, K points.
+    plots: Curve  #: the target's plots.
+    false: Curve  #: the false plots of all scans near the course.
+    tracks: list[Curve]  #: the confirmed tracks, one curve each.
+    gates: list[Curve]  #: edges of their gates at every `EVERY`-th scan, one curve each.
+    #: southern and northern, western and eastern edge of the map.
     window: tuple[tuple[float, float], tuple[float, float]]
 
 

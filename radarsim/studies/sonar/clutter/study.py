@@ -173,19 +173,15 @@ COORDINATES, SIZE = 2, 2  # range and bearing, each a straight line
 
 @dataclass(frozen=True)
 class Plan:
-    """A plan of trackers of a target and of false tracks.
-
-    field_about_false holds the false plots among which false tracks live; seeds (2,) is the key of the stream of their
-    first plots. shift: how false tracks are drawn where they are rare; None: as they are. ends: how further tracks of
-    the target are drawn where its ends are rare; None: there are none.
-    """
+    """A plan of trackers of a target and of false tracks."""
 
     layout: Layout
     axes: ClutterAxes
     trackers: Trackers
-    field_about_false: Field
-    seeds: np.ndarray
-    shift: rare.Shift | None = None
+    field_about_false: Field  #: false plots among which false tracks live
+    seeds: np.ndarray  #: (2,) key of the stream of their first plots
+    shift: rare.Shift | None = None  #: how false tracks are drawn where they are rare; None: as they are
+    #: how further tracks of the target are drawn where its ends are rare; None: there are none
     ends: Ends | None = None
     block: int = base.BLOCK
     gaussian = False

@@ -72,42 +72,31 @@ MODE, QUIET, PLOTS = range(3)  # further rows of an adaptive filter's memory; PL
 
 
 class Detectors(NamedTuple):
-    """D detectors, each for G groups of coordinates: each of C coordinates, then all jointly.
+    """D detectors, each for G groups of coordinates: each of C coordinates, then all jointly."""
 
-    plots (D,) of the parabola, every (D,) scans from one test to the next; threshold (D, G, T), of which the first
-    thresholds (D,) are used; phase (K,) is 0 before the manoeuvre, 1 during it, 2 after it.
-    """
-
-    plots: np.ndarray
-    every: np.ndarray
-    threshold: np.ndarray
-    thresholds: np.ndarray
-    phase: np.ndarray
+    plots: np.ndarray  #: (D,) of the parabola
+    every: np.ndarray  #: (D,) scans from one test to the next
+    threshold: np.ndarray  #: (D, G, T)
+    thresholds: np.ndarray  #: (D,) how many of these are used
+    phase: np.ndarray  #: (K,) 0 before the manoeuvre, 1 during it, 2 after it
 
 
 class AdaptiveRules(NamedTuple):
-    """How F filters respond to a manoeuvre; read only for adaptive ones.
+    """How F filters respond to a manoeuvre; read only for adaptive ones."""
 
-    detector (F,) and group (F, C) whose statistic is compared with threshold (F, C); raises (F,): an alarm raises the
-    degree, else it keeps the memory short; quiet (F,) tests without an alarm end the manoeuvre.
-    """
-
-    detector: np.ndarray
-    group: np.ndarray
-    threshold: np.ndarray
-    raises: np.ndarray
-    quiet: np.ndarray
+    detector: np.ndarray  #: (F,) whose statistic is looked at
+    group: np.ndarray  #: (F, C) of its coordinates
+    threshold: np.ndarray  #: (F, C) that it is compared with
+    raises: np.ndarray  #: (F,) an alarm raises the degree, else it keeps the memory short
+    quiet: np.ndarray  #: (F,) tests without an alarm that end the manoeuvre
 
 
 class Alarms(NamedTuple):
-    """Numbers of realisations by scan: tested (D, G, K), with an alarm (D, G, T, K), with the first event (D, G, T, K).
+    """Numbers of realisations by scan."""
 
-    The first event of a phase is the first alarm before the manoeuvre, the first alarm during it, and after it the
-    first test without an alarm.
-    """
-
-    tested: np.ndarray
-    alarms: np.ndarray
+    tested: np.ndarray  #: (D, G, K)
+    alarms: np.ndarray  #: (D, G, T, K)
+    #: (D, G, T, K) first event of a phase: alarm before the manoeuvre, alarm during it, test without one after it
     first: np.ndarray
 
 
@@ -259,14 +248,10 @@ STATE, COVARIANCE, PROBABILITY, ROWS = 0, 6, 18, 20
 
 
 class ModelPairs(NamedTuple):
-    """The models of F filters; read only for interacting ones.
+    """The models of F filters; read only for interacting ones."""
 
-    manoeuvre (F, C, 2) variances in nominal plots and periods; stay (F, 2) probabilities that each model lasts from
-    scan to scan.
-    """
-
-    manoeuvre: np.ndarray
-    stay: np.ndarray
+    manoeuvre: np.ndarray  #: (F, C, 2) variances in nominal plots and periods
+    stay: np.ndarray  #: (F, 2) probabilities that each model lasts from scan to scan
 
 
 @inline

@@ -45,53 +45,40 @@ class Detections(NamedTuple):
 
 
 class Conversion(NamedTuple):
-    """How plots are converted to the coordinates of the filters.
+    """How plots are converted to the coordinates of the filters."""
 
-    weight (K, C) of a plot that is not converted. frame is 0 for coordinates as measured, 1 for the plain conversion of
-    the first two, 2 for the unbiased one; measured (K, 2) then holds the true range and bearing and spread (2,) the
-    standard deviations of their plots.
-    """
-
-    weight: np.ndarray
-    frame: int
-    measured: np.ndarray
-    spread: np.ndarray
+    weight: np.ndarray  #: (K, C) of a plot that is not converted
+    frame: int  #: 0: coordinates as measured, 1: plain conversion of the first two, 2: the unbiased one
+    measured: np.ndarray  #: (K, 2) true range and bearing, where they are converted
+    spread: np.ndarray  #: (2,) standard deviations of their plots
 
 
 class RealisationBank(NamedTuple):
-    """F filters: kind (F,), size (F,) of the state, length (F,) of a window or of the start of a fixed-gain filter.
+    """F filters."""
 
-    carry (F, K, C) is the correlation c that the filter assumes; manoeuvre (F, C) the variance q and settled (F, C, 3)
-    the gains of a fixed-gain filter, both in nominal plots and periods; memory the number of plots that are kept for
-    windows and detectors. period in s and sigma (C,) of a nominal plot convert to m or rad, and s.
-    """
-
-    kind: np.ndarray
-    size: np.ndarray
-    length: np.ndarray
-    carry: np.ndarray
-    manoeuvre: np.ndarray
-    settled: np.ndarray
-    memory: int
-    period: float
-    sigma: np.ndarray
+    kind: np.ndarray  #: (F,)
+    size: np.ndarray  #: (F,) of the state
+    length: np.ndarray  #: (F,) of a window or of the start of a fixed-gain filter
+    carry: np.ndarray  #: (F, K, C) correlation c that the filter assumes
+    manoeuvre: np.ndarray  #: (F, C) variance q, in nominal plots and periods
+    settled: np.ndarray  #: (F, C, 3) gains of a fixed-gain filter, likewise
+    memory: int  #: number of plots that are kept for windows and detectors
+    period: float  #: s
+    sigma: np.ndarray  #: (C,) of a nominal plot, m or rad
     adaptive: AdaptiveRules
     interacting: ModelPairs
 
 
 class BlockSums(NamedTuple):
-    """Sums of a block over realisations, and estimates that are kept one by one.
-
-    errors and alarms; modes (F, K, C, 3): Σp and Σp² of the probability of a manoeuvre, and Σ of the plots in memory,
-    of filters that respond to manoeuvres. at (A,) are the scans whose estimates are kept; kept (A, F, 2, 6, count)
-    holds for the first two coordinates value, rate, believed variance of the value, covariance and variance of the
-    rate, and 1 where the state is complete.
-    """
+    """Sums of a block over realisations, and estimates that are kept one by one."""
 
     errors: Sums
     alarms: Alarms
+    #: (F, K, C, 3) Σp, Σp² of the probability of a manoeuvre, Σ of the plots in memory; of filters that respond
     modes: np.ndarray
-    at: np.ndarray
+    at: np.ndarray  #: (A,) scans whose estimates are kept
+    #: (A, F, 2, 6, count) of the first two coordinates: value, rate, believed variance of the value, covariance,
+    #: variance of the rate, and 1 where the state is complete
     kept: np.ndarray
 
 

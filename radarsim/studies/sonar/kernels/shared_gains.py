@@ -19,55 +19,41 @@ CHUNK = 512
 
 
 class World(NamedTuple):
-    """Targets and plots of K scans in C coordinates.
+    """Targets and plots of K scans in C coordinates; C is even: an unused coordinate is zero."""
 
-    plots and motion (2,) are the keys of two noise streams; dt (K,) the interval before a scan; truth (K, C, 3); steps
-    (K, C) the correlation of an error with that of the previous scan, fresh (K, C) the standard deviation of its new
-    part; walk (C,) that of a random acceleration, constant over each interval. C is even: an unused coordinate is zero.
-    """
-
-    plots: np.ndarray
-    motion: np.ndarray
-    dt: np.ndarray
-    truth: np.ndarray
-    steps: np.ndarray
-    fresh: np.ndarray
-    walk: np.ndarray
+    plots: np.ndarray  #: (2,) key of their noise
+    motion: np.ndarray  #: (2,) key of that of the motion
+    dt: np.ndarray  #: (K,) interval before a scan
+    truth: np.ndarray  #: (K, C, 3)
+    steps: np.ndarray  #: (K, C) correlation of an error with that of the previous scan
+    fresh: np.ndarray  #: (K, C) standard deviation of its new part
+    walk: np.ndarray  #: (C,) that of a random acceleration, constant over each interval
 
 
 class SharedBank(NamedTuple):
-    """Schedules of F filters, the same for all realisations.
+    """Schedules of F filters, the same for all realisations."""
 
-    gain (F, K, C, 4) and carry (F, K, C) of a recursive filter; carries (F,): whether it carries an error; length (F,)
-    plots of a window, 0 for a recursive filter; weights (F, K, C, 3, L) of a window for the slots of a ring, which plot
-    number n enters at slot n modulo L; slot (K, C) of a scan's plot, -1 where there is none; known (F, K, C) estimated
-    components; size (F,) of the state; inverse (F, K, C, 6) of the believed covariance.
-    """
-
-    gain: np.ndarray
-    carry: np.ndarray
-    carries: np.ndarray
-    length: np.ndarray
+    gain: np.ndarray  #: (F, K, C, 4) of a recursive filter
+    carry: np.ndarray  #: (F, K, C) of a recursive filter
+    carries: np.ndarray  #: (F,) whether it carries an error
+    length: np.ndarray  #: (F,) plots of a window, 0 for a recursive filter
+    #: (F, K, C, 3, L) of a window for the slots of a ring, which plot number n enters at slot n modulo L
     weights: np.ndarray
-    slot: np.ndarray
-    known: np.ndarray
-    size: np.ndarray
-    inverse: np.ndarray
+    slot: np.ndarray  #: (K, C) of a scan's plot, -1 where there is none
+    known: np.ndarray  #: (F, K, C) estimated components
+    size: np.ndarray  #: (F,) of the state
+    inverse: np.ndarray  #: (F, K, C, 6) of the believed covariance
 
 
 class Sums(NamedTuple):
-    """Sums over realisations; `sonar.study` describes them.
+    """Sums over realisations; `sonar.study` describes them."""
 
-    error (F, K, C, 3, 4), paired (F, K, C, 3), joint (F, K, C, 4), ahead (F, K, C, 4), believed and estimates (F, K,
-    C, 3).
-    """
-
-    error: np.ndarray
-    paired: np.ndarray
-    joint: np.ndarray
-    ahead: np.ndarray
-    believed: np.ndarray
-    estimates: np.ndarray
+    error: np.ndarray  #: (F, K, C, 3, 4)
+    paired: np.ndarray  #: (F, K, C, 3)
+    joint: np.ndarray  #: (F, K, C, 4)
+    ahead: np.ndarray  #: (F, K, C, 4)
+    believed: np.ndarray  #: (F, K, C, 3)
+    estimates: np.ndarray  #: (F, K, C, 3)
 
 
 # ---- the world ----------------------------------------------------------------------------------------------------

@@ -62,45 +62,35 @@ NOTHING_NEW = 1e-12  # of a plot's variance: less is rounding
 
 
 class Model(NamedTuple):
-    """The model of a recursive filter for one coordinate and scan.
+    """The model of a recursive filter for one coordinate and scan."""
 
-    size of the state, 2 or 3; start: number of plots up to which the filter is least squares; correlation c and
-    manoeuvre variance q; gain (3,) of a filter of fixed gain, else KALMAN_GAIN.
-    """
-
-    size: int
-    start: int
-    c: float
-    q: float
-    gain: tuple[float, float, float]
+    size: int  #: of the state, 2 or 3
+    start: int  #: number of plots up to which the filter is least squares
+    c: float  #: correlation
+    q: float  #: manoeuvre variance
+    gain: tuple[float, float, float]  #: of a filter of fixed gain, else KALMAN_GAIN
 
 
 class Filters(NamedTuple):
-    """What F filters in C coordinates store from scan to scan, for a chunk.
+    """What F filters in C coordinates store from scan to scan, for a chunk."""
 
-    x (F, C, 4, CHUNK) state, Y (F, C, 8, CHUNK) information, and further rows (F, C, >= 10, CHUNK) whose meaning
-    depends on the kind of filter: here the joint covariance J; for others see `detector.adapt` and
-    `detector.interact`. P (6, CHUNK) of the filter that was updated last.
-    """
-
-    x: np.ndarray
-    Y: np.ndarray
+    x: np.ndarray  #: (F, C, 4, CHUNK) state
+    Y: np.ndarray  #: (F, C, 8, CHUNK) information
+    #: (F, C, >= 10, CHUNK) rows by kind of filter: here the joint covariance J; see `detector.adapt`,
+    #: `detector.interact`
     further: np.ndarray
-    P: np.ndarray
+    P: np.ndarray  #: (6, CHUNK) of the filter that was updated last
 
 
 class Plots(NamedTuple):
-    """Plots of a chunk at a scan: z, weight, number n of plots before the scan and n_now up to it, each (C, CHUNK).
-
-    recent (C, 3, L, ROW) holds the last plots: plot, age, weight; T (D, G, CHUNK) the statistics of the detectors.
-    """
+    """Plots of a chunk at a scan, each (C, CHUNK)."""
 
     z: np.ndarray
     weight: np.ndarray
-    n: np.ndarray
-    n_now: np.ndarray
-    recent: np.ndarray
-    T: np.ndarray
+    n: np.ndarray  #: number of plots before the scan
+    n_now: np.ndarray  #: up to it
+    recent: np.ndarray  #: (C, 3, L, ROW) the last plots: plot, age, weight
+    T: np.ndarray  #: (D, G, CHUNK) statistics of the detectors
 
 
 # ---- small matrices -----------------------------------------------------------------------------------------------

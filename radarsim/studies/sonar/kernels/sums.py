@@ -28,17 +28,13 @@ class Course(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """A filter's estimates in one coordinate, by addresses: Numba would count references to the arrays at each call.
+    """A filter's estimates in one coordinate, by addresses: Numba would count references to the arrays at each call."""
 
-    x (4, CHUNK), and shift and truth of the targets' course; n (CHUNK,) plots of each realisation so far; used (CHUNK,)
-    is 1 for a realisation of the block and 0 for one that only fills up the last chunk.
-    """
-
-    x: int
-    shift: int
-    truth: int
-    n: int
-    used: int
+    x: int  #: (4, CHUNK)
+    shift: int  #: of the targets' course
+    truth: int  #: of the targets' course
+    n: int  #: (CHUNK,) plots of each realisation so far
+    used: int  #: (CHUNK,) 1 for a realisation of the block, 0 for one that only fills up the last chunk
 
 
 @inline

@@ -80,37 +80,28 @@ LAW, LONGEST, ENDED, CAME, SEDUCED, BOX, PUSH_R, PUSH_B, RATIO = range(9)
 
 
 class Ends(NamedTuple):
-    """How the target's tracks of F trackers are drawn, by R laws of runs, N of far plots, and two of false plots.
+    """How the target's tracks of F trackers are drawn, by R laws of runs, N of far plots, and two of false plots."""
 
-    choice (2,) is the key of the stream that chooses the law of each realisation, plots (2,) that of false plots in
-    boxes. shares (F, 1 + R + N + 2) of the law itself and of the others, in this order; the sum is one. length (F, R)
-    of the run of misses that a law is for; undetected (F, R, L, K) the probability that the target is not detected at
-    scan k by tracks with i misses in a row. direction (F, N, J) of the errors at the first scans that may give a plot,
-    whose numbers are young (F, J), -1 where there are fewer, and stretch (F, N) of them.
-    """
-
-    choice: np.ndarray
-    plots: np.ndarray
-    shares: np.ndarray
-    length: np.ndarray
+    choice: np.ndarray  #: (2,) key of the stream that chooses the law of each realisation
+    plots: np.ndarray  #: (2,) that of false plots in boxes
+    shares: np.ndarray  #: (F, 1 + R + N + 2) of the law itself and of the others, in this order; the sum is one
+    length: np.ndarray  #: (F, R) of the run of misses that a law is for
+    #: (F, R, L, K) probability that the target is not detected at scan k by tracks with i misses in a row
     undetected: np.ndarray
-    young: np.ndarray
-    direction: np.ndarray
-    stretch: np.ndarray
+    young: np.ndarray  #: (F, J) the first scans that may give a plot, -1 where there are fewer
+    direction: np.ndarray  #: (F, N, J) of the errors at these
+    stretch: np.ndarray  #: (F, N) of them
 
 
 class Laws(NamedTuple):
-    """What `Ends` holds of one tracker, without the axis F, its rule, and the scans in which a track is young.
+    """What `Ends` holds of one tracker, without the axis F, its rule, and the scans in which a track is young."""
 
-    shares (1 + R + N + 2,), length (R,), undetected (R, L, K), young (J,), direction (N, J), stretch (N,).
-    """
-
-    shares: np.ndarray
-    length: np.ndarray
-    undetected: np.ndarray
-    young: np.ndarray
-    direction: np.ndarray
-    stretch: np.ndarray
+    shares: np.ndarray  #: (1 + R + N + 2,)
+    length: np.ndarray  #: (R,)
+    undetected: np.ndarray  #: (R, L, K)
+    young: np.ndarray  #: (J,)
+    direction: np.ndarray  #: (N, J)
+    stretch: np.ndarray  #: (N,)
     rule: Rule
     young_age: float
 

@@ -111,27 +111,23 @@ ENDS_PER_SCAN, WRONG_PER_PLOT = range(RATIOS)
 
 
 class TrackSums(NamedTuple):
-    """Sums of a block, for F trackers over K scans.
+    """Sums of a block, for F trackers over K scans."""
 
-    Attributes:
-        errors: of the tracks kept, as in all parts of the sonar.
-        counts: (F, K, COUNTS) numbers of realisations that at a scan have a tentative track of the target (TRYING) or
-            a confirmed one (KEPT), confirm their first one (FOUND), lose a confirmed one (LOST) or drop it (DROPPED),
-            or drop a tentative one (FAILED); then, of settled tracks, the number that looked for a plot (LOOKED), of
-            the target's plots (PLOTS), of those in the gate (INSIDE), of false plots in the gate (FALSE), and the
-            expected number of these (EXPECTED).
-        begun: (F, K, FALSE_COUNTS) numbers of tracks begun by false plots that are tentative, are confirmed, and become
-            confirmed.
-        ratios: (F, RATIOS, 5) Σa, Σa², Σb, Σb², Σab over realisations: a ends of tracks and b scans held
-            (ENDS_PER_SCAN); a weight of false plots and b plots taken (WRONG_PER_PLOT).
-        scores: (2, F, T + 1) numbers of the target's first tracks, and of false ones, whose score reached each of T
-            thresholds, and last the number of all these tracks.
-    """
-
-    errors: "Sums"
+    errors: "Sums"  #: of the tracks kept, as in all parts of the sonar.
+    #: (F, K, COUNTS) numbers of realisations that at a scan have a tentative track of the target (TRYING) or a
+    #: confirmed one (KEPT), confirm their first one (FOUND), lose a confirmed one (LOST) or drop it (DROPPED), or drop
+    #: a tentative one (FAILED); then, of settled tracks, the number that looked for a plot (LOOKED), of the target's
+    #: plots (PLOTS), of those in the gate (INSIDE), of false plots in the gate (FALSE), and the expected number of
+    #: these (EXPECTED).
     counts: np.ndarray
+    #: (F, K, FALSE_COUNTS) numbers of tracks begun by false plots that are tentative, are confirmed, and become
+    #: confirmed.
     begun: np.ndarray
+    #: (F, RATIOS, 5) Σa, Σa², Σb, Σb², Σab over realisations: a ends of tracks and b scans held (ENDS_PER_SCAN); a
+    #: weight of false plots and b plots taken (WRONG_PER_PLOT).
     ratios: np.ndarray
+    #: (2, F, T + 1) numbers of the target's first tracks, and of false ones, whose score reached each of T thresholds,
+    #: and last the number of all these tracks.
     scores: np.ndarray
 
 
@@ -149,18 +145,14 @@ NEAREST, PDA, KNOWN = range(3)
 
 
 class Rule(NamedTuple):
-    """How a tracker chooses among the plots in its gate.
+    """How a tracker chooses among the plots in its gate."""
 
-    association is NEAREST, PDA or KNOWN; gate the χ² of two components; detection P_D and inside P_G; density of false
-    plots per m² as the tracker assumes it; speed of targets in m/s, which widens the gate of a track of one plot.
-    """
-
-    association: int
-    gate: float
-    detection: float
-    inside: float
-    density: float
-    speed: float
+    association: int  #: NEAREST, PDA or KNOWN
+    gate: float  #: χ² of two components
+    detection: float  #: P_D
+    inside: float  #: P_G
+    density: float  #: of false plots per m², as the tracker assumes it
+    speed: float  #: of targets in m/s, which widens the gate of a track of one plot
 
 
 class Gate(NamedTuple):
@@ -194,20 +186,16 @@ class Gated(NamedTuple):
 
 
 class Association(NamedTuple):
-    """What a track takes of the plots in its gate.
+    """What a track takes of the plots in its gate."""
 
-    The innovation in r and b and its additional covariance V (rr, rb, bb); taken is 1 if any plot is taken, else 0;
-    then the weight of false plots among them, and the increment of the track's score.
-    """
-
-    nu_r: float
-    nu_b: float
-    rr: float
+    nu_r: float  #: innovation in range
+    nu_b: float  #: innovation in bearing
+    rr: float  #: of the additional covariance V
     rb: float
     bb: float
-    taken: float
-    false_share: float
-    score: float
+    taken: float  #: 1 if any plot is taken, else 0
+    false_share: float  #: weight of false plots among them
+    score: float  #: increment of the track's score
 
 
 @inline
@@ -355,17 +343,13 @@ STARTED = 2.0  # plots from which a line is no longer least squares
 
 
 class Tracks(NamedTuple):
-    """A chunk of tracks of one tracker; lines in range and in bearing.
+    """A chunk of tracks of one tracker; lines in range and in bearing."""
 
-    x (2, 4, CHUNK) states, Y (2, 8, CHUNK) information and P (2, 6, CHUNK) covariance of each line, as in `steps`; C
-    (4, CHUNK) covariance between the lines; plots (CHUNK,) so far.
-    """
-
-    x: np.ndarray
-    Y: np.ndarray
-    P: np.ndarray
-    C: np.ndarray
-    plots: np.ndarray
+    x: np.ndarray  #: (2, 4, CHUNK) states of each line
+    Y: np.ndarray  #: (2, 8, CHUNK) information, as in `steps`
+    P: np.ndarray  #: (2, 6, CHUNK) covariance
+    C: np.ndarray  #: (4, CHUNK) covariance between the lines
+    plots: np.ndarray  #: (CHUNK,) so far
 
 
 def no_tracks() -> Tracks:
@@ -638,10 +622,7 @@ TURN = 2.0 * math.pi
 
 
 class Cells(NamedTuple):
-    """Cells from q0 and b0 (m², rad), nq by nb of them, each dq by db; ring: they close to a full circle.
-
-    density of false plots per m².
-    """
+    """Cells from q0 and b0 (m², rad), nq by nb of them, each dq by db."""
 
     q0: float
     dq: float
@@ -649,8 +630,8 @@ class Cells(NamedTuple):
     b0: float
     db: float
     nb: int
-    ring: bool
-    density: float
+    ring: bool  #: whether they close to a full circle
+    density: float  #: of false plots per m²
 
 
 class Field(NamedTuple):
@@ -845,28 +826,22 @@ def whole_field(field, realisation, scan, r, b):
 
 # ---- tracker ---------------------------------------------------------------------------------------------------------
 class Trackers(NamedTuple):
-    """F trackers.
+    """F trackers."""
 
-    association (F,), gate (F,) as χ², inside (F,) its probability; m and n (F,) of the rule that confirms, misses (F,)
-    in a row that drop a track, lost (F,) in σ of a plot; speed (F,) of targets in m/s; manoeuvre (F, 2) variances q in
-    nominal plots and periods. detection probability and density per m² of false plots as the trackers assume them;
-    period in s and sigma (2,) of a plot; thresholds (T,) of the score.
-    """
-
-    association: np.ndarray
-    gate: np.ndarray
-    inside: np.ndarray
-    m: np.ndarray
-    n: np.ndarray
-    misses: np.ndarray
-    speed: np.ndarray
-    lost: np.ndarray
-    manoeuvre: np.ndarray
-    detection: float
-    density: float
-    period: float
-    sigma: np.ndarray
-    thresholds: np.ndarray
+    association: np.ndarray  #: (F,)
+    gate: np.ndarray  #: (F,) as χ²
+    inside: np.ndarray  #: (F,) probability of the gate
+    m: np.ndarray  #: (F,) of the rule that confirms
+    n: np.ndarray  #: (F,) likewise
+    misses: np.ndarray  #: (F,) in a row that drop a track
+    speed: np.ndarray  #: (F,) of targets in m/s
+    lost: np.ndarray  #: (F,) in σ of a plot
+    manoeuvre: np.ndarray  #: (F, 2) variances q in nominal plots and periods
+    detection: float  #: probability as the trackers assume it
+    density: float  #: of false plots per m², likewise
+    period: float  #: s
+    sigma: np.ndarray  #: (2,) of a plot
+    thresholds: np.ndarray  #: (T,) of the score
 
 
 class Workspace(NamedTuple):
