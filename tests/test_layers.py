@@ -24,6 +24,7 @@ DATA = ("engine.results",)  # the engine's plain data, which studies fill
 CASE = ("config.experiment", "config.fields")
 ROOMS = {
     "errors": (),
+    "failures": ("errors",),
     "language": ("errors",),
     "config": ("errors", "constants"),
     "engine": ("errors",),
@@ -31,16 +32,25 @@ ROOMS = {
     "constants": (),
     "physics": ("constants",),
     "bursts": ("constants", "kernels", "physics"),
-    "report": ("errors", "config", "language", *DATA),
+    "report": ("errors", "failures", "config", "language", *DATA),
     "studies.noise": (*CASE, "kernels.random"),
     "studies.radial": ("errors", "constants", "physics"),
     "studies.interface": (*CASE, *DATA, "report"),
     "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "report.quantities", "studies.interface"),
-    "studies.onefile": ("errors", "language", *CASE, *DATA, "report", "studies.interface", "studies.judged"),
+    "studies.onefile": (
+        "errors",
+        "failures",
+        "language",
+        *CASE,
+        *DATA,
+        "report",
+        "studies.interface",
+        "studies.judged",
+    ),
     "studies.linear": (*("errors", "kernels", *CASE, *DATA, "studies.interface", "studies.noise"), "studies.onefile"),
-    "studies.stepwise": ("errors", *CASE, *DATA, "kernels", "report", "studies.noise", "studies.onefile"),
+    "studies.stepwise": ("errors", "failures", *CASE, *DATA, "kernels", "report", "studies.noise", "studies.onefile"),
     "studies.judged": ("errors", "config", *DATA, "report"),  # claims and readings of studies in one file
-    "studies.registry": ("errors", "config", "report.quantities", "studies.interface"),
+    "studies.registry": ("errors", "failures", "config", "report.quantities", "studies.interface"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry"),
     "recorded": ("errors", "config", "language", "engine", "kernels", "physics", "report", "studies"),
     "app": ("errors", "config", "language", "engine", "kernels", "physics", "report", "studies", "recorded"),
@@ -53,7 +63,7 @@ ROOMS = {
 }
 
 # Inside a study: what of the shared rooms a role stands on, and on which roles of its own study.
-GROUND = ("errors", "constants", "kernels", "physics", "bursts", *CASE)
+GROUND = ("errors", "failures", "constants", "kernels", "physics", "bursts", *CASE)
 KEYS = ("errors", "constants", "config.document", "config.fields", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
@@ -269,6 +279,7 @@ PLANTED = [
     ("cli.console", "radarsim.studies.sonar.config"),
     ("studies.range_doppler.kernels.rows", "radarsim.studies.range_doppler.filters"),
     ("studies.range_doppler.kernels.rows", "radarsim.physics"),
+    ("kernels.traced", "radarsim.failures"),
     ("studies.range_doppler.config", "radarsim.studies.range_doppler.filters"),
     ("studies.range_doppler.filters", "radarsim.studies.range_doppler.study"),
     ("studies.range_doppler.filters", "radarsim.report.tables"),

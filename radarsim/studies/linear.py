@@ -22,7 +22,7 @@ import numpy as np
 from radarsim.engine.results import Axes, Layout, Track
 from radarsim.errors import ConfigError
 from radarsim.studies.interface import CORRELATION, OUTLIERS, Tracker
-from radarsim.studies.onefile import OneFile, said
+from radarsim.studies.onefile import OneFile
 
 if TYPE_CHECKING:
     from radarsim.config.experiment import Case
@@ -78,34 +78,29 @@ class Plan:
 
 
 class LinearStudy(OneFile):
-    """A study of linear filters; what a subclass gives is said at the head of this module."""
+    """A study of linear filters; what a subclass gives is said at the head of this module.
 
+    motion(spec): how the truth moves; its first components are those of the study. plot(spec, one, k): what filter
+    `one` sees at scan k, from 0: the rows H (D, n), and the standard deviations (D,) of its numbers; a single number
+    may be given as (n,) and a float.
+    """
+
+    motion: Callable[[Any], Motion]
+    plot: Callable[[Any, Any, int], tuple[Any, Any]]
     detection: str = ""
     fitted: tuple[str, ...] = ()
 
     @classmethod
     def missing(cls) -> Iterator[str]:
         yield from super().missing()
-        if cls.motion is LinearStudy.motion:
-            yield f"{cls.__name__}.motion must be given: how the truth moves"
-        if cls.plot is LinearStudy.plot:
-            yield f"{cls.__name__}.plot must be given: what a filter sees at scan k"
+        for needed, what in (("motion", "how the truth moves"), ("plot", "what a filter sees at scan k")):
+            if not callable(getattr(cls, needed, None)):
+                yield f"{cls.__name__}.{needed} must be given: {what}"
         for name, keys in (("detection", (cls.detection,)), ("fitted", cls.fitted)):
             if isinstance(getattr(cls, "parts", None), Mapping):
                 yield from (f"{name}: there is no key {key}" for key in keys if key and not cls._has(str(key)))
 
     # ---- the model ---------------------------------------------------------------------------------------------------
-    def motion(self, spec: Any) -> Motion:
-        """How the truth moves. Its first components are those of the study."""
-        raise NotImplementedError
-
-    def plot(self, spec: Any, one: Any, k: int) -> tuple[Any, Any]:
-        """What filter `one` sees at scan k, from 0: the rows H (D, n), and the standard deviations (D,) of its numbers.
-
-        A single number may be given as (n,) and a float.
-        """
-        raise NotImplementedError
-
     def assumed_motion(self, spec: Any, one: Any) -> Motion:
         """How the state moves as a filter believes. Default: as it does."""
         return self.motion(spec)
@@ -139,7 +134,7 @@ class LinearStudy(OneFile):
         place = self.place
         if code is not None and code.co_filename != __file__:
             place = f"{code.co_filename}:{code.co_firstlineno}"
-        return ConfigError(f"{place}: {what}: {words}"[:400])
+        return ConfigError(f"{place}: study {self.name}: {what}: {words}"[:400])
 
     def _array(self, what: str, given: Any, *shape: int) -> np.ndarray:
         """A matrix that the study gives, of this shape; raises ConfigError."""
@@ -171,17 +166,17 @@ class LinearStudy(OneFile):
         for name, one in (("F", of.F), ("Q", of.Q)):
             if not callable(one):
                 raise self._fault(what, f"{name}: must be a function of dt, got {one!r}"[:150])
-            if not np.array_equal(np.asarray(said(one, dt)), np.asarray(said(one, dt)), equal_nan=False):
-                self._array(f"{what}: {name}(dt)", said(one, dt), n, n)
+            if not np.array_equal(np.asarray(self.call(one, dt)), np.asarray(self.call(one, dt)), equal_nan=False):
+                self._array(f"{what}: {name}(dt)", self.call(one, dt), n, n)
                 raise self._fault(what, f"{name}(dt): gives another formula each time: draw by normals")
-        F = self._array(f"{what}: F(dt)", said(of.F, dt), n, n)
-        Q = self._covariance(f"{what}: Q(dt)", said(of.Q, dt), n)
+        F = self._array(f"{what}: F(dt)", self.call(of.F, dt), n, n)
+        Q = self._covariance(f"{what}: Q(dt)", self.call(of.Q, dt), n)
         P = self._covariance(f"{what}: covariance", of.covariance, n)
         return F, Q, self._array(f"{what}: mean", of.mean, n), P
 
     def _rows(self, what: str, given: Callable[[int], tuple[Any, Any]], scans: int, n: int) -> tuple[np.ndarray, ...]:
         """Rows H (K, D, n) and standard deviations (K, D) of what is given for each scan."""
-        every = [said(given, k) for k in range(scans)]
+        every = [given(k) for k in range(scans)]
         for one in every:
             if not isinstance(one, tuple | list) or len(one) != 2:
                 raise self._fault(what, f"must give rows and standard deviations, H, sigma, got {one!r}"[:150])
@@ -190,21 +185,21 @@ class LinearStudy(OneFile):
         sigma = np.stack([self._array(f"{what}: sigma", np.atleast_1d(one), D) for _, one in every])
         if not (sigma > 0).all():
             raise self._fault(what, f"sigma: must be positive, got {sigma.min():g}")
-        again = said(given, 0)
+        again = given(0)
         if not (np.array_equal(np.atleast_2d(again[0]), H[0]) and np.array_equal(np.atleast_1d(again[1]), sigma[0])):
             raise self._fault(what, "gives another formula each time: the noise of a plot is added to it")
         return H, sigma
 
     def _believed(self, spec: Any, one: Any) -> Matrices:
         """The Kalman filter of what a filter believes."""
-        F, Q, x, P = self._moved("assumed_motion", said(self.assumed_motion, spec, one), self.scan_period_s(spec))
-        see, sigma = self._rows("plot", lambda k: self.plot(spec, one, k), spec.scans, x.size)
-        H, R = self._rows("assumed_plot", lambda k: self.assumed_plot(spec, one, k), spec.scans, x.size)
+        F, Q, x, P = self._moved("assumed_motion", self.call(self.assumed_motion, spec, one), self.scan_period_s(spec))
+        see, sigma = self._rows("plot", lambda k: self.call(self.plot, spec, one, k), spec.scans, x.size)
+        H, R = self._rows("assumed_plot", lambda k: self.call(self.assumed_plot, spec, one, k), spec.scans, x.size)
         return Matrices(F, Q, x, P, H, R**2, see, sigma, kalman(F, Q, P, H, R**2), False)
 
     def matrices(self, spec: Any, one: Any) -> Matrices:
         """A filter of a config."""
-        of, own = self._believed(spec, one), said(self.own_gains, spec, one)
+        of, own = self._believed(spec, one), self.call(self.own_gains, spec, one)
         if own is None:
             return of
         gains = self._array("own_gains", own, *of.H.shape)
@@ -214,7 +209,7 @@ class LinearStudy(OneFile):
     def prepare(self, case: "Case") -> Plan:
         spec = case.spec
         truth, probability = (
-            self._moved("motion", said(self.motion, spec), self.scan_period_s(spec)),
+            self._moved("motion", self.call(self.motion, spec), self.scan_period_s(spec)),
             self.probability(spec),
         )
         every = [self.matrices(spec, one) for one in spec.filters]
@@ -238,7 +233,7 @@ class LinearStudy(OneFile):
 
     def limits(self, spec: Any) -> np.ndarray:
         truth, probability = (
-            self._moved("motion", said(self.motion, spec), self.scan_period_s(spec)),
+            self._moved("motion", self.call(self.motion, spec), self.scan_period_s(spec)),
             self.probability(spec),
         )
         every = [self.matrices(spec, one) for one in spec.filters]

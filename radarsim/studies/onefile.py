@@ -38,7 +38,6 @@ Whatever a class lacks, or has of the wrong kind, is one line of a ConfigError w
 import inspect
 import re
 import sys
-import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import chain, combinations
@@ -49,6 +48,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from radarsim.config.fields import Member, Model, keys_of
 from radarsim.config.fields import Study as Keys
 from radarsim.errors import ConfigError
+from radarsim.failures import call
 from radarsim.language import Term, few, listed, term, tr
 from radarsim.studies.interface import Likelihood, Paper, RecordedPlots, Study, Tracker, true_column
 
@@ -82,9 +82,8 @@ class Measured(NamedTuple):
     sigma_keys: tuple[str, ...] = ()
 
 
-OURS = Path(__file__).parents[1]
 RESERVED = "filters", "baseline", "scans"
-MOST_TOLD_APART = 6  # sets of columns of which a file may have any; of more, all or one
+MOST_SETS = 6  # sets of columns of which a file may have any; of more, all or one
 NEEDED: Mapping[str, tuple[type, str]] = {
     "name": (str, "the value of `study:` in YAML"),
     "about": (str, "one line for `radarsim list`"),
@@ -100,8 +99,10 @@ NEEDED: Mapping[str, tuple[type, str]] = {
 class OneFile(Study):
     """A study that one class of one file declares; what a subclass gives is said at the head of this module.
 
-    measured: the numbers of a recorded plot. most_scans: of `scans`. extra_figures: names of figures that a subclass
-    draws beside those of each component, with * for what varies.
+    realisation(case, i): the plots of realisation i as a run draws them, columns (K,), and the true components (K, C).
+    tracker(case): the filters of a case before their first plot. Without either, or without `measured`, the numbers of
+    a recorded plot, the study does nothing with recorded plots. most_scans: of `scans`. extra_figures: names of figures
+    that a subclass draws beside those of each component, with * for what varies.
     """
 
     asks: str
@@ -112,6 +113,8 @@ class OneFile(Study):
     measured: tuple[Measured, ...] = ()
     paper: Paper | None = None
     claims_yaml: str = ""
+    realisation: "Callable[[Case, int], tuple[Mapping[str, np.ndarray], np.ndarray]] | None" = None
+    tracker: "Callable[[Case], Tracker] | None" = None
     most_scans: int = 10_000
     extra_figures: tuple[str, ...] = ()
 
@@ -188,6 +191,10 @@ class OneFile(Study):
         return first in model.model_fields or isinstance(getattr(model, first, None), property)
 
     # ---- numbers -------------------------------------------------------------------------------------------------
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """What a function of the study gives; ConfigError with its place and the study's name where it fails."""
+        return call(function, *arguments, of=f"study {self.name}: ")
+
     def scan_period_s(self, spec: Any) -> float:
         """The time between two plots of a config."""
         return float(attrgetter(self.scan_period)(spec))
@@ -285,8 +292,8 @@ class OneFile(Study):
         last = tables.where(made["last"], case=result.name, component=leading.name).to_dict("records")
         keys: tuple[str, ...] = ("last_sigma", "last_lo", "last_hi")
         each = [f"{row['filter']} {wording.estimate((row[key] for key in keys), tr(row['unit']))}" for row in last]
-        told = {"quantity": self._term(leading.words or leading.name), "t": float(result.axes.t_s[-1])}
-        words = tr("σ of the {quantity} after {t:g} s: {filters}.", **told, filters=listed(each))
+        fields = {"quantity": self._term(leading.words or leading.name), "t": float(result.axes.t_s[-1])}
+        words = tr("σ of the {quantity} after {t:g} s: {filters}.", **fields, filters=listed(each))
         yield panels.at_its_place(result, words)
         gains = tables.where(made["gains"], case=result.name, component=leading.name)
         gains = gains[gains["k"] == gains["k"].max()]
@@ -294,8 +301,9 @@ class OneFile(Study):
             keys = ("gain_percent", "gain_lo", "gain_hi")
             each = [f"{row['filter']} {wording.estimate((row[key] for key in keys), '%', '.3g')}"
                     for row in gains.to_dict("records")]  # fmt: skip
-            told = {"base": result.axes.filters[result.axes.baseline], "filters": listed(each)}
-            yield panels.at_its_place(result, tr("Gain against {base} there: {filters}.", **told))
+            base = result.axes.filters[result.axes.baseline]
+            words = tr("Gain against {base} there: {filters}.", base=base, filters=listed(each))
+            yield panels.at_its_place(result, words)
 
     # ---- the paper -----------------------------------------------------------------------------------------------
     @cached_property
@@ -344,14 +352,6 @@ class OneFile(Study):
         """The columns of recorded plots that a filter takes, in the order of `measured`. Default: theirs."""
         return tuple(number.column for number in self.measured)
 
-    def realisation(self, case: "Case", i: int) -> "tuple[Mapping[str, np.ndarray], np.ndarray]":
-        """The plots of realisation i as a run draws them, columns (K,), and the true components (K, C)."""
-        raise NotImplementedError
-
-    def tracker(self, case: "Case") -> Tracker:
-        """The filters of a case before their first plot."""
-        raise NotImplementedError
-
     def likelihood(
         self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"
     ) -> Likelihood | None:
@@ -359,42 +359,12 @@ class OneFile(Study):
         return None
 
     def recorded(self) -> RecordedPlots | None:
-        own = type(self)
-        given = own.tracker is not OneFile.tracker and own.realisation is not OneFile.realisation
-        return Recorded(self) if self.measured and given else None
+        draw, tracker = self.realisation, self.tracker
+        return Recorded(self, draw, tracker) if self.measured and draw and tracker else None
 
     def shipped(self) -> Path | None:
         folder = Path(str(sys.modules[type(self).__module__].__file__)).parent / "shipped"
         return folder if folder.is_dir() else None
-
-
-# ---- faults of an author's functions ---------------------------------------------------------------------------------
-def said(function: Callable[..., Any], *arguments: Any) -> Any:
-    """What an author's function gives; ConfigError with its file and line where it fails."""
-    try:
-        return function(*arguments)
-    except ConfigError:
-        raise
-    except (Exception, SystemExit) as error:
-        frames = [one for one in traceback.extract_tb(error.__traceback__) if not within(one.filename)]
-        line = str(error).strip().partition("\n")[0] or type(error).__name__
-        words = line if getattr(error, "for_the_author", False) else f"{type(error).__name__}: {line}"
-        if "__array_ufunc__" in line:
-            words = "a number of a realisation is none of NumPy's: radarsim.kernels.traced has sqrt, exp, sin, … for it"
-        if not frames:
-            raise fault(function, words) from error
-        raise ConfigError(f"{frames[-1].filename}:{frames[-1].lineno}: {frames[-1].name}: {words}") from error
-
-
-def within(file: str) -> bool:
-    """Whether a file is one of radarsim's own, or of a library's."""
-    return Path(file).is_relative_to(OURS) or "site-packages" in file
-
-
-def fault(function: Callable[..., Any], words: str, name: str = "") -> ConfigError:
-    """An error that names a function by its file and line."""
-    code = function.__code__
-    return ConfigError(f"{code.co_filename}:{code.co_firstlineno}: {name or code.co_name}: {words}")
 
 
 class Recorded(RecordedPlots):
@@ -403,12 +373,12 @@ class Recorded(RecordedPlots):
     from_any_origin = True
     of_any_keys = True
 
-    def __init__(self, study: OneFile):
-        self.study = study
+    def __init__(self, study: OneFile, draw: "Callable[[Case, int], Any]", tracker: "Callable[[Case], Tracker]"):
+        self.study, self._draw, self._tracker = study, draw, tracker
 
     def columns(self, spec: Any) -> Sequence[Sequence[str]]:
         each = list(dict.fromkeys(self.study.columns(spec, one) for one in spec.filters))
-        counts = range(len(each), 0, -1) if len(each) <= MOST_TOLD_APART else (len(each), 1)
+        counts = range(len(each), 0, -1) if len(each) <= MOST_SETS else (len(each), 1)
         some = [tuple(dict.fromkeys(chain(*part))) for n in counts for part in combinations(each, n)]
         return [("t_s", *names) for names in dict.fromkeys(some)]
 
@@ -423,13 +393,13 @@ class Recorded(RecordedPlots):
         return self.study.scan_period_s(spec)
 
     def simulated(self, case: "Case", realisation: int) -> "Mapping[str, np.ndarray]":
-        plots, truth = self.study.realisation(case, realisation)
+        plots, truth = self._draw(case, realisation)
         columns = (true_column(one.name, one.unit) for one in self.study.components)
         t_s = self.study.axes(case.spec).t_s
         return {"t_s": t_s, **plots} | dict(zip(columns, truth.T, strict=True))
 
     def tracker(self, case: "Case") -> Tracker:
-        return self.study.tracker(case)
+        return self._tracker(case)
 
     def likelihood(
         self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"

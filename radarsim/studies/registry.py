@@ -8,10 +8,7 @@ A package adds a filter to a study that takes such by an entry point of the grou
 value of `kind:` of a filter in YAML, its target a class of keys, derived from what `Study.own_filters` gives.
 """
 
-import os
-import re
-import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -20,6 +17,7 @@ from inspect import isabstract
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
+from radarsim import failures
 from radarsim.config.experiment import Case
 from radarsim.config.fields import Study as Keys
 from radarsim.config.fields import kinds_of, widened
@@ -31,7 +29,6 @@ from radarsim.studies.interface import Study
 Part = TypeVar("Part")
 
 GROUP, FILTERS = "radarsim.studies", "radarsim.filters"
-COMPILING = re.compile(r"Failed in |-+$|\[\d\] |During: ")  # lines of a compiler's message that say where it was
 SHIPPED = {  # in the order of the papers, then what goes beyond them
     "range_doppler": "radarsim.studies.range_doppler",
     "multimodel": "radarsim.studies.multimodel",
@@ -90,7 +87,7 @@ def _loaded(name: str) -> Study | ConfigError:
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # a package may fail in any way of its own, also by sys.exit
-        return _fault(name, f"cannot be loaded: {described(error)}")
+        return _fault(name, f"cannot be loaded: {failures.summary(error)}")
     if not isinstance(found, Study):
         return _fault(name, f"must offer a radarsim.studies.interface.Study, got {type(found).__name__}")
     if found.name != name:
@@ -116,7 +113,7 @@ def part(name: str, take: Callable[[Study], Part]) -> Part:
     except (RadarsimError, KeyboardInterrupt):
         raise
     except BaseException as error:
-        raise _fault(name, f"fails: {described(error)}") from error
+        raise _fault(name, f"fails: {failures.summary(error)}") from error
 
 
 def parts(take: Callable[[Study], Part]) -> dict[str, Part]:
@@ -216,37 +213,30 @@ def package(name: str) -> str | None:
     return _package(next(iter(entries()[name].values())))
 
 
+def homes() -> Iterator[Path]:
+    """The folder of each of these packages, or its one file."""
+    for name in packages():
+        try:
+            spec = find_spec(name)
+        except (ImportError, ValueError):
+            continue
+        if spec is not None:
+            folders = spec.submodule_search_locations or [spec.origin or ""]
+            yield from (Path(one).resolve() for one in folders)
+
+
+failures.homes = homes
+
+
 def _package(entry: EntryPoint) -> str:
     return f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.value
 
 
-def described(error: BaseException) -> str:
-    """An exception in one line: its kind, the first line of its message that says something, and its place.
-
-    That is the last line of an installed package that offers studies; of what the compiler refuses, the one it names.
-    """
-    lines = [line.strip() for line in str(error).splitlines() if line.strip() and not COMPILING.match(line)]
-    said = ": ".join([type(error).__name__, *lines[:1]])
-    found = re.search(r'File "([^"]+)", line (\d+)', str(error))
-    place = f"{found[1]}:{found[2]}" if found else blamed(error)
-    return f"{said} ({place})" if place else said
-
-
-def blamed(error: BaseException) -> str:
-    """The last line of code of an installed package with studies or filters, `file:line`, among those that led to an
-    error; nothing where there is none."""
-    specs = [spec for name in packages() if (spec := find_spec(name)) is not None]
-    homes = tuple(
-        os.path.realpath(one) for spec in specs for one in spec.submodule_search_locations or [spec.origin or ""]
-    )
-    places = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
-    own = [f"{file}:{line}" for file, line in places if homes and os.path.realpath(file).startswith(homes)]
-    return own[-1] if own else ""
-
-
 def fault_of(error: BaseException) -> StudyError | None:
     """What an error that nobody has caught says, where the code of an installed package is to blame; else None."""
-    return StudyError(f"the code of an installed package fails: {described(error)}") if blamed(error) else None
+    if failures.place(error, installed=True) is None:
+        return None
+    return StudyError(f"the code of an installed package fails: {failures.summary(error)}")
 
 
 def _fault(name: str, words: str) -> ConfigError:
@@ -291,7 +281,7 @@ def _filter(kind: str, entry: EntryPoint) -> tuple[Any, str]:
     try:
         found = entry.load()
     except Exception as error:  # a package may fail in any way of its own
-        return None, f"which cannot be loaded: {described(error)}"
+        return None, f"which cannot be loaded: {failures.summary(error)}"
     name = str(getattr(found, "study", None))
     base = study(name).own_filters() if name in SHIPPED else None
     if base is None:

@@ -40,9 +40,10 @@ import numpy as np
 
 from radarsim.engine.results import Axes, CaseResult, Layout, Track
 from radarsim.errors import ConfigError
+from radarsim.failures import call, fault
 from radarsim.kernels import traced
 from radarsim.studies.noise import noise_key
-from radarsim.studies.onefile import OneFile, fault, said
+from radarsim.studies.onefile import OneFile
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -157,15 +158,15 @@ class StepStudy(OneFile):
 
     def _probability(self, spec: Any) -> float:
         """The probability of a plot."""
-        given = said(self.detection, spec)
+        given = self.call(self.detection, spec)
         if not isinstance(given, int | float) or not 0 <= given <= 1:
             raise fault(self.detection, f"must give a probability, from 0 to 1, got {given!r}"[:200])
         return float(given)
 
     def _known(self, spec: Any, t_s: np.ndarray) -> np.ndarray:
         """The time since the scan before, and what is known at each, (K, whole eights)."""
-        given = said(self.known, spec, t_s)
-        if not np.array_equal(given, said(self.known, spec, t_s)):
+        given = self.call(self.known, spec, t_s)
+        if not np.array_equal(given, self.call(self.known, spec, t_s)):
             raise fault(self.known, f"{ANOTHER}: draw in begin, move and plot, by normals")
         if len(given) != len(self.known_columns):
             raise fault(self.known, f"gives {len(given)} columns, known_columns has {len(self.known_columns)}")
@@ -301,9 +302,9 @@ class StepStudy(OneFile):
 
         made = super().tables(results)
         if any("nees" in result.sums for result in results):
-            told = [result for result in results if "nees" in result.sums]
-            made["believed"] = tables.joined(map(self._believed, told))
-            made["consistency"] = tables.joined(map(self._consistency, told))
+            tested = [result for result in results if "nees" in result.sums]
+            made["believed"] = tables.joined(map(self._believed, tested))
+            made["consistency"] = tables.joined(map(self._consistency, tested))
         return made
 
     def _believed(self, result: CaseResult) -> Mapping[str, Any]:
@@ -311,21 +312,21 @@ class StepStudy(OneFile):
         from radarsim.report import notes
 
         sigma = np.sqrt(np.asarray(result.sums["believed"]) / result.count)
-        told = np.array([self.kinds[one.kind].covariance is not None for one in result.spec.filters])
-        axes = replace(result.axes, available=result.axes.available & told[:, None, None])
+        tested = np.array([self.kinds[one.kind].covariance is not None for one in result.spec.filters])
+        axes = replace(result.axes, available=result.axes.available & tested[:, None, None])
         return notes.believed(replace(result, axes=axes), sigma)
 
     def _consistency(self, result: CaseResult) -> Mapping[str, Any]:
         """Mean NEES of all components by scan, per degree of freedom, with bounds and verdict."""
         from radarsim.report import notes, statistics, tables
 
-        told = [f for f, one in enumerate(result.spec.filters) if self.kinds[one.kind].covariance is not None]
+        tested = [f for f, one in enumerate(result.spec.filters) if self.kinds[one.kind].covariance is not None]
         scans, freedom, n = result.axes.k.size, len(self.components), result.count
-        sums = np.asarray(result.sums["nees"])[told].reshape(-1, 2) / [freedom, freedom**2]
+        sums = np.asarray(result.sums["nees"])[tested].reshape(-1, 2) / [freedom, freedom**2]
         bounds = notes.bounds_from_spread(sums[:, 0], sums[:, 1], n, len(sums))
         means = [statistics.mean_square(total, square, n) for total, square in sums]
         return {
-            **tables.leading(result, np.repeat(told, scans), np.tile(np.arange(scans), len(told))),
+            **tables.leading(result, np.repeat(tested, scans), np.tile(np.arange(scans), len(tested))),
             "n": np.full(len(sums), n),
             **notes.normalised("nees", statistics.Estimate(*np.transpose(means)), bounds),
         }
@@ -406,7 +407,7 @@ def plain(numbers: Any) -> np.ndarray:
 # ---- faults of an author's formulas ----------------------------------------------------------------------------------
 def numbers_of(function: Callable[..., Any], *arguments: Any) -> Any:
     """What a step gives; whole numbers in it are numbers of a realisation like others."""
-    return traced.numbered(said(function, *arguments))
+    return traced.numbered(call(function, *arguments))
 
 
 def recorded(function: Callable[..., Any], *arguments: Any) -> Any:
@@ -425,7 +426,7 @@ def recorded(function: Callable[..., Any], *arguments: Any) -> Any:
 
 def record(function: Callable[..., Any], *arguments: Any) -> Any:
     """The numbers that an author's function makes of keys; ConfigError where it gives no tuple or named record."""
-    given, again = said(function, *arguments), said(function, *arguments)
+    given, again = call(function, *arguments), call(function, *arguments)
     if not isinstance(given, tuple):
         raise fault(function, f"must give a tuple or a named record, got {type(given).__name__}")
     numbers = [float(one) for one in traced.leaves(given)]

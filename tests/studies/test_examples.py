@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.studies import registry
+from radarsim import failures
 from tests.studies import outside
 
 EXAMPLES = outside.ROOT / "examples"
@@ -174,7 +174,7 @@ def test_what_its_code_does_wrong_is_one_line_with_its_place(tmp_path, what):
         assert line.startswith(f"the code of an installed package fails: {said}")
         assert line.endswith(f"{place})")
     else:
-        assert f"{place}: own_gains: {said}" in line
+        assert line.startswith(f"{tmp_path}/site{place}: study chirp: Chirp.own_gains: {said}")
     assert (tmp_path / "results/chirp/curves.csv").exists() == written
 
 
@@ -213,7 +213,7 @@ def test_what_the_compiler_refuses_is_its_reason_and_the_line_that_it_names():
     for wrong in (unnamed, untyped):
         with pytest.raises(Exception, match="nothing" if wrong is untyped else "yy") as caught:
             wrong(1.0)
-        said.append(registry.described(caught.value))
+        said.append(failures.summary(caught.value))
     assert said[0] == "TypingError: NameError: name 'yy' is not defined"
     assert said[1].startswith("TypingError: Unknown attribute 'nothing' of type float64")
     line = int(said[1].rpartition(":")[2].rstrip(")"))

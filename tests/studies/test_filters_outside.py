@@ -13,7 +13,7 @@ from tests.studies import outside
 
 ROOT = Path(__file__).parents[2]
 N = 9000  # two whole blocks and a partial one
-BASE = "from typing import Literal\nfrom radarsim.config.fields import key\n"
+BASE = "import numpy as np\nfrom typing import Literal; from radarsim.config.fields import key\n"
 BASE += "from radarsim.studies.range_doppler.given import GivenGains\n"
 CLASS = (
     BASE
@@ -39,10 +39,21 @@ PACKAGES = {  # kind: source of its module, why it cannot be used
     "other": (CLASS.format(kind="another", body="pass"), "whose key kind must be Literal['other']"),
     "kalman": (CLASS.format(kind="kalman", body="pass"), "which range_doppler has itself: that of the package is not "),
 }
-FAILING = {  # kind: what its gains do, what is said
-    "fails": ("return scans.no_such", "its gains fail, {place}/module_of_fails.py:8: AttributeError: "),
-    "short": ("return scans.t_s", "must make gains (15, 3, 2), made (15,)"),
-    "endless": ("return scans.kalman(self.noise) / 0", "must make finite gains, those of scan 3 are [["),
+NOISE = "return np.zeros((15, 3, 2))\n    def noise(self, dt_s):\n        return {}"
+FAILING = {  # kind: what its gains do, what is said; its place is the module's line
+    "fails": ("return scans.no_such", 8, "Own.gains: AttributeError: 'Scans' object has no attribute 'no_such'"),
+    "numpys": ("return np.stack([np.eye(2), np.eye(3)])", 8, "Own.gains: ValueError: all input arrays must have the"),
+    "leaves": ("raise SystemExit", 8, "Own.gains: SystemExit"),
+    "short": ("return scans.t_s", 7, "Own.gains: must give numbers (15, 3, 2), got (15,)"),
+    "words": ("return 'large'", 7, "Own.gains: must give numbers (15, 3, 2), got 'large'"),
+    "endless": ("return scans.kalman(self.noise) / 0", 7, "Own.gains: must make finite gains, those of scan 3 are [["),
+    "flat": (NOISE.format("[[1]]"), 9, "Own.noise: must give numbers (3, 3), got (1, 1)"),
+    "negative": (NOISE.format("-np.eye(3)"), 9, "Own.noise: must give a covariance that is not negative, got [["),
+    "skew": (
+        NOISE.format("np.triu(np.ones((3, 3)))"),
+        9,
+        "Own.noise: must give a symmetric, finite covariance, got [[",
+    ),
 }
 
 
@@ -162,7 +173,7 @@ def beside_broken(tmp_path_factory):
     folder = tmp_path_factory.mktemp("broken")
     site = folder / "site"
     sources = {kind: source for kind, (source, _) in PACKAGES.items()}
-    sources |= {kind: CLASS.format(kind=kind, body=body) for kind, (body, _) in FAILING.items()}
+    sources |= {kind: CLASS.format(kind=kind, body=body) for kind, (body, *_) in FAILING.items()}
     for kind, source in sources.items():
         outside.metadata(site, f"pack-{kind}", "2.0", {kind: f"module_of_{kind}:Own"}, "radarsim.filters")
         (site / f"module_of_{kind}.py").write_text(source)
@@ -193,7 +204,7 @@ def test_what_cannot_be_used_is_named_where_it_is_asked_for_and_listed(beside_br
     faults = radarsim("check", *(f"{kind}.yaml" for kind in words), cwd=tmp_path, code=2).stderr.splitlines()
     for (kind, why), fault in zip(words.items(), faults, strict=True):
         assert fault.startswith(
-            f"{kind}.yaml:12:21: filters.0.kind: must be one of kalman, endless, fails, short; {why}"
+            f"{kind}.yaml:12:21: filters.0.kind: must be one of kalman, {', '.join(sorted(FAILING))}; {why}"
         )
 
 
@@ -209,4 +220,5 @@ def test_gains_that_fail_end_in_one_line(beside_broken, tmp_path, kind):
     radarsim, site = beside_broken
     own = f"filters=[{{name: a, kind: {kind}, observes: [range, velocity]}}]"
     fault = radarsim("run", "rls2", "-n", 10, "--set", own, "--out", tmp_path, code=2).stderr
-    assert fault.splitlines()[-1].startswith(f"filter a: kind {kind}: {FAILING[kind][1].format(place=site)}")
+    _, line, said = FAILING[kind]
+    assert fault.splitlines()[-1].startswith(f"{site}/module_of_{kind}.py:{line}: filter a: kind {kind}: {said}")

@@ -325,7 +325,7 @@ def test_a_wrong_shape_is_one_line_with_the_classs_file(what):
 
 def test_keys_and_methods_that_are_not_there_are_a_line_each():
     Study = study_of(2, 1).__class__
-    given = {"detection": "sensor.detektion", "fitted": ("sensor.nois",), "plot": LinearStudy.plot}
+    given = {"detection": "sensor.detektion", "fitted": ("sensor.nois",), "plot": None}
     Wrong = type("Wrong", (Study,), given | {"__module__": __name__})
     assert list(Wrong.missing()) == [
         "Wrong.plot must be given: what a filter sees at scan k",

@@ -14,6 +14,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.report import claims, tables
 from radarsim.report.claims import over
+from radarsim.report.claims.declared import NoSuchName
 from radarsim.studies import judged
 from radarsim.studies.interface import Paper, true_column
 from radarsim.studies.noise import noise_key
@@ -280,6 +281,7 @@ def failing(what):
         ("fast", "must give an Estimate or a number, got 'fast'"),
         (ValueError("boom"), "ValueError: boom \\("),
         (SystemExit(0), "SystemExit: 0 \\("),
+        (NoSuchName("no filter 'quikc'; there are slow"), "no filter 'quikc'; there are slow \\("),
     ],
 )
 def test_a_measure_that_fails_is_one_line_and_the_other_claims_are_judged(made, what, said):

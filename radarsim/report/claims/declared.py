@@ -40,6 +40,15 @@ class Missing(KeyError):
         return next((arg for arg in self.args if isinstance(arg, str)), "")
 
 
+class NoSuchName(Missing):
+    """A case that is there has no filter, or component, of that name."""
+
+    for_the_author = True
+
+    def __str__(self) -> str:
+        return self.why
+
+
 class Hidden(dict):
     """In place of sums and tables where none may be looked at: everything is missing."""
 
@@ -210,7 +219,7 @@ class Evidence:
         filters, components = result.axes.filters, tuple(name for name, _ in result.axes.components)
         for kind, name, known in (("filter", filter_name, filters), ("component", component, components)):
             if name not in known:
-                return Missing(f"no {kind} {name!r}; there are {', '.join(known)}")
+                return NoSuchName(f"no {kind} {name!r}; there are {', '.join(known)}")
         return Missing((result.name, filter_name, component, *base))
 
     def curve(self, key: Any, filter_name: str, component: str) -> Series:
@@ -268,7 +277,7 @@ class Evidence:
         self.looked.add((table, str(equal.get("component", ""))))
         for name, value in equal.items():
             if name in ("filter", "component") and not (rows[name] == value).any():
-                raise Missing(f"no {name} {value!r}; there are {', '.join(dict.fromkeys(rows[name].astype(str)))}")
+                raise NoSuchName(f"no {name} {value!r}; there are {', '.join(dict.fromkeys(rows[name].astype(str)))}")
             rows = rows[rows[name] == value]
         if not len(rows):
             raise Missing(equal)

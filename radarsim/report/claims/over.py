@@ -36,7 +36,6 @@ rounds to, under the granular one if it lies within the margin of its words.
 import inspect
 import itertools
 import math
-import traceback
 from abc import ABC
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -49,6 +48,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin
 
 import numpy as np
 
+from radarsim import failures
 from radarsim.config.check import check
 from radarsim.config.document import Document, Faults, did_you_mean, shown
 from radarsim.config.document import KeyPath as Keys
@@ -58,7 +58,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError, MeasureError, RadarsimError
 from radarsim.language import term, tr
 from radarsim.report.claims import rule
-from radarsim.report.claims.declared import Claim, Evidence, Missing, PaperClaims, Part, certain
+from radarsim.report.claims.declared import Claim, Evidence, Missing, NoSuchName, PaperClaims, Part, certain
 from radarsim.report.claims.judge import exact as known
 from radarsim.report.claims.judge import weighed
 from radarsim.report.claims.rule import AGAINST, EQUIVALENT, UNSTATED, Judged, Outcome
@@ -467,13 +467,11 @@ class Call:
                 found = getattr(seen, self.name)(*self.cases, **self.arguments)
             else:
                 found = self.function(seen, *self.cases, **self.arguments)
-        except (Missing, Unreadable):
-            raise
         except (Exception, SystemExit) as error:
-            if isinstance(error, RadarsimError) and not isinstance(error, ConfigError):
+            other = isinstance(error, RadarsimError) and not isinstance(error, ConfigError)
+            if other or (isinstance(error, Missing | Unreadable) and not self._misspelt(error)):
                 raise
-            said = error.lines[0] if isinstance(error, ConfigError) else f"{type(error).__name__}: {error}"
-            raise MeasureError(f"{self.source}: {self.name}: {said}{self._place(error)}") from error
+            raise MeasureError(f"{self.source}: {self.name}: {failures.summary(error)}") from error
         if isinstance(found, Estimate):
             return found
         with suppress(TypeError, ValueError):
@@ -481,13 +479,10 @@ class Call:
                 return certain(found)
         raise MeasureError(f"{self.source}: {self.name}: must give an Estimate or a number, got {shown(found)}")
 
-    def _place(self, error: BaseException) -> str:
-        """The last line of the function's own file that led to an error, in brackets."""
-        if self.function is None or self.function.__module__.startswith("radarsim."):
-            return ""
-        file = self.function.__code__.co_filename
-        own = [one.lineno for one in traceback.extract_tb(error.__traceback__) if one.filename == file]
-        return f" ({file}:{own[-1]})" if own else ""
+    def _misspelt(self, error: Exception) -> bool:
+        """Whether a function of a package looks for a name that the paper's own case does not have."""
+        of_a_package = self.function is not None and not self.function.__module__.startswith("radarsim.")
+        return of_a_package and isinstance(error, NoSuchName)
 
     def number(self, seen: Any) -> float:
         """Its value alone."""

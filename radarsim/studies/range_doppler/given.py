@@ -5,19 +5,19 @@ holds the keys of its `kind` and makes its gains; the start by least squares, th
 its exact errors, the kernel and recorded plots are as for the study's own filters.
 """
 
-import traceback
 from abc import abstractmethod
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from radarsim.errors import ConfigError
+from radarsim.failures import call, fault
 from radarsim.kernels.algebra import constant_acceleration, pack, unpack
 from radarsim.physics import transition
 from radarsim.studies.range_doppler.config import FilterKeys
 from radarsim.studies.range_doppler.filters import LinearFilter, Plots, defects, least_squares_start, started, updated
 
+ROUNDED = 1e-9  # of a covariance's largest element, or eigenvalue: what rounding may leave
 STEADY = 1e-9  # relative change of a gain from one scan to the next that counts as none
 
 
@@ -94,20 +94,42 @@ def own_filters() -> type[GivenGains]:
 
 def checked(one: GivenGains, scans: Scans) -> np.ndarray:
     """The gains (K, 3, 2) of a filter of a package, zero where they are not read. Raises ConfigError where it fails."""
-    shape, known = (len(scans.t_s), 3, 2), f"filter {one.name}: kind {one.kind}"
-    try:
-        made = np.asarray(one.gains(scans), dtype=float)
-    except Exception as error:  # of a package, in any way of its own
-        at = traceback.extract_tb(error.__traceback__)[-1]
-        words = f"{type(error).__name__}: {error}"
-        raise ConfigError(f"{known}: its gains fail, {at.filename}:{at.lineno}: {words}") from error
-    if made.shape != shape:
-        raise ConfigError(f"{known}: must make gains {shape}, made {made.shape}")
+    made = _numbers(one, one.gains, (len(scans.t_s), 3, 2), scans)
     read = scans.there & (np.arange(1, len(made) + 1) > scans.start)[:, None]
     made = np.where(read[:, None, :], made, 0.0)
     if not np.isfinite(made).all():
         k = int(np.argmax(~np.isfinite(made).all(axis=(1, 2)))) + 1
-        raise ConfigError(f"{known}: must make finite gains, those of scan {k} are {made[k - 1].tolist()}")
+        raise fault(one.gains, f"must make finite gains, those of scan {k} are {made[k - 1].tolist()}", of=_name(one))
+    return made
+
+
+def noise_of(one: GivenGains) -> Callable[[float], np.ndarray]:
+    """`noise` of a filter of a package; raises ConfigError where it gives no covariance (3, 3)."""
+
+    def noise(dt_s: float) -> np.ndarray:
+        made = _numbers(one, one.noise, (3, 3), dt_s)
+        if not np.isfinite(made).all() or np.abs(made - made.T).max() > ROUNDED * np.abs(made).max():
+            raise fault(one.noise, f"must give a symmetric, finite covariance, got {made.tolist()}", of=_name(one))
+        if (values := np.linalg.eigvalsh(made))[0] < -ROUNDED * np.abs(values).max():
+            raise fault(one.noise, f"must give a covariance that is not negative, got {made.tolist()}", of=_name(one))
+        return made
+
+    return noise
+
+
+def _name(one: GivenGains) -> str:
+    return f"filter {one.name}: kind {one.kind}: "
+
+
+def _numbers(one: GivenGains, function: Callable[..., Any], shape: tuple[int, ...], *arguments: Any) -> np.ndarray:
+    """The numbers of this shape that a function of a filter gives. Raises ConfigError where it gives others."""
+    given = call(function, *arguments, of=_name(one))
+    try:
+        made = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise fault(function, f"must give numbers {shape}, got {given!r}"[:200], of=_name(one)) from None
+    if made.shape != shape:
+        raise fault(function, f"must give numbers {shape}, got {made.shape or 'one number'}", of=_name(one))
     return made
 
 
@@ -117,12 +139,13 @@ def designed(one: GivenGains, sigma: np.ndarray, t: np.ndarray) -> LinearFilter:
     weights, covariance = least_squares_start(observes, start, sigma, dt)
     scans = Scans(t, np.broadcast_to(np.arange(2) < observes, (len(t), 2)), sigma, start, covariance)
     made = checked(one, scans)
-    believed = scans.errors(made, one.noise)
+    noise = noise_of(one)
+    believed = scans.errors(made, noise)
     available = np.ones((len(t), 3), dtype=bool)
     available[: start - 1, observes:] = False
     believed[: start - 1, range(observes), range(observes)] = sigma[:observes] ** 2
     return LinearFilter(
-        observes, start, weights, made, believed, available, tuple(map(float, pack(one.noise(dt)))), given=True
+        observes, start, weights, made, believed, available, tuple(map(float, pack(noise(dt)))), given=True
     )
 
 
@@ -171,14 +194,15 @@ def followed(
     it. Last, the variances (n, 2) of what the plots differ by from the estimates.
     """
     made = checked(one, scans)
-    P, R = scans.errors(made, one.noise), np.diag(scans.sigma**2)
+    noise = noise_of(one)
+    P, R = scans.errors(made, noise), np.diag(scans.sigma**2)
     rows = range(scans.start, len(z))
     estimate, nis, left = np.empty((len(rows), 3)), np.empty((len(rows), 2)), np.empty((len(rows), 2))
     for row, k in enumerate(rows):
         dt, there = float(scans.t_s[k] - scans.t_s[k - 1]), scans.there[k]
         F = transition(dt)
         x = F @ x
-        S = (F @ P[k - 1] @ F.T + one.noise(dt))[:2, :2] + R
+        S = (F @ P[k - 1] @ F.T + noise(dt))[:2, :2] + R
         e = np.where(there, z[k] - x[:2], 0.0)
         known = S[0, 1] / S[0, 0] if there[0] else 0.0
         of_velocity = (e[1] - known * e[0]) ** 2 / (S[1, 1] - known * S[0, 1])

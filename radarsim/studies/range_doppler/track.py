@@ -1,6 +1,7 @@
 """Plots of the range_doppler study: those of one realisation, and the study's filters over recorded ones."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -98,7 +99,7 @@ class Tracker:
         )
 
 
-class _Starting:
+class _Starting(ABC):
     """A filter before its start: the plots that it is to be started from; then its state and covariance."""
 
     def __init__(self, options: FilterKeys, sigma: np.ndarray):
@@ -127,11 +128,11 @@ class _Starting:
         self.last = t[-1]
         return estimate, sigma, nis
 
+    @abstractmethod
     def after(
         self, k: int, t: np.ndarray, z: np.ndarray, taken: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What `feed` gives of the rows from k on, before which the filter has started; taken: the numbers it takes."""
-        raise NotImplementedError
 
     def _begin(self, t: float, z: np.ndarray) -> None:
         """Take one more plot, and start from all so far where they suffice."""

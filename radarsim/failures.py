@@ -1,0 +1,113 @@
+"""Failures of code that is not radarsim's: what an author's function did wrong, in one line with its place.
+
+The place is the deepest line of an installed package that offers studies or filters; where none of these led to the
+error, of any code that is neither radarsim's nor a library's, such as a notebook or a test.
+"""
+
+import functools
+import inspect
+import os
+import re
+import sysconfig
+import traceback
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from types import CodeType
+from typing import Any, NamedTuple
+
+from radarsim.errors import ConfigError, RadarsimError
+
+LIBRARIES = (*(sysconfig.get_path(name) for name in ("stdlib", "platstdlib")), str(Path(__file__).parent))
+COMPILING = re.compile(r"Failed in |-+$|\[\d\] |During: ")  # lines of a compiler's message that say where it was
+OF_NUMPY = "__array_ufunc__"  # what NumPy names where it is asked for the sine of eight realisations
+LONGEST = 300  # characters of a message
+
+homes: Callable[[], Iterable[Path]] = tuple  # the folders, or single files, of packages that offer studies or filters
+
+
+class Place(NamedTuple):
+    """A line of code."""
+
+    file: str
+    line: int
+    function: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}"
+
+
+def place(error: BaseException, installed: bool = False, function: Any = None) -> Place | None:
+    """The line to blame for an error. installed: of an installed package that offers studies or filters, or None.
+
+    function: the author's function that was called; code in its folder is the author's too.
+    """
+    code = _code(function)
+    within = (*homes(), *([Path(os.path.realpath(code.co_filename)).parent] if code else []))
+    places = list(_places(error))
+    own = [one for one in places if any(map(Path(os.path.realpath(one.file)).is_relative_to, within))]
+    if not own and not installed:
+        own = [one for one in places if not _is_library(one.file)]
+    return own[-1] if own else None
+
+
+def _places(error: BaseException) -> Iterator[Place]:
+    """The lines that led to an error, the deepest last: of what cannot be compiled, that which is named."""
+    for frame, line in traceback.walk_tb(error.__traceback__):
+        yield Place(frame.f_code.co_filename, line, frame.f_code.co_qualname.rpartition("<locals>.")[2])
+    if isinstance(error, SyntaxError) and error.filename:
+        yield Place(error.filename, error.lineno or 1)
+    elif found := re.search(r'File "([^"]+)", line (\d+)', str(error)):
+        yield Place(found[1], int(found[2]))
+
+
+def _code(function: Any) -> CodeType | None:
+    """The code of a function; None of what is not written in Python."""
+    while isinstance(function, functools.partial):
+        function = function.func
+    return getattr(inspect.unwrap(function) if callable(function) else function, "__code__", None)
+
+
+def _is_library(file: str) -> bool:
+    return file.startswith(("<", *LIBRARIES)) or "site-packages" in file
+
+
+def words(error: BaseException) -> str:
+    """What an error says, in one line: its kind, and the first line of its message that says something."""
+    message = str(error.msg) if isinstance(error, SyntaxError) else str(error)
+    lines = [line.strip() for line in message.splitlines() if line.strip() and not COMPILING.match(line)]
+    line = lines[0][:LONGEST] if lines else ""
+    if OF_NUMPY in message:
+        return "a number of a realisation is none of NumPy's: radarsim.kernels.traced has sqrt, exp, sin, … for it"
+    whole = isinstance(error, RadarsimError) or getattr(error, "for_the_author", False)
+    kind = "" if whole else type(error).__name__
+    return ": ".join(filter(None, (kind, line)))
+
+
+def summary(error: BaseException) -> str:
+    """What an error says, and its place in brackets."""
+    at = place(error)
+    return f"{words(error)} ({at})" if at else words(error)
+
+
+def call(function: Callable[..., Any], *arguments: Any, of: str = "") -> Any:
+    """What an author's function gives; ConfigError with its file and line where it fails.
+
+    of: what the function belongs to, where that is not clear from its name.
+    """
+    try:
+        return function(*arguments)
+    except ConfigError:
+        raise
+    except (Exception, SystemExit) as error:
+        at = place(error, function=function)
+        if at is None:
+            raise fault(function, words(error), of=of) from error
+        raise ConfigError(f"{at}: {of}{at.function}: {words(error)}") from error
+
+
+def fault(function: Any, message: str, name: str = "", of: str = "") -> ConfigError:
+    """An error that names a function by its file and line."""
+    code = _code(function)
+    where = f"{code.co_filename}:{code.co_firstlineno}: " if code else ""
+    known = getattr(function, "__qualname__", "").rpartition("<locals>.")[2]
+    return ConfigError(f"{where}{of}{name or known or repr(function)[:40]}: {message}")
