@@ -34,6 +34,10 @@ if TYPE_CHECKING:
 
 
 # ---- configs ---------------------------------------------------------------------------------------------------------
+BLAMED = {  # sums that may not be finite, and what is then wrong
+    "error": "not finite",
+    "believed": "with a covariance that is not positive and finite",
+}
 document.further_folders = registry.folders
 language.packages = registry.packages
 
@@ -297,14 +301,18 @@ class CaseWork:
         import numpy as np  # which `radarsim list` does without
 
         axes, layout = self.plan.axes, self.plan.layout
-        bad = np.zeros((len(axes.filters), len(axes.k)), dtype=int)
+        shape = len(axes.filters), len(axes.k)
+        names = [name for name in BLAMED if layout.shapes.get(name, ())[:2] == shape]
+        bad = {name: np.zeros(shape, dtype=int) for name in names}
         for i in range(first, first + count):
-            error = layout.unpack(self.simulate(i, 1))["error"]
-            bad += ~np.isfinite(error).all(axis=(2, 3))
+            sums = layout.unpack(self.simulate(i, 1))
+            for name in names:
+                bad[name] += ~np.isfinite(sums[name]).reshape(*shape, -1).all(axis=2)
         return [
             f"{self.case.name}: filter {axes.filters[f]!r}, scan {axes.k[k]}: "
-            f"{bad[f, k]} of {count} realisations not finite"
-            for f, k in np.argwhere(bad)[:20]
+            f"{bad[name][f, k]} of {count} realisations {BLAMED[name]}"
+            for name in names
+            for f, k in np.argwhere(bad[name])[:20]
         ]
 
 

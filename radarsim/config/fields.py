@@ -230,6 +230,18 @@ class Model(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """Raises ConfigError where a key belongs to values that no key beside it may have."""
+        for name, only in conditions(cls).items():
+            for beside, values in only.where.items():
+                about = f"{cls.__name__}.{name}: only: "
+                if beside not in cls.model_fields:
+                    raise ConfigError(f"{about}no key {beside!r} is beside it; there are {', '.join(cls.model_fields)}")
+                allowed = _literals(cls.model_fields[beside].annotation)
+                if unknown := [value for value in values if allowed and value not in allowed]:
+                    raise ConfigError(f"{about}{beside} is one of {', '.join(allowed)}, got {', '.join(unknown)}")
+
     @model_validator(mode="before")
     @classmethod
     def _radians(cls, data: Any) -> Any:
@@ -309,6 +321,12 @@ def conditions(model: type[Model]) -> dict[str, Only]:
     """The keys of a model that belong to some kinds only, by name."""
     marks = {name: [m for m in info.metadata if isinstance(m, Only)] for name, info in model.model_fields.items()}
     return {name: own[0] for name, own in marks.items() if own}
+
+
+def _literals(annotation: Any) -> tuple[str, ...]:
+    """The texts that a key of a few may have, or none; nothing of other keys."""
+    every = [one for part in get_args(annotation) for one in (get_args(part) or (part,))]
+    return tuple(one for one in every if isinstance(one, str))
 
 
 def unknown_to(spec: Model, home: str) -> list[str]:

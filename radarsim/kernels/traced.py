@@ -408,13 +408,19 @@ def updated(x: Sequence[Any], P: Sequence[Any], h: Sequence[Any], e: Any, R: Any
 
 
 def normalised(P: Sequence[Any], e: Sequence[Any]) -> Any:
-    """e' P⁻¹ e of a positive packed P, by its factors L D L'."""
+    """e' P⁻¹ e of a positive packed P."""
+    return elimination(P, e)[0]
+
+
+def elimination(P: Sequence[Any], e: Sequence[Any]) -> tuple[Any, Any]:
+    """e' P⁻¹ e of a packed P by its factors L D L', and the least element of D, which is positive where P is."""
     n = len(e)
-    rows, left, sums = [list(row_of(P, n, i)) for i in range(n)], list(e), []
+    rows, left, sums, pivots = [list(row_of(P, n, i)) for i in range(n)], list(e), [], []
     for i in range(n):
+        pivots.append(rows[i][i])
         sums.append(left[i] * left[i] / rows[i][i])
         for j in range(i + 1, n):
             share = rows[j][i] / rows[i][i]
             left[j] = left[j] - share * left[i]
             rows[j] = [a - share * b for a, b in zip(rows[j], rows[i], strict=True)]
-    return functools.reduce(lambda a, b: a + b, sums)
+    return functools.reduce(lambda a, b: a + b, sums), functools.reduce(least, pivots)

@@ -96,6 +96,9 @@ class LinearStudy(OneFile):
         for needed, what in (("motion", "how the truth moves"), ("plot", "what a filter sees at scan k")):
             if not callable(getattr(cls, needed, None)):
                 yield f"{cls.__name__}.{needed} must be given: {what}"
+        if isinstance(cls.fitted, str):
+            yield f"fitted: must be a tuple of keys, ({cls.fitted!r},); got {cls.fitted!r}"
+            return
         for name, keys in (("detection", (cls.detection,)), ("fitted", cls.fitted)):
             if isinstance(getattr(cls, "parts", None), Mapping):
                 yield from (f"{name}: there is no key {key}" for key in keys if key and not cls._has(str(key)))
@@ -124,7 +127,10 @@ class LinearStudy(OneFile):
 
     def probability(self, spec: Any) -> float:
         """The probability that there is a plot."""
-        return float(attrgetter(self.detection)(spec)) if self.detection else 1.0
+        given = self.call(attrgetter(self.detection), spec) if self.detection else 1.0
+        if not isinstance(given, int | float) or not 0 <= given <= 1:
+            raise self._fault("detection", f"{self.detection} must be a probability, from 0 to 1, got {given!r}")
+        return float(given)
 
     # ---- from matrices to arrays ---------------------------------------------------------------------------------
     def _fault(self, what: str, words: str) -> ConfigError:

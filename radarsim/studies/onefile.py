@@ -36,6 +36,7 @@ Whatever a class lacks, or has of the wrong kind, is one line of a ConfigError w
 """
 
 import inspect
+import math
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -155,6 +156,9 @@ class OneFile(Study):
                 got = "nothing" if one is None else repr(one)[:40]
                 yield f"{cls.__name__}.{name} must be given: {NEEDED[name][1]}; got {got}"
             return
+        if bare := [one for one in (cls.components, cls.measured) if isinstance(one, Component | Measured)]:
+            yield from (f"{one!r} must stand in a tuple, ({type(one).__name__}(…),)" for one in bare)
+            return
         for one in cls.components:
             if not isinstance(one, Component) or not (one.name and one.unit):
                 yield f"components: {one!r} must be Component(name, unit, symbol, words), with a unit"
@@ -163,9 +167,12 @@ class OneFile(Study):
             if not (isinstance(part, type) and issubclass(part, base)):
                 yield f"{name} must be a subclass of radarsim.config.fields.{base.__name__}, got {part!r}"
                 return
-        if bare := [one for one in cls.measured if isinstance(one.sigma_keys, str)]:
-            for one in bare:
-                yield f"{one.column}: sigma_keys must be a tuple, ({one.sigma_keys!r},); got {one.sigma_keys!r}"
+        others = [one for one in cls.measured if not isinstance(one, Measured)]
+        yield from (f"measured: {one!r} must be Measured(column, unit, keys of its σ)" for one in others)
+        texts = [one for one in cls.measured if isinstance(one, Measured) and isinstance(one.sigma_keys, str)]
+        for one in texts:
+            yield f"{one.column}: sigma_keys must be a tuple, ({one.sigma_keys!r},); got {one.sigma_keys!r}"
+        if others or texts:
             return
         names = [one.name for one in cls.components if isinstance(one, Component)]
         for name in dict.fromkeys(names):
@@ -175,6 +182,8 @@ class OneFile(Study):
                 yield f"components: {name} is there twice"
         if cls.paper is not None and not isinstance(cls.paper, Paper):
             yield f"paper: must be Paper(…), got {cls.paper!r}"[:120]
+        elif cls.paper is not None and isinstance(cls.paper.may_grow, str):
+            yield f"paper: may_grow: must be a tuple, ({cls.paper.may_grow!r},); got {cls.paper.may_grow!r}"
         yield from (f"parts: {name} is added to the keys of every study" for name in RESERVED if name in cls.parts)
         yield from ("measured: t_s is the time of a plot" for one in cls.measured if one.column == "t_s")
         keys = {"scan_period": (cls.scan_period,)} | {one.column: one.sigma_keys for one in cls.measured}
@@ -197,7 +206,10 @@ class OneFile(Study):
 
     def scan_period_s(self, spec: Any) -> float:
         """The time between two plots of a config."""
-        return float(attrgetter(self.scan_period)(spec))
+        period = self.call(attrgetter(self.scan_period), spec)
+        if not isinstance(period, int | float) or not 0 < period < math.inf:
+            raise ConfigError(f"{self.place}: scan_period: {self.scan_period} must be a time > 0, s; got {period!r}")
+        return float(period)
 
     def axes(self, spec: Any, sigma: "np.ndarray | None" = None, bias: "np.ndarray | None" = None) -> "Axes":
         """The axes of a case, with the exact σ and bias (F, K, C) where they are known."""

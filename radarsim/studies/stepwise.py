@@ -38,8 +38,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from radarsim.config.fields import kinds_of
 from radarsim.engine.results import Axes, CaseResult, Layout, Track
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, PlotFault
 from radarsim.failures import call, fault
 from radarsim.kernels import traced
 from radarsim.studies.noise import noise_key
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
 
 ANOTHER = "gives another formula each time"
 ROUNDED = 1e-9  # of the largest truth: what plain Python and the kernel may differ by
+NO_COVARIANCE = -1e100  # in place of the variances and the NEES of a matrix that is not positive
 BLOCK = 512  # realisations in a block
 ROOM = 20_000  # rows of plots and errors at once, 1.3 MB: what a processor keeps near
 
@@ -133,17 +135,38 @@ class StepStudy(OneFile):
         for needed in ("kinds", "normals", "world", "begin", "move", "plot"):
             if not hasattr(cls, needed):
                 yield f"{cls.__name__}.{needed} must be given; see radarsim.studies.stepwise"
-        for kind, steps in getattr(cls, "kinds", {}).items():
+        for name in ("world", "begin", "move", "plot", "known", "truth", "detection", "exact_sigma"):
+            if not callable(given := getattr(cls, name, len)):
+                yield f"{cls.__name__}.{name} must be a function, got {given!r}"[:200]
+        normals = getattr(cls, "normals", (0, 0, 0))
+        if not isinstance(normals, tuple) or len(normals) != 3 or not all(type(n) is int and n >= 0 for n in normals):
+            yield f"normals: must be three whole numbers, of the first state, of a move, of a plot; got {normals!r}"
+        if isinstance(cls.known_columns, str):
+            yield f"known_columns: must be a tuple, ({cls.known_columns!r},); got {cls.known_columns!r}"
+        kinds = getattr(cls, "kinds", {})
+        if not isinstance(kinds, Mapping):
+            yield f"kinds: must be a mapping, a subclass of Steps by its kind, got {kinds!r}"[:200]
+            return
+        for kind, steps in kinds.items():
+            if not (isinstance(steps, type) and issubclass(steps, Steps)):
+                yield f"kinds: {kind}: must be a subclass of radarsim.studies.stepwise.Steps, got {steps!r}"[:200]
+                continue
             for needed in ("design", "start", "predict", "update", "estimate"):
                 if not callable(getattr(steps, needed, None)):
                     yield f"{cls.__name__}.kinds: {kind}: {needed} must be given; see radarsim.studies.stepwise"
+        asked = kinds_of(cls.Filter) if isinstance(getattr(cls, "Filter", None), type) else ()
+        if kinds and not asked:
+            yield f"Filter: must have a key kind: Literal[{', '.join(map(repr, kinds))}]"
+        elif lacking := [kind for kind in asked if kind not in kinds]:
+            there = ", ".join(kinds)
+            yield f"kinds: no {' and no '.join(lacking)}, which the key kind of Filter allows; there are {there}"
 
     # ---- numbers -------------------------------------------------------------------------------------------------
     def prepare(self, case: "Case") -> Plan:
         from radarsim.kernels import stepped
 
         spec = case.spec
-        axes, sums = self.axes(spec, self.exact_sigma(spec)), self.sums(spec)
+        axes, sums = self.axes(spec, self._exact(spec)), self.sums(spec)
         known = self._known(spec, axes.t_s)
         world, detection = record(self.world, spec), self._probability(spec)
         scene = self._scene(world)
@@ -163,13 +186,27 @@ class StepStudy(OneFile):
             raise fault(self.detection, f"must give a probability, from 0 to 1, got {given!r}"[:200])
         return float(given)
 
+    def _exact(self, spec: Any) -> np.ndarray | None:
+        """What `exact_sigma` gives."""
+        if (given := self.call(self.exact_sigma, spec)) is None:
+            return None
+        shape = len(spec.filters), spec.scans, len(self.components)
+        found = array_of(self.exact_sigma, given, "filters × scans × components")
+        if found.shape != shape or (found < 0).any():
+            raise fault(self.exact_sigma, f"must give σ {shape}, none negative, got {found.shape}")
+        return found
+
     def _known(self, spec: Any, t_s: np.ndarray) -> np.ndarray:
         """The time since the scan before, and what is known at each, (K, whole eights)."""
-        given = self.call(self.known, spec, t_s)
-        if not np.array_equal(given, self.call(self.known, spec, t_s)):
+        what = f"must give {len(self.known_columns)} columns of {t_s.size} finite numbers, as known_columns says; "
+        one, other = (self.call(self.known, spec, t_s) for _ in range(2))
+        if not isinstance(one, Sequence | np.ndarray) or isinstance(one, str) or len(one) != len(self.known_columns):
+            raise fault(self.known, f"{what}got {f'{len(one)}' if isinstance(one, tuple | list) else repr(one)}"[:200])
+        given, again = (array_of(self.known, columns, f"{t_s.size} in each column") for columns in (one, other))
+        if given.shape[1:] != (t_s.size,) * bool(len(one)) or not np.isfinite(given).all():
+            raise fault(self.known, f"{what}got {given.shape}, {np.sum(~np.isfinite(given))} of them not finite")
+        if not np.array_equal(given, again):
             raise fault(self.known, f"{ANOTHER}: draw in begin, move and plot, by normals")
-        if len(given) != len(self.known_columns):
-            raise fault(self.known, f"gives {len(given)} columns, known_columns has {len(self.known_columns)}")
         columns = [np.diff(t_s, prepend=t_s[0]), *given]
         known = np.zeros((t_s.size, -(-len(columns) // 8) * 8))
         known[:, : len(columns)] = np.transpose(columns)
@@ -252,7 +289,8 @@ class StepStudy(OneFile):
                 P = recorded(steps.covariance, s, u, c)
                 n = len(components)
                 of_length(steps.covariance, P, n * (n + 1) // 2, "elements of a packed covariance")
-                found = (*(traced.row_of(P, n, i)[i] for i in range(n)), traced.normalised(P, e))
+                nees, pivot = traced.elimination(P, e)
+                found = traced.where(pivot > 0.0, (*variances(P, n), nees), (NO_COVARIANCE,) * (n + 1))
                 trace.write(stepped.TESTED, traced.where(counts, found, (0.0,) * (n + 1)))
             made.append(trace.program())
         return made[0], made[1], traced.count(state)
@@ -279,6 +317,8 @@ class StepStudy(OneFile):
                 one.kernel(groups, many, plan.known, plan.width, one.numbers, plots, work, errors, base, *of)
         if (never := sums["error"][..., 1] == 0).any():
             sums["error"][never & ~self._free_of_error(plan)] = np.nan
+        if "believed" in sums and (lost := (sums["believed"] < 0).any(axis=2)).any():
+            sums["believed"][lost] = sums["nees"][lost] = np.nan
         return values
 
     def _free_of_error(self, plan: Plan) -> np.ndarray:
@@ -437,10 +477,23 @@ def record(function: Callable[..., Any], *arguments: Any) -> Any:
     return given
 
 
+def array_of(function: Callable[..., Any], given: Any, what: str) -> np.ndarray:
+    """An array of the numbers that an author's function gives; ConfigError where they are no such."""
+    try:
+        return np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise fault(function, f"must give numbers, {what}, got {given!r}"[:200]) from None
+
+
 def of_length(function: Callable[..., Any], given: Any, wanted: int, what: str) -> None:
     """Raises ConfigError where a function gives other than so many numbers."""
     if not isinstance(given, tuple) or traced.count(given) != wanted or len(given) != wanted:
         raise fault(function, f"must give a tuple of {wanted} numbers ({what}), got {shape(given)}")
+
+
+def variances(P: Sequence[Any], n: int) -> tuple[Any, ...]:
+    """The diagonal of a packed covariance of n components."""
+    return tuple(traced.row_of(P, n, i)[i] for i in range(n))
 
 
 def same_shape(function: Callable[..., Any], given: Any, wanted: Any) -> None:
@@ -453,7 +506,7 @@ def shape(value: Any) -> str:
     """A structure with its numbers left out: ((·, ·), ·)."""
     if isinstance(value, tuple):
         return f"({', '.join(map(shape, value))})"
-    return "·" if traced.is_number(value) else repr(value)
+    return "·" if traced.is_number(value) else f"a {type(value).__name__}" if isinstance(value, list) else repr(value)
 
 
 # ---- recorded plots --------------------------------------------------------------------------------------------------
@@ -465,7 +518,10 @@ class Tracker:
 
     def __init__(self, study: StepStudy, spec: Any):
         self.study, self.names = study, tuple(one.name for one in spec.filters)
-        self.filters = [(study.kinds[one.kind], study.kinds[one.kind].design(spec, one)) for one in spec.filters]
+        every = [study.kinds[one.kind] for one in spec.filters]
+        self.filters = [
+            (steps, record(steps.design, spec, one)) for steps, one in zip(every, spec.filters, strict=True)
+        ]
         self.states: list[Any] = [None] * len(self.filters)
         self.last = math.nan
 
@@ -477,17 +533,51 @@ class Tracker:
         for n in range(t.size):
             z, u = tuple(map(float, plots[n])), tuple(map(float, known[n]))
             for f, (steps, c) in enumerate(self.filters):
-                s = self.states[f]
+                s = before = self.states[f]
                 if s is not None:
-                    s = numbers_of(steps.predict, s, float(t[n] - self.last), u, c)
+                    s = self._next(n, steps.predict, before, s, float(t[n] - self.last), u, c)
                 if not any(map(math.isnan, z)):
-                    s = numbers_of(steps.start, z, u, c) if s is None else numbers_of(steps.update, s, z, u, c)
+                    step, given = (steps.start, (z, u, c)) if s is None else (steps.update, (s, z, u, c))
+                    s = self._next(n, step, before, *given)
                 self.states[f] = s
                 if s is not None:
-                    found[f, n, 0] = numbers_of(steps.estimate, s, u, c)
+                    m = len(study.components)
+                    found[f, n, 0] = self._numbers(n, steps.estimate, m, "components", s, u, c)
                     if steps.covariance is not None:
-                        P, m = numbers_of(steps.covariance, s, u, c), len(study.components)
-                        found[f, n, 1] = np.sqrt([traced.row_of(P, m, i)[i] for i in range(m)])
+                        what = "elements of a packed covariance"
+                        P = self._numbers(n, steps.covariance, m * (m + 1) // 2, what, s, u, c)
+                        if min(variance := variances(P, m)) < 0:
+                            raise refusal(n, steps.covariance, f"gives a variance of {min(variance):g}")
+                        found[f, n, 1] = np.sqrt(variance)
             self.last = float(t[n])
         components = tuple((one.name, one.unit) for one in study.components)
         return Track(self.names, components, t, found[:, :, 0], found[:, :, 1])
+
+    def _next(self, row: int, step: Callable[..., Any], before: Any, *given: Any) -> Any:
+        """The state that a step gives at a row, of the shape of the one before, where there is one."""
+        with np.errstate(all="ignore"):
+            state = numbers_of(step, *given)
+        if before is not None:
+            same_shape(step, state, before)
+        return finite(row, step, state)
+
+    def _numbers(self, row: int, step: Callable[..., Any], count: int, what: str, *given: Any) -> Any:
+        """So many numbers that a step gives at a row."""
+        with np.errstate(all="ignore"):
+            found = numbers_of(step, *given)
+        of_length(step, found, count, what)
+        return finite(row, step, found)
+
+
+def finite(row: int, step: Callable[..., Any], found: Any) -> Any:
+    """What a step gives; raises PlotFault with the row where a number of it is not finite."""
+    if wrong := [one for one in traced.leaves(found) if not math.isfinite(one)]:
+        raise refusal(row, step, f"gives {wrong[0]:g}")
+    return found
+
+
+def refusal(row: int, step: Callable[..., Any], words: str) -> PlotFault:
+    """Why a filter cannot go on from a row."""
+    error = PlotFault(*fault(step, words).lines)
+    error.row = row
+    return error

@@ -334,7 +334,7 @@ def test_numbers_are_a_record_and_what_is_known_has_its_columns():
     with pytest.raises(ConfigError, match="not_a_record: must give a tuple or a named record, got dict"):
         study.prepare(case_of(study, names=["kalman"]))
     study.kinds, study.known = Walk.kinds, lambda spec, t_s: (t_s, t_s)
-    with pytest.raises(ConfigError, match="gives 2 columns, known_columns has 1"):
+    with pytest.raises(ConfigError, match="must give 1 columns of 12 finite numbers, as known_columns says; got 2"):
         study.prepare(case_of(study))
 
 
