@@ -453,6 +453,8 @@ def numbers_of(function: Callable[..., Any], *arguments: Any) -> Any:
 def recorded(function: Callable[..., Any], *arguments: Any) -> Any:
     """What a step does with numbers of a realisation, which is the same whenever it is asked."""
     made, again = (numbers_of(function, *arguments) for _ in range(2))
+    if made is None or isinstance(made, list):
+        raise fault(function, f"must give a tuple of numbers, got {'nothing' if made is None else 'a list'}")
     for numbers in (made, again):
         if wrong := [
             one for one in traced.leaves(numbers) if not isinstance(one, traced.Lane) and not math.isfinite(one)

@@ -6,6 +6,7 @@ import pytest
 from pydantic import ValidationError
 
 from radarsim.config.fields import Model, Positive, key
+from radarsim.errors import ConfigError
 
 
 class Shape(Model):
@@ -53,3 +54,18 @@ def test_all_that_does_not_belong_or_is_missing_is_told_at_once(given, faults):
     with pytest.raises(ValidationError) as caught:
         Shape.model_validate(given)
     assert [tuple(each) for each in caught.value.errors()[0]["ctx"]["faults"]] == faults
+
+
+@pytest.mark.parametrize(
+    ("only", "words"),
+    [
+        ({"knid": "circle"}, r"Wrong\.hole_m: only: no key 'knid' is beside it; there are kind, .*, hole_m"),
+        ({"kind": "square"}, r"Wrong\.hole_m: only: kind is one of .*circle, ellipse.*, got square"),
+        ({"turned": ("yes", "on")}, r"Wrong\.hole_m: only: turned is one of yes, no, got on"),
+    ],
+)
+def test_a_key_that_belongs_to_what_is_not_there_is_refused_with_its_class(only, words):
+    with pytest.raises(ConfigError, match=words):
+
+        class Wrong(Shape):
+            hole_m: Positive | None = key("hole", "radius, m", only=only)

@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -216,6 +217,9 @@ WRONG = {
     "scan_period": ("sensor.period_s", r"scan_period: there is no key sensor\.period_s"),
     "measured": ((Measured("x_m", "m", ("sensor.sigma",)),), r"x_m: there is no key sensor\.sigma"),
     "measured ": ((Measured("x_m", "m", "sensor.sigma_x_m"),), r"x_m: sigma_keys must be a tuple, \('sensor"),
+    "measured  ": (Measured("x_m", "m"), r"Measured\(column='x_m', .*\) must stand in a tuple, \(Measured\(…\),\)"),
+    "components ": (Component("x", "m"), r"Component\(name='x', .*\) must stand in a tuple"),
+    "paper ": (Paper("Kalman", may_grow="filters"), r"paper: may_grow: must be a tuple, \('filters',\)"),
     "claims_yaml": (
         Walk.claims_yaml.replace("{gain: {filter", "{gian: {filter"),
         r"test_onefile\.py:\d+:\d+: claims\.0\.parts\.0\.measure: must be one of them; did you mean gain\?",
@@ -230,6 +234,13 @@ def test_what_is_missing_is_one_line(name):
     with pytest.raises(ConfigError, match=said) as caught:
         Wrong().keys()
     assert len(caught.value.lines) == 1
+
+
+def test_a_time_between_plots_is_a_time():
+    Wrong = type("Wrong", (Walk,), {"scan_period": "sensor.about", "__module__": __name__})
+    Wrong.parts = {"sensor": type("Odd", (Sensor,), {"about": property(lambda self: "often")}), "target": Target}
+    with pytest.raises(ConfigError, match=r"scan_period: sensor\.about must be a time > 0, s; got 'often'"):
+        Wrong().scan_period_s(SimpleNamespace(sensor=SimpleNamespace(about="often")))
 
 
 def test_a_key_that_no_reading_can_set_is_one_line():

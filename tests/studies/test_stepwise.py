@@ -12,7 +12,7 @@ import pytest
 from radarsim.config.fields import Member, Model, Positive, Probability, key
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
-from radarsim.kernels.traced import sqrt, updated, where
+from radarsim.kernels.traced import elimination, sqrt, updated, where
 from radarsim.studies import judged, stepwise
 from radarsim.studies.onefile import Component, Measured
 from radarsim.studies.stepwise import Steps, StepStudy
@@ -266,6 +266,14 @@ def of_negative_variance(s, z, u, c):
     return x[0], P[0]
 
 
+def a_list(s, z, u, c):
+    return [z[0], s[1]]
+
+
+def nothing(s, z, u, c):
+    return None
+
+
 FAULTS = [
     ("update", branching, 2, r"branching: .* has no one value: write where\(condition, yes, no\)"),
     ("predict", of_another_shape, 0, r"gives a state of the shape \(·, ·, ·\), the one before has \(·, ·\)"),
@@ -279,6 +287,8 @@ FAULTS = [
     ("update", compared_with_itself, 1, r"a test for NaN cannot be made; test what would make it, e\.g\. where"),
     ("update", by_numpy, 1, r"by_numpy: .* radarsim\.kernels\.traced has sqrt"),
     ("update", drawn_by_python, 0, "gives another formula each time: draw by normals"),
+    ("update", a_list, 0, "a_list: must give a tuple of numbers, got a list"),
+    ("update", nothing, 0, "nothing: must give a tuple of numbers, got nothing"),
     ("update", of_negative_variance, 1, "R, the variance of the error of a number, must be positive, got -1"),
 ]
 
@@ -324,6 +334,58 @@ def test_errors_that_are_zero_indeed_are_a_result():
     assert not sums["error"].any()
 
 
+def less_than_nothing(s, u, c):
+    return (s[1] - 0.5,)
+
+
+def of_two(s, u, c):
+    return s[0], s[1], s[0]
+
+
+def root_of_a_negative(s, z, u, c):
+    return sqrt(z[0] - 1e6), s[1]
+
+
+def test_a_covariance_that_is_not_positive_is_no_result():
+    """From the scan on at which the variance falls below 0.5."""
+    study = Walk()
+    study.kinds = {"kalman": type("Wrong", (Kalman,), {"covariance": less_than_nothing})}
+    case = case_of(study, names=["kalman"])
+    _, sums = added(study, case, 16)
+    wanted = exact_variances(kalman_gains()) < 0.5
+    assert 0 < wanted.sum() < SCANS
+    assert np.isnan(sums["believed"][0, :, 0]).tolist() == wanted.tolist()
+    assert np.isnan(sums["nees"][0]).any(axis=1).tolist() == wanted.tolist()
+    assert np.isfinite(sums["error"]).all()
+
+
+def test_a_matrix_that_is_not_positive_has_positive_variances_too():
+    P, e = (1.0, 2.0, 1.0), (0.5, 0.25)
+    assert elimination(P, e)[1] < 0 < elimination((1.0, 0.5, 1.0), e)[1]
+
+
+ON_PLOTS = [  # what a step gives over recorded plots; the row
+    ("covariance", less_than_nothing, r"less_than_nothing: gives a variance of -0\.", 2),
+    ("update", root_of_a_negative, "root_of_a_negative: gives nan", 1),
+    ("update", of_two, r"of_two\(\) takes 3 positional arguments", None),
+    ("covariance", of_two, r"must give a tuple of 1 numbers \(elements of a packed covariance\), got", None),
+    ("estimate", of_two, r"must give a tuple of 1 numbers \(components\), got", None),
+    ("predict", of_another_shape, r"gives a state of the shape \(·, ·, ·\), the one before has \(·, ·\)", None),
+]
+
+
+@pytest.mark.parametrize(("step", "function", "words", "row"), ON_PLOTS)
+def test_a_fault_over_recorded_plots_is_one_line(step, function, words, row, recwarn):
+    study = Walk()
+    study.kinds = {"kalman": type("Wrong", (Kalman,), {step: function})}
+    plots = {"t_s": 2.0 * np.arange(8), "x_m": np.zeros(8), "drift_m": np.zeros(8)}
+    with pytest.raises(ConfigError, match=f"{__file__}:.*{words}") as caught:
+        study.tracker(case_of(study, names=["kalman"])).feed(plots)
+    assert len(caught.value.lines) == 1
+    assert getattr(caught.value, "row", None) == row
+    assert not recwarn.list
+
+
 def not_a_record(spec, one):
     return {"sigma": 1.0}
 
@@ -333,9 +395,46 @@ def test_numbers_are_a_record_and_what_is_known_has_its_columns():
     study.kinds = {"kalman": type("Wrong", (Kalman,), {"design": not_a_record})}
     with pytest.raises(ConfigError, match="not_a_record: must give a tuple or a named record, got dict"):
         study.prepare(case_of(study, names=["kalman"]))
-    study.kinds, study.known = Walk.kinds, lambda spec, t_s: (t_s, t_s)
-    with pytest.raises(ConfigError, match="must give 1 columns of 12 finite numbers, as known_columns says; got 2"):
+    study.kinds = Walk.kinds
+    said = "must give 1 columns of 12 finite numbers, as known_columns says; got "
+    for given, got in (((1, 2), "2"), ((np.ones(3),), r"\(1, 3\)"), ((np.full(12, np.nan),), "12 of them"), (7, "7")):
+        study.known = lambda spec, t_s, given=given: given
+        with pytest.raises(ConfigError, match=f"{said}.*{got}"):
+            study.prepare(case_of(study))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (np.ones(3), r"must give σ \(2, 12, 1\), none negative, got \(3,\)"),
+        ("much", "must give numbers, .* got 'much'"),
+    ],
+)
+def test_an_exact_sigma_has_its_shape(given, words):
+    study = Walk()
+    study.exact_sigma = lambda spec: given
+    with pytest.raises(ConfigError, match=words):
         study.prepare(case_of(study))
+
+
+WRONG = {
+    "normals": ((4, 0), r"normals: must be three whole numbers, .* got \(4, 0\)"),
+    "kinds": ({"kalman": Kalman}, "kinds: no halves, which the key kind of Filter allows; there are kalman$"),
+    "kinds ": ({"kalman": Kalman(), "halves": Halves}, "kinds: kalman: must be a subclass of .*Steps, got "),
+    "kinds  ": ([Kalman, Halves], "kinds: must be a mapping"),
+    "Filter": (Member, r"Filter: must have a key kind: Literal\['kalman', 'halves'\]"),
+    "known_columns": ("drift_m", r"known_columns: must be a tuple, \('drift_m',\); got 'drift_m'"),
+    "detection": (0.9, r"Wrong\.detection must be a function, got 0\.9"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_of_the_wrong_kind_is_one_line(name):
+    value, words = WRONG[name]
+    Wrong = type("Wrong", (Walk,), {name.strip(): value, "__module__": __name__})
+    with pytest.raises(ConfigError, match=words) as caught:
+        Wrong().keys()
+    assert len(caught.value.lines) == 1
 
 
 def test_what_a_class_lacks_is_said_at_once():
