@@ -5,7 +5,6 @@ import math
 import pytest
 
 from radarsim.app.configs import load
-from radarsim.config.experiment import world
 from radarsim.errors import ConfigError
 
 
@@ -88,6 +87,10 @@ def test_the_example_of_the_contract():
         ({"scans": 2, "filters__0__degree": 2}, "scans: must be >= 3 for a filter of degree 2"),
         ({"filters__0__degree": 3}, "filters.0.degree"),
         ({"filters__0__kind": "window"}, "filters.0.plots: is needed by a window"),
+        (
+            {"filters": [{"name": "w", "kind": "window", "degree": 2, "plots": 2}]},
+            "filters.0.plots: must be >= 3 for degree 2",
+        ),
         ({"filters__0__plots": 5}, "filters.0.plots: belongs to kind: window or fixed_gain, not growing_memory, got 5"),
         ({"filters__0__kind": "fixed_gain"}, "filters.0.manoeuvre_variance: must be > 0 for fixed_gain"),
         (
@@ -169,11 +172,6 @@ def test_faults_in_words(changes, words):
     assert words in fault(**changes)
 
 
-def test_a_window_must_hold_its_degree():
-    filters = [{"name": "w", "kind": "window", "degree": 2, "plots": 2}]
-    assert "filters.0.plots: must be >= 3 for degree 2" in fault(filters=filters)
-
-
 def test_turns_must_follow_one_another():
     turn = {"kind": "turning", "x_m": 7e3, "y_m": 5e3, "speed_mps": 8, "course_deg": 250}
     bad = [{"start_s": 10, "end_s": 60, "rate_radps": 0.02}, {"start_s": 50, "end_s": 70, "rate_radps": 0.02}]
@@ -205,26 +203,8 @@ def test_what_is_taken():
     assert load(config()).cases[0].spec.parts == ("smoothing",)
 
 
-def test_a_threshold_can_be_swept():
-    made = config(filters=[ADAPTIVE]) | {"sweep": {"filters.0.detector.plots": [4, 6]}}
-    assert [case.spec.filters[0].detector.plots for case in load(made).cases] == [4, 6]
-
-
 def test_defaults_are_told_and_used():
     (one,) = load(config(**AMONG)).cases[0].spec.filters
     assert (one.rule.m, one.rule.n) == (3, 4)
     assert one.gate_probability == 0.99
     assert one.lost_beyond_sigmas == 10.0
-
-
-def test_density_and_sector_are_no_part_of_the_world():
-    """So cases that differ in them see the same plots of the target, and plain cases keep their noise."""
-    one, other = (load(config(**among(sensor__false_plots_per_km2=d))).cases[0].spec for d in (0.0, 2.0))
-    assert world(one) == world(other)
-    assert "sector" not in world(one)["sensor"]
-
-
-def test_gate_probability_can_be_swept_by_its_bare_key():
-    cases = load(config(**AMONG, sweep={"gate_probability": [0.9, 0.99], "sensor.false_plots_per_km2": [0, 1]})).cases
-    assert len(cases) == 4
-    assert cases[0].spec.filters[0].gate_probability == 0.9

@@ -12,12 +12,6 @@ def test_sigma_formulas_have_the_digests_values():
     assert exact.sigma_extrapolated(n).round(3).tolist() == [2.236, 1.528, 1.225, 1.049, 0.931, 0.845, 0.779]
 
 
-@pytest.mark.parametrize("n", range(3, 51))
-def test_720_formula_is_least_squares(n):
-    _, P = exact.generalised_least_squares(np.arange(n) * 5.0, 900 * np.eye(n), 3)
-    assert np.sqrt(P[2, 2]) == pytest.approx(30 * exact.sigma_acceleration(n, 5.0), rel=1e-10)
-
-
 @pytest.mark.parametrize(
     ("rho", "n", "optimal", "naive", "believed"),
     [
@@ -89,14 +83,3 @@ def test_walk_of_velocity_by_both_ways_of_reckoning():
     C = world.error_covariance(np.full(9, 30.0), 0.0, t, 5.0)
     _, other = exact.weighted_errors(W, first, t, truth, C, walk, first)
     assert S[0, 8] == pytest.approx(other[0], rel=1e-9)
-
-
-def test_consistency_of_the_naive_filter():
-    """NEES of a filter that ignores ρ = 0.9: by calculation far over 2; of a consistent one, 2."""
-    n, t = 20, np.arange(20.0)
-    C = world.error_covariance(np.ones(n), 0.9, t, 1.0)
-    W, plain = exact.generalised_least_squares(t, np.eye(n), 2)
-    _, P = exact.generalised_least_squares(t, C, 2)
-    zero = np.zeros(2)
-    assert exact.consistency(P, zero, P) == pytest.approx(2)
-    assert exact.consistency(plain, zero, W @ C @ W.T) > 5

@@ -7,6 +7,7 @@ from radarsim.app.configs import load
 from radarsim.kernels.random import fill_normal_pairs, fill_uniform_pairs
 from radarsim.studies.sonar import STUDY, world
 from tests.studies.sonar import naive as naive
+from tests.studies.sonar.test_study import config as configured
 
 T, SCANS = 5.0, 18
 SIGMA = np.array([30.0, np.radians(1)])
@@ -27,16 +28,7 @@ FILTERS = [
 
 
 def config(frame="polar", **sensor):
-    filters = FILTERS if frame == "polar" else FILTERS[:8]
-    return {
-        "study": "sonar",
-        "sensor": {"sigma_range_m": 30.0, "sigma_bearing_deg": 1.0, "scan_period_s": T, **sensor},
-        "target": {"kind": "polynomial", "frame": "polar", "range_m": [9e3, -4.0], "bearing_deg": [20.0, 0.01]},
-        "frame": frame,
-        "filters": filters,
-        "scans": SCANS,
-        "realisations": 10,
-    }
+    return configured(SCANS, FILTERS if frame == "polar" else FILTERS[:8], frame=frame, **sensor)
 
 
 def plots(plan, realisation, rho, probability, missed=()):

@@ -5,7 +5,6 @@ import pytest
 
 import radarsim
 from radarsim.app import result as output
-from radarsim.app.configs import load
 from radarsim.report import claims, figures, statistics
 from radarsim.studies.sonar import STUDY, exact, scene
 
@@ -151,12 +150,3 @@ def test_what_is_known_exactly_is_judged_exactly(results):
         assert row["exact"].item() * exact.sigma_smoothed(n) == pytest.approx(
             curves["growing", "r", n] / sigma, rel=1e-9
         )
-
-
-def test_words_of_the_report(results):
-    for stem, result in results.items():
-        question = STUDY.question(load(stem))
-        assert question.endswith("?")
-        told = STUDY.answer(result.cases, result.tables)
-        assert told
-        assert all(sentence.endswith(".") for sentence in told)

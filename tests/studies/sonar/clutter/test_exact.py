@@ -52,11 +52,3 @@ def test_pairs_of_false_plots_far_from_any_edge():
     assert (found[1:3] < wanted).all()
     assert found[0] == 0
     assert (found[3:] == 0).all()
-
-
-def test_quadrature_has_converged():
-    sigma, rule = np.array([30.0, 0.0175]), SimpleNamespace(n=4, speed=10.0, gate_probability=0.99)
-    sector = SimpleNamespace(range_m=(7e3, 11e3), bearing_rad=(0.1, 0.7))
-    given = (sector, filters.Conditions(5.0, sigma, 0.9, 1e-6), rule, 6)
-    coarse, fine = filters.false_pairs(*given), filters.false_pairs(*given, nodes=120)
-    assert coarse == pytest.approx(fine, rel=1e-3)

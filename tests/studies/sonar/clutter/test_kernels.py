@@ -2,41 +2,28 @@
 
 import dataclasses
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 
 from radarsim.app.configs import load
-from radarsim.kernels import random
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter import filters as design
 from radarsim.studies.sonar.clutter import track
 from radarsim.studies.sonar.clutter.filters import tracker_specs
 from radarsim.studies.sonar.clutter.kernels import tracker as places
 from tests.studies.sonar.clutter import naive
+from tests.studies.sonar.clutter import test_study as given
 
 T, SIGMA = 5.0, np.array([30.0, np.radians(1)])
 
 
-def tracker(association, gate=0.99, m=2, n=3, variance=1e-3, **more):
-    rules = {"gate_probability": gate, "initiation": {"m": m, "n": n}, "manoeuvre_variance": variance}
-    return {"name": association, "kind": "kalman", "association": association, **rules, **more}
+def tracker(association, gate=0.99, m=2, n=3, name=None, **more):
+    return given.tracker(name or association, association, m, n, gate, **{"manoeuvre_variance": 1e-3} | more)
 
 
-def config(filters, density=0.0, detection=1.0, scans=30, **sensor):
-    return {
-        "study": "sonar",
-        "sensor": {
-            **{"sigma_range_m": 30.0, "sigma_bearing_deg": 1.0, "scan_period_s": T},
-            **{"detection_probability": detection, "false_plots_per_km2": density},
-            **{"sector": {"range_m": [7e3, 11e3], "bearing_deg": [5, 40]}},
-            **sensor,
-        },
-        "target": "sonar_straight",
-        "filters": filters,
-        "scans": scans,
-        "realisations": 10,
-    }
+config = partial(given.config, scans=30)
 
 
 def prepared(*of, **more):
@@ -51,7 +38,11 @@ def sums_of(plan, first, count=1):
 @pytest.mark.parametrize("density", [0.0, 1.0, 5.0])
 def test_estimates_are_the_twins(density):
     """Nearest plot and PDA, with misses, drops and losses, realisation by realisation to 1e-10 of σ."""
-    filters = [tracker("nearest"), tracker("pda"), tracker("pda", 0.9, 3, 4, 1e-2, drop_after_misses=2, name="other")]
+    filters = [
+        tracker("nearest"),
+        tracker("pda"),
+        tracker("pda", 0.9, 3, 4, "other", manoeuvre_variance=1e-2, drop_after_misses=2),
+    ]
     case, plan = prepared(filters, density=density, detection=0.8)
     wanted, t, compared = tracker_specs(case.spec), plan.axes.t_s, 0
     for realisation in (0, 1, 2, 3, 511, 70_000):
@@ -131,18 +122,6 @@ def test_a_full_circle_has_no_seam():
         counts.append(found[:, places.FALSE].sum() / found[:, places.EXPECTED].sum())
         expected = found[:, places.EXPECTED].sum()
     assert np.abs(np.array(counts) - 1).max() < 3.9 / np.sqrt(expected)
-
-
-def test_cells_have_draws_of_their_own():
-    """No two cells or scans share a draw: the numbers of neighbouring draws differ in the first word."""
-    words = set()
-    x, y = np.empty(1, dtype=np.uint64), np.empty(1, dtype=np.uint64)
-    key = random.stream(1, "field")
-    for scan in range(3):
-        for cell in range(10):
-            random.fill_words(key, 0, (scan * 10 + cell) << 12, x, y)
-            words.add(int(x[0]))
-    assert len(words) == 30
 
 
 # ---- the area of a gate within the sector ----------------------------------------------------------------------------
