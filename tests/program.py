@@ -1,10 +1,18 @@
 """The command as a user types it, run in this process, and what it leaves in a folder of results."""
 
+import io
 import json
 
 from click.testing import CliRunner
 
 from radarsim.cli import main
+
+
+class Terminal(io.StringIO):
+    """A stream that says that it is a terminal."""
+
+    def isatty(self):
+        return True
 
 
 def command(*words, code=0):

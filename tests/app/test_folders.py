@@ -7,7 +7,6 @@ import sys
 import threading
 import unicodedata
 
-import numpy as np
 import pytest
 
 import radarsim
@@ -262,22 +261,6 @@ def test_a_new_config_is_whole_or_not_there(tmp_path, monkeypatch):
 def test_formats_of_figures(tmp_path, figures, kinds):
     radarsim.run("rls2", realisations=200, out=tmp_path, figures=figures)
     assert {path.suffix for path in (tmp_path / "rls2" / "figures").glob("*")} == kinds
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"figures": "gif"}, "figures: must be True, False or of svg, png, pdf, got 'gif'"),
-        ({"figures": 7}, "figures: must be True"),
-        ({"overrides": None}, "overrides: must be a list of texts"),
-        ({"overrides": "scans=4"}, "overrides: must be a list of texts"),
-        ({"precision": np.array([1.0])}, "precision: must be > 0"),
-        ({"threads": np.array([1])}, "threads: must be a whole number"),
-    ],
-)
-def test_arguments_that_are_none(arguments, words):
-    with pytest.raises(ConfigError, match=words):
-        radarsim.run("rls2", realisations=2000, **arguments)
 
 
 def test_a_sweep_without_effect_is_told_as_one():

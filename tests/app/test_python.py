@@ -53,23 +53,6 @@ def test_figures_by_the_names_of_their_files():
         result.figure("gain_x")
 
 
-def test_a_wrong_config_raises_the_lines_of_the_command():
-    wrong = copy.deepcopy(CONFIG)
-    wrong["radar"]["sigma_range_m"] = -250
-    with pytest.raises(radarsim.ConfigError) as caught:
-        radarsim.run(wrong)
-    assert caught.value.lines == ("config: radar.sigma_range_m: must be > 0, got -250",)
-
-
-def test_realisation_i_is_the_same_in_any_run():
-    """Sums over the first 5000 of 5000 and of 9000 agree: the difference is the sum over the others."""
-    from radarsim.app.configs import CaseWork, load
-
-    work = CaseWork(load(CONFIG).cases[0])
-    whole, parts = work.simulate(0, 9000), work.simulate(0, 5000) + work.simulate(5000, 4000)
-    np.testing.assert_allclose(parts, whole, rtol=1e-9, atol=1e-6 * np.abs(whole).max())
-
-
 @pytest.mark.parametrize(("config", "overrides", "n"), [("rls2", [], 1), ("multimodel_1hz", ["report_every=40"], 2)])
 def test_one_or_two_realisations_make_no_numeric_warning(config, overrides, n):
     """Here any warning is an error: intervals are infinite, and no word of NumPy's reaches the user."""
@@ -97,12 +80,6 @@ def test_a_notebook_shows_the_answer_and_no_markup_of_a_users():
     assert "&lt;script&gt;" in shown
     assert "lower than with range alone" in shown
     assert "exact_sigma" in shown
-
-
-def test_a_figure_as_pdf(tmp_path):
-    result = radarsim.run(CONFIG)
-    result.write(tmp_path, figures=["pdf"])
-    assert {path.suffix for path in (tmp_path / "config" / "figures").iterdir()} == {".pdf", ".md"}
 
 
 def test_a_value_that_is_not_known_stays_empty_in_a_notebook():

@@ -146,8 +146,3 @@ def test_a_change_of_sign_across_a_gap_is_no_root():
     found = quantities.roots_of(lambda x: math.nan if -0.001 < x < 0.001 else x / abs(x) * (1 + x * x), over)
     assert found.roots == ()
     assert abs(found.at_nearest) == pytest.approx(1, abs=0.01)
-
-
-def test_a_jump_over_zero_is_where_it_jumps():
-    found = quantities.roots_of(lambda x: 1.0 if x > 0.3 else -1.0, quantities.searched(-1.0, 2.0))
-    assert found.roots == (pytest.approx(0.3, abs=1e-12),)

@@ -323,14 +323,6 @@ def test_the_command_ends_with_3_where_it_is_not_attainable():
     assert document["limit"] == pytest.approx(56.7, abs=0.05)
 
 
-def test_the_command_gives_one_json_document():
-    ended = command("rls2", "manoeuvre_variance", "--sigma", "Vr", "--filter", "r", "--equals", 6, "--json")
-    document = json.loads(ended.stdout)
-    assert set(document) >= {"key", "value", "lo", "hi", "exact", "attained", "slope", "others", "limit"}
-    assert document["exact"] is True
-    assert document["lo"] == document["value"] == document["hi"]
-
-
 def test_rates_of_other_studies_are_read_by_the_names_of_their_tables():
     """Folds unfolded rightly: sampled with an interval that holds the config's own rate when that is the target."""
     quantity = Wanted("right", "memory", at_k=4)

@@ -1,6 +1,5 @@
 """What the terminal shows: numbers as sentences have them, and where claims without results are to be had."""
 
-import io
 import math
 import re
 
@@ -12,7 +11,7 @@ from radarsim.cli import console, outcomes, verdicts
 from radarsim.report import notes
 from radarsim.report.claims.judge import SAID
 from radarsim.report.wording import significant_digits
-from tests.program import command
+from tests.program import Terminal, command
 
 
 @pytest.mark.parametrize(
@@ -89,13 +88,6 @@ def test_sentences_are_broken_between_words_and_never_within_a_number(line):
     assert not any(part.rstrip().endswith(("140", "189.8", "18.27")) for part in broken)  # a unit stays with its number
     if line.startswith("claims"):
         assert all(part.startswith(9 * " ") for part in broken[1:])
-
-
-class Terminal(io.StringIO):
-    """A stream that says that it is a terminal."""
-
-    def isatty(self):
-        return True
 
 
 def test_a_table_says_which_columns_it_leaves_out(monkeypatch):

@@ -240,14 +240,6 @@ def test_a_realisation_that_no_run_has(tmp_path, realisation):
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        (
-            "t_s,range_m,velocity_mps\n0,1e5,1\n0,1e5,1\n",
-            "plots.csv:3:1: t_s: must be later than the row before, got 0 after 0",
-        ),
-        (
-            "t_s,range_m,velocity_mps\n5,1e5,1\n0,1e5,1\n",
-            "plots.csv:3:1: t_s: must be later than the row before, got 0 after 5",
-        ),
         ("t_s,range_m,velocity_mps\n0,x,1\n", "plots.csv:2:2: range_m: must be a finite number, got 'x'"),
         ("t_s,range_m\n0,1\n", "plots.csv:1: must have the columns t_s, range_m, velocity_mps; got t_s, range_m"),
     ],

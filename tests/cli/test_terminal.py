@@ -1,6 +1,5 @@
 """What commands show on a terminal of 80 columns, in English and in Russian: whole lines, and nothing in English."""
 
-import io
 import re
 
 import pytest
@@ -8,6 +7,7 @@ import pytest
 from radarsim.cli import console, main
 from radarsim.language import VARIABLE
 from tests.language.test_russian import NAMES, untranslated
+from tests.program import Terminal
 
 WIDTH = 80
 FIRST = "rls2"
@@ -35,13 +35,6 @@ KEPT = NAMES | {  # what a user types and names of the config's own
     *("target", "sonar", "with", "start", "set", "between", "make", "reproduce", "figures", "compare"),
     *("chart", "blocks"),
 }
-
-
-class Terminal(io.StringIO):
-    """A stream that says that it is a terminal."""
-
-    def isatty(self):
-        return True
 
 
 def shown(monkeypatch, *arguments):

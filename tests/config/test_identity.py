@@ -10,13 +10,17 @@ from pydantic import Field
 
 from radarsim.app.configs import load
 from radarsim.config.document import SHIPPED
-from radarsim.config.experiment import canonical, world
+from radarsim.config.experiment import canonical
 from radarsim.config.fields import DataFile, Model, Study
 from radarsim.studies import registry
+from radarsim.studies.identity import identity
+from radarsim.studies.noise import noise_key
 
 LABELS = ["radar.name=Something", "radar.band=metre", "filters.0.name=range alone"]
 SAME = [
     "radar.repetition_rate_hz=1e3",
+    "radar.detection_probability=1",
+    "radar.bias_range_m=0",
     "filters.0.initial_scans=3",
     "baseline=r",
     "target={kind: polynomial, coefficients: [1e5, -250, 4]}",
@@ -33,6 +37,7 @@ WORLDS = [
     "radar.sigma_velocity_mps=1",
     "radar.scan_period_s=5",
     "radar.wavelength_m=0.2",
+    "radar.detection_probability=0.9",
     "target.coefficients.1=-251",
     "target=turn",
 ]
@@ -42,22 +47,26 @@ def spec(*overrides):
     return load("rls2", overrides).cases[0].spec
 
 
-@pytest.mark.parametrize("override", [*LABELS, *SAME])
+def made(*overrides):
+    """What tells a case from others, and its noise."""
+    (case,) = load("rls2", overrides).cases
+    return identity(case), noise_key(case, "plots").tobytes()
+
+
+@pytest.mark.parametrize("override", [*LABELS, *SAME, "realisations=7"])
 def test_labels_and_spelt_out_defaults_change_nothing(override):
-    assert canonical(spec(override)) == canonical(spec())
-    assert world(spec(override)) == world(spec())
+    assert made(override) == made()
 
 
 @pytest.mark.parametrize("override", FILTERS)
 def test_filters_and_scans_change_the_case_but_not_its_noise(override):
-    assert canonical(spec(override)) != canonical(spec())
-    assert world(spec(override)) == world(spec())
+    (case, noise), (before, same) = made(override), made()
+    assert (case != before, noise == same) == (True, True)
 
 
 @pytest.mark.parametrize("override", WORLDS)
 def test_the_world_changes_both(override):
-    assert canonical(spec(override)) != canonical(spec())
-    assert world(spec(override)) != world(spec())
+    assert all(one != other for one, other in zip(made(override), made(), strict=True))
 
 
 def test_the_baseline_is_a_place_and_no_name():

@@ -4,22 +4,8 @@ import pytest
 from pydantic import Field
 
 from radarsim.app.configs import load
-from radarsim.config.check import Label, label, models_in
+from radarsim.config.check import Label, label
 from radarsim.config.fields import Model, Positive, Study
-from radarsim.config.schema import Common
-from radarsim.studies import registry
-
-
-def every_model(model):
-    return {model}.union(*(every_model(m) for info in model.model_fields.values() for m in models_in(info.annotation)))
-
-
-@pytest.mark.parametrize("study", registry.SHIPPED)
-def test_every_key_has_a_label(study):
-    for model in every_model(registry.keys(study)) | {Common}:
-        for name, info in model.model_fields.items():
-            assert info.title, f"{model.__name__}.{name}"
-            assert info.title == info.title.strip()
 
 
 @pytest.mark.parametrize(

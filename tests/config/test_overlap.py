@@ -5,15 +5,6 @@ import pytest
 from radarsim.app.configs import load
 from radarsim.errors import ConfigError
 
-OWN = {
-    "study": "range_doppler",
-    "radar": {"wavelength_m": 0.15, "sigma_range_m": 250, "sigma_velocity_mps": 15, "scan_period_s": 10},
-    "target": "polynomial",
-    "filters": [{"name": "r", "observes": ["range"], "manoeuvre_variance": 1e-3}],
-    "scans": 15,
-    "realisations": 100,
-}
-
 
 @pytest.mark.parametrize(
     ("first", "second"),
@@ -24,11 +15,11 @@ OWN = {
         ("filters.0", "filters.0.manoeuvre_variance"),
     ],
 )
-def test_keys_of_one_value_are_not_swept_together(first, second):
-    values = {"radar": [OWN["radar"]], "filters.0": [OWN["filters"][0]]}
+def test_keys_of_one_value_are_not_swept_together(good, first, second):
+    values = {"radar": [good["radar"]], "filters.0": [good["filters"][0]]}
     sweep = {first: values.get(first, [1, 2]), second: values.get(second, [1, 2])}
     with pytest.raises(ConfigError) as caught:
-        load({**OWN, "sweep": sweep})
+        load({**good, "sweep": sweep})
     assert caught.value.lines == (f"config: sweep.{second}: sweeps what {first} sweeps as well",)
 
 
@@ -37,9 +28,9 @@ def test_a_sweep_of_what_an_included_config_sweeps_is_refused():
         load({"include": ["rls2_manoeuvre_variance"], "sweep": {"manoeuvre_variance": [1, 2]}})
 
 
-def test_sweeps_of_different_values_go_together():
+def test_sweeps_of_different_values_go_together(good):
     sweep = {"manoeuvre_variance": [1e-3, 1e-2], "radar.sigma_range_m": [100, 200], "filters.0.initial_scans": [3, 4]}
-    assert len(load({**OWN, "sweep": sweep}).cases) == 8
+    assert len(load({**good, "sweep": sweep}).cases) == 8
 
 
 def test_an_override_that_is_no_text():
@@ -48,9 +39,9 @@ def test_an_override_that_is_no_text():
     assert caught.value.lines == ("--set radar.name: is not UTF-8 text",)
 
 
-def test_a_range_that_drowns_its_accuracy_is_refused():
+def test_a_range_that_drowns_its_accuracy_is_refused(good):
     far = {"kind": "polynomial", "coefficients": [1e9, -200]}
-    fine = {**OWN["radar"], "sigma_range_m": 1e-6, "sigma_velocity_mps": 1e-7}
-    load({**OWN, "target": far})
+    fine = {**good["radar"], "sigma_range_m": 1e-6, "sigma_velocity_mps": 1e-7}
+    load({**good, "target": far})
     with pytest.raises(ConfigError, match=r"target: must stay within .* m of the radar"):
-        load({**OWN, "target": far, "radar": fine})
+        load({**good, "target": far, "radar": fine})

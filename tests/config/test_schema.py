@@ -34,6 +34,7 @@ def test_every_key_is_described(study):
         assert model.__doc__
         for name, info in model.model_fields.items():
             assert info.description, f"{model.__name__}.{name}"
+            assert info.title == (info.title or "").strip() != "", f"{model.__name__}.{name}"
 
 
 @pytest.mark.parametrize("study", registry.SHIPPED)

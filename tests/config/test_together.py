@@ -6,8 +6,6 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.config.experiment import complete
-from radarsim.report.panels import RADIAL
-from radarsim.studies.range_doppler.config import Keys
 
 SHORT = "must be >= 3 for the initialisation of filter r, got 2"
 OBSERVES = "must be [range] or [range, velocity], got ['velocity']"
@@ -140,17 +138,3 @@ def test_figures_are_those_of_the_study(good, said):
 def test_figures_in_a_file_and_of_included_configs(house, said):
     house("configs/both.yaml", "include: [rls1, rls2]\nfigures:\n  gian_r: [rls1]\n")
     assert said("configs/both.yaml") == ["configs/both.yaml:3:3: figures.gian_r: no such figure; did you mean gain_r?"]
-
-
-def test_figure_names_are_those_that_the_report_draws():
-    drawn = {f"{kind}_{component}" for component in RADIAL for kind in ("sigma", "gain", "dynamic")}
-    assert set(Keys.figure_names) == drawn | {"settling", "consistency"}
-
-
-def test_unknown_figures_of_bursts_are_refused():
-    from radarsim.errors import ConfigError
-
-    for name in ("residuals", "locks", "accuracy", "lock_density", "lock_scale_noise_variance"):
-        assert load("discriminator", [f"figures.{name}=[discriminator]"])
-    with pytest.raises(ConfigError, match=r"figures\.lokcs: no such figure; did you mean locks"):
-        load("discriminator", ["figures.lokcs=[discriminator]"])

@@ -21,6 +21,7 @@ def row(claim="P9.1", kind=REFUTED, **more):
         "what": "x",
         "expected": "5",
         "unit": "m",
+        "old_verdict": "",
     }
     return {"claim": claim, **words, **classes, **numbers, **beside, **more}
 
@@ -66,6 +67,13 @@ def test_forest_stands_in_margins():
     (wide,) = page.figure([row(judged_lo="", judged_hi="")]).panels[0].marks[:1]  # few realisations have no interval
     assert np.isnan(wide.lo).all()
     assert page.measured(row(judged_lo="", judged_hi="")) == "3 m"
+
+
+def test_words_that_markdown_would_read_are_escaped():
+    of = row(statement="a | b < c", expected="< 0", config="rls2", original="а")
+    words = "<summary>a \\| b &lt; c</summary>«а» (p)<br>Came out: x: 3 [2, 4] m; expected &lt; 0 m.</details>"
+    text = page.page([of], {"Someone": "range_doppler"})
+    assert f"| P9.1 | <details>{words} | **refuted** | `rls2` |" in text
 
 
 def test_of_variants_of_a_number_the_nearest_is_drawn():

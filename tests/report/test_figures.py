@@ -276,12 +276,6 @@ def test_long_lines_are_thinned_and_short_ones_are_whole():
     assert len(drawn(one(line(1999))).lines[0].get_xdata()) == 1999
 
 
-def test_styles_differ_in_grey():
-    """Neighbouring colours differ in lightness or dash; all dashes differ, all markers differ."""
-    assert len({str(dash) for dash in figures.DASHES}) == len(figures.DASHES)
-    assert len(set(figures.MARKERS)) == len(figures.MARKERS) >= len(figures.COLOURS)
-
-
 HOSTILE = ["<script>alert(1)</script>", r"$\frac{$", "漢 & " + 60 * "x"]
 
 

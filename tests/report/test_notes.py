@@ -9,9 +9,7 @@ import pytest
 
 import radarsim
 from radarsim.app import result as output
-from radarsim.app.configs import CaseWork, load
 from radarsim.config.document import SHIPPED
-from radarsim.engine.results import CaseResult
 from radarsim.report import notes
 from radarsim.report.quantities import Quantity
 from radarsim.report.statistics import FEW
@@ -112,37 +110,10 @@ def test_no_note_stands_beside_an_exact_value(exact):
     assert list(noted["note"]) == ["" if exact else notes.HEAVY] * 2 + [notes.HEAVY]
 
 
-def sampled(experiment, n, runs):
-    """For each run of n realisations of the first case of an experiment: its result."""
-    work = CaseWork(experiment.cases[0])
-    of = experiment.cases[0]
-    for run in range(runs):
-        sums = work.plan.layout.unpack(work.simulate(run * n, n))
-        yield CaseResult(of.name, of.study, of.spec, of.swept, n, sums, work.plan.axes)
-
-
 S_BAND = (
     *("radar.sigma_range_m=60", "radar.sigma_velocity_mps=3", "radar.scan_period_s=4"),
     "radar.detection_probability=0.9",
 )
-
-
-def test_marks_of_a_radar_that_misses_plots_fall_on_the_rows_that_do_not_cover():
-    """Its first scans and its last ones are all but Gaussian; those between have the tails of several plots missed.
-
-    Marked as if no exact value stood beside: these cover less than the others, and the last scans are not marked.
-    """
-    experiment, parts = load("rls2", list(S_BAND)), []
-    for result in sampled(experiment, 1000, 150):
-        made = notes.noted({"curves": output.study(result.study).curves([result])}, [result], exact=False)["curves"]
-        held = made["sigma_lo"].le(made["exact_sigma"]) & made["exact_sigma"].le(made["sigma_hi"])
-        parts.append(pd.DataFrame({"k": made["k"], "marked": notes.heavy(made), "held": held}))
-    rows = pd.concat(parts)
-    held, marked = rows.groupby("marked")["held"].mean(), rows.groupby("k")["marked"].mean()
-    assert held[True] < 0.92
-    assert held[False] > 0.93
-    assert marked[[1, 14, 15]].max() < 0.02
-    assert marked[5:9].min() > 0.1
 
 
 def test_the_answer_of_a_radar_that_misses_plots_stands_without_a_warning():

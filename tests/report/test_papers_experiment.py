@@ -1,8 +1,5 @@
 """A claim is judged in the paper's experiment alone: every other key of every study, changed one at a time."""
 
-from dataclasses import replace
-from itertools import islice
-
 import pytest
 
 import radarsim
@@ -88,37 +85,6 @@ def test_only_the_declared_keys_are_for_display(study):
                 yield from marked(inner, (*path, name))
 
     assert set(marked(registry.keys(study))) == MAY_DIFFER[study] - {"scans"}
-
-
-JUDGED = ["rls1", "multimodel_banks", "sonar_smoothing", "sonar_correlated", "discriminator_paper"]
-
-
-def judges_nothing(config, step):
-    """The numbers of the paper's run, under a config with another value of every step-th key: none of its claims."""
-    result = radarsim.run(config, realisations=60)
-    of = registry.study(result.experiment.study).claims()
-    made = {name: table for name, table in result.tables.items() if name != "claims"}
-    judged = claims.judged(of, result.cases, made, configs.shipped)
-    assert len(judged)
-    needed = {claim for claim, cases in judged.groupby("claim")["case"] if any(cases)}
-    for path, changed in islice(swept(result.cases[0].spec), 0, None, step):
-        if path in MAY_DIFFER[result.experiment.study]:
-            continue
-        others = [replace(result.cases[0], spec=changed), *result.cases[1:]]
-        left = claims.judged(of, others, made, configs.shipped)
-        assert result.cases[0].name not in {name for cases in left["case"] for name in cases.split(", ")}, path
-        assert set(left["claim"]) <= needed
-
-
-@pytest.mark.parametrize("config", JUDGED)
-def test_a_run_with_another_key_judges_nothing(config):
-    judges_nothing(config, step=10)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("config", JUDGED)
-def test_a_run_with_any_other_key_judges_nothing(config):
-    judges_nothing(config, step=1)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ from radarsim.app import result as output
 from radarsim.app import run
 from radarsim.report import chart, figures, panels, sweeps, tables
 from radarsim.report.claims import page
-from radarsim.report.claims.judge import SAID
 from radarsim.report.drawing import Line
 
 
@@ -70,57 +69,6 @@ def test_every_study_of_tracks_draws_its_sweeps(config, overrides, name):
 
 def test_no_sweep_no_figure(expected_radar):
     assert sweeps.figures([expected_radar("rls2")], {}) == {}
-
-
-ROW = {
-    **{"claim": "P1.1", "paper": "Gorshkov & Zavizhenets 2017", "statement": "a | b < c", "place": "table"},
-    **{"reading": ""},
-    **{"overall": "confirmed", "verdict": "confirmed", "what": "gain", "measured": -1.23456, "lo": -1.3, "hi": -1.2},
-    **{"unit": "%", "config": "rls2", "case": "rls2", "expected": "< 0"},
-    **{"class": "confirmed", "original": "а", "extension": False, "exact": -1.25, "miss": 0.0, "worst_miss": 0.0},
-    **{"needed": "", "why": "", "holds": "", "of": "", "old_verdict": "confirmed", "ceiling": "", "number": ""},
-    **{"as_shipped": "confirmed", "depends_on": "", "expected_lo": "", "expected_hi": 0.0, "margin": 1.0},
-}
-
-
-def test_the_page_of_claims():
-    counted = {
-        **ROW,
-        "claim": "P1.2",
-        "what": "operations",
-        "measured": 7.0,
-        **dict.fromkeys(("lo", "hi", "judged_lo", "judged_hi"), 7.0),
-        "unit": "",
-        "exact": "",
-    }
-    never = {**ROW, "claim": "P1.3", "measured": "", "reading": "so"} | dict.fromkeys(SAID, "not run")
-    verdicts = ("refuted", *["confirmed"] * 3)
-    false = {"claim": "P1.4"} | dict.fromkeys(SAID, "refuted")
-    parts = [{**ROW, **false, "verdict": v, "case": f"rls{i}", "exact": -1.25 - i} for i, v in enumerate(verdicts)]
-    parts[0] |= {"miss": 2.5, "exact": 2.5}
-    text = page.page([ROW, counted, never, *parts], {ROW["paper"]: "range_doppler"})
-    lines = [line for line in text.split("\n") if line.startswith("| P1")]
-    words, measured = "a \\| b &lt; c", "gain | −1.235 [−1.300, −1.200] %"
-
-    def row(claim, inner, verdict):
-        return f"| {claim} | <details><summary>{words}</summary>«а» (table){inner}</details> | {verdict} | `rls2` |"
-
-    assert lines == [
-        row("P1.1", "<br>Came out: gain: −1.25 % exactly; expected &lt; 0 %.", "**confirmed**"),
-        row("P1.2", "<br>Came out: operations: 7; expected &lt; 0.", "**confirmed**"),
-        row("P1.3", "<br>Read as: so.", "not run"),
-        row("P1.4", "<br>Came out: `rls0`: gain: 2.5 % exactly; expected &lt; 0 %.", "**refuted**"),  # the worst
-        f"| P1.1 | {measured} | −1.25 | &lt; 0 % | 0 | **confirmed** | confirmed |",
-        "| P1.2 | operations | 7 |  | &lt; 0 | 0 | **confirmed** | confirmed |",
-        f"| P1.4 | `rls0`: {measured} | 2.5 | &lt; 0 % | 2.5 | **refuted** | confirmed |",
-        *(
-            f"| P1.4 | `rls{i}`: {measured} | −{1.25 + i} | &lt; 0 % | 0 | **confirmed** | confirmed |"
-            for i in (1, 2, 3)
-        ),
-    ]
-    assert "* **2 confirmed**, true as stated: P1.1, P1.2\n* **1 refuted**" in text
-    assert text.count("<details>") == text.count("</details>") == 5
-    assert "part by part" not in page.page([ROW], {}, parts=False)
 
 
 def test_measured_values_are_written_to_two_figures_of_their_half_width():

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from radarsim import failures
+from tests.program import csv_bytes
 from tests.studies import outside
 
 EXAMPLES = outside.ROOT / "examples"
@@ -30,10 +31,6 @@ def place(tmp_path_factory):
 def radarsim(place):
     """The real command, beside the installed packages."""
     yield from outside.forking(place / "site", place)
-
-
-def csv_bytes(folder):
-    return {file.name: file.read_bytes() for file in sorted(folder.glob("*.csv"))}
 
 
 LINES = {"chirp": 120, "bearings": 200}  # at most, of its file

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -317,28 +316,6 @@ def test_a_name_that_a_measure_of_ones_own_looks_for_in_vain_is_the_reason(made)
         seen.row("last", filter="quick", component="y")
     with pytest.raises(ConfigError, match="no table 'believed'; there are last, curves, gains"):
         judged.over_believed(seen, {}, "quick", "x")
-
-
-class Misnamed(Walk):
-    """A study whose claim is judged by a measure that is not there."""
-
-    claims_yaml = """
-paper: walk
-config: walk
-claims:
-- id: 1
-  place: section 1
-  statement: The quick filter is the better one
-  parts:
-  - {of: [{}], what: gain, measure: {gian: {filter: quick, component: x}}, expected: {above: 0}}
-"""
-
-
-def test_a_fault_of_a_claim_has_its_file_and_line():
-    with pytest.raises(ConfigError, match=r"did you mean gain\?") as caught:
-        Misnamed().keys()
-    line = re.match(r".*test_onefile\.py:(\d+):", caught.value.lines[0])[1]
-    assert "gian: {filter: quick" in Path(__file__).read_text(encoding="utf-8").splitlines()[int(line) - 1]
 
 
 WRONG_NAMES = {

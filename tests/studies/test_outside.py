@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from radarsim.kernels.compile import ROOT
+from tests.program import csv_bytes
 from tests.studies import outside
 
 N = 10_000  # two whole blocks and a partial one
@@ -41,10 +42,6 @@ def ran(place):
     arguments = ("run", "fifth", "-n", N, "--threads", 1, "--out", "results")
     outside.command(*arguments, site=place / "site", cwd=place)
     return place / "results/fifth"
-
-
-def csv_bytes(folder: Path) -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in sorted(folder.glob("*.csv"))}
 
 
 def test_it_is_listed_with_its_configs_and_filters(radarsim):

@@ -64,10 +64,11 @@ def reseeded(case: Any, seed: int = 1) -> Any:
 P1_STUDY = "studies/range_doppler/test_study.py"
 OTHER_NOISE = "trust/test_faults.py::test_seeds_and_streams_have_noise_of_their_own"
 P1_EXACT = "studies/range_doppler/test_exact.py"
-IDENTITY = f"{P1_STUDY}::test_identity_ignores_names_and_realisations"
+OTHER_SEED = "studies/test_every.py::test_a_case_is_the_same_elsewhere_and_another_with_another_seed"
+IDENTITY = "config/test_identity.py::test_labels_and_spelt_out_defaults_change_nothing"
 
 
-@fault("studies.noise:noise_key", f"{P1_STUDY}::test_cases_that_differ_only_in_filters_share_their_noise")
+@fault("studies.noise:noise_key", "config/test_identity.py::test_filters_and_scans_change_the_case_but_not_its_noise")
 def noise_of_the_filters_too(right):
     """Gains of cases that differ in their filters would not be paired."""
     return lambda case, what: right(case, f"{what}{case.spec!r}")
@@ -84,7 +85,7 @@ def one_stream_for_all_noise(right):
     return lambda case, what: right(case, "noise")
 
 
-@fault("studies.identity:identity", IDENTITY)
+@fault("studies.identity:identity", OTHER_SEED)
 def seed_not_in_the_identity(right):
     return lambda case: right(reseeded(case))
 

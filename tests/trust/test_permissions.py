@@ -170,11 +170,7 @@ def test_what_may_not_be_looked_at_is_not_said_to_be_missing(command, made, tmp_
 
 def test_a_record_that_may_not_be_read_is_not_taken_for_a_damaged_one(command, made, tmp_path):
     record = made / "rls2/run.json"
-    mode = record.stat().st_mode
-    record.chmod(0)
-    try:
+    with unreadable(record):
         done = command("compare", made / "rls2", made / "rls2", "--no-figures", "--out", tmp_path)
-    finally:
-        record.chmod(mode)
     assert done.returncode == 4
     assert done.stderr == f"{record}: cannot be read: Permission denied\n"

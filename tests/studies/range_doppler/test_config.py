@@ -223,34 +223,6 @@ def test_the_contracts_example(house, said):
     assert said("rls2") == ["configs/rls2.yaml:7:18: radar.sigma_range_m: must be > 0, got -250"]
 
 
-def test_all_faults_at_once_each_at_its_place(house, said):
-    text = """
-        study: range_doppler
-        radar:
-          wavelength_m: 0
-          sigma_range: 250
-          sigma_velocity_mps: yes
-          scan_period_s: 10
-        target: {kind: polynomial, coefficients: [1, x]}
-        filters:
-          - {name: r, observes: [range], manoeuvre_variance: 0}
-          - {name: a, observes: [rnge, velocity], manoeuvre_variance: 1e-3}
-        scans: 15.5
-        realisations: true
-        """
-    assert said(house("own.yaml", text)) == [
-        "own.yaml:3:3: radar.sigma_range_m: required key is missing",
-        "own.yaml:3:17: radar.wavelength_m: must be > 0, got 0",
-        f"own.yaml:4:3: radar.sigma_range: unknown key; did you mean sigma_range_m? allowed: {RADAR}",
-        "own.yaml:5:23: radar.sigma_velocity_mps: must be a number, got 'yes'",
-        "own.yaml:7:46: target.coefficients.1: must be a number, got 'x'",
-        "own.yaml:9:54: filters.0.manoeuvre_variance: must be > 0, got 0",
-        "own.yaml:10:26: filters.1.observes.0: must be one of range, velocity, got 'rnge'",
-        "own.yaml:11:8: scans: must be a whole number, got 15.5",
-        "own.yaml:12:15: realisations: must be a whole number, got true",
-    ]
-
-
 @pytest.mark.parametrize(
     ("key", "value", "at", "limit"),
     [
@@ -287,11 +259,6 @@ def test_what_is_accepted_can_be_designed(good):
         registry.study("range_doppler").prepare(experiment.cases[0])
         prepared += 1
     assert prepared > 30
-
-
-def test_filter_names_differ(good, said):
-    good["filters"][1]["name"] = "r"
-    assert said(good) == ["config: filters: names must differ: r is there twice"]
 
 
 def test_at_most_sixteen_filters(good, said):

@@ -5,8 +5,6 @@ import pytest
 
 from radarsim.app.configs import CaseWork, load
 from radarsim.engine.run import collect
-from radarsim.studies.identity import identity
-from radarsim.studies.noise import noise_key
 
 RADARS = ("rls1", "rls2", "rls3", "rls4", "rls5")
 N = 100_000
@@ -45,28 +43,6 @@ def test_bias_of_a_turning_target_is_the_exact_one():
     z = (moments[..., 0] - axes.exact_bias)[axes.available] / spread[axes.available] * np.sqrt(N)
     assert np.abs(z).max() < LIMIT
     assert np.nanmax(np.abs(axes.exact_bias[:, :, 0])) > 3 * spread[0, -1, 0]
-
-
-def test_c_theta_is_the_papers_table():
-    expected = {"rls1": 0.25, "rls2": 2.78, "rls3": 11.11, "rls4": 25, "rls5": 100}
-    found = {radar: work_of(radar).plan.axes.C_theta for radar in RADARS}
-    assert found == pytest.approx(expected, abs=0.005)
-
-
-def test_cases_that_differ_only_in_filters_share_their_noise():
-    one, other = (load("rls2", ["filters.0.manoeuvre_variance=" + v]).cases[0] for v in ("1e-3", "1e-2"))
-    np.testing.assert_array_equal(noise_key(one, "plots"), noise_key(other, "plots"))
-    assert identity(one) != identity(other)
-    another = load("rls2", ["radar.sigma_range_m=251"]).cases[0]
-    assert (noise_key(one, "plots") != noise_key(another, "plots")).any()
-
-
-def test_identity_ignores_names_and_realisations():
-    plain = load("rls2").cases[0]
-    for change in ("realisations=7", "radar.name=other", "filters.0.name=mine"):
-        assert identity(load("rls2", [change]).cases[0]) == identity(plain)
-    for change in ("seed=3", "scans=14", "radar.scan_period_s=9", "target=turn"):
-        assert identity(load("rls2", [change]).cases[0]) != identity(plain)
 
 
 def test_non_finite_numbers_are_found_and_explained():

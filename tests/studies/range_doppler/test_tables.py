@@ -139,12 +139,6 @@ def test_captions_have_the_papers_figure_numbers_where_they_are_of_its_experimen
     assert not any("of the paper." in one.caption for one in drawn_of(results).values())
 
 
-def test_figures_have_the_contracts_names(paper, swept):
-    names = {f"{kind}_{component}" for kind in ("sigma", "gain") for component in ("r", "Vr", "ar")} | {"consistency"}
-    assert set(drawn_of(paper)) == names
-    assert set(drawn_of(swept)) == names | {"settling"}
-
-
 def test_consistency_figure_draws_the_table(paper):
     made = made_of(paper)
     first, second = drawn_of(paper, made)["consistency"].panels

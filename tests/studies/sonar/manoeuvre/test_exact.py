@@ -110,12 +110,12 @@ def test_flat_states_move_as_their_rates_say():
 def test_closest_approach_is_the_least_distance():
     track = exact.flat(POLAR, True)
     found = exact.uses(track, OWN, 60.0)
-    t = np.linspace(-3000, 3000, 6_000_001)
+    t = np.linspace(-3000, 3000, 600_001)
     for one, row in zip(track, found, strict=True):
         apart = one - OWN
         distance = np.hypot(apart[0] + t * apart[2], apart[1] + t * apart[3])
         assert row[4] == pytest.approx(distance.min(), rel=1e-6)
-        assert row[5] == pytest.approx(t[distance.argmin()], abs=2e-3)
+        assert row[5] == pytest.approx(t[distance.argmin()], abs=2e-2)
         assert row[:2] == pytest.approx([np.arctan2(one[3], one[2]), np.hypot(one[2], one[3])])
         assert row[2:4] == pytest.approx(one[:2] + 60 * one[2:])
 
