@@ -29,6 +29,7 @@ from radarsim.kernels.lanes import WIDTH
 from radarsim.studies.ambiguous_doppler import filters
 from radarsim.studies.ambiguous_doppler.config import joint_span
 from radarsim.studies.ambiguous_doppler.kernels import records, sums
+from radarsim.studies.ambiguous_doppler.kernels.steps import remainder
 from radarsim.studies.ambiguous_doppler.study import COMPONENTS, prepare
 from radarsim.studies.interface import BIAS, RecordedPlots, true_column
 
@@ -77,6 +78,17 @@ def _kept(w: np.ndarray, options: Any) -> np.ndarray:
     return kept[np.argsort(-w[kept], kind="stable")[: options.hypotheses]]
 
 
+def _merged(e: np.ndarray, S: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean and variance (n,) of innovations e (n, folds) by their likelihoods, S (n,); logarithms of these summed."""
+    like = -(e**2) / (2 * S[..., None])
+    most = like.max(axis=-1)
+    p = np.exp(like - most[..., None])
+    total = p.sum(axis=-1)
+    p /= total[..., None]
+    mean = (p * e).sum(axis=-1)
+    return mean, (p * (e - mean[..., None]) ** 2).sum(axis=-1), most + np.log(total)
+
+
 class Folds:
     """What a velocity may have been before it was folded: by the span of its row, or by those of two rows."""
 
@@ -120,9 +132,7 @@ class Folds:
         joint = joint_span(self.span, before[1]) if before else 0.0
         if before is None or joint == 0:
             return np.nan
-        u = np.arange(v + self.span * np.ceil((-joint / 2 - v) / self.span), joint / 2, self.span)
-        off = u - before[0]
-        return u[np.argmin(np.abs(off - before[1] * np.floor(off / before[1] + 0.5)))]
+        return remainder(v, self.span, *before, joint)
 
 
 class Single:
@@ -201,18 +211,16 @@ class Single:
         self._judge(1, e, S)
         if self.member.doppler == "folded" and not self.folds.certain(float(S)):
             self.nis[1] = np.nan
-        w = self.w[:, None] - e**2 / (2 * S)
-        self.x = np.array(add_scaled(self.x[:, :, None], e, gain)).reshape(3, -1)
-        self.P, self.w = P, w.ravel() - w.max()
         if self.member.doppler == "folded" and self.options.merge == "each_scan":
-            p = np.exp(self.w) / np.exp(self.w).sum()
-            mean = (self.x @ p)[:, None]
-            spread = add_outer(NO_NOISE, p, self.x - mean)
-            self.P = tuple(own + more.sum() for own, more in zip(self.P, spread, strict=True))
-            self.x, self.w = mean, np.zeros(1)
-        elif self.member.doppler == "folded":
-            kept = _kept(self.w, self.options)
-            self.x, self.w = self.x[:, kept], self.w[kept]
+            mean, variance, _ = _merged(e, np.full(1, S))
+            self.x, self.P = np.array(add_scaled(self.x, mean, gain)), add_outer(P, float(variance[0]), gain)
+        else:
+            w = self.w[:, None] - e**2 / (2 * S)
+            self.x = np.array(add_scaled(self.x[:, :, None], e, gain)).reshape(3, -1)
+            self.P, self.w = P, w.ravel() - w.max()
+            if self.member.doppler == "folded":
+                kept = _kept(self.w, self.options)
+                self.x, self.w = self.x[:, kept], self.w[kept]
         self.sure, gain, _ = TAKE[1](self.sure, self.variances[1], 1.0)
         return np.array(gain)
 
@@ -326,17 +334,10 @@ class Interacting:
             self.x = np.array(add_scaled(self.x, e, gain))
             self._weigh(logs - e**2 / (2 * S))
         elif self.options.merge == "each_scan":
-            folds = self.folds.innovations(e, S)
-            like = -(folds**2) / (2 * S[..., None])
-            most = like.max(axis=-1, keepdims=True)
-            p = np.exp(like - most)
-            logs = logs + most[..., 0] + np.log(p.sum(axis=-1))
-            p /= p.sum(axis=-1, keepdims=True)
-            mean = (p * folds).sum(axis=-1)
-            variance = (p * (folds - mean[..., None]) ** 2).sum(axis=-1)
+            mean, variance, log_sum = _merged(self.folds.innovations(e, S), S)
             self.x = np.array(add_scaled(self.x, mean, gain))
             self.P = np.array(add_outer(P, variance, gain))
-            self._weigh(logs)
+            self._weigh(logs + log_sum)
         else:
             self._branch(v, np.array(gain), S, logs)
 
