@@ -127,3 +127,17 @@ def test_folded_velocities_are_noticed_in_99_of_100():
     """60 scans of RLS 2 at 1 kHz, whose σ of velocity is a fifth of the span."""
     config = loaded("scans=60", "target={kind: polynomial, coefficients: [200e3, 250]}", radar={})
     assert noticed(config, 100, 75.0, fold=True) >= 99
+
+
+def test_a_remainder_needs_no_range():
+    """Of two velocities it is known without either's range; as measured, it would be wrong by whole spans."""
+    slow = "target={kind: random_polynomial, range_m: 2e5, sigma_velocity_mps: 15, sigma_acceleration_mps2: 0.05}"
+    (one,) = load_all(["ambiguous_turns"], ("radar.sigma_velocity_mps=0.1", slow))
+    case = one.cases[0]
+    columns = dict(follow.recorded_of(case).simulated(case, 0))
+    columns["range_m"][7] = np.nan
+    measured = {name: column for name, column in columns.items() if not name.startswith("true_")}
+    track = follow.recorded_of(case).tracker(case).feed(measured)
+    found, true = track.estimate[track.filters.index("remainder"), 2:, 1], columns["true_Vr_mps"][2:]
+    assert abs(columns["velocity_mps"][7] - columns["true_Vr_mps"][7]) > 14
+    np.testing.assert_allclose(found, true, atol=0.6)

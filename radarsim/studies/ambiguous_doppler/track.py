@@ -168,7 +168,7 @@ class Single:
         self.began, self.last = True, t
         if not np.isnan(z):
             gains[0] = self._take_range(z)
-        if self.member.doppler == "remainder" and not np.isnan(v) and not np.isnan(z):
+        if self.member.doppler == "remainder" and not np.isnan(v):
             v = self.folds.remainder(v)
         if self.started and not np.isnan(v) and self.member.doppler != "none":
             gains[1] = self._take_velocity(v)
