@@ -13,24 +13,9 @@ from radarsim.kernels.compile import aligned_zeros, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, row
 from radarsim.kernels.linear import CROSSED, fill_plots, plain
 from radarsim.kernels.random import fill_uniform_pairs
-from radarsim.studies.range_doppler.kernels.steps import (
-    CHUNK,
-    OWN,
-    PAIRED,
-    advance,
-    advance_given,
-    count_plots,
-    displace,
-    displace_plots,
-    draw_once,
-    make_starts,
-    pair,
-    places,
-    score,
-    work,
-)
+from radarsim.studies.range_doppler.kernels import steps
 
-ROWS = (OWN + PAIRED) // WIDTH  # of what is found of a filter and scan
+ROWS = (steps.OWN + steps.PAIRED) // WIDTH  # of what is found of a filter and scan
 
 
 class Problem(NamedTuple):
@@ -118,7 +103,7 @@ def begin_chunk(keys, first, made, bias, sigma_bias, sigma_flight):
     for m in range(2):
         made.offset[m, :] = bias[m]
     if drawn:
-        draw_once(keys, first, made, bias, sigma_bias, sigma_flight)
+        steps.draw_once(keys, first, made, bias, sigma_bias, sigma_flight)
     return drawn
 
 
@@ -127,53 +112,53 @@ def add_block(made, first, count, problem, found):
     """`simulate_block` for a plain problem, with the work arrays of one chunk, into found (F, K, OWN + PAIRED)."""
     keys, truth, sigma, bias, sigma_bias, sigma_flight, flight, detection, dt = problem[:9]
     observes, start, Q, baseline, given, gains, believed = problem[9:]
-    filters, scans, R, at, sums = observes.size, truth.shape[0], sigma * sigma, places(made), address(found)
-    detected, other, next_word = made.detected, made.other, np.empty(CHUNK, np.uint64)
+    filters, scans, R, at, sums = observes.size, truth.shape[0], sigma * sigma, steps.places(made), address(found)
+    detected, other, next_word = made.detected, made.other, np.empty(steps.CHUNK, np.uint64)
     running = np.zeros(filters, dtype=np.bool_)  # filters that have started in every realisation of the chunk
-    for done in range(0, count, CHUNK):
+    for done in range(0, count, steps.CHUNK):
         # A partial chunk is computed whole, with no plots beyond its end, so each realisation goes through the same
         # instructions.
-        n = min(CHUNK, count - done)
+        n = min(steps.CHUNK, count - done)
         drawn = begin_chunk(keys, first + done, made, bias, sigma_bias, sigma_flight)
         displaced = drawn or np.any(bias != 0.0)
         running[:] = False
         for k in range(scans):
             if drawn and flight.shape[0] > 0:
-                displace(made, flight[k], truth[k], k * dt)
+                steps.displace(made, flight[k], truth[k], k * dt)
             fill_plots(keys[0], first + done, k, truth[k], sigma, next_word, made.plots[0], made.plots[1])
             if displaced:
-                displace_plots(at)
+                steps.displace_plots(at)
             if detection < 1.0 and k % 2 == 0:
                 fill_uniform_pairs(keys[1], first + done, k // 2, detected, other)
-            count_plots(at, k, detection, n)
+            steps.count_plots(at, k, detection, n)
             for f in range(filters):
                 if k > 0 and given[f] == 1:
-                    advance_given(at, f, dt, gains[f, k], believed[f, k])
+                    steps.advance_given(at, f, dt, gains[f, k], believed[f, k])
                 elif k > 0:
-                    advance(at, f, dt, (observes[f], Q[f]), R)
+                    steps.advance(at, f, dt, (observes[f], Q[f]), R)
                 if not running[f]:
                     weights = 1.0 / R[0], 1.0 / (R[1] * dt * dt) if observes[f] == 2 else 0.0
-                    running[f] = make_starts(at, f, k, start[f], weights, dt)
-                score(at, f, start[f], observes[f], truth[k], R, row(sums, (f * scans + k) * ROWS))
+                    running[f] = steps.make_starts(at, f, k, start[f], weights, dt)
+                steps.score(at, f, start[f], observes[f], truth[k], R, row(sums, (f * scans + k) * ROWS))
             for f in range(filters):
                 if f != baseline:
-                    pair(at, f, baseline, row(sums, (f * scans + k) * ROWS + OWN // WIDTH))
+                    steps.pair(at, f, baseline, row(sums, (f * scans + k) * ROWS + steps.OWN // WIDTH))
 
 
 @kernel
 def fill_simulated(made, first, problem, plots, detected, truth):
     """Realisation `first`: plots (K, 2), detected (K,) 1 where there is one, truth (K, 3); made: work arrays."""
     spread = problem.sigma_bias, problem.sigma_flight
-    drawn, at = begin_chunk(problem.keys, first, made, problem.bias, *spread), places(made)
-    next_word = np.empty(CHUNK, np.uint64)
+    drawn, at = begin_chunk(problem.keys, first, made, problem.bias, *spread), steps.places(made)
+    next_word = np.empty(steps.CHUNK, np.uint64)
     for k in range(plots.shape[0]):
         if drawn and problem.flight.shape[0] > 0:
-            displace(made, problem.flight[k], problem.truth[k], k * problem.dt)
+            steps.displace(made, problem.flight[k], problem.truth[k], k * problem.dt)
         fill_plots(problem.keys[0], first, k, problem.truth[k], problem.sigma, next_word, made.plots[0], made.plots[1])
-        displace_plots(at)
+        steps.displace_plots(at)
         if problem.detection < 1.0 and k % 2 == 0:
             fill_uniform_pairs(problem.keys[1], first, k // 2, made.detected, made.other)
-        count_plots(at, k, problem.detection, CHUNK)
+        steps.count_plots(at, k, problem.detection, steps.CHUNK)
         plots[k, 0], plots[k, 1], detected[k] = made.plots[0, 0], made.plots[1, 0], made.detected[0]
         for c in range(3):
             truth[k, c] = problem.truth[k, c] + made.state[c, 0]
@@ -184,7 +169,7 @@ def add_found(found: np.ndarray, baseline: int, sums: Sums) -> None:
     each = (*found.shape[:2], 3)
     error = found[..., :12].reshape(*each, 4)
     estimates = found[..., 18:21]
-    pairs = found[..., OWN : OWN + 18].reshape(*each, 6).copy()
+    pairs = found[..., steps.OWN : steps.OWN + 18].reshape(*each, 6).copy()
     own_2, own_4 = error[baseline, ..., 1], error[baseline, ..., 3]
     pairs[baseline] = np.stack([estimates[baseline], own_2, own_4, own_2, own_4, own_4], axis=-1)
     for total, more in zip(
@@ -201,8 +186,8 @@ def simulate_block(problem: Problem, first: int, count: int, sums: Sums) -> None
     The arrays of sums are float64 and contiguous. Realisation i has the same plots and estimates in any block.
     """
     problem = problem.plain()
-    found = aligned_zeros(len(problem.observes), len(problem.truth), OWN + PAIRED)
-    add_block(work(len(problem.observes)), int(first), int(count), problem, found)
+    found = aligned_zeros(len(problem.observes), len(problem.truth), steps.OWN + steps.PAIRED)
+    add_block(steps.work(len(problem.observes)), int(first), int(count), problem, found)
     add_found(found, problem.baseline, sums)
 
 
@@ -210,5 +195,5 @@ def simulate_plots(problem: Problem, realisation: int) -> tuple[np.ndarray, np.n
     """A realisation's plots (K, 2) as `simulate_block` draws them, not-a-number where missed, and its truth (K, 3)."""
     problem, scans = problem.plain(), len(problem.truth)
     plots, detected, truth = np.empty((scans, 2)), np.empty(scans), np.empty((scans, 3))
-    fill_simulated(work(len(problem.observes)), int(realisation), problem, plots, detected, truth)
+    fill_simulated(steps.work(len(problem.observes)), int(realisation), problem, plots, detected, truth)
     return np.where(detected[:, None] == 1, plots, np.nan), truth

@@ -18,23 +18,7 @@ from radarsim.studies.noise import noise_key
 from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.clutter import filters
 from radarsim.studies.sonar.clutter.filters import Conditions, TrackerSpec, trackers
-from radarsim.studies.sonar.clutter.kernels.tracker import (
-    CLOSEST,
-    CONFIRMED,
-    NONE,
-    PDA,
-    TENTATIVE,
-    Field,
-    Rule,
-    Tracks,
-    associate_innovations,
-    clear,
-    next_state,
-    no_tracks,
-    predict,
-    update,
-    whole_field,
-)
+from radarsim.studies.sonar.clutter.kernels import tracker as kernels
 from radarsim.studies.sonar.clutter.study import SIZE, detected_plots
 from radarsim.studies.sonar.kernels import patterns as pattern_kernels
 from radarsim.studies.sonar.kernels import shared_gains as sonar_kernels
@@ -53,7 +37,7 @@ class TrackHistory:
     """
 
     lane: tuple[int, int]
-    state: int = TENTATIVE
+    state: int = kernels.TENTATIVE
     age: int = 1
     hits: int = 1
     misses: int = 0
@@ -74,8 +58,8 @@ class MultiTracker:
         arrays = trackers([spec], given)
         self.spec, self.given, self.manoeuvre = spec, given, arrays.manoeuvre[0]
         association, gate = int(arrays.association[0]), arrays.gate[0]
-        self.rule = Rule(association, gate, given.detection, spec.gate_probability, given.density, spec.speed)
-        self.chunks: list[Tracks] = []
+        self.rule = kernels.Rule(association, gate, given.detection, spec.gate_probability, given.density, spec.speed)
+        self.chunks: list[kernels.Tracks] = []
         self.free: list[tuple[int, int]] = []
         self.alive: list[TrackHistory] = []
         self.ended: list[TrackHistory] = []
@@ -90,8 +74,8 @@ class MultiTracker:
             self._associate(track, predicted[a], innovations[:, a, owner == a], taken)
         new = [self._begin(r[p], b[p], taken) for p in np.flatnonzero(owner < 0)]
         for chunk, rows in zip(self.chunks, taken, strict=True):
-            joint = self.rule.association == PDA
-            update(chunk, dt, self.given.period, self.given.sigma, self.manoeuvre, joint, rows)
+            joint = self.rule.association == kernels.PDA
+            kernels.update(chunk, dt, self.given.period, self.given.sigma, self.manoeuvre, joint, rows)
         for track, gate in zip(self.alive, predicted, strict=True):
             self._judge(track)
             track.gates.append(gate)
@@ -107,14 +91,14 @@ class MultiTracker:
         rows = []
         for chunk in self.chunks:
             rows.append(np.empty((5, CHUNK)))
-            predict(chunk, dt, self.given.period, self.given.sigma, self.manoeuvre, rows[-1])
+            kernels.predict(chunk, dt, self.given.period, self.given.sigma, self.manoeuvre, rows[-1])
         out = np.array([rows[c][:, i] for c, i in (track.lane for track in self.alive)]).reshape(-1, 5)
         for track, row in zip(self.alive, out, strict=True):
             track.since += dt
             if not self._settled(track):
                 reach = self.spec.speed * track.since
                 row[2] += reach**2
-                row[4] += (reach / max(row[0], CLOSEST)) ** 2
+                row[4] += (reach / max(row[0], kernels.CLOSEST)) ** 2
         return out
 
     def _settled(self, track: TrackHistory) -> bool:
@@ -134,8 +118,8 @@ class MultiTracker:
         Only probabilistic association takes more than one plot, and only for a track of two plots or more.
         """
         owner = np.full(distance.shape[1], -1)
-        several = np.array([self.rule.association == PDA and self._settled(track) for track in self.alive])
-        confirmed = np.array([track.state == CONFIRMED for track in self.alive])
+        several = np.array([self.rule.association == kernels.PDA and self._settled(track) for track in self.alive])
+        confirmed = np.array([track.state == kernels.CONFIRMED for track in self.alive])
         busy = np.zeros(len(self.alive), dtype=bool)
         for group in (confirmed, ~confirmed) if len(self.alive) else ():
             a, p = np.nonzero((distance <= self.rule.gate) & group[:, None])
@@ -150,7 +134,7 @@ class MultiTracker:
     ) -> None:
         """Associate a track with the plots that it owns, given their innovations (2, n); writes to its chunk's rows."""
         nu = np.ascontiguousarray(innovations)
-        result = associate_innovations(self.rule, self._settled(track), gate[0], tuple(gate[2:]), *nu)
+        result = kernels.associate_innovations(self.rule, self._settled(track), gate[0], tuple(gate[2:]), *nu)
         chunk, i = track.lane
         taken[chunk][:, i] = result.taken, result.nu_r, result.nu_b, result.rr, result.rb, result.bb
         track.age, track.score = track.age + 1, track.score + result.score
@@ -163,20 +147,20 @@ class MultiTracker:
         """A track of one plot, in a free lane."""
         if not self.free:
             self.free = [(len(self.chunks), i) for i in reversed(range(CHUNK))]
-            self.chunks.append(no_tracks())
+            self.chunks.append(kernels.no_tracks())
             taken.append(np.zeros((6, CHUNK)))
         chunk, i = self.free.pop()
-        clear(self.chunks[chunk], i)
+        kernels.clear(self.chunks[chunk], i)
         taken[chunk][:, i] = 1.0, r, b, 0.0, 0.0, 0.0
         return TrackHistory((chunk, i))
 
     def _judge(self, track: TrackHistory) -> None:
         rule = float(self.spec.m), float(self.spec.n), float(self.spec.misses)
-        state = next_state(track.state, float(track.hits), float(track.misses), float(track.age), *rule)
+        state = kernels.next_state(track.state, float(track.hits), float(track.misses), float(track.age), *rule)
         chunk, i = track.lane
         uncertain = self.chunks[chunk].P[:, 0, i].max() > self.spec.lost**2
-        track.state = NONE if track.state == CONFIRMED and uncertain else state
-        track.was_confirmed |= track.state == CONFIRMED
+        track.state = kernels.NONE if track.state == kernels.CONFIRMED and uncertain else state
+        track.was_confirmed |= track.state == kernels.CONFIRMED
 
     def _record(self, track: TrackHistory, scan: int) -> None:
         chunk, i = track.lane
@@ -189,8 +173,8 @@ class MultiTracker:
         track.scores.append(track.score)
 
     def _remove_ended(self) -> None:
-        ended = [track for track in self.alive if track.state == NONE]
-        self.alive = [track for track in self.alive if track.state != NONE]
+        ended = [track for track in self.alive if track.state == kernels.NONE]
+        self.alive = [track for track in self.alive if track.state != kernels.NONE]
         self.free += [track.lane for track in ended]
         self.ended += ended
 
@@ -220,16 +204,16 @@ def target_plots(
     return np.where(there[:, None], drawn[..., 0], np.nan), world.truth[..., 0] + drawn[..., 2]
 
 
-def false_plots(field: Field, realisation: int, scan: int) -> np.ndarray:
+def false_plots(field: kernels.Field, realisation: int, scan: int) -> np.ndarray:
     """All false plots (2, n) of a scan, range and bearing."""
     cells = field.cells
     if cells.density == 0:
         return np.zeros((2, 0))
     room = np.empty((2, int(20 + 2 * cells.density * cells.dq * cells.nq * cells.db * cells.nb)))
-    n = whole_field(field, realisation, scan, *room)
+    n = kernels.whole_field(field, realisation, scan, *room)
     while n > room.shape[1]:
         room = np.empty((2, n))
-        n = whole_field(field, realisation, scan, *room)
+        n = kernels.whole_field(field, realisation, scan, *room)
     return room[:, :n]
 
 

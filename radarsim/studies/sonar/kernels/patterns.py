@@ -14,18 +14,6 @@ from radarsim.kernels.compile import kernel, part
 from radarsim.kernels.lanes import address
 from radarsim.kernels.random import U, uniforms
 from radarsim.studies.sonar.kernels import detector
-from radarsim.studies.sonar.kernels.detector import (
-    PROBABILITY,
-    ROWS,
-    AdaptiveRules,
-    Alarms,
-    ModelPairs,
-    adapt,
-    add_alarms,
-    detector_statistics,
-    interact,
-    mode_sums,
-)
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK, Sums, move_and_measure
 from radarsim.studies.sonar.kernels.steps import ROW, Filters, Model, Plots, copy_row, fit, recur, remember
 from radarsim.studies.sonar.kernels.sums import Course, add_ahead, add_sums, rows_of
@@ -65,15 +53,15 @@ class RealisationBank(NamedTuple):
     memory: int  #: number of plots that are kept for windows and detectors
     period: float  #: s
     sigma: np.ndarray  #: (C,) of a nominal plot, m or rad
-    adaptive: AdaptiveRules
-    interacting: ModelPairs
+    adaptive: detector.AdaptiveRules
+    interacting: detector.ModelPairs
 
 
 class BlockSums(NamedTuple):
     """Sums of a block over realisations, and estimates that are kept one by one."""
 
     errors: Sums
-    alarms: Alarms
+    alarms: detector.Alarms
     #: (F, K, C, 3) Σp, Σp² of the probability of a manoeuvre, Σ of the plots in memory; of filters that respond
     modes: np.ndarray
     at: np.ndarray  #: (A,) scans whose estimates are kept
@@ -150,9 +138,9 @@ def filter_scan(bank, f, c, k, dt, filters, plots):
     """Update filter f in coordinate c with scan k, in place, dt after the scan before."""
     size, length, kind, period = bank.size[f], bank.length[f], bank.kind[f], bank.period
     if kind == ADAPTIVE:
-        adapt(filters, plots, f, c, bank.adaptive, size, length, dt, period)
+        detector.adapt(filters, plots, f, c, bank.adaptive, size, length, dt, period)
     elif kind == IMM:
-        interact(filters, plots, f, c, bank.interacting, size, dt, period, bank.sigma[c])
+        detector.interact(filters, plots, f, c, bank.interacting, size, dt, period, bank.sigma[c])
     elif kind == WINDOW:
         fit(filters, plots, f, c, length, size, period)
     else:
@@ -167,9 +155,9 @@ def filter_scan(bank, f, c, k, dt, filters, plots):
 def add_modes(kind, further, used, out, modes):
     """Add the modes of a filter of this kind, with these further rows, to modes (3,); out (3,) is scratch."""
     if kind == ADAPTIVE:
-        mode_sums(further, detector.MODE, detector.PLOTS, used, out)
+        detector.mode_sums(further, detector.MODE, detector.PLOTS, used, out)
     elif kind == IMM:
-        mode_sums(further, PROBABILITY + 1, -1, used, out)
+        detector.mode_sums(further, detector.PROBABILITY + 1, -1, used, out)
     else:
         return
     for j in range(3):
@@ -230,7 +218,7 @@ def simulate_block(world, detections, conversion, bank, detectors, first, total,
     The last chunk is always computed in full, and only the realisations asked for are summed.
     """
     F, K, C = bank.carry.shape
-    rows = ROWS if (bank.kind == IMM).any() else 10
+    rows = detector.ROWS if (bank.kind == IMM).any() else 10
     x, Y, further = np.empty((F, C, 4, CHUNK)), np.empty((F, C, 8, CHUNK)), np.empty((F, C, rows, CHUNK))
     filters = Filters(x, Y, further, np.empty((6, CHUNK)))
     z, weight, n, n_now = np.empty((C, CHUNK)), np.empty((C, CHUNK)), np.empty((C, CHUNK)), np.empty((C, CHUNK))
@@ -258,7 +246,7 @@ def simulate_block(world, detections, conversion, bank, detectors, first, total,
             for c in range(C):
                 if recent.shape[2] > 0:
                     remember(recent[c], z[c], weight[c], dt / bank.period)
-            detector_statistics(detectors, k, recent, bank.sigma, n_now, weight, T)
-            add_alarms(detectors, k, T, used, passed, sums.alarms)
+            detector.detector_statistics(detectors, k, recent, bank.sigma, n_now, weight, T)
+            detector.add_alarms(detectors, k, T, used, passed, sums.alarms)
             chunk = Chunk(done, min(CHUNK, total - done), k, dt, used, course)
             step_filters(bank, baseline, chunk, filters, plots, out, sums)

@@ -34,35 +34,6 @@ from radarsim.kernels.lanes import address
 from radarsim.kernels.random import uniforms
 from radarsim.studies.sonar.clutter.kernels import tracker
 from radarsim.studies.sonar.clutter.kernels.rare import LARGEST, MOST_MEAN, associate_drawn, box_of
-from radarsim.studies.sonar.clutter.kernels.tracker import (
-    COUNTS,
-    KNOWN,
-    OPEN,
-    PDA,
-    Rule,
-    Scan,
-    Target,
-    Workspace,
-    add_drawn,
-    add_weight,
-    associate,
-    associate_track,
-    begin,
-    distance_squared,
-    draws_of,
-    gate_of,
-    inverse_two,
-    judge,
-    measure_target,
-    off_target,
-    predict,
-    reset,
-    rule_of,
-    settle,
-    tracks_of,
-    update,
-)
-from radarsim.studies.sonar.clutter.kernels.tracker import ENDS as TRACKS_ENDED
 from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
 from radarsim.studies.sonar.kernels.steps import CHUNK, copy_row
 from radarsim.studies.sonar.kernels.sums import Course
@@ -102,41 +73,16 @@ class Laws(NamedTuple):
     young: np.ndarray  #: (J,)
     direction: np.ndarray  #: (N, J)
     stretch: np.ndarray  #: (N,)
-    rule: Rule
+    rule: tracker.Rule
     young_age: float
 
 
-class Plots(NamedTuple):
-    """The law of the target's plots at a scan: their course, about which they lie, and their σ (2,) in m and rad."""
-
-    course: Course
-    sigma: np.ndarray
-
-
-class Chunk(NamedTuple):
-    """Arrays of a chunk: work arrays of the trackers, own (F, RATIO + laws, CHUNK), the target's plots as measured and
-    as drawn (2, CHUNK), whether they are detected (CHUNK,), their law, and what `judge` writes.
-    """
-
-    work: Workspace
-    own: np.ndarray
-    measured: np.ndarray
-    z: np.ndarray
-    detected: np.ndarray
-    plots: Plots
-    kept: np.ndarray
-    counts: np.ndarray
-
-
 class EndSums(NamedTuple):
-    """Sums of a block by weights w, for F trackers over K scans.
+    """Sums of a block by weights w, for F trackers over K scans."""
 
-    ended (F, K, KINDS, 4): Σw, Σw², number and Σw⁴ of realisations whose first confirmed track of the target ends at a
-    scan, dropped or lost; ended_drawn (F, 3): number of plain ones, Σw and Σw² of all.
-    """
-
+    #: (F, K, KINDS, 4) Σw, Σw², number, Σw⁴ of realisations whose first confirmed track of the target ends at a scan
     ended: np.ndarray
-    ended_drawn: np.ndarray
+    ended_drawn: np.ndarray  #: (F, 3) number of plain ones, Σw and Σw² of all
 
 
 @inline
@@ -154,7 +100,7 @@ def outside(off, S, threshold, sigma):
     the range it is smooth and periodic, so that the midpoint rule converges exponentially.
     """
     (off_r, off_b), (sigma_r, sigma_b) = off, sigma
-    if threshold >= OPEN:
+    if threshold >= tracker.OPEN:
         return 0.0
     wide, slope = math.sqrt(threshold * S[0]), S[1] / S[0]
     low, high = max(-wide, off_r - WIDEST * sigma_r), min(wide, off_r + WIDEST * sigma_r)
@@ -246,8 +192,8 @@ def stretched(laws, k, n, z, sigma, own, out):
 @inline
 def laws_of(ends, trackers, f):
     """The laws of tracker f."""
-    far = (ends.young[f], ends.direction[f], ends.stretch[f])
-    return Laws(ends.shares[f], ends.length[f], ends.undetected[f], *far, rule_of(trackers, f), trackers.n[f] + FURTHER)
+    far, rule = (ends.young[f], ends.direction[f], ends.stretch[f]), tracker.rule_of(trackers, f)
+    return Laws(ends.shares[f], ends.length[f], ends.undetected[f], *far, rule, trackers.n[f] + FURTHER)
 
 
 @inline
@@ -271,7 +217,7 @@ def look(field, laws, scan, tracks, status, predicted, own):
         ):
             place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
             reach = laws.rule.speed * (status[tracker.SINCE, i] + scan.dt)
-            mean = box_of(cells, gate_of(place, S, plots[i] > 1.5, reach), laws.rule.gate).mean
+            mean = box_of(cells, tracker.gate_of(place, S, plots[i] > 1.5, reach), laws.rule.gate).mean
             own[BOX, i] = -math.expm1(-mean) if 0.0 < mean <= MOST_MEAN else 0.0
 
 
@@ -303,10 +249,11 @@ def may_be_seduced(laws, k, certain, own, i):
 
 
 @part
-def detect_drawn(detections, laws, scan, status, predicted, target, plots, own):
+def detect_drawn(detections, laws, scan, status, predicted, target, course, sigma, own):
     """Set target.detected as each realisation's law has it, and bring the ratios of runs in own up to date.
 
-    Before association: predicted (5, CHUNK) is of this scan. A realisation whose track has ended has no more plots.
+    Before association: predicted (5, CHUNK) is of this scan; plots lie about course with σ (2,) in m and rad. A
+    realisation whose track has ended has no more plots.
     """
     k, certain, detection = scan.k, detections.certain[scan.k], detections.probability
     detected, z, most, free = target.detected, target.z, laws.length.max(), k > laws.young.max()
@@ -328,13 +275,13 @@ def detect_drawn(detections, laws, scan, status, predicted, target, plots, own):
         hit, c = detected[i] > 0.0, 0.0
         if free:
             S = (predicted[2, i], predicted[3, i], predicted[4, i])
-            irr, irb, ibb, _ = inverse_two(S[0], S[1], S[2])
+            irr, irb, ibb, _ = tracker.inverse_two(S[0], S[1], S[2])
             nu = (z[0, i] - predicted[0, i], z[1, i] - predicted[1, i])
-            hit = hit and distance_squared(nu[0], nu[1], (irr, irb, ibb)) <= laws.rule.gate
+            hit = hit and tracker.distance_squared(nu[0], nu[1], (irr, irb, ibb)) <= laws.rule.gate
             if not hit:
-                off_r = plots.course.truth[0, 0] + plots.course.shift[0, 0, i] - predicted[0, i]
-                off_b = plots.course.truth[1, 0] + plots.course.shift[1, 0, i] - predicted[1, i]
-                c = outside((off_r, off_b), S, laws.rule.gate, (plots.sigma[0], plots.sigma[1]))
+                off_r = course.truth[0, 0] + course.shift[0, 0, i] - predicted[0, i]
+                off_b = course.truth[1, 0] + course.shift[1, 0, i] - predicted[1, i]
+                c = outside((off_r, off_b), S, laws.rule.gate, (sigma[0], sigma[1]))
         for j in range(laws.length.size):
             h = undetected_by(laws, j + 1, longest, misses, k, detection)
             factor = (1.0 - h) / detection if hit else (h + (1.0 - h) * c) / (1.0 - detection + detection * c)
@@ -358,23 +305,23 @@ def drawn_false(laws, k, certain, missed, detected, status, own, i):
 
 
 @part
-def associate_young(field, detections, ends, laws, scan, tracks, status, chunk):
+def associate_young(field, detections, keys, laws, scan, tracks, status, target, work, own, counts):
     """Associate a scan's plots with every track, as `tracker.associate`; about young tracks false plots are drawn.
 
-    The ratios of the laws of false plots, the last two, are brought up to date. chunk.own is of this tracker.
+    The ratios of the laws of false plots, the last two, are brought up to date; keys are of those plots.
     """
-    draws, out, rule, tally, own = draws_of(field), chunk.work.association, laws.rule, address(chunk.counts), chunk.own
-    predicted, detected, z, lives = chunk.work.predicted, chunk.detected, chunk.z, address(status)
-    keys, last, missed = (ends.plots[0], ends.plots[1]), own.shape[0] - 1, 1.0 - detections.probability
+    draws, out, rule, tally = tracker.draws_of(field), work.association, laws.rule, address(counts)
+    predicted, detected, z, lives = work.predicted, target.detected, target.z, address(status)
+    last, missed = own.shape[0] - 1, 1.0 - detections.probability
     for i in range(scan.count):
         if status[tracker.STATE, i] == tracker.NONE:
             out[:, i] = 0.0
             if detected[i] > 0.0:
-                begin(tracks, status, i, z, out)
+                tracker.begin(tracks, status, i, z, out)
             continue
         status[tracker.SINCE, i] += scan.dt
         place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
-        gate = gate_of(place, S, tracks.plots[i] > 1.5, rule.speed * status[tracker.SINCE, i])
+        gate = tracker.gate_of(place, S, tracks.plots[i] > 1.5, rule.speed * status[tracker.SINCE, i])
         plot, realisation = (detected[i], z[0, i], z[1, i]), scan.first + i
         if own[BOX, i] > 0.0:
             certain, box, seen = detections.certain[scan.k], box_of(draws.cells, gate, rule.gate), detected[i] > 0.0
@@ -387,8 +334,8 @@ def associate_young(field, detections, ends, laws, scan, tracks, status, chunk):
                 own[last, i] = min(own[last, i] * (eta / plainly if both else (1.0 - eta) / (1.0 - plainly)), LARGEST)
                 own[SEDUCED, i] = 1.0 if both else 0.0
         else:
-            found = associate_track(draws, rule, realisation, scan.k, plot, gate, tally)
-        settle(lives, i, found, address(out))
+            found = tracker.associate_track(draws, rule, realisation, scan.k, plot, gate, tally)
+        tracker.settle(lives, i, found, address(out))
 
 
 # ---- sums -----------------------------------------------------------------------------------------------------------
@@ -409,35 +356,15 @@ def add_ended(limits, n, tracks, status, course, laws, own, ended):
     """
     misses, beyond = limits
     for i in range(n):
-        if status[TRACKS_ENDED, i] > 0.0 and own[ENDED, i] == 0.0:
+        if status[tracker.ENDS, i] > 0.0 and own[ENDED, i] == 0.0:
             own[ENDED, i] = 1.0
-            lost = status[tracker.MISSES, i] < misses and off_target(tracks, course, beyond, i)
+            lost = status[tracker.MISSES, i] < misses and tracker.off_target(tracks, course, beyond, i)
             beside = own[CAME, i] > 0.0 and own[SEDUCED, i] == 0.0
             kind = (LOST if lost else DROPPED) + (DROPPED_AFTER if beside else 0)
-            add_weight(weight_of(laws.shares, own, i), ended, kind)
+            tracker.add_weight(weight_of(laws.shares, own, i), ended, kind)
 
 
 # ---- a block --------------------------------------------------------------------------------------------------------
-@part
-def scan_target(detections, field, trackers, ends, laws, f, scan, chunk):
-    """Process a scan of the target's tracks of tracker f: its plots as drawn, association, update, and the rules."""
-    work, own, counts = chunk.work, chunk.own[f], chunk.counts
-    tracks, status, manoeuvre = tracks_of(work, f), work.status[f], trackers.manoeuvre[f]
-    predict(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, work.predicted)
-    target = Target(chunk.detected, chunk.z, True)
-    stretched(laws, scan.k, scan.count, chunk.measured, chunk.plots.sigma, own, target.z)
-    look(field, laws, scan, tracks, status, work.predicted, own)
-    detect_drawn(detections, laws, scan, status, work.predicted, target, chunk.plots, own)
-    if laws.shares[-1] > 0.0:
-        of_tracker = Chunk(work, own, chunk.measured, chunk.z, chunk.detected, chunk.plots, chunk.kept, counts)
-        associate_young(field, detections, ends, laws, scan, tracks, status, of_tracker)
-    else:
-        associate(field, laws.rule, scan, tracks, status, target, work, counts)
-    joint = trackers.association[f] == PDA
-    update(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, joint, work.association)
-    judge(trackers, f, scan.count, tracks, status, chunk.plots.course, chunk.kept, counts)
-
-
 @kernel
 def simulate_ends(world, detections, field, trackers, ends, work, first, total, sums):
     """Add the weighted ends of the target's first confirmed tracks to sums, an EndSums.
@@ -446,30 +373,40 @@ def simulate_ends(world, detections, field, trackers, ends, work, first, total, 
     """
     F, K = trackers.gate.size, world.dt.size
     plots, shift = np.empty((2, 4, CHUNK)), np.zeros((2, 3, CHUNK))
-    measured, z = np.empty((2, CHUNK)), np.empty((2, CHUNK))
-    own, kept, counts = np.empty((F, RATIO + ends.shares.shape[1] - 1, CHUNK)), np.empty(CHUNK), np.zeros(COUNTS)
-    detected, errors = np.empty(CHUNK), np.empty((ends.young.shape[1], 2, CHUNK))
+    measured, z, detected = np.empty((2, CHUNK)), np.empty((2, CHUNK)), np.empty(CHUNK)
+    own, kept = np.empty((F, RATIO + ends.shares.shape[1] - 1, CHUNK)), np.empty(CHUNK)
+    counts, keys, target = np.zeros(tracker.COUNTS), (ends.plots[0], ends.plots[1]), tracker.Target(detected, z, True)
+    errors = np.empty((ends.young.shape[1], 2, CHUNK))
     for done in range(0, total, CHUNK):
-        reset(work)
+        tracker.reset(work)
         plots[:] = 0.0
         n = min(CHUNK, total - done)
         for f in range(F):
             young_errors(world, ends.young[f], first + done, errors)
             begin_drawn(ends.choice, laws_of(ends, trackers, f), first + done, n, errors, own[f])
         for k in range(K):
-            scan, course = Scan(first + done, n, k, world.dt[k]), Course(world.truth[k], shift)
-            measure_target(world, first + done, k, plots, measured, shift)
-            law_of_plots = Plots(course, world.fresh[k])
-            chunk = Chunk(work, own, measured, z, detected, law_of_plots, kept, counts)
+            scan, course = tracker.Scan(first + done, n, k, world.dt[k]), Course(world.truth[k], shift)
+            tracker.measure_target(world, first + done, k, plots, measured, shift)
+            sigma = world.fresh[k]
             for f in range(F):
-                if trackers.association[f] == KNOWN:
+                if trackers.association[f] == tracker.KNOWN:
                     continue
-                laws = laws_of(ends, trackers, f)
-                scan_target(detections, field, trackers, ends, laws, f, scan, chunk)
+                laws, tracks, status = laws_of(ends, trackers, f), tracker.tracks_of(work, f), work.status[f]
+                motion = trackers.period, trackers.sigma, trackers.manoeuvre[f]
+                tracker.predict(tracks, scan.dt, *motion, work.predicted)
+                stretched(laws, k, n, measured, sigma, own[f], z)
+                look(field, laws, scan, tracks, status, work.predicted, own[f])
+                detect_drawn(detections, laws, scan, status, work.predicted, target, course, sigma, own[f])
+                if laws.shares[-1] > 0.0:
+                    associate_young(field, detections, keys, laws, scan, tracks, status, target, work, own[f], counts)
+                else:
+                    tracker.associate(field, laws.rule, scan, tracks, status, target, work, counts)
+                joint = trackers.association[f] == tracker.PDA
+                tracker.update(tracks, scan.dt, *motion, joint, work.association)
+                tracker.judge(trackers, f, n, tracks, status, course, kept, counts)
                 beyond = (trackers.lost[f] * trackers.sigma[0], trackers.lost[f] * trackers.sigma[1])
-                limits, tracks, status = (trackers.misses[f], beyond), tracks_of(work, f), work.status[f]
-                add_ended(limits, n, tracks, status, course, laws, own[f], sums.ended[f, k])
+                add_ended((trackers.misses[f], beyond), n, tracks, status, course, laws, own[f], sums.ended[f, k])
         for f in range(F):
             for i in range(n):
-                if trackers.association[f] != KNOWN:
-                    add_drawn(weight_of(ends.shares[f], own[f], i), own[f, LAW, i] == 0.0, sums.ended_drawn[f])
+                if trackers.association[f] != tracker.KNOWN:
+                    tracker.add_drawn(weight_of(ends.shares[f], own[f], i), own[f, LAW, i] == 0.0, sums.ended_drawn[f])

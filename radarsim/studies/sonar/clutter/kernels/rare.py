@@ -24,35 +24,6 @@ from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import address
 from radarsim.kernels.random import uniform, uniforms
 from radarsim.studies.sonar.clutter.kernels import tracker
-from radarsim.studies.sonar.clutter.kernels.tracker import (
-    COUNTS,
-    KNOWN,
-    PDA,
-    TURN,
-    Scan,
-    Target,
-    add_drawn,
-    add_scores,
-    add_weight,
-    associate_track,
-    associated,
-    cell_words,
-    draws_of,
-    empty_gate,
-    even_places,
-    gate_of,
-    inverse_two,
-    judge_false,
-    place_in,
-    predict,
-    reset,
-    rule_of,
-    settle,
-    step,
-    tracks_of,
-    update,
-    with_plot,
-)
 from radarsim.studies.sonar.kernels.steps import CHUNK
 
 MOST_MEAN = 16.0  # of a box: where it is larger, false plots are in the gate anyway, and the field is as it is
@@ -109,7 +80,7 @@ def box_of(cells, gate, threshold):
         left, right = -high, high
     else:
         # As in `with_false_plots`: less whole turns from the middle of the sector.
-        b = gate.b - TURN * np.floor((gate.b - b0) / TURN - 0.5 * sector / TURN + 0.5)
+        b = gate.b - tracker.TURN * np.floor((gate.b - b0) / tracker.TURN - 0.5 * sector / tracker.TURN + 0.5)
         left, right = max(-high, b0 - b), min(high, b0 + sector - b)
     deep, broad = max(most - least, 0.0), max(right - left, 0.0)
     return Box(least, deep, left, broad, density * deep * broad)
@@ -129,17 +100,14 @@ def number_when_any(mean, p, v):
 @inline
 def with_drawn_plots(keys, realisation, k, gate, threshold, box, p, h):
     """The plots in a gate of those drawn in its box at scan k, and whether there are any in the box."""
-    gated, (irr, irb, ibb, _) = empty_gate(), inverse_two(gate.S[0], gate.S[1], gate.S[2])
-    u, spare = cell_words(keys[0], keys[1], realisation, k, 0)
+    gated, (irr, irb, ibb, _) = tracker.empty_gate(), tracker.inverse_two(gate.S[0], gate.S[1], gate.S[2])
+    u, spare = tracker.cell_words(keys[0], keys[1], realisation, k, 0)
     some = uniform(u) < h
     if some:
         for n in range(number_when_any(box.mean, p, uniform(u) / h)):
-            word = spare
-            if n % 2 == 1:
-                word, spare = cell_words(keys[0], keys[1], realisation, k, (n + 1) // 2)
-            u_q, u_b = place_in(word)
+            u_q, u_b, spare = tracker.place_in(keys[0], keys[1], realisation, k, n, spare)
             nu_r, nu_b = math.sqrt(2.0 * (box.q + box.dq * u_q)) - gate.r, box.b + box.db * u_b
-            gated = with_plot(gated, nu_r, nu_b, 1.0, (irr, irb, ibb), threshold)
+            gated = tracker.with_plot(gated, nu_r, nu_b, 1.0, (irr, irb, ibb), threshold)
     return gated, some
 
 
@@ -154,9 +122,9 @@ def associate_drawn(keys, rule, place, gate, plot, box, needed, drawn):
     h = max(needed, p)
     gated, some = with_drawn_plots(keys, place[0], place[1], gate, rule.gate, box, p, max(drawn, p))
     if plot[0] > 0.0:
-        irr, irb, ibb, _ = inverse_two(gate.S[0], gate.S[1], gate.S[2])
-        gated = with_plot(gated, plot[1] - gate.r, plot[2] - gate.b, 0.0, (irr, irb, ibb), rule.gate)
-    found = associated(gated, rule, gate.r, gate.S, gate.settled)
+        irr, irb, ibb, _ = tracker.inverse_two(gate.S[0], gate.S[1], gate.S[2])
+        gated = tracker.with_plot(gated, plot[1] - gate.r, plot[2] - gate.b, 0.0, (irr, irb, ibb), rule.gate)
+    found = tracker.associated(gated, rule, gate.r, gate.S, gate.settled)
     return found, h / p if some else (1.0 - h) / (1.0 - p), some
 
 
@@ -166,9 +134,9 @@ def associate_false(field, shift, trackers, f, scan, work, own, counts):
 
     The results go to work.association (6, CHUNK), as those of `tracker.associate`; own (ROWS, CHUNK) has the ratios.
     """
-    draws, out, tally, status = draws_of(field), work.association, address(counts), work.status[f]
-    predicted, plots, rule, m, n = work.predicted, work.plots[f], rule_of(trackers, f), trackers.m[f], trackers.n[f]
-    lives, taken = address(status), address(out)
+    draws, out, tally, status = tracker.draws_of(field), work.association, address(counts), work.status[f]
+    predicted, plots, rule = work.predicted, work.plots[f], tracker.rule_of(trackers, f)
+    lives, taken, m, n = address(status), address(out), trackers.m[f], trackers.n[f]
     keys, most, held_on = (shift.plots[0], shift.plots[1]), trackers.misses[f], shift.shares[2] > 0.0
     for i in range(scan.count):
         if status[tracker.STATE, i] == tracker.NONE:
@@ -176,7 +144,7 @@ def associate_false(field, shift, trackers, f, scan, work, own, counts):
             continue
         status[tracker.SINCE, i] += scan.dt
         place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
-        gate = gate_of(place, S, plots[i] > 1.5, rule.speed * status[tracker.SINCE, i])
+        gate = tracker.gate_of(place, S, plots[i] > 1.5, rule.speed * status[tracker.SINCE, i])
         box, tentative = box_of(draws.cells, gate, rule.gate), status[tracker.STATE, i] == tracker.TENTATIVE
         if (tentative or held_on) and 0.0 < box.mean <= MOST_MEAN:
             rest = (
@@ -189,8 +157,8 @@ def associate_false(field, shift, trackers, f, scan, work, own, counts):
             own[FOUND, i] = min(own[FOUND, i] * (factor if tentative else 1.0), LARGEST)
             own[LONG, i] = min(own[LONG, i] * factor, LARGEST)
         else:
-            found = associate_track(draws, rule, scan.first + i, scan.k, NO_PLOT, gate, tally)
-        settle(lives, i, found, taken)
+            found = tracker.associate_track(draws, rule, scan.first + i, scan.k, NO_PLOT, gate, tally)
+        tracker.settle(lives, i, found, taken)
 
 
 @part
@@ -215,19 +183,19 @@ def add_held(shares, own, state, n, held):
     """Count a scan of the n tracks that are confirmed, by their weights so far; state (CHUNK,)."""
     for i in range(n):
         if state[i] == tracker.CONFIRMED:
-            add_weight(weight_of(shares, own, i), held, int(own[HELD, i]))
+            tracker.add_weight(weight_of(shares, own, i), held, int(own[HELD, i]))
             own[HELD, i] += 1.0
 
 
 @part
 def scan_false(field, shift, trackers, f, scan, work, own, counts):
     """Process scan k > 0 of the tracks of a chunk; returns whether any is left."""
-    tracks, status, manoeuvre = tracks_of(work, f), work.status[f], trackers.manoeuvre[f]
-    predict(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, work.predicted)
+    tracks, status, manoeuvre = tracker.tracks_of(work, f), work.status[f], trackers.manoeuvre[f]
+    tracker.predict(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, work.predicted)
     associate_false(field, shift, trackers, f, scan, work, own, counts)
-    joint = trackers.association[f] == PDA
-    update(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, joint, work.association)
-    return judge_false(trackers, f, scan.count, tracks, status, counts)
+    joint = trackers.association[f] == tracker.PDA
+    tracker.update(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, joint, work.association)
+    return tracker.judge_false(trackers, f, scan.count, tracks, status, counts)
 
 
 @kernel
@@ -236,23 +204,24 @@ def simulate_false(seeds, field, shift, trackers, work, dt, first, total, scores
 
     Arguments as those of `tracker.simulate_false`; scores (F, T + 1).
     """
-    z, detected, counts, own = np.empty((2, CHUNK)), np.ones(CHUNK), np.zeros(COUNTS), np.zeros((ROWS, CHUNK))
+    z, detected, counts, own = np.empty((2, CHUNK)), np.ones(CHUNK), np.zeros(tracker.COUNTS), np.zeros((ROWS, CHUNK))
     for done in range(0, total, CHUNK):
-        reset(work)
+        tracker.reset(work)
         n = min(CHUNK, total - done)
-        even_places(seeds, field, first + done, n, z)
+        tracker.even_places(seeds, field, first + done, n, z)
         for f in range(trackers.gate.size):
-            tracks, status = tracks_of(work, f), work.status[f]
-            if trackers.association[f] == KNOWN:
+            tracks, status = tracker.tracks_of(work, f), work.status[f]
+            if trackers.association[f] == tracker.KNOWN:
                 continue
-            step(trackers, f, field, Scan(first + done, n, 0, dt[0]), tracks, Target(detected, z, True), work, counts)
+            scan, target = tracker.Scan(first + done, n, 0, dt[0]), tracker.Target(detected, z, True)
+            tracker.step(trackers, f, field, scan, tracks, target, work, counts)
             begin_false(shift, first + done, n, status, own)
             for k in range(1, dt.size):
-                scan = Scan(first + done, n, k, dt[k])
+                scan = tracker.Scan(first + done, n, k, dt[k])
                 left = scan_false(field, shift, trackers, f, scan, work, own, counts)
                 add_held(shift.shares, own, status[tracker.STATE], n, sums.held[f])
                 if not left:
                     break
             for i in range(n):
-                add_drawn(weight_of(shift.shares, own, i), own[LAW, i] == 0.0, sums.drawn[f])
-            add_scores(trackers.thresholds, n, status[tracker.FIRST], status[tracker.BEST], scores[f])
+                tracker.add_drawn(weight_of(shift.shares, own, i), own[LAW, i] == 0.0, sums.drawn[f])
+            tracker.add_scores(trackers.thresholds, n, status[tracker.FIRST], status[tracker.BEST], scores[f])

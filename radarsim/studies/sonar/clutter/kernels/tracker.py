@@ -682,9 +682,15 @@ def cell_words(k0, k1, realisation, cell, draw):
 
 
 @inline
-def place_in(word):
-    """Position in a cell, each coordinate from 0 to 1: the two halves of a word."""
-    return np.float64(word >> U(32)) * 2.0**-32 + 2.0**-33, np.float64(word & HALF) * 2.0**-32 + 2.0**-33
+def place_in(k0, k1, realisation, cell, n, spare):
+    """Position of plot n in a cell, each coordinate from 0 to 1, by the halves of a word; and the spare word after it.
+
+    Words come two at a time; the first spare one is that beside the word of the number of plots.
+    """
+    word = spare
+    if n % 2 == 1:
+        word, spare = cell_words(k0, k1, realisation, cell, (n + 1) // 2)
+    return np.float64(word >> U(32)) * 2.0**-32 + 2.0**-33, np.float64(word & HALF) * 2.0**-32 + 2.0**-33, spare
 
 
 @inline
@@ -724,10 +730,7 @@ def with_false_plots(gated, draws, realisation, scan, gate, threshold):
             cell = (scan * nq + i) * nb + column
             u, spare = cell_words(draws.k0, draws.k1, realisation, cell, 0)
             for n in range(number_in(draws.share, uniform(u))):
-                word = spare
-                if n % 2 == 1:
-                    word, spare = cell_words(draws.k0, draws.k1, realisation, cell, (n + 1) // 2)
-                u_q, u_b = place_in(word)
+                u_q, u_b, spare = place_in(draws.k0, draws.k1, realisation, cell, n, spare)
                 q, off = q0 + dq * (i + u_q), b0 + db * (j + u_b) - b
                 if least <= q <= most and abs(off) <= high:  # roots are slow
                     gated = with_plot(gated, math.sqrt(2.0 * q) - r, off, 1.0, (irr, irb, ibb), threshold)
@@ -813,10 +816,7 @@ def whole_field(field, realisation, scan, r, b):
         i, j, number = cell // nb, cell % nb, scan * (nq * nb) + cell
         u, spare = cell_words(k0, k1, realisation, number, 0)
         for n in range(number_in(share, uniform(u))):
-            word = spare
-            if n % 2 == 1:
-                word, spare = cell_words(k0, k1, realisation, number, (n + 1) // 2)
-            u_q, u_b = place_in(word)
+            u_q, u_b, spare = place_in(k0, k1, realisation, number, n, spare)
             if total < r.size:
                 r[total] = math.sqrt(2.0 * (q0 + dq * (i + u_q)))
                 b[total] = b0 + db * (j + u_b)
