@@ -229,22 +229,6 @@ def fill_plots(keys, frame, truth, certain, first, random, plots):
 
 
 # ---- strip -----------------------------------------------------------------------------------------------------------
-class Filter(NamedTuple):
-    """A filter, by addresses."""
-
-    rules: Rules  #: what it is, see `records.Rules`
-    models: np.ndarray  #: (size * 3,): moves, accelerates (0 or 1), sigma of the acceleration per step in m/s²
-    transitions: np.ndarray  #: (U * size * size,): T over each different interval between scans, row by row
-
-
-class Memory(NamedTuple):
-    """A filter's memory, by addresses: rows (WORK,), numbers CURRENT … SETTLED, and room for MOST whole numbers."""
-
-    work: np.ndarray
-    numbers: np.ndarray
-    listed: np.ndarray
-
-
 class Scans(NamedTuple):
     """The scans first … stop - 1 of a strip."""
 
@@ -272,13 +256,12 @@ def prepare_model(work, at, moves, accelerates, sigma, dt):
 
 
 @part
-def prepare_step(work, design, interval, dt, settled):
+def prepare_step(work, size, models, transitions, interval, dt, settled):
     """Models and transition probabilities over the time since each lane's last plot.
 
     interval is the number of the interval dt since the last scan; where plots were missed since then (not settled),
     T(a + b) = T(a) T(b), eq. (8).
     """
-    size, models = design.rules.size, design.models
     first = interval * size * size
     wait = full(dt)
     if not settled:
@@ -289,11 +272,11 @@ def prepare_step(work, design, interval, dt, settled):
         prepare_model(work, rec.MODEL + rec.MODEL_ROWS * i, models[m], models[m + 1], models[m + 2], wait)
     for j in range(size):
         for i in range(size):
-            c = full(design.transitions[first + i * size + j])
+            c = full(transitions[first + i * size + j])
             if not settled:
                 c = full(0.0)
                 for n in range(size):
-                    c = c + design.transitions[first + i * size + n] * get(work, rec.TRANSITION + n * rec.MOST + j)
+                    c = c + transitions[first + i * size + n] * get(work, rec.TRANSITION + n * rec.MOST + j)
             put(work, rec.WEIGHT + i, c)
         for i in range(size):
             put(work, rec.TRANSITION + i * rec.MOST + j, get(work, rec.WEIGHT + i))
@@ -386,18 +369,20 @@ def start_block(work, e, plots, weights):
 
 
 @part
-def run_strip(memory, design, scans, plots, frame, out):
-    """Run one filter over scans; see `Memory`, `Filter`, `Scans`.
+def run_strip(work, numbers, listed, rules, models, transitions, scans, plots, frame, out):
+    """Run one filter over scans, see `Scans`; all by addresses.
 
-    plots: PLOT rows a scan; frame: of the sensor, for the covariance at the prediction; out: OUTPUT rows a scan.
+    work: rows (WORK,); numbers: CURRENT … SETTLED; listed: room for MOST whole numbers; models (size * 3,): moves,
+    accelerates (0 or 1), sigma of the acceleration per step in m/s²; transitions (U * size * size,): T over each
+    different interval between scans, row by row; plots: PLOT rows a scan; frame: of the sensor, for the covariance at
+    the prediction; out: OUTPUT rows a scan.
     """
-    work, numbers, listed = memory.work, memory.numbers, memory.listed
-    rules = design.rules
     for k in range(scans.first, scans.stop):
         plot, interval, to = row(plots, k * rec.PLOT), scans.intervals[k], row(out, k * rec.OUTPUT)
         noise, detected = row(plot, rec.COVARIANCE), get(plot, rec.DETECTED)
         if numbers[rec.PREPARED] != interval or numbers[rec.SETTLED] == 0:
-            prepare_step(work, design, interval, scans.times[interval], numbers[rec.SETTLED] == 1)
+            dt, settled = scans.times[interval], numbers[rec.SETTLED] == 1
+            prepare_step(work, rules.size, models, transitions, interval, dt, settled)
             numbers[rec.PREPARED] = interval
         if rules.at_prediction == 1:
             noise = row(work, rec.NOISE)
@@ -432,10 +417,10 @@ def rules_of(numbers, size):
 @kernel
 def filter_strip(work, numbers, plots, first, stop, models, transitions, intervals, times, rules, frame, reported, out):
     """`run_strip` of arrays."""
-    memory = Memory(address(work), address(numbers), address(np.zeros(rec.MOST, dtype=np.int64)))
-    design = Filter(rules_of(rules, models.size // rec.MODEL_NUMBERS), address(models), address(transitions))
+    memory = address(work), address(numbers), address(np.zeros(rec.MOST, dtype=np.int64))
+    design = rules_of(rules, models.size // rec.MODEL_NUMBERS), address(models), address(transitions)
     scans = Scans(first, stop, address(intervals), address(times), address(reported))
-    run_strip(memory, design, scans, address(plots), address(frame), address(out))
+    run_strip(*memory, *design, scans, address(plots), address(frame), address(out))
 
 
 @kernel
@@ -454,17 +439,8 @@ class SumsMemory(NamedTuple):
     out: np.ndarray  #: OUTPUT rows a filter and scan of a strip
     stages: np.ndarray  #: STAGE rows a filter and stage  #: STAGE rows a filter and stage
     counted: np.ndarray  #: one row  #: one row
-    numbers: np.ndarray  #: (F, 8) whole numbers of each filter, see `Memory`
+    numbers: np.ndarray  #: (F, 8) whole numbers of each filter, see `run_strip`
     listed: np.ndarray  #: (MOST,) likewise
-
-
-class ScanSums(NamedTuple):
-    """The sums of one filter and scan, by addresses: see `records.Sums`."""
-
-    error: np.ndarray
-    paired: np.ndarray
-    probability: np.ndarray
-    believed: np.ndarray
 
 
 def memory(filters: int, stages: int) -> SumsMemory:
@@ -505,25 +481,26 @@ def believed_error(out, e):
 
 @part
 def add_scan(out, base, truth, counted, size, sums):
-    """Add a reported scan of eight realisations to the sums of that filter and scan (`ScanSums`).
+    """Add a reported scan of eight realisations to the sums of that filter and scan.
 
-    out, base: outputs of the filter and of the baseline; truth (9,); size: number of models.
+    sums: error, paired, probability, believed by addresses; out, base: outputs of the filter and of the baseline; truth (9,); size: number of models.
     """
+    error, paired, probability, believed = sums
     for c in range(rec.STATES):
         e, e0 = counted * (get(out, c) - truth[c]), get(base, c) - truth[c]
         e2 = e * e
-        sums.error[4 * c] += total(e)
-        sums.error[4 * c + 1] += total(e2)
-        sums.error[4 * c + 2] += total(e2 * e)
-        sums.error[4 * c + 3] += total(e2 * e2)
-        sums.paired[c] += total(e2 * (e0 * e0))
+        error[4 * c] += total(e)
+        error[4 * c + 1] += total(e2)
+        error[4 * c + 2] += total(e2 * e)
+        error[4 * c + 3] += total(e2 * e2)
+        paired[c] += total(e2 * (e0 * e0))
     for i in range(size):
         p = counted * get(out, rec.MODELS + i)
-        sums.probability[2 * i] += total(p)
-        sums.probability[2 * i + 1] += total(p * p)
+        probability[2 * i] += total(p)
+        probability[2 * i + 1] += total(p * p)
     q = counted * believed_error(out, position_error(out, truth))
-    sums.believed[0] += total(q)
-    sums.believed[1] += total(q * q)
+    believed[0] += total(q)
+    believed[1] += total(q * q)
 
 
 @part
@@ -597,11 +574,11 @@ def simulate_block(world, banks, memory, sums, baseline, first, count):
                 if k == 0:
                     start(work, numbers, size, plots, address(world.weights), row(address(banks.probabilities), f))
                 rules = rules_of(row(address(banks.numbers), f), size)
-                design = Filter(rules, row(address(banks.models), 2 * f), row(address(banks.transitions), padded * f))
+                design = rules, row(address(banks.models), 2 * f), row(address(banks.transitions), padded * f)
                 intervals, reported = address(world.intervals[k:]), address(world.reported[k:])
                 span = Scans(begin, length, intervals, address(world.times), reported)
-                own = Memory(work, numbers, address(memory.listed))
-                run_strip(own, design, span, plots, frame, row(address(memory.out), f * STRIP * rec.OUTPUT))
+                out = row(address(memory.out), f * STRIP * rec.OUTPUT)
+                run_strip(work, numbers, address(memory.listed), *design, span, plots, frame, out)
             add_strip(world, banks, memory, sums, baseline, k, begin, length)
         lengths, counted = address(world.lengths), get(address(memory.counted), 0)
         close_stages(
@@ -623,12 +600,8 @@ def add_strip(world, banks, memory, sums, baseline, k, begin, length):
             add_to_stage(out, row(address(memory.plots), n * rec.PLOT), truth, reported, stage)
             if reported:
                 place = world.place[k + n]
-                places = ScanSums(
-                    address(sums.error[f, place]),
-                    address(sums.paired[f, place]),
-                    address(sums.probability[f, place]),
-                    address(sums.believed[f, place]),
-                )
+                of_filter = address(sums.error[f, place]), address(sums.paired[f, place])
+                places = *of_filter, address(sums.probability[f, place]), address(sums.believed[f, place])
                 add_scan(out, row(base, n * rec.OUTPUT), truth, counted, banks.numbers[f, rec.SIZE], places)
 
 
@@ -647,11 +620,12 @@ def log_likelihood(work, numbers, plots, models, transitions, intervals, times, 
         for i in range(6):
             plots[(k * rec.PLOT + rec.COVARIANCE + i) * WIDTH + 1] *= FACTOR * FACTOR
     listed = np.zeros(rec.MOST, dtype=np.int64)
-    memory = Memory(address(work), address(numbers), address(listed))
-    design = Filter(own, address(models), address(transitions))
+    memory = address(work), address(numbers), address(listed)
     for k in range(n):
         scans = Scans(k, k + 1, address(intervals), address(times), address(reported))
-        run_strip(memory, design, scans, address(plots), address(frame), address(out))
+        run_strip(
+            *memory, own, address(models), address(transitions), scans, address(plots), address(frame), address(out)
+        )
         score[k] = 0.0
         if plots[(k * rec.PLOT + rec.DETECTED) * WIDTH] > 0.5:
             new = numbers[rec.CURRENT] * rec.BANK
