@@ -483,7 +483,8 @@ def believed_error(out, e):
 def add_scan(out, base, truth, counted, size, sums):
     """Add a reported scan of eight realisations to the sums of that filter and scan.
 
-    sums: error, paired, probability, believed by addresses; out, base: outputs of the filter and of the baseline; truth (9,); size: number of models.
+    sums: addresses of error, paired, probability, believed; out, base: outputs of the filter and of the baseline;
+    truth (9,); size: number of models.
     """
     error, paired, probability, believed = sums
     for c in range(rec.STATES):
@@ -620,12 +621,10 @@ def log_likelihood(work, numbers, plots, models, transitions, intervals, times, 
         for i in range(6):
             plots[(k * rec.PLOT + rec.COVARIANCE + i) * WIDTH + 1] *= FACTOR * FACTOR
     listed = np.zeros(rec.MOST, dtype=np.int64)
-    memory = address(work), address(numbers), address(listed)
+    memory, design = (address(work), address(numbers), address(listed)), (own, address(models), address(transitions))
     for k in range(n):
         scans = Scans(k, k + 1, address(intervals), address(times), address(reported))
-        run_strip(
-            *memory, own, address(models), address(transitions), scans, address(plots), address(frame), address(out)
-        )
+        run_strip(*memory, *design, scans, address(plots), address(frame), address(out))
         score[k] = 0.0
         if plots[(k * rec.PLOT + rec.DETECTED) * WIDTH] > 0.5:
             new = numbers[rec.CURRENT] * rec.BANK
