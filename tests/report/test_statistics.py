@@ -22,6 +22,12 @@ def test_by_hand():
     assert of.sigma.value**2 == pytest.approx(of.bias**2 + of.spread**2)
 
 
+def test_mean_by_hand():
+    of = statistics.mean(4.0, 10.0, 2)  # of 1 and 3: the sample deviation √2 over √2 is 1
+    assert (of.value, of.hi - of.value, of.value - of.lo) == (2, statistics.student(1), statistics.student(1))
+    assert tuple(statistics.mean(2.0, 4.0, 1)) == (2, -np.inf, np.inf)
+
+
 def test_student_against_the_library():
     from scipy.special import stdtrit
 
@@ -88,6 +94,13 @@ def test_effective_realisations():
     assert statistics.effective(10.0, 10.0, 10) == np.inf
     assert statistics.effective(1.0, 1.0, 1000) == pytest.approx(1000 / 999)
     assert np.isnan(statistics.effective(0.0, 0.0, 0))
+
+
+def test_a_weighted_share_of_one_has_the_interval_of_the_plain_trials():
+    """Weights may add up to n and more; how often it does not happen, only realisations of the law itself tell."""
+    for total in (1000.0, 1001.0):
+        of = statistics.weighted_rate(total, 2000.0, 1000.0, 100.0)
+        np.testing.assert_array_equal(of, statistics.rate(100.0, 100.0))
 
 
 @pytest.mark.parametrize("n", [1, 3, 100, 106, 109, 315, 1000, 12345])

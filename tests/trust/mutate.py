@@ -23,7 +23,8 @@ from queue import SimpleQueue
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
-TREE = ("radarsim", "tests", "configs", "scenarios", "docs", "pyproject.toml", "Makefile", "README.md", "CHANGELOG.md")
+FOLDERS = ("radarsim", "tests", "configs", "scenarios", "docs", "examples")
+TREE = (*FOLDERS, "pyproject.toml", "Makefile", "README.md", "CHANGELOG.md")
 ROOMS = ("kernels", "exact", "filters", "fisher", "statistics")  # folders and modules that hold formulas
 MACHINERY = ("cache", "compile", "formula", "resolving", "sources", "trees")  # with the kernels: calculates nothing
 OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}
