@@ -159,10 +159,11 @@ class Tests:
         }
 
     def beside(self, path: str) -> list[str]:
-        """The tests in the folder of `tests` that is nearest to a module's, if not all."""
+        """The tests in and under the folder of `tests` that is nearest to a module's, if not all of them or studies."""
         folder = Path("tests", *Path(path).parts[1:-1])
         while folder.parts != ("tests",):
-            if found := sorted((self.root / folder).glob("test_*.py")):
+            pattern = "test_*.py" if folder.parts[-1] == "studies" else "**/test_*.py"
+            if found := sorted((self.root / folder).glob(pattern)):
                 return [str(file.relative_to(self.root)) for file in found]
             folder = folder.parent
         return []

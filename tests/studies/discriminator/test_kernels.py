@@ -9,7 +9,7 @@ from radarsim.bursts.kernels import scoring
 from radarsim.bursts.kernels import sequence as kernels
 from radarsim.bursts.kernels import strip as strips
 from radarsim.kernels import lanes
-from radarsim.kernels.compile import kernel
+from radarsim.kernels.compile import aligned_zeros, kernel, part
 from radarsim.kernels.random import stream
 from radarsim.studies.discriminator.kernels import sums as added
 from tests.studies.discriminator import naive as naive
@@ -326,3 +326,36 @@ def test_amplitude_estimate_and_its_misprint(complex_samples):
     assert printed == pytest.approx(naive.amplitude(burst, u, as_printed=True)) == pytest.approx(measured**2)
     assert measured == pytest.approx(burst.amplitude, rel=0.02)
     assert kernels.estimated_amplitude(physics_of(burst), rows(0 * u), 1) == pytest.approx(1e-3)  # a floor, not a root
+
+
+@part
+def parabolas(physics, work, sums, peaks, window, state):
+    """Puts a likelihood in each lane that falls off with the square of the distance from its peak along x₁."""
+    away = lanes.get(work, laned.X + 1) - lanes.get(lanes.address(peaks), 0)
+    lanes.put(work, laned.VALUE, lanes.full(0.0) - away * away)
+
+
+search_of_parabolas = kernels.searching(parabolas)
+
+
+@kernel
+def search(physics, work, peaks, window, options, needed):
+    at, wanted = lanes.address(work), lanes.get(lanes.address(needed), 0)
+    parabolas(physics, at, needed, peaks, window, needed)
+    search_of_parabolas(physics, 1.0, at, needed, peaks, needed, window, options, wanted)
+
+
+def test_the_search_at_a_hand_over_ends_at_the_best_of_its_points():
+    """Of points −3 … 3 at half a unit, and where it began when that is best, in lanes that need a search only."""
+    burst, options = burst_of(), np.zeros(1, kernels.OPTIONS)[0]
+    options["search"], options["spacing"] = 3, 0.25
+    window = window_of(burst, burst.pulses)
+    window["direction"][1] = 2.0
+    work, peaks, needed = (aligned_zeros(n, lanes.WIDTH) for n in (laned.ROWS, 1, 1))
+    work[laned.X], work[laned.X + 1] = 0.7, 10.0
+    peaks[0] = 10.0 + np.array([-9.0, -1.4, -0.6, 0.1, 0.3, 1.1, 9.0, 9.0])
+    needed[0] = [1, 1, 1, 1, 1, 1, 1, 0]
+    search(physics_of(burst), work, peaks, window, options, needed)
+    assert list(work[laned.X + 1] - 10.0) == [-1.5, -1.5, -0.5, 0.0, 0.5, 1.0, 1.5, 0.0]
+    assert (work[laned.X] == 0.7).all()
+    assert list(work[laned.PASSES]) == [7, 7, 7, 7, 7, 7, 7, 0]  # each point, and the end
