@@ -1,10 +1,11 @@
-"""The table of contents, read off the index: each heading of docs/README.md with the pages that its list links to."""
+"""The table of contents, read off the index and the doors it leads to: the pages that their lists link to."""
 
 import posixpath
 import re
 from pathlib import Path
 
 INDEX = "docs/README"
+DOORS = ("docs/ask", "docs/howto/recordings", "docs/papers", "docs/extend", "docs/reference/README", "docs/ru/README")
 LINK = re.compile(r"^[*-] \[[^\]]+\]\(([^)#\s]+)\.md\)", re.MULTILINE)
 FRONT = """<!doctype html>
 <meta charset="utf-8">
@@ -14,23 +15,17 @@ FRONT = """<!doctype html>
 """
 
 
-def sections(text: str) -> list[tuple[str, list[str]]]:
-    """Headings of the index and the pages that open the items below each, as paths from the repository's root."""
-    found = []
-    for part in re.split(r"^## ", text, flags=re.MULTILINE)[1:]:
-        heading, _, body = part.partition("\n")
-        pages = [posixpath.normpath(posixpath.join(posixpath.dirname(INDEX), link)) for link in LINK.findall(body)]
-        if pages:
-            found.append((heading.strip(), pages))
-    return found
+def listed(name: str, text: str) -> list[str]:
+    """The pages that open the items of a page's lists, from the repository's root; a door is no page of another."""
+    pages = [posixpath.normpath(posixpath.join(posixpath.dirname(name), link)) for link in LINK.findall(text)]
+    return [page for page in pages if name == INDEX or page not in (INDEX, *DOORS)]
 
 
 def add(app, name: str, source: list[str]) -> None:
-    """Add to the index the contents that Sphinx wants; on a file view its lists are enough."""
-    if name == INDEX:
-        for heading, pages in sections(source[0]):
-            entries = "\n".join(f"/{page}" for page in pages)
-            source[0] += f"\n```{{toctree}}\n:hidden:\n:caption: {heading}\n\n{entries}\n```\n"
+    """Add to the index and the doors the contents that Sphinx wants; on a file view their lists are enough."""
+    if name in (INDEX, *DOORS):
+        entries = "\n".join(f"/{page}" for page in listed(name, source[0]))
+        source[0] += f"\n```{{toctree}}\n:hidden:\n\n{entries}\n```\n"
 
 
 def front_page(app, exception) -> None:

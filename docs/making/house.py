@@ -1,4 +1,4 @@
-"""The picture of the rooms and the arrows between them, drawn from the package's own imports.
+"""The picture of the rooms: each imports only rooms of lower rows, or the neighbour that an arrow names.
 
 python -m making.house docs/house.svg          (with PYTHONPATH=docs; `make docs-house`)
 """
@@ -10,8 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[2] / "radarsim"
-# Rooms from left to right, a row each; arrows go from a row to a lower one, or to a neighbour. Every room may use
-# `errors`, which is left out.
+# Rooms from left to right, a row each. Every room may use `errors`, which is left out.
 ROWS = (
     ("cli",),
     ("app", "recorded"),
@@ -42,7 +41,7 @@ ABOUT = {
     "physics": "motion, targets, frames",
     "bursts": "a burst and its estimator",
 }
-WIDTH, ROOM, HEIGHT, GAP, MARGIN = 1290, 196, 44, 62, 12  # px
+WIDTH, ROOM, HEIGHT, GAP, MARGIN, SIDE = 840, 200, 58, 22, 10, 64  # px; SIDE: the column of the long arrow
 
 
 def room_of(module: str) -> str | None:
@@ -96,52 +95,59 @@ def sizes() -> Counter[str]:
     return found
 
 
-def places() -> dict[str, tuple[float, float]]:
-    """The upper left corner of each room's box."""
+def beside() -> list[tuple[str, str]]:
+    """The imports within a row: from a room to its neighbour."""
+    row = {room: i for i, rooms in enumerate(ROWS) for room in rooms}
+    return sorted((a, b) for a, b in arrows() if row[a] == row[b])
+
+
+def places() -> dict[str, tuple[float, float, float]]:
+    """The upper left corner and the width of each room's box."""
     found = {}
     for row, rooms in enumerate(ROWS):
-        free = WIDTH - len(rooms) * ROOM
+        free = WIDTH - SIDE - 2 * MARGIN
+        width = min(ROOM, free / len(rooms) - 8)
         for i, room in enumerate(rooms):
-            found[room] = (free * (i + 1) / (len(rooms) + 1) + i * ROOM, MARGIN + row * (HEIGHT + GAP))
+            middle = SIDE + MARGIN + free * (i + 0.5) / len(rooms)
+            found[room] = (middle - width / 2, MARGIN + row * (HEIGHT + GAP), width)
     return found
 
 
-def line(a: tuple[float, float], b: tuple[float, float], count: int) -> str:
-    """An arrow from a box to another, the wider the more modules stand behind it."""
-    (x, y), (u, v) = a, b
-    width = 0.8 + 0.35 * count**0.5
-    if y == v:  # neighbours
-        x0, x1 = (x + ROOM, u) if u > x else (x, u + ROOM)
-        path = f"M{x0:.0f} {y + HEIGHT / 2:.0f} L{x1:.0f} {v + HEIGHT / 2:.0f}"
-    else:
-        shift = max(-0.38, min(0.38, (u - x) / WIDTH)) * ROOM  # so that arrows leave a box side by side
-        x0, x1 = x + ROOM / 2 + shift, u + ROOM / 2 - shift
-        bend = (v - y - HEIGHT) / 2
-        path = f"M{x0:.0f} {y + HEIGHT:.0f} C{x0:.0f} {y + HEIGHT + bend:.0f} {x1:.0f} {v - bend:.0f} {x1:.0f} {v:.0f}"
-    return f'<path d="{path}" stroke-width="{width:.1f}" marker-end="url(#tip)"/>'
+def line(x: float, y: float, u: float, v: float) -> str:
+    """An arrow between two points."""
+    return f'<path d="M{x:.0f} {y:.0f} L{u:.0f} {v:.0f}" marker-end="url(#tip)"/>'
 
 
 def svg() -> str:
     """The whole picture."""
     at, lines = places(), sizes()
     height = 2 * MARGIN + len(ROWS) * HEIGHT + (len(ROWS) - 1) * GAP
-    drawn = [line(at[a], at[b], count) for (a, b), count in sorted(arrows().items())]
-    boxes = []
-    for room, (x, y) in at.items():
-        title = f"studies/{room}" if room in ROWS[STUDIES] or room in ("registry", "interface") else room
-        boxes.append(f'<rect x="{x:.0f}" y="{y:.0f}" width="{ROOM}" height="{HEIGHT}" rx="4"/>')
-        middle = x + ROOM / 2
-        boxes.append(f'<text x="{middle:.0f}" y="{y + 18:.0f}" class="name">{title}</text>')
-        boxes.append(f'<text x="{middle:.0f}" y="{y + 35:.0f}">{ABOUT[room]} · {lines[room]} lines</text>')
+    bands, boxes = [], []
+    for row in range(len(ROWS)):
+        y = MARGIN + row * (HEIGHT + GAP) - GAP / 4
+        bands.append(
+            f'<rect x="{SIDE}" y="{y:.0f}" width="{WIDTH - SIDE}" height="{HEIGHT + GAP / 2:.0f}" class="band"/>'
+        )
+    for room, (x, y, width) in at.items():
+        title = f"studies/{room}" if room in ("registry", "interface") else room
+        boxes.append(f'<rect x="{x:.0f}" y="{y:.0f}" width="{width:.0f}" height="{HEIGHT}" rx="4"/>')
+        words = ((19, ' class="name"', title), (35, "", ABOUT[room]), (50, "", f"{lines[room]} lines"))
+        boxes += [f'<text x="{x + width / 2:.0f}" y="{y + down:.0f}"{of}>{text}</text>' for down, of, text in words]
+    for a, b in beside():
+        (x, y, width), (u, _, _) = at[a], at[b]
+        boxes.append(line(x + width, y + HEIGHT / 2, u, y + HEIGHT / 2))
+    down = line(SIDE / 2, MARGIN, SIDE / 2, height - MARGIN)
+    turn = f"translate({SIDE / 2 - 8:.0f} {height / 2:.0f}) rotate(-90)"
+    turned = f'<text transform="{turn}">imports only what is below</text>'
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}" '
-        'role="img" aria-label="The rooms of radarsim and which imports which">\n'
-        "<style>rect{fill:#fff;stroke:#335} path{fill:none;stroke:#557;opacity:.55} "
-        "text{font:11px sans-serif;text-anchor:middle;fill:#223} .name{font-weight:bold;font-size:12px}</style>\n"
+        'role="img" aria-label="The rooms of radarsim, each of which imports only rooms below it">\n'
+        "<style>rect{fill:#fff;stroke:#335} .band{fill:#eef1f6;stroke:none} "
+        "path{fill:none;stroke:#335;stroke-width:1.6} text{font:11px sans-serif;text-anchor:middle;fill:#223} .name{font-weight:bold;font-size:12.5px}</style>\n"
         f'<rect width="{WIDTH}" height="{height}" style="stroke:none"/>\n'
         '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="9" markerHeight="9" '
-        'markerUnits="userSpaceOnUse" orient="auto"><path d="M0 0L8 4L0 8z" style="fill:#557;stroke:none"/></marker>'
-        "</defs>\n" + "\n".join([*drawn, *boxes]) + "\n</svg>\n"
+        'markerUnits="userSpaceOnUse" orient="auto"><path d="M0 0L8 4L0 8z" style="fill:#335;stroke:none"/></marker>'
+        "</defs>\n" + "\n".join([*bands, down, turned, *boxes]) + "\n</svg>\n"
     )
 
 

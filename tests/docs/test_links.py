@@ -23,9 +23,9 @@ def test_wrong_links_are_seen(tmp_path):
     assert list(links.broken(page)) == ["c.md: no such file", "a.md#three: no such heading"]
 
 
-def test_every_page_is_in_the_index():
-    index = (ROOT / "docs/README.md").read_text(encoding="utf-8")
-    listed = [page for _, pages in contents.sections(index) for page in pages]
+def test_every_page_is_in_the_index_or_behind_a_door():
+    indexes = {name: (ROOT / f"{name}.md").read_text(encoding="utf-8") for name in (contents.INDEX, *contents.DOORS)}
+    listed = [page for name, text in indexes.items() for page in contents.listed(name, text)]
     there = {page.relative_to(ROOT).with_suffix("").as_posix() for page in PAGES} - {contents.INDEX}
     assert sorted(listed) == sorted(there)
 
@@ -51,3 +51,10 @@ def test_the_picture_of_the_house_has_every_room():
     folders = {path.parent.name for path in house.PACKAGE.glob("*/__init__.py")} - {"studies"}
     assert folders | {path.parent.name for path in house.PACKAGE.glob("studies/*/__init__.py")} <= drawn
     assert 'class="name">cli<' in house.svg()
+
+
+def test_rooms_import_only_what_is_below_or_the_neighbour_that_is_drawn():
+    row = {room: i for i, rooms in enumerate(house.ROWS) for room in rooms}
+    assert not [(a, b) for a, b in house.arrows() if row[b] < row[a]]
+    for a, b in house.beside():
+        assert house.ROWS[row[a]].index(b) == house.ROWS[row[a]].index(a) + 1
