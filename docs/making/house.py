@@ -143,7 +143,8 @@ def svg() -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}" '
         'role="img" aria-label="The rooms of radarsim, each of which imports only rooms below it">\n'
         "<style>rect{fill:#fff;stroke:#335} .band{fill:#eef1f6;stroke:none} "
-        "path{fill:none;stroke:#335;stroke-width:1.6} text{font:11px sans-serif;text-anchor:middle;fill:#223} .name{font-weight:bold;font-size:12.5px}</style>\n"
+        "path{fill:none;stroke:#335;stroke-width:1.6} text{font:11px sans-serif;text-anchor:middle;fill:#223} "
+        ".name{font-weight:bold;font-size:12.5px}</style>\n"
         f'<rect width="{WIDTH}" height="{height}" style="stroke:none"/>\n'
         '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="9" markerHeight="9" '
         'markerUnits="userSpaceOnUse" orient="auto"><path d="M0 0L8 4L0 8z" style="fill:#335;stroke:none"/></marker>'
