@@ -19,6 +19,7 @@ PACKAGE = ROOT / "radarsim"
 TEMPLATE = PACKAGE / "app/template/src"  # a study of a package of its own, to which the rules of studies apply
 
 STUDIES = sorted(path.name for path in (PACKAGE / "studies").iterdir() if (path / "__init__.py").is_file())
+ON_THE_OUTSIDE = "app/one_file", "app/one_step"  # studies in one file, which stand on what all packages may use
 TEMPLATES = sorted(path.name for path in TEMPLATE.iterdir())
 DATA = ("engine.results",)  # the engine's plain data, which studies fill
 CASE = ("config.experiment", "config.fields")
@@ -177,9 +178,7 @@ CHOOSE = {"studies.sonar"}  # where the variants of a study are chosen
 def modules() -> dict[str, Path]:
     """Every module, by its name without `radarsim.`; those of the template by `template.`."""
     found = {named(path.relative_to(PACKAGE)): path for path in sorted(PACKAGE.rglob("*.py"))}
-    apart = tuple(
-        f"{PACKAGE / place}/" for place in ("app/template", "app/one_file")
-    )  # the latter stands on the outside
+    apart = tuple(f"{PACKAGE / place}/" for place in ("app/template", *ON_THE_OUTSIDE))
     found = {name: path for name, path in found.items() if not str(path).startswith(apart)}
     template = {f"template.{named(path.relative_to(TEMPLATE))}": path for path in sorted(TEMPLATE.rglob("*.py"))}
     return found | template
@@ -248,7 +247,7 @@ def test_arrows_point_downwards(module):
 
 def test_every_module_is_looked_at():
     here = {PACKAGE / "__init__.py", *PACKAGE.rglob("*.py")} - set((PACKAGE / "app/template/tests").rglob("*.py"))
-    here -= set((PACKAGE / "app/one_file").rglob("*.py"))
+    here -= {file for place in ON_THE_OUTSIDE for file in (PACKAGE / place).rglob("*.py")}
     assert set(MODULES.values()) == here
     assert {place(module).room for module in MODULES} == {*ROOMS, "studies", "study"}
     assert {place(module).role for module in MODULES if place(module).room == "study"} == set(ROLES)

@@ -7,8 +7,9 @@ name are mostly of one study, and the two would compile its kernels at the same 
 
 `radarsim new-study`: a package with a small whole study, written once and never over anything.
 
-It is a copy of radarsim/app/one_file, or of radarsim/app/template, under another name. These are packages that work as
-they stand: the same linter reads them as all else, and tests run them.
+It is a copy of radarsim/app/one_file, with the files of radarsim/app/one_step in place of its own, or of
+radarsim/app/template, under another name. These are packages that work as they stand: the same linter reads them as all
+else, and tests run them.
 """
 
 import json
@@ -254,14 +255,15 @@ def _stages(done: Sequence[Done]) -> list[str]:
 
 
 # ---- new study -------------------------------------------------------------------------------------------------------
-ONE_FILE, TEMPLATE = (Path(__file__).parent / name for name in ("one_file", "template"))
+ONE_FILE, ONE_STEP, TEMPLATE = (Path(__file__).parent / name for name in ("one_file", "one_step", "template"))
+FORMS = {"linear": (ONE_FILE,), "step": (ONE_FILE, ONE_STEP), "folder": (TEMPLATE,)}  # a later folder's files stand
 MODULE = "random_walk"  # the name that the templates have
 SUFFIXES = (".md", ".py", ".toml", ".yaml")
 PLAIN = re.compile(r"[a-z][a-z0-9_]{0,39}")
 
 
-def new_study(name: str, folder: str | os.PathLike = ".", several: bool = False) -> Path:
-    """Write the package folder/NAME with a study called NAME, in one file or in several; its path.
+def new_study(name: str, folder: str | os.PathLike = ".", form: str = "linear") -> Path:
+    """Write the package folder/NAME with a study called NAME, of one of `FORMS`; its path.
 
     Raises ConfigError for a name that cannot be a new module's, and where there is anything of that name already;
     StoreError where it cannot be written.
@@ -275,9 +277,8 @@ def new_study(name: str, folder: str | os.PathLike = ".", several: bool = False)
         raise ConfigError(f"{path}: is there already and is never overwritten; choose another name") from None
     except OSError as error:
         raise StoreError(f"{path}: cannot be written: {error.strerror}") from error
-    template = TEMPLATE if several else ONE_FILE
-    for file in files(template):
-        _write(path / renamed(file.relative_to(template).as_posix(), name), renamed(file.read_text("utf-8"), name))
+    for place, file in files(form).items():
+        _write(path / renamed(place, name), renamed(file.read_text("utf-8"), name))
     return path
 
 
@@ -294,9 +295,15 @@ def unfit(name: str) -> str | None:
     return None
 
 
-def files(template: Path) -> list[Path]:
-    """The files of a template, in order."""
-    return sorted(file for file in template.rglob("*") if file.suffix in SUFFIXES)
+def files(form: str) -> dict[str, Path]:
+    """The files of a form by their places in the package, in order."""
+    found = {
+        file.relative_to(folder).as_posix(): file
+        for folder in FORMS[form]
+        for file in folder.rglob("*")
+        if file.suffix in SUFFIXES
+    }
+    return dict(sorted(found.items()))
 
 
 def renamed(text: str, name: str) -> str:

@@ -34,19 +34,15 @@ class Asking(click.Command):
 
     @functools.cached_property
     def asking(self) -> dict[str, click.Option]:
-        """Those options, by the quantity's name; what another option has is its name no more."""
+        """Those options, by the quantity's name."""
         from radarsim.studies import registry
 
         measured: dict[str, dict[str, Quantity]] = {}
-        for study, every in registry.parts(lambda one: one.quantities()).items():
+        for study, every in registry.parts(lambda one: tuple(one.quantities())).items():
             for one in every:
                 measured.setdefault(one.name, {})[study] = one
-        taken = {name for param in self.params for name in param.opts}
-        return {
-            name: _option(by_study, len(by_study) == len(registry.names()))
-            for name, by_study in measured.items()
-            if next(iter(by_study.values())).option not in taken
-        }
+        everywhere = len(registry.names())
+        return {name: _option(by_study, len(by_study) == everywhere) for name, by_study in measured.items()}
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         return [*super().get_params(ctx), *self.asking.values()]
@@ -61,11 +57,14 @@ class Asking(click.Command):
 def _option(by_study: "Mapping[str, Quantity]", everywhere: bool) -> click.Option:
     """The option of a quantity, by the studies that measure it."""
     one = next(iter(by_study.values()))
-    metavar = one.per.upper() or "NAME"
-    unit = one.shown_unit() or "in the component's unit"
-    where = "" if everywhere else f" ({', '.join(by_study)})"
+    (metavar, *others) = dict.fromkeys(of.per.upper() or "NAME" for of in by_study.values())
+    metavar = "NAME" if others else metavar
+    studies: dict[str, list[str]] = {}
+    for study, of in by_study.items():
+        studies.setdefault(of.shown_unit() or "in the component's unit", []).append(study)
+    each = [unit if everywhere and len(studies) == 1 else f"{unit} ({', '.join(of)})" for unit, of in studies.items()]
     words = one.words[0].upper() + one.words[1:] if one.words[0].isascii() else one.words
-    text = f"{words}, {unit}{where}."
+    text = f"{words}, {', '.join(each)}."
     return click.Option([one.option, f"{OF}{one.name}"], type=Named(metavar), metavar=metavar, help=text)
 
 

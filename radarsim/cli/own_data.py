@@ -44,14 +44,15 @@ def new(name: str, like: str) -> None:
 
 @main.command(name="new-study")
 @click.argument("name", metavar="NAME")
-@click.option("--folder", "several", is_flag=True, help="A study in a folder of files, for what no base derives.")
-def new_study(name: str, several: bool) -> None:
+@click.option("--step", "form", flag_value="step", help="Of filters that are not linear: the step of one realisation.")
+@click.option("--folder", "form", flag_value="folder", help="A study in a folder of files, for what no base derives.")
+def new_study(name: str, form: str | None) -> None:
     """A package with a small whole study, to be made one's own: ./NAME.
 
     It compares two filters on a random walk: one file with keys, matrices, claims and a reading, from which kernel,
-    exact values, tables, figures and recorded plots follow; a config; a test. With --folder each of these is a file of
-    its own. A comment `Yours: …` says where one's own goes. Installed beside radarsim it is a study like those shipped
-    here. Nothing is ever overwritten.
+    exact values, tables, figures and recorded plots follow; a config; a test. With --step the filters are functions of
+    one plot and need not be linear. With --folder each part is a file of its own. A comment `Yours: …` says where one's
+    own goes. Installed beside radarsim it is a study like those shipped here. Nothing is ever overwritten.
 
     \b
     Example
@@ -62,8 +63,8 @@ def new_study(name: str, several: bool) -> None:
     from radarsim.app.reproduce import new_study as write
     from radarsim.cli import console
 
-    path = write(name, several=several)
-    guide = path / "README.md" if several else path / "src" / name / "__init__.py"
+    path = write(name, form=form or "linear")
+    guide = path / "README.md" if form == "folder" else path / "src" / name / "__init__.py"
     console.field("package", str(path))
     told = {"path": str(path), "name": name, "guide": str(guide)}
     console.field("", tr("`pip install -e {path}`, then `radarsim run {name}`; {guide} says what goes where", **told))

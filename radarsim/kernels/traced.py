@@ -317,7 +317,7 @@ HALF_PI = (1.57079632673412561417, 6.07710050630396597660e-11, 2.022266248795950
 
 
 def sine_cosine(x: Any) -> tuple[Any, Any]:
-    """sin x and cos x; of lanes for |x| to 10⁵, to 2·10⁻¹⁶ of 1."""
+    """sin x and cos x; of lanes for x from -10⁵ to 10⁵, to 2·10⁻¹⁶ of 1."""
     if not isinstance(x, Lane):
         return np.sin(x), np.cos(x)
     from radarsim.kernels.random import sine_cosine_polynomial

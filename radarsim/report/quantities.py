@@ -5,10 +5,12 @@ what `compare` puts side by side, their words, units and axes. `Study.quantities
 are those that several studies measure.
 """
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
+from radarsim.errors import ConfigError
 from radarsim.language import term
 
 if TYPE_CHECKING:
@@ -18,6 +20,11 @@ if TYPE_CHECKING:
     from radarsim.report.statistics import Estimate
 
 Kind = Literal["size", "share", "signed"]
+# The other options of `radarsim solve`.
+TAKEN = frozenset(
+    "--at --at-k --between --case --equals --filter --help --json --language --realisations --seed --set "
+    "--threads".split()
+)
 
 
 @dataclass(frozen=True)
@@ -54,6 +61,13 @@ class Quantity:
     squares: bool = False
     paired: bool = False
     rest: bool = False
+
+    def __post_init__(self) -> None:
+        """Raises ConfigError for a name that no option can have."""
+        if not re.fullmatch("[a-z][a-z0-9_]*", self.name):
+            raise ConfigError(f"quantity {self.name!r}: its name must be of small letters, digits and _")
+        if self.option in TAKEN:
+            raise ConfigError(f"quantity {self.name!r}: {self.option} is another option of `radarsim solve`; rename it")
 
     @property
     def value(self) -> str:

@@ -9,31 +9,32 @@ from radarsim.app import reproduce
 from radarsim.errors import ConfigError, StoreError
 from tests.program import command
 
-LARGE = (reproduce.TEMPLATE, ("--folder",))
 
-
-@pytest.mark.parametrize(("template", "options"), [(reproduce.ONE_FILE, ()), LARGE])
-def test_the_command_writes_a_package_under_its_name(tmp_path, monkeypatch, template, options):
+@pytest.mark.parametrize(("form", "options"), [("linear", ()), ("step", ("--step",)), ("folder", ("--folder",))])
+def test_the_command_writes_a_package_under_its_name(tmp_path, monkeypatch, form, options):
     monkeypatch.chdir(tmp_path)
     assert "pip install -e my_paper" in command("new-study", "my_paper", *options).output
     written = [file for file in sorted((tmp_path / "my_paper").rglob("*")) if file.is_file()]
-    assert len(written) == len(reproduce.files(template))
+    names = [file.relative_to(tmp_path / "my_paper").as_posix() for file in written]
+    assert sorted(names) == sorted(one.replace("random_walk", "my_paper") for one in reproduce.files(form))
     assert (tmp_path / "my_paper/src/my_paper/shipped/configs/my_paper.yaml").is_file()
     text = "".join(file.read_text(encoding="utf-8") for file in written)
     assert "random_walk" not in text
     assert '"my_paper"' in text
 
 
-def test_a_study_in_one_file_is_one_file_with_a_config_and_a_test():
-    files = reproduce.files(reproduce.ONE_FILE)
+@pytest.mark.parametrize("form", ["linear", "step"])
+def test_a_study_in_one_file_is_one_file_with_a_config_and_a_test(form):
+    files = list(reproduce.files(form).values())
     assert [file.suffix for file in files] == [".toml", ".py", ".yaml", ".py"]
     assert len(files[1].read_text(encoding="utf-8").splitlines()) <= 120
 
 
-@pytest.mark.parametrize("template", [reproduce.ONE_FILE, reproduce.TEMPLATE])
-def test_every_file_says_what_goes_there(template):
-    silent = [file.name for file in reproduce.files(template) if "Yours:" not in file.read_text(encoding="utf-8")]
-    assert silent == ["__init__.py", "random_walk_step.yaml"] * (template == reproduce.TEMPLATE)
+@pytest.mark.parametrize("form", reproduce.FORMS)
+def test_every_file_says_what_goes_there(form):
+    every = reproduce.files(form).values()
+    silent = [file.name for file in every if "Yours:" not in file.read_text(encoding="utf-8")]
+    assert silent == ["__init__.py", "random_walk_step.yaml"] * (form == "folder")
 
 
 @pytest.mark.parametrize(

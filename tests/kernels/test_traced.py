@@ -1,7 +1,11 @@
 """Programs of eight: what plain Python does with one number, done with eight; and what it may not do."""
 
+import inspect
 import math
+import operator
+import re
 import traceback
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -149,3 +153,47 @@ def test_what_is_done_twice_stands_once_and_words_change_no_program():
     assert len(program.ops) == 4
     assert program.digest == made(lambda y: (y + 1) * (y + 1)).digest
     assert program.digest != made(lambda x: (x + 1.0) * (x + 1.0000001)).digest
+
+
+# ---- what authors may use, as the how-to has it ----
+PAGE = (Path(__file__).parents[2] / "docs/howto/own_study.md").read_text(encoding="utf-8")
+INNER = {
+    "elimination",
+    "is_number",
+    "leaves",
+    "count",
+    "mapped",
+    "numbered",
+    "power_of_two",
+    "stated",
+}  # of the program
+
+
+OPERATORS = {
+    **{"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv},
+    **{"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq, "!=": operator.ne},
+}
+
+
+def test_the_page_lists_every_function_of_numbers_with_its_docstring():
+    functions = {name: one for name, one in vars(traced).items() if inspect.isfunction(one) and name[0] != "_"}
+    wanted = {}
+    for name, one in functions.items():
+        if one.__module__ == traced.__name__ and name not in INNER:
+            words = " ".join(str(one.__doc__).split("\n\n")[0].split())
+            wanted[name] = f"({', '.join(inspect.signature(one).parameters)})` | {words}"
+    rows = re.findall(r"^\| `(\w+)(\(.*\)` \| .*) \|$", PAGE, re.MULTILINE)
+    assert {name: row for name, row in rows if name in functions} == wanted
+
+
+def test_the_operations_that_the_page_names_are_those_that_lanes_have():
+    (line,) = [one for one in PAGE.splitlines() if one.startswith("On numbers of a realisation work ")]
+    named = set(" ".join(re.findall("`([^`]+)`", line)).split())
+    assert named - {"n"} == {*OPERATORS, "abs", "**", "&", "|", "~"}
+    x, y = Trace().rows(0, (0.0, 0.0))
+    assert all(isinstance(one(x, y), traced.Lane) for one in OPERATORS.values())
+    assert isinstance((x > y) & (x < y) | ~(x == y), traced.Mask)
+    assert isinstance(abs(x) ** 2, traced.Lane)
+    for other in (operator.mod, operator.floordiv, operator.matmul, operator.lshift):
+        with pytest.raises(TypeError):
+            other(x, y)

@@ -185,8 +185,9 @@ def test_its_own_tests_pass(place, radarsim):
     assert "6 passed" in done.stdout
 
 
-def test_what_new_study_writes_in_one_file_passes_its_own_tests(tmp_path):
-    outside.command("new-study", "short", site=tmp_path, cwd=tmp_path)
+@pytest.mark.parametrize("options", [(), ("--step",)], ids=["linear", "step"])
+def test_what_new_study_writes_in_one_file_passes_its_own_tests(tmp_path, options):
+    outside.command("new-study", "short", *options, site=tmp_path, cwd=tmp_path)
     outside.installed(tmp_path / "short", tmp_path / "site")
     ran = {"site": tmp_path / "site", "cwd": tmp_path / "short"}
     assert "2 passed" in outside.command("-q", "-p", "no:cacheprovider", module="pytest", **ran).stdout

@@ -2,12 +2,16 @@
 
 import json
 
+import click
 import pandas as pd
 import pytest
 
 from radarsim.app.quantities import Wanted
 from radarsim.app.solve import solve
+from radarsim.cli import design, main
 from radarsim.errors import ConfigError
+from radarsim.report import quantities
+from radarsim.report.quantities import Quantity
 from radarsim.studies import registry
 from tests.studies import outside
 
@@ -212,3 +216,25 @@ def test_a_study_that_takes_no_spec_is_one_line(monkeypatch):
     monkeypatch.setattr(registry, "package", lambda name: "odd 1.0")
     with pytest.raises(ConfigError, match=r"^study odd: the package odd 1\.0 fails: TypeError: .*quantities"):
         registry.quantities("odd", None)
+
+
+def test_a_name_that_another_option_has_is_refused_where_it_is_declared():
+    command = main.commands["solve"]
+    options = {
+        name
+        for param in click.Command.get_params(command, click.Context(command))
+        for name in param.opts
+        if "--" in name
+    }
+    assert options == quantities.TAKEN
+    with pytest.raises(ConfigError, match="quantity 'at_k': --at-k is another option of `radarsim solve`; rename it"):
+        Quantity("at_k", "rate", "slips", "rate")
+    with pytest.raises(ConfigError, match="quantity 'at first': its name must be of small letters, digits and _"):
+        Quantity("at first", "rate", "slips", "rate")
+
+
+def test_one_name_in_two_units_is_listed_with_both():
+    depth, share = Quantity("slip", "slip", "slips", "slip", unit="m"), Quantity("slip", "slip", "s", "s", kind="share")
+    option = design._option({"one": depth, "other": share, "third": depth}, everywhere=False)
+    assert option.help == "Slip, m (one, third), % (other)."
+    assert design._option({"one": depth}, everywhere=True).help == "Slip, m."
