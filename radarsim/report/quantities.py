@@ -20,11 +20,8 @@ if TYPE_CHECKING:
     from radarsim.report.statistics import Estimate
 
 Kind = Literal["size", "share", "signed"]
-# The other options of `radarsim solve`.
-TAKEN = frozenset(
-    "--at --at-k --between --case --equals --filter --help --json --language --realisations --seed --set "
-    "--threads".split()
-)
+OTHERS = "at", "at-k", "between", "case", "equals", "filter", "help", "json", "language"
+TAKEN = frozenset(f"--{name}" for name in (*OTHERS, "realisations", "seed", "set", "threads"))  # options of `solve`
 
 
 @dataclass(frozen=True)
