@@ -480,7 +480,7 @@ def record(function: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def array_of(function: Callable[..., Any], given: Any, what: str) -> np.ndarray:
-    """An array of the numbers that an author's function gives; ConfigError where they are no such."""
+    """An array (…,) of the numbers that an author's function gives; ConfigError where they are no such."""
     try:
         return np.asarray(given, dtype=float)
     except (TypeError, ValueError):
