@@ -95,7 +95,11 @@ class Cases:
 
     def at(self, key: str, value: float) -> Case:
         """The case with another value at a key. Raises ConfigError where the config refuses it."""
-        return replace(self._chosen((*self.overrides, self._setting(key, value))), noise_of=self.base.spec)
+        setting = self._setting(key, value)
+        try:
+            return replace(self._chosen((*self.overrides, setting)), noise_of=self.base.spec)
+        except ConfigError as error:
+            raise ConfigError(*(_not_by_option(line, setting) for line in error.lines)) from error
 
     def _setting(self, key: str, value: float) -> str:
         """A key's setting; of an item of a list the whole list, which the config may give in degrees or not at all."""
@@ -108,6 +112,20 @@ class Cases:
             return f"{key}={_yaml(value)}"
         values = (value if path == key else own for path, own in items.items())
         return f"{holder}=[{', '.join(_yaml(one) for one in values if one is not None)}]"
+
+
+def _not_by_option(line: str, setting: str) -> str:
+    """A fault of a key's value that nobody gave by --set, without that option.
+
+    >>> _not_by_option("--set filters.0.orders: filters.0.orders.0: must be <= 2, got 3", "filters.0.orders=[3]")
+    'filters.0.orders.0: must be <= 2, got 3'
+    """
+    key = setting.partition("=")[0]
+    option = f"--set {key}: "
+    if not line.startswith(option):
+        return line
+    said = line.removeprefix(option)
+    return said if said.startswith(f"{key}.") else f"{key}: {said}"
 
 
 def _yaml(value: float) -> str:

@@ -309,8 +309,8 @@ class Read:
 class Done:
     """What `readings` made: of each paper asked for, and the files written, by their path under `folder`.
 
-    left has a line for each claim that was to be decided and is not. outdated: the configs beside them whose stored
-    claims have another class.
+    left has a line for each claim that was to be decided and is not. outdated: the configs beside them, run as they
+    are now, whose stored claims have another class.
     """
 
     read: list[Read]
@@ -320,11 +320,11 @@ class Done:
     outdated: tuple[str, ...] = field(default=())
 
 
-def papers() -> dict[str, Paper]:
-    """The papers with readings, by their key (P1)."""
+def papers(keys: Collection[str] = ()) -> dict[str, Paper]:
+    """The papers with readings, by their key (P1); with keys those, and maybe others."""
     found = {}
-    for name, of in registry.parts(lambda study: study.readings()).items():
-        claims = registry.study(name).claims()
+    for name, of in registry.papers(lambda study: study.readings(), keys).items():
+        claims = None if of is None else registry.study(name).claims()
         if of is not None and claims is not None:
             found[of.paper] = Paper(of, claims, name)
     return dict(sorted(found.items()))
@@ -365,11 +365,13 @@ def _closed(paper: Paper, names: Sequence[str]) -> list[str]:
 
 
 def _unknown(name: str, every: Mapping[str, Paper], owner: Mapping[str, str]) -> str:
-    if any(
-        claim.id == name for of in registry.parts(lambda study: study.claims()).values() if of for claim in of.claims
-    ):
+    paper = name.partition(".")[0]
+    judged = {claim.id for of in run.papers([paper]) for claim in of.claims}
+    if paper not in every and any(claim.partition(".")[0] == paper for claim in judged):
+        return f"readings: {name}: its study declares no choices that {paper} leaves open: nothing to read otherwise"
+    if name in judged:
         return f"readings: {name} is an extension, ours, of which no paper leaves anything open"
-    ids = [claim for claim, key in owner.items() if key == name.partition(".")[0]]
+    ids = [claim for claim, key in owner.items() if key == paper]
     allowed = f"its claims: {', '.join(ids)}" if ids else f"papers: {', '.join(every)}; claims as P1.4"
     return f"readings: no paper or claim {name!r}; {allowed}"
 
@@ -515,10 +517,15 @@ def _classes(done: Done) -> str:
 
 
 def _outdated(done: Done) -> tuple[str, ...]:
-    """The configs whose stored claims have another class than their readings gave now."""
+    """The configs whose stored claims have another class than their readings gave now.
+
+    Not those that have changed since they were run: of these no report can be made of what is stored.
+    """
     new = {over.claim.id: over for read in done.read for over in read.over if over.outcome}
     found = []
     for config in dict.fromkeys(over.claim.config for over in new.values()):
+        if not files.is_of(done.folder.parent / config, configs.load(config)):
+            continue
         with suppress(StoreError):  # `radarsim claims` tells of a damaged one
             for row in stored_claims.stored(done.folder.parent / config / "claims.csv") or ():
                 outcome = new[row["claim"]].outcome if row["claim"] in new else None

@@ -60,7 +60,8 @@ def of_other_sources(names: Mapping[str, str]) -> list[str]:
 
     names are those of cases, by identity.
     """
-    found = [one for one in store.settled if one.identity in names]
+    # The last of an identity counts: those before are of folders that gave other bytes, or of another directory.
+    found = {one.identity: one for one in store.settled if one.identity in names}.values()
     store.settled[:] = [one for one in store.settled if one.identity not in names]
     lines = []
     if kept := [one for one in found if one.same]:
@@ -72,8 +73,7 @@ def of_other_sources(names: Mapping[str, str]) -> list[str]:
         if unseen := [one.again for one in kept if one.again < one.stored]:
             line += f". A change in one realisation of {min(unseen) // SURE:,} would have shown, rarer ones may not"
         lines.append(line)
-    same = {one.identity for one in kept}
-    if begun := [one for one in found if one.identity not in same]:
+    if begun := [one for one in found if not one.same]:
         lines.append(
             f"stored blocks of {_listed(begun, names)} were made by other sources that give other bytes, and are not "
             "used; `radarsim clean` removes them"

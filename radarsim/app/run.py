@@ -649,13 +649,22 @@ def draw_claims(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[str])
     files.replace_all(Path(path).parent, {Path(path).name: save(figure, (kind,))[kind]})
 
 
-def papers() -> "list[PaperClaims]":
-    """The claims of every paper, in the order of the studies."""
-    return [of for of in registry.parts(lambda study: study.claims()).values() if of is not None]
+def papers(keys: Collection[str] = ()) -> "list[PaperClaims]":
+    """The claims of every paper, or of those with these keys (P1) and others, in the order of the studies."""
+    return [of for of in registry.papers(lambda study: study.claims(), keys).values() if of is not None]
 
 
 # P1.3 and P4, known or not; a small letter and names joined by commas are taken for what they are meant to be.
 LIKE_A_CLAIM = re.compile(r"P\d+(\.\w+)?|[Pp]\d+(\.[Ee]?\d+\w?)?(,.+)?")
+
+
+def _meant_as_a_claim(name: str) -> bool:
+    """Whether a name is written like a claim or a paper; a claim of a package begins with the key of its paper."""
+    if Path(name).is_file():
+        return False
+    paper, _, number = name.partition(".")
+    own = paper and number and paper in registry.parts(lambda one: one.paper_key()).values()
+    return bool(own or LIKE_A_CLAIM.fullmatch(name))
 
 
 def _unknown_claims(names: Sequence[str], known: Collection[str]) -> list[str]:
@@ -690,12 +699,14 @@ def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, 
     from radarsim.report.claims.judge import listed, unstored
     from radarsim.report.claims.page import with_classes
 
-    every = papers()
-    of = {claim.id: claim.config for paper in every for claim in paper.claims}
-    wanted = [name for name in names if LIKE_A_CLAIM.fullmatch(name) and not Path(name).is_file()]
-    if faults := _unknown_claims(wanted, of):
-        raise ConfigError(*faults)
+    wanted = [name for name in names if _meant_as_a_claim(name)]
+    known = [claim.id for paper in papers(_keys(wanted)) for claim in paper.claims] if wanted else []
+    if _unknown_claims(wanted, known):  # told beside all that there are
+        raise ConfigError(*_unknown_claims(wanted, [claim.id for paper in papers() for claim in paper.claims]))
     asked = load_all([name for name in names if name not in wanted])
+    keys = _keys(wanted) + [registry.study(one.study).paper_key() for one in asked]
+    every = papers(keys)
+    of = {claim.id: claim.config for paper in every for claim in paper.claims}
     shown = [claim for claim in of if not names or claim in wanted or claim.partition(".")[0] in wanted]
     stems = dict.fromkeys([*(one.stem for one in asked), *(of[claim] for claim in shown)])
     held = {stem: rows for stem in stems if (rows := kept.stored(Path(out) / stem / "claims.csv")) is not None}
@@ -705,8 +716,8 @@ def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, 
         if not own and one.cases and (paper := registry.study(one.cases[0].study).claims()) is not None:
             own = unstored(paper, one.cases, shipped, one.stem)
         rows += [row | {"config": one.stem} for row in own]
-    known = {(row["claim"], row["config"]) for row in rows}
+    there = {(row["claim"], row["config"]) for row in rows}
     own = [row for row in listed(every, held) if row["claim"] in shown]
-    rows += [row for row in own if (row["claim"], row["config"]) not in known]
-    open_ = [(paper.readings, paper.claims) for paper in readings.papers().values()]
+    rows += [row for row in own if (row["claim"], row["config"]) not in there]
+    open_ = [(paper.readings, paper.claims) for paper in readings.papers(keys).values()]
     return with_classes(rows, kept.classes_of(open_, Path(out)))

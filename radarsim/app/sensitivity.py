@@ -121,7 +121,7 @@ def sensitivity(
             rows += look.rows(cases.base, key, before, after)
             apart += [key.path] if before is not base else []
         except ConfigError as error:
-            left_out[key.path] = error.lines[0]
+            left_out[key.path] = error.lines[0].removeprefix(f"{key.path}: ")
         if progress is not None:
             progress(n + 1, len(keys), 0)
     effect = {key.path: size(rows, key.path, leading, kinds[0].changes[0]) for key in keys}

@@ -91,9 +91,11 @@ def report_fit(found: "Fit") -> None:
 
 # ---- verdicts --------------------------------------------------------------------------------------------------------
 SHORT = 12  # words of a claim in a list
-NOTHING_RUN = term(
-    "nothing is run here: `make reproduce-figures` runs it all; docs/claims.md, which `make docs` builds, has the "
-    "results at full size"
+MOST_CONFIGS = 6  # that a command names
+NOTHING_RUN = term("nothing is run here: `{command}` runs what they are judged by")
+NOTHING_OF_ALL = term(
+    "nothing is run here: each line names its config; `make reproduce-figures` runs those of the four papers; "
+    "docs/claims.md, which `make docs` builds, has their results at full size"
 )
 
 
@@ -147,7 +149,9 @@ def print_claims(
         say(tr("{stem}: not judged: {names}: {reason}", **told))
     say(page.counted(stated) or tr("no claims are judged by this"))
     if stated and all(row["class"] == NOT_RUN for row in stated):
-        say(tr(NOTHING_RUN))
+        stems = list(dict.fromkeys(str(row["config"]) for row in stated))
+        command = f"radarsim run {shlex.join(stems)}{configs.into(out)}"
+        say(tr(NOTHING_RUN, command=command) if len(stems) <= MOST_CONFIGS else tr(NOTHING_OF_ALL))
     elif any(row["class"] != NOT_RUN and row["claim"] not in detailed for row in stated):
         if names:
             command = f"radarsim claims {shlex.join(names)} --parts{configs.into(out)}"
@@ -216,5 +220,9 @@ def print_readings(done: "Done", detailed: bool) -> None:
         drawn = plural("{count} figure drawn again", "{count} figures drawn again", curves)
         field("table", tr("{file}; curves: {drawn}", file=str(done.folder / "readings.csv"), drawn=drawn))
     if done.outdated:
-        told = {"configs": listed(done.outdated), "command": f"radarsim report {' '.join(done.outdated)}"}
-        field("note", tr("claims and reports of {configs} were written with other classes: `{command}`", **told))
+        command = f"radarsim report {shlex.join(done.outdated)}{configs.into(done.folder.parent)}"
+        told = {"configs": listed(done.outdated), "command": command}
+        words = tr(
+            "claims.csv and report.html of {configs} have the verdicts of before: `{command}` writes these", **told
+        )
+        field("note", words)

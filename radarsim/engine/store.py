@@ -405,11 +405,11 @@ def _gives_the_same(folder: Path, work: Work) -> bool:
     return same
 
 
-def _distinct(looked: Collection[tuple[int, int]]) -> int:
-    """How many realisations some tasks are of, each its first and how many: the end of a run may lie in a task of
+def _distinct(pieces: Collection[tuple[int, int]]) -> int:
+    """How many realisations some pieces are of, each its first and how many: the end of a run may lie in a task of
     a longer one."""
     found = reached = 0
-    for first, count in sorted(looked):
+    for first, count in sorted(pieces):
         found += max(first + count - max(first, reached), 0)
         reached = max(reached, first + count)
     return found
@@ -418,15 +418,15 @@ def _distinct(looked: Collection[tuple[int, int]]) -> int:
 def _marked(folder: Path, work: Work) -> tuple[dict[Node | Partial, str], int]:
     """The marks of a folder, and how many realisations it holds; nothing where its blocks are of another length."""
     marks: dict[Node | Partial, str] = {}
+    held: list[tuple[int, int]] = []
     pieces = [piece for path in folder.iterdir() if (piece := piece_named(path.name)) is not None]
-    stored = sum(work.block << one.level for one in maximal([one for one in pieces if isinstance(one, Node)], 1 << 62))
     for piece in pieces:
         with suppress(OSError, Damage):
             header, values = decoded(content(folder / (piece.name + SUFFIX)))
             if (header.get("block"), values.size) == (work.block, work.size):
                 marks |= marks_in(header)
-                stored = max(stored, piece.realisations(work.block)[1])
-    return marks, stored
+                held.append(piece.realisations(work.block))
+    return marks, _distinct(held)
 
 
 def mark_of(sums: Sums) -> str:

@@ -323,9 +323,14 @@ def replaced(folder: Path, experiment: Experiment) -> list[str]:
     """A warning where a folder holds the results of another config, which has the same name."""
     record = earlier(folder)
     before, now = record.get("config_path"), path_of(experiment)
-    if not isinstance(before, str) or before == now or _asked(record.get("resolved")) == _asked(experiment.resolved):
+    if not isinstance(before, str) or before == now or is_of(folder, experiment):
         return []
     return [f"{folder}: held the results of another config of this name, {before}; they are replaced"]
+
+
+def is_of(folder: Path, experiment: Experiment) -> bool:
+    """Whether a folder holds the results of an experiment, with whatever seed and however many realisations."""
+    return _asked(earlier(folder).get("resolved")) == _asked(experiment.resolved)
 
 
 def path_of(experiment: Experiment) -> str:

@@ -40,7 +40,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, get_args
 
 from radarsim.report.quantities import COMMON, Quantity
-from radarsim.studies.interface import OptionalPart, Paper, Study
+from radarsim.studies.interface import OptionalPart, Paper, Study, paper_in
 
 if TYPE_CHECKING:
     from radarsim.config.fields import Study as Keys
@@ -119,6 +119,11 @@ class StudyFolder(Study):
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
         return getattr(self.file("figures"), "DRAWN_FROM", {})
+
+    def paper_key(self) -> str:
+        (folder,) = import_module(self.package).__path__
+        written = Path(folder) / "claims.yaml"
+        return paper_in(written.read_text(encoding="utf-8")) if written.is_file() else ""
 
     def claims(self) -> "PaperClaims | None":
         if self.paper is None:

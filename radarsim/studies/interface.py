@@ -10,6 +10,7 @@ realisations. Everything else is made of these sums.
 A study whose files have the usual names need not write the class: see `radarsim.studies.folder`.
 """
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -188,6 +189,12 @@ class Paper(NamedTuple):
     held_too: Mapping[str, tuple[str, ...]] = MappingProxyType({})
 
 
+def paper_in(claims: str) -> str:
+    """The key `paper` of a text as claims.yaml, where it stands on a line of its own; else nothing."""
+    found = re.search(r"^paper: *([\w-]+) *$", claims, re.MULTILINE)
+    return found[1] if found else ""
+
+
 Beside = Literal["readings", "recorded", "shipped", "chart", "shortened", "own_filters"]
 Costs = Literal["cost", "seconds_per_update", "seconds_at_most"]
 OptionalPart = Literal["curves", "gains", "inputs", Costs, "warnings", "exact_but_for", "costly", Beside]
@@ -325,6 +332,10 @@ class Study(ABC):
     def claim_faults(self, shipped: "Shipped") -> Sequence[str]:
         """What its claims and readings name and no shipped config has, a line each. `shipped` as of `claims.judged`."""
         return ()
+
+    def paper_key(self) -> str:
+        """What the names of its claims begin with (P1), before they are read. Default: not known, so they are read."""
+        return ""
 
     def claims(self) -> "PaperClaims | None":
         """The paper's claims. Default: none."""

@@ -51,7 +51,7 @@ from radarsim.config.fields import Study as Keys
 from radarsim.errors import ConfigError
 from radarsim.failures import call
 from radarsim.language import Term, few, listed, term, tr
-from radarsim.studies.interface import Likelihood, Paper, RecordedPlots, Study, Tracker, true_column
+from radarsim.studies.interface import Likelihood, Paper, RecordedPlots, Study, Tracker, paper_in, true_column
 
 if TYPE_CHECKING:
     import numpy as np
@@ -332,6 +332,9 @@ class OneFile(Study):
         if keys:
             raise ConfigError(*(f"{self.place}: claims_yaml: choices: sets: there is no key {key}" for key in keys))
         return claims, choices
+
+    def paper_key(self) -> str:
+        return paper_in(self.claims_yaml)
 
     def claims(self) -> "PaperClaims | None":
         if self.paper is None or not self.claims_yaml:

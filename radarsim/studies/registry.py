@@ -8,7 +8,7 @@ A package adds a filter to a study that takes such by an entry point of the grou
 value of `kind:` of a filter in YAML, its target a class of keys, derived from what `Study.own_filters` gives.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from radarsim import failures
+from radarsim.config.document import did_you_mean
 from radarsim.config.experiment import Case
 from radarsim.config.fields import Study as Keys
 from radarsim.config.fields import kinds_of, widened
@@ -127,6 +128,15 @@ def parts(take: Callable[[Study], Part]) -> dict[str, Part]:
     return found
 
 
+def papers(take: Callable[[Study], Part], keys: Collection[str] = ()) -> dict[str, Part]:
+    """The same of the studies whose paper has one of these keys (P1), or is not known before its claims are read."""
+
+    def may_be(one: Study) -> bool:
+        return not keys or one.paper_key() in ("", *keys)
+
+    return parts(lambda one: take(one) if may_be(one) else None)
+
+
 def unusable() -> dict[str, str]:
     """The studies of installed packages that cannot be used, by name, and why."""
     found = {
@@ -182,11 +192,16 @@ def usable() -> tuple[str, ...]:
 
 
 def quantity(name: str, case: Case) -> Quantity:
-    """The quantity of a name that a case measures. Raises ConfigError where there is none such."""
+    """The quantity of a name that a case measures, also in the spelling of its option (`above-oracle`).
+
+    Raises ConfigError where there is none such.
+    """
     measured = {one.name: one for one in quantities(case.study, case.spec)}
-    if name not in measured:
-        raise ConfigError(f"{case.name}: study {case.study} measures no {name!r}, but {', '.join(measured)}")
-    return measured[name]
+    spelt = name if name in measured else name.removeprefix("--").replace("-", "_")
+    if spelt not in measured:
+        near = did_you_mean(spelt, measured)
+        raise ConfigError(f"{case.name}: study {case.study} measures no {name!r}, but {', '.join(measured)}{near}")
+    return measured[spelt]
 
 
 def quantities(name: str, spec: Keys) -> tuple[Quantity, ...]:

@@ -11,6 +11,7 @@ from radarsim.app.configs import load
 from radarsim.app.sensitivity import sensitivity
 from radarsim.errors import ConfigError
 from radarsim.report.quantities import COMMON
+from radarsim.studies import registry
 from tests.program import command
 from tests.studies.range_doppler import impulse
 
@@ -189,3 +190,10 @@ def test_what_is_the_targets_own_says_so():
     assert finding.named(spec, "target.duration_s") == ("target: duration", "", "s")
     assert finding.named(spec, "target.start_s").text == "target: start time"
     assert finding.named(spec, "radar.sigma_range_m").text == "σ of the measured range"
+
+
+def test_a_quantity_is_found_in_the_spelling_of_its_option():
+    (case,) = load("ambiguous_rls2").cases
+    assert {registry.quantity(name, case).name for name in ("above-oracle", "--above-oracle", "above_oracle")} == {
+        "above_oracle"
+    }

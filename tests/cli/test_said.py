@@ -23,6 +23,7 @@ run rls2 --precision 0 => must be a number > 0
 run rls2 --precision -1 => must be a number > 0
 run rls2 --precision nan => must be a number > 0
 run rls2 --precision 101 => ≤ 100
+run ambiguous_rls2 --precision 1 --of above-orcle => right, wrong; did you mean above_oracle?
 run rls2 --precision 1 --of speed => rls2: study range_doppler measures no 'speed', but sigma, gain
 run rls2 --precision 1 -n 1999 => rls2.yaml: realisations: must be at least 2000 for a precision
 run rls2 --of gain => --of says what a precision is of

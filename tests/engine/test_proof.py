@@ -90,6 +90,13 @@ def test_of_what_is_long_as_much_is_computed_again_as_time_allows(tmp_path, sett
     assert 0 < settled[0].again < N
 
 
+def test_no_more_is_computed_again_than_is_stored_where_shares_lie_side_by_side(tmp_path, settled):
+    for part in ((1, 2), (2, 2)):
+        share(of(0), N, part, store=tmp_path)  # whole blocks and the end of a block, without a total
+    assert collect(of(1), N, store=tmp_path).computed == 0
+    assert [(one.again, one.stored) for one in settled] == [(N, N)]
+
+
 def test_of_many_tasks_those_of_the_least_hashes_are_marked_however_they_are_merged(tmp_path, monkeypatch):
     monkeypatch.setattr(store, "MOST_MARKS", 8)
     for part in ((2, 3), (1, 3), (3, 3)):

@@ -3,6 +3,7 @@
 What their code may do wrong is one line, and never the numbers that are computed already.
 """
 
+import hashlib
 import json
 import shutil
 from pathlib import Path
@@ -215,3 +216,35 @@ def test_what_the_compiler_refuses_is_its_reason_and_the_line_that_it_names():
     assert said[1].startswith("TypingError: Unknown attribute 'nothing' of type float64")
     line = int(said[1].rpartition(":")[2].rstrip(")"))
     assert "x.nothing" in Path(__file__).read_text(encoding="utf-8").splitlines()[line - 1]
+
+
+def test_what_a_package_is_told_is_of_its_own_configs_and_of_options_that_were_given(radarsim, tmp_path):
+    said = radarsim("claims", "chirp", "bearings.1", "--out", tmp_path).stdout
+    assert f"nothing is run here: `radarsim run chirp bearings --out {tmp_path}` runs what they are judged by" in said
+    assert "is no claim of bearings; its claims: bearings.1," in radarsim("claims", "bearings.9", code=2).stderr
+    for name in ("bearings", "bearings.1"):
+        words = (
+            f"readings: {name}: its study declares no choices that bearings leaves open: nothing to read otherwise\n"
+        )
+        assert radarsim("readings", name, code=2).stderr == words
+    ask = ("solve", "chirp", "radar.detection_probability", "--sigma", "r", "--filter", "up", "--equals", 27)
+    said = radarsim(*ask, "--between", 2, 4, code=2).stderr
+    assert said == "radar.detection_probability: must be <= 1, got 2\n"
+    said = radarsim("sensitivity", "chirp", "--of", "limit", "--out", tmp_path).stdout
+    assert "left out  radar.detection_probability: must be <= 1, got 1.1" in said
+
+
+def test_claims_and_reports_are_told_to_be_of_before_only_where_they_are_of_the_config_as_it_is(radarsim, tmp_path):
+    radarsim("run", "chirp", "-n", 100, "--no-figures", "--out", tmp_path)
+    table = tmp_path / "chirp/claims.csv"
+    table.write_text(table.read_text().replace("confirmed", "refuted"))
+    record = tmp_path / "chirp/run.json"
+    facts = json.loads(record.read_text())
+    facts["outputs"]["claims.csv"] = hashlib.sha256(table.read_bytes()).hexdigest()
+    record.write_text(json.dumps(facts))
+    readings = ("readings", "chirp.1", "-n", 100, "--no-figures", "--out", tmp_path)
+    words = f"claims.csv and report.html of chirp have the verdicts of before: `radarsim report chirp --out {tmp_path}`"
+    assert words in " ".join(radarsim(*readings).stdout.split())
+    facts["resolved"]["cases"][0]["radar"]["sigma_range_m"] = 51.0  # run before the config was changed
+    record.write_text(json.dumps(facts))
+    assert "verdicts of before" not in " ".join(radarsim(*readings).stdout.split())

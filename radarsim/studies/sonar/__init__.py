@@ -97,6 +97,9 @@ class Sonar(Study):
         answers = (file_of(part, "words").answer(chosen, made) for part, chosen in reversed(by_part(results)))
         return [sentence for answer in answers for sentence in answer]
 
+    def paper_key(self) -> str:
+        return "P3"
+
     def claims(self) -> "PaperClaims":
         from radarsim.report.claims import PaperClaims
         from radarsim.report.claims.over import claims_of
