@@ -128,7 +128,7 @@ def parts(take: Callable[[Study], Part]) -> dict[str, Part]:
     return found
 
 
-def papers(take: Callable[[Study], Part], keys: Collection[str] = ()) -> dict[str, Part]:
+def papers(take: Callable[[Study], Part], keys: Collection[str] = ()) -> dict[str, Part | None]:
     """The same of the studies whose paper has one of these keys (P1), or is not known before its claims are read."""
 
     def may_be(one: Study) -> bool:
