@@ -47,9 +47,9 @@ def spec(*overrides):
     return load("rls2", overrides).cases[0].spec
 
 
-def made(*overrides):
+def made(*overrides, of="rls2"):
     """What tells a case from others, and its noise."""
-    (case,) = load("rls2", overrides).cases
+    case = load(of, overrides).cases[0]
     return identity(case), noise_key(case, "plots").tobytes()
 
 
@@ -62,6 +62,20 @@ def test_labels_and_spelt_out_defaults_change_nothing(override):
 def test_filters_and_scans_change_the_case_but_not_its_noise(override):
     (case, noise), (before, same) = made(override), made()
     assert (case != before, noise == same) == (True, True)
+
+
+@pytest.mark.parametrize(
+    ("of", "known", "world"),
+    [
+        ("ambiguous_prior", "sweep.prior.sigma_velocity_mps=[77]", "radar.repetition_rate_hz=900"),
+        ("discriminator", "estimators.0.lock_probability=0.9", "burst.noise_variance=9"),
+        ("multimodel", "start_acceleration_mps2=10", "sensor.scan_period_s=0.7"),
+        ("sonar_smoothing", "scans=20", "sensor.sigma_range_m=77"),
+    ],
+)
+def test_what_filters_know_is_no_part_of_the_noise_of_any_study(of, known, world):
+    (case, noise), (changed, same), (_, other) = made(of=of), made(known, of=of), made(world, of=of)
+    assert (case != changed, noise == same, noise != other) == (True, True, True)
 
 
 @pytest.mark.parametrize("override", WORLDS)

@@ -8,7 +8,7 @@ import pytest
 from radarsim.engine.run import collect, share
 from radarsim.engine.store import agree, audited, removable
 from tests.engine.fake import NAMES, WORK, Fake, N, contents
-from tests.engine.test_damage import DAMAGE, reforged
+from tests.engine.test_damage import reforged
 
 
 def damage(path, draw):
@@ -37,13 +37,6 @@ def test_a_hundred_of_a_hundred_damaged_blocks_are_found_and_named(tmp_path, blo
         assert [fault.split(":")[0] for fault in faults] == [str(blocks / name)], (kind, name, faults)
         assert contents(blocks) == before
         (blocks / name).write_bytes(good[name])
-
-
-@pytest.mark.parametrize("kind", DAMAGE)
-def test_every_kind_of_damage_is_named(tmp_path, blocks, kind):
-    collect(WORK, N, store=tmp_path)
-    DAMAGE[kind](blocks / "L08-0.sums")
-    assert str(blocks / "L08-0.sums") in audited(blocks, N).faults[0]
 
 
 def test_sums_that_were_forged_with_a_right_checksum_do_not_add_up(tmp_path, blocks):

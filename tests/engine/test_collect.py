@@ -1,19 +1,15 @@
 """The run loop: the same bytes whatever the workers do, stops and faults that lose nothing, memory that stays."""
 
-import pickle
 import random
 import subprocess
 import sys
 import time
-from concurrent.futures import ProcessPoolExecutor
 from itertools import pairwise
-from multiprocessing import get_context
-from queue import Empty, SimpleQueue
 
 import numpy as np
 import pytest
 
-from radarsim.engine.executors import Serial, Threads, attempted
+from radarsim.engine.executors import Serial, Threads
 from radarsim.engine.run import Pace, collect, time_limit
 from radarsim.engine.store import available_cores
 from radarsim.errors import NonFiniteError
@@ -39,33 +35,6 @@ class Shuffled(Serial):
         return [outcome for _ in range(3) for outcome in Serial.finished(self, timeout_s)]
 
 
-class Processes:
-    """Worker processes, behind the interface that further executors will have."""
-
-    workers, depth, shortest_s, longest_s = 2, 4, 1e-3, 0.1
-
-    def __init__(self, pool):
-        self._pool, self._done = pool, SimpleQueue()
-
-    def submit(self, work, piece):
-        self._pool.submit(attempted, work, piece).add_done_callback(self._done.put)
-
-    def finished(self, timeout_s):
-        try:
-            return [self._done.get(timeout=timeout_s).result()]
-        except Empty:
-            return []
-
-    def cancel(self):
-        return 0
-
-    def forget(self):
-        pass
-
-    def close(self):
-        raise AssertionError("whoever hands an executor in closes it")
-
-
 @pytest.mark.parametrize("realisations", [1, 15, 16, 17, 32, 999, 10_000])
 def test_every_number_of_threads_gives_the_bytes_of_the_textbook(realisations):
     expected = textbook(WORK, realisations).tobytes()
@@ -78,13 +47,6 @@ def test_every_number_of_threads_gives_the_bytes_of_the_textbook(realisations):
 @pytest.mark.parametrize("seed", range(10))
 def test_any_order_of_completion_gives_the_same_bytes(seed):
     assert collect(WORK, 5_005, executor=Shuffled(seed)).values.tobytes() == textbook(WORK, 5_005).tobytes()
-
-
-def test_other_processes_give_the_same_bytes():
-    assert len(pickle.dumps(WORK)) < 1000
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        result = collect(WORK, 3_001, executor=Processes(pool))
-    assert result.values.tobytes() == textbook(WORK, 3_001).tobytes()
 
 
 def test_every_block_is_simulated_once_and_whole():
@@ -196,14 +158,6 @@ def test_the_programs_own_mistakes_come_through():
 
     with pytest.raises(KeyError, match="gain"):
         collect(Broken(), 100)
-
-
-def test_ctrl_c_in_somebodys_own_program_comes_through():
-    def stop():
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        collect(WORK, 10**6, stop=stop)
 
 
 def test_what_a_failed_run_left_running_is_no_part_of_the_next():

@@ -16,7 +16,7 @@ from radarsim.engine import store
 from radarsim.engine.blocks import Node
 from radarsim.engine.results import Sums
 from radarsim.engine.run import collect, stored
-from radarsim.engine.store import Store, decoded, encoded
+from radarsim.engine.store import Store, audited, decoded, encoded
 from radarsim.errors import StoreError
 from tests.engine.fake import NAMES, WORK, Fake, N, contents, names, same
 
@@ -63,6 +63,7 @@ def signed(body):
 def test_damage_is_found_named_and_computed_again(tmp_path, blocks, kind, name):
     collect(WORK, N, store=tmp_path)
     DAMAGE[kind](blocks / name)
+    assert str(blocks if kind == "another block" else blocks / name) in audited(blocks, N).faults[0]
     if not name.startswith("T"):
         (blocks / "T5005.sums").unlink()
     result = collect(WORK, N, store=tmp_path)

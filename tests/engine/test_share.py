@@ -53,12 +53,6 @@ def test_a_share_is_stored_without_a_total_and_counted_once(tmp_path):
     assert stored(WORK, N, tmp_path) is None
 
 
-def test_shares_may_write_into_one_store(tmp_path):
-    for number in (3, 1, 2):
-        share(WORK, N, (number, 3), store=tmp_path, threads=2)
-    assert same(stored(WORK, N, tmp_path))
-
-
 def test_a_share_finds_what_a_whole_run_has_stored(tmp_path):
     collect(WORK, N, store=tmp_path)
     assert share(WORK, N, (2, 5), store=tmp_path).computed == 0

@@ -96,15 +96,6 @@ def test_other_identities_and_block_sizes_share_nothing(tmp_path):
     assert len(changed.warnings) > 0
 
 
-def test_a_file_from_another_identitys_folder_is_not_believed(tmp_path, blocks):
-    collect(Fake(identity="cd"), N, store=tmp_path)
-    shutil.copytree(tmp_path / ".blocks" / "cd", blocks)
-    moved = collect(WORK, N, store=tmp_path)
-    assert moved.from_store == 0
-    assert all("identity: expected" in warning for warning in moved.warnings)
-    assert len(moved.warnings) > 0
-
-
 @pytest.mark.parametrize("identity", ["", "../x", "AB", "a/b", "ab\n"])
 def test_an_identity_is_no_path(tmp_path, identity):
     with pytest.raises(ValueError, match="identity"):

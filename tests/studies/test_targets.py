@@ -19,6 +19,7 @@ REFUSED = [
     ("rls2", ["target={kind: polynomial, coefficients: [10e3, -250]}"], rf"{RANGE} 0 m at 40 s, scan 5 of 15"),
     ("rls2", ["target={kind: polynomial, coefficients: [100, -250]}"], rf"{RANGE} -2400 m at 10 s, scan 2 of 15"),
     ("rls2", [OVER], "over the radar"),
+    ("ambiguous_rls4", ["target={kind: polynomial, coefficients: [10e3, -250]}"], rf"{RANGE} 0 m at 40 s, scan 5 of"),
     ("sonar_smoothing", [THROUGH], rf"{NEAR} \S+ m at 10 s, plot 3 of"),
     ("sonar_smoothing", [ACROSS], rf"{NEAR} \S+ m at 10 s, plot 3 of"),
     ("sonar_conversion", [ACROSS], rf"{NEAR} \S+ m at 10 s, plot 3 of"),

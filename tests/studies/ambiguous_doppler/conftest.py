@@ -42,13 +42,24 @@ def made(radar, filters, scans, target=RANDOM, variance=1e-3, seed=1, prior=None
     return Case("case", "case", "ambiguous_doppler", spec, (), 1, seed)
 
 
-def summed(case, n):
-    """The plan and the sums of n realisations."""
-    plan = study.prepare(case)
+def added(plan, n):
+    """Sums of n realisations."""
     values = np.zeros(plan.layout.size)
     for first in range(0, n, plan.block):
         values += study.simulate(plan, first, min(plan.block, n - first))
-    return plan, SimpleNamespace(**plan.layout.unpack(values))
+    return plan.layout.unpack(values)
+
+
+def summed(case, n):
+    """The plan and the sums of n realisations."""
+    plan = study.prepare(case)
+    return plan, SimpleNamespace(**added(plan, n))
+
+
+def config_of(*filters, **keys):
+    """The config of eight scans of RLS 5, as a document, with further keys."""
+    spec = made("RLS 5", filters, 8).spec
+    return {"study": "ambiguous_doppler", "realisations": 10} | spec.model_dump(exclude_none=True) | keys
 
 
 @pytest.fixture(scope="session")

@@ -16,7 +16,7 @@ from radarsim.report import rare as report
 from radarsim.studies.ambiguous_doppler import filters, study
 from radarsim.studies.ambiguous_doppler.kernels import records
 from radarsim.studies.ambiguous_doppler.kernels import sums as kernels
-from tests.studies.ambiguous_doppler.conftest import FIXED, MEMORY, NEAREST, ORACLE, made
+from tests.studies.ambiguous_doppler.conftest import FIXED, MEMORY, NEAREST, ORACLE, added, config_of, made
 
 ALL = MEMORY | {"hypotheses": 3000, "prune_below": 0}
 KNOWN = {"sigma_velocity_mps": 3.0, "sigma_acceleration_mps2": 0.1}
@@ -34,14 +34,6 @@ def reseeded(plan, seed):
     keys = np.stack([stream(seed, str(i)) for i in range(4)])
     mixture = plan.mixture and plan.mixture._replace(key=keys[3])
     return replace(plan, world=plan.world._replace(keys=keys[:3]), mixture=mixture)
-
-
-def added(plan, n):
-    """Sums of n realisations."""
-    values = np.zeros(plan.layout.size)
-    for first in range(0, n, plan.block):
-        values += study.simulate(plan, first, min(plan.block, n - first))
-    return plan.layout.unpack(values)
 
 
 def rate(plan, n, f=0):
@@ -323,9 +315,11 @@ def test_sums_are_those_of_the_weights_and_add_up():
     assert np.array_equal(shared["error"], expected["error"])
 
 
+MISSING = made("RLS 5", [MEMORY], 8, detection_probability=0.9).spec.radar.model_dump(exclude_none=True)
+
+
 def result_of(n, *others, **keys):
-    config = {"study": "ambiguous_doppler"} | made("RLS 5", [MEMORY, *others], 8).spec.model_dump(exclude_none=True)
-    return radarsim.run(config | {"rare": {"filter": "memory"}, "realisations": n} | keys)
+    return radarsim.run(config_of(MEMORY, *others, rare={"filter": "memory"}, realisations=n, **keys))
 
 
 def test_tables_tell_the_rate_and_how_well_it_is_known():
@@ -387,19 +381,13 @@ def test_calibration_and_curves_are_marked_by_their_own_realisations():
         ({"rare": {"filter": "memory", "shift": 3}}, "rare.shift: unknown key"),
         ({"rare": {"filter": "memory"}, "scans": 65}, "rare: needs at most 64 scans, got 65"),
         ({"rare": {}}, "rare.filter: "),
+        ({"rare": {"filter": "memory"}, "radar": MISSING}, "rare: needs every plot"),
     ],
 )
 def test_wrong_values_are_told_by_their_key(keys, words):
-    config = {"study": "ambiguous_doppler"} | made("RLS 5", [MEMORY, ORACLE], 8).spec.model_dump(exclude_none=True)
     with pytest.raises(ConfigError) as error:
-        load(config | {"realisations": 10} | keys)
+        load(config_of(MEMORY, *([] if "radar" in keys else [ORACLE]), **keys))
     assert any(words in line for line in error.value.lines), error.value.lines
-
-
-def test_every_plot_is_needed():
-    config = {"study": "ambiguous_doppler"} | made("RLS 5", [MEMORY], 8).spec.model_dump(exclude_none=True)
-    with pytest.raises(ConfigError, match="rare: needs every plot"):
-        load(config | {"realisations": 10, "rare": {"filter": "memory"}}, ["radar.detection_probability=0.9"])
 
 
 def test_a_filter_that_is_never_wrong_is_refused():

@@ -75,24 +75,10 @@ def test_shortest_window_is_the_printed_one_with_the_printed_estimates():
     assert estimators.energy_ratio(printed, 1.79e-3) == pytest.approx(4.97, abs=0.005)
 
 
-def test_a_prior_adds_information():
-    sigma = np.array([0.1, 1.0, 10.0, 100.0, 1000.0])
-    information = estimators.fisher(PAPER, 5, 0.3)
-    both = estimators.spreads(information + np.diag(sigma**-2))
-    assert np.all(both < np.minimum(estimators.spreads(information), sigma))
-
-
 def test_complex_samples_hold_twice_the_information():
     assert estimators.fisher(replace(PAPER, complex_samples=True), 5, 0.3) == pytest.approx(
         2 * estimators.fisher(PAPER, 5, 0.3)
     )
-
-
-def test_frequency_is_known_best_in_the_middle():
-    covariance = model.balanced_inverse(estimators.fisher(PAPER, 5, 0.3))
-    start, middle = (estimators.derivative_spread(covariance, 0, t) for t in (0.0, 0.15))
-    assert start == pytest.approx(0.4502, abs=1e-4)
-    assert middle < start / 4
 
 
 @pytest.mark.parametrize("theta", [None, THETA])

@@ -196,12 +196,6 @@ def test_plots_of_the_local_frame():
     assert np.isfinite(case.simulate(0, 8)).all()
 
 
-def test_cases_that_differ_in_filters_share_their_noise():
-    one, other = work(), work(filters=FILTERS[:1], start_acceleration_mps2=10, report_every=5)
-    assert np.array_equal(one.plan.world.keys, other.plan.world.keys)
-    assert one.identity != other.identity
-
-
 def test_recorded_flights_are_read_and_their_faults_reported(tmp_path):
     file = tmp_path / "own.csv"
     t = np.arange(0, 60, 0.7)

@@ -118,15 +118,6 @@ def test_mixed_sonars_are_exact():
     assert np.nanmax(np.abs(off)) < BOUND
 
 
-def test_cases_that_differ_in_filters_share_their_plots():
-    few = load(config(filters=FILTERS[:1])).cases[0]
-    many = load(config(scans=20)).cases[0]
-    a, b = STUDY.prepare(few), STUDY.prepare(many)
-    assert (a.world.plots == b.world.plots).all()
-    first = a.layout.unpack(STUDY.simulate(a, 0, 512))["error"][0, :20, 0]
-    assert first == pytest.approx(b.layout.unpack(STUDY.simulate(b, 0, 512))["error"][0, :20, 0], rel=1e-9)
-
-
 def test_conversion_bias_and_its_cure():
     """At 4 degrees and 15 km the plain conversion is 36 m short; the unbiased one is not, nor are its estimates."""
     made = {}
