@@ -42,22 +42,29 @@ def log_likelihood(x, P, F, Q, H, z, variance, there, manoeuvre, share, white, s
     manoeuvre: its variance; share: of outliers; white: 1, or 0 where the errors are states. Out: score (n, m), the
     logarithm of each number's density given those before it, zero where it is not there.
     """
-    d, room, p = x.size, np.zeros_like(P), np.zeros_like(x)
+    room, p = np.zeros_like(P), np.zeros_like(x)
     for k in range(z.shape[0]):
         if k > 0:
             extrapolate(x, P, room, p, F[k], Q[k], manoeuvre)
         for j in range(z.shape[1]):
             score[k, j] = 0.0
             if there[k, j]:
-                e, spread = z[k, j], 0.0
-                for a in range(d):
-                    e -= H[k, j, a] * x[a]
-                    p[a] = 0.0
-                    for b in range(d):
-                        p[a] += P[a, b] * H[k, j, b]
-                for a in range(d):
-                    spread += H[k, j, a] * p[a]
+                e, spread = innovation(x, P, H[k, j], z[k, j], p)
                 score[k, j] = take(x, P, p, e, spread + white * variance[k, j], variance[k, j], share)
+
+
+@kernel
+def innovation(x, P, h, z, p):
+    """The innovation z - h x of a number, and the part h P h' of its variance; p (d,) takes P h'."""
+    e, spread, d = z, 0.0, x.size
+    for a in range(d):
+        e -= h[a] * x[a]
+        p[a] = 0.0
+        for b in range(d):
+            p[a] += P[a, b] * h[b]
+    for a in range(d):
+        spread += h[a] * p[a]
+    return e, spread
 
 
 @kernel

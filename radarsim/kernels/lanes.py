@@ -365,23 +365,59 @@ def emitted(program: traced.Program):
     @intrinsic
     def run(typingctx, arrays):
         def generate(context, builder, sig, args):
-            pointers, made = cgutils.unpack_tuple(builder, args[0]), []
-            for op, *of in program.ops:
-                if op in ("row", "plain"):
-                    made.append(_read(builder, op, pointers[of[0]], of[1]))
-                elif op == "number":
-                    made.append(ir.Constant(VECTOR, [of[0]] * WIDTH))
-                else:
-                    made.append(_operation(builder, op, [made[at] for at in of]))
-            for array, number, at in program.outputs:
-                where = _row_pointer(builder, pointers[array], ir.Constant(ir.IntType(64), number))
-                builder.store(made[at], where).align = 8
+            _run(program, builder, cgutils.unpack_tuple(builder, args[0]))
             return context.get_dummy_value()
 
         return types.none(arrays), generate
 
     run.made_of = program.digest  # what a kernel with it in it is kept by
     return run
+
+
+def emitted_sums(program: traced.Program):
+    """The same of a program with sums: to its arrays and a tuple of lanes it gives the tuple with these added."""
+    kind = types.UniTuple(lanes, len(program.sums))
+
+    @intrinsic
+    def run(typingctx, arrays, sums):
+        def generate(context, builder, sig, args):
+            made = _run(program, builder, cgutils.unpack_tuple(builder, args[0]))
+            held = cgutils.unpack_tuple(builder, args[1])
+            added = [builder.fadd(a, made[at]) for a, at in zip(held, program.sums, strict=True)]
+            return context.make_tuple(builder, kind, added)
+
+        return kind(arrays, kind), generate
+
+    run.made_of = program.digest
+    return run
+
+
+def zeros(count: int):
+    """An intrinsic that gives a tuple of so many lanes of zero."""
+    kind = types.UniTuple(lanes, count)
+
+    @intrinsic
+    def none(typingctx):
+        nothing = ir.Constant(VECTOR, [0.0] * WIDTH)
+        return kind(), lambda context, builder, sig, args: context.make_tuple(builder, kind, [nothing] * count)
+
+    none.made_of = f"zeros {count}"
+    return none
+
+
+def _run(program, builder, pointers):
+    """The results of all operations of a program, whose outputs are written."""
+    made = []
+    for op, *of in program.ops:
+        if op in ("row", "plain"):
+            made.append(_read(builder, op, pointers[of[0]], of[1]))
+        elif op == "number":
+            made.append(ir.Constant(VECTOR, [of[0]] * WIDTH))
+        else:
+            made.append(_operation(builder, op, [made[at] for at in of]))
+    for array, number, at in program.outputs:
+        builder.store(made[at], _row_pointer(builder, pointers[array], ir.Constant(ir.IntType(64), number))).align = 8
+    return made
 
 
 def _read(builder, op, pointer, number):

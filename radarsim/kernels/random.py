@@ -200,3 +200,14 @@ def fill_normal_strip(key, first, pair, a, b):
     for i in range((a.size + LANES) >> (LANE_BITS + 1) << LANE_BITS):
         x[i], y[i] = threefry(start + (U(i) & U(LANES - 1)), call + (U(i) >> U(LANE_BITS)), k0, k1)
     words_to_normals(a, b)
+
+
+@kernel
+def fill_uniform_strip(key, first, pair, a, b):
+    """Uniform numbers in (0, 1) of LANES realisations over several pairs, laid out as `fill_normal_strip` does."""
+    k0, k1, start, call = key[0], key[1], U(first), U(pair)
+    x, y = a.view(np.uint64), b.view(np.uint64)
+    for i in range(a.size):
+        x[i], y[i] = threefry(start + (U(i) & U(LANES - 1)), call + (U(i) >> U(LANE_BITS)), k0, k1)
+    for i in range(a.size):
+        a[i], b[i] = uniform(x[i]), uniform(y[i])

@@ -1,24 +1,47 @@
 """Linear filters of any number of states over many realisations: truth, plots, scans, sums of errors.
 
 The truth is a linear process with noise, so each realisation has its own; a filter may believe another model than the
-true one. Realisations lie in chunks that stay in cache, scans outermost, and a sum of rows is one plain loop over the
-chunk. A plot's numbers have independent errors and are taken in one after the other.
+true one. A plot's numbers have independent errors and are taken in one after the other.
+
+Formulas are recorded from the matrices (`radarsim.kernels.traced`): what is 0 or 1 at all scans stands in them, so that
+a coupling that is not there takes no time; other numbers are read, so that keys change no kernel. Realisations lie in
+eights, some GROUPS of them in a chunk that stays in cache, scans outermost.
 
 Letters as in the book: t truth, x estimate, P its covariance, F transition, Q noise of the process, H row of a number.
 """
 
+from collections.abc import Sequence
+from functools import cache, reduce
+from operator import add
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from radarsim.kernels import algebra
-from radarsim.kernels.compile import aligned_zeros, inline, kernel, part, summing
-from radarsim.kernels.hypotheses import extrapolate
-from radarsim.kernels.lanes import address
-from radarsim.kernels.random import fill_uniform_pairs, fill_words, normal_pair
+from radarsim.kernels.compile import aligned_zeros, kernel, part
+from radarsim.kernels.hypotheses import extrapolate, innovation
+from radarsim.kernels.lanes import (
+    WIDTH,
+    address,
+    emitted,
+    emitted_sums,
+    full,
+    get,
+    put,
+    row,
+    total,
+    where_greater,
+    zeros,
+)
+from radarsim.kernels.random import U, fill_normal_strip, fill_uniform_strip
+from radarsim.kernels.traced import Program, Trace, row_of, where
 
-CHUNK = 512  # realisations; a row is 4 KB
-LOT = 4  # scans whose normals are drawn together, so that no word and no half of a pair is left over
+GROUPS = 32  # eights in a chunk
+STRIP = 16  # scans whose noise is drawn at once
+POWERS = 5  # sums of a component: e, e², e³, e⁴, and e² times the baseline's e²
+# Arrays of a program of the world, of a filter, and of the sums.
+STATE, NUMBERS, FIRST_NORMALS, SECOND_NORMALS, PLOTS = range(5)
+SEEN, THERE = 2, 3
+OWN, TRUTH, COUNTED, BASE = range(4)
 
 
 class Problem(NamedTuple):
@@ -59,389 +82,274 @@ class Problem(NamedTuple):
     baseline: int
 
 
-# ---- sums of rows --------
-# Rows are of one work array, whose address `a` is; a row is counted from its beginning. Coefficients c are read from
-# number `at` on. Arrays in place of addresses would be counted at each of these calls, a third of the time.
-@part
-def combine(a, out, c, at, n, x):
-    """Row `out` = the sum of n coefficients times the rows from x on; zeros that lead cost nothing."""
-    o, j = out * CHUNK, 0
-    while j < n - 1 and c[at + j] == 0.0:
-        j += 1
-    u, p, left = c[at + j], (x + j) * CHUNK, n - j
-    if left >= 3:
-        v, w, q, r = c[at + j + 1], c[at + j + 2], p + CHUNK, p + 2 * CHUNK
-        for i in range(CHUNK):
-            a[o + i] = u * a[p + i] + v * a[q + i] + w * a[r + i]
-    elif left == 2:
-        v, q = c[at + j + 1], p + CHUNK
-        for i in range(CHUNK):
-            a[o + i] = u * a[p + i] + v * a[q + i]
-    else:
-        for i in range(CHUNK):
-            a[o + i] = u * a[p + i]
-    for m in range(j + 3, n):
-        add_scaled(a, out, c[at + m], x + m)
+# ---- formulas --------------------------------------------------------------------------------------------------------
+def table(trace: Trace, *matrices: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+    """Of matrices (m, K, …): each (…) as numbers of a program, and the table (m, K, width) of those that are read."""
+    flat = np.concatenate([one.reshape(*one.shape[:2], -1) for one in matrices], axis=2)
+    first = flat[0, 0]
+    stands = (flat == first).all(axis=(0, 1)) & np.isin(first, (0, 1))
+    read = iter(trace.plain(NUMBERS, (0.0,) * int((~stands).sum())))
+    entries = np.empty(first.size, dtype=object)
+    for i, fixed in enumerate(stands):
+        entries[i] = float(first[i]) if fixed else next(read)
+    ends = np.cumsum([one[0, 0].size for one in matrices])[:-1]
+    shaped = [part.reshape(one.shape[2:]) for part, one in zip(np.split(entries, ends), matrices, strict=True)]
+    return shaped, np.ascontiguousarray(np.concatenate([flat[..., ~stands], 0 * flat[..., :1]], axis=2))
 
 
-@part
-def add_scaled(a, out, c, x):
-    """Row `out` += c times row x."""
-    if c != 0.0:
-        o, p = out * CHUNK, x * CHUNK
-        for i in range(CHUNK):
-            a[o + i] += c * a[p + i]
+def combined(weights: Sequence[Any], x: Sequence[Any], more: Any = 0.0) -> Any:
+    """`more` and a sum of products, without those whose weight is zero in every case."""
+    terms = [one if is_plain(w, 1) else w * one for w, one in zip(weights, x, strict=True) if not is_plain(w, 0)]
+    return reduce(add, terms if is_plain(more, 0) and terms else [more, *terms])
 
 
-# ---- truth and plots --------
-@part
-def fill_normals(key, first, lot, w):
-    """Unit normals w (LOT m, CHUNK) of realisations first, first + 1, … over the scans of a lot, m a scan."""
-    for j in range(0, w.shape[0], 4):
-        a, b, c, d = w[j], w[j + 1], w[j + 2], w[j + 3]
-        x, y = a.view(np.uint64), c.view(np.uint64)
-        fill_words(key, first, lot * (w.shape[0] // 4) + j // 4, x, y)
-        for i in range(CHUNK):
-            a[i], b[i] = normal_pair(x[i])
-        for i in range(CHUNK):
-            c[i], d[i] = normal_pair(y[i])
+def is_plain(number: Any, value: float) -> bool:
+    """Whether a number stands in the formulas, and is this one."""
+    return isinstance(number, float) and number == value
 
 
-@part
-def advance_truth(a, n, r, F, L, old, new, w):
-    """The truth, n rows from `new` on: F times the old one and L (n, r) times the unit normals from row w on."""
-    for j in range(n):
-        combine(a, new + j, F, j * n, n, old)
-        for m in range(r):
-            add_scaled(a, new + j, L[j * r + m], w + m)
+def world(problem: Problem) -> list[tuple[Program, np.ndarray]]:
+    """The programs of truth and plots at the first scan and at others, each with its table (K, width)."""
+    groups, scans, D, n = problem.see.shape
+    r, made = problem.push.shape[1], []
+    for state, noise in ((problem.start, problem.spread), (problem.move, problem.push)):
+        trace = Trace()
+        matrices = [np.broadcast_to(one, (1, scans, *one.shape)) for one in (state, noise)]
+        matrices += [one.swapaxes(0, 1)[None] for one in (problem.see, problem.sigma)]
+        (moved, L, see, sigma), numbers = table(trace, *matrices)
+        w = [trace.rows((FIRST_NORMALS, SECOND_NORMALS)[i % 2], 0.0, i // 2) for i in range(r + D)]
+        t = moved if state is problem.start else [combined(one, trace.rows(STATE, (0.0,) * n)) for one in moved]
+        t = tuple(combined(one, w[:r], before) for one, before in zip(L, t, strict=True))
+        trace.write(STATE, t)
+        for g in range(groups):
+            for d in range(D):
+                trace.write(PLOTS, combined([sigma[g, d]], [w[r + d]], combined(see[g, d], t)), g * D + d)
+        made.append((trace.program(), numbers[0]))
+    return made
 
 
-@part
-def begin_truth(a, n, r, mean, L, new, w):
-    """The truth at the first scan: its mean (n,) and L (n, r) times unit normals."""
-    for j in range(n):
-        o = (new + j) * CHUNK
-        for i in range(CHUNK):
-            a[o + i] = mean[j]
-        for m in range(r):
-            add_scaled(a, new + j, L[j * r + m], w + m)
+def of_filters(problem: Problem, some: np.ndarray, adapts: bool) -> tuple[Program, np.ndarray]:
+    """The program of a scan of some filters (F,), of all the same, and their tables (F, K, width).
+
+    At the first scan the estimates stay as they are before its plot: there F is the unit matrix, and Q zero.
+    """
+    trace, n, scans = Trace(), problem.x.shape[1], problem.H.shape[1]
+    F, Q = (np.repeat(one[some][:, None], scans, axis=1) for one in (problem.F, problem.Q))
+    F[:, 0], Q[:, 0] = np.eye(n), 0.0
+    of_plots = (Q, problem.R[some]) if adapts else (problem.gains[some],)
+    (F, H, *of_plots), numbers = table(trace, F, problem.H[some], *of_plots)
+    x = trace.rows(STATE, (0.0,) * n)
+    x = [combined(one, x) for one in F]
+    there = trace.rows(THERE, 0.0) if problem.probability < 1 else 1.0
+    if adapts:
+        Q, R = of_plots
+        P = trace.rows(STATE, (0.0,) * (n * (n + 1) // 2), n)
+        moved = [[combined(F[i], row_of(P, n, j)) for j in range(n)] for i in range(n)]
+        P = [combined(F[j], moved[i], Q[i, j]) for i in range(n) for j in range(i, n)]
+    for d, h in enumerate(H):
+        e = trace.rows(SEEN, 0.0, d) - combined(h, x)
+        if adapts:
+            g = [combined(h, row_of(P, n, i)) for i in range(n)]
+            share = there / combined(h, g, R[d])
+            x = [a + b * (share * e) for a, b in zip(x, g, strict=True)]
+            P = [row_of(P, n, i)[j] - g[i] * (share * g[j]) for i in range(n) for j in range(i, n)]
+        else:
+            x = [combined([gain], [e * there], a) for a, gain in zip(x, of_plots[0][d], strict=True)]
+    trace.write(STATE, (*x, *P) if adapts else tuple(x))
+    return trace.program(), numbers
 
 
-@part
-def fill_plots(a, n, count, H, at, sigma, t, v, z):
-    """Plots of `count` numbers, the rows from z on, of rows H from number `at` on, with unit normals from row v on."""
-    for d in range(count):
-        combine(a, z + d, H, (at + d) * n, n, t)
-        add_scaled(a, z + d, sigma[at + d], v + d)
+def of_sums(components: int) -> Program:
+    """The program of the sums of the leading components of a filter."""
+    trace = Trace()
+    own, true, base = (trace.rows(array, (0.0,) * components) for array in (OWN, TRUTH, BASE))
+    counts = trace.rows(COUNTED, 0.0) > 0.5
+    for x, t, b in zip(own, true, base, strict=True):
+        e, d = where(counts, x - t, 0.0), b - t
+        trace.add((e, e * e, e * (e * e), (e * e) * (e * e), (e * e) * (d * d)))
+    return trace.program()
 
 
-# ---- filters --------
-@part
-def predict(a, n, F, at, old, x):
-    """Estimates, n rows from x on: F (n, n), from number `at` on, times the old ones."""
-    for j in range(n):
-        combine(a, x + j, F, at + j * n, n, old)
+# ---- kernels ---------------------------------------------------------------------------------------------------------
+class Work(NamedTuple):
+    """Room for a chunk of GROUPS eights: rows are eights of realisations.
 
-
-@part
-def innovate(a, n, z, H, at, x, y):
-    """Row y = row z - h x."""
-    combine(a, y, H, at, n, x)
-    p, q = z * CHUNK, y * CHUNK
-    for i in range(CHUNK):
-        a[q + i] = a[p + i] - a[q + i]
-
-
-@part
-def take(a, n, z, H, gains, at, x, y):
-    """The n estimates from row x on after the number of row z, by its row in H and its gains, from `at` on."""
-    if n == 2:
-        take_two(a, z * CHUNK, (H[at], H[at + 1]), (gains[at], gains[at + 1]), x * CHUNK)
-    elif n == 3:
-        h, g = (H[at], H[at + 1], H[at + 2]), (gains[at], gains[at + 1], gains[at + 2])
-        take_three(a, z * CHUNK, h, g, x * CHUNK)
-    else:
-        innovate(a, n, z, H, at, x, y)
-        for j in range(n):
-            add_scaled(a, x + j, gains[at + j], y)
-
-
-# Of few states in one loop: half of the time of a loop a row.
-@part
-def take_two(a, z, h, g, p):
-    """`take` of two states; z and p are places, not rows."""
-    q = p + CHUNK
-    for i in range(CHUNK):
-        y = a[z + i] - (h[0] * a[p + i] + h[1] * a[q + i])
-        a[p + i], a[q + i] = a[p + i] + y * g[0], a[q + i] + y * g[1]
-
-
-@part
-def take_three(a, z, h, g, p):
-    """`take` of three states; z and p are places, not rows."""
-    q, r = p + CHUNK, p + 2 * CHUNK
-    for i in range(CHUNK):
-        x = a[p + i], a[q + i], a[r + i]
-        a[p + i], a[q + i], a[r + i] = algebra.add_scaled(x, a[z + i] - algebra.dot(h, x), g)
-
-
-@part
-def take_there(a, n, z, H, gains, at, there, x, y):
-    """As `take`, where row `there` has a 1."""
-    innovate(a, n, z, H, at, x, y)
-    p, q = there * CHUNK, y * CHUNK
-    for i in range(CHUNK):
-        a[q + i] *= a[p + i]
-    for j in range(n):
-        add_scaled(a, x + j, gains[at + j], y)
-
-
-@part
-def predict_covariance(a, n, F, Q, at, P, room):
-    """Covariances P, n n rows: F P F' + Q, of matrices from number `at` on; room: n n rows."""
-    for j in range(n):
-        for m in range(n):
-            combine(a, room + j * n + m, F, at + j * n, n, P + m * n)
-    for j in range(n):
-        for m in range(j + 1):
-            combine(a, P + j * n + m, F, at + m * n, n, room + j * n)
-            o, p = (P + j * n + m) * CHUNK, (P + m * n + j) * CHUNK
-            for i in range(CHUNK):
-                a[o + i] += Q[at + j * n + m]
-                a[p + i] = a[o + i]
-
-
-@part
-def take_adapting(a, n, z, H, at, R, there, x, P, y):
-    """As `take_there` with the gains that the covariances from row P on give; after y are n + 1 rows of room."""
-    innovate(a, n, z, H, at, x, y)
-    h, s, there, y = y + 1, (y + n + 1) * CHUNK, there * CHUNK, y * CHUNK
-    for j in range(n):
-        combine(a, h + j, H, at, n, P + j * n)
-    combine(a, h + n, H, at, n, h)
-    for i in range(CHUNK):
-        a[s + i] = a[there + i] / (a[s + i] + R)
-    for j in range(n):
-        p, q = (h + j) * CHUNK, (x + j) * CHUNK
-        for i in range(CHUNK):
-            a[q + i] += a[p + i] * (a[s + i] * a[y + i])
-        for m in range(j + 1):
-            o, u, v = (h + m) * CHUNK, (P + j * n + m) * CHUNK, (P + m * n + j) * CHUNK
-            for i in range(CHUNK):
-                a[u + i] -= a[p + i] * (a[s + i] * a[o + i])
-                a[v + i] = a[u + i]
-
-
-# ---- sums --------
-@summing
-def powers(a, x, t, n):
-    """Sums over the first n realisations of e, e², e³, e⁴ of the errors e of row x, whose truth is row t."""
-    s1 = s2 = s3 = s4 = 0.0
-    for i in range(n):
-        e = a[x * CHUNK + i] - a[t * CHUNK + i]
-        q = e * e
-        s1, s2, s3, s4 = s1 + e, s2 + q, s3 + e * q, s4 + q * q
-    return s1, s2, s3, s4
-
-
-@summing
-def powers_beside(a, x, b, t, n):
-    """The same, and of e² times the squared error of row b."""
-    s1 = s2 = s3 = s4 = s22 = 0.0
-    for i in range(n):
-        e, d = a[x * CHUNK + i] - a[t * CHUNK + i], a[b * CHUNK + i] - a[t * CHUNK + i]
-        q = e * e
-        s1, s2, s3, s4, s22 = s1 + e, s2 + q, s3 + e * q, s4 + q * q, s22 + q * (d * d)
-    return s1, s2, s3, s4, s22
-
-
-@part
-def add_sums(a, states, k, many, baseline, t, error, paired):
-    """Add scan k over the first `many` realisations; states: of a filter; t: the first row of the truth, after them."""
-    filters, components = error.shape[0], error.shape[2]
-    x = t - filters * states
-    for f in range(filters):
-        for c in range(components):
-            own = x + f * states + c
-            if f == baseline:
-                s1, s2, s3, s4 = powers(a, own, t + c, many)
-                s22 = s4
-            else:
-                s1, s2, s3, s4, s22 = powers_beside(a, own, x + baseline * states + c, t + c, many)
-            error[f, k, c, 0] += s1
-            error[f, k, c, 1] += s2
-            error[f, k, c, 2] += s3
-            error[f, k, c, 3] += s4
-            paired[f, k, c] += s22
-
-
-# ---- blocks --------
-class Places(NamedTuple):
-    """The rows of a work array, and what the loops over them count: filters, scans, states, numbers, unit normals.
-
-    Estimates of all filters and then the truth, of one scan and of another; normals of a lot; plots; `there` and the
-    half that is kept of it; an innovation with n + 1 rows of room; covariances, and those of one filter as room.
+    a, b (GROUPS, …)    unit normals of STRIP scans, of each pair the first and the second
+    u, v (GROUPS, …)    uniform numbers in the same way
+    truth, plots, there, counted    n, G D, 1 and 1 rows an eight; there: 1 where there is a plot, else 0; counted: 0
+                                    beyond the block's last realisation
+    states (F, …)       what a filter keeps
     """
 
-    F: int
-    K: int
+    a: np.ndarray
+    b: np.ndarray
+    u: np.ndarray
+    v: np.ndarray
+    truth: np.ndarray
+    plots: np.ndarray
+    there: np.ndarray
+    counted: np.ndarray
+    states: np.ndarray
+
+
+class Shape(NamedTuple):
+    """Rows of an eight: states, unit normals of a scan, plots' numbers; what a filter keeps; numbers of a plot."""
+
     n: int
-    D: int
-    G: int
-    r: int
     normals: int
     plots: int
-    there: int
-    innovation: int
-    P: int
-    end: int
+    kept: int
+    D: int
 
 
-@inline
-def places(filters, problem):
-    """Those of a problem, of so many of its filters."""
-    groups, scans, D, n = problem.see.shape
-    r = problem.push.shape[1]
-    normals = 2 * (filters + 1) * n
-    plots = normals + LOT * (r + D)
-    there = plots + groups * D
-    P = there + 4 + n
-    end = P + (filters + 1 if problem.adapts.any() else 0) * n * n
-    return Places(filters, scans, n, D, groups, r, normals, plots, there, there + 2, P, end)
+def follower(program: Program, sums: Program, shape: Shape):
+    """The part that runs a filter through a scan of a chunk and adds to its sums."""
+    step, judged, nothing, many = emitted(program), emitted_sums(sums), zeros(len(sums.sums)), len(sums.sums)
+    n, _, plots, kept, _ = shape
+
+    @part
+    def follow(groups, own, base, numbers, seen, there, truth, counted, held):
+        found = nothing()
+        for g in range(groups):
+            state = row(own, g * kept)
+            step((state, numbers, row(seen, g * plots), row(there, g)))
+            found = judged((state, row(truth, g * n), row(counted, g), row(base, g * kept)), found)
+        for i in range(many):
+            held[i] += total(found[i])
+
+    return follow
 
 
-class Addresses(NamedTuple):
-    """Where the arrays of a problem are, without counting references to them."""
+@cache
+def kernels(begin: Program, move: Program, fixed: Program, own: Program, sums: Program, shape: Shape):
+    """The kernels that add a block to sums and that draw one realisation."""
+    opening, moving = emitted(begin), emitted(move)
+    follow_fixed, follow_own = follower(fixed, sums, shape), follower(own, sums, shape)
+    n, normals, plots_rows, kept, D = shape
 
-    move: Any
-    push: Any
-    start: Any
-    spread: Any
-    see: Any
-    sigma: Any
-    sees: Any
-    F: Any
-    H: Any
-    gains: Any
-    adapts: Any
-    Q: Any
-    R: Any
+    @part
+    def draw(k, scans, groups, keys, first, probability, at_first, numbers, work):
+        """Truth and plots of scan k."""
+        at, strip = k % STRIP * normals, (STRIP * normals + 1) >> 1
+        if k % STRIP == 0:
+            pairs = (min(STRIP, scans - k) * normals + 1) >> 1
+            halves = (min(STRIP, scans - k) + 1) >> 1
+            for g in range(groups):
+                start = first + g * WIDTH
+                fill_normal_strip(
+                    keys[0], start, U(k * normals >> 1), work.a[g, : pairs * WIDTH], work.b[g, : pairs * WIDTH]
+                )
+                if probability < 1.0:
+                    fill_uniform_strip(
+                        keys[1], start, U(k >> 1), work.u[g, : halves * WIDTH], work.v[g, : halves * WIDTH]
+                    )
+        a, b = address(work.a), address(work.b)
+        uniform = address(work.v) if k & 1 else address(work.u)
+        truth, plots = address(work.truth), address(work.plots)
+        for g in range(groups):
+            one = g * strip + (at >> 1)
+            state, to = row(truth, g * n), row(plots, g * plots_rows)
+            # Of an odd number of normals a scan, every other one begins with the second of a pair.
+            first_normals, second_normals = (row(b, one), row(a, one + 1)) if at & 1 else (row(a, one), row(b, one))
+            if k == 0:
+                opening((state, address(at_first), first_normals, second_normals, to))
+            else:
+                moving((state, address(numbers), first_normals, second_normals, to))
+            if probability < 1.0:
+                drawn = get(uniform, g * (STRIP >> 1) + (k % STRIP >> 1))
+                put(address(work.there), g, where_greater(full(probability), drawn, full(1.0), full(0.0)))
 
+    @kernel
+    def simulate(keys, first, count, probability, at_first, moves, numbers, which, starts, work, held):
+        scans = numbers.shape[1]
+        truth, plots, there, counted = address(work.truth), address(work.plots), address(work.there), work.counted
+        for done in range(0, count, GROUPS * WIDTH):
+            groups = min(GROUPS, (count - done + WIDTH - 1) // WIDTH)
+            for i in range(groups * WIDTH):
+                counted[i] = 1.0 if done + i < count else 0.0
+            for f in range(numbers.shape[0]):
+                for i in range(groups * kept):
+                    put(address(work.states[f]), i, full(starts[f, i % kept]))
+            for k in range(scans):
+                draw(k, scans, groups, keys, first + done, probability, at_first, moves[k], work)
+                for f, sees, adapts in which:
+                    own, base, of = address(work.states[f]), address(work.states[which[0, 0]]), address(numbers[f, k])
+                    to, seen = address(held[f, k]), row(plots, sees * D)
+                    if adapts:
+                        follow_own(groups, own, base, of, seen, there, truth, address(counted), to)
+                    else:
+                        follow_fixed(groups, own, base, of, seen, there, truth, address(counted), to)
 
-@inline
-def addresses(problem):
-    """Those of a problem, which must outlive their use."""
-    return Addresses(
-        address(problem.move),
-        address(problem.push),
-        address(problem.start),
-        address(problem.spread),
-        address(problem.see),
-        address(problem.sigma),
-        address(problem.sees),
-        address(problem.F),
-        address(problem.H),
-        address(problem.gains),
-        address(problem.adapts),
-        address(problem.Q),
-        address(problem.R),
-    )
+    @kernel
+    def realisation(keys, number, probability, at_first, moves, work, truth, plots):
+        for k in range(truth.shape[0]):
+            draw(k, truth.shape[0], 1, keys, number, probability, at_first, moves[k], work)
+            for i in range(n):
+                truth[k, i] = work.truth[i * WIDTH]
+            for i in range(plots_rows):
+                plots[k, i] = work.plots[i * WIDTH] if work.there[0] > 0.0 else np.nan
 
-
-@part
-def advance_world(a, k, of, at, old, new):
-    """The truth, n rows from `new` on, and the plots of scan k."""
-    own = at.normals + k % LOT * (at.r + at.D)
-    if k == 0:
-        begin_truth(a, at.n, at.r, of.start, of.spread, new, own)
-    else:
-        advance_truth(a, at.n, at.r, of.move, of.push, old, new, own)
-    for g in range(at.G):
-        fill_plots(a, at.n, at.D, of.see, (g * at.K + k) * at.D, of.sigma, new, own + at.r, at.plots + g * at.D)
-
-
-@part
-def advance_filter(a, f, k, of, at, missing, same, old, x):
-    """The estimates of filter f, n rows from x on, after scan k; missing: whether plots are; same: the unit matrix."""
-    n, first, matrix, z = at.n, (f * at.K + k) * at.D, f * at.n * at.n, at.plots + of.sees[f] * at.D
-    predict(a, n, of.F if k else same, matrix if k else 0, old, x)
-    if of.adapts[f] and k:
-        predict_covariance(a, n, of.F, of.Q, matrix, at.P + matrix, at.P + at.F * n * n)
-    for d in range(at.D):
-        number, row = first + d, (first + d) * n
-        if of.adapts[f]:
-            R = of.R[number]
-            take_adapting(a, n, z + d, of.H, row, R, at.there, x, at.P + matrix, at.innovation)
-        elif missing:
-            take_there(a, n, z + d, of.H, of.gains, row, at.there, x, at.innovation)
-        else:
-            take(a, n, z + d, of.H, of.gains, row, x, at.innovation)
-
-
-@part
-def fill_there(k, key, probability, first, there, other):
-    """there (CHUNK,): 1 where a realisation has a plot at scan k, else 0; scans in their order, other keeps a half."""
-    if k % 2 == 0:
-        fill_uniform_pairs(key, first, k // 2, there, other)
-    else:
-        there[:] = other
-    for i in range(CHUNK):
-        there[i] = 1.0 if there[i] < probability else 0.0
+    return simulate, realisation
 
 
-@part
-def start(work, at, problem):
-    """Every filter's estimates before the first scan, and covariances of those that adapt."""
-    n = at.n
-    for f in range(at.F):
-        for j in range(n):
-            work[(at.F + 1 + f) * n + j] = problem.x[f, j]
-            for m in range(n if problem.adapts[f] else 0):
-                work[at.P + (f * n + j) * n + m] = problem.P[f, j, m]
+class Simulator:
+    """A problem with its formulas and their tables."""
+
+    def __init__(self, problem: Problem, components: int):
+        self.problem, self.components = problem, components
+        groups, scans, D, n = problem.see.shape
+        filters, own = len(problem.x), problem.adapts.astype(bool)
+        kept = n + n * (n + 1) // 2 if own.any() else n
+        self.shape = Shape(n, problem.push.shape[1] + D, groups * D, kept, D)
+        (begin, at_first), (move, self.moves) = world(problem)
+        self.at_first, self.keys = at_first[0], np.stack([problem.key, problem.detections])
+        programs = {adapts: of_filters(problem, own == adapts, adapts) for adapts in (False, True) if adapts in own}
+        self.numbers = np.zeros((filters, scans, max(numbers.shape[2] for _, numbers in programs.values())))
+        for adapts, (_, numbers) in programs.items():
+            self.numbers[own == adapts, :, : numbers.shape[2]] = numbers
+        self.which = np.array(sorted(zip(range(filters), problem.sees, own, strict=True), key=self._last), dtype=int)
+        P = problem.P[(slice(None), *np.triu_indices(n))]
+        self.starts = np.concatenate([problem.x, P], axis=1)[:, :kept].copy()
+        fixed, adapting = (programs.get(one, next(iter(programs.values())))[0] for one in (False, True))
+        self.block, self.draw = kernels(begin, move, fixed, adapting, of_sums(components), self.shape)
+
+    def _last(self, one: tuple) -> bool:
+        return one[0] != self.problem.baseline
+
+    def _work(self) -> Work:
+        n, normals, plots, kept, _ = self.shape
+        strip, rows = (STRIP * normals + 1) // 2, (n, plots, 1, 1)
+        made = Work(
+            *(aligned_zeros(GROUPS, many * WIDTH) for many in (strip, strip, STRIP // 2, STRIP // 2)),
+            *(aligned_zeros(GROUPS * many * WIDTH) for many in rows),
+            aligned_zeros(len(self.starts), GROUPS * kept * WIDTH),
+        )
+        made.there[:] = 1.0
+        return made
+
+    def simulate_block(self, first: int, count: int, error: np.ndarray, paired: np.ndarray) -> None:
+        """Simulate realisations first … first + count - 1 and add all filters' errors to the sums.
+
+        error (F, K, C, 4) takes e, e², e³, e⁴ of the first C states, paired (F, K, C) e² times the baseline's e².
+        Realisation i has the same plots and estimates in any block.
+        """
+        held = np.zeros((*self.numbers.shape[:2], self.components * POWERS))
+        of = self.keys, first, count, self.problem.probability, self.at_first, self.moves
+        self.block(*of, self.numbers, self.which, self.starts, self._work(), held)
+        sums = held.reshape(*error.shape[:3], POWERS)
+        error += sums[..., :4]
+        paired += sums[..., 4]
+
+    def simulate_plots(self, realisation: int) -> tuple[np.ndarray, np.ndarray]:
+        """The truth (K, n) and the plots (G, K, D) of a realisation, not-a-number where one is missed."""
+        groups, scans, D, n = self.problem.see.shape
+        truth, plots = np.empty((scans, n)), np.empty((scans, groups * D))
+        of = self.keys, realisation, self.problem.probability, self.at_first, self.moves
+        self.draw(*of, self._work(), truth, plots)
+        return truth, plots.reshape(scans, groups, D).swapaxes(0, 1)
 
 
-@kernel
-def add_block(work, first, count, problem, error, paired):
-    """`simulate_block` with a work array (its places' end, CHUNK)."""
-    at, of, a, eye = places(problem.H.shape[0], problem), addresses(problem), address(work), np.eye(problem.H.shape[3])
-    span, truth, same = (at.F + 1) * at.n, at.F * at.n, address(eye)
-    normals, there, other = work[at.normals : at.plots], work[at.there], work[at.there + 1]
-    there[:] = 1.0
-    for done in range(0, count, CHUNK):
-        # A partial chunk is computed whole and summed in part, so each realisation goes through the same instructions.
-        many = min(CHUNK, count - done)
-        start(work, at, problem)
-        for k in range(at.K):
-            now, old = k % 2 * span, (1 - k % 2) * span
-            if k % LOT == 0:
-                fill_normals(problem.key, first + done, k // LOT, normals)
-            advance_world(a, k, of, at, old + truth, now + truth)
-            if problem.probability < 1.0:
-                fill_there(k, problem.detections, problem.probability, first + done, there, other)
-            for f in range(at.F):
-                advance_filter(a, f, k, of, at, problem.probability < 1.0, same, old + f * at.n, now + f * at.n)
-            add_sums(a, at.n, k, many, problem.baseline, now + truth, error, paired)
-
-
-@kernel
-def fill_realisation(work, realisation, problem, truth, plots):
-    """`simulate_plots` into truth (K, n) and plots (G, K, D), with a work array as of no filter."""
-    at, of, a = places(0, problem), addresses(problem), address(work)
-    there, other = work[at.there], work[at.there + 1]
-    there[:] = 1.0
-    for k in range(at.K):
-        now, old = k % 2 * at.n, (1 - k % 2) * at.n
-        if k % LOT == 0:
-            fill_normals(problem.key, realisation, k // LOT, work[at.normals : at.plots])
-        advance_world(a, k, of, at, old, now)
-        if problem.probability < 1.0:
-            fill_there(k, problem.detections, problem.probability, realisation, there, other)
-        truth[k] = work[now : now + at.n, 0]
-        for g in range(at.G):
-            for d in range(at.D):
-                plots[g, k, d] = work[at.plots + g * at.D + d, 0] if there[0] > 0.0 else np.nan
-
-
+# ---- recorded plots --------------------------------------------------------------------------------------------------
 @kernel
 def follow(x, P, F, Q, H, R, gains, adapts, z, there, out):
     """One filter over rows of recorded plots; x (n,) and P (n, n), as before the first row, are overwritten.
@@ -455,14 +363,8 @@ def follow(x, P, F, Q, H, R, gains, adapts, z, there, out):
         extrapolate(x, P, room, p, F[k], Q[k], 1.0)
         for d in range(D):
             if there[k, d]:
-                y, S = z[k, d], R[k, d]
-                for j in range(n):
-                    y -= H[k, d, j] * x[j]
-                    p[j] = 0.0
-                    for m in range(n):
-                        p[j] += P[j, m] * H[k, d, m]
-                for j in range(n):
-                    S += H[k, d, j] * p[j]
+                y, spread = innovation(x, P, H[k, d], z[k, d], p)
+                S = spread + R[k, d]
                 out[k, 2 * n + d] = y * y / S
                 correct(x, P, p, S, y, gains[k, d], adapts)
         for j in range(n):
@@ -480,21 +382,3 @@ def correct(x, P, p, S, y, gain, adapts):
             other = p[m] / S if adapts else gain[m]
             P[j, m] += g * other * S - g * p[m] - p[j] * other
             P[m, j] = P[j, m]
-
-
-def simulate_block(problem: Problem, first: int, count: int, error: np.ndarray, paired: np.ndarray) -> None:
-    """Simulate realisations first … first + count - 1 and add all filters' errors to the sums.
-
-    error (F, K, C, 4) takes e, e², e³, e⁴ of the first C states, paired (F, K, C) e² times the baseline's e².
-    Realisation i has the same plots and estimates in any block.
-    """
-    work = aligned_zeros(places(len(problem.H), problem).end, CHUNK)
-    add_block(work, int(first), int(count), problem, error, paired)
-
-
-def simulate_plots(problem: Problem, realisation: int) -> tuple[np.ndarray, np.ndarray]:
-    """The truth (K, n) and the plots (G, K, D) of a realisation, not-a-number where one is missed."""
-    groups, scans, D, n = problem.see.shape
-    truth, plots = np.empty((scans, n)), np.empty((groups, scans, D))
-    fill_realisation(aligned_zeros(places(0, problem).end, CHUNK), int(realisation), problem, truth, plots)
-    return truth, plots

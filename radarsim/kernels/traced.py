@@ -106,16 +106,18 @@ class Program:
     """Operations on eight realisations, in order, each on the results of earlier ones by their numbers.
 
     ("number", x), ("row", array, r) and ("plain", array, r) begin: a constant, row r of lanes of an array, and its
-    plain number r in all lanes. outputs are (array, row, number of the operation).
+    plain number r in all lanes. outputs are (array, row, number of the operation); sums are the operations whose
+    results are added up over all eights.
     """
 
     ops: tuple[tuple, ...]
     outputs: tuple[tuple[int, int, int], ...]
+    sums: tuple[int, ...] = ()
 
     @functools.cached_property
     def digest(self) -> str:
         """SHA-256 of what is calculated: an edit that changes none of it leaves kernels as they are."""
-        return hashlib.sha256(repr((self.ops, self.outputs)).encode()).hexdigest()
+        return hashlib.sha256(repr((self.ops, self.outputs, self.sums)).encode()).hexdigest()
 
 
 class Trace:
@@ -127,6 +129,7 @@ class Trace:
     def __init__(self) -> None:
         self.known: dict[tuple, int] = {}
         self.outputs: list[tuple[int, int, int]] = []
+        self.sums: list[int] = []
         self.always: dict[int, float] = {}  # the value of operations whatever the case
         self.stated: dict[int, float] = {}  # these, and by the keys of this case
 
@@ -185,9 +188,13 @@ class Trace:
         for row, one in enumerate(leaves(value), first):
             self.outputs.append((array, row, self.place(one)))
 
+    def add(self, value: Any) -> None:
+        """Sums of the numbers of a structure."""
+        self.sums += map(self.place, leaves(value))
+
     def program(self) -> Program:
         """All that was recorded."""
-        return Program(tuple(self.known), tuple(self.outputs))
+        return Program(tuple(self.known), tuple(self.outputs), tuple(self.sums))
 
 
 CALCULATED: dict[str, Callable] = {

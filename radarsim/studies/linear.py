@@ -72,7 +72,7 @@ class Plan:
 
     layout: Layout
     axes: Axes
-    problem: "states.Problem"
+    simulator: "states.Simulator"
     gaussian: bool
     block: int = BLOCK
 
@@ -213,6 +213,8 @@ class LinearStudy(OneFile):
 
     # ---- numbers -------------------------------------------------------------------------------------------------
     def prepare(self, case: "Case") -> Plan:
+        from radarsim.kernels import states
+
         spec = case.spec
         truth, probability = (
             self._moved("motion", self.call(self.motion, spec), self.scan_period_s(spec)),
@@ -228,13 +230,11 @@ class LinearStudy(OneFile):
                 sigma[f], bias[f] = found[0][:, :shown], found[1][:, :shown]
         axes = self.axes(spec, sigma, bias)
         problem = problem_of(case, truth, every, probability, axes.baseline)
-        return Plan(self.sums(spec), axes, problem, probability == 1)
+        return Plan(self.sums(spec), axes, states.Simulator(problem, shown), probability == 1)
 
     def simulate(self, plan: Plan, first: int, count: int) -> np.ndarray:
-        from radarsim.kernels import states
-
         sums = {name: np.zeros(shape) for name, shape in plan.layout.shapes.items()}
-        states.simulate_block(plan.problem, first, count, sums["error"], sums["paired"])
+        plan.simulator.simulate_block(int(first), int(count), sums["error"], sums["paired"])
         return plan.layout.pack(**sums)
 
     def limits(self, spec: Any) -> np.ndarray:
@@ -248,13 +248,11 @@ class LinearStudy(OneFile):
 
     # ---- recorded plots ------------------------------------------------------------------------------------------
     def realisation(self, case: "Case", i: int) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        from radarsim.kernels import states
-
-        problem = self.prepare(case).problem
-        truth, plots = states.simulate_plots(problem, i)
+        simulator = self.prepare(case).simulator
+        truth, plots = simulator.simulate_plots(int(i))
         columns = {
             name: plots[group, :, d]
-            for one, group in zip(case.spec.filters, problem.sees, strict=True)
+            for one, group in zip(case.spec.filters, simulator.problem.sees, strict=True)
             for d, name in enumerate(self.columns(case.spec, one))
         }
         return columns, truth[:, : len(self.components)]
