@@ -1,7 +1,7 @@
 """Speed of a study by its matrices against rls2's kernel: python benchmarks/matrices.py [--pairs 9] [--only 3,2]
 
 CPU time of a filter, a realisation and a scan in a pool thread, noise and sums in, in units of `rls2`'s (r+Vr and r,
-15 scans, all plots there); by turns, and the same of its normals alone, which no kernel can go under.
+15 scans, all plots there), by turns.
 """
 
 import argparse
@@ -13,7 +13,6 @@ import numpy as np
 from radarsim.app.configs import load
 from radarsim.config.experiment import Case
 from radarsim.config.fields import Member, Model, Positive, Probability, key
-from radarsim.kernels.random import fill_normal_strip, stream
 from radarsim.studies import registry
 from radarsim.studies.linear import LinearStudy, Motion
 from radarsim.studies.onefile import Component, Measured
@@ -97,15 +96,6 @@ def measured(pairs: int, only: str) -> None:
     steps = BLOCK * plan.axes.k.size * len(plan.axes.filters)
     base = lambda: study.simulate(plan, 0, BLOCK)  # noqa: E731
     base()
-    keys = stream(1, "plots")
-
-    def normals(rows):
-        a, b = np.zeros((2, rows * SCANS // 2 * 8))
-        for first in range(0, BLOCK, 8):
-            fill_normal_strip(keys, first, 0, a, b)
-
-    normals(2)
-
     for name, of in WORK.items():
         if only and not any(name.startswith(one) for one in only.split(";")):
             continue
@@ -121,10 +111,9 @@ def measured(pairs: int, only: str) -> None:
             before, one, after = (min(cpu(what) for _ in range(5)) for what in (base, run, base))
             here = one / (BLOCK * SCANS * 2) / ((before + after) / 2 / steps)
             ratios, least = [*ratios, here], min(least, one)
-        floor = min(cpu(lambda: normals(of[1] + of[2])) for _ in range(5)) / min(cpu(base) for _ in range(5))  # noqa: B023
         ns = least / (BLOCK * SCANS * 2) * 1e9
         print(f"{name:28} {np.median(ratios):5.2f} ({min(ratios):.2f} … {max(ratios):.2f}), {ns:.2f} ns; "
-              f"normals {floor:.2f}; first block {first:.1f} s", flush=True)  # fmt: skip
+              f"first block {first:.1f} s", flush=True)  # fmt: skip
 
 
 def main() -> None:

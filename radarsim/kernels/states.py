@@ -35,7 +35,7 @@ from radarsim.kernels.lanes import (
 from radarsim.kernels.random import U, fill_normal_strip, fill_uniform_strip
 from radarsim.kernels.traced import Program, Trace, row_of, where
 
-GROUPS = 32  # eights in a chunk
+GROUPS = 64  # eights in a chunk
 STRIP = 16  # scans whose noise is drawn at once
 POWERS = 5  # sums of a component: e, e², e³, e⁴, and e² times the baseline's e²
 # Arrays of a program of the world, of a filter, and of the sums.

@@ -172,13 +172,17 @@ class LinearStudy(OneFile):
         for name, one in (("F", of.F), ("Q", of.Q)):
             if not callable(one):
                 raise self._fault(what, f"{name}: must be a function of dt, got {one!r}"[:150])
-            if not np.array_equal(np.asarray(self.call(one, dt)), np.asarray(self.call(one, dt)), equal_nan=False):
-                self._array(f"{what}: {name}(dt)", self.call(one, dt), n, n)
-                raise self._fault(what, f"{name}(dt): gives another formula each time: draw by normals")
         F = self._array(f"{what}: F(dt)", self.call(of.F, dt), n, n)
         Q = self._covariance(f"{what}: Q(dt)", self.call(of.Q, dt), n)
+        for name, one, first in (("F", of.F, F), ("Q", of.Q, Q)):
+            if not np.array_equal(np.asarray(self.call(one, dt)), first):
+                raise self._fault(what, f"{name}(dt): gives another formula each time: draw by normals")
         P = self._covariance(f"{what}: covariance", of.covariance, n)
         return F, Q, self._array(f"{what}: mean", of.mean, n), P
+
+    def _truth(self, spec: Any) -> tuple[tuple[np.ndarray, ...], float]:
+        """How the truth moves (`_moved`), and the probability of a plot."""
+        return self._moved("motion", self.call(self.motion, spec), self.scan_period_s(spec)), self.probability(spec)
 
     def _rows(self, what: str, given: Callable[[int], tuple[Any, Any]], scans: int, n: int) -> tuple[np.ndarray, ...]:
         """Rows H (K, D, n) and standard deviations (K, D) of what is given for each scan."""
@@ -216,10 +220,7 @@ class LinearStudy(OneFile):
         from radarsim.kernels import states
 
         spec = case.spec
-        truth, probability = (
-            self._moved("motion", self.call(self.motion, spec), self.scan_period_s(spec)),
-            self.probability(spec),
-        )
+        truth, probability = self._truth(spec)
         every = [self.matrices(spec, one) for one in spec.filters]
         shown = len(self.components)
         known = [exact(truth, of, probability) if of.own or probability == 1 else None for of in every]
@@ -238,10 +239,7 @@ class LinearStudy(OneFile):
         return plan.layout.pack(**sums)
 
     def limits(self, spec: Any) -> np.ndarray:
-        truth, probability = (
-            self._moved("motion", self.call(self.motion, spec), self.scan_period_s(spec)),
-            self.probability(spec),
-        )
+        truth, probability = self._truth(spec)
         every = [self.matrices(spec, one) for one in spec.filters]
         found = [limit(truth, of, probability) if of.own or probability == 1 else of.x * np.nan for of in every]
         return np.stack(found)[:, : len(self.components)]
