@@ -171,6 +171,14 @@ def test_exact_values_are_those_of_the_kernel_of_wrong_filters_too(n, D):
     assert plan.gaussian
 
 
+def test_filters_that_see_different_plots_have_their_own():
+    study, count = study_of(2, 1), 20_000
+    study.plot = lambda spec, one, k: (rows(2, 1, k), spec.sensor.sigma_m * np.array([3.0 if one.wrong else 1.0]))
+    plan = study.prepare(case_of(study, [{}, {"wrong": "H"}, {"gain": "steady"}]))
+    e2, _, e4 = np.moveaxis(plan.layout.unpack(study.simulate(plan, 0, count))["error"][..., 1:] / count, -1, 0)
+    assert (abs(e2 - plan.axes.exact_sigma**2) < 5.5 * np.sqrt((e4 - e2**2) / count)).all()
+
+
 def test_with_missed_plots_exact_values_are_known_of_gains_that_do_not_depend_on_them():
     """Of a biased filter too, whose error is a mixture with means apart."""
     study, count = study_of(2, 1), 40_000
