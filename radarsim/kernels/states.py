@@ -220,12 +220,10 @@ def follower(program: Program, sums: Program, shape: Shape):
     return follow
 
 
-@cache
-def kernels(begin: Program, move: Program, fixed: Program, own: Program, sums: Program, shape: Shape):
-    """The kernels that add a block to sums and that draw one realisation."""
+def scene(begin: Program, move: Program, shape: Shape):
+    """The part that draws truth and plots of a scan of a chunk."""
     opening, moving = emitted(begin), emitted(move)
-    follow_fixed, follow_own = follower(fixed, sums, shape), follower(own, sums, shape)
-    n, normals, plots_rows, kept, D = shape
+    n, normals, plots_rows, _, _ = shape
 
     @part
     def draw(k, scans, groups, keys, first, probability, at_first, numbers, work):
@@ -258,6 +256,15 @@ def kernels(begin: Program, move: Program, fixed: Program, own: Program, sums: P
             if probability < 1.0:
                 drawn = get(uniform, g * (STRIP >> 1) + (k % STRIP >> 1))
                 put(address(work.there), g, where_greater(full(probability), drawn, full(1.0), full(0.0)))
+
+    return draw
+
+
+@cache
+def kernels(begin: Program, move: Program, fixed: Program, own: Program, sums: Program, shape: Shape):
+    """The kernels that add a block to sums and that draw one realisation."""
+    draw, follow_fixed, follow_own = scene(begin, move, shape), follower(fixed, sums, shape), follower(own, sums, shape)
+    n, _, plots_rows, kept, D = shape
 
     @kernel
     def simulate(keys, first, count, probability, at_first, moves, numbers, which, starts, work, held):
