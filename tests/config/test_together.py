@@ -48,6 +48,8 @@ def test_at_their_lines_in_a_file(house, said):
         baseline: s
         scans: 2
         realisations: 0
+        seed: 1
+        seed: 2
         """
     assert said(house("own.yaml", text)) == [
         "own.yaml:2:88: radar.scan_period_s: must be > 0, got 0",
@@ -55,6 +57,7 @@ def test_at_their_lines_in_a_file(house, said):
         "own.yaml:6:11: baseline: must be the name of a filter: r, got 's'",
         f"own.yaml:7:8: scans: {SHORT}",
         "own.yaml:8:15: realisations: must be >= 1, got 0",
+        "own.yaml:10:1: seed: duplicate key, first in line 9",
     ]
 
 

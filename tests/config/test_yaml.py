@@ -96,24 +96,6 @@ def test_byte_order_mark_is_ignored(house, said):
     assert said(house("c.yaml", "\ufeffstudy: nothing\n"))[0].startswith("c.yaml:1:")
 
 
-def test_faults_of_structure_and_of_meaning_are_told_together(house, said):
-    text = """
-        study: range_doppler
-        radar: {wavelength_m: 0.15, sigma_range_m: .nan, sigma_velocity_mps: -1, scan_period_s: 10}
-        target: {kind: polynomial, coefficients: [1]}
-        scans: 15
-        scans: 16
-        realisations: 0
-        """
-    assert said(house("c.yaml", text)) == [
-        "c.yaml:1:1: filters: required key is missing",
-        "c.yaml:2:44: radar.sigma_range_m: must be a finite number, got '.nan'",
-        "c.yaml:2:70: radar.sigma_velocity_mps: must be > 0, got -1",
-        "c.yaml:5:1: scans: duplicate key, first in line 4",
-        "c.yaml:6:15: realisations: must be >= 1, got 0",
-    ]
-
-
 def test_pure_python_parser_gives_the_same(house, monkeypatch):
     text = "é: {b: [1, 'é', 2], c: x}\nd:\n  - e: |\n      text\n    f: .5\n"
     fast = load.parse(text, "c.yaml", Faults())

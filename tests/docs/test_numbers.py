@@ -7,8 +7,6 @@ from making import numbers
 
 PAGES = numbers.pages()
 PARTS = {"range_doppler": 5000, "manoeuvre_variance": 5000}
-DISCRIMINATOR = ("paper", "maps", "region", "rival", "crossing", "profile")
-SONAR = ("smoothing", "fluctuating", "missed", "correlated", "conversion")
 
 
 def every_mark():
@@ -66,45 +64,21 @@ def test_range_and_radial_velocity(run):
 
 
 @pytest.mark.slow
-def test_multimodel(run):
-    for stem in ("", "_trajectories", "_rules", "_transition", "_banks", "_covariance"):
-        results = run(f"multimodel{stem}", 1000)
-    check("multimodel", results)
-
-
-@pytest.mark.slow
-def test_pulses(run):
-    for stem in ("", "_snr", "_forecast", "_energy", "_radars", "_folds", "_acceleration"):
-        results = run(f"pulses{stem}", 300)
-    check("pulses", results)
-
-
-@pytest.mark.slow
-def test_sonar(run):
-    for stem in SONAR:
-        results = run(f"sonar_{stem}", 1000)
-    check("sonar", results)
-
-
-@pytest.mark.slow
-def test_sonar_manoeuvres(run):
-    for stem in ("", "_turning"):
-        results = run(f"sonar_manoeuvre{stem}", 500)
-    check("manoeuvre_(?!variance)", results)
-
-
-@pytest.mark.slow
-def test_sonar_false_plots(run):
-    for stem in ("", "_gate"):
-        results = run(f"sonar_clutter{stem}", 1000)
-    check("clutter", results)
-
-
-@pytest.mark.slow
-def test_discriminator(run):
-    for stem in DISCRIMINATOR:
-        results = run(f"discriminator_{stem}", 64)
-    check("doppler", results)
+@pytest.mark.parametrize(
+    ("marks", "stem", "more", "realisations"),
+    [
+        ("multimodel", "multimodel", ("", "_trajectories", "_rules", "_transition", "_banks", "_covariance"), 1000),
+        ("pulses", "pulses", ("", "_snr", "_forecast", "_energy", "_radars", "_folds", "_acceleration"), 300),
+        ("sonar", "sonar", ("_smoothing", "_fluctuating", "_missed", "_correlated", "_conversion"), 1000),
+        ("manoeuvre_(?!variance)", "sonar_manoeuvre", ("", "_turning"), 500),
+        ("clutter", "sonar_clutter", ("", "_gate"), 1000),
+        ("doppler", "discriminator", ("_paper", "_maps", "_region", "_rival", "_crossing", "_profile"), 64),
+    ],
+)
+def test_other_studies(run, marks, stem, more, realisations):
+    for end in more:
+        results = run(f"{stem}{end}", realisations)
+    check(marks, results)
 
 
 def test_missing_results_are_told_with_the_command(tmp_path):

@@ -64,17 +64,25 @@ def test_a_filter_whose_column_a_file_lacks_is_named(radarsim, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_chirps_run_is_the_same_by_any_means(radarsim, tmp_path):
-    radarsim("run", "chirp", "-n", N, "--out", tmp_path / "one")
-    wanted = csv_bytes(tmp_path / "one/chirp")
-    assert wanted.keys() == {"curves.csv", "gains.csv", "last.csv", "claims.csv"}
-    assert {"sigma_r.svg", "gain_v.svg"} <= {file.name for file in (tmp_path / "one/chirp/figures").iterdir()}
-    radarsim("run", "chirp", "-n", N, "--workers", 2, "--no-figures", "--out", tmp_path / "workers")
-    assert csv_bytes(tmp_path / "workers/chirp") == wanted
-    for share in ("1/2", "2/2"):
-        radarsim("run", "chirp", "-n", N, "--shard", share, "--out", tmp_path / "shares")
-    radarsim("report", "chirp", "-n", N, "--no-figures", "--out", tmp_path / "shares")
-    assert csv_bytes(tmp_path / "shares/chirp") == wanted
+@pytest.mark.parametrize(
+    ("name", "n", "further", "figures"),
+    [
+        ("chirp", N, (), {"sigma_r.svg", "gain_v.svg"}),
+        ("bearings", 1500, ("believed.csv", "consistency.csv"), {"consistency.svg"}),
+    ],
+)
+def test_an_examples_run_is_the_same_by_any_means(radarsim, tmp_path, name, n, further, figures):
+    run, plain = ("run", name, "-n", n), "--no-figures"
+    radarsim(*run, "--threads", 1, "--out", tmp_path / "one")
+    wanted = csv_bytes(tmp_path / "one" / name)
+    assert wanted.keys() == {"curves.csv", "gains.csv", "last.csv", "claims.csv", *further}
+    assert figures <= {file.name for file in (tmp_path / "one" / name / "figures").iterdir()}
+    radarsim(*run, "--workers", 2, plain, "--out", tmp_path / "workers")
+    assert csv_bytes(tmp_path / "workers" / name) == wanted
+    for share in ("2/2", "1/2"):
+        radarsim(*run, "--threads", 2, "--shard", share, "--out", tmp_path / "shares")
+    radarsim("report", name, "-n", n, plain, "--out", tmp_path / "shares")
+    assert csv_bytes(tmp_path / "shares" / name) == wanted
 
 
 @pytest.mark.slow
@@ -114,20 +122,6 @@ def test_the_chirps_questions_and_recorded_plots(radarsim, tmp_path):
     assert "chirp" in json.loads(radarsim("schema").stdout)["$defs"]
     russian = radarsim("run", "chirp", "-n", 100, "--no-figures", "--out", tmp_path, "--language", "ru").stdout
     assert "СКО дальности через" in russian
-
-
-@pytest.mark.slow
-def test_the_bearings_run_is_the_same_by_any_means(radarsim, tmp_path):
-    radarsim("run", "bearings", "-n", 1500, "--threads", 1, "--out", tmp_path / "one")
-    wanted = csv_bytes(tmp_path / "one/bearings")
-    assert wanted.keys() >= {"curves.csv", "gains.csv", "last.csv", "believed.csv", "consistency.csv", "claims.csv"}
-    assert (tmp_path / "one/bearings/figures/consistency.svg").is_file()
-    radarsim("run", "bearings", "-n", 1500, "--workers", 2, "--no-figures", "--out", tmp_path / "workers")
-    assert csv_bytes(tmp_path / "workers/bearings") == wanted
-    for share in ("2/2", "1/2"):
-        radarsim("run", "bearings", "-n", 1500, "--threads", 2, "--shard", share, "--out", tmp_path / "shares")
-    radarsim("report", "bearings", "-n", 1500, "--no-figures", "--out", tmp_path / "shares")
-    assert csv_bytes(tmp_path / "shares/bearings") == wanted
 
 
 @pytest.mark.slow
