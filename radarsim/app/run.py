@@ -416,7 +416,7 @@ def run(
         check_precision([experiment], precision, of)
     if decide:
         readings.check(experiment)
-    limit = time_limit if time_limit is None or callable(time_limit) else stopping.time_limit(time_limit)
+    limit = time_limit if time_limit is None or callable(time_limit) else stopping.TimeLimit(time_limit)
     started, kept = time.perf_counter(), None
     if out is not None and isinstance(limit, stopping.TimeLimit) and limit.left >= WORTH_MEASURING_S:
         limit = limit.reserving(kept := seconds(experiment, figures, width_mm))

@@ -78,7 +78,7 @@ def run(
         raise click.UsageError("--workers and --scheduler do not go together: give one of them")
     from radarsim.engine import run as stopping
 
-    limit = stopping.time_limit(time_limit) if time_limit else None
+    limit = stopping.TimeLimit(time_limit) if time_limit else None
     with stopping.Signals() as stop:
         from radarsim.app import run as simulation
 

@@ -88,7 +88,7 @@ def readings(
     from radarsim.engine import run
     from radarsim.errors import TargetUnmet
 
-    limit = run.time_limit(time_limit) if time_limit else None
+    limit = run.TimeLimit(time_limit) if time_limit else None
     with run.Signals() as stop:
         from radarsim.app import documents
         from radarsim.app import readings as app

@@ -45,11 +45,6 @@ class TimeLimit:
         return TimeLimit(self.seconds, self.begun, min(seconds, 0.5 * self.left))
 
 
-def time_limit(seconds: float) -> TimeLimit:
-    """Stop when that many seconds have passed from now."""
-    return TimeLimit(seconds)
-
-
 class Either:
     """Whichever of several conditions gives a reason first; `grace_s` is then that one's."""
 

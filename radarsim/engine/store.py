@@ -42,7 +42,7 @@ import sys
 import threading
 import time
 import uuid
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -241,27 +241,13 @@ class Store:
         return Sums(header["count"], values)
 
     def _check(self, header: dict, values: np.ndarray, piece: Piece) -> None:
-        first, count = piece.realisations(self._work.block)
-        expected = self._described(piece, first, count)
-        for key, value in expected.items():
-            if header.get(key) != value:
-                raise Damage(f"{key}: expected {value}, got {header.get(key)}")
-        check_platforms(header)
+        check(header, values, self._described(piece))
         if values.size != self._work.size:
             raise Damage(f"expected {self._work.size} numbers, got {values.size}")
-        if not np.isfinite(values).all():
-            raise Damage("not all numbers are finite")
 
-    def _described(self, piece: Piece, first: int, count: int) -> dict:
+    def _described(self, piece: Piece) -> dict:
         work = self._work
-        return {
-            "identity": self.path.name,
-            "piece": piece.name,
-            "first": first,
-            "count": count,
-            "block": work.block,
-            "size": work.size,
-        }
+        return described_piece(self.path, piece, work.block) | {"block": work.block, "size": work.size}
 
     def make(self) -> None:
         """Make the directory, where there is none."""
@@ -286,7 +272,7 @@ class Store:
             spans = [(hashed, one, *one.realisations(self._work.block)) for one, hashed in dict(self.marks).items()]
             spans.sort(key=lambda mark: mark[0])  # the least hashes are a draw that merging does not disturb
             for piece, sums in pieces.items():
-                described = self._described(piece, *piece.realisations(self._work.block))
+                described = self._described(piece)
                 first, count = described["first"], described["count"]
                 inside = [one for one in spans if first <= one[2] and one[2] + one[3] <= first + count]
                 marks = {one.name: hashed for hashed, one, *_ in inside[:MOST_MARKS]}
@@ -458,11 +444,19 @@ def put(path: Path, content: bytes) -> None:
         raise
 
 
-def check_platforms(header: Mapping) -> None:
-    """Damage for a header that does not name the platforms of its sums."""
-    named = header.get("platforms")
-    if not isinstance(named, list) or not all(isinstance(name, str) for name in named):
-        raise Damage("does not name the platforms that its sums were made on")
+def described_piece(folder: Path, piece: Piece, block: int) -> dict:
+    """What a piece of a folder says of itself, blocks having so many realisations."""
+    first, count = piece.realisations(block)
+    return {"identity": folder.name, "piece": piece.name, "first": first, "count": count}
+
+
+def check(header: Mapping, values: np.ndarray, expected: Mapping) -> None:
+    """Damage for a header that says something else than is expected, and for sums that are not finite."""
+    for key, value in expected.items():
+        if header.get(key) != value:
+            raise Damage(f"{key}: expected {value}, got {header.get(key)}")
+    if not np.isfinite(values).all():
+        raise Damage("not all numbers are finite")
 
 
 def mixture(platforms: Collection[str]) -> str:
@@ -694,27 +688,16 @@ def _read(found: Audit, piece: Piece) -> None:
     path = found.path / (piece.name + SUFFIX)
     try:
         header, values = decoded(content(path))
-        _check(header, values, piece, found.path.name)
+        block = header.get("block")
+        if not isinstance(block, int) or block < 1:
+            raise Damage(f"block: expected a number, got {block}")
+        check(header, values, described_piece(found.path, piece, block) | {"size": values.size})
     except OSError as error:
         found.faults.append(f"{path}: cannot be read: {error.strerror}")
     except Damage as damage:
         found.faults.append(f"{path}: damaged: {damage}")
     else:
         found.pieces[piece] = header, values
-
-
-def _check(header: dict, values: np.ndarray, piece: Piece, identity: str) -> None:
-    block = header.get("block")
-    if not isinstance(block, int) or block < 1:
-        raise Damage(f"block: expected a number, got {block}")
-    first, count = piece.realisations(block)
-    expected = {"identity": identity, "piece": piece.name, "first": first, "count": count, "size": values.size}
-    for key, value in expected.items():
-        if header.get(key) != value:
-            raise Damage(f"{key}: expected {value}, got {header.get(key)}")
-    check_platforms(header)
-    if not np.isfinite(values).all():
-        raise Damage("not all numbers are finite")
 
 
 def _gaps(found: Audit) -> None:
@@ -744,10 +727,11 @@ def _added_up(found: Audit, total: Total) -> None:
     for node in inner:
         forest.add(node, Sums(*_sums(found, node)))
     for first, stop in forest.gaps(full):
-        if any(_covers(node, (first, stop)) for node in nodes):
+        if any(node.first <= first and stop <= node.stop for node in nodes):
             continue
-        for node in _widest(first, stop):
-            _missing(found, node)
+        while first < stop:
+            _missing(found, node := widest(first, stop, 62))
+            first = node.stop
     cut = Partial(full, rest)
     inside = any(node in found.pieces for node in cut.above(64))
     if rest and cut not in found.pieces and not inside:
@@ -770,16 +754,6 @@ def agree(one: np.ndarray, other: np.ndarray, platforms: set[str]) -> bool:
     if len(platforms) < 2:
         return one.tobytes() == other.tobytes()
     return bool(np.allclose(one, other, rtol=ACROSS, atol=ACROSS * float(np.abs(other).max(initial=0.0))))
-
-
-def _covers(node: Node, gap: tuple[int, int]) -> bool:
-    return node.first <= gap[0] and gap[1] <= node.stop
-
-
-def _widest(first: int, stop: int) -> Iterator[Node]:
-    while first < stop:
-        yield (node := widest(first, stop, 62))
-        first = node.stop
 
 
 def _sums(found: Audit, piece: Piece) -> tuple[int, np.ndarray]:

@@ -89,13 +89,7 @@ def plan(track: Track, paths: Mapping[str, Path]) -> Figure | None:
     names = [panels.literal(name) for name in paths]
     several = len(own) > 1
     over_time = [
-        Line(
-            path.t_s,
-            path.places[:, 2] / size,
-            "",
-            style,
-            name=tr("track {number}", number=name) if several else tr("plots"),
-        )
+        Line(path.t_s, path.places[:, 2] / size, "", style, name=_called(name) if several else tr("plots"))
         for path, style, name in zip(own, styles, names, strict=False)
     ]
     made = [Panel(_time(), Axis(tr("range, {unit}", unit=unit)), tuple(over_time), tr("Range"), direct=False)]
@@ -115,9 +109,7 @@ def plan(track: Track, paths: Mapping[str, Path]) -> Figure | None:
             equal=True,
         )
         made.insert(0, view)
-    keys = [
-        (tr("track {number}", number=name), style) for name, style in zip(names[:MOST_TRACKS], styles, strict=False)
-    ]
+    keys = [(_called(name), style) for name, style in zip(names[:MOST_TRACKS], styles, strict=False)]
     if len(own) > MOST_TRACKS:
         keys.append((tr("{count} more", count=len(own) - MOST_TRACKS), styles[-1]))
     if several:

@@ -514,18 +514,6 @@ def together(case: Case, found: Mapping[str | None, Followed], passed_over: int)
     return whole
 
 
-def track(experiment: Experiment, source: str | os.PathLike) -> tuple[Case, Track]:
-    """The filters of an experiment's one case over the recorded plots in a CSV file, all of it at once.
-
-    Raises ConfigError as `follow`.
-    """
-    parts: list[Track] = []
-    followed = follow(experiment, source, lambda track, name: parts.append(track))
-    if len(followed.tracks) > 1:
-        raise ConfigError(f"{source}: track: must be one track, got {len(followed.tracks)}")
-    return followed.case, joined(parts)
-
-
 def drawn(followed: Followed) -> "dict[str, Figure]":
     """The figures of a track, or of the longest of several, described; by name."""
     from radarsim.recorded import figures

@@ -83,28 +83,6 @@ PLACES = ("range_m", "bearing_rad", "x_m", "y_m", "z_m")  # columns that say whe
 CHUNK = 20_000  # rows read, filtered and written at a time
 
 
-def read(path: str | os.PathLike, choices: Sequence[Sequence[str]]) -> dict[str, np.ndarray]:
-    """The columns (n,) of the first of `choices` that the file has, `t_s` first; not-a-number where a cell is empty.
-
-    Raises ConfigError with all faults, each `file:row's line:column: name: what is wrong`.
-    """
-    parts = list(chunks(path, choices))
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
-def chunks(
-    path: str | os.PathLike, choices: Sequence[Sequence[str]], size: int = CHUNK, several: bool = False
-) -> Iterator[dict[str, np.ndarray]]:
-    """The columns of a file as `read` gives them, some rows at a time, so that memory does not grow with the file.
-
-    several: rows may have the time of the row before.
-
-    After the first fault no more rows come: the rest is read for its faults, and ConfigError raised at the end.
-    """
-    for piece in pieces(path, choices, size, several):
-        yield piece.columns
-
-
 class Piece(NamedTuple):
     """Some rows of a file of plots: the columns (n,) that are measured; the track of each row, none where the file does
     not tell tracks apart; the columns (n,) of the truth, `true_…`; and those that say where the plots are, of PLACES.
@@ -123,8 +101,15 @@ def pieces(
     several: bool = False,
     any_origin: bool = False,
 ) -> Iterator[Piece]:
-    """As `chunks`, with tracks and truth; where there are tracks the times rise within each. any_origin: ranges may be
-    negative."""
+    """The columns of a file, of the first of `choices` that it has, `size` rows at a time, so that memory does not grow
+    with the file: `t_s` first; not-a-number where a cell is empty.
+
+    Times rise, where there are tracks within each; several: rows may have the time of the row before. any_origin:
+    ranges may be negative.
+
+    After the first fault no more rows come: the rest is read for its faults, and ConfigError raised at the end, with
+    all of them, each `file:row's line:column: name: what is wrong`.
+    """
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
             yield from _Reader(str(path), csv.reader(file, strict=True), choices, several, any_origin).chunks(size)
@@ -340,13 +325,6 @@ def rows_of(track: Track, name: str | None = None) -> Iterator[tuple[str, ...]]:
 
 def _cell(value: float) -> str:
     return "" if math.isnan(value) else repr(value)
-
-
-def write(track: Track, path: str | os.PathLike) -> None:
-    """Write a track as CSV; errors of `Writer`."""
-    with Writer(path) as file:
-        file.write([header_of(track)])
-        file.write(rows_of(track))
 
 
 def write_columns(

@@ -88,7 +88,7 @@ def asked(cases: Sequence[Case]) -> "dict[str, pd.DataFrame]":
         for key, (value, about) in first.items()
         if all(key in other and other[key][0] == value for other in keys_of.values())
     ]
-    counts, seeds = (sorted({value(case) for case in cases}) for value in (_realisations, _seed))
+    counts, seeds = (sorted({getattr(case, name) for case in cases}) for name in ("realisations", "seed"))
     counted = [("realisations", numeral(f"{n:,}"), tr("independent runs")) for n in counts]
     counted += [("seed", str(s), tr("of the noise")) for s in seeds]
     title = plural("Every key with its value and meaning", "What all {count} cases share", len(cases))
@@ -106,14 +106,6 @@ def asked(cases: Sequence[Case]) -> "dict[str, pd.DataFrame]":
             title = tr("In what the cases differ (first {shown}; {left} more in run.json)", shown=len(rows), left=left)
         made[title] = _frame(("case", *keys, "realisations", "seed"), rows)
     return made
-
-
-def _realisations(case: Case) -> int:
-    return case.realisations
-
-
-def _seed(case: Case) -> int:
-    return case.seed
 
 
 def _frame(columns: Sequence[str], rows: Sequence[tuple[object, ...]]) -> "pd.DataFrame":
@@ -344,7 +336,7 @@ def _template(name: str) -> "Template":
         "unit": lambda name: tr(wording.unit(name)),
         "expected": claims_page.expected,
         "css": _css,
-        "kept": kept,
+        "kept": wording.unbroken,  # numbers stay with their units, and with ± before them
         "reason": rule.said,
         "measured": _measured,
         "bounds": _bounds,
@@ -352,11 +344,6 @@ def _template(name: str) -> "Template":
     environment.filters.update(own)
     environment.globals.update(tr=tr, plural=plural)
     return environment.get_template(name)
-
-
-def kept(words: object) -> str:
-    """Text in which numbers stay with their units, and with ± before them."""
-    return wording.unbroken(str(words))
 
 
 def _measured(part: Mapping[str, Any]) -> str:
@@ -426,44 +413,28 @@ def table_in_words(name: str, table: "pd.DataFrame") -> dict[str, Any]:
 
 def head(column: str) -> str:
     """What a column of a table that stands in the page alone is called; a unit stands behind the last comma."""
-    if column in HEADS:
-        return tr(HEADS[column])
+    if column in CALLED or column in HEADS:
+        return tr(CALLED.get(column, column))
     by_stage = re.fullmatch(r"σ of y, (.+), m", column)
     if by_stage:
         return tr("σ of y, {stage}, m", stage=tr(by_stage[1]))
     name, _, unit = column.rpartition(", ")
-    return f"{tr(HEADS.get(name, name))}, {tr(unit)}" if name else column
+    return f"{tr(CALLED.get(name, name))}, {tr(unit)}" if name else column
 
 
 FACTS = (  # names of facts of a run and of its machine
     *(term("system"), term("architecture"), term("processor"), term("cores"), term("byteorder"), term("threads")),
     *(term("seconds"), term("kernel seconds"), term("realisations computed"), term("realisations from store")),
 )
-HEADS = {  # of tables that stand in pages alone
-    "SNR a pulse": term("SNR a pulse"),
-    "at_k": term("at scan"),
-    "burst": term("burst"),
-    "case": term("case"),
-    "component": term("component"),
-    "energy": term("energy"),
-    "filter": term("filter"),
-    "family": term("family"),
-    "inside_percent": term("inside the interval, %"),
-    "key": term("key"),
+CALLED = {  # columns of tables that stand in pages alone, where these have other names
+    **{"at_k": term("at scan"), "merge": term("merging rule"), "inside_percent": term("inside the interval, %")},
     "largest_difference_percent": term("largest difference, %"),
-    "meaning": term("meaning"),
-    "measured, ns": term("measured, ns"),
-    "merge": term("merging rule"),
-    "models": term("models"),
-    "operations": term("operations"),
-    "pulses": term("pulses"),
-    "radar": term("radar"),
-    "realisations": term("realisations"),
-    "scans": term("scans"),
-    "seed": term("seed"),
-    "unit": term("unit"),
-    "value": term("value"),
 }
+HEADS = (  # their other columns
+    *(term("SNR a pulse"), term("burst"), term("case"), term("component"), term("energy"), term("filter")),
+    *(term("family"), term("key"), term("meaning"), term("measured, ns"), term("models"), term("operations")),
+    *(term("pulses"), term("radar"), term("realisations"), term("scans"), term("seed"), term("unit"), term("value")),
+)
 
 
 def _table(name: str, table: "pd.DataFrame", most: int = ROWS) -> dict[str, Any]:
@@ -481,7 +452,6 @@ def _table(name: str, table: "pd.DataFrame", most: int = ROWS) -> dict[str, Any]
 
 def _figures(figures: Sequence[Figure]) -> list[dict[str, Any]]:
     """The figures as charts; where there are many curves, each is drawn of fewer points."""
-
     lines = sum(isinstance(mark, Line) for figure in figures for panel in figure.panels for mark in panel.marks)
     points = max(LEAST_POINTS, min(chart.POINTS, MOST_POINTS // max(1, lines)))
     made = []
@@ -506,10 +476,10 @@ def words_of_script(own: Sequence[str] = ()) -> "Markup":
 
 
 def _json(value: object) -> "Markup":
-    """JSON that cannot end the element in which it stands."""
+    """JSON of a value, or of text that is JSON already, that cannot end the element in which it stands."""
     from markupsafe import Markup
 
-    data = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
+    data = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, separators=(",", ":"))
     return Markup(data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
 
 
@@ -517,7 +487,11 @@ def _json(value: object) -> "Markup":
 def script() -> tuple[str, str]:
     """The page's script, and its hash as the page's policy names it: no other script runs."""
     code = _file("script.js")
-    return code, "sha256-" + base64.b64encode(hashlib.sha256(code.encode()).digest()).decode()
+    return code, _policy_hash(code)
+
+
+def _policy_hash(code: str) -> str:
+    return "sha256-" + base64.b64encode(hashlib.sha256(code.encode()).digest()).decode()
 
 
 @cache
@@ -536,11 +510,9 @@ def live(title: str, parts: Sequence[str], data: str, words: Sequence[str] = ())
 
     source, style, script = parts
     body = Environment(autoescape=True, undefined=StrictUndefined).from_string(source).render(tr=tr)
-
-    digest = "sha256-" + base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    safe = Markup(data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
     own = {"title": title, "body": Markup(body), "own_style": Markup(style), "own_script": Markup(script)}
-    return whole("live.html.j2", own_script_hash=digest, data=safe, words=words_of_script(words), **own)
+    own |= {"own_script_hash": _policy_hash(script), "data": _json(data), "words": words_of_script(words)}
+    return whole("live.html.j2", **own)
 
 
 def whole(template: str, **content: object) -> str:

@@ -156,7 +156,7 @@ def test_a_limit_leaves_time_for_tables_and_figures(monkeypatch):
     """As much as they take, and at most half of what is left."""
     clock = [100.0]
     monkeypatch.setattr(stopping.time, "monotonic", lambda: clock[0])
-    limit = stopping.time_limit(60.0)
+    limit = stopping.TimeLimit(60.0)
     for reserve, end in ((10.0, 150.0), (45.0, 130.0)):
         clock[0] = 100.0
         kept = limit.reserving(reserve)

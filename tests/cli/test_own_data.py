@@ -22,6 +22,7 @@ from radarsim.recorded import figures as accuracy
 from radarsim.recorded import follow, plots
 from radarsim.studies.range_doppler import track as range_doppler_plots
 from tests.program import command
+from tests.recorded import whole
 
 RUNS = {  # config, overrides, filters' tolerance in their own σ: rules that choose among models amplify a rounding
     "rls2": ((), 1e-10),
@@ -56,7 +57,7 @@ def test_track_over_a_simulated_file_makes_the_errors_of_the_study(tmp_path, con
     columns = follow.simulated(one, realisation)
     path = tmp_path / "plots.csv"
     plots.write_columns(columns, path)
-    case, track = follow.track(one, path)
+    case, track = whole.track(one, path)
     work = CaseWork(case)
     sums = work.plan.layout.unpack(work.simulate(realisation, 1))
     at = np.asarray(work.plan.axes.k) - 1
@@ -255,7 +256,7 @@ def test_times_are_judged_across_pieces_of_a_file(tmp_path, monkeypatch):
     path = tmp_path / "plots.csv"
     path.write_text("t_s,range_m,velocity_mps\n" + "".join(f"{t},1e5,1\n" for t in (0, 1, 2, 2, 3)))
     with pytest.raises(ConfigError, match=r":5:1: t_s: must be later than the row before, got 2 after 2"):
-        list(plots.chunks(path, [("t_s", "range_m", "velocity_mps")], 3))
+        list(plots.pieces(path, [("t_s", "range_m", "velocity_mps")], 3))
 
 
 def advised(fault):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from radarsim.engine.executors import Serial, Threads
-from radarsim.engine.run import Pace, collect, time_limit
+from radarsim.engine.run import Pace, TimeLimit, collect
 from radarsim.engine.store import available_cores
 from radarsim.errors import NonFiniteError
 from tests.engine.fake import Fake, textbook
@@ -120,7 +120,7 @@ def test_a_stop_that_comes_when_all_is_done_is_none():
 
 
 def test_a_time_limit():
-    result = collect(Fake(pause_s=1e-3), 10**9, stop=time_limit(0.3))
+    result = collect(Fake(pause_s=1e-3), 10**9, stop=TimeLimit(0.3))
     assert result.stopped == "time limit of 0.3 s"
     assert result.count < 10**9
 

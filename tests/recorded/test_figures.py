@@ -11,6 +11,7 @@ from radarsim.recorded import figures, follow
 from radarsim.recorded.plots import MOST, Path, in_plane
 from radarsim.report.drawing import Line, Note
 from tests.program import command
+from tests.recorded import whole
 
 
 def loaded(config, *overrides):
@@ -37,7 +38,7 @@ def test_residuals_lie_between_their_bounds(tmp_path, config):
     more = more.get(config, ())
     one, inside, count = loaded(config, *more), 0, 0
     for i in range(12):
-        _, track = follow.track(one, written(tmp_path / "plots.csv", follow.simulated(one, i)))
+        _, track = whole.track(one, written(tmp_path / "plots.csv", follow.simulated(one, i)))
         share = np.abs(track.residual[:, 10:]) / track.residual_sigma[:, 10:]
         share = share[np.isfinite(share)]
         inside, count = inside + int((share < 2).sum()), count + share.size

@@ -10,6 +10,7 @@ from radarsim.engine.results import Track
 from radarsim.errors import ConfigError, StoreError
 from radarsim.recorded import plots
 from radarsim.report.files import Writer
+from tests.recorded import whole
 
 CHOICES = (("t_s", "range_m", "bearing_rad"), ("t_s", "x_m", "y_m"))
 
@@ -17,7 +18,7 @@ CHOICES = (("t_s", "range_m", "bearing_rad"), ("t_s", "x_m", "y_m"))
 def read(tmp_path, text):
     path = tmp_path / "plots.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return plots.read(path, CHOICES)
+    return whole.read(path, CHOICES)
 
 
 def faults(tmp_path, text):
@@ -76,7 +77,7 @@ def test_all_faults_at_once_but_not_without_end(tmp_path):
 
 def test_a_missing_file(tmp_path):
     with pytest.raises(ConfigError, match=r"nothing\.csv: cannot be read: No such file"):
-        plots.read(tmp_path / "nothing.csv", CHOICES)
+        whole.read(tmp_path / "nothing.csv", CHOICES)
 
 
 def test_a_track_is_written_row_by_row(tmp_path):
@@ -90,7 +91,7 @@ def test_a_track_is_written_row_by_row(tmp_path):
         probability=np.array([[[0.25, 0.75], [0.5, 0.5]], [[1.0, nan], [1.0, nan]]]),
     )
     path = tmp_path / "track.csv"
-    plots.write(track, path)
+    whole.write(track, path)
     assert path.read_text() == (
         "t_s,filter,component,unit,estimate,sigma,probability_1,probability_2\n"
         "0.0,one,r,m,1.0,0.5,0.25,0.75\n"
@@ -105,7 +106,7 @@ def test_a_track_is_written_row_by_row(tmp_path):
 def test_an_unwritable_place(tmp_path):
     track = Track(("one",), (("r", "m"),), np.zeros(1), np.zeros((1, 1, 1)), np.ones((1, 1, 1)))
     with pytest.raises(StoreError, match="cannot be written"):
-        plots.write(track, tmp_path / "no folder" / "track.csv")
+        whole.write(track, tmp_path / "no folder" / "track.csv")
 
 
 def test_intervals_that_no_filter_can_take_are_a_fault_of_the_file(tmp_path, monkeypatch):
@@ -118,14 +119,14 @@ def test_intervals_that_no_filter_can_take_are_a_fault_of_the_file(tmp_path, mon
     path.write_text("t_s,range_m,bearing_rad\n0,9000,1\n1e-6,9000,1\n1e7,9000,1\n")
     (config,) = run.load_all(["sonar_smoothing"])
     with pytest.raises(ConfigError, match=r"plots\.csv:4: t_s: after a gap of 1e\+07 s .* split the file here"):
-        follow.track(config, path)
+        whole.track(config, path)
 
     def without_solution(tracker, columns):
         raise LinAlgError
 
     monkeypatch.setattr(type(follow.recorded_of(config.cases[0]).tracker(config.cases[0])), "feed", without_solution)
     with pytest.raises(ConfigError, match=r"plots\.csv: t_s: intervals so different"):
-        follow.track(config, path)
+        whole.track(config, path)
 
 
 def test_an_existing_file_keeps_its_mode_and_a_new_one_heeds_the_umask(tmp_path):

@@ -9,6 +9,7 @@ from radarsim.app.configs import load
 from radarsim.errors import ConfigError
 from radarsim.recorded import follow, plots
 from radarsim.recorded.follow import Twin, unlike
+from tests.recorded import whole
 
 SCANS = 14
 RANGE, VELOCITY, JERK = Fraction(250) ** 2, Fraction(15) ** 2, Fraction(1, 1000)  # variances of rls2
@@ -61,7 +62,7 @@ def file_with(tmp_path, steps):
 @pytest.mark.parametrize("gap", [10, 100, 1000, 5000, 10_000])
 def test_sigma_after_a_gap_is_that_of_exact_arithmetic(tmp_path, gap):
     one = load("rls2")
-    _, track = follow.track(one, file_with(tmp_path, [gap, 10, 10]))
+    _, track = whole.track(one, file_with(tmp_path, [gap, 10, 10]))
     for f, options in enumerate(one.cases[0].spec.filters):
         expected = exact(len(options.observes), options.initial_scans, [gap, 10, 10])
         np.testing.assert_allclose(track.sigma[f, -3:], expected, rtol=1e-4)
@@ -71,12 +72,12 @@ def test_sigma_after_a_gap_is_that_of_exact_arithmetic(tmp_path, gap):
 @pytest.mark.parametrize("gap", [1e6, 1e7, 1e8, 1e9, 1e10, 1e12])
 def test_a_gap_that_leaves_no_digits_ends_the_track_with_its_place(tmp_path, gap, after):
     with pytest.raises(ConfigError, match=rf"plots\.csv:{SCANS + 2}: t_s: after a gap of .* s .*split the file here"):
-        follow.track(load("rls2"), file_with(tmp_path, [gap] + [10] * after))
+        whole.track(load("rls2"), file_with(tmp_path, [gap] + [10] * after))
 
 
 def test_the_gap_of_one_number_among_rows_of_the_other(tmp_path):
     """A file without long intervals, whose range fails for a long time: the filter of ranges counts its own gap."""
-    columns = plots.read(file_with(tmp_path, [1000] * 100 + [10]), (("t_s", "range_m", "velocity_mps"),))
+    columns = whole.read(file_with(tmp_path, [1000] * 100 + [10]), (("t_s", "range_m", "velocity_mps"),))
     columns["range_m"][SCANS:-1] = np.nan
     (case,) = load("rls2").cases
     study = follow.recorded_of(case)
@@ -106,9 +107,9 @@ def test_other_studies_print_nothing_that_is_lost(tmp_path, config, overrides, g
     plots.write_columns({n: c for n, c in columns.items() if not n.startswith("true_")}, tmp_path / "plots.csv")
     if lost:
         with pytest.raises(ConfigError, match=r"plots\.csv:.* t_s: "):
-            follow.track(one, tmp_path / "plots.csv")
+            whole.track(one, tmp_path / "plots.csv")
     else:
-        _, track = follow.track(one, tmp_path / "plots.csv")
+        _, track = whole.track(one, tmp_path / "plots.csv")
         known = np.isfinite(track.estimate)
         assert (track.sigma[known] >= 0).all()
         assert (track.sigma[..., 0][known[..., 0]] > 0).all()
@@ -116,7 +117,7 @@ def test_other_studies_print_nothing_that_is_lost(tmp_path, config, overrides, g
 
 def test_pieces_of_a_file_lose_their_digits_where_the_whole_does(tmp_path):
     one = load("rls2")
-    columns = plots.read(file_with(tmp_path, [1e7, 10, 10]), (("t_s", "range_m", "velocity_mps"),))
+    columns = whole.read(file_with(tmp_path, [1e7, 10, 10]), (("t_s", "range_m", "velocity_mps"),))
     (case,) = one.cases
     study = follow.recorded_of(case)
     for size in (1, 5, 14, 100):
@@ -131,7 +132,7 @@ def test_pieces_of_a_file_lose_their_digits_where_the_whole_does(tmp_path):
 
 
 def test_tracks_differ_by_sigma_estimate_or_an_impossible_sigma(tmp_path):
-    _, track = follow.track(load("rls2"), file_with(tmp_path, [10]))
+    _, track = whole.track(load("rls2"), file_with(tmp_path, [10]))
     assert not unlike(track, track).any()
     for name, value in (("sigma", np.nan), ("sigma", 0.0), ("estimate", np.nan), ("estimate", 7.0)):
         other = follow.rows_of(track, np.arange(SCANS + 1))

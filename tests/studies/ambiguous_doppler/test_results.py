@@ -10,12 +10,13 @@ import pytest
 import radarsim
 from radarsim.app.configs import load
 from radarsim.errors import ConfigError, PlotFault
-from radarsim.recorded import fit, follow, plots
+from radarsim.recorded import fit, plots
 from radarsim.report import notes, statistics
 from radarsim.studies import registry
 from radarsim.studies.ambiguous_doppler import figures, study, track
 from radarsim.studies.ambiguous_doppler.kernels import records
 from radarsim.studies.ambiguous_doppler.tables import FEW_FOLDS
+from tests.recorded import whole
 
 
 @pytest.fixture(scope="module")
@@ -210,7 +211,7 @@ def test_plots_with_too_many_folds_are_a_fault_of_their_row(tmp_path, change, wo
     t = np.arange(15) * 10.0
     plots.write_columns({"t_s": t, "range_m": 1e5 + 0 * t, "velocity_mps": 0 * t} | change, tmp_path / "plots.csv")
     with warnings.catch_warnings(action="error"), pytest.raises(ConfigError) as error:
-        follow.track(experiment, tmp_path / "plots.csv")
+        whole.track(experiment, tmp_path / "plots.csv")
     assert words in str(error.value)
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from radarsim.app import run
 from radarsim.errors import ConfigError
-from radarsim.recorded import follow, plots
+from radarsim.recorded import follow
+from tests.recorded import whole
 
 EXAMPLE = Path(__file__).parents[4] / "docs/examples/sonar_clutter.csv"
 ONE = ("sweep.sensor.false_plots_per_km2=[0.03]",)
@@ -34,7 +35,7 @@ def test_the_example_is_realisation_3_of_the_shipped_config():
 
 def test_the_target_of_the_example_is_found():
     """The track of the highest score is the target's, in every tracker; the one told its plots is left out."""
-    _, track = follow.track(loaded(), EXAMPLE)
+    _, track = whole.track(loaded(), EXAMPLE)
     assert set(track.filters) == {"nearest", "PDA", "nearest, 4 of 6"}
     truth = np.genfromtxt(EXAMPLE, delimiter=",", names=True)
     for name in set(track.filters):
@@ -48,8 +49,8 @@ def test_the_target_of_the_example_is_found():
 
 
 def test_columns_tell_the_tracks_apart(tmp_path):
-    _, track = follow.track(loaded(), EXAMPLE)
-    plots.write(track, tmp_path / "track.csv")
+    _, track = whole.track(loaded(), EXAMPLE)
+    whole.write(track, tmp_path / "track.csv")
     header, first = (tmp_path / "track.csv").read_text().split("\n")[:2]
     assert header == "t_s,filter,component,unit,estimate,sigma,track,score"
     assert first.split(",")[6] == "1"
@@ -67,8 +68,8 @@ def test_one_plot_a_scan_is_the_plain_filter(tmp_path):
     tracker = {**rules, "association": "nearest", "gate_probability": 1.0}
     (one,) = run.load_all([base | {"sensor": sensor, "filters": [rules]}])
     (other,) = run.load_all([base | {"sensor": sensor | {"sector": sector}, "filters": [tracker]}])
-    _, plain = follow.track(one, path)
-    _, found = follow.track(other, path)
+    _, plain = whole.track(one, path)
+    _, found = whole.track(other, path)
     assert found.estimate.shape == plain.estimate.shape
     np.testing.assert_allclose(found.estimate, plain.estimate, rtol=1e-13, atol=1e-15)
     np.testing.assert_allclose(found.sigma, plain.sigma, rtol=1e-12)
@@ -77,15 +78,15 @@ def test_one_plot_a_scan_is_the_plain_filter(tmp_path):
 def test_equal_times_are_for_trackers_alone(tmp_path):
     path = written(tmp_path / "plots.csv", [(0, 9e3, 0.3), (0, 8e3, 0.2), (5, 9e3, 0.3)])
     with pytest.raises(ConfigError, match="must be later than the row before, got 0 after 0"):
-        follow.track(loaded("sonar_smoothing", ()), path)
-    follow.track(loaded(), path)
+        whole.track(loaded("sonar_smoothing", ()), path)
+    whole.track(loaded(), path)
     with pytest.raises(ConfigError, match="must not be earlier than the row before, got 4 after 5"):
-        follow.track(loaded(), written(path, [(5, 9e3, 0.3), (4, 8e3, 0.2)]))
+        whole.track(loaded(), written(path, [(5, 9e3, 0.3), (4, 8e3, 0.2)]))
 
 
 def test_a_scan_without_plots_and_no_track_at_all(tmp_path):
     path = written(tmp_path / "plots.csv", [(0, 9e3, 0.3), (5, "", ""), (10, 9e3, "")])
-    _, track = follow.track(loaded(), path)
+    _, track = whole.track(loaded(), path)
     assert track.estimate.shape == (0, 3, 4)
 
 
@@ -93,4 +94,4 @@ def test_an_oracle_alone_cannot_track(tmp_path):
     path = written(tmp_path / "plots.csv", [(0, 9e3, 0.3)])
     config = loaded("sonar_clutter", (*ONE, "filters=[{name: a, kind: kalman, association: known}]"))
     with pytest.raises(ConfigError, match="nearest or pda is needed"):
-        follow.track(config, path)
+        whole.track(config, path)
