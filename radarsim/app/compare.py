@@ -6,6 +6,7 @@
 import os
 from collections.abc import Callable, Collection, Hashable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -101,7 +102,7 @@ def compare(
         runs, sentences, notes, warnings, list(described.values()), made, contents
     ).encode()
     contents["compare.json"] = files.to_json(_record(runs, contents))
-    files.replace_all(folder, contents, stale=_earlier)
+    files.replace_all(folder, contents, stale=partial(files.outputs, name="compare.json"))
     rows, last = (tuple(table.to_dict("records")) for table in (made, sides.at_the_end(made)))
     told = tuple((of.value, of.words) for of in sides.told(made, shared))
     written = folder, tuple(sorted(contents)), tuple(sentences), tuple(notes), tuple(warnings)
@@ -203,12 +204,6 @@ def _stale(run: Run) -> list[str]:
     )
     again = command(run.experiment, (), run.folder.parent)
     return [] if same else [f"{run.folder}: of an earlier state of {run.label}; `{again}` brings it up to date"]
-
-
-def _earlier(folder: Path) -> list[str]:
-    """The files of an earlier comparison in a folder."""
-    outputs = files.earlier(folder, "compare.json").get("outputs")
-    return [path for path in outputs if isinstance(path, str)] if isinstance(outputs, dict) else []
 
 
 def _replaced(folder: Path, runs: Sequence[Run]) -> list[str]:

@@ -297,12 +297,8 @@ def said_of(asked: Question) -> dict[str, str]:
 
 def answered(asked: Question, attained_now: float, **given: Any) -> Answer:
     """An answer of what was asked; what is not given is none."""
-    whole: dict[str, Any] = {
-        **dict.fromkeys(("value", "lo", "hi", "attained", "slope", "limit", "limit_at")),
-        "others": (),
-        "notes": (),
-        **given,
-    }
+    empty: dict[str, Any] = dict.fromkeys(("value", "lo", "hi", "attained", "slope", "limit", "limit_at"))
+    whole = empty | {"others": ()} | given
     shown = whole["limit_at"] if whole["value"] is None else whole["value"]
     return Answer(
         key=asked.key,

@@ -313,9 +313,9 @@ def earlier(folder: Path, name: str = "run.json") -> dict:
     return record if isinstance(record, dict) else {}
 
 
-def outputs(folder: Path) -> list[str]:
-    """The outputs that an earlier run.json of the folder names; none where there is no such record."""
-    named = earlier(folder).get("outputs")
+def outputs(folder: Path, name: str = "run.json") -> list[str]:
+    """The outputs that an earlier record of the folder names; none where there is no such record."""
+    named = earlier(folder, name).get("outputs")
     return [path for path in named if isinstance(path, str)] if isinstance(named, dict) else []
 
 

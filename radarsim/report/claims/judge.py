@@ -199,11 +199,7 @@ def weighed(part: Part, seen: Evidence, measured: Estimate, n: int) -> Judged:
         kind=part.expected.kind,
         ceiling=part.ceiling(seen) if part.ceiling else math.nan,
         n=n,
-        statement=part.statement,
-        number=part.number,
-        variant=part.variant,
-        against_print=part.against_print,
-        asserted=part.asserted,
+        **{name: getattr(part, name) for name in ("statement", "number", "variant", "against_print", "asserted")},
     )
 
 
@@ -252,12 +248,8 @@ def _row(claim: Claim, paper: str, one: _Tried, outcome: Outcome | None, many: i
     part, of = one.part, one.judged
     row = blank(claim, paper) | {
         "case": one.cases,
-        "expected": part.expected.words,
-        "expected_lo": _end(part.expected.lo),
-        "expected_hi": _end(part.expected.hi),
-        "what": part.what,
-        "unit": part.unit,
-        "margin_kind": part.expected.kind,
+        **{"what": part.what, "unit": part.unit, "margin_kind": part.expected.kind, "expected": part.expected.words},
+        **{"expected_lo": _end(part.expected.lo), "expected_hi": _end(part.expected.hi)},
         "number": f"{part.statement}{part.number}" if part.number else "",
         "extension": not (claim.counted and part.asserted),
         "overall": outcome.words if outcome else NOT_JUDGED,
@@ -271,16 +263,9 @@ def _row(claim: Claim, paper: str, one: _Tried, outcome: Outcome | None, many: i
     if of is None:
         return row
     return row | {
-        "measured": of.measured,
-        "lo": of.lo,
-        "hi": of.hi,
-        "verdict": rule.verdict(of, many),
-        "exact": of.exact,
-        "margin": _end(of.margin),
-        "miss": _end(rule.miss(of)),
-        "old_verdict": one.old,
-        "ceiling": of.ceiling,
-        "n": of.n,
+        **{name: getattr(of, name) for name in ("measured", "lo", "hi", "exact", "ceiling", "n")},
+        **{"margin": _end(of.margin), "miss": _end(rule.miss(of))},
+        **{"verdict": rule.verdict(of, many), "old_verdict": one.old},
         **dict(zip(("judged_lo", "judged_hi"), rule.ends(of, many), strict=True)),
     }
 
@@ -289,13 +274,8 @@ def blank(claim: Claim, paper: str) -> dict[str, Any]:
     """The columns of a claim that do not depend on a measurement; the others empty."""
     empty: dict[str, Any] = dict.fromkeys(CLAIMED, "") | dict.fromkeys(NUMBERS, math.nan)
     return empty | {
-        "claim": claim.id,
-        "paper": paper,
-        "statement": claim.statement,
-        "place": claim.place,
-        "reading": claim.reading,
-        "original": claim.original,
-        "extension": not claim.counted,
+        **{"claim": claim.id, "paper": paper, "extension": not claim.counted},
+        **{name: getattr(claim, name) for name in ("statement", "place", "reading", "original")},
         "why": claim.unstated,
     }
 
