@@ -393,11 +393,16 @@ def chart(figure: Figure, points: int = POINTS) -> Chart:
     for mark in (m for panel in shown for m in panel.marks if isinstance(m, Line) and named(m)):
         groups.setdefault(named(mark), mark.style)
     numbers = {name: n for n, name in enumerate(groups)}
-    maps = [mark for panel in shown for mark in panel.marks if isinstance(mark, Heat)]
-    heats = {one.label: heat_scale([m.values for m in maps if m.label == one.label]) for one in maps}
+    heats = heats_of(shown)
     panels = tuple(_panel(figure, panel, numbers, points, heats) for panel in shown)
     switches = tuple(Switch(n, html(name), sample(groups[name])) for name, n in numbers.items())
     return Chart(panels, switches, len(panels) > 1)
+
+
+def heats_of(panels: Sequence[Panel]) -> Heats:
+    """The scales of the colours of maps: one for all of a figure that have the same words."""
+    maps = [mark for panel in panels for mark in panel.marks if isinstance(mark, Heat)]
+    return {one.label: heat_scale([m.values for m in maps if m.label == one.label]) for one in maps}
 
 
 def named(line: Line) -> str:

@@ -34,7 +34,7 @@ from matplotlib.transforms import ScaledTranslation
 
 from radarsim.language import tr
 from radarsim.report import chart
-from radarsim.report.chart import Scale, contrast, heat_scale, tick_text
+from radarsim.report.chart import Scale, contrast, tick_text
 from radarsim.report.drawing import Axis as Ends
 from radarsim.report.drawing import Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.wording import number, spoken
@@ -537,14 +537,8 @@ def _bars(axes: Axes, bars: Bars) -> None:
 
 def common_colours(panels: Sequence[Panel]) -> Colours:
     """The colours of maps: one scale for all of a figure whose bars have the same words."""
-    values: dict[str, list[np.ndarray]] = {}
-    for mark in (mark for panel in panels for mark in panel.marks if isinstance(mark, Heat)):
-        values.setdefault(mark.label, []).append(np.ravel(mark.values))
-    scales: Colours = {}
-    for label, parts in values.items():
-        low, high, log = heat_scale(parts)
-        scales[label] = LogNorm(low, high) if log else Normalize(low, high)
-    return scales
+    scales = chart.heats_of(panels).items()
+    return {label: LogNorm(low, high) if log else Normalize(low, high) for label, (low, high, log) in scales}
 
 
 def _heat(axes: Axes, heat: Heat, maps: Colours) -> None:
