@@ -18,7 +18,10 @@ RESULTS = Path(__file__).parents[2] / "results"
 MEASURED = ("measured", "lo", "hi", "judged_lo", "judged_hi", "exact", "expected_lo", "expected_hi", "margin", "needed")
 COLUMNS = ("claim", "config", "case", "what", "unit", *MEASURED, "expected", "number", "verdict", "as_shipped", "why")
 FIGURE = "claims.svg"
-PICTURE = f'<img src="{FIGURE}" alt="All claims, in margins of what their papers say" width="100%">'
+PICTURE = f"""<details>
+<summary>How far each claim lies from its words: a figure</summary>
+<img src="{FIGURE}" alt="All claims, in margins of what their papers say" width="100%">
+</details>"""
 
 
 def kept() -> list[dict]:

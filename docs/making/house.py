@@ -41,7 +41,7 @@ ABOUT = {
     "physics": "motion, targets, frames",
     "bursts": "a burst and its estimator",
 }
-WIDTH, ROOM, HEIGHT, GAP, MARGIN, SIDE = 840, 200, 58, 22, 10, 64  # px; SIDE: the column of the long arrow
+WIDTH, ROOM, HEIGHT, GAP, MARGIN, SIDE = 840, 200, 58, 22, 6, 44  # px; SIDE: the column of the long arrow
 
 
 def room_of(module: str) -> str | None:
@@ -144,7 +144,7 @@ def svg() -> str:
         'role="img" aria-label="The rooms of radarsim, each of which imports only rooms below it">\n'
         "<style>rect{fill:#fff;stroke:#335} .band{fill:#eef1f6;stroke:none} "
         "path{fill:none;stroke:#335;stroke-width:1.6} text{font:11px sans-serif;text-anchor:middle;fill:#223} "
-        ".name{font-weight:bold;font-size:12.5px}</style>\n"
+        ".name{font-weight:bold;font-size:12px}</style>\n"
         f'<rect width="{WIDTH}" height="{height}" style="stroke:none"/>\n'
         '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="9" markerHeight="9" '
         'markerUnits="userSpaceOnUse" orient="auto"><path d="M0 0L8 4L0 8z" style="fill:#335;stroke:none"/></marker>'
