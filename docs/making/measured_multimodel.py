@@ -7,8 +7,6 @@ from making.pick import part
 
 SIX = ("MMA2-122", "MMA2-11", "Kalman-1 20", "Kalman-1 5", "Kalman-2 20", "Kalman-2 1")
 STAGES = ("start", "ballistic", "manoeuvre", "after")
-CLAIMS = ("multimodel", "multimodel_trajectories", "multimodel_rules", "multimodel_transition", "multimodel_banks")
-VERDICTS = ("confirmed", "refuted", "no material difference", "not yet decided")
 HEIGHT, CLIMB = "height", "rate of climb"
 
 
@@ -41,22 +39,6 @@ def costs(results: Results) -> list[tuple]:
         (other,) = slow[slow["filter"] == one.filter]["operations"]
         rows.append((one.family, one.merge.replace("_", " "), f"{one.operations:.0f}", f"{other:.0f}"))
     return rows
-
-
-def verdicts(results: Results) -> list[tuple]:
-    """Each claim by case: the verdicts of its parts there, counted."""
-    rows: list[tuple] = [("claim", "flight", *VERDICTS)]
-    for stem in CLAIMS:
-        for (claim, case), own in results.table(stem, "claims").groupby(["claim", "case"], sort=False):
-            counts = own["verdict"].value_counts()
-            flight = case.rpartition("target=")[2].replace("_", " ") if "target=" in case else "aeroballistic"
-            flight += ", 1 Hz" if case.endswith("_1hz") else ""
-            rows.append((claim, flight, *(str(counts.get(verdict, "")) for verdict in VERDICTS)))
-    return sorted(rows[:1]) + sorted(rows[1:], key=lambda row: (_number(row[0]), row[0]))
-
-
-def _number(claim: str) -> int:
-    return int("".join(filter(str.isdigit, claim.partition(".")[2])))
 
 
 def rival(stage: str, words: str) -> Callable[[Results], str]:
@@ -109,7 +91,6 @@ MEASURED = {
     "multimodel_sigma_y": sigma("y"),
     "multimodel_sigma_vy": sigma("vy"),
     "multimodel_costs": costs,
-    "multimodel_verdicts": verdicts,
     **{f"multimodel_rival_{stage}_y": rival(stage, HEIGHT) for stage in STAGES},
     **{f"multimodel_rival_{stage}_vy": rival(stage, CLIMB) for stage in STAGES},
     "multimodel_weak": part("multimodel", "P2.5", "mean probability of model 1, aeroballistic, stage whole", ""),
