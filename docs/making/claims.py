@@ -8,9 +8,11 @@ Where results/ holds a full reproduction the page is made from that, with every 
 import csv
 import io
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from radarsim.app import readings, run, stored
+from radarsim.errors import StoreError
 from radarsim.report.claims import NUMBERS, judge, page
 
 FILE = Path(__file__).with_name("claims.csv")
@@ -42,8 +44,11 @@ def kept() -> list[dict]:
 
 def rows(results: Path = RESULTS) -> tuple[list[dict], bool]:
     """Rows of all claims, and whether they are those of a full reproduction, with every part of each."""
-    full = run.claims((), results)
-    return (kept(), False) if any(row["class"] == judge.NOT_RUN for row in full) else (full, True)
+    with suppress(StoreError):  # of another version, or damaged: no full reproduction
+        full = run.claims((), results)
+        if all(row["class"] != judge.NOT_RUN for row in full):
+            return full, True
+    return kept(), False
 
 
 def markdown(results: Path = RESULTS) -> str:
@@ -63,7 +68,7 @@ def main(results: str) -> None:
     """Write claims.csv from a full reproduction; ends with 1 where a claim was not run."""
     found, whole = rows(Path(results))
     if not whole:
-        sys.exit(f"{results}: not every claim was run there; `make reproduce-figures` runs them")
+        sys.exit(f"{results}: holds no full reproduction of this version; `make reproduce-figures` makes it")
     lines = []
     for parts in page.grouped(found):
         row = dict(page.worst(parts) or parts[0])

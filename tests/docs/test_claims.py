@@ -60,6 +60,18 @@ def test_a_full_reproduction_is_shown_with_every_part(tmp_path, text, monkeypatc
     assert "another part" not in text
 
 
+def test_readme_and_landing_page_count_the_claims():
+    count = sum(page.counts(claims.kept())[0].values())
+    for name in ("README.md", "docs/README.md"):
+        assert f"{count} claims" in (claims.FILE.parents[2] / name).read_text(encoding="utf-8")
+
+
+def test_results_that_cannot_be_read_are_no_full_reproduction(tmp_path, text):
+    (tmp_path / "range_doppler").mkdir()
+    (tmp_path / "range_doppler" / "claims.csv").write_text("claim\nP1.1\n")
+    assert claims.markdown(tmp_path) == text
+
+
 def test_the_figure_is_drawn_beside_the_page():
     assert {mark.label for panel in page.figure(claims.kept()).panels for mark in panel.marks} >= {
         "confirmed",
