@@ -26,6 +26,7 @@ def test_marks_are_whole_and_each_is_made_once():
         text = page.read_text(encoding="utf-8")
         opened = re.findall(r"<!-- (?:table|value): ", text)
         assert len(numbers.marks(text)) == len(opened) == text.count("<!-- end -->"), page.name
+        assert not re.search(r"^ *<!-- value: ", text, re.MULTILINE), page.name  # there it would end the paragraph
     assert sorted(name for _, name, _ in every_mark()) == sorted(numbers.measured())
 
 
