@@ -29,17 +29,7 @@ from radarsim.bursts.estimators import energy_ratio, fisher, fisher_sums
 from radarsim.bursts.kernels.scoring import BLOCK_SUMS
 from radarsim.bursts.kernels.sequence import OPTIONS, WINDOW
 from radarsim.engine.results import Axes
-from radarsim.kernels.algebra import (
-    CORRECT,
-    NO_NOISE,
-    TAKE,
-    add_scaled,
-    constant_acceleration,
-    pack,
-    predicted,
-    predicted_covariance,
-    unpack,
-)
+from radarsim.kernels import algebra
 from radarsim.physics import process_noise, transition
 from radarsim.studies import radial
 from radarsim.studies.pulses_to_tracks.kernels import records
@@ -359,16 +349,16 @@ def errors(spec: Any, one: Any, sigma: np.ndarray, missed: np.ndarray) -> tuple[
     sigma (K, 2) of velocity and acceleration; missed (K, 3) what the model misses, see `defects`. The filter's
     covariance P gives the gains; that of the errors, S, has no manoeuvre noise.
     """
-    F, S, mean = constant_acceleration(spec.radar.scan_period_s), designation(spec), (0.0, 0.0, 0.0)
+    F, S, mean = algebra.constant_acceleration(spec.radar.scan_period_s), designation(spec), (0.0, 0.0, 0.0)
     means, covariances = np.zeros((len(missed), 3)), np.zeros((len(missed), 6))
     for k, taken in enumerate(gains(spec, one, sigma)):
         if k > 0:
-            S = predicted_covariance(S, F, NO_NOISE)
-            mean = add_scaled(predicted(mean, F), 1.0, missed[k])
+            S = algebra.predicted_covariance(S, F, algebra.NO_NOISE)
+            mean = algebra.add_scaled(algebra.predicted(mean, F), 1.0, missed[k])
         for c, gain, variance in taken:
-            S, mean = CORRECT[c](S, variance, gain), add_scaled(mean, -mean[c], gain)
+            S, mean = algebra.CORRECT[c](S, variance, gain), algebra.add_scaled(mean, -mean[c], gain)
         means[k], covariances[k] = mean, S
-    return means, unpack(covariances.T)
+    return means, algebra.unpack(covariances.T)
 
 
 def designation(spec: Any) -> tuple[float, ...]:
@@ -380,15 +370,15 @@ def designation(spec: Any) -> tuple[float, ...]:
 def gains(spec: Any, one: Any, sigma: np.ndarray) -> Iterator[list[tuple[int, Any, float]]]:
     """By scan what a filter takes as measured: number of the component, gain (3,), variance. sigma as in `errors`."""
     dt = spec.radar.scan_period_s
-    F, Q = constant_acceleration(dt), pack(process_noise(one.process_noise, one.manoeuvre_variance, dt))
+    F, Q = algebra.constant_acceleration(dt), algebra.pack(process_noise(one.process_noise, one.manoeuvre_variance, dt))
     P = designation(spec)
     for k in range(len(sigma)):
         if k > 0:
-            P = predicted_covariance(P, F, Q if k >= start_scans(one) else NO_NOISE)
+            P = algebra.predicted_covariance(P, F, Q if k >= start_scans(one) else algebra.NO_NOISE)
         taken = []
         for c in range(0 if k else 1, one.takes + 1):
             variance = float(spec.radar.sigma_range_m**2 if c == 0 else sigma[k, c - 1] ** 2)
-            P, gain, _ = TAKE[c](P, variance, 1.0)
+            P, gain, _ = algebra.TAKE[c](P, variance, 1.0)
             taken.append((c, gain, variance))
         yield taken
 
@@ -400,14 +390,14 @@ def of_losses(spec: Any, one: Any, sigma: np.ndarray) -> np.ndarray:
     span (the acceleration over what sweeps the rate), and taken as measured; one that the next forecast rests on
     confirms itself from scan to scan. A gate, a mixture or hypotheses answer less.
     """
-    F, scans = constant_acceleration(spec.radar.scan_period_s), len(sigma)
+    F, scans = algebra.constant_acceleration(spec.radar.scan_period_s), len(sigma)
     size = np.array([spec.span_mps, spec.span_mps / spec.burst_s]) / math.sqrt(12.0)
     answers, found = np.zeros((3, scans, 2)), np.zeros((scans, 3))  # of the bursts so far to errors of one
     for k, taken in enumerate(gains(spec, one, sigma)):
-        answers = np.array(predicted(answers, F))
+        answers = np.array(algebra.predicted(answers, F))
         begun = np.arange(scans) <= k if one.forecast == "track" else np.arange(scans) == k
         for c, gain, _ in taken:
-            answers = np.array(add_scaled(answers, -answers[c], gain))
+            answers = np.array(algebra.add_scaled(answers, -answers[c], gain))
             if c:
                 answers[:, begun, c - 1] += np.array(gain)[:, None]
         found[k] = np.einsum("xjc,c->x", answers**2, size**2)

@@ -39,19 +39,7 @@ import numpy as np
 from radarsim import physics
 from radarsim.config.experiment import Case
 from radarsim.errors import ConfigError
-from radarsim.kernels.algebra import (
-    CORRECT,
-    NO_NOISE,
-    TAKE,
-    add_scaled,
-    constant_acceleration,
-    pack,
-    predicted,
-    predicted_covariance,
-    take_rate,
-    take_value,
-    unpack,
-)
+from radarsim.kernels import algebra
 from radarsim.physics import manoeuvre_covariance, process_noise, transition
 from radarsim.studies.radial import checked_truth
 from radarsim.studies.range_doppler.config import FlyBy, Flying, Keys, Recorded, Target, Turn
@@ -94,7 +82,7 @@ def defects(x: np.ndarray, dt: float, plots: Plots, drawn: np.ndarray | None = N
     drawn (K, 3, 1 + of_truth): beside x, the mean and the columns of a truth that is drawn; None: it is not.
     """
     made = np.zeros((len(x), 3, plots.inputs.shape[1]))
-    made[1:, :, 0] = np.array(predicted(x[:-1].T, constant_acceleration(dt))).T - x[1:]
+    made[1:, :, 0] = np.array(algebra.predicted(x[:-1].T, algebra.constant_acceleration(dt))).T - x[1:]
     if drawn is not None:
         made[:, :, 0] += drawn[:, :, 0]
         made[:, :, made.shape[2] - plots.of_truth :] = drawn[:, :, 1:]
@@ -109,31 +97,31 @@ def started(weights: np.ndarray, believed: np.ndarray, plots: Plots, defect: np.
     S = np.einsum("ijk,j,ljk->il", weights, plots.sigma**2, weights)
     truth = np.zeros((weights.shape[2], 3, defect.shape[2]))
     for k in range(1, len(truth)):  # from zero, as the start forgets what a filter of the model can follow
-        truth[k] = np.array(predicted(truth[k - 1], constant_acceleration(dt))) - defect[k]
+        truth[k] = np.array(algebra.predicted(truth[k - 1], algebra.constant_acceleration(dt))) - defect[k]
     E = np.einsum("ijk,kjc->ic", weights, truth[:, :2]) - truth[-1] + weights.sum(axis=2) @ plots.inputs
-    P, S = ([float(part) for part in pack(matrix)] for matrix in (believed, S))
+    P, S = ([float(part) for part in algebra.pack(matrix)] for matrix in (believed, S))
     return Errors(P, S, E[:, :, None])
 
 
 def scans(errors: Errors, observes: int, plots: Plots, Q: Any, defect: np.ndarray, dt: float) -> Iterator[Errors]:
     """The errors after each further scan, with its plot: numbers are taken one after the other, as their noises are
     independent. Q packed, of numbers or arrays (B,); defect (K, 3, C) of these scans."""
-    (P, S, E), F = errors, constant_acceleration(dt)
+    (P, S, E), F = errors, algebra.constant_acceleration(dt)
     inputs: Any = plots.inputs[:, :, None]
     of_scans: Any = defect[:, :, :, None]
     if alone := isinstance(Q[0], float) and E.size == 3:  # of plain numbers alone Python is faster
         E, inputs, of_scans = E.ravel().tolist(), inputs.ravel().tolist(), defect.reshape(-1, 3).tolist()
     R, settled = [float(sigma) ** 2 for sigma in plots.sigma[:observes]], False
     gains: list[Any] = []
-    add, forward = add_scaled.function, predicted.function  # a call less in each of many scans
+    add, forward = algebra.add_scaled.function, algebra.predicted.function  # a call less in each of many scans
     for of_scan in of_scans:
         E = add(forward(E, F), 1.0, of_scan)
         if not settled:
             before, gains = (P, S), []
-            P, S = predicted_covariance(P, F, Q), predicted_covariance(S, F, NO_NOISE)
+            P, S = algebra.predicted_covariance(P, F, Q), algebra.predicted_covariance(S, F, algebra.NO_NOISE)
             for m in range(observes):
-                P, gain, _ = TAKE[m](P, R[m], 1.0)
-                S = CORRECT[m](S, R[m], gain)
+                P, gain, _ = algebra.TAKE[m](P, R[m], 1.0)
+                S = algebra.CORRECT[m](S, R[m], gain)
                 gains.append(gain)
             settled = alone and before == (P, S)  # to the last bit, and so they stay
         for m, gain in enumerate(gains):
@@ -316,7 +304,7 @@ def noise_by_time(noise: str, manoeuvre_variance: float, period: float) -> np.nd
     between two plots; white jerk keeps its density; of the acceleration's steps there are as many as periods.
     """
     made = np.zeros((2, 6))
-    of_a_second = np.array(pack(process_noise(noise, manoeuvre_variance, 1.0)))
+    of_a_second = np.array(algebra.pack(process_noise(noise, manoeuvre_variance, 1.0)))
     made[int(noise == "random_jerk")] = of_a_second * (1.0 if noise == "random_jerk" else period)
     return made
 
@@ -335,14 +323,17 @@ def design(
     Before the start the estimates are the plots themselves: the range, and the velocity where it is observed. `noise`
     is the form of the process noise, see `physics.process_noise`.
     """
-    F, Q = constant_acceleration(dt), tuple(map(float, pack(process_noise(noise, manoeuvre_variance, dt))))
+    F, Q = (
+        algebra.constant_acceleration(dt),
+        tuple(map(float, algebra.pack(process_noise(noise, manoeuvre_variance, dt)))),
+    )
     R, there = tuple(map(float, sigma**2)), (True, observes == 2)
     weights, covariance = least_squares_start(observes, start, sigma, dt)
     gains, believed = np.zeros((scans, 3, 2)), np.zeros((scans, 6))
     available = np.ones((scans, 3), dtype=bool)
     available[: start - 1, observes:] = False
     believed[: start - 1, [0, 3][:observes]] = sigma[:observes] ** 2
-    P = tuple(map(float, pack(covariance)))
+    P = tuple(map(float, algebra.pack(covariance)))
     believed[start - 1] = P
     after: list[tuple[float, ...]] = []
     while len(after) < scans - start:
@@ -353,17 +344,17 @@ def design(
             after += [after[-1]] * (scans - start - len(after))
     found = np.array(after).reshape(-1, 12)
     believed[start:], gains[start:] = found[:, :6], found[:, 6:].reshape(-1, 2, 3).swapaxes(1, 2)
-    return LinearFilter(observes, start, weights, gains, unpack(believed.T), available, Q)
+    return LinearFilter(observes, start, weights, gains, algebra.unpack(believed.T), available, Q)
 
 
 def updated(P: Any, F: Any, Q: Any, R: Any, there: Any) -> tuple[Any, Any, Any]:
     """A covariance after a scan, packed, and its gains (3,) on range and velocity, of which there are some; R (2,)."""
-    P, of_range, of_velocity = predicted_covariance(P, F, Q), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    P, of_range, of_velocity = algebra.predicted_covariance(P, F, Q), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if there[0]:
-        P, of_range, _ = take_value(P, R[0], 1.0)
+        P, of_range, _ = algebra.take_value(P, R[0], 1.0)
     if there[1]:  # taken after the range, so that it moves what that makes of the estimate
-        P, of_velocity, _ = take_rate(P, R[1], 1.0)
-        of_range = add_scaled(of_range, -of_range[1], of_velocity)
+        P, of_velocity, _ = algebra.take_rate(P, R[1], 1.0)
+        of_range = algebra.add_scaled(of_range, -of_range[1], of_velocity)
     return P, of_range, of_velocity
 
 
@@ -518,7 +509,7 @@ def error_recursion(
     if further:
         E[one.start :] = np.array([errors.E for errors in further]).reshape(len(further), 3, -1)
         S[one.start :] = [errors.S for errors in further]
-    return E, unpack(S.T)
+    return E, algebra.unpack(S.T)
 
 
 def steady_state(

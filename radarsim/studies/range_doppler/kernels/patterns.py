@@ -11,21 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels.algebra import (
-    NO_NOISE,
-    add_outer,
-    add_scaled,
-    constant_acceleration,
-    correct_rate,
-    correct_value,
-    inverse,
-    predicted,
-    predicted_covariance,
-    predicted_information,
-    take_rate,
-    take_value,
-    times,
-)
+from radarsim.kernels import algebra
 from radarsim.kernels.compile import aligned_zeros, inline, kernel, part
 from radarsim.kernels.lanes import (
     WIDTH,
@@ -188,7 +174,7 @@ def weigh(rows, n, columns, towards):
             for i in range(high - FURTHER):
                 put(p, i, get(p, i) * scale)
         for c in range(columns):
-            put6(p, 6, add_outer(get6(p, 6), float(towards), get3(p, 12 + c, columns)))
+            put6(p, 6, algebra.add_outer(get6(p, 6), float(towards), get3(p, 12 + c, columns)))
         if towards == 1:
             for i in range(high - FURTHER):
                 put(p, i, get(p, i) * scale)
@@ -251,13 +237,13 @@ class World(NamedTuple):
 @part
 def predict(rows, n, columns, dt, Q, defect):
     """Go to the next scan, in place."""
-    high, F, noise = height(columns), constant_acceleration(dt), (Q[0], Q[1], Q[2], Q[3], Q[4], Q[5])
+    high, F, noise = height(columns), algebra.constant_acceleration(dt), (Q[0], Q[1], Q[2], Q[3], Q[4], Q[5])
     for j in range(blocks_of(n)):
         p = row(rows, j * high)
-        put6(p, 0, predicted_covariance(get6(p, 0), F, noise))
-        put6(p, 6, predicted_covariance(get6(p, 6), F, NO_NOISE))
+        put6(p, 0, algebra.predicted_covariance(get6(p, 0), F, noise))
+        put6(p, 6, algebra.predicted_covariance(get6(p, 6), F, algebra.NO_NOISE))
         for c in range(columns):
-            r, v, a = predicted(get3(p, 12 + c, columns), F)
+            r, v, a = algebra.predicted(get3(p, 12 + c, columns), F)
             put3(p, 12 + c, (r + defect[0, c], v + defect[1, c], a + defect[2, c]), columns)
 
 
@@ -266,7 +252,7 @@ def move_columns(p, gain, columns, inputs, m):
     """The columns of E with their share of the plot's error of number m."""
     for c in range(columns):
         e = inputs[m, c] - get(p, 12 + m * columns + c)
-        put3(p, 12 + c, add_scaled(get3(p, 12 + c, columns), e, gain), columns)
+        put3(p, 12 + c, algebra.add_scaled(get3(p, 12 + c, columns), e, gain), columns)
 
 
 @part
@@ -276,13 +262,13 @@ def update(rows, n, columns, world):
     for j in range(blocks_of(n)):
         p = row(rows, j * high)
         S, R = get6(p, 6), world.R[0]
-        P, gain, _ = take_value(get6(p, 0), R, 1.0)
-        S = correct_value(S, R, gain)
+        P, gain, _ = algebra.take_value(get6(p, 0), R, 1.0)
+        S = algebra.correct_value(S, R, gain)
         move_columns(p, gain, columns, world.inputs, 0)
         if world.observes == 2:
             R = world.R[1]
-            P, gain, _ = take_rate(P, R, 1.0)
-            S = correct_rate(S, R, gain)
+            P, gain, _ = algebra.take_rate(P, R, 1.0)
+            S = algebra.correct_rate(S, R, gain)
             move_columns(p, gain, columns, world.inputs, 1)
         put6(p, 0, P)
         put6(p, 6, S)
@@ -321,12 +307,12 @@ def branch(rows, n, columns, world):
 @part
 def refer(L, columns, dt, defect):
     """Refer a start in the making to the next scan, in place: L ← F⁻ᵀ L F⁻¹; Y gains L times the defect."""
-    made = predicted_information((L[0], L[1], L[2], L[3], L[4], L[5]), dt)
+    made = algebra.predicted_information((L[0], L[1], L[2], L[3], L[4], L[5]), dt)
     L[0], L[1], L[2], L[3], L[4], L[5] = made
     for c in range(columns):
         y0, y1, y2 = L[6 + c], L[6 + columns + c], L[6 + 2 * columns + c]
         moved = y0, y1 - dt * y0, y2 - dt * y1 + 0.5 * dt * dt * y0
-        more = times(made, (defect[0, c], defect[1, c], defect[2, c]))
+        more = algebra.times(made, (defect[0, c], defect[1, c], defect[2, c]))
         for i in range(3):
             L[6 + i * columns + c] = moved[i] + more[i]
 
@@ -334,12 +320,12 @@ def refer(L, columns, dt, defect):
 @part
 def begin(rows, n, L, columns):
     """A pattern more, the n-th, which starts with the sums L."""
-    high, P = height(columns), inverse((L[0], L[1], L[2], L[3], L[4], L[5]))
+    high, P = height(columns), algebra.inverse((L[0], L[1], L[2], L[3], L[4], L[5]))
     first = at(n, high)
     for i in range(6):
         rows[first + i * WIDTH] = rows[first + (6 + i) * WIDTH] = P[i]
     for c in range(columns):
-        e = times(P, (L[6 + c], L[6 + columns + c], L[6 + 2 * columns + c]))
+        e = algebra.times(P, (L[6 + c], L[6 + columns + c], L[6 + 2 * columns + c]))
         for i in range(3):
             rows[first + (12 + i * columns + c) * WIDTH] = e[i]
     for i in range(FURTHER):
@@ -397,7 +383,7 @@ def second_moment(p, columns):
     """S + E Eᵀ, packed, of a block."""
     S = get6(p, 6)
     for c in range(columns):
-        S = add_outer(S, 1.0, get3(p, 12 + c, columns))
+        S = algebra.add_outer(S, 1.0, get3(p, 12 + c, columns))
     return S
 
 

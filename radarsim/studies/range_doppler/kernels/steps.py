@@ -17,18 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels.algebra import (
-    NO_NOISE,
-    add_outer,
-    add_scaled,
-    constant_acceleration,
-    inverse,
-    predicted,
-    predicted_covariance,
-    take_rate,
-    take_value,
-    times,
-)
+from radarsim.kernels import algebra
 from radarsim.kernels.compile import aligned_zeros, inline, part
 from radarsim.kernels.lanes import (
     WIDTH,
@@ -111,15 +100,15 @@ def scan_of(observes):
     @part
     def scan(x, p, plots, detected, dt, Q, R):
         """One scan, in place: addresses of x (3, n), p (6, n), plots, detected; Q (6,), R (2,)."""
-        F, noise = constant_acceleration(dt), (Q[0], Q[1], Q[2], Q[3], Q[4], Q[5])
+        F, noise = algebra.constant_acceleration(dt), (Q[0], Q[1], Q[2], Q[3], Q[4], Q[5])
         R_range, R_velocity = R[0], R[1]
         for i in range(EIGHTS):
-            state, here = predicted(get3(x, i, EIGHTS), F), get(detected, i)
-            P, gain, _ = take_value(predicted_covariance(get6(p, i, EIGHTS), F, noise), R_range, here)
-            state = add_scaled(state, get(plots, i) - state[0], gain)
+            state, here = algebra.predicted(get3(x, i, EIGHTS), F), get(detected, i)
+            P, gain, _ = algebra.take_value(algebra.predicted_covariance(get6(p, i, EIGHTS), F, noise), R_range, here)
+            state = algebra.add_scaled(state, get(plots, i) - state[0], gain)
             if observes == 2:  # one number after the other
-                P, gain, _ = take_rate(P, R_velocity, here)
-                state = add_scaled(state, get(plots, EIGHTS + i) - state[1], gain)
+                P, gain, _ = algebra.take_rate(P, R_velocity, here)
+                state = algebra.add_scaled(state, get(plots, EIGHTS + i) - state[1], gain)
             put3(x, i, state, EIGHTS)
             put6(p, i, P, EIGHTS)
 
@@ -138,17 +127,17 @@ def gathered(sums, right, u, weights, plots):
     dt.
     """
     of_range, of_velocity = (1.0, u, 0.5 * u * u), (0.0, 1.0, u)
-    sums = add_outer(add_outer(sums, weights[0], of_range), weights[1], of_velocity)
-    right = add_scaled(right, weights[0] * plots[0], of_range)
-    return sums, add_scaled(right, weights[1] * plots[1], of_velocity)
+    sums = algebra.add_outer(algebra.add_outer(sums, weights[0], of_range), weights[1], of_velocity)
+    right = algebra.add_scaled(right, weights[0] * plots[0], of_range)
+    return sums, algebra.add_scaled(right, weights[1] * plots[1], of_velocity)
 
 
 @inline
 def solved(sums, right, u, dt):
     """State and packed covariance, u scan periods after the first plot, of the normal equations."""
-    P, F = inverse(sums), constant_acceleration(u)
-    r, v, a = predicted(times(P, right), F)
-    c0, c1, c2, c3, c4, c5 = predicted_covariance(P, F, NO_NOISE)
+    P, F = algebra.inverse(sums), algebra.constant_acceleration(u)
+    r, v, a = algebra.predicted(algebra.times(P, right), F)
+    c0, c1, c2, c3, c4, c5 = algebra.predicted_covariance(P, F, algebra.NO_NOISE)
     return (r, v / dt, a / (dt * dt)), (c0, c1 / dt, c2 / dt**2, c3 / dt**2, c4 / dt**3, c5 / dt**4)
 
 
@@ -193,13 +182,13 @@ def advance(at, f, dt, design, R):
 @part
 def advance_given(at, f, dt, gain, believed):
     """The same of a filter whose gain (3, 2), and packed covariance (6,) after it, are given."""
-    x, p, F = of_filter(at.x, f, 3), of_filter(at.p, f, 6), constant_acceleration(dt)
+    x, p, F = of_filter(at.x, f, 3), of_filter(at.p, f, 6), algebra.constant_acceleration(dt)
     of_range, of_velocity = (gain[0, 0], gain[1, 0], gain[2, 0]), (gain[0, 1], gain[1, 1], gain[2, 1])
     P = full(believed[0]), full(believed[1]), full(believed[2]), full(believed[3]), full(believed[4]), full(believed[5])
     for i in range(EIGHTS):
-        state = predicted(get3(x, i, EIGHTS), F)
+        state = algebra.predicted(get3(x, i, EIGHTS), F)
         r, v = get(at.plots, i) - state[0], get(at.plots, EIGHTS + i) - state[1]
-        put3(x, i, add_scaled(add_scaled(state, r, of_range), v, of_velocity), EIGHTS)
+        put3(x, i, algebra.add_scaled(algebra.add_scaled(state, r, of_range), v, of_velocity), EIGHTS)
         put6(p, i, P, EIGHTS)
 
 

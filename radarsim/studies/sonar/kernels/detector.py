@@ -27,16 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels.algebra import (
-    add_outer,
-    add_scaled,
-    constant_acceleration,
-    predicted,
-    predicted_covariance,
-    predicted_information,
-    take_value,
-    times,
-)
+from radarsim.kernels import algebra
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import (
     address,
@@ -213,25 +204,25 @@ def adapt(filters, plots, f, c, rules, size, length, dt, period):
     T, recent, raises = plots.T[rules.detector[f], rules.group[f, c]], plots.recent[c], rules.raises[f]
     at, ar, longest = address(T), address(recent), recent.shape[1]
     zero, one, half, threshold = full(0.0), full(1.0), full(0.5), full(rules.threshold[f, c])
-    tau, per, twice, F = dt / period, 1.0 / period, 1.0 / (period * period), constant_acceleration(dt)
+    tau, per, twice, F = dt / period, 1.0 / period, 1.0 / (period * period), algebra.constant_acceleration(dt)
     most, short, patience = full(float(size)), full(float(length)), full(float(rules.quiet[f]))
     raised = full(3.0) if raises else most
     for i in range(GROUPS):
         w, mode = get(aw, i), get(am, i)
         detected = where_greater(w, zero, one, zero)
-        Y = predicted_information(get6(ay, i, GROUPS), tau)
+        Y = algebra.predicted_information(get6(ay, i, GROUPS), tau)
         Y = (Y[0] + w, Y[1], Y[2], Y[3], Y[4], Y[5])
         most_now, rank = where_greater(mode, half, raised, most), get(an, i) + detected
         P = leading_inverse(Y, where_greater(rank, most_now, most_now, rank))
-        x = predicted(get3(ax, i, GROUPS), F)
-        x = add_scaled(x, w * (get(az, i) - x[0]), (P[0], per * P[1], twice * P[2]))
+        x = algebra.predicted(get3(ax, i, GROUPS), F)
+        x = algebra.add_scaled(x, w * (get(az, i) - x[0]), (P[0], per * P[1], twice * P[2]))
         mode_now, quiet = next_mode(get(at, i), threshold, mode, get(am, QUIET * GROUPS + i), patience)
         kept = get(am, PLOTS * GROUPS + i) + detected
         restarted = (mode_now - mode) * (mode_now - mode) + (zero if raises else mode_now)
         if any_greater(restarted, half):
             Y_recent, b, newest = parabola(ar, length, longest, i)
             P_recent = leading_inverse(Y_recent, where_greater(mode_now, half, raised, most))
-            r, v, a = times(P_recent, b)
+            r, v, a = algebra.times(P_recent, b)
             x = choose3(restarted, half, (newest + r, per * v, twice * a), x)
             kept = where_greater(restarted, half, short, kept)
             P = choose6(restarted, half, P_recent, P)
@@ -267,7 +258,7 @@ def merged(mu1, x1, P1, mu2, x2, P2):
         mu1 * P1[4] + mu2 * P2[4],
         mu1 * P1[5] + mu2 * P2[5],
     )
-    return m, add_outer(P, mu1 * mu2, d)
+    return m, algebra.add_outer(P, mu1 * mu2, d)
 
 
 @inline
@@ -285,11 +276,11 @@ def mixed(c, from_first, first, second):
 @inline
 def filtered(x, P, tau, Q, z, w):
     """Predict and update with a plot z of weight w, zero where missed: x, P, nis and S."""
-    zero, one, F = full(0.0), full(1.0), constant_acceleration(tau)
-    x, taken = predicted(x, F), where_greater(w, zero, one, zero)
-    P, g, S = take_value(predicted_covariance(P, F, Q), 1.0 / where_greater(w, zero, w, one), taken)
+    zero, one, F = full(0.0), full(1.0), algebra.constant_acceleration(tau)
+    x, taken = algebra.predicted(x, F), where_greater(w, zero, one, zero)
+    P, g, S = algebra.take_value(algebra.predicted_covariance(P, F, Q), 1.0 / where_greater(w, zero, w, one), taken)
     e = z - x[0]
-    return add_scaled(x, e, g), P, taken * e * e / S, where_greater(w, zero, S, one)
+    return algebra.add_scaled(x, e, g), P, taken * e * e / S, where_greater(w, zero, S, one)
 
 
 @inline
@@ -319,7 +310,7 @@ def interact(filters, plots, f, c, pairs, size, dt, period, sigma):
     """
     ax, ay, am, ap, az, aw, an = memory_of(filters, plots, f, c)
     tau, per, unit, one, zero = dt / period, 1.0 / period, 1.0 / sigma, full(1.0), full(0.0)
-    first_scans, half, F = full(size - 0.5), full(0.5), constant_acceleration(dt)
+    first_scans, half, F = full(size - 0.5), full(0.5), algebra.constant_acceleration(dt)
     q, stay = pairs.manoeuvre[f, c], pairs.stay[f]
     Q = (manoeuvre_covariance(q[0], tau, size), manoeuvre_covariance(q[1], tau, size))
     p11, p22 = stay[0], stay[1]
@@ -331,8 +322,8 @@ def interact(filters, plots, f, c, pairs, size, dt, period, sigma):
         z, w, n = get(az, i), get(aw, i), get(an, i)
         Y, K, P_start = least_squares(get_information(ay, i), n, w, tau, 0.0, size)
         put_information(ay, i, Y)
-        x_now = predicted(get3(ax, i, GROUPS), F)
-        x_now = add_scaled(x_now, z - x_now[0], (K[0], per * K[1], per * per * K[2]))
+        x_now = algebra.predicted(get3(ax, i, GROUPS), F)
+        x_now = algebra.add_scaled(x_now, z - x_now[0], (K[0], per * K[1], per * per * K[2]))
         x_start = (unit * x_now[0], unit * period * x_now[1], unit * period * period * x_now[2])
         x, mu = get6(am, STATE * GROUPS + i, GROUPS), (get(am, to_first + i), get(am, to_second + i))
         first, second = (x[:3], get6(am, P_first + i, GROUPS)), (x[3:], get6(am, P_second + i, GROUPS))

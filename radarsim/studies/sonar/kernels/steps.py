@@ -25,17 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels.algebra import (
-    NO_NOISE,
-    add_outer,
-    add_scaled,
-    constant_acceleration,
-    corrected,
-    predicted,
-    predicted_covariance,
-    predicted_information,
-    times,
-)
+from radarsim.kernels import algebra
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import (
     WIDTH,
@@ -129,7 +119,7 @@ def normal_equations(recent, length, longest, i, origin, half):
         z = get(recent, here) - origin
         age, w = get(recent, longest * PITCH + here), get(recent, 2 * longest * PITCH + here)
         h = (1.0, zero - age, half * age * age)
-        Y, b = add_outer(Y, w, h), add_scaled(b, w * z, h)
+        Y, b = algebra.add_outer(Y, w, h), algebra.add_scaled(b, w * z, h)
     return Y, b
 
 
@@ -145,7 +135,7 @@ def manoeuvre_covariance(q, tau, size):
     """Q (6) of a random derivative of order `size` and variance q, constant over tau."""
     half = 0.5 * tau * tau
     g = (half, tau, 0.0) if size == 2 else (tau * half / 3.0, half, tau)
-    return add_outer(NO_NOISE, q, g)
+    return algebra.add_outer(algebra.NO_NOISE, q, g)
 
 
 # ---- least squares in information form ----------------------------------------------------------------------------
@@ -164,10 +154,10 @@ def least_squares(Y, n, w, tau, c, size):
     w_new = where_greater(new, full(NOTHING_NEW), w / new, zero)
     second = -0.5 if size == 3 else 0.0
     H = (1.0 - c_last, c_last * age, second * (c_last * age) * age)
-    Y = add_outer(predicted_information(Y[:6], tau), w_new, H)
+    Y = algebra.add_outer(algebra.predicted_information(Y[:6], tau), w_new, H)
     rank, most = n + where_greater(w, zero, one, zero), full(float(size))
     P = leading_inverse(Y, where_greater(rank, most, most, rank))
-    k0, k1, k2 = times(P, (w_new * H[0], w_new * H[1], w_new * H[2]))
+    k0, k1, k2 = algebra.times(P, (w_new * H[0], w_new * H[1], w_new * H[2]))
     carried = 1.0 if c != 0.0 else 0.0
     k3 = carried * where_greater(w_new, zero, 1.0 - k0, zero)
     age, c_last = where_greater(w, zero, zero, age), where_greater(w, zero, one, c_last)
@@ -178,9 +168,9 @@ def least_squares(Y, n, w, tau, c, size):
 @inline
 def predicted_joint(J, w, tau, model):
     """F J Fᵀ + Q; the variance of the error remains that of a stationary process, 1 / w."""
-    one, zero, c, F = full(1.0), full(0.0), model.c, constant_acceleration(tau)
-    P = predicted_covariance(J[:6], F, manoeuvre_covariance(model.q, tau, model.size))
-    e = predicted(J[6:9], F)
+    one, zero, c, F = full(1.0), full(0.0), model.c, algebra.constant_acceleration(tau)
+    P = algebra.predicted_covariance(J[:6], F, manoeuvre_covariance(model.q, tau, model.size))
+    e = algebra.predicted(J[6:9], F)
     return (*P, c * e[0], c * e[1], c * e[2], c * c * J[9] + (1.0 - c * c) / where_greater(w, zero, w, one))
 
 
@@ -207,7 +197,7 @@ def updated_joint(J, K, h, S):
     """J - h Kᵀ - K hᵀ + K S Kᵀ with h = J Hᵀ, which is valid for any gain."""
     r = (K[0] * S - h[0], K[1] * S - h[1], K[2] * S - h[2], K[3] * S - h[3])
     e = (J[6] + K[0] * r[3] - h[0] * K[3], J[7] + K[1] * r[3] - h[1] * K[3], J[8] + K[2] * r[3] - h[2] * K[3])
-    return (*corrected(J[:6], h, K, S), *e, J[9] + K[3] * r[3] - h[3] * K[3])
+    return (*algebra.corrected(J[:6], h, K, S), *e, J[9] + K[3] * r[3] - h[3] * K[3])
 
 
 @inline
@@ -234,7 +224,7 @@ def kalman(J, start, n, w, tau, model):
 def updated_state(x, z, K, dt, period, c):
     """State x (4) after an interval dt and a plot z: F x + K (z - H F x), in m or rad, and s."""
     per, twice = 1.0 / period, 1.0 / (period * period)
-    r, v, a = predicted((x[0], x[1], x[2]), constant_acceleration(dt))
+    r, v, a = algebra.predicted((x[0], x[1], x[2]), algebra.constant_acceleration(dt))
     e = c * x[3]
     innovation = z - r - e
     return (r + K[0] * innovation, v + per * K[1] * innovation, a + twice * K[2] * innovation, e + K[3] * innovation)
@@ -315,6 +305,6 @@ def fit(filters, plots, f, c, length, size, period):
         Y, b = normal_equations(a, length, longest, i, zero, half)
         rank = get(an, i)
         P = leading_inverse(Y, where_greater(rank, most, most, rank))
-        r, v, acceleration = times(P, b)
+        r, v, acceleration = algebra.times(P, b)
         put3(ax, i, (r, per * v, twice * acceleration), GROUPS)
         put6(ap, i, P, GROUPS)
