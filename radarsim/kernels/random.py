@@ -211,3 +211,32 @@ def fill_uniform_strip(key, first, pair, a, b):
         x[i], y[i] = threefry(start + (U(i) & U(LANES - 1)), call + (U(i) >> U(LANE_BITS)), k0, k1)
     for i in range(a.size):
         a[i], b[i] = uniform(x[i]), uniform(y[i])
+
+
+# ---- mixtures of laws, from which rare events are drawn --------
+@inline
+def part_of(key, cumulative, realisation):
+    """Which part of a mixture a realisation is drawn from, 0 the plain law; cumulative (M + 1,) sums up their shares,
+    the last is 1."""
+    which, _ = uniforms(key[0], key[1], realisation, 0)
+    m = 0
+    while which > cumulative[m]:
+        m += 1
+    return m
+
+
+@inline
+def add_weight(w, sums, j):
+    """Add an event of weight w to row j of sums (n, 4): Σw, Σw², number and Σw⁴."""
+    sums[j, 0] += w
+    sums[j, 1] += w * w
+    sums[j, 2] += 1.0
+    sums[j, 3] += w**4
+
+
+@inline
+def add_drawn(w, plain, drawn):
+    """Add a realisation of weight w, drawn as it is or not, to drawn (3,): number of plain ones, Σw and Σw²."""
+    drawn[0] += plain
+    drawn[1] += w
+    drawn[2] += w * w

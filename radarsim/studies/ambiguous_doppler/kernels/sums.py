@@ -17,7 +17,7 @@ import numpy as np
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.hypotheses import Lists
 from radarsim.kernels.lanes import WIDTH, address, exponential, full, get, put, row, rows, total, where_greater
-from radarsim.kernels.random import uniforms
+from radarsim.kernels.random import add_drawn, add_weight, part_of
 from radarsim.studies.ambiguous_doppler.kernels import records as rec
 from radarsim.studies.ambiguous_doppler.kernels.records import Banks, Sums, World, memory
 from radarsim.studies.ambiguous_doppler.kernels.steps import (
@@ -228,16 +228,6 @@ class Losses(NamedTuple):
 
 
 @part
-def drawn_from(mixture, realisation):
-    """Which part of the mixture a realisation is drawn from: 0 is the plain law, m is shifted along u_m−1."""
-    which, _ = uniforms(mixture.key[0], mixture.key[1], realisation, 0)
-    m = 0
-    while which > mixture.cumulative[m]:
-        m += 1
-    return m
-
-
-@part
 def weigh(mixture, normals, weights):
     """The weights of eight realisations into a row, from the rows of their normals; both are addresses."""
     density = full(mixture.cumulative[0])
@@ -258,20 +248,11 @@ def fill_shifted(world, mixture, first, normals, chosen, weights):
     """
     fill_normals(world, first, normals)
     for n in range(WIDTH):
-        chosen[n] = m = drawn_from(mixture, first + n)
+        chosen[n] = m = part_of(mixture.key, mixture.cumulative, first + n)
         if m > 0:
             for r in range(mixture.units.shape[1]):
                 normals[WIDTH * r + n] += mixture.shift[m - 1] * mixture.units[m - 1, r]
     weigh(mixture, address(normals), address(weights))
-
-
-@part
-def add_event(weight, to):
-    """Count an event of a realisation."""
-    to[0] += weight
-    to[1] += weight * weight
-    to[2] += 1.0
-    to[3] += weight**4
 
 
 @part
@@ -289,11 +270,11 @@ def add_events(world, banks, memory, weights, size, losses):
                     gone |= 1 << n
                     crowded |= (1 if bank[rec.COUNT * WIDTH + n] >= most else 0) << n
                 if bank[rec.RIGHT * WIDTH + n] == 0.0:
-                    add_event(weights[n], losses.events[f, k, WRONG])
+                    add_weight(weights[n], losses.events[f, k], WRONG)
                     if crowded >> n & 1 == 1:
-                        add_event(weights[n], losses.events[f, k, FULL])
+                        add_weight(weights[n], losses.events[f, k], FULL)
                 if abs(velocity[n] - plot[(rec.TRUTH + 1) * WIDTH + n]) > 0.5 * world.spans[k]:
-                    add_event(weights[n], losses.events[f, k, BEYOND])
+                    add_weight(weights[n], losses.events[f, k], BEYOND)
 
 
 @kernel
@@ -308,9 +289,7 @@ def add_weighted_block(world, banks, mixture, memory, room, sums, losses, first,
         for n in range(WIDTH):
             memory.counted[n] = 1.0 if n < size and chosen[n] == 0 else 0.0
         for n in range(size):
-            losses.drawn[0] += memory.counted[n]
-            losses.drawn[1] += weights[n]
-            losses.drawn[2] += weights[n] * weights[n]
+            add_drawn(weights[n], memory.counted[n], losses.drawn)
         add_events(world, banks, memory, weights, size, losses)
         add_group(world, banks, memory, sums)
 

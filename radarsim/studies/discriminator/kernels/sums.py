@@ -19,7 +19,7 @@ from radarsim.bursts.kernels.lanes import PRIOR, lane
 from radarsim.bursts.kernels.scoring import SIZE
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put
-from radarsim.kernels.random import uniforms
+from radarsim.kernels.random import add_weight, part_of
 
 # ---- sums ------------------------------------------------------------------------------------------------------------
 BINS_PER_OCTAVE, FEWEST_OCTAVES, OCTAVES = 4, -6, 18  # of |e|/σ: from 1/64 to 4096, outer bins open
@@ -130,10 +130,7 @@ def accumulate_losses(errors, options, potential, posterior, weights, losses):
             for i in range(n):
                 for lock in range(len(LOCKS)):
                     if met[i, k, lock] == 0.0:
-                        losses[f, k, lock, 0] += weights[i]
-                        losses[f, k, lock, 1] += weights[i] * weights[i]
-                        losses[f, k, lock, 2] += 1.0
-                        losses[f, k, lock, 3] += weights[i] ** 4
+                        add_weight(weights[i], losses[f, k], lock)
 
 
 # ---- rare ------------------------------------------------------------------------------------------------------------
@@ -155,11 +152,7 @@ def choose(key, first, cumulative, chosen):
     0 is the plain law, m the shift along direction m − 1.
     """
     for i in range(chosen.size):
-        which, _ = uniforms(key[0], key[1], first + i, 0)
-        m = 0
-        while which > cumulative[m]:
-            m += 1
-        chosen[i] = m
+        chosen[i] = part_of(key, cumulative, first + i)
 
 
 @kernel

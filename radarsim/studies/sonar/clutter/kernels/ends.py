@@ -31,7 +31,7 @@ import numpy as np
 
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import address
-from radarsim.kernels.random import uniforms
+from radarsim.kernels.random import add_drawn, add_weight, uniforms
 from radarsim.studies.sonar.clutter.kernels import tracker
 from radarsim.studies.sonar.clutter.kernels.rare import LARGEST, MOST_MEAN, associate_drawn, box_of
 from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
@@ -361,7 +361,7 @@ def add_ended(limits, n, tracks, status, course, laws, own, ended):
             lost = status[tracker.MISSES, i] < misses and tracker.off_target(tracks, course, beyond, i)
             beside = own[CAME, i] > 0.0 and own[SEDUCED, i] == 0.0
             kind = (LOST if lost else DROPPED) + (DROPPED_AFTER if beside else 0)
-            tracker.add_weight(weight_of(laws.shares, own, i), ended, kind)
+            add_weight(weight_of(laws.shares, own, i), ended, kind)
 
 
 # ---- a block --------------------------------------------------------------------------------------------------------
@@ -409,4 +409,4 @@ def simulate_ends(world, detections, field, trackers, ends, work, first, total, 
         for f in range(F):
             for i in range(n):
                 if trackers.association[f] != tracker.KNOWN:
-                    tracker.add_drawn(weight_of(ends.shares[f], own[f], i), own[f, LAW, i] == 0.0, sums.ended_drawn[f])
+                    add_drawn(weight_of(ends.shares[f], own[f], i), own[f, LAW, i] == 0.0, sums.ended_drawn[f])

@@ -22,7 +22,7 @@ import numpy as np
 
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import address
-from radarsim.kernels.random import uniform, uniforms
+from radarsim.kernels.random import add_drawn, add_weight, uniform, uniforms
 from radarsim.studies.sonar.clutter.kernels import tracker
 from radarsim.studies.sonar.kernels.steps import CHUNK
 
@@ -183,7 +183,7 @@ def add_held(shares, own, state, n, held):
     """Count a scan of the n tracks that are confirmed, by their weights so far; state (CHUNK,)."""
     for i in range(n):
         if state[i] == tracker.CONFIRMED:
-            tracker.add_weight(weight_of(shares, own, i), held, int(own[HELD, i]))
+            add_weight(weight_of(shares, own, i), held, int(own[HELD, i]))
             own[HELD, i] += 1.0
 
 
@@ -223,5 +223,5 @@ def simulate_false(seeds, field, shift, trackers, work, dt, first, total, scores
                 if not left:
                     break
             for i in range(n):
-                tracker.add_drawn(weight_of(shift.shares, own, i), own[LAW, i] == 0.0, sums.drawn[f])
+                add_drawn(weight_of(shift.shares, own, i), own[LAW, i] == 0.0, sums.drawn[f])
             tracker.add_scores(trackers.thresholds, n, status[tracker.FIRST], status[tracker.BEST], scores[f])

@@ -321,23 +321,6 @@ def add_errors(trackers, tracks, f, k, course, kept, used, out, sums):
         add_sums(rows, tracks.P[c], size, tracks.x[c], 0, units, (f, k, c), out, sums)
 
 
-@inline
-def add_weight(w, sums, j):
-    """Add an event of weight w to row j of sums (n, 4): Σw, Σw², number and Σw⁴."""
-    sums[j, 0] += w
-    sums[j, 1] += w * w
-    sums[j, 2] += 1.0
-    sums[j, 3] += w**4
-
-
-@inline
-def add_drawn(w, plain, drawn):
-    """Add a realisation of weight w, drawn as it is or not, to drawn (3,): number of plain ones, Σw and Σw²."""
-    drawn[0] += plain
-    drawn[1] += w
-    drawn[2] += w * w
-
-
 # ---- tracks ----------------------------------------------------------------------------------------------------------
 STARTED = 2.0  # plots from which a line is no longer least squares
 
