@@ -19,7 +19,7 @@ from radarsim.bursts.kernels.lanes import PRIOR, lane
 from radarsim.bursts.kernels.scoring import SIZE
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put
-from radarsim.kernels.random import add_weight, part_of
+from radarsim.kernels.random import part_of
 
 # ---- sums ------------------------------------------------------------------------------------------------------------
 BINS_PER_OCTAVE, FEWEST_OCTAVES, OCTAVES = 4, -6, 18  # of |e|/σ: from 1/64 to 4096, outer bins open
@@ -130,7 +130,11 @@ def accumulate_losses(errors, options, potential, posterior, weights, losses):
             for i in range(n):
                 for lock in range(len(LOCKS)):
                     if met[i, k, lock] == 0.0:
-                        add_weight(weights[i], losses[f, k], lock)
+                        # As `add_weight`, which is compiled to other last digits here.
+                        losses[f, k, lock, 0] += weights[i]
+                        losses[f, k, lock, 1] += weights[i] * weights[i]
+                        losses[f, k, lock, 2] += 1.0
+                        losses[f, k, lock, 3] += weights[i] ** 4
 
 
 # ---- rare ------------------------------------------------------------------------------------------------------------
