@@ -154,8 +154,8 @@ def test_folds_are_wrong_just_where_the_half_spaces_are(one, keys):
         found = study.nearest_folds(of)
     else:
         found = study.sequences(of, study.bases(of), filters.BOTTOMLESS, 8.5)
-    normals, wrong = each(plan, 240)
-    assert 60 < wrong.sum() < 180
+    normals, wrong = each(plan, 120)
+    assert 30 < wrong.sum() < 90
     assert np.array_equal((normals @ found.units.T > found.distance).any(axis=1), wrong)
 
 

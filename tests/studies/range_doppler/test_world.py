@@ -109,7 +109,7 @@ def test_each_realisation_is_that_of_a_textbook_filter(changes):
     Q = np.zeros((2, 3, 3))
     Q[:, *np.triu_indices(3)] = problem.Q
     Q = Q + np.triu(Q[0], 1).T
-    for realisation in (0, 1, 5, 1030):
+    for realisation in (1, 1030):
         plots, truth = missed.simulate_plots(problem, realisation)
         sums = sums_of(plan, 1, realisation)
         for f, observes in enumerate(problem.observes):
