@@ -287,8 +287,10 @@ class Result:
         return [*self.faults, *self.facts["warnings"], *self._of_intervals]
 
     @cached_property
-    def _of_intervals(self) -> list[str]:
-        return notes.of_intervals(self.cases, self._tables, partial(answered, self.cases))
+    def _of_intervals(self) -> Sequence[str]:
+        if self.written is not None:
+            return self.written.of_intervals
+        return notes.of_intervals(self.cases, self._tables, answers(self.cases))
 
 
 # ---- output ----------------------------------------------------------------------------------------------------------
@@ -354,15 +356,20 @@ MOST_FURTHER = 6  # sentences on further baselines
 
 def answered(results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"]) -> tuple[str, ...]:
     """The answer of an experiment: the study's, and the gains at the last scan against further baselines."""
-    own = study(results[0].study).answer(results, against_first(made, results))
-    further = [_gained(one, made["gains"]) for result in results for one in result.against]
-    more = [tr("Further gains stand in gains.csv.")] if len(further) > MOST_FURTHER else []
-    return (*own, *filter(None, further[:MOST_FURTHER]), *more)
+    more = [tr("Further gains stand in gains.csv.")] if sum(len(one.against) for one in results) > MOST_FURTHER else []
+    return (*(sentence for part in answers(results) for sentence in part(made)), *more)
 
 
-def _gained(result: CaseResult, gains: "pd.DataFrame") -> str:
+def answers(results: Sequence[CaseResult]) -> "list[notes.Answer]":
+    """What makes the answer from the tables, in parts: the study's own, and of each further baseline."""
+    own = study(results[0].study)
+    further = [partial(_gained, one) for result in results for one in result.against]
+    return [lambda made: own.answer(results, against_first(made, results)), *further[:MOST_FURTHER]]
+
+
+def _gained(result: CaseResult, made: Mapping[str, "pd.DataFrame"]) -> list[str]:
     """What each filter gains against the baseline of a result, at the last scan that both have."""
-    last = common.against_own(gains, [result])
+    last = common.against_own(made["gains"], [result])
     last = last.groupby(["filter", "component"], sort=False).tail(1)
     keys = ("gain_percent", "gain_lo", "gain_hi")
     each = []
@@ -372,9 +379,9 @@ def _gained(result: CaseResult, gains: "pd.DataFrame") -> str:
         ]
         each.append(f"{name[0] if isinstance(name, tuple) else name} {', '.join(parts)}")
     if not each:
-        return ""
+        return []
     told = {"case": result.name, "base": result.baseline, "t": float(last["t_s"].max()), "filters": "; ".join(each)}
-    return tr("{case}, gain against {base} at {t:g} s: {filters}.", **told)
+    return [tr("{case}, gain against {base} at {t:g} s: {filters}.", **told)]
 
 
 def case_figures(
@@ -422,7 +429,7 @@ class Written:
     """What was written: the folder, its files by their path in it, the tables, and the sentences of the answer.
 
     removed are files of an earlier run that this one did not write. seconds: what drawing took, and writing with the
-    report.
+    report. of_intervals: what a reader of the answer must know of its intervals.
     """
 
     folder: Path
@@ -431,6 +438,7 @@ class Written:
     tables: Mapping[str, "pd.DataFrame"] = field(repr=False)
     answer: tuple[str, ...]
     seconds: Mapping[str, float]
+    of_intervals: tuple[str, ...]
 
 
 ALWAYS = ("curves", "gains")  # tables written without a row too; others only where they have one
@@ -477,7 +485,7 @@ def write_files(
             contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
         contents["figures/captions.md"] = captions(described).encode()
     drawn = time.perf_counter()
-    of_intervals = notes.of_intervals(results, made, partial(answered, results))
+    of_intervals = notes.of_intervals(results, made, answers(results))
     run = {**run, "warnings": [*run.get("warnings", ()), *of_intervals, *unnamed(own, described)]}
     record = files.record(experiment, results, run, contents, answer, store.described())
     report = html.report_page(
@@ -497,7 +505,7 @@ def write_files(
     removed = sorted(set(files.outputs(folder)) - set(contents))
     files.replace_all(folder, contents, stale=files.outputs)
     seconds = {"drawing": drawn - began, "writing": time.perf_counter() - drawn}
-    return Written(folder, tuple(sorted(contents)), tuple(removed), made, answer, seconds)
+    return Written(folder, tuple(sorted(contents)), tuple(removed), made, answer, seconds, tuple(of_intervals))
 
 
 DRAWN_FOR_ALL = ("claims", "sweep")  # figures that no study names, and begin so

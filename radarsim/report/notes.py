@@ -351,23 +351,31 @@ def heavy(table: "pd.DataFrame") -> np.ndarray:
     return table["note"].ne("").to_numpy() if "note" in table else np.full(len(table), False)
 
 
-def concerned(
-    made: Mapping[str, "pd.DataFrame"], answer: Callable[[Mapping[str, "pd.DataFrame"]], Sequence[str]]
-) -> "dict[str, pd.DataFrame]":
+Answer = Callable[[Mapping[str, "pd.DataFrame"]], Sequence[str]]  # sentences from the tables
+
+
+def concerned(made: Mapping[str, "pd.DataFrame"], answers: Sequence[Answer]) -> "dict[str, pd.DataFrame]":
     """By table the marked rows whose intervals the answer gives, or is decided by: with wider ones it reads otherwise.
 
-    answer makes its sentences from the tables.
+    answers: the parts of the answer, each looked at by itself, as most rows concern one of many.
     """
-    said, found = list(answer(made)), {}
-    for name, table in made.items():
+    found: dict[str, set[int]] = {}
+    for answer in answers:
+        said = list(answer(made))
+        for name, table in made.items():
 
-        def matter(at: np.ndarray, name: str = name, table: "pd.DataFrame" = table) -> bool:
-            return list(answer({**made, name: _wider(table, at)})) != said
+            def matter(
+                at: np.ndarray,
+                name: str = name,
+                table: "pd.DataFrame" = table,
+                answer: Answer = answer,
+                said: list[str] = said,
+            ) -> bool:
+                return list(answer({**made, name: _wider(table, at)})) != said
 
-        marked = heavy(table) & (table["note"] != VARIES) if "note" in table else heavy(table)
-        if rows := _least(np.flatnonzero(marked), matter):
-            found[name] = table.iloc[rows]
-    return found
+            marked = heavy(table) & (table["note"] != VARIES) if "note" in table else heavy(table)
+            found.setdefault(name, set()).update(_least(np.flatnonzero(marked), matter))
+    return {name: made[name].iloc[sorted(rows)] for name, rows in found.items() if rows}
 
 
 def _least(rows: np.ndarray, matter: Callable[[np.ndarray], bool]) -> list[int]:
@@ -481,15 +489,13 @@ MOST_NAMES = 3  # named in a line
 
 
 def of_intervals(
-    results: Sequence[CaseResult],
-    made: "Mapping[str, pd.DataFrame]",
-    answer: "Callable[[Mapping[str, pd.DataFrame]], Sequence[str]]",
+    results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", answers: Sequence[Answer]
 ) -> list[str]:
     """What a reader of the answer must know of its intervals, a line at most; and whether weights are wrong.
 
-    answer makes its sentences from the tables. How many rows of which table are marked is said where these are shown.
+    answers: the parts of the answer. How many rows of which table are marked is said where these are shown.
     """
-    return [*(few(results) or rests(results, made, answer)), *rare.warnings(made.get("rare"))]
+    return [*(few(results) or rests(results, made, answers)), *rare.warnings(made.get("rare"))]
 
 
 def few(results: Sequence[CaseResult]) -> list[str]:
@@ -506,13 +512,9 @@ def few(results: Sequence[CaseResult]) -> list[str]:
     return [words]
 
 
-def rests(
-    results: Sequence[CaseResult],
-    made: "Mapping[str, pd.DataFrame]",
-    answer: "Callable[[Mapping[str, pd.DataFrame]], Sequence[str]]",
-) -> list[str]:
+def rests(results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", answers: Sequence[Answer]) -> list[str]:
     """A line on the answer's intervals that are too narrow, with the realisations that it takes, if any are."""
-    found = concerned(made, answer).values()
+    found = concerned(made, answers).values()
     if not found:
         return []
     count, names = sum(map(len, found)), _named(list(dict.fromkeys(name for rows in found for name in rows["filter"])))

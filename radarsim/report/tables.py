@@ -240,7 +240,8 @@ def _gains(result: CaseResult) -> Columns:
 def against_own(gains: "pd.DataFrame", results: Sequence[CaseResult]) -> "pd.DataFrame":
     """The rows of gains that are against the baselines of these results, not against further ones of their cases."""
     own = {(result.name, result.baseline) for result in results}
-    return gains[np.array([pair in own for pair in zip(gains["case"], gains["baseline"], strict=True)], dtype=bool)]
+    pairs = zip(gains["case"].tolist(), gains["baseline"].tolist(), strict=True)
+    return gains[np.array([pair in own for pair in pairs], dtype=bool)]
 
 
 def below(parts: "Sequence[pd.DataFrame]") -> "pd.DataFrame":

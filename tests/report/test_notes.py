@@ -137,13 +137,13 @@ def test_what_is_said_above_an_answer_is_of_the_intervals_that_it_gives():
     curves.loc[20, "n_eff"] = 30.0
     made = notes.noted({"curves": curves, "gains": pd.DataFrame()}, results)
     assert notes.heavy(made["curves"]).sum() == 13
-    assert not notes.of_intervals(results, made, given(0, 59, 80))
-    (line,) = notes.of_intervals(results, made, given(0, 14, 80))
+    assert not notes.of_intervals(results, made, [given(0, 59, 80)])
+    (line,) = notes.of_intervals(results, made, [given(0, 14, 80)])
     assert line.startswith("1 interval of the answer is too narrow")
     assert "(f): -n 2e4 would do" in line  # 5000 × 100/30
-    (line,) = notes.of_intervals(results, made, given(14, 15, 26, 27))
+    (line,) = notes.of_intervals(results, made, [given(14), given(15, 26, 27)])
     assert line.startswith("3 intervals of the answer are too narrow")
-    (line,) = notes.of_intervals([SimpleNamespace(name="a", count=FEW - 1)], made, given(14))
+    (line,) = notes.of_intervals([SimpleNamespace(name="a", count=FEW - 1)], made, [given(14)])
     assert f"{FEW - 1} realisations are rough" in line
 
 
@@ -151,8 +151,8 @@ def test_a_note_that_begins_with_the_name_of_an_interval_is_of_that_one_alone():
     row = {"case": "a", "filter": "f", "n": 5000, "sigma_lo": 0.9, "sigma_hi": 1.1, "gain_lo": 1.0, "gain_hi": 3.0}
     made = {"stages": pd.DataFrame([row | {"note": notes.OF_GAIN + notes.HEAVY}]), "curves": pd.DataFrame()}
     results = [SimpleNamespace(name="a", count=5000)]
-    assert not notes.of_intervals(results, made, lambda made: [str(made["stages"]["sigma_hi"][0])])
-    (line,) = notes.of_intervals(results, made, lambda made: [str(made["stages"]["gain_hi"][0])])
+    assert not notes.of_intervals(results, made, [lambda made: [str(made["stages"]["sigma_hi"][0])]])
+    (line,) = notes.of_intervals(results, made, [lambda made: [str(made["stages"]["gain_hi"][0])]])
     assert "may be too narrow" in line
     assert "(f)" in line
 
@@ -174,7 +174,7 @@ def check_notes_and_warning(config):
         wide = {name: notes._wider(table, at) for name, table in made.items() if len(at := widened(name, table))}
         return list(study.answer(result.cases, {**made, **wide}))
 
-    found = notes.concerned(made, lambda tables: study.answer(result.cases, tables))
+    found = notes.concerned(made, [lambda tables: study.answer(result.cases, tables)])
     every = answer(lambda _, table: np.flatnonzero(notes.heavy(table) & (table.get("note", "") != notes.VARIES)))
     own = answer(lambda name, table: table.index.get_indexer(found[name].index) if name in found else ())
     assert own == every  # no other row's interval is in the answer
