@@ -27,7 +27,6 @@ from radarsim.app import stored as stored_claims
 from radarsim.app.run import Progress, RunOptions, SimulatedCases
 from radarsim.app.stored import CLASSES, PLACE, stored_classes, stored_readings
 from radarsim.config.experiment import Case, Experiment
-from radarsim.engine.results import CaseResult
 from radarsim.engine.run import Signals
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.report import files
@@ -190,7 +189,7 @@ class Plan:
         simulated = run.simulate(experiment, options, progress=progress)
         if simulated.stopped:
             raise TargetUnmet(f"readings: {simulated.stopped}: the same command continues")
-        results = [run.case_result(*one) for one in simulated.cases]
+        results = run.finished(simulated)
         tables = result.measured(results)
         originals = [replace(own, spec=case.spec) for own, (case, _) in zip(results, pairs, strict=True)]
         may_grow = self._paper.claims.may_grow
@@ -257,7 +256,7 @@ def simulated(experiment: Experiment, options: RunOptions, progress: Progress | 
 
 def rows_of(experiment: Experiment, found: SimulatedCases) -> list[dict[str, Any]]:
     """The rows of claims.csv of what is done."""
-    results: list[CaseResult] = [run.case_result(*one) for one in found.cases]
+    results = run.finished(found)
     if len(results) < len(experiment.cases):
         return []
     table = result.case_tables(results, stem=experiment.stem)["claims"]
@@ -416,7 +415,7 @@ def readings(
     total, done = sum(plan.total for plan in plans), 0
     read, left = [], []
     for plan, one in zip(plans, wanted, strict=True):
-        over = plan.judged(options, _after(progress, done, total), stop)
+        over = plan.judged(options, _shifted(progress, done, max(total, 1)), stop)
         if decide:
             over = plan.decided(over, realisations or one.paper.readings.most, options, progress, stop)
             left += [line for each in over if (line := _left(each))]
@@ -449,10 +448,6 @@ def _left(over: Over) -> str:
 def _counted(paper: Paper, over: list[Over]) -> Search | Joint:
     """The joint search of a paper: over all it computes at once, else over its declared readings."""
     return paper.readings.search() or joint(paper.readings, over)
-
-
-def _after(progress: Progress | None, before: int, total: int) -> Progress | None:
-    return progress and (lambda done, _, held: progress(before + done, max(total, 1), before + held))
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
@@ -572,8 +567,7 @@ def documents(done: Done) -> list[dict[str, Any]]:
             {
                 "claim": over.claim.id,
                 "verdict": outcome.words if outcome else "not judged",
-                "holds": outcome.holds_in if outcome else None,
-                "of": outcome.readings if outcome else None,
+                **{"holds": outcome and outcome.holds_in, "of": outcome and outcome.readings},
                 "depends_on": list(outcome.depends_on) if outcome else [],
                 "readings": [_document(one) for one in over.under],
             }

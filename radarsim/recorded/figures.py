@@ -9,6 +9,7 @@ filter takes it to; less: they are better.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -330,7 +331,7 @@ def better(case: Case, filter_name: str, columns: Mapping[str, np.ndarray]) -> d
     (options,) = (f for f in case.spec.filters if f.name == filter_name)
     spec = case.spec.model_copy(update={"filters": (options,), "baseline": None})
     keys = of.sigmas(spec)
-    stated = {key: _get(spec, key) for own in keys.values() for key in own}
+    stated = {key: float(attrgetter(key)(spec)) for own in keys.values() for key in own}
     factors = dict.fromkeys(stated, 1.0)
     for _ in range(ROUNDS):
         trial = spec
@@ -358,11 +359,6 @@ def better(case: Case, filter_name: str, columns: Mapping[str, np.ndarray]) -> d
         if not all(1e-6 < factor < 1e6 for factor in factors.values()):
             return {}
     return {}
-
-
-def _get(spec: Model, key: str) -> float:
-    part, name = key.split(".")
-    return float(getattr(getattr(spec, part), name))
 
 
 def _set(spec: Model, key: str, value: float) -> Model:
