@@ -1,9 +1,9 @@
 """Figures that every study needs, made from the tables alone: σ against time, gain against time."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from radarsim.language import plural, power_of_ten, term, tr
 from radarsim.report import seen, wording
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.report.quantities import Component
 from radarsim.report.statistics import Z95
 
 if TYPE_CHECKING:
@@ -40,18 +41,6 @@ FEW_DIGITS = 3  # of an angle that was given in radians
 POWERS = ("manoeuvre_variance",)  # swept keys that are read as powers of ten
 
 
-class Quantity(NamedTuple):
-    """A component in figures: its letter (mathematical text) and its name."""
-
-    symbol: str
-    name: str
-
-
-RADIAL = {
-    "r": Quantity("$r$", term("range")),
-    "Vr": Quantity("$V_r$", term("radial velocity")),
-    "ar": Quantity("$a_r$", term("radial acceleration")),
-}
 SIGMA = ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")  # columns of a line of σ against time
 GAIN = ("t_s", "gain_percent", "gain_lo", "gain_hi", "exact_percent")
 
@@ -441,28 +430,23 @@ def _overlapping(one: Line, other: Line) -> np.ndarray:
     return ((lo <= other_hi) & (other_lo <= hi))[known]
 
 
-def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity) -> Figure:
+def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: Component) -> Figure:
     """σ(t) of one component: a panel for each config, a line for each filter and swept value.
 
     curves is tables.groups(table, "case", "filter", "component").
     """
     every = by_panel(results)
-    panels = [_sigma_panel(title, members, curves, component, of) for title, members in every.items()]
+    panels = [_sigma_panel(title, members, curves, of) for title, members in every.items()]
     panels = [panel for panel in panels if panel.marks]
     caption = tr(
         "Root-mean-square error of the {quantity} about the truth against time, of {realisations}. "
         "Bands: 95 % intervals, where not seen narrower than the line.",
-        quantity=of.name,
+        quantity=of.words,
         realisations=realisations(results),
     )
-    title = tr("σ of the {quantity}", quantity=of.name)
+    title = tr("σ of the {quantity}", quantity=of.words)
     figure = in_columns(Figure(name, title, caption, tuple(one_scale(panels))))
     return seen.begun(figure, seen.at_the_end(figure))
-
-
-def unit_in(curves: Mapping, component: str) -> str:
-    """The unit of a component in a table's rows by case, filter and component."""
-    return next((rows["unit"].iloc[0] for key, rows in curves.items() if key[2] == component), "")
 
 
 def in_columns(figure: Figure) -> Figure:
@@ -474,9 +458,9 @@ def in_columns(figure: Figure) -> Figure:
     return replace(figure, columns=2 if count in (2, 4) else 3, width_mm=PAGE_MM, panel_height_mm=56.0)
 
 
-def _sigma_panel(title: str, members: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity) -> Panel:
-    marks = lines_of(members, curves, component, SIGMA)
-    y = fitting_axis(sigma_of(of.symbol, unit_in(curves, component)), marks)
+def _sigma_panel(title: str, members: Sequence[CaseResult], curves: Mapping, of: Component) -> Panel:
+    marks = lines_of(members, curves, of.name, SIGMA)
+    y = fitting_axis(sigma_of(of.symbol, of.unit), marks)
     return keyed(Panel(time_axis(), y, tuple(marks), title), members)
 
 
@@ -576,7 +560,7 @@ def look(nth_filter: int, nth_case: int, cases: int) -> Style:
     return Style(colour, nth_filter, nth_filter)
 
 
-def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, component: str, of: Quantity) -> Figure:
+def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, of: Component) -> Figure:
     """Relative gain of one component against time, a line for each case and filter.
 
     One panel where no config is swept; else one for each of `by_panel`. gains is
@@ -586,26 +570,26 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
     caption = tr(
         "Relative gain in σ of the {quantity} against filter {base}, paired on common noise, of {realisations}. "
         "Bands: 95 % intervals. Below zero: a loss.",
-        quantity=of.name,
+        quantity=of.words,
         base=base,
         realisations=realisations(results),
     )
     y, title = (
         Axis(tr("gain in $\\sigma$ of {symbol}, %", symbol=of.symbol)),
-        tr("Gain in σ of the {quantity}", quantity=of.name),
+        tr("Gain in σ of the {quantity}", quantity=of.words),
     )
     several = any(len(result.axes.filters) > 2 for result in results)
     if any(result.swept for result in results) or (several and len(results) > 1):
         drawn = []
         for words, members in by_panel(results).items():
-            lines = lines_of(members, gains, component, GAIN)
+            lines = lines_of(members, gains, of.name, GAIN)
             panel = Panel(time_axis(), *_cut(y, lines), words)
             drawn += [keyed(panel, members, baseline=False)] if lines else []
         return _gains_said(in_columns(Figure(name, title, caption, tuple(drawn))))
     marks: list[Mark] = []
     for i, result in enumerate(results):
         for n, f in enumerate(result.axes.filters):
-            rows = gains.get((result.name, f, component))
+            rows = gains.get((result.name, f, of.name))
             if rows is not None:
                 case = label(result) if len(results) > 1 else ""
                 words = ", ".join(filter(None, (case, literal(f) if several or len(results) == 1 else "")))
@@ -637,29 +621,27 @@ def _cut(y: Axis, lines: Sequence[Mark]) -> tuple[Axis, tuple[Mark, ...]]:
 def per_component(
     results: Sequence[CaseResult],
     tables: "Mapping[str, pd.DataFrame]",
-    quantities: Mapping[str, Quantity],
+    components: Iterable[Component],
     experiment: Experiment,
 ) -> dict[str, Figure]:
     """gain_<component> and sigma_<component> of every component; each of the cases that the config names for it."""
     curves, gains = (common.groups(tables[name], "case", "filter", "component") for name in ("curves", "gains"))
     made = {}
-    for component, of in quantities.items():
+    for of in components:
         for kind, draw, rows in (
             ("gain", gain_figure, gains),
             ("sigma", sigma_figure, curves),
             ("dynamic", dynamic_figure, curves),
         ):
-            name = f"{kind}_{component}"
+            name = f"{kind}_{of.name}"
             some, left = shown_families(results, named(experiment, name))
-            figure = draw(name, some, rows, component, of) if some else None
+            figure = draw(name, some, rows, of) if some else None
             if figure and any(isinstance(mark, Line) for panel in figure.panels for mark in panel.marks):
                 made[name] = replace(figure, caption=figure.caption + left)
     return made
 
 
-def dynamic_figure(
-    name: str, results: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity
-) -> Figure | None:
+def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: Component) -> Figure | None:
     """Dynamic error (bias) and fluctuation error (spread) of one component apart, a panel for each case that has both.
 
     None where no case's bias exceeds its spread anywhere: then σ says it all.
@@ -667,9 +649,7 @@ def dynamic_figure(
     drawn: list[Panel] = []
     for result in results:
         found = [
-            (f, curves[(result.name, f, component)])
-            for f in result.axes.filters
-            if (result.name, f, component) in curves
+            (f, curves[(result.name, f, of.name)]) for f in result.axes.filters if (result.name, f, of.name) in curves
         ]
         if any((abs(rows["bias"]) > rows["spread"]).any() for _, rows in found):
             panel = _dynamic_panel(result, found, of)
@@ -679,20 +659,20 @@ def dynamic_figure(
     caption = tr(
         "Errors of the {quantity} in cases whose mean error somewhere exceeds the spread: mean error (dynamic, bias) "
         "and standard deviation (fluctuation, spread) of {realisations}; σ² is the sum of their squares.",
-        quantity=of.name,
+        quantity=of.words,
         realisations=realisations(results),
     )
     titles = [panel.title for panel in drawn]
     caption += left_out(titles, spread_out(titles, MOST_PANELS))
-    title = tr("Dynamic and fluctuation error of the {quantity}", quantity=of.name)
+    title = tr("Dynamic and fluctuation error of the {quantity}", quantity=of.words)
     figure = in_columns(Figure(name, title, caption, tuple(spread_out(drawn, MOST_PANELS))))
     return seen.begun(figure, seen.extremes(figure))
 
 
-def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Quantity) -> Panel:
+def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Component) -> Panel:
     marks: list[Mark] = [Reference(0)]
     for n, (f, rows) in enumerate(found):
-        t, unit = rows["t_s"].to_numpy(), rows["unit"].iloc[0]
+        t = rows["t_s"].to_numpy()
         bias, half = rows["bias"].to_numpy(), Z95 * rows["bias_se"].to_numpy()
         name = literal(f)
         marks.append(Line(t, bias, "", Style(n, 0, n), bias - half, bias + half, name=tr("{name}: bias", name=name)))
@@ -700,5 +680,5 @@ def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Quantity) -> 
     keys = [(literal(f), Style(n, None, n)) for n, (f, _) in enumerate(found)]
     keys += [(tr("bias"), Style(0, 0)), (tr("spread"), Style(0, 1))]
     title = swept(result) or device(result)
-    y = Axis(with_unit(tr("error of {symbol}", symbol=of.symbol), unit))
+    y = Axis(with_unit(tr("error of {symbol}", symbol=of.symbol), of.unit))
     return Panel(time_axis(), y, tuple(marks), title, tuple(keys))

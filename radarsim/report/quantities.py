@@ -1,4 +1,4 @@
-"""What a study measures, each quantity declared once.
+"""What a study measures: the components of its errors, and each quantity of them, declared once.
 
 From a declaration follow the options of `radarsim solve`, what `--of` takes in `run --precision` and in `sensitivity`,
 what `compare` puts side by side, their words, units and axes. `Study.quantities` gives those of a study. Declared here
@@ -8,7 +8,7 @@ are those that several studies measure.
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from radarsim.errors import ConfigError
 from radarsim.language import term
@@ -22,6 +22,22 @@ if TYPE_CHECKING:
 Kind = Literal["size", "share", "signed"]
 OTHERS = "at", "at-k", "between", "case", "equals", "filter", "help", "json", "language"
 TAKEN = frozenset(f"--{name}" for name in (*OTHERS, "realisations", "seed", "set", "threads"))  # options of `solve`
+
+
+class Component(NamedTuple):
+    """A component of the errors: its name in tables, its unit, its letter (mathematical text), what it is called."""
+
+    name: str
+    unit: str
+    symbol: str = ""
+    words: str = ""
+
+
+RADIAL = (
+    Component("r", "m", "$r$", term("range")),
+    Component("Vr", "m/s", "$V_r$", term("radial velocity")),
+    Component("ar", "m/s2", "$a_r$", term("radial acceleration")),
+)
 
 
 @dataclass(frozen=True)

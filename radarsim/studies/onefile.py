@@ -51,6 +51,7 @@ from radarsim.config.fields import Study as Keys
 from radarsim.errors import ConfigError
 from radarsim.failures import call
 from radarsim.language import Term, few, listed, term, tr
+from radarsim.report.quantities import COMMON, Component, Quantity
 from radarsim.studies.interface import Likelihood, Paper, RecordedPlots, Study, Tracker, paper_in, true_column
 
 if TYPE_CHECKING:
@@ -63,16 +64,6 @@ if TYPE_CHECKING:
     from radarsim.report.claims.declared import Claim, Shipped
     from radarsim.report.claims.over import Choice, PaperReadings
     from radarsim.report.drawing import Figure
-    from radarsim.report.quantities import Quantity
-
-
-class Component(NamedTuple):
-    """A component of the errors: its name in tables, its unit, its letter (mathematical text), what it is called."""
-
-    name: str
-    unit: str
-    symbol: str = ""
-    words: str = ""
 
 
 class Measured(NamedTuple):
@@ -242,9 +233,7 @@ class OneFile(Study):
         """The σ (F, C) that the errors of a config tend to, not-a-number where there is none; None: not known."""
         return None
 
-    def quantities(self, spec: Any = None) -> "tuple[Quantity, ...]":
-        from radarsim.report.quantities import COMMON, Quantity
-
+    def quantities(self, spec: Any = None) -> tuple[Quantity, ...]:
         limit = Quantity("limit", term("limit of σ"), "last", "steady_sigma", per="component")
         return COMMON if type(self).limits is OneFile.limits else (*COMMON, limit)
 
@@ -274,11 +263,11 @@ class OneFile(Study):
     ) -> "dict[str, Figure]":
         from radarsim.report import panels
 
-        quantities = {
-            one.name: panels.Quantity(one.symbol or panels.letter(one.name), self._term(one.words or one.name))
+        shown = [
+            one._replace(symbol=one.symbol or panels.letter(one.name), words=self._term(one.words or one.name))
             for one in self.components
-        }
-        return panels.per_component(results, made, quantities, experiment)
+        ]
+        return panels.per_component(results, made, shown, experiment)
 
     def question(self, experiment: "Experiment") -> str:
         names = dict.fromkeys(one.name for case in experiment.cases for one in case.spec.filters)

@@ -10,6 +10,7 @@ import pytest
 
 from radarsim.report import chart, figures, panels, sweeps, tables
 from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
+from radarsim.report.quantities import Component
 from radarsim.studies.range_doppler import figures as range_doppler_figures
 from radarsim.studies.range_doppler import tables as range_doppler
 
@@ -370,7 +371,7 @@ def test_losses_far_below_are_cut_and_the_caption_says_so():
     )
     drawn = {
         least: panels.gain_figure(
-            "gain_r", [result], {("a", "v", "r"): gains(least)}, "r", panels.Quantity("r", "range")
+            "gain_r", [result], {("a", "v", "r"): gains(least)}, Component("r", "m", "r", "range")
         )
         for least in (-150.0, -30000.0)
     }

@@ -15,6 +15,7 @@ from radarsim.kernels.lanes import WIDTH
 from radarsim.language import term, tr
 from radarsim.report import panels, seen, sweeps, tables
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
+from radarsim.report.quantities import RADIAL
 from radarsim.studies.ambiguous_doppler.kernels import records, sums
 from radarsim.studies.ambiguous_doppler.study import prepare
 from radarsim.studies.ambiguous_doppler.tables import Result
@@ -66,7 +67,7 @@ DRAWN_FROM = {"right": ("folds",), "lost": ("folds",)}
 
 def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
     """sigma_r … gain_ar; right and lost; hypotheses; orders."""
-    drawn = panels.per_component(results, made, panels.RADIAL, experiment)
+    drawn = panels.per_component(results, made, RADIAL, experiment)
     for name, (column, words, caption) in SHARES.items():
         some, left_out = panels.shown_families(results, panels.named(experiment, name))
         figure = share_figure(name, some, made["folds"], (column, tr(words), tr(caption) + left_out)) if some else None

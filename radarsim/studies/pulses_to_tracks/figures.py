@@ -10,6 +10,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.language import term, tr
 from radarsim.report import panels, seen, sweeps, tables
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
+from radarsim.report.quantities import RADIAL
 from radarsim.report.statistics import FEW_EVENTS
 from radarsim.studies.pulses_to_tracks.kernels.records import AGES
 from radarsim.studies.pulses_to_tracks.tables import Result
@@ -26,7 +27,7 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
     """sigma_r … gain_ar; folds; locks, measured, losses of what is not swept, threshold of what is."""
     drawn = {
         name: replace(figure, panels=tuple(map(wide, figure.panels))) if name.startswith("sigma") else figure
-        for name, figure in panels.per_component(results, made, panels.RADIAL, experiment).items()
+        for name, figure in panels.per_component(results, made, RADIAL, experiment).items()
     }
     for name, (draw, title, caption) in OWN.items():
         unswept = [result for result in panels.unswept(results) if not result.swept]

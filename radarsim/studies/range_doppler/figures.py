@@ -10,6 +10,7 @@ from radarsim.language import tr
 from radarsim.report import panels, seen, tables, wording
 from radarsim.report.chart import spoken
 from radarsim.report.drawing import GREY, Axis, Figure, Line, Note, Panel, Reference, Style
+from radarsim.report.quantities import RADIAL
 from radarsim.studies.range_doppler.tables import PERIODS, Result
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ NUMBERS = {
 
 def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
     """sigma_r … gain_ar (the paper's figures 1a … 3b), and `settling` where the manoeuvre variance is swept."""
-    drawn = panels.per_component(results, made, panels.RADIAL, experiment)
+    drawn = panels.per_component(results, made, RADIAL, experiment)
     if experiment.stem == OF_THE_PAPER:
         drawn = {name: seen.numbered(one, NUMBERS[name]) if name in NUMBERS else one for name, one in drawn.items()}
     some = [result for result in results if result.name in set(panels.named(experiment, "settling"))]

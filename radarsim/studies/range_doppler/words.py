@@ -8,6 +8,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.language import listed, numeral, plural, term, tr
 from radarsim.report import panels, tables, wording
+from radarsim.report.quantities import RADIAL
 from radarsim.studies.range_doppler import tuning
 from radarsim.studies.range_doppler.config import Best, variance_of
 from radarsim.studies.range_doppler.tables import PERIODS, Result, follows_the_model, span_mps
@@ -51,9 +52,9 @@ def _gain_sentences(results: Sequence[Result], made: Made) -> list[str]:
     gains, every = tables.groups(rows, "component"), tables.groups(made["gains"], "component")
     labels = {result.name: panels.plain_label(result) for result in results}
     sentences = [
-        _gain_sentence(plain, gains[(c,)], every[(c,)], of.name, labels)
-        for c, of in panels.RADIAL.items()
-        if (c,) in gains
+        _gain_sentence(plain, gains[(of.name,)], every[(of.name,)], of.words, labels)
+        for of in RADIAL
+        if (of.name,) in gains
     ]
     return sentences or [_sigma_sentence(results[0], made["curves"])]
 

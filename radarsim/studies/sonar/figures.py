@@ -13,31 +13,33 @@ from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
 from radarsim.report import panels, seen, tables
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.report.quantities import Component
 from radarsim.studies.sonar.world import GivenPlotsAxes, SonarAxes
 
 if TYPE_CHECKING:
     import pandas as pd
 
-QUANTITIES = {
-    "r": panels.Quantity("$r$", term("range")),
-    "vr": panels.Quantity("$v_r$", term("radial velocity")),
-    "ar": panels.Quantity("$a_r$", term("radial acceleration")),
-    "b": panels.Quantity("$\\beta$", term("bearing")),
-    "vb": panels.Quantity("$v_\\beta$", term("bearing rate")),
-    "ab": panels.Quantity("$a_\\beta$", term("second rate of the bearing")),
-    "x": panels.Quantity("$x$", term("distance north")),
-    "vx": panels.Quantity("$v_x$", term("velocity north")),
-    "ax": panels.Quantity("$a_x$", term("acceleration north")),
-    "y": panels.Quantity("$y$", term("distance east")),
-    "vy": panels.Quantity("$v_y$", term("velocity east")),
-    "ay": panels.Quantity("$a_y$", term("acceleration east")),
-    "d": panels.Quantity("$d$", term("depth")),
-    "vd": panels.Quantity("$v_d$", term("rate of depth")),
-    "ad": panels.Quantity("$a_d$", term("second rate of depth")),
-    "e": panels.Quantity("$\\varepsilon$", term("elevation")),
-    "ve": panels.Quantity("$v_\\varepsilon$", term("rate of elevation")),
-    "ae": panels.Quantity("$a_\\varepsilon$", term("second rate of elevation")),
-}
+COMPONENTS = (
+    Component("r", "m", "$r$", term("range")),
+    Component("vr", "m/s", "$v_r$", term("radial velocity")),
+    Component("ar", "m/s2", "$a_r$", term("radial acceleration")),
+    Component("b", "rad", "$\\beta$", term("bearing")),
+    Component("vb", "rad/s", "$v_\\beta$", term("bearing rate")),
+    Component("ab", "rad/s2", "$a_\\beta$", term("second rate of the bearing")),
+    Component("x", "m", "$x$", term("distance north")),
+    Component("vx", "m/s", "$v_x$", term("velocity north")),
+    Component("ax", "m/s2", "$a_x$", term("acceleration north")),
+    Component("y", "m", "$y$", term("distance east")),
+    Component("vy", "m/s", "$v_y$", term("velocity east")),
+    Component("ay", "m/s2", "$a_y$", term("acceleration east")),
+    Component("d", "m", "$d$", term("depth")),
+    Component("vd", "m/s", "$v_d$", term("rate of depth")),
+    Component("ad", "m/s2", "$a_d$", term("second rate of depth")),
+    Component("e", "rad", "$\\varepsilon$", term("elevation")),
+    Component("ve", "rad/s", "$v_\\varepsilon$", term("rate of elevation")),
+    Component("ae", "rad/s2", "$a_\\varepsilon$", term("second rate of elevation")),
+)
+BY_NAME = {one.name: one for one in COMPONENTS}
 
 
 WHAT = {  # of the position or motion, by its name in the table
@@ -60,12 +62,12 @@ def figures(
     """sigma_<component> of every component that some case has; and the figures of filters that know their plots."""
     curves = tables.groups(made["curves"], "case", "filter", "component")
     drawn: dict[str, Figure | None] = {}
-    for component in QUANTITIES:
-        name = f"sigma_{component}"
-        having = [result for result in results if component in dict(result.axes.components)]
+    for of in COMPONENTS:
+        name = f"sigma_{of.name}"
+        having = [result for result in results if of.name in dict(result.axes.components)]
         chosen, left_out = panels.shown(having, panels.named(experiment, name))
         if chosen:
-            drawn[name] = sigma_figure(name, chosen, curves, component, left_out)
+            drawn[name] = sigma_figure(name, chosen, curves, of, left_out)
     known: Any = [result for result in results if isinstance(result.axes, GivenPlotsAxes)]
     of_tables = {"plots": plots_figure, "smoothing_gains": gains_figure, "conversion": conversion_figure}
     own = {name: draw(made[name]) for name, draw in of_tables.items() if name in made}
@@ -86,16 +88,16 @@ def sigma_figure(
     name: str,
     results: Sequence[CaseResult[SonarAxes]],
     curves: "Mapping[Any, pd.DataFrame]",
-    component: str,
+    of: Component,
     left_out: str,
 ) -> Figure | None:
     """σ(t) of one component: a panel for each case, a line for each filter."""
-    quantity, drawn = QUANTITIES[component], []
+    drawn = []
+    factor, unit = panels.in_degrees(of.unit)
     for result in results:
-        factor, unit = panels.in_degrees(dict(result.axes.components).get(component, ""))
-        marks = [panels.scaled(one, factor) for one in case_lines(result, curves, component, panels.SIGMA)]
+        marks = [panels.scaled(one, factor) for one in case_lines(result, curves, of.name, panels.SIGMA)]
         if marks:
-            y = panels.fitting_axis(panels.with_unit(f"$\\sigma$ of {quantity.symbol}", unit), marks)
+            y = panels.fitting_axis(panels.with_unit(f"$\\sigma$ of {of.symbol}", unit), marks)
             drawn.append(Panel(panels.time_axis(), y, tuple(marks), panels.swept(result), direct=False))
     if not drawn:
         return None
@@ -104,13 +106,13 @@ def sigma_figure(
         tr(
             "Root-mean-square error of the {name} about the truth against time, of {count:,} "
             "realisations. Bands: 95 % intervals, where not seen narrower than the line.",
-            name=quantity.name,
+            name=of.words,
             count=results[0].count,
         )
         + same
         + left_out
     )
-    figure = panels.in_columns(Figure(name, tr("σ of the {name}", name=quantity.name), caption, tuple(drawn)))
+    figure = panels.in_columns(Figure(name, tr("σ of the {name}", name=of.words), caption, tuple(drawn)))
     return seen.begun(figure, seen.at_the_end(figure))
 
 
@@ -196,7 +198,7 @@ def believed_figure(
         "Left: σ of the {name} at plot {last} in σ of a plot, true (lines) and as the filter "
         "believes it (markers alone, where they differ by over 5 %). Right: normalised squared error "
         "per component, 1 for a consistent filter.",
-        name=QUANTITIES[component].name,
+        name=BY_NAME[component].words,
         last=last,
     )
     x, y = (
@@ -215,9 +217,9 @@ def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.Dat
     cases = [r for r in results if r.spec.frame == "polar"]
     if len({r.spec.sensor.detection_probability for r in cases}) < 2:
         return None
-    component, unit = cases[0].axes.components[0]
-    groups = tables.groups(curves[curves["component"] == component], "case", "filter")
-    y = Axis(panels.sigma_of(QUANTITIES[component].symbol, unit), limits=(0, None))
+    of = BY_NAME[cases[0].axes.components[0][0]]
+    groups = tables.groups(curves[curves["component"] == of.name], "case", "filter")
+    y = Axis(panels.sigma_of(of.symbol, of.unit), limits=(0, None))
     drawn = []
     for f in cases[0].axes.filters:
         marks = []
@@ -234,7 +236,7 @@ def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.Dat
         "σ of the {name} for several detection probabilities (legend), one panel a filter, of "
         "{count:,} realisations. Exact values are means over all patterns of misses, where "
         "these can be enumerated.",
-        name=QUANTITIES[component].name,
+        name=of.words,
         count=cases[0].count,
     ) + (tr(" Scans {scans} never give a plot.", scans=", ".join(map(str, gap))) if gap else "")
     columns = min(3, len(drawn))

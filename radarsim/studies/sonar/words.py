@@ -7,7 +7,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.language import few, tr
 from radarsim.report import panels, tables, wording
 from radarsim.studies.sonar.config import Keys, correlation_of
-from radarsim.studies.sonar.figures import QUANTITIES
+from radarsim.studies.sonar.figures import BY_NAME
 from radarsim.studies.sonar.world import SonarAxes
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def _best(result: CaseResult[SonarAxes], curves: "pd.DataFrame") -> str:
     order = last["exact_sigma"].round(9) if last["exact_sigma"].notna().all() else last["sigma"]
     last = last.loc[order.sort_values(kind="stable").index]
     low, high = last.iloc[0], last.iloc[-1]
-    said = {"quantity": QUANTITIES[first].name, "t_s": low["t_s"], "least": _with(low), "most": _with(high)}
+    said = {"quantity": BY_NAME[first].words, "t_s": low["t_s"], "least": _with(low), "most": _with(high)}
     if len(last) > 1:
         words = tr("σ of the {quantity} after {t_s:g} s: least with {least}, largest with {most}.", **said)
     else:
@@ -77,7 +77,7 @@ def _most_optimistic(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[st
             "Most optimistic: {filter}, whose true σ is {ratio} times the one it believes ({quantity}, scan {k}).",
             filter=f"{worst['filter']} ({swept})" if swept else str(worst["filter"]),
             ratio=wording.estimate((worst[key] for key in ("ratio", "ratio_lo", "ratio_hi")), form=".2f"),
-            quantity=QUANTITIES[worst["component"]].name,
+            quantity=BY_NAME[worst["component"]].words,
             k=worst["k"],
         )
     ]

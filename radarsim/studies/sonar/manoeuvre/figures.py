@@ -10,7 +10,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
 from radarsim.report import panels, seen, tables
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
-from radarsim.studies.sonar.figures import QUANTITIES, case_lines
+from radarsim.studies.sonar.figures import BY_NAME, case_lines
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes
 
@@ -194,9 +194,9 @@ def response_figure(results: Results, curves: "pd.DataFrame") -> Figure | None:
     groups = tables.groups(curves, "case", "filter", "component")
     drawn = []
     for result in results:
-        component, unit = result.axes.components[0]
-        marks: tuple[Mark, ...] = (*_ends(result), *case_lines(result, groups, component, panels.SIGMA))
-        y = Axis(panels.sigma_of(QUANTITIES[component].symbol, unit), "log")
+        component = BY_NAME[result.axes.components[0][0]]
+        marks: tuple[Mark, ...] = (*_ends(result), *case_lines(result, groups, component.name, panels.SIGMA))
+        y = Axis(panels.sigma_of(component.symbol, component.unit), "log")
         drawn.append(Panel(panels.time_axis(), y, marks, _title(result), direct=False))
     caption = tr(
         "Root-mean-square error of the first coordinate about the truth on the same plots, of "

@@ -10,11 +10,12 @@ from radarsim.engine.results import CaseResult
 from radarsim.language import term
 from radarsim.report import panels
 from radarsim.report.drawing import Figure
+from radarsim.report.quantities import Component
 
-# Yours: of each component its letter and what it is called.
-QUANTITIES = {"x": panels.Quantity("$x$", term("position"))}
+# Yours: of each component its name, unit, letter and what it is called.
+COMPONENTS = (Component("x", "m", "$x$", term("position")),)
 
 
 def figures(results: Sequence[CaseResult], made: Mapping, experiment: Experiment) -> dict[str, Figure]:
     """sigma_x: σ(t) of every case and filter, with exact values; gain_x: the gain against the baseline."""
-    return panels.per_component(results, made, QUANTITIES, experiment)
+    return panels.per_component(results, made, COMPONENTS, experiment)
