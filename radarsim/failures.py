@@ -11,6 +11,8 @@ import re
 import sysconfig
 import traceback
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from types import CodeType
 from typing import Any, NamedTuple
@@ -22,6 +24,7 @@ COMPILING = re.compile(r"Failed in |-+$|\[\d\] |During: ")  # lines of a compile
 OF_NUMPY = "__array_ufunc__"  # what NumPy names where it is asked for the sine of eight realisations
 LONGEST = 300  # characters of a message
 
+_of: ContextVar[str] = ContextVar("_of", default="")
 homes: Callable[[], Iterable[Path]] = tuple  # the folders, or single files, of packages that offer studies or filters
 
 
@@ -89,10 +92,20 @@ def summary(error: BaseException) -> str:
     return f"{words(error)} ({at})" if at else words(error)
 
 
+@contextmanager
+def of_study(name: str) -> Iterator[None]:
+    """What `call` and `fault` name within it belongs to this study."""
+    before = _of.set(f"study {name}: ")
+    try:
+        yield
+    finally:
+        _of.reset(before)
+
+
 def call(function: Callable[..., Any], *arguments: Any, of: str = "") -> Any:
     """What an author's function gives; ConfigError with its file and line where it fails.
 
-    of: what the function belongs to, where that is not clear from its name.
+    of: what the function belongs to, where that is not clear from its name; by default what `of_study` names.
     """
     try:
         return function(*arguments)
@@ -102,7 +115,7 @@ def call(function: Callable[..., Any], *arguments: Any, of: str = "") -> Any:
         at = place(error, function=function)
         if at is None:
             raise fault(function, words(error), of=of) from error
-        raise ConfigError(f"{at}: {of}{at.function}: {words(error)}") from error
+        raise ConfigError(f"{at}: {of or _of.get()}{at.function}: {words(error)}") from error
 
 
 def fault(function: Any, message: str, name: str = "", of: str = "") -> ConfigError:
@@ -110,4 +123,4 @@ def fault(function: Any, message: str, name: str = "", of: str = "") -> ConfigEr
     code = _code(function)
     where = f"{code.co_filename}:{code.co_firstlineno}: " if code else ""
     known = getattr(function, "__qualname__", "").rpartition("<locals>.")[2]
-    return ConfigError(f"{where}{of}{name or known or repr(function)[:40]}: {message}")
+    return ConfigError(f"{where}{of or _of.get()}{name or known or repr(function)[:40]}: {message}")

@@ -169,7 +169,7 @@ def _sides(run: Run) -> list[Side]:
 def _measured(study: str) -> tuple[Quantity, ...]:
     """What a study measures; of one that is no longer there σ and gain."""
     try:
-        return registry.part(study, lambda one: one.quantities())
+        return registry.quantities(study, None)
     except (ConfigError, KeyError):
         return COMMON
 

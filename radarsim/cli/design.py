@@ -38,7 +38,7 @@ class Asking(click.Command):
         from radarsim.studies import registry
 
         measured: dict[str, dict[str, Quantity]] = {}
-        for study, every in registry.parts(lambda one: tuple(one.quantities())).items():
+        for study, every in registry.parts(lambda one: registry.declared(one, None)).items():
             for one in every:
                 measured.setdefault(one.name, {})[study] = one
         everywhere = len(registry.names())

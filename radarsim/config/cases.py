@@ -487,15 +487,21 @@ class Expander:
         """The document with the first of several baselines alone, and the others, each checked as if it stood alone."""
         path: KeyPath = ("baseline",)
         names = document.get(path)
-        if not isinstance(names, list) or "baseline" not in model.model_fields or not names:
+        if "baseline" not in model.model_fields or names is ABSENT or isinstance(names, str | None):
             return document, ()
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names) or not names:
+            many = names if isinstance(names, list) else []
+            wrong = next(((*path, i) for i, name in enumerate(many) if not isinstance(name, str)), path)
+            message = "must be the name of a filter or a list of such names"
+            self.faults.add(document.origin(wrong), wrong, message, document.get(wrong))
+            return document.without(("baseline",)), ()
         each = [document.graft(path, name, document.origin((*path, i))) for i, name in enumerate(names)]
         for i, name in enumerate(names[1:], 1):
             if name in names[:i]:
                 self.faults.add(document.origin((*path, i)), (*path, i), "stands there already", name)
             elif not self.faults:
                 check(model, each[i], self.faults, also=COMMON_KEYS)
-        return each[0], tuple(map(str, names[1:]))
+        return each[0], tuple(names[1:])
 
     def _refuse_twins(self, cases: list[Case], document: Document) -> None:
         seen: set[str] = set()

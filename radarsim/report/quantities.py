@@ -137,11 +137,16 @@ class Quantity:
         return replace(self, name=name, words=words, more_is_better=not self.more_is_better, rest=not self.rest)
 
     def read(self, rows: "pd.DataFrame") -> "tuple[Estimate, np.ndarray]":
-        """Values with their intervals, and exact values (rows,) or not-a-number, of rows of its table."""
+        """Values with their intervals, and exact values (rows,) or not-a-number, of rows of its table.
+
+        Raises ConfigError where that lacks a column.
+        """
         import numpy as np
 
         from radarsim.report.statistics import Estimate
 
+        if lacking := [one for one in (self.value, self.per) if one and one not in rows and len(rows)]:
+            raise ConfigError(f"quantity {self.name!r}: {self.table}.csv has no column {lacking[0]!r}")
         names = [self.value, *self.ends, self.known]
         value, lo, hi, known = (
             rows[name].to_numpy(dtype=float) if name in rows else np.full(len(rows), np.nan) for name in names

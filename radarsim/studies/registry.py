@@ -204,9 +204,17 @@ def quantity(name: str, case: Case) -> Quantity:
     return measured[spelt]
 
 
-def quantities(name: str, spec: Keys) -> tuple[Quantity, ...]:
-    """What the study of a name measures of a case with these keys. Raises as `part`."""
-    return tuple(part(name, lambda one: one.quantities(spec)))
+def quantities(name: str, spec: Keys | None) -> tuple[Quantity, ...]:
+    """What the study of a name measures of a case with these keys, None: of any. Raises as `part`."""
+    return part(name, lambda one: declared(one, spec))
+
+
+def declared(study: Study, spec: Keys | None) -> tuple[Quantity, ...]:
+    """The same of a study. ConfigError for what is no Quantity."""
+    given: Any = study.quantities(spec)
+    if not isinstance(given, tuple | list) or not all(isinstance(one, Quantity) for one in given):
+        raise _fault(study.name, f"quantities: must give a tuple of Quantity, got {given!r}"[:200])
+    return tuple(given)
 
 
 def folders() -> tuple[Path, ...]:

@@ -41,7 +41,7 @@ import numpy as np
 from radarsim.config.fields import kinds_of
 from radarsim.engine.results import Axes, CaseResult, Layout, Track
 from radarsim.errors import ConfigError, PlotFault
-from radarsim.failures import call, fault
+from radarsim.failures import call, fault, of_study
 from radarsim.kernels import traced
 from radarsim.studies.noise import noise_key
 from radarsim.studies.onefile import OneFile
@@ -163,6 +163,10 @@ class StepStudy(OneFile):
 
     # ---- numbers -------------------------------------------------------------------------------------------------
     def prepare(self, case: "Case") -> Plan:
+        with of_study(self.name):
+            return self._prepared(case)
+
+    def _prepared(self, case: "Case") -> Plan:
         from radarsim.kernels import stepped
 
         spec = case.spec
@@ -399,7 +403,8 @@ class StepStudy(OneFile):
         return named | dict(zip(self.known_columns, known.T, strict=True)), plots[:, 1 + numbers :]
 
     def tracker(self, case: "Case") -> "Tracker":
-        return Tracker(self, case.spec)
+        with of_study(self.name):
+            return Tracker(self, case.spec)
 
 
 @dataclass(frozen=True)
@@ -528,6 +533,10 @@ class Tracker:
         self.last = math.nan
 
     def feed(self, columns: "Mapping[str, np.ndarray]") -> Track:
+        with of_study(self.study.name):
+            return self._followed(columns)
+
+    def _followed(self, columns: "Mapping[str, np.ndarray]") -> Track:
         study, t = self.study, columns["t_s"]
         plots = np.transpose([columns[one.column] for one in study.measured])
         known = np.reshape([columns[name] for name in study.known_columns], (-1, t.size)).T

@@ -61,6 +61,14 @@ def test_at_their_lines_in_a_file(house, said):
     ]
 
 
+@pytest.mark.parametrize(
+    ("given", "at", "got"), [([], "", "[]"), (["r", 3], ".1", "3"), (3, "", "3"), ({"a": 1}, "", "{a: 1}")]
+)
+def test_a_baseline_is_a_name_or_a_list_of_names(good, said, given, at, got):
+    good["baseline"] = given
+    assert said(good) == [f"config: baseline{at}: must be the name of a filter or a list of such names, got {got}"]
+
+
 @pytest.mark.parametrize("key", ["initial_scan", "colour"])
 def test_a_misspelt_key_is_not_taken_for_one_left_out(good, said, key):
     good["scanz"] = good.pop("scans")

@@ -1,6 +1,8 @@
 """Quantities that only a study of an installed package declares: asked for by every command that asks for one."""
 
 import json
+import re
+from types import SimpleNamespace
 
 import click
 import pandas as pd
@@ -234,3 +236,20 @@ def test_one_name_in_two_units_is_listed_with_both():
     option = design._option({"one": depth, "other": share, "third": depth}, everywhere=False)
     assert option.help == "Slip, m (one, third), % (other)."
     assert design._option({"one": depth}, everywhere=True).help == "Slip, m."
+
+
+@pytest.mark.parametrize("given", [7, (7,), None])
+def test_quantities_that_are_none_are_one_line(given, monkeypatch):
+    monkeypatch.setattr(registry, "_loaded", lambda name: SimpleNamespace(name="odd", quantities=lambda spec: given))
+    monkeypatch.setattr(registry, "package", lambda name: "odd 1.0")
+    with pytest.raises(
+        ConfigError, match=rf"^study odd: .*quantities: must give .*Quantity, got {re.escape(repr(given))}$"
+    ):
+        registry.quantities("odd", None)
+
+
+def test_a_column_that_the_table_lacks_is_named_with_it():
+    rows = pd.DataFrame({"filter": ["r"], "value": [1.0]})
+    for column, value, per in (("other", "other", ""), ("model", "value", "model")):
+        with pytest.raises(ConfigError, match=rf"^quantity 'a': areas\.csv has no column '{column}'$"):
+            Quantity("a", "a", "areas", value, per=per).read(rows)

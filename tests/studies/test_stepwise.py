@@ -379,7 +379,7 @@ def test_a_fault_over_recorded_plots_is_one_line(step, function, words, row, rec
     study = Walk()
     study.kinds = {"kalman": type("Wrong", (Kalman,), {step: function})}
     plots = {"t_s": 2.0 * np.arange(8), "x_m": np.zeros(8), "drift_m": np.zeros(8)}
-    with pytest.raises(ConfigError, match=f"{__file__}:.*{words}") as caught:
+    with pytest.raises(ConfigError, match=rf"^{__file__}:\d+: study \w+: .*{words}") as caught:
         study.tracker(case_of(study, names=["kalman"])).feed(plots)
     assert len(caught.value.lines) == 1
     assert getattr(caught.value, "row", None) == row
