@@ -284,8 +284,9 @@ def new_study(name: str, folder: str | os.PathLike = ".", form: str = "linear") 
 
 def unfit(name: str) -> str | None:
     """Why a name cannot be that of a new study, its package and its first config; None where it can."""
-    if not PLAIN.fullmatch(name) or iskeyword(name) or issoftkeyword(name):
-        return "must be a module's name: a small letter, then at most 39 small letters, digits and _; no word of Python"
+    if not PLAIN.fullmatch(name) or iskeyword(name) or issoftkeyword(name) or name in ("true", "false", "null"):
+        of = "a small letter, then at most 39 small letters, digits and _; no word of Python or YAML"
+        return f"must be a module's name: {of}"
     if name in registry.names():
         return "there is a study of this name already; choose another"
     if name in sys.stdlib_module_names or name == "tests" or name in packages_distributions():

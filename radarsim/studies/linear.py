@@ -29,10 +29,11 @@ if TYPE_CHECKING:
     from radarsim.kernels import states
 
 BLOCK = 4096
-CLOSE = 1e-14  # relative change of a limit that has settled
+CLOSE = 1e-14  # change of a limit that has settled, of its components' own sizes
 DOUBLINGS = 60
 LONGEST_PERIOD = 64  # scans after which plots repeat themselves, looked for up to here
-ROUNDED = 1e-9  # of the largest element, or eigenvalue, of a covariance: what rounding may leave
+ROUNDED = 1e-7  # of a correlation: what rounding may leave
+NOTHING = 1e-15  # of the largest element of a covariance: a variance that is only rounding
 LEAST = 1e-6  # of a stated key that is fitted, which counts as zero
 
 
@@ -157,8 +158,12 @@ class LinearStudy(OneFile):
     def _covariance(self, what: str, given: Any, n: int) -> np.ndarray:
         """A covariance (n, n) that the study gives; raises ConfigError."""
         found = self._array(what, given, n, n)
-        values, size = np.linalg.eigvalsh(found), np.abs(found).max()
-        if np.abs(found - found.T).max() > ROUNDED * size or values[0] < -ROUNDED * np.abs(values).max():
+        least = NOTHING * (np.abs(found).max() or 1.0)
+        sigma = np.sqrt(np.maximum(np.diag(found), least))
+        scaled = found / np.outer(sigma, sigma)  # else m² would hide what is wrong of rad²
+        asymmetry = np.abs(scaled - scaled.T).max()
+        np.fill_diagonal(scaled, np.diag(scaled).clip(0))
+        if np.diag(found).min() < -least or asymmetry > ROUNDED or np.linalg.eigvalsh(scaled)[0] < -ROUNDED:
             raise self._fault(what, f"must be symmetric and not negative, got {found.tolist()}")
         return found
 
@@ -293,6 +298,7 @@ def period(*arrays: np.ndarray) -> int:
     return scans
 
 
+@np.errstate(all="ignore")  # what grows without end has no limit
 def steady(of: Matrices) -> tuple[np.ndarray, np.ndarray]:
     """The gains (p, D, n) over a period of p scans that a Kalman filter tends to, and its P before the first of them.
 
@@ -300,14 +306,17 @@ def steady(of: Matrices) -> tuple[np.ndarray, np.ndarray]:
     form, so 2^m periods take m of them (structured doubling: Chu, Fan & Lin 2005).
     """
     eye, phases = np.eye(of.x.size), range(period(of.H, of.R))
-    A, C, J = reduce(_after, ((of.F, of.Q, (of.H[k].T / of.R[k]) @ of.H[k]) for k in phases))
-    P = C
-    with np.errstate(all="ignore"):
+    try:
+        A, C, J = reduce(_after, ((of.F, of.Q, (of.H[k].T / of.R[k]) @ of.H[k]) for k in phases))
+        P = C
         for _ in range(DOUBLINGS):
             A, C, J = _after((A, C, J), (A, C, J))
             before, P = P, A @ np.linalg.solve(eye + of.P @ J, of.P) @ A.T + C
-            if not np.isfinite(P).all() or np.abs(P - before).max() <= CLOSE * np.abs(P).max():
+            sigma = np.sqrt(np.diag(P))
+            if not np.isfinite(P).all() or (np.abs(P - before) <= CLOSE * np.outer(sigma, sigma)).all():
                 break
+    except np.linalg.LinAlgError:
+        P = np.full_like(of.P, np.nan)
     gains = []
     for k in phases:
         found, P_after = updated(P, of.H[k], of.R[k])
@@ -357,6 +366,7 @@ def exact(truth: tuple[np.ndarray, ...], of: Matrices, probability: float) -> tu
     return sigma, bias
 
 
+@np.errstate(all="ignore")
 def limit(truth: tuple[np.ndarray, ...], of: Matrices, probability: float) -> np.ndarray:
     """The σ (n,) that a filter's errors tend to, at scans of the phase of its last one; not-a-number where there is
     none, or where it depends on the truth: by a wrong F or H.

@@ -38,7 +38,7 @@ def test_every_file_says_what_goes_there(form):
 
 
 @pytest.mark.parametrize(
-    "name", ["", "1st", "my-paper", "My", "class", "match", "a.b", "../a", "ё", "a" * 41, "a\nb", "_a"]
+    "name", ["", "1st", "my-paper", "My", "class", "match", "a.b", "../a", "ё", "a" * 41, "a\nb", "_a", "true"]
 )
 def test_a_name_that_is_no_modules_is_refused(name, tmp_path):
     with pytest.raises(ConfigError, match="must be a module's name"):

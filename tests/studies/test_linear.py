@@ -234,6 +234,20 @@ def test_a_filter_that_diverges_has_no_limit():
     study = study_of(2, 1)
     study.own_gains = lambda spec, one: np.zeros((spec.scans, 1, 2))
     assert np.isnan(study.limits(case_of(study, [{}]).spec)).all()
+    study = study_of(2, 1)  # two states that double at each scan, of which only the sum is seen
+    study.motion = lambda spec: Motion(lambda t: 2 * np.eye(2), lambda t: np.eye(2), [0, 0], np.eye(2))
+    study.plot = lambda spec, one, k: (np.ones((1, 2)), 1.0)
+    assert np.isnan(study.limits(case_of(study, [{}]).spec)).all()
+
+
+def test_a_small_component_that_settles_late_has_its_own_limit():
+    """Two random walks that have nothing to do with each other: variance p = (q + √(q² + 4 q R)) / 2 before a plot."""
+    study = study_of(2, 2)
+    q, R = np.array([1e6, 1e-14]), np.array([1e6, 1e-8])
+    study.motion = lambda spec: Motion(lambda t: np.eye(2), lambda t: np.diag(q), [0, 0], np.diag([1e6, 1e-9]))
+    study.plot = lambda spec, one, k: (np.eye(2), np.sqrt(R))
+    p = (q + np.sqrt(q**2 + 4 * q * R)) / 2
+    np.testing.assert_allclose(study.limits(case_of(study, [{}]).spec)[0], np.sqrt(p * R / (p + R)), rtol=1e-9)
 
 
 @pytest.mark.parametrize("n", [2, 4])
@@ -308,6 +322,12 @@ WRONG = {
     "covariance negative": ("assumed_motion", lambda spec, one: Motion(
         lambda t: np.eye(2), lambda t: np.eye(2), [0, 0], [[1, 2], [2, 1]]),
         "assumed_motion: covariance: must be symmetric and not negative, got"),
+    "small and negative": ("motion", lambda spec: Motion(
+        lambda t: np.eye(2), lambda t: np.eye(2), [0, 0], [[1e6, 0], [0, -1e-4]]),
+        "motion: covariance: must be symmetric and not negative, got"),
+    "small and turned": ("motion", lambda spec: Motion(
+        lambda t: np.eye(2), lambda t: [[1e6, 1e-4], [0, 1e-6]], [0, 0], np.eye(2)),
+        r"motion: Q\(dt\): must be symmetric and not negative, got"),
     "F": ("motion", lambda spec: Motion(np.eye(2), lambda t: np.eye(2), [0, 0], np.eye(2)), "F: must be a function"),
     "F drawn": ("motion", lambda spec: Motion(lambda t: RNG.normal(size=(2, 2)), lambda t: np.eye(2), [0, 0],
                                               np.eye(2)), r"F\(dt\): gives another formula each time"),
