@@ -249,11 +249,13 @@ class Store:
         work = self._work
         return described_piece(self.path, piece, work.block) | {"block": work.block, "size": work.size}
 
-    def make(self) -> None:
-        """Make the directory, where there is none."""
+    def make(self, last: bool = True) -> None:
+        """Make the directory, where there is none; unless it is the last try FileNotFoundError is left as it is."""
         try:
             self.path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
+            if isinstance(error, FileNotFoundError) and not last:
+                raise
             raise StoreError(f"{error.filename or self.path}: cannot be written: {error.strerror}") from error
 
     def write(self, pieces: Mapping[Piece, Sums]) -> None:
@@ -262,8 +264,8 @@ class Store:
         if not pieces:
             return
         for look in range(LOOKS):
-            self.make()
-            with suppress(FileNotFoundError):  # `radarsim clean` removed the directory just now
+            with suppress(FileNotFoundError):  # `radarsim clean` removed the directory, or the one above it, just now
+                self.make(last=look == LOOKS - 1)
                 self._write_all(pieces, last=look == LOOKS - 1)
                 return
 

@@ -175,12 +175,14 @@ def test_classes_that_were_worked_out_beside_the_run_count(tmp_path):
 
 
 def test_readings_tell_of_runs_that_were_written_with_other_classes(tmp_path):
-    as_runs_would_store(tmp_path, rule.CONFIRMED)
     asked = ("readings", "P1.9", "P1.8", "--no-figures", "--out", tmp_path)
     assert "radarsim report" not in printed(*asked)
-    path = tmp_path / "range_doppler/claims.csv"
-    path.write_text(path.read_text().replace(f",{rule.CONFIRMED},", f",{rule.REFUTED},"))
-    assert "`radarsim report range_doppler`" in printed(*asked)
+    classes = tmp_path / CLASSES
+    classes.write_text(classes.read_text().replace(f",{rule.CONFIRMED},", f",{rule.REFUTED},"))
+    printed("run", "range_doppler", "-n", 300, "--no-figures", "--out", tmp_path)
+    assert f"`radarsim report range_doppler --out {tmp_path}`" in printed(*asked)
+    printed("run", "range_doppler", "-n", 300, "--no-figures", "--out", tmp_path)
+    assert "radarsim report" not in printed(*asked)
 
 
 @pytest.mark.slow

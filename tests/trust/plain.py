@@ -59,7 +59,35 @@ def add_totals(pointer, number, *values):
         pointer[number + i] += total(value)
 
 
+def results(program, arrays):
+    """The results of all operations of a recorded program, eight numbers each, whose outputs are written."""
+    made = []
+    for op, *of in program.ops:
+        if op == "number":
+            made.append(np.full(WIDTH, of[0]))
+        elif op == "row":
+            made.append(arrays[of[0]].array[arrays[of[0]].row(of[1])].copy())
+        elif op == "plain":
+            made.append(np.full(WIDTH, arrays[of[0]][of[1]]))
+        else:
+            made.append(OPERATIONS[op](*(made[at] for at in of)))
+    for array, number, at in program.outputs:
+        put(arrays[array], number, made[at])
+    return made
+
+
+def added(program, arrays, held):
+    """The sums of a program with its results added."""
+    made = results(program, arrays)
+    return tuple(one + made[at] for one, at in zip(held, program.sums, strict=True))
+
+
+OPERATIONS = {"fadd": np.add, "fsub": np.subtract, "fmul": np.multiply, "fdiv": np.divide, "sqrt": np.sqrt}
+OPERATIONS |= {"where": np.where, ">": np.greater, "<": np.less}
 LANES = {
+    "emitted": lambda program: functools.partial(results, program),
+    "emitted_sums": lambda program: functools.partial(added, program),
+    "zeros": lambda count: lambda: (np.zeros(WIDTH),) * count,
     "where_greater": lambda x, y, yes, no: np.where(x > y, yes, no),
     "any_greater": lambda x, y: bool(np.any(x > y)),
     "full": float,  # formulas are called by NumPy too, with arrays of other sizes
