@@ -316,20 +316,24 @@ class Found:
     at_nearest: float
 
 
+class Undefined(ValueError):
+    """A function without a value anywhere on a range."""
+
+
 def roots_of(function: Function, over: Range, width: float = EXACTLY) -> Found:
     """All roots that a scan of the range shows: changes of sign, and touching ones where it turns near zero.
 
     Where the function jumps over zero, the place of the jump counts as one, unless it is undefined between. Brackets
     are closed to a part `width` of the root, by default to rounding.
 
-    Raises ValueError where the function is defined nowhere on the scan.
+    Raises Undefined where the function is so everywhere on the scan.
     """
     places = [(x, function(x)) for x in over.grid()]
     places = _with_edges(function, over, places)
     places = _with_turns(function, over, places)
     known = [(x, y) for x, y in places if not math.isnan(y)]
     if not known:
-        raise ValueError("not defined on the range")
+        raise Undefined("not defined on the range")
     found = [x for x, y in known if y == 0]
     for (a, ya), (b, yb) in pairwise(places):
         if ya * yb < 0:

@@ -252,7 +252,7 @@ def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answ
     question.predict(told, what + (tr(", each {near}", near=tr(near)) if near else ""), seconds)
     try:
         found = roots(asked, curve)
-    except ValueError:
+    except quantities.Undefined:
         raise question.nowhere(asked, curve) from None
     counted = question.ROUGH if curve.rough else 0  # both kinds differ a little where the key has no effect
     question.refuse_without_effect(asked, [one.value for (_, count), one in curve.known.items() if count == counted])
@@ -280,7 +280,7 @@ def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answ
 def roots(asked: Question, curve: Curve) -> quantities.Found:
     """Where the exact quantity reaches the target; first looked for roughly where that is much less work.
 
-    Raises ValueError where it is defined nowhere.
+    Raises quantities.Undefined where it is defined nowhere.
     """
 
     def missing(x: float) -> float:

@@ -145,7 +145,7 @@ def _now(answer: "Answer") -> str:
 
 def _quantity(answer: "Answer", value: float) -> str:
     number = _rate(value) if answer.quantity.of.kind == "share" else _number(value, ".4g")
-    return f"{number} {tr(answer.quantity_unit)}"
+    return f"{number} {tr(answer.quantity_unit)}".rstrip()
 
 
 def _rate(percent: float) -> str:

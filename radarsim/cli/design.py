@@ -61,10 +61,11 @@ def _option(by_study: "Mapping[str, Quantity]", everywhere: bool) -> click.Optio
     metavar = "NAME" if others else metavar
     studies: dict[str, list[str]] = {}
     for study, of in by_study.items():
-        studies.setdefault(of.shown_unit() or "in the component's unit", []).append(study)
+        unit = of.shown_unit("in the component's unit" if of.per == "component" else "")
+        studies.setdefault(unit and f", {unit}", []).append(study)
     each = [unit if everywhere and len(studies) == 1 else f"{unit} ({', '.join(of)})" for unit, of in studies.items()]
     words = one.words[0].upper() + one.words[1:] if one.words[0].isascii() else one.words
-    text = f"{words}, {', '.join(each)}."
+    text = f"{words}{''.join(each)}."
     return click.Option([one.option, f"{OF}{one.name}"], type=Named(metavar), metavar=metavar, help=text)
 
 

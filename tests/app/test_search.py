@@ -105,7 +105,7 @@ def test_a_root_in_the_last_defined_step_is_found():
 
 
 def test_a_function_that_is_defined_nowhere_is_refused():
-    with pytest.raises(ValueError, match="not defined"):
+    with pytest.raises(quantities.Undefined, match="not defined"):
         quantities.roots_of(lambda x: math.nan, RANGE)
 
 

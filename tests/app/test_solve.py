@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 import radarsim
+from radarsim.app import quantities
 from radarsim.app.quantities import Wanted, checked
 from radarsim.app.question import Cases, Curve
 from radarsim.app.solve import solve
@@ -544,3 +545,16 @@ def test_the_run_that_a_sampled_answer_names_confirms_it(kind):
     seen, _ = quantities.sampled(checked(quantity, one), one)
     half = (seen.hi - seen.lo) / 2
     assert abs(seen.value - equals) <= 2 * math.sqrt(2) * half, (seen, found)
+
+
+def test_a_fault_of_a_study_is_not_taken_for_a_quantity_without_values(monkeypatch):
+    exact = quantities.exact
+
+    def failing(quantity, case, axes):
+        if case.spec.radar.sigma_velocity_mps > 1000:
+            raise np.linalg.LinAlgError("Singular matrix")
+        return exact(quantity, case, axes)
+
+    monkeypatch.setattr(quantities, "exact", failing)
+    with pytest.raises(np.linalg.LinAlgError):
+        solve("rls2", "radar.sigma_velocity_mps", GAIN, 30)

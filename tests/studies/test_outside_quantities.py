@@ -236,6 +236,9 @@ def test_one_name_in_two_units_is_listed_with_both():
     option = design._option({"one": depth, "other": share, "third": depth}, everywhere=False)
     assert option.help == "Slip, m (one, third), % (other)."
     assert design._option({"one": depth}, everywhere=True).help == "Slip, m."
+    ratio, error = Quantity("ratio", "ratio", "r", "r"), Quantity("error", "error", "e", "e", per="component")
+    assert design._option({"one": ratio}, everywhere=False).help == "Ratio (one)."
+    assert design._option({"one": error}, everywhere=False).help == "Error, in the component's unit (one)."
 
 
 @pytest.mark.parametrize("given", [7, (7,), None])

@@ -541,7 +541,8 @@ def steady_state(
 def normalised_error(
     believed: np.ndarray, bias: np.ndarray, moment: np.ndarray, available: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and variance of eᵀP⁻¹e per estimated component (…,) of a Gaussian error e; not-a-number without components.
+    """Mean and variance of eᵀP⁻¹e per estimated component (…,) of a Gaussian error e; not-a-number without components
+    and where P is singular.
 
     believed (…, 3, 3) is P, bias (…, 3) the mean m of e, moment (…, 3, 3) its second moment M = E eeᵀ, available
     (…, 3) the components of e that there are. The mean is tr P⁻¹M, the variance 2 tr (P⁻¹M)² - 2 (mᵀP⁻¹m)².
@@ -555,6 +556,7 @@ def normalised_error(
         if known.size:
             P, M = ((part * unit)[where][:, known][:, :, known] for part in (believed, moment))
             m = (bias * scale)[where][:, known, None]
+            P[np.linalg.slogdet(P).sign == 0] = np.nan  # of a filter that diverges, by rounding; solve would raise
             ratio = np.linalg.solve(P, M)
             shift = (m * np.linalg.solve(P, m)).sum(axis=(1, 2))
             mean[where] = np.trace(ratio, axis1=1, axis2=2) / known.size

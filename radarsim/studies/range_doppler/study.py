@@ -172,7 +172,8 @@ def exact_values(made: Designed, baseline: int) -> Known:
     covariance = covariance + np.einsum("fkic,fkjc->fkij", further, further)
     available, believed = (np.stack([getattr(d, what) for d in made.filters]) for what in ("available", "believed"))
     moment = covariance + bias[..., :, None] * bias[..., None, :]
-    root = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3) + bias**2)
+    with np.errstate(invalid="ignore"):  # a filter that diverges has variances below zero by rounding: no σ
+        root = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3) + bias**2)
     return Known(root, bias, gains(root, root[baseline]), nees_of(believed, bias, moment, available), believed)
 
 

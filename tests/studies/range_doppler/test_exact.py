@@ -149,6 +149,13 @@ def test_normalised_error_without_components_is_not_a_number():
     assert np.isnan(of).all()
 
 
+def test_normalised_error_of_a_singular_covariance_is_not_a_number_beside_others_that_are():
+    P = np.stack([np.diag([4.0, 1.0, 1.0]), np.ones((3, 3))])
+    mean, variance = normalised_error(P, np.zeros((2, 3)), 2 * P, np.ones((2, 3), dtype=bool))
+    np.testing.assert_allclose(mean, [2, np.nan], rtol=1e-12)
+    np.testing.assert_allclose(variance, [8 / 3, np.nan], rtol=1e-12)
+
+
 @pytest.mark.parametrize("noise", ["random_jerk", "white_jerk", "white_acceleration"])
 def test_noise_over_a_time_of_one_period_is_that_of_a_scan(noise):
     a, b = noise_by_time(noise, 0.3, 7.0)
