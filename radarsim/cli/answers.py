@@ -127,7 +127,7 @@ def slope(answer: "Answer") -> str:
     better = (change > 0) == answer.quantity.of.more_is_better
     size = _number(abs(change), "#.3g")
     points = tr("{size} points", size=size)
-    changed = points if answer.quantity_unit == "%" else f"{size} {tr(answer.quantity_unit)}"
+    changed = points if answer.quantity_unit == "%" else f"{size} {tr(answer.quantity_unit)}".rstrip()
     told = {"step": _with_unit(step, answer.unit, PLAIN), "change": changed}
     if answer.quantity.of.more_is_better:
         return tr("{step} more brings {change}", **told) if better else tr("{step} more costs {change}", **told)
