@@ -356,7 +356,7 @@ MOST_FURTHER = 6  # sentences on further baselines
 
 def answered(results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"]) -> tuple[str, ...]:
     """The answer of an experiment: the study's, and the gains at the last scan against further baselines."""
-    more = [tr("Further gains stand in gains.csv.")] if sum(len(one.against) for one in results) > MOST_FURTHER else []
+    more = [tr("Further gains stand in gains.csv.")] if any(one.against for one in results) else []
     return (*(sentence for part in answers(results) for sentence in part(made)), *more)
 
 
@@ -368,20 +368,17 @@ def answers(results: Sequence[CaseResult]) -> "list[notes.Answer]":
 
 
 def _gained(result: CaseResult, made: Mapping[str, "pd.DataFrame"]) -> list[str]:
-    """What each filter gains against the baseline of a result, at the last scan that both have."""
-    last = common.against_own(made["gains"], [result])
-    last = last.groupby(["filter", "component"], sort=False).tail(1)
+    """What each filter gains in the first component against the baseline of a result, at the last scan of both."""
+    gains = common.against_own(made["gains"], [result])
+    last = gains[gains["component"].eq(gains["component"].iloc[0])] if len(gains) else gains
+    last = last.groupby("filter", sort=False).tail(1)
     keys = ("gain_percent", "gain_lo", "gain_hi")
-    each = []
-    for name, rows in common.groups(last, "filter").items():
-        parts = [
-            f"{row['component']} {estimate((row[key] for key in keys), '%', '.3g')}" for row in rows.to_dict("records")
-        ]
-        each.append(f"{name[0] if isinstance(name, tuple) else name} {', '.join(parts)}")
+    each = [f"{row['filter']} {estimate((row[key] for key in keys), '%', '.3g')}" for row in last.to_dict("records")]
     if not each:
         return []
-    told = {"case": result.name, "base": result.baseline, "t": float(last["t_s"].max()), "filters": "; ".join(each)}
-    return [tr("{case}, gain against {base} at {t:g} s: {filters}.", **told)]
+    told = {"case": result.name, "base": result.baseline, "component": last["component"].iloc[0]}
+    told |= {"t": f"{last['t_s'].max():g}", "filters": "; ".join(each)}
+    return [tr("{case}, gain in {component} against {base} at {t} s: {filters}.", **told)]
 
 
 def case_figures(

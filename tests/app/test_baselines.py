@@ -85,9 +85,9 @@ def test_figures_answer_and_last_scan(both):
     assert {"gain_r", "gain_r_2", "gain_Vr_2"} <= set(both.figures)
     assert "against filter r," in both._described["gain_r_2"].caption
     assert "against filter r+Vr," in both._described["gain_r"].caption
-    (further,) = [line for line in both.answer if line.startswith("config, gain against r at 110 s: r+Vr r ")]
+    (further,) = [line for line in both.answer if line.startswith("config, gain in r against r at 110 s: r+Vr ")]
     row = both.gains[(both.gains["baseline"] == "r") & (both.gains["filter"] == "slow") & (both.gains["k"] == 12)]
-    assert f"slow r {row.iloc[0]['gain_percent']:.3g} % [" in further
+    assert f"slow {row[row.component == 'r'].iloc[0]['gain_percent']:.3g} % [" in further
     assert len(both.last_scan) == 9
     assert set(both.last_scan["baseline"].dropna()) == {"r+Vr"}
 
@@ -151,7 +151,7 @@ def test_precision_of_gains_looks_at_all_baselines():
     [
         ("[r, x]", "two.yaml:1:15: baseline: must be the name of a filter: r, r+Vr, slow, got 'x'"),
         ("[r, slow, r]", "two.yaml:1:21: baseline.2: stands there already, got 'r'"),
-        ("[]", "two.yaml:1:11: baseline: must be text, got []"),
+        ("[]", "two.yaml:1:11: baseline: must be the name of a filter or a list of such names, got []"),
         ("[x, r]", "two.yaml:1:12: baseline: must be the name of a filter: r, r+Vr, slow, got 'x'"),
     ],
 )

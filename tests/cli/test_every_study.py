@@ -32,7 +32,7 @@ SOLVED = {
     "smoothing": "sensor.sigma_range_m --sigma r --filter kalman --equals 10",
     "manoeuvre": "sensor.sigma_range_m --sigma r --filter growing --equals 300",
     "clutter": "sensor.detection_probability --loss nearest --equals 5 --between 0.6 1",
-    "discriminator": "burst.noise_variance --lock narrow --equals 95",
+    "discriminator": "burst.noise_variance --lock sequence --equals 95",
     "ambiguous_doppler": "radar.sigma_velocity_mps --right memory --at-k 6 --equals 99",
     "pulses_to_tracks": "burst.snr_db --lock spectrum --equals 95",
 }

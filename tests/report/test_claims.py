@@ -102,6 +102,12 @@ def test_ratio_of_estimates():
     assert of == pytest.approx((150, 135, 165))
 
 
+def test_a_ratio_to_what_is_exactly_known_has_no_ends():
+    none, some = Estimate(0.0, 0.0, 0.0), Estimate(1.0, 0.9, 1.1)
+    for a, b in ((none, some), (some, none)):
+        assert np.isnan([claims.ratio(a, b).lo, claims.ratio(a, b).hi]).all()  # and no warning, which is an error here
+
+
 def test_all_claims_judged(table):
     assert list(dict.fromkeys(table["claim"])) == [f"P1.{n}" for n in range(1, 37)]
     assert ",".join(table.columns[:9]) == "claim,paper,statement,case,measured,lo,hi,expected,verdict"

@@ -145,10 +145,14 @@ def minus(a: Series, b: Series) -> Series:
 
 
 def ratio(a: Estimate, b: Estimate, scale: float = 1.0) -> Estimate:
-    """scale · a / b of independent positive estimates: relative half-widths add in squares."""
-    value = scale * a.value / b.value
-    down = np.hypot(1 - a.lo / a.value, b.hi / b.value - 1)
-    up = np.hypot(a.hi / a.value - 1, 1 - b.lo / b.value)
+    """scale · a / b of independent positive estimates: relative half-widths add in squares.
+
+    Its ends are no numbers where one of them is zero, as errors of what is exactly known are.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        value = scale * np.divide(a.value, b.value)
+        down = np.hypot(1 - np.divide(a.lo, a.value), np.divide(b.hi, b.value) - 1)
+        up = np.hypot(np.divide(a.hi, a.value) - 1, 1 - np.divide(b.lo, b.value))
     return Estimate(value, value * (1 - down), value * (1 + up))
 
 

@@ -74,7 +74,7 @@ def stage_gain(result: CaseResult, f: int, base: int, s: int, c: int) -> statist
 
 @table("stages")
 def _stages(result: CaseResult) -> common.Columns:
-    """σ over each stage of the flight, of all its scans, and the paired gain against the baseline filter.
+    """σ over each stage of the flight, of all its scans, and the paired gain against the first baseline filter.
 
     begin_s, end_s: times from which and to which the stage lasts
     """
