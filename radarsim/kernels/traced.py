@@ -64,7 +64,8 @@ class Lane:
 
 
 class Mask(Lane):
-    """What a comparison of lanes gives: holds or not, lane by lane; `&`, `|` and `~` join such."""
+    """What a comparison of lanes gives: holds or not, lane by lane; `&`, `|` and `~` join such, and truth values. In
+    arithmetic it is 1 where it holds, else 0, as in Python."""
 
     __hash__ = None  # type: ignore[assignment]
     __slots__ = ()
@@ -135,7 +136,12 @@ class Trace:
 
     def put(self, op: str, *operands: Any) -> Lane:
         """An operation on lanes and numbers. Raises Unfit where it can give no number."""
-        places = tuple(self.place(one) for one in operands)
+        if op in ("and", "or", "not"):
+            places = tuple(map(self.holds, operands))
+        elif op == "where":
+            places = operands[0].at, *map(self.place, operands[1:])
+        else:
+            places = tuple(map(self.place, operands))
         if op in ("==", "!=") and places[0] == places[1]:
             raise Unfit("a test for NaN cannot be made; test what would make it, e.g. where(z >= 0, …)")
         value = _value(op, places, self.always)
@@ -151,6 +157,8 @@ class Trace:
 
     def place(self, one: Any) -> int:
         """The number of the operation that a lane comes from, or that of a constant. Raises Unfit where it is none."""
+        if isinstance(one, Mask):
+            return self.put("where", one, 1.0, 0.0).at
         if isinstance(one, Lane):
             return one.at
         number = float(one)
@@ -159,6 +167,14 @@ class Trace:
         at = self._at("number", number)
         self.always[at] = self.stated[at] = number
         return at
+
+    def holds(self, one: Any) -> int:
+        """The number of the operation that a mask comes from, or that of a truth value. Raises Unfit of others."""
+        if isinstance(one, bool | np.bool_):
+            one = self.put("<", 0.0, float(one))
+        if not isinstance(one, Mask):
+            raise Unfit(f"& and | join comparisons, got {'a number' if isinstance(one, Lane) else repr(one)[:40]}")
+        return one.at
 
     def _at(self, *operation: Any) -> int:
         return self.known.setdefault(operation, len(self.known))
@@ -262,6 +278,8 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
         return mapped(lambda *pair: where(condition, *pair), numbered(yes), numbered(no))
     if isinstance(condition, Mask):
         return condition.trace.put("where", condition, yes, no)
+    if isinstance(condition, int) and condition < 0:
+        condition &= 1  # ~True is -2 in Python, ~False -1; joined by & and | with others the last bit says it still
     return np.where(condition, yes, no) if isinstance(condition, np.ndarray) else yes if condition else no
 
 

@@ -460,6 +460,8 @@ def recorded(function: Callable[..., Any], *arguments: Any) -> Any:
     made, again = (numbers_of(function, *arguments) for _ in range(2))
     if made is None or isinstance(made, list):
         raise fault(function, f"must give a tuple of numbers, got {'nothing' if made is None else 'a list'}")
+    if any(isinstance(one, traced.Mask) for one in traced.leaves(made)):
+        raise fault(function, "gives a comparison in place of a number: where(condition, 1.0, 0.0) makes one of it")
     for numbers in (made, again):
         if wrong := [
             one for one in traced.leaves(numbers) if not isinstance(one, traced.Lane) and not math.isfinite(one)

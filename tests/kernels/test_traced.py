@@ -84,6 +84,26 @@ def test_branches_are_taken_lane_by_lane():
     np.testing.assert_allclose(in_lanes(branching, x, y), wanted, rtol=4e-15, atol=1e-15)
 
 
+def joined(x, y):
+    """Comparisons joined, with truth values too, and as numbers."""
+    neither = where(~(x > 0.0) & ~(y > 0.0), 1.0, 0.0)
+    either = where(~(x > 0.0) | ~(y > 0.0), 1.0, 0.0)
+    by_key = where((x > 0.0) & True, 1.0, 0.0), where(False | ~(x > 0.0), 1.0, 0.0), where(False & (x > y), 1.0, 0.0)
+    counted = (x > 0.0) * y + sum([x > 0.0, y > 0.0]) - (x > y) ** 2, abs(-(x > 0.0))
+    return neither, either, *by_key, *counted, where((x > 0.0) == (y > 0.0), x, y)
+
+
+def test_comparisons_are_joined_and_counted_as_in_python():
+    x, y = SMALL, RNG.normal(size=SMALL.size)
+    wanted = np.transpose([joined(float(a), float(b)) for a, b in zip(x, y, strict=True)])
+    np.testing.assert_array_equal(in_lanes(joined, x, y), wanted)
+    assert set(np.unique(wanted[:5])) == {0, 1}
+    np.testing.assert_array_equal(wanted[0], (x <= 0) & (y <= 0))
+    for number in (Trace().rows(0, 0.0), 1, 2.0):
+        with pytest.raises(traced.Unfit, match="join comparisons, got"):
+            (Trace().rows(0, 0.0) > 0.0) & number
+
+
 @pytest.mark.parametrize("n", [2, 4])
 def test_small_matrices_are_those_of_the_textbook(n):
     A = RNG.normal(size=(n, n))

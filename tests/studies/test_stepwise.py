@@ -274,6 +274,10 @@ def nothing(s, z, u, c):
     return None
 
 
+def a_comparison(s, z, u, c):
+    return z[0] > s[0], s[1]
+
+
 FAULTS = [
     ("update", branching, 2, r"branching: .* has no one value: write where\(condition, yes, no\)"),
     ("predict", of_another_shape, 0, r"gives a state of the shape \(·, ·, ·\), the one before has \(·, ·\)"),
@@ -289,6 +293,7 @@ FAULTS = [
     ("update", drawn_by_python, 0, "gives another formula each time: draw by normals"),
     ("update", a_list, 0, "a_list: must give a tuple of numbers, got a list"),
     ("update", nothing, 0, "nothing: must give a tuple of numbers, got nothing"),
+    ("update", a_comparison, 0, "a_comparison: gives a comparison in place of a number"),
     ("update", of_negative_variance, 1, "R, the variance of the error of a number, must be positive, got -1"),
 ]
 
