@@ -378,7 +378,7 @@ ATAN = (
 def atan2(y: Any, x: Any) -> Any:
     """The angle of the point (x, y) from the axis of x, from -π to π; of lanes to 4·10⁻¹⁶ of itself, at (0, 0) zero."""
     if not isinstance(x, Lane) and not isinstance(y, Lane):
-        return np.arctan2(y, x)
+        return np.arctan2(y + 0.0, x + 0.0)  # -0.0 is 0.0, as of lanes
     a, b = abs(x), abs(y)
     steep = b > a
     low, high = where(steep, a, b), where(steep, b, a)

@@ -103,6 +103,10 @@ class LinearStudy(OneFile):
         for name, keys in (("detection", (cls.detection,)), ("fitted", cls.fitted)):
             if isinstance(getattr(cls, "parts", None), Mapping):
                 yield from (f"{name}: there is no key {key}" for key in keys if key and not cls._has(str(key)))
+        for key in map(str, cls.fitted):
+            part, _, own = key.partition(".")
+            if cls._has(key) and own.partition(".")[0] not in getattr(cls.parts.get(part), "model_fields", {}):
+                yield f"fitted: {key} must be a key of a part that YAML gives, PART.KEY"
 
     # ---- the model ---------------------------------------------------------------------------------------------------
     def assumed_motion(self, spec: Any, one: Any) -> Motion:
@@ -210,6 +214,13 @@ class LinearStudy(OneFile):
         F, Q, x, P = self._moved("assumed_motion", self.call(self.assumed_motion, spec, one), self.scan_period_s(spec))
         see, sigma = self._rows("plot", lambda k: self.call(self.plot, spec, one, k), spec.scans, x.size)
         H, R = self._rows("assumed_plot", lambda k: self.call(self.assumed_plot, spec, one, k), spec.scans, x.size)
+        if x.size != (n := self._truth(spec)[0][2].size):
+            raise self._fault(
+                "assumed_motion", f"{one.name}: mean: must be of the {n} states of `motion`, got {x.size}"
+            )
+        if R.shape != sigma.shape:
+            words = f"{one.name}: must be of as many numbers as `plot`, {sigma.shape[1]}, got {R.shape[1]}"
+            raise self._fault("assumed_plot", words)
         return Matrices(F, Q, x, P, H, R**2, see, sigma, kalman(F, Q, P, H, R**2), False)
 
     def matrices(self, spec: Any, one: Any) -> Matrices:
@@ -227,6 +238,9 @@ class LinearStudy(OneFile):
         spec = case.spec
         truth, probability = self._truth(spec)
         every = [self.matrices(spec, one) for one in spec.filters]
+        numbers = sorted({of.sigma.shape[1] for of in every})
+        if len(numbers) > 1:
+            raise self._fault("plot", f"must give all filters as many numbers, got {numbers[0]} and {numbers[-1]}")
         shown = len(self.components)
         known = [exact(truth, of, probability) if of.own or probability == 1 else None for of in every]
         shape = len(every), spec.scans, shown
@@ -457,9 +471,14 @@ class _Rows:
 
     def moves(self, dt: np.ndarray, spec: Any = None) -> tuple[np.ndarray, np.ndarray]:
         """F and Q (n, n, n) over times; over none at all the state stays."""
-        motion = self.study.assumed_motion(spec or self.spec, self.one)
+        motion, n = self.study.assumed_motion(spec or self.spec, self.one), self.of.x.size
         times, at = np.unique(dt, return_inverse=True)
-        F, Q = (np.stack([np.asarray(one(t), dtype=float) for t in times]) for one in (motion.F, motion.Q))
+        F, Q = np.tile(np.eye(n), (times.size, 1, 1)), np.zeros((times.size, n, n))
+        for name, one, made in (("F", motion.F, F), ("Q", motion.Q, Q)):
+            moved = [self.study.call(one, t) for t in times[times != 0].tolist()]
+            made[times != 0] = self.study._array(f"assumed_motion: {name}(dt)", moved or made[:0], len(moved), n, n)
+        for i in np.flatnonzero(np.linalg.eigvalsh(Q)[:, 0] < 0):
+            self.study._covariance(f"assumed_motion: Q({times[i]:g} s)", Q[i], n)
         return F[at], Q[at]
 
     def rows(self, first: int, n: int, spec: Any = None) -> tuple[np.ndarray, np.ndarray]:
@@ -523,8 +542,6 @@ class Following:
 
         rows, z = len(dt), one.numbers(columns, len(dt))
         (F, Q), (H, R) = one.moves(dt), one.rows(self.count, rows)
-        if self.count == 0:
-            F[0], Q[0] = np.eye(x.size), 0.0
         out, there = np.full((rows, 2 * x.size + z.shape[1]), np.nan), np.isfinite(z)
         gains = one.gains(self.count, rows) if one.of.own else np.zeros_like(H)
         states.follow(x, P, F, Q, H, R, gains, not one.of.own, np.where(there, z, 0.0), there, out)

@@ -62,6 +62,8 @@ def test_angles_are_those_of_the_library():
     x, y = size * np.cos(turns), size * np.sin(turns)
     found, wanted = in_lanes(traced.atan2, y, x), np.arctan2(y, x)
     assert np.max(np.abs(found / np.where(wanted == 0, 1, wanted) - np.where(wanted == 0, 0, 1))) < 4.5e-16
+    assert traced.atan2(-0.0, -1.0) == math.pi  # zero has no sign
+    assert traced.atan2(0.0, -0.0) == 0.0
     zero = np.zeros(8)
     edges = in_lanes(traced.atan2, np.r_[0.0, 0, 1, -1, 0, 2, -2, 2], np.r_[1.0, -1, 0, 0, 0, 2, 2, -2])
     assert np.allclose(

@@ -304,6 +304,37 @@ def test_the_likelihood_is_that_of_all_plots_together():
         assert sum(found.by_number(np.array([sigma, noise])).values()) == pytest.approx(wanted, rel=1e-10)
 
 
+def test_at_the_first_plot_and_over_no_time_the_state_stays_whatever_the_motion_says():
+    """Of a motion that is the same over any time; F(0) of an author's formula may fail."""
+    study = study_of(2, 1)
+    F, Q = np.array([[0.9, 0.1], [0.0, 0.8]]), np.diag([0.5, 2.0])
+    study.motion = lambda spec: Motion(lambda t: F * (t / t), lambda t: Q, [1, 2], np.eye(2))
+    case = case_of(study, [{}])
+    columns = study.recorded().simulated(case, 0)
+    one = {name: value[:1] for name, value in columns.items()}
+    S = rows(2, 1, 0)[0] @ rows(2, 1, 0)[0] + 4
+    wanted = multivariate_normal(rows(2, 1, 0)[0] @ [1, 2], S).logpdf(one["z0_m"][0])
+    assert study.likelihood(case, None, [one])(np.array([2.0, 1.0])) == pytest.approx(wanted, rel=1e-12)
+    twice = {name: np.repeat(value[:2], 2) for name, value in columns.items()} | {"t_s": np.repeat([0, 0.5], 2)}
+    twice["z0_m"][[1, 3]] = np.nan
+    estimate = study.tracker(case).feed(twice).estimate[0]
+    np.testing.assert_array_equal(estimate[::2], estimate[1::2])
+
+
+@pytest.mark.parametrize(
+    ("F", "Q", "said"),
+    [
+        (np.eye(2), lambda t: np.diag([1, 0.75 - t]), r"assumed_motion: Q\(1 s\): must be symmetric and not negative"),
+        ([[1]], lambda t: np.eye(2), r"assumed_motion: F\(dt\): must be 1 × 2 × 2, got 1 × 1 × 1"),
+    ],
+)
+def test_a_motion_that_is_wrong_over_the_times_of_recorded_plots_is_one_line(F, Q, said):
+    study = study_of(2, 1)
+    study.motion = lambda spec: Motion(lambda t: np.eye(2) if t == 0.5 else F, Q, [0, 0], np.eye(2))
+    with pytest.raises(ConfigError, match=said):
+        study.tracker(case_of(study, [{}])).feed({"t_s": np.array([0.0, 1.0]), "z0_m": np.zeros(2)})
+
+
 RNG = np.random.default_rng(1)
 WRONG = {
     "motion": ("motion", lambda spec: Motion(lambda t: [[1, t]], lambda t: np.eye(2), [0, 0], np.eye(2)),
@@ -335,6 +366,10 @@ WRONG = {
     "zero": ("plot", lambda spec, one, k: ([1, 0], 0.0), "plot: sigma: must be positive, got 0"),
     "drawn": ("plot", lambda spec, one, k: ([1, RNG.normal()], 1.0), "plot: gives another formula each time"),
     "boom": ("plot", lambda spec, one, k: 1 / 0, "ZeroDivisionError: division by zero"),
+    "of other states": ("assumed_motion", lambda spec, one: Motion(
+        lambda t: np.eye(3), lambda t: np.eye(3), np.zeros(3), np.eye(3)), "plot: H: must be 1 × 3, got 1 × 2"),
+    "of other numbers": ("assumed_plot", lambda spec, one, k: (np.eye(2), np.ones(2)),
+                         "assumed_plot: H: must be 1 × 2"),
     "gains": ("own_gains", lambda spec, one: np.zeros((3, 2)), "own_gains: must be 25 × 1 × 2, got 3 × 2"),
 }  # fmt: skip
 
@@ -351,12 +386,35 @@ def test_a_wrong_shape_is_one_line_with_the_classs_file(what):
     assert "test_linear.py:" in caught.value.lines[0]
 
 
+def test_filters_have_the_states_of_the_truth_and_as_many_numbers():
+    study = study_of(2, 1)
+    study.assumed_motion = lambda spec, one: Motion(lambda t: np.eye(3), lambda t: np.eye(3), np.zeros(3), np.eye(3))
+    study.plot = study.assumed_plot = lambda spec, one, k: (np.eye(1, 3), 1.0)
+    case = case_of(study, [{}, {"wrong": "H"}])
+    for of in (study.prepare, study.tracker):
+        with pytest.raises(
+            ConfigError, match=r"assumed_motion: 0 .*: mean: must be of the 2 states of `motion`, got 3"
+        ):
+            of(case)
+    study = study_of(2, 1)
+    study.measured = ()
+    study.assumed_plot = lambda spec, one, k: (np.eye(2), np.ones(2))
+    with pytest.raises(ConfigError, match=r"assumed_plot: 0 .*: must be of as many numbers as `plot`, 1, got 2"):
+        study.prepare(case)
+    D = lambda one: 1 + bool(one.wrong)  # noqa: E731
+    study.plot = study.assumed_plot = lambda spec, one, k: (np.eye(D(one), 2), np.ones(D(one)))
+    with pytest.raises(ConfigError, match="plot: must give all filters as many numbers, got 1 and 2"):
+        study.prepare(case)
+
+
 def test_keys_and_methods_that_are_not_there_are_a_line_each():
     Study = study_of(2, 1).__class__
-    given = {"detection": "sensor.detektion", "fitted": ("sensor.nois",), "plot": None}
+    given = {"detection": "sensor.detektion", "fitted": ("sensor.nois", "scans", "gain"), "plot": None}
     Wrong = type("Wrong", (Study,), given | {"__module__": __name__})
     assert list(Wrong.missing()) == [
         "Wrong.plot must be given: what a filter sees at scan k",
         "detection: there is no key sensor.detektion",
         "fitted: there is no key sensor.nois",
+        "fitted: scans must be a key of a part that YAML gives, PART.KEY",
+        "fitted: gain must be a key of a part that YAML gives, PART.KEY",
     ]
