@@ -107,6 +107,9 @@ def test_the_parts_of_claims_before_it(claims):
         ("{pick: first}", "first", "measure.gain: must have its arguments by name, got 'first'"),
         ("above: 0", "above: high", "expected.above.value: must be a number, got 'high'"),
         ("above: 0", "printed: 5", "expected.printed.text: must be text, got 5"),
+        ("above: 0", "same: [1, 0]", "expected: must be a range from low to high with a margin > 0, got '1 ± 0'"),
+        ("above: 0", "same: [1, -0.1]", "must be a range from low to high with a margin > 0, got '1 ± -0.1'"),
+        ("above: 0", "within: [2, 1]", "must be a range from low to high with a margin > 0, got '2 to 1'"),
         ("above: 0", "more: 0", "parts.0.expected: must be one of them; allowed: printed, between"),
         ("of: [1]", "of: 1", "parts.0.of: must be a list of cases, got 1"),
         ("of: [1]", "of: [1], each: {n: 1}", "parts.0.each.n: must be a list, got 1"),
@@ -122,6 +125,11 @@ def test_a_mistake_is_named_with_its_line_and_what_is_allowed(claims, old, new, 
         claims(HEAD + CLAIM + PART.replace(old, new))
     assert said in str(raised.value)
     assert "claims.yaml:9:" in str(raised.value)
+
+
+def test_no_two_claims_have_one_number(claims):
+    with pytest.raises(ConfigError, match=r"claims.yaml:10:7: claims.1.id: stands there already, got 1"):
+        claims(HEAD + (CLAIM + PART) * 2)
 
 
 def test_parts_of_a_claim_that_is_not_there(claims):

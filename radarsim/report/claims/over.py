@@ -575,6 +575,8 @@ class _Reader:
         names = self._named(keys.names)
         parts: dict[str, list[Part]] = {}
         for i, one in enumerate(keys.claims):
+            if f"{keys.paper}.{one.id}" in parts:
+                self._add(("claims", i, "id"), "stands there already", one.id)
             own = parts[f"{keys.paper}.{one.id}"] = [
                 part for name in one.parts_of for part in self._parts_of(name, parts, ("claims", i, "parts_of"))
             ]
@@ -650,6 +652,9 @@ class _Reader:
         exact = replace(measure, name=f"exact_{measure.name}", function=exactly).number if exactly else None
         assert expected.function
         found = expected.function(**expected.arguments)
+        if not (found.lo <= found.hi and found.margin > 0):
+            self._add((*path, "expected"), "must be a range from low to high with a margin > 0", found.words)
+            raise _Unknown
         return Part(cases, measure=measure, expected=found, exact=exact, **given)
 
     def _filled(self, value: Any, names: Mapping[str, Any], path: Keys) -> Any:
