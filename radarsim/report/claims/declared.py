@@ -150,7 +150,7 @@ def ratio(a: Estimate, b: Estimate, scale: float = 1.0) -> Estimate:
     Its ends are no numbers where one of them is zero, as errors of what is exactly known are.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        value = scale * np.divide(a.value, b.value)
+        value = np.divide(scale * a.value, b.value)
         down = np.hypot(1 - np.divide(a.lo, a.value), np.divide(b.hi, b.value) - 1)
         up = np.hypot(np.divide(a.hi, a.value) - 1, 1 - np.divide(b.lo, b.value))
     return Estimate(value, value * (1 - down), value * (1 + up))
