@@ -16,7 +16,7 @@ from radarsim.app.run import case_result
 from radarsim.config import fields
 from radarsim.config.check import label
 from radarsim.config.document import did_you_mean
-from radarsim.config.experiment import Case
+from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.engine.run import collect
 from radarsim.errors import ConfigError
@@ -76,12 +76,14 @@ class Cases:
     overrides: tuple[str, ...]
     name: str | None = None
     base: Case = field(init=False)
+    stem: str = field(init=False)  # the config's, of one case; else that of the case's own config
 
     def __post_init__(self) -> None:
-        self.base = self._chosen(self.overrides)
+        experiment = load(self.config, self.overrides)
+        self.base = self._chosen(experiment)
+        self.stem = experiment.stem if len(experiment.cases) == 1 else self.base.stem
 
-    def _chosen(self, overrides: Iterable[str]) -> Case:
-        experiment = load(self.config, overrides)
+    def _chosen(self, experiment: Experiment) -> Case:
         named = {case.name: case for case in experiment.cases}
         if self.name is None and len(named) == 1:
             return experiment.cases[0]
@@ -97,7 +99,7 @@ class Cases:
         """The case with another value at a key. Raises ConfigError where the config refuses it."""
         setting = self._setting(key, value)
         try:
-            return replace(self._chosen((*self.overrides, setting)), noise_of=self.base.spec)
+            return replace(self._chosen(load(self.config, (*self.overrides, setting))), noise_of=self.base.spec)
         except ConfigError as error:
             raise ConfigError(*(_not_by_option(line, setting) for line in error.lines)) from error
 

@@ -132,7 +132,7 @@ def sensitivity(
     silent = [name for name, own in zip(axes.filters, base.whole[0], strict=True) if not np.isfinite(own).any()]
     return Sensitivity(
         *(
-            cases.base.stem,
+            cases.stem,
             kinds,
             leading,
             when(asked) if scans else "",

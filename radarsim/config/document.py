@@ -70,6 +70,11 @@ class Faults:
         """Whether the value at this place has been reported as unusable."""
         return (origin._replace(prefix=0), path[origin.prefix :]) in self._spoiled
 
+    def beside(self, source: str) -> None:
+        """Name the file whose keys lie over those of others, where faults are named in the others alone."""
+        if source not in self._sources and not any(one.startswith("--") for one in self._sources):
+            self._lines = {f"{line} (with the keys of {source} over it)": rank for line, rank in self._lines.items()}
+
     def raise_if_any(self) -> None:
         """Raise ConfigError with every fault, file by file, from the top of each downwards."""
         if self._lines:

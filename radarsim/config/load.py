@@ -18,7 +18,7 @@ from typing import Any, get_args
 import yaml
 from pydantic_core import PydanticUndefined
 
-from radarsim.config.cases import Expander, Setting, no_such_config
+from radarsim.config.cases import Expander, Setting, changes_included, no_such_config
 from radarsim.config.check import models_in
 from radarsim.config.document import (
     RESERVED,
@@ -59,6 +59,8 @@ def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Iterable
     else:
         faults.add(Origin("config"), (), f"must be a path, a name or a mapping, got {repr(source)[:60]}")
     experiment = None if document is None else Expander(read, settings, faults, studies).experiment(document)
+    if document is not None and changes_included(document):
+        faults.beside(document.origin(()).source)
     faults.raise_if_any()
     assert experiment is not None  # without one there is a fault
     return experiment
@@ -422,12 +424,20 @@ def new(
     faults.raise_if_any()
     assert document is not None  # a file that cannot be read is a fault
     data = copy.deepcopy(dict(document.data))
-    if values and "include" in data and len(experiment.cases) == 1:  # values have their places in the whole
+    file = Path(experiment.path or like)
+    lost = any(_place(name) != _place(name, file) for name in data.get("include", ()))  # what lies beside it alone
+    if (values or lost) and "include" in data and len(experiment.cases) == 1:  # values have their places in the whole
         (case,) = experiment.cases
         data = {"study": case.study, **case.keys, "realisations": case.realisations, "seed": case.seed}
     for key, value in values.items():
         _put(data, key, value)
     return f"{name}.yaml", starter(data, studies.keys(experiment.study), name, experiment.stem)
+
+
+def _place(name: str, beside: Path | None = None) -> Path | None:
+    """The file of a config that is included by a file, or from here."""
+    found = config_file(name, beside)
+    return found and found.resolve()
 
 
 def _put(data: dict[str, Any], key: str, value: float) -> None:

@@ -197,3 +197,10 @@ def test_a_quantity_is_found_in_the_spelling_of_its_option():
     assert {registry.quantity(name, case).name for name in ("above-oracle", "--above-oracle", "above_oracle")} == {
         "above_oracle"
     }
+
+
+def test_what_changes_an_included_config_has_the_name_of_its_own_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.yaml").write_text("include: [rls2]\nscans: 9\n")
+    assert sensitivity("mine", at_s=20).stem == "mine"
+    assert sensitivity("range_doppler", case="rls3", at_s=20).stem == "rls3"

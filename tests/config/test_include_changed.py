@@ -159,3 +159,20 @@ def test_of_several_changed_cases_one_is_chosen_with_its_changes(folder):
     with pytest.raises(ConfigError, match=r"choose one of mine, yours: track other --set 'include=\[mine\]'"):
         one_case(load("other"), "track with", "track {}")
     assert one_case(load("other", ["include=[mine]"]), "track with", "track {}").spec.scans == 20
+
+
+def test_one_of_ones_own_after_what_includes_a_neighbour_is_written_out(folder):
+    folder("apart/base.yaml", "include: [rls2]\nscans: 20\n")
+    folder("apart/over.yaml", "include: [base]\nscans: 30\n")
+    name, text = new("copy", "apart/over.yaml", registry)
+    folder(name, text)
+    assert canonical(load("copy").cases[0].spec)["scans"] == 30
+
+
+def test_what_own_keys_break_in_an_included_config_names_both(folder, said):
+    folder("configs/base.yaml", "include: [sonar_missed]\n")
+    folder("configs/over.yaml", "include: [base]\nscans: 5\n")
+    (line,) = said("over")
+    assert "sonar_missed.yaml:" in line
+    assert line.endswith("(with the keys of configs/over.yaml over it)")
+    assert all("over it" not in one for one in said("rls2", "radar.detection_probability=2"))

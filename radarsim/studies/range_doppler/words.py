@@ -144,10 +144,11 @@ def _loss(every: "pd.DataFrame", sentences: "pd.Series[Any]", labels: dict[str, 
 
 
 def _baseline(results: Sequence[Result]) -> str:
-    """Than what a gain is: range alone only where the baseline filter observes no more."""
+    """Than what a gain is: range alone only where the baseline filter, and no other, observes no more."""
     bases = [result.spec.filters[result.axes.baseline] for result in results]
     given = {one for one in map(variance_of, bases) if isinstance(one, float)}
-    if all(base.observes == ("range",) for base in bases):
+    alone = [one.name for result in results for one in result.spec.filters if one.observes == ("range",)]
+    if all(base.observes == ("range",) for base in bases) and len(alone) == len(bases):
         if len(given) > 1:
             return tr("than with range alone at the same D_M")
         return tr("than with range alone")
