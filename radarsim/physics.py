@@ -26,6 +26,9 @@ import numpy as np
 
 from radarsim.constants import STANDARD_GRAVITY_MPS2
 
+ROUNDED = 1e-7  # of a correlation: what rounding may leave
+NOTHING = 1e-15  # of the largest element of a covariance: a variance that is only rounding
+
 
 # ---- motion ----------------------------------------------------------------------------------------------------------
 def transition(dt: float, size: int = 3) -> np.ndarray:
@@ -73,6 +76,16 @@ def manoeuvre_covariance(variance: float, dt: float, size: int = 3) -> np.ndarra
     """
     g = transition(dt, size + 1)[:-1, -1]
     return variance * np.outer(g, g)
+
+
+def is_covariance(found: np.ndarray) -> bool:
+    """Whether a finite matrix (n, n) is symmetric and not negative, up to rounding: of any units, by correlations."""
+    least = NOTHING * (np.abs(found).max() or 1.0)
+    sigma = np.sqrt(np.maximum(np.diag(found), least))
+    scaled = found / np.outer(sigma, sigma)  # else m² would hide what is wrong of rad²
+    asymmetry = np.abs(scaled - scaled.T).max()
+    np.fill_diagonal(scaled, np.diag(scaled).clip(0))
+    return bool(np.diag(found).min() >= -least and asymmetry <= ROUNDED and np.linalg.eigvalsh(scaled)[0] >= -ROUNDED)
 
 
 # ---- frames ----------------------------------------------------------------------------------------------------------

@@ -48,7 +48,10 @@ ROOMS = {
         "studies.interface",
         "studies.judged",
     ),
-    "studies.linear": (*("errors", "kernels", *CASE, *DATA, "studies.interface", "studies.noise"), "studies.onefile"),
+    "studies.linear": (
+        *("errors", "kernels", "physics", *CASE, *DATA),
+        *("studies.interface", "studies.noise", "studies.onefile"),
+    ),
     "studies.stepwise": ("errors", "failures", *CASE, *DATA, "kernels", "report", "studies.noise", "studies.onefile"),
     "studies.judged": ("errors", "config", *DATA, "report"),  # claims and readings of studies in one file
     "studies.registry": ("errors", "failures", "config", "report.quantities", "studies.interface"),

@@ -44,9 +44,9 @@ def new(name: str, like: str) -> None:
 
 @main.command(name="new-study")
 @click.argument("name", metavar="NAME")
-@click.option("--step", "form", flag_value="step", help="Of filters that are not linear: the step of one realisation.")
-@click.option("--folder", "form", flag_value="folder", help="A study in a folder of files, for what no base derives.")
-def new_study(name: str, form: str | None) -> None:
+@click.option("--step", is_flag=True, help="Of filters that are not linear: the step of one realisation.")
+@click.option("--folder", is_flag=True, help="A study in a folder of files, for what no base derives.")
+def new_study(name: str, step: bool, folder: bool) -> None:
     """A package with a small whole study, to be made one's own: ./NAME.
 
     It compares two filters on a random walk: one file with keys, matrices, claims and a reading, from which kernel,
@@ -63,8 +63,10 @@ def new_study(name: str, form: str | None) -> None:
     from radarsim.app.reproduce import new_study as write
     from radarsim.cli import console
 
-    path = write(name, form=form or "linear")
-    guide = path / "README.md" if form == "folder" else path / "src" / name / "__init__.py"
+    if step and folder:
+        raise click.UsageError("--step and --folder do not go together: give one of them")
+    path = write(name, form="step" if step else "folder" if folder else "linear")
+    guide = path / "README.md" if folder else path / "src" / name / "__init__.py"
     console.field("package", str(path))
     told = {"path": str(path), "name": name, "guide": str(guide)}
     console.field("", tr("`pip install -e {path}`, then `radarsim run {name}`; {guide} says what goes where", **told))

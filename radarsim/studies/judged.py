@@ -162,7 +162,7 @@ def faults(
 
 
 def _names(measure: Call, specs: Sequence[Model], components: Sequence[str]) -> Iterator[str]:
-    """Which case, filter or component of a measure is not there; names alone that are arguments of functions here."""
+    """Which case, filter, component, gain or scan of a measure is not there: of arguments of functions here alone."""
     of: list[Any] = []
     for key in (key for key in measure.cases if isinstance(key, Mapping)):
         if unknown := _unknown(key, specs):
@@ -179,6 +179,16 @@ def _names(measure: Call, specs: Sequence[Model], components: Sequence[str]) -> 
             known = components if kind == "component" else [one.name for one in spec.filters]
             if (name := measure.arguments[argument]) not in known:
                 yield f"no {kind} {name!r}; there are {', '.join(known)}"
+    yield from (fault for spec in of for fault in _no_number(measure, spec))
+
+
+def _no_number(measure: Call, spec: Any) -> Iterator[str]:
+    """Why a case has no number for a measure of functions here: no gain of its baseline, no scan after its last."""
+    name, at = measure.arguments.get("filter"), measure.arguments.get("at")
+    if measure.function in (gain, gain_change) and name == (spec.baseline or spec.filters[0].name):
+        yield f"filter {name!r} is the baseline: it has no gain"
+    if at is not None and not 1 <= at <= spec.scans:
+        yield f"no scan {at}; there are 1 to {spec.scans}"
 
 
 def _kept_from(spec: Model, values: Mapping[str, Any]) -> str:

@@ -3,7 +3,7 @@
 Beside what that says a class gives `motion` and `plot`: how the truth moves, and what a filter sees. A filter that
 believes other matrices than the true ones has them by `assumed_motion` and `assumed_plot`, one with gains of its own
 by `own_gains`. `detection` is the key of the probability that there is a plot, `fitted` are those that `radarsim fit`
-looks for.
+looks for, real numbers.
 
 Derived are the Kalman gains, exact σ and bias of every filter, of one with a wrong model too, the σ that it tends to,
 the compiled kernel, plots of one realisation, filters over recorded plots, and their likelihood. A plot's numbers have
@@ -15,12 +15,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from types import NoneType, UnionType
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Union, get_args, get_origin
 
 import numpy as np
 
 from radarsim.engine.results import Axes, Layout, Track
 from radarsim.errors import ConfigError
+from radarsim.physics import is_covariance
 from radarsim.studies.interface import CORRELATION, OUTLIERS, Tracker
 from radarsim.studies.onefile import OneFile
 
@@ -32,8 +34,6 @@ BLOCK = 4096
 CLOSE = 1e-14  # change of a limit that has settled, of its components' own sizes
 DOUBLINGS = 60
 LONGEST_PERIOD = 64  # scans after which plots repeat themselves, looked for up to here
-ROUNDED = 1e-7  # of a correlation: what rounding may leave
-NOTHING = 1e-15  # of the largest element of a covariance: a variance that is only rounding
 LEAST = 1e-6  # of a stated key that is fitted, which counts as zero
 
 
@@ -103,10 +103,20 @@ class LinearStudy(OneFile):
         for name, keys in (("detection", (cls.detection,)), ("fitted", cls.fitted)):
             if isinstance(getattr(cls, "parts", None), Mapping):
                 yield from (f"{name}: there is no key {key}" for key in keys if key and not cls._has(str(key)))
+        if cls.detection and cls._has(str(cls.detection)) and not cls._of_a_part(str(cls.detection)):
+            yield f"detection: {cls.detection} must be a key of a part, PART.KEY"
         for key in map(str, cls.fitted):
-            part, _, own = key.partition(".")
-            if cls._has(key) and own.partition(".")[0] not in getattr(cls.parts.get(part), "model_fields", {}):
+            if not cls._has(key):
+                continue
+            part, *own = key.split(".")
+            found: Any = cls.parts.get(part)
+            for one in own:
+                fields = [getattr(model, "model_fields", {}) for model in (found, *get_args(found))]
+                found = next((each[one].annotation for each in fields if one in each), None)
+            if not own or found is None:
                 yield f"fitted: {key} must be a key of a part that YAML gives, PART.KEY"
+            elif not _is_real(found):
+                yield f"fitted: {key} must be a key that is a real number"
 
     # ---- the model ---------------------------------------------------------------------------------------------------
     def assumed_motion(self, spec: Any, one: Any) -> Motion:
@@ -162,12 +172,7 @@ class LinearStudy(OneFile):
     def _covariance(self, what: str, given: Any, n: int) -> np.ndarray:
         """A covariance (n, n) that the study gives; raises ConfigError."""
         found = self._array(what, given, n, n)
-        least = NOTHING * (np.abs(found).max() or 1.0)
-        sigma = np.sqrt(np.maximum(np.diag(found), least))
-        scaled = found / np.outer(sigma, sigma)  # else m² would hide what is wrong of rad²
-        asymmetry = np.abs(scaled - scaled.T).max()
-        np.fill_diagonal(scaled, np.diag(scaled).clip(0))
-        if np.diag(found).min() < -least or asymmetry > ROUNDED or np.linalg.eigvalsh(scaled)[0] < -ROUNDED:
+        if not is_covariance(found):
             raise self._fault(what, f"must be symmetric and not negative, got {found.tolist()}")
         return found
 
@@ -565,7 +570,10 @@ class PlotLikelihood:
         self.spec, self.filter, self.of = spec, one.name, _Rows(study, spec, one)
         self.tracks, self.rows = len(tracks), sum(len(track["t_s"]) for track in tracks)
         self.keys = study.fitted
-        self.stated = np.array([attrgetter(key)(spec) for key in self.keys], dtype=float)
+        stated = [attrgetter(key)(spec) for key in self.keys]
+        if None in stated:
+            raise study._fault("fitted", f"{self.keys[stated.index(None)]} is not given")
+        self.stated = np.array(stated, dtype=float)
         self.least = LEAST * np.where(self.stated > 0, self.stated, 1.0)
         self.plots = [
             (np.diff(one["t_s"], prepend=one["t_s"][0]), self.of.numbers(one, len(one["t_s"]))) for one in tracks
@@ -601,6 +609,13 @@ class PlotLikelihood:
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The sums of each number of a plot."""
         return dict(zip(self.of.columns, self._scores(values, 0.0, 0.0).tolist(), strict=True))
+
+
+def _is_real(annotation: Any) -> bool:
+    """Whether a key is a real number, or may be left out."""
+    if get_origin(annotation) in (Union, UnionType):
+        return all(one is NoneType or _is_real(one) for one in get_args(annotation))
+    return (get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation) is float
 
 
 def _changed(model: Any, path: Sequence[str], value: float) -> Any:

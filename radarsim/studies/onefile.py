@@ -180,6 +180,14 @@ class OneFile(Study):
         keys = {"scan_period": (cls.scan_period,)} | {one.column: one.sigma_keys for one in cls.measured}
         for name, every in keys.items():
             yield from (f"{name}: there is no key {key}" for key in every if key and not cls._has(key))
+        if cls._has(cls.scan_period) and not cls._of_a_part(cls.scan_period):
+            yield f"scan_period: {cls.scan_period} must be a key of a part, PART.KEY"
+
+    @classmethod
+    def _of_a_part(cls, key: str) -> bool:
+        """Whether a dotted name is of a part, so that a case has one value of it."""
+        part, _, own = key.partition(".")
+        return bool(own) and part in cls.parts
 
     @classmethod
     def _has(cls, key: str) -> bool:

@@ -23,6 +23,14 @@ def test_the_command_writes_a_package_under_its_name(tmp_path, monkeypatch, form
     assert '"my_paper"' in text
 
 
+def test_a_study_has_one_form(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for options in (("--step", "--folder"), ("--folder", "--step")):
+        refused = command("new-study", "my_paper", *options, code=2)
+        assert "--step and --folder do not go together" in refused.output
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("form", ["linear", "step"])
 def test_a_study_in_one_file_is_one_file_with_a_config_and_a_test(form):
     files = list(reproduce.files(form).values())

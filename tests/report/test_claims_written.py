@@ -107,6 +107,8 @@ def test_the_parts_of_claims_before_it(claims):
         ("{pick: first}", "first", "measure.gain: must have its arguments by name, got 'first'"),
         ("above: 0", "above: high", "expected.above.value: must be a number, got 'high'"),
         ("above: 0", "printed: 5", "expected.printed.text: must be text, got 5"),
+        ("above: 0", "between: [2, 1]", "expected.between.low: must be text; its ends must rise, got 2"),
+        ("above: 0", "between: [1, 2]", "expected.between.low: must be text, got 1"),
         ("above: 0", "same: [1, 0]", "expected: must be a range from low to high with a margin > 0, got '1 ± 0'"),
         ("above: 0", "same: [1, -0.1]", "must be a range from low to high with a margin > 0, got '1 ± -0.1'"),
         ("above: 0", "within: [2, 1]", "must be a range from low to high with a margin > 0, got '2 to 1'"),

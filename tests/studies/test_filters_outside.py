@@ -40,6 +40,7 @@ PACKAGES = {  # kind: source of its module, why it cannot be used
     "kalman": (CLASS.format(kind="kalman", body="pass"), "which range_doppler has itself: that of the package is not "),
 }
 NOISE = "return np.zeros((15, 3, 2))\n    def noise(self, dt_s):\n        return {}"
+COVARIANCE = "must give a covariance, finite, symmetric and not negative, got [["
 FAILING = {  # kind: what its gains do, what is said; its place is the module's line
     "fails": ("return scans.no_such", 8, "Own.gains: AttributeError: 'Scans' object has no attribute 'no_such'"),
     "numpys": ("return np.stack([np.eye(2), np.eye(3)])", 8, "Own.gains: ValueError: all input arrays must have the"),
@@ -48,12 +49,8 @@ FAILING = {  # kind: what its gains do, what is said; its place is the module's 
     "words": ("return 'large'", 7, "Own.gains: must give numbers (15, 3, 2), got 'large'"),
     "endless": ("return scans.kalman(self.noise) / 0", 7, "Own.gains: must make finite gains, those of scan 3 are [["),
     "flat": (NOISE.format("[[1]]"), 9, "Own.noise: must give numbers (3, 3), got (1, 1)"),
-    "negative": (NOISE.format("-np.eye(3)"), 9, "Own.noise: must give a covariance that is not negative, got [["),
-    "skew": (
-        NOISE.format("np.triu(np.ones((3, 3)))"),
-        9,
-        "Own.noise: must give a symmetric, finite covariance, got [[",
-    ),
+    "negative": (NOISE.format("np.diag([1e6, 1, -1e-4])"), 9, f"Own.noise: {COVARIANCE}"),
+    "skew": (NOISE.format("np.triu(np.ones((3, 3)))"), 9, f"Own.noise: {COVARIANCE}"),
 }
 
 

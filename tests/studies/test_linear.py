@@ -418,3 +418,25 @@ def test_keys_and_methods_that_are_not_there_are_a_line_each():
         "fitted: scans must be a key of a part that YAML gives, PART.KEY",
         "fitted: gain must be a key of a part that YAML gives, PART.KEY",
     ]
+
+
+def test_what_is_fitted_is_a_real_number_and_what_is_detected_is_of_a_part():
+    class Odd(Sensor):
+        """A sensor with keys that are no real numbers."""
+
+        about: str = key("about", "what it is", "")
+        bursts: int = key("bursts", "of a plot", 4)
+        both: bool = key("both", "whether it has two", True)
+        offsets_m: tuple[float, ...] = key("offsets", "of both numbers, m", ())
+        drift_m: Positive | None = key("drift", "of its zero, m", None)
+
+    unreal = "about", "bursts", "both", "offsets_m"
+    fitted = tuple(f"sensor.{name}" for name in ("sigma_m", *unreal, "drift_m", "noise"))
+    given = {"parts": {"sensor": Odd}, "fitted": fitted, "detection": "gain", "__module__": __name__}
+    Wrong = type("Wrong", (study_of(2, 1).__class__,), given)
+    said = [f"fitted: sensor.{name} must be a key that is a real number" for name in unreal]
+    assert list(Wrong.missing()) == ["detection: gain must be a key of a part, PART.KEY", *said]
+    study = type("Right", (Wrong,), {"fitted": ("sensor.drift_m",), "detection": "", "__module__": __name__})()
+    case = case_of(study, [{}])
+    with pytest.raises(ConfigError, match=r"fitted: sensor\.drift_m is not given"):
+        study.likelihood(case, None, [study.recorded().simulated(case, 0)])

@@ -214,6 +214,7 @@ WRONG = {
     "paper": ("Kalman", r"paper: must be Paper\(…\), got 'Kalman'"),
     "Filter": (Sensor, r"Filter must be a subclass of radarsim\.config\.fields\.Member, got .*Sensor"),
     "scan_period": ("sensor.period_s", r"scan_period: there is no key sensor\.period_s"),
+    "scan_period ": ("gain", r"scan_period: gain must be a key of a part, PART\.KEY"),
     "measured": ((Measured("x_m", "m", ("sensor.sigma",)),), r"x_m: there is no key sensor\.sigma"),
     "measured ": ((Measured("x_m", "m", "sensor.sigma_x_m"),), r"x_m: sigma_keys must be a tuple, \('sensor"),
     "measured  ": (Measured("x_m", "m"), r"Measured\(column='x_m', .*\) must stand in a tuple, \(Measured\(…\),\)"),
@@ -251,6 +252,9 @@ def test_a_key_that_no_reading_can_set_is_one_line():
 UNKNOWN = {  # in the text: what stands there instead, and what is said of it
     "filter: quick": ("filter: quikc", "no filter 'quikc'; there are slow, quick"),
     "component: x": ("component: y", "no component 'y'; there are x"),
+    "{filter: quick, component: x}": ("{filter: slow, component: x}", "filter 'slow' is the baseline: it has no gain"),
+    "component: x}": ("component: x, at: 0}", "no scan 0; there are 1 to 40"),
+    "component: x}}": ("component: x, at: 41}}", "no scan 41; there are 1 to 40"),
     "target.sigma_step_m: 2": ("target.step: 2", "of: target.step: there is no such key"),
     "{target.sigma_step_m: 2}": ("{target.sigma_step_m: 7}", "of: no case has target.sigma_step_m 7"),
     "config: walk": ("config: walkk", "config: no such config 'walkk' is shipped; there are none"),
@@ -314,6 +318,8 @@ def test_a_name_that_a_measure_of_ones_own_looks_for_in_vain_is_the_reason(made)
         seen.curve({}, "quikc", "x")
     with pytest.raises(claims.Missing, match="no component 'y'; there are x"):
         seen.row("last", filter="quick", component="y")
+    with pytest.raises(claims.Missing, match="filter 'slow' is the baseline: it has no gain"):
+        seen.gain({}, "slow", "x")
     with pytest.raises(ConfigError, match="no table 'believed'; there are last, curves, gains"):
         judged.over_believed(seen, {}, "quick", "x")
 

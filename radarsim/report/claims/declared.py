@@ -41,7 +41,7 @@ class Missing(KeyError):
 
 
 class NoSuchName(Missing):
-    """A case that is there has no filter, or component, of that name."""
+    """A case that is there has no filter, or component, of that name, or no gain of it: it is the baseline."""
 
     for_the_author = True
 
@@ -224,6 +224,8 @@ class Evidence:
         for kind, name, known in (("filter", filter_name, filters), ("component", component, components)):
             if name not in known:
                 return NoSuchName(f"no {kind} {name!r}; there are {', '.join(known)}")
+        if filter_name in base:
+            return NoSuchName(f"filter {filter_name!r} is the baseline: it has no gain")
         return Missing((result.name, filter_name, component, *base))
 
     def curve(self, key: Any, filter_name: str, component: str) -> Series:

@@ -699,7 +699,8 @@ class _Reader:
         for key, one in given.items():
             wanted = _misfit(parameters[key].annotation, one) if key in parameters else ""
             if wanted:
-                self._add((*path, key), f"must be {wanted}", one)
+                words = "; its ends must rise" if known is self.ranges and _falls(given) else ""
+                self._add((*path, key), f"must be {wanted}{words}", one)
                 raise _Unknown
         used = self.functions.get(name) if known is self.measures else function
         return Call(name, used, cases, given, self._source(path))
@@ -718,6 +719,12 @@ def _parameters(function: Callable[..., Any]) -> Mapping[str, inspect.Parameter]
 
 def _listed(name: str, known: Mapping[str, Any]) -> str:
     return f"{did_you_mean(name, list(known)) or ';'} allowed: {', '.join(known)}"
+
+
+def _falls(ends: Mapping[str, Any]) -> bool:
+    """Whether the ends of a range are plain numbers and fall."""
+    low, high = ends.get("low"), ends.get("high")
+    return isinstance(low, int | float) and isinstance(high, int | float) and low > high
 
 
 def _misfit(annotation: Any, value: Any) -> str:

@@ -427,6 +427,7 @@ WHOLE = (  # `changed` is made of differences, case by case
     term("its measure fails: {error}"),
     term("no filter {name}; there are {names}"),
     term("no component {name}; there are {names}"),
+    term("filter {name} is the baseline: it has no gain"),
 )
 DIFFERENCES = (
     term("{missing} of the paper's {count} {key} changed or not there"),

@@ -13,11 +13,10 @@ import numpy as np
 
 from radarsim.failures import call, fault
 from radarsim.kernels.algebra import constant_acceleration, pack, unpack
-from radarsim.physics import transition
+from radarsim.physics import is_covariance, transition
 from radarsim.studies.range_doppler.config import FilterKeys
 from radarsim.studies.range_doppler.filters import LinearFilter, Plots, defects, least_squares_start, started, updated
 
-ROUNDED = 1e-9  # of a covariance's largest element, or eigenvalue: what rounding may leave
 STEADY = 1e-9  # relative change of a gain from one scan to the next that counts as none
 
 
@@ -108,10 +107,9 @@ def noise_of(one: GivenGains) -> Callable[[float], np.ndarray]:
 
     def noise(dt_s: float) -> np.ndarray:
         made = _numbers(one, one.noise, (3, 3), dt_s)
-        if not np.isfinite(made).all() or np.abs(made - made.T).max() > ROUNDED * np.abs(made).max():
-            raise fault(one.noise, f"must give a symmetric, finite covariance, got {made.tolist()}", of=_name(one))
-        if (values := np.linalg.eigvalsh(made))[0] < -ROUNDED * np.abs(values).max():
-            raise fault(one.noise, f"must give a covariance that is not negative, got {made.tolist()}", of=_name(one))
+        if not (np.isfinite(made).all() and is_covariance(made)):
+            words = f"must give a covariance, finite, symmetric and not negative, got {made.tolist()}"
+            raise fault(one.noise, words, of=_name(one))
         return made
 
     return noise
