@@ -153,7 +153,7 @@ def ratio(a: Estimate, b: Estimate, scale: float = 1.0) -> Estimate:
         value = np.divide(scale * a.value, b.value)
         down = np.hypot(1 - np.divide(a.lo, a.value), np.divide(b.hi, b.value) - 1)
         up = np.hypot(np.divide(a.hi, a.value) - 1, 1 - np.divide(b.lo, b.value))
-    return Estimate(value, value * (1 - down), value * (1 + up))
+    return Estimate(*(one if np.ndim(one) else float(one) for one in (value, value * (1 - down), value * (1 + up))))
 
 
 def certain(value: float) -> Certain:
