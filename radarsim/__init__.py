@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from radarsim.app.run import run
     from radarsim.errors import ConfigError, RadarsimError
 
-__version__ = "0.1.0"
+__version__ = "0.3.0"
 __all__ = [
     "ConfigError",
     "RadarsimError",
