@@ -1,5 +1,18 @@
 """The exceptions that a user meets, each with the exit code of the command that met it."""
 
+from contextvars import ContextVar
+
+ON_COMMAND_LINE = ContextVar("ON_COMMAND_LINE", default=False)  # whether a command gave the arguments, not Python
+
+
+def argument(name: str, option: str = "") -> str:
+    """An argument as its giver calls it: by its name in Python, on the command line by its option, else `--NAME`.
+
+    >>> argument("at_s", "--at")
+    'at_s'
+    """
+    return (option or f"--{name}") if ON_COMMAND_LINE.get() else name
+
 
 class RadarsimError(Exception):
     """Any fault that is reported to the user; `lines` are printed one to a line."""

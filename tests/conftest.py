@@ -49,3 +49,13 @@ def pytest_collection_finish() -> None:
     """The tests themselves stay to the end: no collection looks through them."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture
+def command_line():
+    """Faults as a command words them, which name its options."""
+    from radarsim.errors import ON_COMMAND_LINE
+
+    before = ON_COMMAND_LINE.set(True)
+    yield
+    ON_COMMAND_LINE.reset(before)

@@ -38,17 +38,21 @@ BLAMED = {  # sums that may not be finite, and what is then wrong
     "error": "not finite",
     "believed": "with a covariance that is not positive and finite",
 }
+Config = str | os.PathLike[str] | Mapping[str, Any] | Experiment
+Overrides = reading.Overrides
 document.further_folders = registry.folders
 language.packages = registry.packages
 
 
-def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Iterable[str] = ()) -> Experiment:
+def load(source: Config, overrides: Overrides = ()) -> Experiment:
     """The experiment that a config describes, all of it checked.
 
-    source is a path, the stem of a config (here, in ./configs, or shipped), or a mapping as YAML would give it;
-    overrides are texts `dotted.key=value`, the value in YAML. Raises ConfigError, one line for each fault of the whole,
-    and of the claims of a study of an installed package.
+    source is a path, the stem of a config (here, in ./configs, or shipped), a mapping as YAML would give it, or an
+    experiment loaded with these overrides; these are as config.load.texts takes them. Raises ConfigError, one line for
+    each fault of the whole, and of the claims of a study of an installed package.
     """
+    if isinstance(source, Experiment):
+        return source
     experiment = reading.load(source, overrides, registry)
     if experiment.study not in registry.SHIPPED and (faults := _claim_faults(experiment.study)):
         raise ConfigError(*faults)
@@ -175,10 +179,10 @@ def check(
     time_limit: object = None,
     executor: object = None,
     out: object = None,
-    overrides: object = (),
+    overrides: Overrides = (),
     figures: object = True,
-) -> None:
-    """ConfigError with a line for each invalid argument of `run`."""
+) -> tuple[str, ...]:
+    """The overrides as texts. ConfigError with a line for each invalid argument of `run`."""
     faults = [
         *_count("threads", threads),
         *_count("workers", workers),
@@ -189,11 +193,15 @@ def check(
         faults.append(f"executor: must be an executor of radarsim.engine, got {executor!r}")
     if out is not None:
         faults += _directory(out)
-    if isinstance(overrides, str | bytes) or not isinstance(overrides, Iterable):
-        faults.append(f"overrides: must be a list of texts key=value, got {overrides!r}")
     faults += _formats(figures)
+    texts: tuple[str, ...] = ()
+    try:
+        texts = reading.texts(overrides)
+    except ConfigError as error:
+        faults += error.lines
     if faults:
         raise ConfigError(*faults)
+    return texts
 
 
 def formats(figures: bool | str | Iterable[str]) -> tuple[str, ...]:

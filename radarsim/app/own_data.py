@@ -2,22 +2,21 @@
 
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from radarsim.app.configs import load
+from radarsim.app.configs import Config, Overrides, load
 from radarsim.recorded import fit as fitting
 from radarsim.recorded import follow, plots
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Config = str | os.PathLike[str] | Mapping[str, Any]
 Found = TypeVar("Found")
 
 
-def simulate(config: Config, realisation: int = 0, overrides: Iterable[str] = ()) -> "pd.DataFrame":
+def simulate(config: Config, realisation: int = 0, overrides: Overrides = ()) -> "pd.DataFrame":
     """One realisation's plots and the truth in columns true_…, number for number those of a run.
 
     Raises ConfigError for a wrong config, for one of several cases, and for a study without recorded plots.
@@ -51,7 +50,7 @@ def read_plots(path: str | os.PathLike[str]) -> "pd.DataFrame":
 
 
 def track(
-    config: Config, recorded: "str | os.PathLike[str] | pd.DataFrame", overrides: Iterable[str] = ()
+    config: Config, recorded: "str | os.PathLike[str] | pd.DataFrame", overrides: Overrides = ()
 ) -> "pd.DataFrame":
     """The config's filters over recorded plots (a file or a table): the columns of `radarsim track`.
 
@@ -81,7 +80,7 @@ def track(
 def fit(
     config: Config,
     recorded: "str | os.PathLike[str] | pd.DataFrame",
-    overrides: Iterable[str] = (),
+    overrides: Overrides = (),
     filter_name: str | None = None,
     robust: bool = False,
 ) -> "pd.DataFrame":

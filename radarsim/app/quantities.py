@@ -20,7 +20,7 @@ import numpy as np
 from radarsim.config.document import did_you_mean
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Axes, CaseResult
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, argument
 from radarsim.language import term, tr
 from radarsim.report.quantities import Quantity
 from radarsim.report.statistics import Estimate
@@ -91,7 +91,7 @@ def checked(wanted: Wanted, case: Case) -> Asked:
     of = registry.quantity(name, case)
     if not of.per:
         if chosen is not None and component is not None:
-            raise ConfigError(f"{of.option} names the filter itself: leave --filter out")
+            raise ConfigError(f"{argument(of.name, of.option)} names the filter itself: leave {argument('filter')} out")
         chosen, component = component if chosen is None else chosen, None
     if chosen is not None:
         named(chosen, [member.name for member in case.spec.members])
@@ -112,7 +112,7 @@ def resolved(asked: Asked, axes: Axes) -> Asked:
     if chosen is None:
         others = [name for i, name in enumerate(names) if not gain or i != axes.baseline]
         if len(others) != 1:
-            raise ConfigError(f"--filter: name one of {', '.join(names)}")
+            raise ConfigError(f"{argument('filter')}: name one of {', '.join(names)}")
         chosen = others[0]
     named(chosen, names)
     if gain and chosen == names[axes.baseline]:
@@ -240,17 +240,19 @@ def at(quantity: Asked, series: Series) -> Estimate:
     if not len(k):
         return UNKNOWN
     if not k.any() and (quantity.at_s, quantity.at_k) != (None, None):
-        option = "--at" if quantity.at_k is None else "--at-k"
-        raise ConfigError(f"{option}: the {quantity.of.words} has one value, not one a scan: leave it out")
+        where = argument("at_s", "--at") if quantity.at_k is None else argument("at_k", "--at-k")
+        raise ConfigError(f"{where}: the {quantity.of.words} has one value, not one a scan: leave it out")
     if quantity.at_k is not None:
         if quantity.at_k > k[-1] or quantity.at_k < 1:
-            raise ConfigError(f"--at-k: must be from 1 to {k[-1]}, the last scan, got {quantity.at_k}")
+            where = argument("at_k", "--at-k")
+            raise ConfigError(f"{where}: must be from 1 to {k[-1]}, the last scan, got {quantity.at_k}")
         found = np.flatnonzero(k == quantity.at_k)
         return Estimate(*(float(part[found[0]]) for part in values)) if len(found) else UNKNOWN
     if quantity.at_s is None:
         return Estimate(*(float(part[-1]) for part in values))
     if not 0 <= quantity.at_s <= t_s[-1] * (1 + 1e-12):
-        raise ConfigError(f"--at: must be from 0 to {t_s[-1]:g} s, the last scan's time, got {quantity.at_s:g}")
+        where = argument("at_s", "--at")
+        raise ConfigError(f"{where}: must be from 0 to {t_s[-1]:g} s, the last scan's time, got {quantity.at_s:g}")
     if quantity.at_s < t_s[0] - 1e-9 * t_s[-1]:
         return UNKNOWN
     exactly = np.flatnonzero(np.isclose(t_s, quantity.at_s, rtol=1e-12, atol=0))

@@ -5,21 +5,22 @@ function of the key; and the answer.
 import math
 import os
 import shlex
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from radarsim.app import quantities
-from radarsim.app.configs import CaseWork, load
+from radarsim.app.configs import CaseWork, Config, load
 from radarsim.app.quantities import UNKNOWN, Asked
 from radarsim.app.run import case_result
 from radarsim.config import fields
 from radarsim.config.check import label
 from radarsim.config.document import did_you_mean
 from radarsim.config.experiment import Case, Experiment
+from radarsim.config.load import given
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.engine.run import collect
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, argument
 from radarsim.language import term, tr
 from radarsim.report.statistics import Estimate
 
@@ -30,8 +31,6 @@ JUMPS = term("the quantity jumps over the target there")
 SAME = 1e-12  # of a quantity: what rounding may make of no change
 ROUGH = -1  # in place of a number of realisations
 LONG_S = 2.0  # of an answer, from which it is predicted what it takes
-
-Config = str | os.PathLike[str] | Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,7 @@ class Cases:
             return experiment.cases[0]
         if self.name is None:
             some = ", ".join(repr(one) for one in list(named)[:MOST_NAMED]) + (", …" if len(named) > MOST_NAMED else "")
-            raise ConfigError(f"{experiment.stem} has {len(named)} cases: choose one with --case: {some}")
+            raise ConfigError(f"{experiment.stem} has {len(named)} cases: choose one with {argument('case')}: {some}")
         if self.name not in named:
             near = did_you_mean(self.name, named) or f"; there are: {', '.join(named)}"
             raise ConfigError(f"no case {self.name!r} in {experiment.stem}{near}")
@@ -98,10 +97,11 @@ class Cases:
     def at(self, key: str, value: float) -> Case:
         """The case with another value at a key. Raises ConfigError where the config refuses it."""
         setting = self._setting(key, value)
+        key = setting.partition("=")[0]
         try:
             return replace(self._chosen(load(self.config, (*self.overrides, setting))), noise_of=self.base.spec)
         except ConfigError as error:
-            raise ConfigError(*(_not_by_option(line, setting) for line in error.lines)) from error
+            raise ConfigError(*(_not_by_argument(line, key) for line in error.lines)) from error
 
     def _setting(self, key: str, value: float) -> str:
         """A key's setting; of an item of a list the whole list, which the config may give in degrees or not at all."""
@@ -116,17 +116,16 @@ class Cases:
         return f"{holder}=[{', '.join(_yaml(one) for one in values if one is not None)}]"
 
 
-def _not_by_option(line: str, setting: str) -> str:
-    """A fault of a key's value that nobody gave by --set, without that option.
+def _not_by_argument(line: str, key: str) -> str:
+    """A fault of a key's value that nobody gave as an argument, without that argument.
 
-    >>> _not_by_option("--set filters.0.orders: filters.0.orders.0: must be <= 2, got 3", "filters.0.orders=[3]")
+    >>> _not_by_argument("overrides['filters.0.orders']: filters.0.orders.0: must be <= 2, got 3", "filters.0.orders")
     'filters.0.orders.0: must be <= 2, got 3'
     """
-    key = setting.partition("=")[0]
-    option = f"--set {key}: "
-    if not line.startswith(option):
+    where = f"{given(key)}: "
+    if not line.startswith(where):
         return line
-    said = line.removeprefix(option)
+    said = line.removeprefix(where)
     return said if said.startswith(f"{key}.") else f"{key}: {said}"
 
 
@@ -174,18 +173,18 @@ def range_of(found: Sequence[fields.NumericKey], name: str, between: tuple[float
     if between is not None:
         low, high = between
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise ConfigError(f"--between: must be two rising numbers, got {low:g} {high:g}")
+            raise ConfigError(f"{argument('between')}: must be two rising numbers, got {low:g} {high:g}")
         if key.whole:
             low, high = float(math.ceil(low)), float(math.floor(high))
             if low > high:
                 ends = " ".join(f"{end:g}" for end in between)
-                raise ConfigError(f"--between: {name} takes whole numbers, and there is none from {ends}")
+                raise ConfigError(f"{argument('between')}: {name} takes whole numbers, and there is none from {ends}")
         return quantities.searched(low, high, key.whole)
     if math.isfinite(key.low) and math.isfinite(key.high) and not key.whole:
         return quantities.searched(key.low, key.high)
     if not values:
         what = "there is no value to search about" if key.value is None else f"is {key.value:g} in the config"
-        raise ConfigError(f"{name}: {what}, and its own range has no end: give --between LO HI")
+        raise ConfigError(f"{name}: {what}, and its own range has no end: give {_between()}")
     if key.low >= 0:
         low, high = max(rounded(min(values) / FACTOR), key.low), min(rounded(max(values) * FACTOR), key.high)
         return quantities.searched(
@@ -193,6 +192,11 @@ def range_of(found: Sequence[fields.NumericKey], name: str, between: tuple[float
         )
     size = 10 * max(map(abs, values))
     return quantities.searched(max(-size, key.low), min(size, key.high), key.whole)
+
+
+def _between() -> str:
+    """The argument that says where to search."""
+    return argument("between=(low, high)", "--between LO HI")
 
 
 class Curve:
@@ -249,7 +253,8 @@ class Curve:
     def noted(self, value: float) -> tuple[str, ...]:
         """What the tables note of the interval at a value, in words."""
         note = quantities.noted(self.quantity, self._result(self.cases.at(self.key, value), self.realisations))
-        return (f"the interval may be too narrow: {note}; more realisations, -n, mend that",) if note else ()
+        more = argument("realisations=…", "-n")
+        return (f"the interval may be too narrow: {note}; more realisations, {more}, mend that",) if note else ()
 
     def _kept(self, value: float | None, count: int, of: Callable[[Case], Estimate]) -> Estimate:
         place = (math.nan if value is None else value, count)
@@ -352,6 +357,6 @@ def nearest(values: Sequence[float], asked: Question) -> float:
 def boundary(asked: Question, curve: Curve, x: float) -> tuple[str, ...]:
     """Whether the nearest value lies at an end of what was searched, or of what the config allows, in words."""
     if x in (asked.over.low, asked.over.high):
-        return (term("the end of what was searched; --between LO HI searches elsewhere"),)
+        return (tr("the end of what was searched; {between} searches elsewhere", between=_between()),)
     beyond = [other for other in curve.refused if abs(other - x) <= 0.05 * abs(x)]
     return (term("the end of what the config allows"),) if beyond else ()

@@ -28,7 +28,7 @@ from radarsim.app.run import Progress, RunOptions, SimulatedCases
 from radarsim.app.stored import CLASSES, PLACE, stored_classes, stored_readings
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.run import Signals
-from radarsim.errors import ConfigError, StoreError, TargetUnmet
+from radarsim.errors import ConfigError, StoreError, TargetUnmet, argument
 from radarsim.report import files
 from radarsim.report.claims import PaperClaims, page
 from radarsim.report.claims.declared import Claim
@@ -379,11 +379,12 @@ def _only(texts: Sequence[str], wanted: Sequence[Paper]) -> dict[str, str]:
     choices = {choice.key: choice for paper in wanted for choice in paper.readings.choices}
     found, faults = {}, []
     for text in texts:
+        where = f"{argument('only:', '--only')} {text}"
         key, _, value = (part.strip() for part in text.partition("="))
         if key not in choices:
-            faults.append(f"--only {text}: no choice {key!r}; choices: {', '.join(choices)}")
+            faults.append(f"{where}: no choice {key!r}; choices: {', '.join(choices)}")
         elif value not in (values := [one.name for one in choices[key].alternatives]):
-            faults.append(f"--only {text}: no value {value!r} of {key}; values: {', '.join(values)}")
+            faults.append(f"{where}: no value {value!r} of {key}; values: {', '.join(values)}")
         found[key] = value
     if faults:
         raise ConfigError(*faults)
@@ -409,7 +410,7 @@ def readings(
     Raises TargetUnmet where a time limit left something undone, Interrupted where `stop` saw a signal.
     """
     if realisations is not None and realisations < 1:
-        raise ConfigError(f"--realisations: must be >= 1, got {realisations}")
+        raise ConfigError(f"{argument('realisations')}: must be >= 1, got {realisations}")
     options = replace(options or RunOptions(), out=out)
     plans = [Plan(one, _first(one.paper.readings, realisations, decide)) for one in wanted]
     total, done = sum(plan.total for plan in plans), 0

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from radarsim.app import configs
-from radarsim.app.configs import RESULTS, CaseWork, command, load, repeated, shipped
+from radarsim.app.configs import RESULTS, CaseWork, Config, Overrides, command, load, repeated, shipped
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine import run as stopping
 from radarsim.engine.executors import Executor
@@ -345,9 +345,6 @@ def load_all(sources: Sequence[str | os.PathLike[str]], overrides: Sequence[str]
     return loaded
 
 
-Config = str | os.PathLike[str] | Mapping[str, Any] | Experiment
-
-
 def namesakes(experiments: Sequence[Experiment]) -> list[str]:
     """A line for each config whose results would overwrite those of another one: their folder has the config's name.
 
@@ -368,7 +365,7 @@ def run(
     *,
     realisations: float | None = None,
     seed: int | None = None,
-    overrides: Sequence[str] = (),
+    overrides: Overrides = (),
     precision: float | None = None,
     of: str = "sigma",
     decide: bool = False,
@@ -386,14 +383,16 @@ def run(
     """Run an experiment and give its result; nothing is written unless `out` names a directory.
 
     config is a path, the name of a shipped config, a dict as YAML would give it, or an Experiment loaded with these
-    overrides. overrides are texts `key=value` with dotted keys. With a precision, in per cent, a case ends at the first
-    of 2000, 4000, 8000 …, N realisations at which the 95 % half-width of every σ is under it, or of every quantity of
-    another name, `of`, that the study measures (gain, lock, …); where errors are not known to be Gaussian,
-    of σ and gains not before 64,000, or 512,000 where large ones have come. decide: all cases end at the first of
-    these at which every claim of the config is decided. time_limit is in seconds, tables and figures counted in, or a
-    condition that runs already. `result.unmet` says what of the two was not reached. workers are processes of this
-    machine, scheduler the address of a Dask scheduler, executor one that is open already.
-    width_mm is the width of the figures' files in place of their own.
+    overrides. overrides change keys of it: `{"radar": {"sigma_range_m": 300}}`, the same with dotted keys,
+    `{"radar.sigma_range_m": 300}`, or texts, `["radar.sigma_range_m=300"]`.
+
+    With a precision, in per cent, a case ends at the first of 2000, 4000, 8000 …, N realisations at which the 95 %
+    half-width of every σ is under it, or of every quantity of another name, `of`, that the study measures (gain, lock,
+    …); where errors are not known to be Gaussian, of σ and gains not before 64,000, or 512,000 where large ones have
+    come. decide: all cases end at the first of these at which every claim of the config is decided. time_limit is in
+    seconds, tables and figures counted in, or a condition that runs already. `result.unmet` says what of the two was
+    not reached. workers are processes of this machine, scheduler the address of a Dask scheduler, executor one that is
+    open already. width_mm is the width of the figures' files in place of their own.
 
     Raises ConfigError for a wrong config, StoreError for a bad disk, NonFiniteError for a filter that diverged,
     TargetUnmet where the time did not suffice for a single block, and Interrupted, with all that was done stored, if
@@ -406,12 +405,12 @@ def run(
     """
     from radarsim.app import readings  # with it the parts that judge and draw, which `check` does without
 
-    configs.check(
+    overrides = configs.check(
         **{"threads": threads, "workers": workers, "precision": precision, "time_limit": time_limit},
         **{"executor": executor, "out": out, "overrides": overrides, "figures": figures},
     )
     overrides = merged(overrides, realisations, seed)
-    experiment = config if isinstance(config, Experiment) else load(config, overrides)
+    experiment = load(config, overrides)
     if precision is not None:
         check_precision([experiment], precision, of)
     if decide:
@@ -481,10 +480,10 @@ def trust(scheduler: str) -> str | None:
     return line(scheduler)
 
 
-def merged(overrides: Sequence[str], realisations: float | None, seed: int | None) -> tuple[str, ...]:
-    """Overrides with realisations and seed, where given, as two more."""
+def merged(overrides: Overrides, realisations: float | None = None, seed: int | None = None) -> tuple[str, ...]:
+    """Overrides as texts, with realisations and seed, where given, as two more."""
     given = {"realisations": realisations, "seed": seed}
-    return (*overrides, *(f"{key}={value}" for key, value in given.items() if value is not None))
+    return (*configs.reading.texts(overrides), *(f"{key}={value}" for key, value in given.items() if value is not None))
 
 
 def report(
@@ -505,7 +504,7 @@ def report(
     return result
 
 
-def load_result(config: Config, *, out: str | os.PathLike[str] = RESULTS, overrides: Sequence[str] = ()) -> "Result":
+def load_result(config: Config, *, out: str | os.PathLike[str] = RESULTS, overrides: Overrides = ()) -> "Result":
     """The result of an experiment that was run into `out`, from what is stored there: computes and writes nothing.
 
     config and overrides as for `run`. Raises ConfigError where something is missing, with the command that computes it.
@@ -517,8 +516,8 @@ def load_result(config: Config, *, out: str | os.PathLike[str] = RESULTS, overri
     >>> loaded.curves.equals(ran.curves)
     True
     """
-    experiment = config if isinstance(config, Experiment) else load(config, overrides)
-    return from_store(experiment, out, overrides)
+    overrides = configs.reading.texts(overrides)
+    return from_store(load(config, overrides), out, overrides)
 
 
 def from_store(experiment: Experiment, out: str | os.PathLike[str], overrides: Sequence[str]) -> "Result":

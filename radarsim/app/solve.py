@@ -18,7 +18,7 @@ from radarsim.app import quantities, question
 from radarsim.app.quantities import UNPAIRED, Wanted
 from radarsim.app.question import Answer, Cases, Curve, Question
 from radarsim.config import fields
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, argument
 from radarsim.language import tr
 from radarsim.report.statistics import Estimate
 from radarsim.studies import registry
@@ -70,10 +70,11 @@ def by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> A
         limit = curve.simulated(best, count)
         near = limit.lo <= asked.equals <= limit.hi
         doubt = tr(
-            "its 95 % interval, {lo:.4g} to {hi:.4g} {unit}, holds the target: -n decides",
+            "its 95 % interval, {lo:.4g} to {hi:.4g} {unit}, holds the target: more realisations, {option}, decide",
             lo=limit.lo,
             hi=limit.hi,
             unit=tr(asked.unit),
+            option=argument("realisations=…", "-n"),
         )
         notes = (doubt,) if near else question.boundary(asked, curve, best)
         return answer(limit=limit.value, limit_at=best, notes=notes + apart)
@@ -217,7 +218,7 @@ def solve(
     Raises ConfigError for a wrong config, key, filter or component, and for a key without effect.
     """
     if not math.isfinite(equals):
-        raise ConfigError(f"--equals: must be a finite number, got {equals:g}")
+        raise ConfigError(f"{argument('equals')}: must be a finite number, got {equals:g}")
     cases = Cases(config, tuple(overrides), case)
     found = fields.find(cases.base.spec, key)
     quantity = quantities.checked(wanted, cases.base)

@@ -15,7 +15,7 @@ import click
 
 import radarsim
 from radarsim import language
-from radarsim.errors import ConfigError, Interrupted, RadarsimError, StoreError
+from radarsim.errors import ON_COMMAND_LINE, ConfigError, Interrupted, RadarsimError, StoreError
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -50,6 +50,7 @@ class Commands(click.Group):
                 formatter.write_dl(rows)
 
     def invoke(self, ctx: click.Context) -> Any:
+        before = ON_COMMAND_LINE.set(True)
         try:
             with stoppable():
                 result = super().invoke(ctx)
@@ -72,6 +73,7 @@ class Commands(click.Group):
                 raise
             fail(fault)
         finally:
+            ON_COMMAND_LINE.reset(before)
             for line in language.faults:
                 click.echo(line, err=True)
             language.faults.clear()

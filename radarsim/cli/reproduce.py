@@ -14,7 +14,7 @@ from radarsim.app.run import RESULTS, load_all
 from radarsim.cli import console
 from radarsim.config import document
 from radarsim.engine.run import Signals
-from radarsim.errors import RadarsimError, StoreError
+from radarsim.errors import ON_COMMAND_LINE, RadarsimError, StoreError
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -48,4 +48,5 @@ def main(arguments: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
+    ON_COMMAND_LINE.set(True)
     sys.exit(main(sys.argv[1:]))

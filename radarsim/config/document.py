@@ -24,15 +24,17 @@ LONGEST_SOURCE = 500  # characters of the place
 
 
 class Origin(NamedTuple):
-    """Where a value was written: a file with line and column from 1, `--set KEY`, `--seed`, or `config`: a dictionary.
+    """Where a value was written: a file with line and column from 1, an argument, or `config`: a dictionary.
 
     prefix counts the leading keys of a path that do not stand in that file: a scenario's own keys begin below `target`.
+    key: that which an argument such as `--set KEY` names itself, maybe a bare filter key.
     """
 
     source: str
     line: int = 0
     column: int = 0
     prefix: int = 0
+    key: str = ""
 
     def __str__(self) -> str:
         return f"{self.source}:{self.line}:{self.column}" if self.line else self.source
@@ -45,6 +47,7 @@ class Faults:
         self._lines: dict[str, tuple[int, int, int, int]] = {}
         self._sources: list[str] = []
         self._spoiled: set[tuple[Origin, KeyPath]] = set()
+        self._of_arguments = False
 
     def __len__(self) -> int:
         return len(self._lines)
@@ -56,6 +59,7 @@ class Faults:
         if key and not _names(origin, key):
             parts.append(one_line(key))
         parts.append(message if got is ABSENT else f"{message}, got {shown(got)}")
+        self._of_arguments |= bool(origin.key)
         if origin.source not in self._sources:
             self._sources.append(origin.source)
         rank = self._sources.index(origin.source)
@@ -72,7 +76,7 @@ class Faults:
 
     def beside(self, source: str) -> None:
         """Name the file whose keys lie over those of others, where faults are named in the others alone."""
-        if source not in self._sources and not any(one.startswith("--") for one in self._sources):
+        if source not in self._sources and not self._of_arguments:
             self._lines = {f"{line} (with the keys of {source} over it)": rank for line, rank in self._lines.items()}
 
     def raise_if_any(self) -> None:
@@ -82,9 +86,8 @@ class Faults:
 
 
 def _names(origin: Origin, key: str) -> bool:
-    """Whether the origin, `--set KEY` or `--KEY`, names the key already; a bare filter key is the end of the full."""
-    option, _, given = origin.source.partition(" ")
-    return origin.source == f"--{key}" or (option == "--set" and (key == given or key.endswith(f".{given}")))
+    """Whether the origin, an argument, names the key already; a bare filter key is the end of the full."""
+    return bool(origin.key) and (key == origin.key or key.endswith(f".{origin.key}"))
 
 
 def dotted(path: KeyPath) -> str:

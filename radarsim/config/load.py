@@ -35,22 +35,24 @@ from radarsim.config.document import (
 from radarsim.config.experiment import Experiment
 from radarsim.config.fields import DEEPEST, Model, NotFinite, from_python, from_text, in_radians
 from radarsim.config.schema import COMMON_KEYS, Common, Studies
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, argument
 
 # ---- load ------------------------------------------------------------------------------------------------------------
 LARGEST_FILE = 256_000  # bytes
 OPTIONS = ("realisations", "seed")  # overrides that are options of their own on the command line
+WHOLE = {"kind", "minimise"}  # a mapping with one of these is a value, not keys to be changed one by one
+Overrides = Mapping[str, Any] | Iterable[str]
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same events and marks, ten times faster
 
 
-def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Iterable[str], studies: Studies) -> Experiment:
+def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Overrides, studies: Studies) -> Experiment:
     """The experiment that a config describes, all of it checked.
 
     source is a path, the stem of a config (here, in ./configs, or shipped), or a mapping as YAML would give it;
-    overrides are texts `dotted.key=value`, the value in YAML. Raises ConfigError, one line for each fault of the whole.
+    overrides see `texts`. Raises ConfigError, one line for each fault of the whole.
     """
     faults = Faults()
-    settings = [setting for text in overrides if (setting := _setting(str(text), faults))]
+    settings = [setting for text in texts(overrides) if (setting := _setting(text, faults))]
     document: Document | None = None
     if isinstance(source, Mapping):
         document = _from_mapping(source, faults)
@@ -107,13 +109,56 @@ def _from_user(source: str | bytes | os.PathLike[str], studies: Studies, faults:
     return document
 
 
+def texts(overrides: Overrides) -> tuple[str, ...]:
+    """Overrides as texts `dotted.key=value`, the value in YAML, as `--set` takes them.
+
+    They are such texts, or a mapping from keys, dotted or nested, to Python's values: a mapping inside changes the keys
+    that it names, unless it is a value as a whole: a target with its `kind`. Raises ConfigError.
+
+    >>> texts({"scans": 20, "radar": {"sigma_range_m": 300.0, "name": "mine"}})
+    ('scans=20', 'radar.sigma_range_m=300.0', 'radar.name=mine')
+    """
+    if isinstance(overrides, Mapping):
+        faults = Faults()
+        found = tuple(_texts(overrides, "", faults))
+        faults.raise_if_any()
+        return found
+    if isinstance(overrides, str | bytes) or not isinstance(overrides, Iterable):
+        example = '{"radar.sigma_range_m": 300}'
+        raise ConfigError(f"overrides: must be a mapping such as {example}, or texts KEY=VALUE, got {overrides!r}")
+    return tuple(map(str, overrides))
+
+
+def _texts(values: Mapping[Any, Any], above: str, faults: Faults) -> Iterator[str]:
+    for name, value in values.items():
+        key = f"{above}{name}"
+        if isinstance(value, Mapping) and value and not WHOLE & value.keys():
+            yield from _texts(value, f"{key}.", faults)
+            continue
+        plain = from_python(value, (), origin := given(key), faults)
+        if not faults.spoiled(origin, ()):
+            yield f"{key}={_literal(plain)}"
+
+
+def _literal(value: object) -> str:
+    """A plain value as YAML in one line."""
+    if isinstance(value, str) and PLAIN.fullmatch(value) and from_text(value) == value == value.strip():
+        return value
+    return json.dumps(value, ensure_ascii=False)
+
+
+def given(key: str) -> Origin:
+    """Where an override of a key is given: an argument of its own, or one of several."""
+    return Origin(argument(key) if key in OPTIONS else argument(f"overrides[{key!r}]", f"--set {key}"), key=key)
+
+
 def _setting(text: str, faults: Faults) -> Setting | None:
     """An override `key=value`, its value read as YAML."""
     key, equals, value = text.partition("=")
     key = key.strip()
-    origin = Origin(f"--{key}" if key in OPTIONS else f"--set {key}")
+    origin = given(key)
     if not equals or not key or not all(key.split(".")):
-        faults.add(Origin(f"--set {text}"), (), "must be KEY=VALUE, with a dotted KEY")
+        faults.add(given(text), (), "must be KEY=VALUE, with a dotted KEY")
         return None
     read_value = parse(value, origin.source, faults, plain_origin=origin)
     return None if read_value is None else Setting(key, read_value.data, origin)

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from radarsim.engine.blocks import Node, Partial, Work
 from radarsim.engine.executors import Outcome, attempted
-from radarsim.errors import ClusterError, ConfigError, Interrupted
+from radarsim.errors import ClusterError, ConfigError, Interrupted, argument
 
 if TYPE_CHECKING:
     from distributed import Future, LocalCluster, Security
@@ -163,9 +163,9 @@ def _configured(distributed: ModuleType, address: str) -> "Security | None":
     try:
         context = security.get_connection_args("client").get("ssl_context")
     except (OSError, ValueError, TypeError) as error:
-        raise ConfigError(f"--scheduler: {hint}: {error}") from error
+        raise ConfigError(f"{argument('scheduler')}: {hint}: {error}") from error
     if context is None:
-        raise ConfigError(f"--scheduler: {hint}")
+        raise ConfigError(f"{argument('scheduler')}: {hint}")
     return security
 
 
@@ -173,12 +173,14 @@ def _check(distributed: ModuleType, address: str) -> None:
     """ConfigError for an invalid address: a Client that cannot read it takes half a minute to report it."""
     scheme, separator, _ = address.partition("://")
     if separator and scheme not in SCHEMES:
-        raise ConfigError(f"--scheduler: must be an address such as tcp://host:8786, got {address!r}: only tcp and tls")
+        raise ConfigError(
+            f"{argument('scheduler')}: must be an address such as tcp://host:8786, got {address!r}: only tcp and tls"
+        )
     try:
         distributed.comm.resolve_address(address)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ConfigError(
-            f"--scheduler: must be an address such as tcp://host:8786, got {address!r}: {error}"
+            f"{argument('scheduler')}: must be an address such as tcp://host:8786, got {address!r}: {error}"
         ) from error
 
 
@@ -226,7 +228,9 @@ class Cluster:
             try:
                 self._client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False, security=security)
             except OSError as error:
-                raise ConfigError(f"--scheduler: no Dask scheduler answers at {scheduler}: {error}") from error
+                raise ConfigError(
+                    f"{argument('scheduler')}: no Dask scheduler answers at {scheduler}: {error}"
+                ) from error
         if workers is not None:
             self._own = _Processes(workers, address, security)
         self._wait_for_workers(workers or 1)
@@ -236,7 +240,9 @@ class Cluster:
         while self._count() < wanted:
             if time.monotonic() > end:
                 self.close()
-                raise ConfigError(f"--scheduler: no worker is connected to {self._place}; `dask worker` starts one")
+                raise ConfigError(
+                    f"{argument('scheduler')}: no worker is connected to {self._place}; `dask worker` starts one"
+                )
             time.sleep(0.1)
 
     def _count(self) -> int:

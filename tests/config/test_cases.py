@@ -1,9 +1,12 @@
 """Includes, sweeps and overrides: which cases they make, how these are called, and what is refused."""
 
+import numpy as np
 import pytest
 
 from radarsim.app.configs import load
 from radarsim.config.experiment import matches
+from radarsim.config.load import texts
+from radarsim.errors import ConfigError
 
 RADAR = "radar: {wavelength_m: 0.15, sigma_range_m: 250, sigma_velocity_mps: 15, scan_period_s: 10}\n"
 REST = """
@@ -173,11 +176,55 @@ OVERRIDES = [
 
 
 @pytest.mark.parametrize(("override", "line"), OVERRIDES)
-def test_bad_override(folder, said, override, line):
+def test_bad_override(command_line, folder, said, override, line):
     assert any(found.startswith(line) for found in said("a", override)), said("a", override)
 
 
-def test_an_override_of_a_swept_key_would_be_lost(folder, said):
+@pytest.mark.parametrize("override", [{"radar": {"sigma_range_m": -3}}, ["radar.sigma_range_m=-3"]])
+def test_a_bad_override_from_python_names_no_option(folder, override):
+    with pytest.raises(ConfigError) as refused:
+        load("a", override)
+    assert refused.value.lines == ("overrides['radar.sigma_range_m']: must be > 0, got -3",)
+
+
+@pytest.mark.parametrize(
+    ("override", "line"),
+    [
+        ({"radar": {"sigma_rnge_m": 3}}, "overrides['radar.sigma_rnge_m']: unknown key; did you mean sigma_range_m?"),
+        ({"filters": {5: {"name": "x"}}}, "overrides['filters.5.name']: filters is a list: its items are 0 to 1"),
+        ({"scans": float("nan")}, "overrides['scans']: must be a finite number, got nan"),
+        ({"target": None}, "overrides['target']: has no value"),
+        ({"realisations": 0}, "realisations: must be >= 1, got 0"),
+        ({"target": {"kind": "polynomial"}}, "overrides['target']: target.coefficients: required key is missing"),
+    ],
+)
+def test_bad_override_of_a_mapping(folder, override, line):
+    with pytest.raises(ConfigError) as refused:
+        load("a", override)
+    assert refused.value.lines[0].startswith(line)
+
+
+def test_a_mapping_of_overrides_is_what_its_texts_say(folder):
+    values = {
+        "radar": {"sigma_range_m": np.float64(300), "name": "no: \"Ω\", #"},
+        "filters": {0: {"manoeuvre_variance": {"minimise": "sigma_r", "over": "worst"}, "name": "1e3"}},
+        "filters.1.manoeuvre_variance": 1e-7,
+        "target": {"kind": "polynomial", "coefficients": np.array([1e5, -250.0])},
+        "baseline": ["1e3", "r+Vr"],
+        "seed": 3,
+    }
+    found = load("a", values)
+    assert found == load("a", texts(values))
+    (case,) = found.cases
+    assert (case.spec.radar.sigma_range_m, case.spec.radar.name, case.seed) == (300, "no: \"Ω\", #", 3)
+    assert case.spec.radar.sigma_velocity_mps == 15  # what a nested mapping does not name stays
+    assert case.spec.filters[0].manoeuvre_variance.over == "worst"
+    assert case.spec.filters[1].manoeuvre_variance == 1e-7
+    assert case.spec.target.coefficients == (1e5, -250)
+    assert (case.spec.baseline, case.against) == ("1e3", ("r+Vr",))
+
+
+def test_an_override_of_a_swept_key_would_be_lost(command_line, folder, said):
     folder("configs/swept.yaml", CONFIG + "sweep: {filters.0.manoeuvre_variance: [1, 2]}\n")
     cure = "the config sweeps it: set sweep.filters.0.manoeuvre_variance=[...] instead"
     assert said("swept", "manoeuvre_variance=3") == [f"--set manoeuvre_variance: {cure}"]
@@ -267,7 +314,7 @@ def test_too_many_cases_by_include_alone(folder, said):
     assert said("both") == ["configs/both.yaml:1:18: include: more than 10000 cases"]
 
 
-def test_an_override_below_a_scenario_that_is_not_there_is_not_told_twice(folder, said):
+def test_an_override_below_a_scenario_that_is_not_there_is_not_told_twice(command_line, folder, said):
     lines = said("a", "target=../x", "target.kind=turn")
     assert lines == ["--set target: must be the stem of a scenario, without folder or suffix, got '../x'"]
 

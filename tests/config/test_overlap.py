@@ -33,7 +33,7 @@ def test_sweeps_of_different_values_go_together(good):
     assert len(load({**good, "sweep": sweep}).cases) == 8
 
 
-def test_an_override_that_is_no_text():
+def test_an_override_that_is_no_text(command_line):
     with pytest.raises(ConfigError) as caught:
         load("rls2", ["radar.name=\udce9"])
     assert caught.value.lines == ("--set radar.name: is not UTF-8 text",)
