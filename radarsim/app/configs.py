@@ -172,6 +172,7 @@ NEEDED = ("workers", "depth", "shortest_s", "longest_s", "submit", "finished", "
 
 
 def check(
+    overrides: Overrides = (),
     *,
     threads: object = None,
     workers: object = None,
@@ -179,7 +180,6 @@ def check(
     time_limit: object = None,
     executor: object = None,
     out: object = None,
-    overrides: Overrides = (),
     figures: object = True,
 ) -> tuple[str, ...]:
     """The overrides as texts. ConfigError with a line for each invalid argument of `run`."""

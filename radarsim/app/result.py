@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.app import configs
 from radarsim.app.configs import load
+from radarsim.app.shown import Several, Shown
 from radarsim.app.stored import classes_of
 from radarsim.config.experiment import Case, Experiment, matches
 from radarsim.engine import store
 from radarsim.engine.results import CaseResult
 from radarsim.errors import DisagreementError, MeasureError, RadarsimError
-from radarsim.language import tr
+from radarsim.language import plural, tr
 from radarsim.report import claims, files, notes, seen
 from radarsim.report import tables as common
 from radarsim.report.claims import page
@@ -33,8 +34,6 @@ from radarsim.studies.registry import quantities, study
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from radarsim.report.figures import Canvas
 
 
 # ---- records ---------------------------------------------------------------------------------------------------------
@@ -91,23 +90,31 @@ def _listed(found: list[store.Settled], names: Mapping[str, str]) -> str:
 MOST_ROWS = 40  # that a notebook shows
 
 
-class Result:
+class Result(Shown):
     """A finished experiment: its cases, tables (pandas), figures (Matplotlib). Nothing is written unless asked for.
 
     written: what the last call of `write` wrote; None before the first.
     """
 
     def __init__(self, experiment: Experiment, cases: Sequence[CaseResult], facts: Mapping[str, Any]):
-        self.experiment, self.cases, self.facts = experiment, tuple(cases), dict(facts)
+        self.experiment, self.facts = experiment, dict(facts)
+        self.cases: tuple[CaseResult, ...] = Several(cases)
         self.written: Written | None = None
 
-    def __repr__(self) -> str:
-        counts = sorted({case.count for case in self.cases})
-        each = f"{counts[0]:,}" if len(counts) == 1 else f"{counts[0]:,} to {counts[-1]:,}"
-        return f"<radarsim result {self.experiment.stem}: {len(self.cases)} cases of {each} realisations>"
+    @property
+    def sentences(self) -> Sequence[str]:
+        """What was run, then the answer."""
+        count, cases = files.span(sorted({case.count for case in self.cases})), len(self.cases)
+        told = {"config": self._label, "cases": plural("{count} case", "{count} cases", cases), "count": count}
+        return (tr("{config}: {cases}, {count} realisations", **told), *self.answer)
 
-    def _repr_html_(self) -> str:
-        """What a notebook shows: question, answer, realisations, σ and gain at the last scan; text escaped."""
+    @property
+    def _label(self) -> str:
+        return self.experiment.stem
+
+    @property
+    def _html(self) -> Sequence[str]:
+        """Question, answer, realisations; below the figure σ and gain at the last scan; text escaped."""
         from html import escape
 
         shown = ("case", "filter", "component", "unit", "t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")
@@ -116,7 +123,7 @@ class Result:
         table = rows.to_html(index=False, border=0, float_format=lambda v: f"{v:.4g}", na_rep="", max_rows=MOST_ROWS)
         answer = "".join(f"<p>{escape(line)}</p>" for line in self.answer)
         count = escape(files.span(sorted({case.count for case in self.cases})))
-        return f"<h4>{escape(self.question)}</h4>{answer}<p>{count} realisations; 95 % intervals.</p>{table}"
+        return f"<h4>{escape(self.question)}</h4>{answer}<p>{count} realisations; 95 % intervals.</p>", table
 
     @property
     def question(self) -> str:
@@ -183,27 +190,6 @@ class Result:
     def _described(self) -> "dict[str, Figure]":
 
         return case_figures(self.cases, self._tables, self.experiment)
-
-    @property
-    def figures(self) -> tuple[str, ...]:
-        """The names that `figure` takes."""
-        return tuple(self._described)
-
-    def figure(self, name: str) -> "Canvas":
-        """A Matplotlib figure by its name; KeyError names those there are.
-
-        >>> import radarsim
-        >>> result = radarsim.run("rls2", realisations=2000)
-        >>> result.figures[:2]
-        ('gain_r', 'sigma_r')
-        >>> result.figure("sigma_r").axes[0].get_xlabel()
-        'time from the first plot, s'
-        """
-        from radarsim.report.figures import render
-
-        if name not in self._described:
-            raise KeyError(f"no figure {name!r}; there are: {', '.join(self._described)}")
-        return render(self._described[name])
 
     def write(
         self, out: str | os.PathLike[str], figures: bool | str | Sequence[str] = True, width_mm: float | None = None

@@ -405,11 +405,9 @@ def run(
     """
     from radarsim.app import readings  # with it the parts that judge and draw, which `check` does without
 
-    overrides = configs.check(
-        **{"threads": threads, "workers": workers, "precision": precision, "time_limit": time_limit},
-        **{"executor": executor, "out": out, "overrides": overrides, "figures": figures},
-    )
-    overrides = merged(overrides, realisations, seed)
+    checked: dict[str, Any] = {"threads": threads, "workers": workers, "precision": precision, "time_limit": time_limit}
+    checked |= {"executor": executor, "out": out, "figures": figures}
+    overrides = merged(configs.check(overrides, **checked), realisations, seed)
     experiment = load(config, overrides)
     if precision is not None:
         check_precision([experiment], precision, of)

@@ -101,6 +101,10 @@ class Case:
     roughly: bool = False
     against: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        filters = ", ".join(member.name for member in self.spec.members)
+        return f"<case {self.name}: {self.realisations:,} realisations, seed {self.seed}; filters {filters}>"
+
     @property
     def companions(self) -> "tuple[Case, ...]":
         """The case with each further baseline in place of its own."""
@@ -135,6 +139,11 @@ class Experiment:
     seed: int
     figures: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     changes_included: bool = False
+
+    def __repr__(self) -> str:
+        return (
+            f"<experiment {self.stem} of study {self.study}: cases {', '.join(case.name for case in self.cases)[:120]}>"
+        )
 
     @cached_property
     def resolved(self) -> dict[str, Any]:

@@ -73,6 +73,13 @@ class Axes:
     exact_sigma: np.ndarray
     exact_bias: np.ndarray
 
+    def __init_subclass__(cls) -> None:
+        cls.__repr__ = Axes.__repr__  # type: ignore[method-assign]  # else a dataclass shows all its arrays
+
+    def __repr__(self) -> str:
+        parts = ", ".join(name for name, _ in self.components)
+        return f"<axes: filters {', '.join(self.filters)}; components {parts}; {len(self.k)} scans>"
+
     @property
     def exact_gains(self) -> np.ndarray:
         """Exact gains (F, K, C) against the baseline, per cent, of the realisations in which both have an estimate.
@@ -108,6 +115,10 @@ class CaseResult(Generic[A_co]):
     axes: A_co
     seconds: float = 0.0
     against: "tuple[CaseResult[A_co], ...]" = ()
+
+    def __repr__(self) -> str:
+        filters = ", ".join(self.axes.filters)
+        return f"<case {self.name}: {self.count:,} realisations, {len(self.axes.k)} scans; filters {filters}>"
 
     @property
     def baseline(self) -> str:

@@ -32,6 +32,7 @@ from matplotlib.text import Annotation
 from matplotlib.ticker import FuncFormatter, Locator, NullFormatter
 from matplotlib.transforms import ScaledTranslation
 
+from radarsim.errors import ConfigError
 from radarsim.language import tr
 from radarsim.report import chart
 from radarsim.report.chart import Scale, contrast, tick_text
@@ -210,6 +211,44 @@ def render(figure: Figure) -> Canvas:
         return _laid_out(figure)
 
 
+def draw_on(figure: Figure, axes: Any, label: str = "") -> Canvas:
+    """Draw the panels of a figure on axes that are there, one each, beside what these hold; the figure they belong to.
+
+    label is put before the names of its curves, whose colours and markers follow those of curves already there.
+    """
+    panels = [panel for panel in figure.panels if panel.marks]
+    given = [one for one in np.atleast_1d(np.asarray(axes, dtype=object)).ravel() if isinstance(one, Axes)]
+    if len(given) != len(panels):
+        raise ConfigError(f"ax: figure {figure.name!r} takes {len(panels)} Matplotlib axes, got {len(given)}")
+    maps = common_colours(panels)
+    with matplotlib.rc_context(STYLE), _unknown_letters_pass():
+        for one, panel in zip(given, panels, strict=True):
+            crosses = panel.crosses or tr("exact")
+            there = set(one.get_legend_handles_labels()[1]) - {crosses}
+            one.autoscale(True)  # limits of what stood there hold for that alone
+            _draw(one, _beside(panel, len(there), label), maps)
+            if keys := dict(zip(*reversed(one.get_legend_handles_labels()), strict=True)):
+                ordered = sorted(keys, key=lambda name: name == crosses)  # what explains all curves stands last
+                one.legend([keys[name] for name in ordered], ordered)
+    canvas: Canvas = given[0].figure.canvas.figure  # of axes in a subfigure too the whole
+    return canvas
+
+
+def _beside(panel: Panel, after: int, label: str) -> Panel:
+    """A panel beside so many curves: its curves with the next colours and with the label before their names."""
+    marks: list[Any] = []
+    for mark in panel.marks:
+        if isinstance(mark, Line) and (mark.label or mark.name):
+            style, name = mark.style, ", ".join(filter(None, (label, mark.label or mark.name)))
+            if isinstance(style.colour, int) and style.colour >= 0:
+                marker = None if style.marker is None else style.marker + after
+                style = replace(style, colour=style.colour + after, marker=marker)
+            marks.append(replace(mark, label=name, name=name, style=style))
+        elif not (after and isinstance(mark, Reference)):
+            marks.append(mark)
+    return replace(panel, marks=tuple(marks), title="" if after else panel.title)
+
+
 @contextmanager
 def _unknown_letters_pass() -> Iterator[None]:
     """Letters that the font lacks are drawn as boxes, without a warning for each."""
@@ -367,7 +406,7 @@ def _draw(axes: Axes, panel: Panel, maps: Colours) -> None:
     for mark in panel.marks:
         match mark:
             case Line():
-                _line(axes, mark)
+                _line(axes, mark, panel.crosses)
             case Reference():
                 _reference(axes, mark)
             case Bars():
@@ -487,7 +526,7 @@ def readable(colour: Any) -> str:
     return dark
 
 
-def _line(axes: Axes, line: Line) -> None:
+def _line(axes: Axes, line: Line, crosses: str) -> None:
     line = _thinned(line)
     if axes.get_yscale() == "log":  # zero is nowhere on it
         there = np.where(np.asarray(line.y) > 0, 1.0, np.nan)
@@ -496,7 +535,7 @@ def _line(axes: Axes, line: Line) -> None:
     scattered = line.style.dash is None
     step = 1 if scattered else max(1, -(-len(line.x) // MARKED))
     every = step if line.exact is None or step == 1 else 2 * step  # of many, markers and crosses by turns
-    axes.plot(line.x, line.y, markevery=every, zorder=3, **_look(line.style))
+    axes.plot(line.x, line.y, markevery=every, zorder=3, label=line.label or line.name or None, **_look(line.style))
     if line.lo is not None and line.hi is not None:
         if line.style.dash is None:
             axes.vlines(line.x, line.lo, line.hi, color=_colour(line.style), linewidth=0.8, zorder=2.8)
@@ -504,7 +543,7 @@ def _line(axes: Axes, line: Line) -> None:
             axes.fill_between(line.x, line.lo, line.hi, color=_colour(line.style), alpha=0.25, linewidth=0, zorder=2)
     if line.exact is not None:
         first = 0 if step == 1 else step
-        axes.plot(line.x[first::every], line.exact[first::every], zorder=4, **EXACT)
+        axes.plot(line.x[first::every], line.exact[first::every], zorder=4, label=crosses or tr("exact"), **EXACT)
 
 
 def _thinned(line: Line) -> Line:

@@ -206,7 +206,7 @@ def test_bad_override_of_a_mapping(folder, override, line):
 
 def test_a_mapping_of_overrides_is_what_its_texts_say(folder):
     values = {
-        "radar": {"sigma_range_m": np.float64(300), "name": "no: \"Ω\", #"},
+        "radar": {"sigma_range_m": np.float64(300), "name": 'no: "Ω", #'},
         "filters": {0: {"manoeuvre_variance": {"minimise": "sigma_r", "over": "worst"}, "name": "1e3"}},
         "filters.1.manoeuvre_variance": 1e-7,
         "target": {"kind": "polynomial", "coefficients": np.array([1e5, -250.0])},
@@ -216,7 +216,7 @@ def test_a_mapping_of_overrides_is_what_its_texts_say(folder):
     found = load("a", values)
     assert found == load("a", texts(values))
     (case,) = found.cases
-    assert (case.spec.radar.sigma_range_m, case.spec.radar.name, case.seed) == (300, "no: \"Ω\", #", 3)
+    assert (case.spec.radar.sigma_range_m, case.spec.radar.name, case.seed) == (300, 'no: "Ω", #', 3)
     assert case.spec.radar.sigma_velocity_mps == 15  # what a nested mapping does not name stays
     assert case.spec.filters[0].manoeuvre_variance.over == "worst"
     assert case.spec.filters[1].manoeuvre_variance == 1e-7

@@ -1,0 +1,111 @@
+"""What Python and a notebook show of an answer: its first sentences, its first figure, its figures by name."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from radarsim.report.drawing import Figure
+    from radarsim.report.figures import Canvas
+
+MOST_LINES, MOST_LETTERS = 3, 200  # of a text that stands for the whole
+
+
+class Shown:
+    """An answer with sentences, maybe with a table and with figures, which are drawn when they are asked for."""
+
+    @property
+    def sentences(self) -> Sequence[str]:
+        """The answer in words."""
+        raise NotImplementedError
+
+    @property
+    def _label(self) -> str:
+        """What the answer is called beside others."""
+        return ""
+
+    @property
+    def _described(self) -> "Mapping[str, Figure]":
+        """Its figures, as data, by name."""
+        return {}
+
+    @property
+    def _html(self) -> Sequence[str]:
+        """What a notebook shows: HTML above the first figure, and below it."""
+        from html import escape
+
+        return "".join(f"<p>{escape(line)}</p>" for line in self.sentences), ""
+
+    def __repr__(self) -> str:
+        return brief(self.sentences)
+
+    def _repr_html_(self) -> str:
+        above, below = self._html
+        return "\n".join(filter(None, (above, _image(next(iter(self._described.values()), None)), below)))
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """The names that `figure` takes."""
+        return tuple(self._described)
+
+    def figure(self, name: str = "", *, ax: Any = None, label: str | None = None) -> "Canvas":
+        """A Matplotlib figure by its name, by default the first; KeyError names those there are.
+
+        ax: axes that are there, in place of a figure of its own; of a figure of several panels as many of them. Curves
+        that were drawn there before keep their colours, and the new ones take the next: so two results are drawn on one
+        pair of axes. label is put before the names of the new curves there; by default it is the config's name.
+
+        >>> import matplotlib.pyplot as plt, radarsim
+        >>> result = radarsim.run("rls2", realisations=2000)
+        >>> result.figure("sigma_r").axes[0].get_xlabel()
+        'time from the first plot, s'
+        >>> _, ax = plt.subplots()
+        >>> for name in ("rls2", "rls4"):
+        ...     _ = radarsim.run(name, realisations=2000).figure("gain_r", ax=ax)
+        >>> [words.get_text() for words in ax.get_legend().get_texts()]
+        ['rls2, r+Vr', 'rls4, r+Vr', 'exact']
+        >>> plt.close()
+        """
+        from radarsim.report.figures import draw_on, render
+
+        described = self._described
+        if not described:
+            raise KeyError("there are no figures")
+        name = name or next(iter(described))
+        if name not in described:
+            raise KeyError(f"no figure {name!r}; there are: {', '.join(described)}")
+        if ax is None:
+            return render(described[name])
+        return draw_on(described[name], ax, self._label if label is None else label)
+
+
+class Several(tuple[Any, ...]):
+    """A tuple that shows the first of its items, and how many there are."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        more = f", … ({len(self)})" if len(self) > MOST_LINES else ""
+        return f"({', '.join(map(repr, self[:MOST_LINES]))}{more})"
+
+
+def brief(lines: Sequence[str]) -> str:
+    """The first lines, and of long ones the beginning."""
+    first = [line if len(line) <= MOST_LETTERS else f"{line[: MOST_LETTERS - 2]} …" for line in lines[:MOST_LINES]]
+    if len(lines) > MOST_LINES and first:
+        first[-1] += " …"
+    return "\n".join(first)
+
+
+def _image(figure: "Figure | None") -> str:
+    """A figure as HTML that needs no other file; nothing for none."""
+    if figure is None:
+        return ""
+    from base64 import b64encode
+    from html import escape
+
+    from radarsim.report.figures import save
+    from radarsim.report.wording import spoken
+
+    data = b64encode(save(figure, ("png",))["png"]).decode("ascii")
+    style = f"width:{figure.width_mm:g}mm;max-width:100%"
+    return f'<img src="data:image/png;base64,{data}" alt="{escape(spoken(figure.title))}" style="{style}">'
