@@ -18,7 +18,7 @@ from radarsim.app import configs
 from radarsim.app.configs import load
 from radarsim.app.shown import Several, Shown
 from radarsim.app.stored import classes_of
-from radarsim.config.experiment import Case, Experiment, matches
+from radarsim.config.experiment import DRAWN_FOR_ALL, Case, Experiment, matches
 from radarsim.engine import store
 from radarsim.engine.results import CaseResult
 from radarsim.errors import DisagreementError, MeasureError, RadarsimError
@@ -367,10 +367,16 @@ def _gained(result: CaseResult, made: Mapping[str, "pd.DataFrame"]) -> list[str]
     return [tr("{case}, gain in {component} against {base} at {t} s: {filters}.", **told)]
 
 
+FEW_CLAIMS = 3  # which the verdicts tell better than a figure
+
+
 def case_figures(
     results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"], experiment: Experiment
 ) -> dict[str, Figure]:
-    """The figures of an experiment, described, by the stem of their file: the study's own, and of sweeps."""
+    """All figures of an experiment, described, by the stem of their file: the study's own, and of sweeps.
+
+    The config may have fewer of them drawn: `Experiment.drawn`.
+    """
     own = study(results[0].study)
     banded = _banded(made)
     drawn = dict(own.figures(results, against_first(banded, results), experiment))
@@ -378,7 +384,7 @@ def case_figures(
         others = [result.against[n] for result in results if len(result.against) > n]
         found = own.figures(others, {**banded, "gains": common.against_own(banded["gains"], others)}, experiment)
         drawn |= {f"{name}_{n + 2}": figure for name, figure in found.items() if name.startswith("gain_")}
-    if (judged := page.figure(made["claims"].to_dict("records"))) is not None:
+    if made["claims"]["claim"].nunique() > FEW_CLAIMS and (judged := page.figure(made["claims"].to_dict("records"))):
         drawn["claims"] = judged
     if any(notes.heavy(made[name]).any() for name in ("curves", "gains")):
         drawn = {
@@ -452,6 +458,7 @@ def write_files(
     own, began = study(experiment.study), time.perf_counter()
     try:
         described = case_figures(results, made, experiment) if draw else {}
+        described = {name: described[name] for name in experiment.drawn(described)}
         answer = answered(results, made)
         question = own.question(experiment)
     except RadarsimError:
@@ -489,9 +496,6 @@ def write_files(
     files.replace_all(folder, contents, stale=files.outputs)
     seconds = {"drawing": drawn - began, "writing": time.perf_counter() - drawn}
     return Written(folder, tuple(sorted(contents)), tuple(removed), made, answer, seconds, tuple(of_intervals))
-
-
-DRAWN_FOR_ALL = ("claims", "sweep")  # figures that no study names, and begin so
 
 
 def unnamed(own: Study, described: Iterable[str]) -> list[str]:

@@ -318,7 +318,7 @@ def seconds(experiment: Experiment, figures: bool | str | Sequence[str], width_m
         return SPARE * tables
     from radarsim.report.figures import save
 
-    names = list(described)
+    names = experiment.drawn(described) or list(described)
     started = time.perf_counter()
     for name in dict.fromkeys((names[0], names[-1])):
         save(described[name], formats, width_mm, "")

@@ -26,7 +26,7 @@ from radarsim.config.document import (
     shown,
     stems,
 )
-from radarsim.config.experiment import Case, Experiment, in_name, matches
+from radarsim.config.experiment import DRAWN_FOR_ALL, Case, Experiment, in_name, matches
 from radarsim.config.fields import DataFile, Model, Scenario, Study, in_degrees, in_radians
 from radarsim.config.schema import COMMON_KEYS, Common, Studies
 
@@ -316,7 +316,7 @@ class Expander:
             cases=tuple(cases),
             realisations=common.realisations or max(case.realisations for case in cases),
             seed=cases[0].seed if common.seed is None else common.seed,
-            figures=dict(common.figures),
+            figures=common.cases_of_figures(),
             changes_included=changes_included(document),
         )
 
@@ -525,17 +525,20 @@ class Expander:
         known = [self.studies.keys(study).figure_names for study in {draft.study for draft in drafts}]
         if len(known) != 1 or known[0] is None:
             return
-        for figure in common.figures:
-            if not any(matches(figure, name) for name in known[0]):
-                path = ("figures", figure)
-                near = did_you_mean(figure, known[0]) or f"; there are: {', '.join(known[0])}"
-                self.faults.add(document.key_origin(path), path, f"no such figure{near}")
+        every = (*known[0], *DRAWN_FOR_ALL)
+        for n, figure in enumerate(common.figures):
+            if not any(matches(figure, name) or matches(name, figure) for name in every):
+                named = isinstance(common.figures, dict)
+                path = ("figures", figure if named else n)
+                near = did_you_mean(figure, known[0]) or f"; there are: {', '.join(every)}"
+                origin = document.key_origin(path) if named else document.origin(path)
+                self.faults.add(origin, path, f"no such figure{near}", *([] if named else [figure]))
 
     def _check_figures(self, common: Common, cases: list[Case], document: Document) -> None:
         """Every pattern must match a case; otherwise a figure would be empty without an explanation."""
         if self.faults:
             return
-        for figure, patterns in common.figures.items():
+        for figure, patterns in common.cases_of_figures().items():
             for i, pattern in enumerate(patterns):
                 if not any(matches(case.name, pattern) for case in cases):
                     path = ("figures", figure, i)

@@ -5,7 +5,7 @@ What a checked config is: an experiment of cases.
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -126,7 +126,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What a config asks for; figures holds, for a figure, names or patterns of the cases that it shows.
+    """What a config asks for; figures holds, for each that is drawn, names or patterns of the cases that it shows.
 
     changes_included: keys of the study stand beside `include`, so that a case is not what the config of its stem says.
     """
@@ -160,6 +160,15 @@ class Experiment:
         if figure not in self.figures:
             return self.cases
         return tuple(case for case in self.cases if any(matches(case.name, p) for p in self.figures[figure]))
+
+    def drawn(self, figures: Iterable[str]) -> list[str]:
+        """Those of the figures that the config has drawn, in its order; all of them, where it names none."""
+        every = list(figures)
+        wanted = [name for pattern in self.figures for name in every if matches(name, pattern)]
+        return list(dict.fromkeys(wanted)) if self.figures else every
+
+
+DRAWN_FOR_ALL = ("claims", "sweep_*")  # figures that no study names
 
 
 def matches(name: str, pattern: str) -> bool:

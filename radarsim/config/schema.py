@@ -32,9 +32,15 @@ class Common(Model):
         "realisations", "how often the experiment is repeated", None
     )
     seed: Annotated[int, Whole(0, LARGEST_SEED)] | None = key("seed", "seed of the noise; default 1", None)
-    figures: dict[Name, Annotated[tuple[Name, ...], Field(min_length=1)]] = key(
-        "cases in figures", "for a figure the cases it shows: names, or patterns with * and ?", {}
+    figures: tuple[Name, ...] | dict[Name, Annotated[tuple[Name, ...], Field(min_length=1)]] = key(
+        "figures that are drawn",
+        "names or patterns with * and ?, in the report's order; or a mapping to the cases of each; default and []: all",
+        (),
     )
+
+    def cases_of_figures(self) -> dict[str, tuple[str, ...]]:
+        """For each figure that is drawn, or pattern of such, the patterns of its cases."""
+        return self.figures if isinstance(self.figures, dict) else dict.fromkeys(self.figures, ("*",))
 
 
 COMMON_KEYS = tuple(Common.model_fields)

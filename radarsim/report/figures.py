@@ -278,6 +278,7 @@ def _laid_out(figure: Figure) -> Canvas:
     maps = common_colours(plan.panels)
     for n, (axes, panel) in enumerate(zip(grid.flat, plan.panels, strict=False)):
         x, y = _wrapped(panel.x, figure.width_mm / columns), _wrapped(panel.y, figure.panel_height_mm - 5)
+        y = replace(y, label="") if figure.share_y and n % columns else y
         fitted = replace(panel, title=wrapped(panel.title, letters), x=x, y=y)
         _draw(axes, fitted, maps)
         ended.append(_at_ends(axes, panel) if plan.at_ends[n] else [])

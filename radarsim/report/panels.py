@@ -32,6 +32,7 @@ MOST_LINES = 12  # of a panel that several cases of more than FEW_FILTERS share
 FEW_FILTERS = 3  # told apart by dash, while shades tell the cases apart
 LONG = 5  # powers of ten from this one on are written raised
 NEAR_ZERO = 1e-5  # of the largest σ: below it a logarithmic axis would show rounding
+WIDEST_BAND, LOG_MARGIN, MARGIN = 2.0, 1.12, 0.05  # of a shared axis: how far bands count, and room at its ends
 LOSS = 100.0  # per cent at which gains far below are cut
 ALIKE = 0.97  # of the points of two panels: so many intervals overlap where the panels show the same
 LONGEST_INSIDE = 28  # letters of a name that may stand in a legend inside a panel of many lines
@@ -393,14 +394,39 @@ def never_lost(lines: Sequence[Line]) -> str:
     return " " + tr("Never lost: {names}.", names=seen.named(names, MOST_GONE)) if names else ""
 
 
-def one_scale(drawn: Sequence[Panel]) -> list[Panel]:
-    """Panels side by side, all with a logarithmic axis of y where one has it."""
-    if all(panel.y.scale == "linear" for panel in drawn):
+def shared(drawn: Sequence[Panel]) -> list[Panel]:
+    """Panels of lines side by side: of one quantity all have one axis of y, that of them which holds all the others."""
+    shown = [panel for panel in drawn if panel.marks]
+    lines = [mark for panel in shown for mark in panel.marks if isinstance(mark, Line)]
+    if len(shown) < 2 or len({panel.y.label for panel in shown}) > 1 or not lines or any(p.y.ticks for p in shown):
         return list(drawn)
-    return [
-        panel if panel.y.scale == "log" else replace(panel, y=replace(panel.y, scale="log", limits=(None, None)))
-        for panel in drawn
-    ]
+    given = [panel.y for panel in shown if None not in panel.y.limits]
+    log = [panel.y for panel in shown if panel.y.scale == "log"]
+    own = shown[0].y
+    y = (given or log or [fitting_axis(own.label, lines) if own.limits == (0, None) else own])[0]
+    if not given:
+        y = replace(y, limits=_holding(lines, y))
+    return [replace(panel, y=y) for panel in drawn]
+
+
+def _holding(lines: Sequence[Line], y: Axis) -> tuple[float, float]:
+    """Limits that hold all lines, and their bands but for what is far beyond them."""
+    values = np.concatenate(
+        [np.asarray(part, float) for one in lines for part in (one.y, one.exact) if part is not None]
+    )
+    bands = np.concatenate(
+        [np.asarray(part, float) for one in lines for part in (one.lo, one.hi) if part is not None] or [values]
+    )
+    log = y.scale == "log"
+    values, bands = (one[np.isfinite(one) & (one > 0 if log else True)] for one in (values, bands))
+    if log:
+        low = float(max(values.min() / WIDEST_BAND, bands.min(initial=values.min()))) / LOG_MARGIN
+        high = float(min(values.max() * WIDEST_BAND, bands.max(initial=values.max()))) * LOG_MARGIN
+        return y.limits[0] or low, high
+    span = float(values.max() - values.min()) or 1.0
+    low = float(max(values.min() - span, bands.min(initial=values.min()))) - MARGIN * span
+    high = float(min(values.max() + span, bands.max(initial=values.max()))) + MARGIN * span
+    return low if y.limits[0] is None else y.limits[0], high
 
 
 def differing(drawn: Sequence[Panel]) -> tuple[list[Panel], str]:
@@ -445,13 +471,16 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: 
         realisations=realisations(results),
     )
     title = tr("σ of the {quantity}", quantity=of.words)
-    figure = in_columns(Figure(name, title, caption, tuple(one_scale(panels))))
+    figure = in_columns(Figure(name, title, caption, tuple(panels)))
     return seen.begun(figure, seen.at_the_end(figure))
 
 
 def in_columns(figure: Figure) -> Figure:
     """A figure of as many columns as its panels fill, at one of the widths of a page."""
     count = len([panel for panel in figure.panels if panel.marks])
+    alike = tuple(shared(figure.panels))
+    one = {(panel.y.label, panel.y.scale, panel.y.limits, panel.y.ticks) for panel in alike if panel.marks}
+    figure = replace(figure, panels=alike, share_y=count > 1 and len(one) == 1)
     if count == 1:
         wide = figure.panels[0].legend == "right"
         return replace(figure, columns=1, width_mm=WIDE_MM if wide else COLUMN_MM, panel_height_mm=64.0)

@@ -2,13 +2,14 @@
 
 import textwrap
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import tr
 from radarsim.report import panels, seen, wording
-from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Heat, Line, Panel, Style
+from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Style
 
 WIDE = 20  # largest over least swept value from which the axis is logarithmic
 VALUES = ("m", "rad")  # units of what is measured itself, not of its rates
@@ -22,14 +23,24 @@ def figures(results: Sequence[CaseResult], curves: Mapping) -> dict[str, Figure]
     curves is tables.groups(table, "case", "filter", "component").
     """
     drawn = {}
-    for (stem, keys), members in families(results).items():
-        several = len({family for family, _ in families(results)}) > 1
-        name = "_".join(["sweep", *([stem] if several else []), *(key.rpartition(".")[2] for key in keys)])
-        made = line_figure(name, keys[0], members, curves) if len(keys) == 1 else None
-        made = map_figure(name, keys, members, curves) if len(keys) == 2 else made
-        if made is not None:
-            drawn[name] = made
-    return drawn
+    for keys, groups in by_keys(results).items():
+        name = "_".join(["sweep", *(key.rpartition(".")[2] for key in keys)])
+        if len(keys) == 1:
+            drawn[name] = line_figure(name, keys[0], groups, curves)
+        elif len(keys) == 2:
+            several = len(groups) > 1
+            for members in groups:
+                own = f"{name}_{panels.stem(members[0])}" if several else name
+                drawn[own] = map_figure(own, keys, members, curves)
+    return {name: figure for name, figure in drawn.items() if figure}
+
+
+def by_keys(results: Sequence[CaseResult]) -> dict[tuple[str, ...], list[list[CaseResult]]]:
+    """Swept cases by the keys that they differ in, those of each config together."""
+    found: dict[tuple[str, ...], list[list[CaseResult]]] = {}
+    for (_, keys), members in families(results).items():
+        found.setdefault(keys, []).append(members)
+    return found
 
 
 def families(results: Sequence[CaseResult]) -> dict[tuple[str, tuple[str, ...]], list[CaseResult]]:
@@ -71,24 +82,16 @@ def last(result: CaseResult, filter_name: str, component: str, curves: Mapping) 
     return tuple(float(row[name]) for name in ("sigma", "sigma_lo", "sigma_hi", "exact_sigma"))
 
 
-def line_figure(name: str, key: str, members: Sequence[CaseResult], curves: Mapping) -> Figure | None:
-    """σ at the last scan against one key: a panel for each component, a line for each filter."""
-    x, axis = places(members[0], key, [dict(result.swept)[key] for result in members])
-    order, made = np.argsort(x), []
-    filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
-    for n, (component, given) in enumerate(components(members[0])):
-        marks, (factor, unit) = [], panels.in_degrees(given)
-        for i, f in enumerate(filters):
-            found = factor * np.array([last(members[j], f, component, curves) for j in order])
-            if np.isfinite(found[:, 0]).any():
-                words, exact = panels.literal(f), found[:, 3] if np.isfinite(found[:, 3]).any() else None
-                style = Style(i, i, i)
-                label = words if n == 0 else ""
-                marks.append(Line(x[order], found[:, 0], label, style, found[:, 1], found[:, 2], exact, words))
-        if marks:
-            words = tr("$\\sigma$ of {symbol} at the end", symbol=panels.letter(component))
-            y = panels.fitting_axis(panels.with_unit(words, unit), marks)
-            made.append(Panel(axis, y, tuple(marks), direct=False))
+def line_figure(name: str, key: str, groups: Sequence[Sequence[CaseResult]], curves: Mapping) -> Figure | None:
+    """σ at the last scan against one key, a line for each filter: a panel for each component; of several configs one
+    for each of these, of the first component."""
+    members, several = [result for group in groups for result in group], len(groups) > 1
+    made = [
+        panel
+        for group in groups
+        for component in components(group[0])[: 1 if several else None]
+        if (panel := _line_panel(key, group, component, curves, panels.device(group[0]) if several else "")).marks
+    ]
     if not made:
         return None
     caption = tr(
@@ -96,11 +99,39 @@ def line_figure(name: str, key: str, members: Sequence[CaseResult], curves: Mapp
         key=panels.key_label(members[0], key).text,
         realisations=panels.realisations(members),
     )
-    columns = min(3 if len(made) != 4 else 2, len(made))
-    width = COLUMN_MM if columns == 1 else PAGE_MM
     title = tr("σ over the {key}", key=panels.key_label(members[0], key).text)
-    figure = Figure(name, title, caption, tuple(made), columns, width, 60)
+    figure = panels.in_columns(Figure(name, title, caption, tuple(made)))
+    if len(made[0].x.ticks) > FEW_NAMES:
+        figure = replace(figure, columns=min(2, len(made)))
     return seen.begun(figure, seen.extremes(figure))
+
+
+FEW_NAMES = 3  # on the axis of a panel of three beside each other
+APART = 0.12  # between the points of filters beside each other, values being one apart
+
+
+def _line_panel(
+    key: str, members: Sequence[CaseResult], component: tuple[str, str], curves: Mapping, title: str = ""
+) -> Panel:
+    """Lines over numbers; over anything else points, from the least leading σ of the first filter to its largest."""
+    filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
+    factor, unit = panels.in_degrees(component[1])
+    x, axis = places(members[0], key, [dict(result.swept)[key] for result in members])
+    if axis.ticks:
+        leading = members[0].axes.components[0][0]
+        members = sorted(members, key=lambda one: last(one, filters[0], leading, curves)[0])
+        _, axis = places(members[0], key, [dict(result.swept)[key] for result in members])
+    order = np.argsort(x)
+    marks = []
+    for i, f in enumerate(filters):
+        found = factor * np.array([last(members[j], f, component[0], curves) for j in order])
+        if np.isfinite(found[:, 0]).any():
+            exact = found[:, 3] if np.isfinite(found[:, 3]).any() else None
+            at = np.arange(len(x)) + APART * (i - (len(filters) - 1) / 2) if axis.ticks else x[order]
+            style = Style(i, None if axis.ticks else i, i)
+            marks.append(Line(at, found[:, 0], panels.literal(f), style, found[:, 1], found[:, 2], exact))
+    words = tr("$\\sigma$ of {symbol} at the end", symbol=panels.letter(component[0]))
+    return Panel(axis, panels.fitting_axis(panels.with_unit(words, unit), marks), tuple(marks), title, direct=False)
 
 
 def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], curves: Mapping) -> Figure | None:
@@ -109,7 +140,7 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
     members = [result for result in members if component in dict(result.axes.components)]
     shown = [key for key in keys if len({_hashable(dict(r.swept)[key]) for r in members}) > 1]
     if len(shown) < 2:  # the component is of one value of a key alone
-        return line_figure(name, shown[0], members, curves) if shown else None
+        return line_figure(name, shown[0], [members], curves) if shown else None
     values = [list(dict.fromkeys(_hashable(dict(r.swept)[key]) for r in members)) for key in keys]
     ranked = [sorted(v, key=lambda one: (isinstance(one, str), one)) for v in values]
     (x, x_axis), (y, y_axis) = (places(members[0], key, v) for key, v in zip(keys, ranked, strict=True))

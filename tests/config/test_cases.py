@@ -339,6 +339,22 @@ def test_figures_name_their_cases(folder):
         "swept filters.0.observes=[range,velocity] scans=9",
     ]
     assert experiment.shown_in("sigma_Vr") == experiment.cases
+    assert experiment.drawn(["gain_Vr", "gain_r", "sigma_r"]) == ["sigma_r", "gain_r"]
+
+
+@pytest.mark.parametrize(
+    ("named", "drawn"),
+    [
+        ("[gain_Vr, 'sigma_*', gain_r]", ["gain_Vr", "sigma_r", "sigma_Vr", "gain_r"]),
+        ("['*r', gain_r]", ["gain_r", "gain_Vr", "sigma_r", "sigma_Vr"]),
+        ("[]", ["gain_r", "gain_Vr", "sigma_r", "sigma_Vr", "claims"]),
+    ],
+)
+def test_named_figures_are_drawn_in_their_order_with_all_cases(folder, named, drawn):
+    folder("configs/f.yaml", f"include: [a]\nfigures: {named}\n")
+    experiment = load("f")
+    assert experiment.drawn(["gain_r", "gain_Vr", "sigma_r", "sigma_Vr", "claims"]) == drawn
+    assert experiment.shown_in("sigma_r") == experiment.cases
 
 
 def test_brackets_in_patterns_are_brackets():

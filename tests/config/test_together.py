@@ -141,7 +141,7 @@ def test_figures_are_those_of_the_study(good, said):
     known = "sigma_r, gain_r, dynamic_r, sigma_Vr, gain_Vr, dynamic_Vr, sigma_ar, gain_ar, dynamic_ar, settling"
     assert set(said(good)) == {
         "config: figures.sigma_vr: no such figure; did you mean sigma_Vr?",
-        f"config: figures.map: no such figure; there are: {known}, consistency",
+        f"config: figures.map: no such figure; there are: {known}, consistency, claims, sweep_*",
         "config: scans: must be >= 2, got 0",
     }
 
@@ -149,3 +149,8 @@ def test_figures_are_those_of_the_study(good, said):
 def test_figures_in_a_file_and_of_included_configs(house, said):
     house("configs/both.yaml", "include: [rls1, rls2]\nfigures:\n  gian_r: [rls1]\n")
     assert said("configs/both.yaml") == ["configs/both.yaml:3:3: figures.gian_r: no such figure; did you mean gain_r?"]
+    house("configs/both.yaml", "include: [rls1, rls2]\nfigures: ['gain_*', gian_r, sweep_target, claims, 'map_*']\n")
+    assert [one.partition(";")[0] for one in said("configs/both.yaml")] == [
+        "configs/both.yaml:2:21: figures.1: no such figure",
+        "configs/both.yaml:2:51: figures.4: no such figure",
+    ]

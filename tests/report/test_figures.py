@@ -334,8 +334,25 @@ def test_panels_that_show_the_same_are_drawn_once():
 
 def test_panels_side_by_side_have_one_kind_of_scale():
     linear, log = shown_together(1.0)[0], shown_together(2.0, log=True)[0]
-    assert [panel.y.scale for panel in panels.one_scale([linear, log])] == ["log", "log"]
-    assert panels.one_scale([linear, linear])[0].y == linear.y
+    assert [panel.y.scale for panel in panels.shared([linear, log])] == ["log", "log"]
+    assert panels.shared([linear])[0].y == linear.y
+    others = [linear, replace(log, y=Axis("V"))]
+    assert panels.shared(others) == others
+
+
+@pytest.mark.parametrize(("values", "scale"), [((1.0, 3.0), "linear"), ((1.0, 300.0), "log")])
+def test_panels_of_one_quantity_share_the_axis_that_holds_all_of_them(values, scale):
+    figure = panels.in_columns(Figure("f", "F", "F.", tuple(shown_together(*values))))
+    assert figure.share_y
+    (y,) = {panel.y for panel in figure.panels}
+    assert y.scale == scale
+    low, high = y.limits
+    lines = [mark for panel in figure.panels for mark in panel.marks]
+    assert low < min(line.lo.min() for line in lines)
+    assert high > max(line.hi.max() for line in lines)
+    axes = figures.render(figure).axes
+    assert [one.get_ylabel() for one in axes] == ["σ", ""]
+    assert axes[0].get_ylim() == axes[1].get_ylim() == y.limits
 
 
 def test_an_axis_of_sigma_shows_no_rounding():

@@ -67,6 +67,30 @@ def test_every_study_of_tracks_draws_its_sweeps(config, overrides, name):
     assert {mark.name for mark in marks} >= {marks[0].name}
 
 
+def test_several_configs_over_one_key_share_a_figure_and_an_axis():
+    _, drawn = swept("manoeuvre_variance", n=50)
+    assert [name for name in drawn if name.startswith("sweep")] == ["sweep_manoeuvre_variance"]
+    figure = drawn["sweep_manoeuvre_variance"]
+    assert [panel.title for panel in figure.panels] == [f"RLS {n}" for n in range(1, 6)]
+    assert len({panel.y for panel in figure.panels}) == 1
+    assert figure.share_y
+
+
+def test_values_that_are_no_numbers_are_points_from_least_to_largest():
+    """No line joins what has no order of its own; every panel has the order of the leading component."""
+    result, drawn = swept("rls2_manoeuvres", n=50)
+    panels_ = drawn["sweep_target"].panels
+    assert all(mark.style.dash is None for panel in panels_ for mark in panel.marks)
+    assert len({panel.x.ticks for panel in panels_}) == 1
+    leading = panels_[0].marks[0]
+    assert list(leading.y) == sorted(leading.y)
+    rows = result.curves[(result.curves["filter"] == "r") & (result.curves["component"] == "r")]
+    assert sorted(leading.y) == sorted(rows.groupby("case")["sigma"].last())
+    for a, b in zip(panels_[0].marks, panels_[0].marks[1:], strict=False):
+        assert (b.x > a.x).all()
+        assert np.abs(b.x - np.arange(len(b.x))).max() < 0.5
+
+
 def test_no_sweep_no_figure(expected_radar):
     assert sweeps.figures([expected_radar("rls2")], {}) == {}
 

@@ -43,9 +43,9 @@ SEEN = {"consistency": seen.extremes}
 
 
 def consistency_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: str) -> Figure:
-    """NEES per component against time: a panel for each radar or swept value, else for each filter."""
+    """NEES per component against time: a panel for each radar or swept value, of several radars for each filter."""
     rows = tables.groups(table, "case", "filter")
-    if any(result.swept for result in results):
+    if len(results) == 1 or any(result.swept for result in results):
         nees = {(*key, "nees"): own for key, own in rows.items()}
         drawn = panels.nees_panels(results, nees)
     else:
@@ -131,7 +131,7 @@ def _settling_panel(title: str, result: Result, rows: "pd.DataFrame") -> Panel:
         (tr("best $D_M$"), Style(0, None, BEST, size_pt=8)),
         (tr("{periods} scan periods", periods=PERIODS), Style(GREY, 2, width_pt=0.7)),
     ]
-    y, words = Axis(tr("steady $\\sigma$ of $r$, m")), tr("at the points: $D_M$, (m/s³)²")
+    y, words = Axis(tr("steady $\\sigma$ of $r$, m"), "log"), tr("at the points: $D_M$, (m/s³)²")
     remark = _not_settled(rows[~np.isfinite(rows["settling_s"])])
     return Panel(x, y, tuple(marks), title, tuple(keys), words, direct=False, remark=remark)
 

@@ -101,7 +101,7 @@ def sigma_figure(
             drawn.append(Panel(panels.time_axis(), y, tuple(marks), panels.swept(result), direct=False))
     if not drawn:
         return None
-    drawn, same = panels.differing(panels.one_scale(drawn))
+    drawn, same = panels.differing(drawn)
     caption = (
         tr(
             "Root-mean-square error of the {name} about the truth against time, of {count:,} "
