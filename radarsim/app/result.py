@@ -7,7 +7,7 @@ From finished cases to files: tables, figures, claims, run.json and report.html 
 
 import os
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property, partial
@@ -22,12 +22,12 @@ from radarsim.config.experiment import DRAWN_FOR_ALL, Case, Experiment, matches
 from radarsim.engine import store
 from radarsim.engine.results import CaseResult
 from radarsim.errors import DisagreementError, MeasureError, RadarsimError
-from radarsim.language import plural, tr
+from radarsim.language import ENGLISH, called, current, plural, tr
 from radarsim.report import claims, files, notes, seen
 from radarsim.report import tables as common
 from radarsim.report.claims import page
 from radarsim.report.claims.page import OVER, with_classes
-from radarsim.report.drawing import Figure
+from radarsim.report.drawing import Figure, reworded
 from radarsim.report.wording import estimate, spoken
 from radarsim.studies.interface import Study
 from radarsim.studies.registry import quantities, study
@@ -128,7 +128,7 @@ class Result(Shown):
     @property
     def question(self) -> str:
         """What the experiment asks, in one sentence."""
-        return study(self.experiment.study).question(self.experiment)
+        return asked(self.experiment)
 
     @cached_property
     def answer(self) -> tuple[str, ...]:
@@ -276,7 +276,7 @@ class Result(Shown):
     def _of_intervals(self) -> Sequence[str]:
         if self.written is not None:
             return self.written.of_intervals
-        return notes.of_intervals(self.cases, self._tables, answers(self.cases))
+        return of_intervals(self.cases, self._tables)
 
 
 # ---- output ----------------------------------------------------------------------------------------------------------
@@ -343,7 +343,13 @@ MOST_FURTHER = 6  # sentences on further baselines
 def answered(results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"]) -> tuple[str, ...]:
     """The answer of an experiment: the study's, and the gains at the last scan against further baselines."""
     more = [tr("Further gains stand in gains.csv.")] if any(one.against for one in results) else []
-    return (*(sentence for part in answers(results) for sentence in part(made)), *more)
+    names = names_in(results)
+    return (*(called(sentence, names) for part in answers(results) for sentence in part(made)), *more)
+
+
+def asked(experiment: Experiment) -> str:
+    """What an experiment asks, in one sentence."""
+    return called(study(experiment.study).question(experiment), names_in(experiment.cases))
 
 
 def answers(results: Sequence[CaseResult]) -> "list[notes.Answer]":
@@ -351,6 +357,29 @@ def answers(results: Sequence[CaseResult]) -> "list[notes.Answer]":
     own = study(results[0].study)
     further = [partial(_gained, one) for result in results for one in result.against]
     return [lambda made: own.answer(results, against_first(made, results)), *further[:MOST_FURTHER]]
+
+
+def of_intervals(results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"]) -> list[str]:
+    """What a reader of the answer must know of its intervals."""
+    names = names_in(results)
+    return [called(line, names) for line in notes.of_intervals(results, made, answers(results))]
+
+
+def names_in(cases: Sequence[Case] | Sequence[CaseResult]) -> frozenset[str]:
+    """What configs call things, and their values in words; none where all is said as it stands."""
+    if current() == ENGLISH:
+        return frozenset()
+    found = {one for case in cases for one in (case.name, *_texts([case.spec.model_dump(), case.swept]))}
+    found |= {case.name.partition(" ")[0] for case in cases}
+    return frozenset(name for one in found for name in (one, one.replace("_", " ")) if name)
+
+
+def _texts(value: object) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping | list | tuple):
+        for one in value.values() if isinstance(value, Mapping) else value:
+            yield from _texts(one)
 
 
 def _gained(result: CaseResult, made: Mapping[str, "pd.DataFrame"]) -> list[str]:
@@ -394,7 +423,8 @@ def case_figures(
         from radarsim.report import sweeps
 
         drawn |= sweeps.figures(results, common.groups(made["curves"], "case", "filter", "component"))
-    return {name: seen.crossed(figure) for name, figure in drawn.items()}
+    names = names_in(results)
+    return {name: reworded(seen.crossed(figure), partial(called, names=names)) for name, figure in drawn.items()}
 
 
 def _said(figure: Figure) -> Figure:
@@ -460,7 +490,7 @@ def write_files(
         described = case_figures(results, made, experiment) if draw else {}
         described = {name: described[name] for name in experiment.drawn(described)}
         answer = answered(results, made)
-        question = own.question(experiment)
+        question = asked(experiment)
     except RadarsimError:
         raise
     except (Exception, SystemExit):  # of a package's figures or words: the tables do not depend on them
@@ -475,8 +505,8 @@ def write_files(
             contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
         contents["figures/captions.md"] = captions(described).encode()
     drawn = time.perf_counter()
-    of_intervals = notes.of_intervals(results, made, answers(results))
-    run = {**run, "warnings": [*run.get("warnings", ()), *of_intervals, *unnamed(own, described)]}
+    warned = of_intervals(results, made)
+    run = {**run, "warnings": [*run.get("warnings", ()), *warned, *unnamed(own, described)]}
     record = files.record(experiment, results, run, contents, answer, store.described())
     report = html.report_page(
         experiment,
@@ -495,7 +525,7 @@ def write_files(
     removed = sorted(set(files.outputs(folder)) - set(contents))
     files.replace_all(folder, contents, stale=files.outputs)
     seconds = {"drawing": drawn - began, "writing": time.perf_counter() - drawn}
-    return Written(folder, tuple(sorted(contents)), tuple(removed), made, answer, seconds, tuple(of_intervals))
+    return Written(folder, tuple(sorted(contents)), tuple(removed), made, answer, seconds, tuple(warned))
 
 
 def unnamed(own: Study, described: Iterable[str]) -> list[str]:

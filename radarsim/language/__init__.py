@@ -14,13 +14,16 @@ A package with a study of its own has its own catalogues, `PACKAGE/language/<cod
 words and the terms that it marks are looked up there and nowhere else. What is said for it by radarsim's code, such as
 its claims, is looked up in radarsim's catalogue first, then in those of the packages.
 
+Names that shipped configs give (filters, radars, scenarios) stand in radarsim's catalogue under the context "label":
+`called` says them in a text. What is typed and what stands in CSV files stays as the config has it.
+
 Tables are the same in every language, and so are messages on faults of a config: neither may import this room.
 """
 
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from gettext import GNUTranslations, NullTranslations
@@ -39,6 +42,7 @@ VARIABLE = "RADARSIM_LANGUAGE"
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 POWER = re.compile(r"(?P<mantissa>\d[\d.,]*)e(?P<exponent>[+-]\d+)")  # of a number in Python's form
 NUMBER = "number"  # context of the point and of the separator of thousands
+LABEL = "label"  # context of names in shipped configs
 
 
 class Term(str):
@@ -145,6 +149,34 @@ def in_form(word: Term, context: str) -> str:
     if context and (found := _catalogue(word, sys._getframe(), context)):
         return found.pgettext(context, word)
     return tr(word)
+
+
+def called(text: str, names: frozenset[str] = frozenset()) -> str:
+    """A text with names of configs as the language calls those that it knows; without names the text is one itself.
+
+    A name that the language does not know stays, and so does a known one within it.
+    """
+    said = _labels(current())
+    if not names or not said:
+        return said.get(text, text)
+    return _any_of(names).sub(lambda found: _called(found[0], said), text)
+
+
+def _called(name: str, said: Mapping[str, str]) -> str:
+    plain = name.replace("\n", " ")  # of a tick in several lines
+    return said[plain].replace(" ", "\n") if plain != name and plain in said else said.get(name, name)
+
+
+@cache
+def _labels(code: str) -> Mapping[str, str]:
+    return {one.id: one.said[0] for one in messages(code) if one.context == LABEL}
+
+
+@cache
+def _any_of(names: frozenset[str]) -> re.Pattern[str]:
+    """Any of names as a word of its own, the longest first: none within a path, a key or its value."""
+    found = "|".join(re.escape(name).replace(r"\ ", r"[ \n]") for name in sorted(names, key=len, reverse=True))
+    return re.compile(rf"(?<![\w.=/-])(?:{found})(?![\w=/]|[.-]\w)")
 
 
 def _catalogue(message: str, caller: FrameType, context: str = "") -> NullTranslations | None:

@@ -3,9 +3,9 @@
 Nothing here knows how it is drawn (report/figures.py does).
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -106,6 +106,7 @@ class Note:
 
 
 Mark = Line | Reference | Bars | Heat | Note
+MARKED = ("label", "name", "text")  # words of marks
 
 
 @dataclass(frozen=True)
@@ -143,6 +144,29 @@ class Figure:
     width_mm: float = COLUMN_MM
     panel_height_mm: float = 62.0
     share_y: bool = False
+
+
+def reworded(figure: Figure, said: Callable[[str], str]) -> Figure:
+    """The figure with every text of it put into other words."""
+
+    def with_words(one: Any, *names: str) -> Any:
+        return replace(one, **{name: said(getattr(one, name)) for name in names if hasattr(one, name)})
+
+    def mark(one: Mark) -> Mark:
+        return replace(one, names=tuple(map(said, one.names))) if isinstance(one, Bars) else with_words(one, *MARKED)
+
+    def axis(one: Axis) -> Axis:
+        return replace(one, label=said(one.label), ticks=tuple((value, said(words)) for value, words in one.ticks))
+
+    panels = tuple(
+        replace(
+            with_words(panel, "title", "key_title", "remark", "crosses"),
+            **{"x": axis(panel.x), "y": axis(panel.y), "marks": tuple(map(mark, panel.marks))},
+            keys=tuple((said(words), style) for words, style in panel.keys),
+        )
+        for panel in figure.panels
+    )
+    return replace(with_words(figure, "title", "caption"), panels=panels)
 
 
 @dataclass(frozen=True)

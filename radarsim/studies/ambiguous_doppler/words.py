@@ -25,8 +25,11 @@ def warnings(experiment: Experiment) -> list[str]:
         radar = case.spec.radar
         for span in radar.spans_mps:
             if span < 2 * radar.sigma_velocity_mps and any(one.folds for one in case.spec.filters):
-                sigma = f"2 σ_V, {2 * radar.sigma_velocity_mps:g} m/s"
-                words = f"its span of {span:g} m/s is under {sigma}: next to nothing can be unfolded"
+                words = tr(
+                    "its span of {span:g} m/s is under 2 σ_V, {sigma:g} m/s: next to nothing can be unfolded",
+                    span=span,
+                    sigma=2 * radar.sigma_velocity_mps,
+                )
                 lines[f"{case.stem}: radar.repetition_rate_hz: {words}"] = None
     return list(lines)
 
@@ -50,7 +53,7 @@ def answer(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> lis
 
 def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
     axes, sentences = result.axes, []
-    spans = ", ".join(numeral(f"{span:g}") for span in result.spec.radar.spans_mps)
+    spans = wording.in_a_row(numeral(f"{span:g}") for span in result.spec.radar.spans_mps)
     for name in _told_of(result):
         where = f"{panels.plain_label(result)}, D = {spans} {tr('m/s')}, {name}"
         right = _wrong(result, name, made) or _right(result, name, made)
@@ -82,7 +85,7 @@ def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> list
     worst = curves.loc[curves.groupby("filter", sort=False)["decides"].idxmax()]
     said = [
         tr(
-            "{filter} {sigma} at scan {k}",
+            "{filter}, {sigma} at scan {k}",
             filter=row["filter"],
             sigma=wording.estimate((row["sigma"], row["sigma_lo"], row["sigma_hi"]), tr("m")),
             k=row["k"],

@@ -37,7 +37,7 @@ def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
     return [
         words
         for result in sentences
-        for words in _of_one(result, made, f"{result.name}, " if len(sentences) > 1 else "")
+        for words in _of_one(result, made, f"{panels.plain_label(result)}, " if len(sentences) > 1 else "")
     ]
 
 
@@ -90,7 +90,7 @@ def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:
     if rare_event:
         words.append(before + _rare(tables.groups(made["rare"], "case")[(result.name,)]))
     if others:
-        locks = ", ".join(f"{name} {_lock(last_locks(made, result, name))}" for name in others)
+        locks = "; ".join(f"{name}, {_lock(last_locks(made, result, name))}" for name in others)
         words.append(before + tr("the others lock in: {locks}.", locks=locks))
     return words
 

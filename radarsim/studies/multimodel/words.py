@@ -42,5 +42,5 @@ def _least(result: CaseResult, made: Mapping, component: str, quantity: str) -> 
             numeral(f"{float(f'{best[name]:.3g}'):,.10g}") for name in ("sigma", "sigma_lo", "sigma_hi")
         )
         ends = wording.interval(low, high)
-        parts.append(f"{tr(str(stage))} {best['filter']}, {value} {panels.unit_of(best['unit'])} {ends}")
+        parts.append(f"{tr(str(stage))}: {best['filter']}, {value} {panels.unit_of(best['unit'])} {ends}")
     return tr("least σ of {quantity} by stage: {stages}.", quantity=quantity, stages="; ".join(parts))

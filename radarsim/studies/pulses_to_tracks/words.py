@@ -23,8 +23,12 @@ def warnings(experiment: Experiment) -> list[str]:
         spec = case.spec
         reach = 3 * spec.prior.sigma_velocity_mps
         if reach > spec.span_mps / 2 and any(one.hypotheses == 1 for one in spec.filters):
-            half = f"half the span of {spec.span_mps:g} m/s"
-            words = f"3 σ of the velocity, {reach:g} m/s, are over {half}: first bursts may be taken in a wrong fold"
+            words = tr(
+                "3 σ of the velocity, {reach:g} m/s, are over half the span of {span:g} m/s: first bursts may be taken "
+                "in a wrong fold",
+                reach=reach,
+                span=spec.span_mps,
+            )
             lines[f"{case.stem}: prior.sigma_velocity_mps: {words}"] = None
     return list(lines)
 

@@ -263,7 +263,7 @@ def _broken_sentences(results: Sequence[Result], made: Made) -> list[str]:
     rows = tables.groups(tables.where(made["curves"], component="r"), "case", "filter")
     sentences = []
     for result in broken[:MOST_TOLD]:
-        words = [f"{name} {_worst(rows[result.name, name])}" for name in result.axes.filters]
+        words = [f"{name}: {_worst(rows[result.name, name])}" for name in result.axes.filters]
         sentences.append(
             tr(
                 "{case}, a target that breaks the filters' model: {filters}.",

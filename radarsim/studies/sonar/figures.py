@@ -97,7 +97,7 @@ def sigma_figure(
     for result in results:
         marks = [panels.scaled(one, factor) for one in case_lines(result, curves, of.name, panels.SIGMA)]
         if marks:
-            y = panels.fitting_axis(panels.with_unit(f"$\\sigma$ of {of.symbol}", unit), marks)
+            y = panels.fitting_axis(panels.sigma_of(of.symbol, unit), marks)
             drawn.append(Panel(panels.time_axis(), y, tuple(marks), panels.swept(result), direct=False))
     if not drawn:
         return None

@@ -54,12 +54,8 @@ def _best(result: CaseResult[SonarAxes], curves: "pd.DataFrame") -> str:
 
 def _with(row: "pd.Series") -> str:
     """A filter and its σ with the interval."""
-    return " ".join(
-        (
-            row["filter"],
-            wording.estimate((row[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(row["unit"])),
-        )
-    )
+    sigma = wording.estimate((row[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(row["unit"]))
+    return f"{row['filter']}, {sigma}"
 
 
 def _most_optimistic(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:

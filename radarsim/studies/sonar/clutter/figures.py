@@ -158,7 +158,7 @@ def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
         return None
     rows = by_line(tracking, column, results[0])
     rows = rows[rows[rate] > 0]
-    rules = {row["filter"]: f"{row['m']:.0f} of {row['of']:.0f}" for _, row in rows.iterrows()}
+    rules = {row["filter"]: tr("{count} of {of}", count=int(row["m"]), of=int(row["of"])) for _, row in rows.iterrows()}
     rows = rows.assign(
         filter=[f"{name} ({rules[name]})" for name in rows["filter"]],
         false_lo=np.maximum(rows["false_lo"], rows[rate] / 10),

@@ -67,7 +67,7 @@ def _by_importance(rows: "pd.DataFrame") -> str:
     """What stands behind rates of false tracks that importance sampling found, by tracker."""
     found = (
         tr(
-            "{filter} {events:,} of them, {n_eff:,.0f} effective",
+            "{filter}, {events:,} of them, {n_eff:,.0f} effective",
             filter=row["filter"],
             events=row["events"],
             n_eff=row["n_eff"],
@@ -81,7 +81,7 @@ def _ends_by_importance(rows: "pd.DataFrame") -> str:
     """How rarely the target's track ends, and what stands behind these rates, by tracker."""
     found = (
         tr(
-            "{filter} {rate:.3g} [{low:.3g}, {high:.3g}] from {events:,} of them, {n_eff:,.0f} effective",
+            "{filter}, {rate:.3g} [{low:.3g}, {high:.3g}] from {events:,} of them, {n_eff:,.0f} effective",
             filter=row["filter"],
             **rare.told(row),
         )

@@ -28,7 +28,7 @@ def answer(results: Sequence[CaseResult[ManoeuvreAxes]], made: "Mapping[str, pd.
     """Sentences with 95 % intervals: how often each manoeuvre is detected, and σ of uses against the covariance's."""
     moving = [result for result in results if result.spec.detectors and result.axes.manoeuvre_s]
     shown = panels.reported(moving, 2)[0] if "detections" in made else []
-    return [*filter(None, (_detected(result, made["detections"]) for result in shown)), *_first_order(made)]
+    return [*filter(None, (_detected(result, made["detections"]) for result in shown)), *_first_order(results, made)]
 
 
 def _detected(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame") -> str:
@@ -40,7 +40,7 @@ def _detected(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame") -> 
     if not ranked:
         return ""
     ends = [
-        f"{row['filter']} {wording.estimate((row[key] for key in ('probability', 'lo', 'hi')), form='.3g')}"
+        f"{row['filter']}, {wording.estimate((row[key] for key in ('probability', 'lo', 'hi')), form='.3g')}"
         for row in ranked[:: len(ranked) - 1 or 1]
     ]
     if len(ends) == 1:
@@ -60,7 +60,7 @@ def _detected(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame") -> 
     return panels.at_its_place(result, words)
 
 
-def _first_order(made: "Mapping[str, pd.DataFrame]") -> list[str]:
+def _first_order(results: Sequence[CaseResult[ManoeuvreAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
     """Measured σ of uses over that from the covariance, for the first case's first filter at the last time; or none."""
     if "uses" not in made:
         return []
@@ -77,7 +77,7 @@ def _first_order(made: "Mapping[str, pd.DataFrame]") -> list[str]:
             "Measured σ of the track's uses over that from its covariance ({filter}, {t_s:g} s, {case}): {ratios}.",
             filter=first["filter"],
             t_s=rows.iloc[0]["t_s"],
-            case=first["case"],
+            case=next(panels.plain_label(one) for one in results if one.name == first["case"]),
             ratios=", ".join(ratios),
         )
     ]
