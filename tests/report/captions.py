@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.language import tr
+from radarsim.app.result import names_in
+from radarsim.language import called, tr
 from radarsim.report import panels, seen
 from radarsim.report.chart import spoken
 from radarsim.report.drawing import Line
@@ -100,7 +101,7 @@ def drawn(result, figure, caption):
         return cases[:1]
     if (left := found(SHOWN, caption + " ")) is None:
         return cases
-    names = panels.names_of(cases)
+    names = [called(name, names_in(result.cases)) for name in panels.names_of(cases)]
     quoted = re.findall("[“«](.+?)[”»]", left["names"])
     bare = re.split(tr("{first} and {last}", first=", |", last=""), re.sub("[“«].+?[”»]", "", left["names"]))
     gone = [name for name in names if name in (*quoted, *bare)]
@@ -133,13 +134,13 @@ def judged(result, figure, caption):
     of, study, caption = table_of(figure, result.experiment.study), result.experiment.study, spoken(caption)
     cases = drawn(result, figure, caption)
     every = lines(result, of, result.cases if cases is None else cases)
-    devices = {one.name: panels.plain_label(one) for one in result.cases}
+    devices = {one.name: called(panels.plain_label(one), names_in(result.cases)) for one in result.cases}
     faults, told = [], 0
 
     def says(words, true, names=None, who=()):
         if not close(value(words), true):
             faults.append(f"{figure}: {words!r} is {true:.4g}")
-        named = [row for row in who if spoken(panels.literal(row.filter)) in names or devices[row.case] in names]
+        named = [row for row in who if called(row.filter) in names or devices[row.case] in names]
         if names is not None and not named:
             faults.append(f"{figure}: {names!r} is {' or '.join(row.filter for row in who)}")
 
@@ -163,13 +164,13 @@ def judged(result, figure, caption):
             told += 1
             for rows in panels_of(study, cases or result.cases, every):
                 _, first = at(rows, sign)
-                if not any(spoken(panels.literal(row.filter)) in claim["names"] for row in first):
+                if not any(called(row.filter) in claim["names"] for row in first):
                     faults.append(f"{figure}: {claim['names']} is {first[0].filter} in {first[0].case}")
     for sign, template in SOME.items():
         if claim := found(template, caption):
             for rows in panels_of(study, cases or result.cases, every):
                 _, first = at(rows, sign)
-                named = any(spoken(panels.literal(row.filter)) in claim["told"] for row in first)
+                named = any(called(row.filter) in claim["told"] for row in first)
                 if not named and tr("others in {count}").partition(" ")[0] not in claim["told"]:
                     faults.append(f"{figure}: {claim['told']} is {first[0].filter} in {first[0].case}")
     for template in MOST:
@@ -237,7 +238,7 @@ def rates(result, figure, caption):
         else:
             return [f"{figure}: nothing was judged of: {spoke[:200]}"]
         for end, names, true in pairs:
-            if not close(value(claim[end]), true) or not any(spoken(one) in claim[names] for one in who[true]):
+            if not close(value(claim[end]), true) or not any(called(one) in claim[names] for one in who[true]):
                 wrong[-1].append(f"{figure}: {claim[end]!r} of {claim[names]!r} is {true:.4g} of {who[true]}")
     return [] if [] in wrong else wrong[0]
 

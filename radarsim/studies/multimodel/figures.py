@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SIGMAS = {"y": (term("the height"), "$y$", "m"), "vy": (term("the rate of climb"), "$\\dot y$", "m/s")}
 RULES = ("moment", "best", "combined", "modified_combined")
-FAMILIES = {"gpb1": "MMA1", "imm": "MMA2", "gpb2": "MMA3"}
+FAMILIES = {"gpb1": term("MMA1"), "imm": term("MMA2"), "gpb2": term("MMA3")}
 SPREAD = 0.5  # of the points of a stage, stages being one apart
 MOST_LOOKS = 8  # filters, each of a colour, dash and marker of its own
 DRAWN_FROM = {"families": ("stages",), "cost": ("stages", "operations")}
@@ -81,8 +81,8 @@ def _keys(result: CaseResult, **look: Any) -> tuple[tuple[str, Style], ...]:
     rules = {of.merge: replace(style, dash=0, marker=None, width_pt=4.0, flat=True) for of, style in styled}
     families = {of.family: replace(style, colour=0) for of, style in styled}
     named = [(rule.replace("_", " "), style) for rule, style in rules.items()]
-    named += [(FAMILIES.get(family, family), style) for family, style in families.items()]
-    marked = {FAMILIES.get(family, family) for family in families}
+    named += [(tr(FAMILIES.get(family, family)), style) for family, style in families.items()]
+    marked = {tr(FAMILIES.get(family, family)) for family in families}
     return tuple((label, replace(style, **look) if label in marked else style) for label, style in named)
 
 
@@ -141,7 +141,11 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
     caption = tr(
         "{name}: from {begin:.0f} to {end:.0f} km of the radar over the ground, up to {height:.0f} km high and "
         "{acceleration:.0f} m/s². ",
-        **{"name": track.name or track.label or results[0].name, "begin": float(far[0]), "end": float(far[-1])},
+        **{
+            "name": track.name or track.label or panels.plain_label(results[0]),
+            "begin": float(far[0]),
+            "end": float(far[-1]),
+        },
         **{"height": float(height.y.max()), "acceleration": float(acceleration.y.max())},
     ) + tr(
         "The true flight: the ground track from its start, at one scale "
@@ -268,8 +272,8 @@ def families(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
             value = own.set_index("filter")["sigma"]
             grid = np.array([[value.get(name, np.nan) for name in row] for row in names], dtype=float)
             x = Axis(tr("merging rule"), ticks=tuple((i, rule.replace("_", "\n")) for i, rule in enumerate(RULES)))
-            y = Axis(tr("family"), ticks=tuple(enumerate(FAMILIES.values())))
-            title = stage if len(results) == 1 else f"{_title(result, results)}: {stage}"
+            y = Axis(tr("family"), ticks=tuple(enumerate(map(tr, FAMILIES.values()))))
+            title = ": ".join(filter(None, (_title(result, results), tr(str(stage)))))
             drawn.append(Panel(x, y, (Heat(np.arange(4), np.arange(3), grid, panels.sigma_of("$y$", "m")),), title))
     caption = tr(
         "σ of the height over each stage, by family and rule of the partial merges; one bank, one set of plots."

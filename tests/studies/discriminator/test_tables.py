@@ -119,7 +119,7 @@ def test_answer_names_every_estimator(made):
     first, others = words.answer(made.cases, made.tables)
     names = made.cases[0].axes.filters
     assert first.startswith(f"{names[0]}: ")
-    assert all(re.search(rf"(: |, ){re.escape(name)} \d+(\.\d\d)? % \[", others) for name in names[1:])
+    assert all(re.search(rf"(: |; ){re.escape(name)}, \d+(\.\d\d)? % \[", others) for name in names[1:])
 
 
 def test_claims_find_their_estimators(made):

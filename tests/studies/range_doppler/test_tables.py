@@ -268,7 +268,7 @@ def test_a_target_that_breaks_the_model(expected_radar):
     rows = made["curves"][(made["curves"]["component"] == "r") & (made["curves"]["filter"] == "r")]
     worst = rows.loc[rows["sigma"].idxmax()]
     told = range_doppler_words.answer(results, made)[-1]
-    assert f"r worst σ of the range {worst['sigma']:.4g} m [" in told
+    assert f"r: worst σ of the range {worst['sigma']:.4g} m [" in told
     assert f"at {worst['t_s']:g} s, largest bias " in told
 
 

@@ -222,7 +222,7 @@ def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
         "{name}, tracker {tracker}.",
         tracks=len(shown.tracks),
         false=len(shown.false[0]),
-        name=result.name,
+        name=panels.plain_label(result),
         tracker=shown.tracker,
         k=len(result.axes.k),
     )

@@ -245,7 +245,7 @@ def test_tables_tell_the_curve_and_how_tracks_end():
         how = own[own["event"] != "target's track ended"].set_index("event")["rate"]
         assert list(how.index) == ["target's track dropped", "target's track lost"]
         assert how.sum() == pytest.approx(curve.iloc[-1]["rate"], rel=1e-12)
-    assert "has ended by the last scan, by importance sampling: a " in " ".join(result.answer)
+    assert "has ended by the last scan, by importance sampling: a, " in " ".join(result.answer)
     assert not result.tables["rare"]["event"].str.contains("false").any()
 
 
