@@ -20,7 +20,14 @@ language = "en"
 
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
 root_doc = "docs/README"
-include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/**.md", "benchmarks/README.md", "results/README.md"]
+include_patterns = [
+    "README.md",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    "docs/**.md",
+    "benchmarks/README.md",
+    "results/README.md",
+]
 exclude_patterns = ["docs/_build", ".venv", ".git", "results/.blocks", "radarsim", "tests"]
 myst_heading_anchors = 4
 myst_enable_extensions = ["dollarmath"]
