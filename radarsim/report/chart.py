@@ -351,6 +351,8 @@ def text_at(x: float, y: float, text: str, anchor: str, css: str = "", data: tup
 WIDTH, HEIGHT = 440.0, 280.0  # of a panel, in units of the SVG
 LETTER = 0.62 * SIZE  # mean width of one
 RIGHT, BOTTOM = 12.0, 44.0
+ENDS_SHARE = 0.3  # of a panel's width that the names at the ends of its lines may take
+ROW = 1.15 * SIZE  # of a panel's height that each of them takes
 MARKED = 16  # at most about so many markers or crosses a line
 FEWER = 6  # points of a line for each marker, at least: where lines are drawn of few points, for a small page
 POINTS = 400  # of a line; a panel is as many units wide
@@ -379,11 +381,12 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Chart:
-    """A figure for the page."""
+    """A figure for the page; direct: every curve has its name at its end in some panel."""
 
     panels: tuple[Drawn, ...]
     switches: tuple[Switch, ...]
     wide: bool
+    direct: bool
 
 
 def chart(figure: Figure, points: int = POINTS) -> Chart:
@@ -396,7 +399,8 @@ def chart(figure: Figure, points: int = POINTS) -> Chart:
     heats = heats_of(shown)
     panels = tuple(_panel(figure, panel, numbers, points, heats) for panel in shown)
     switches = tuple(Switch(n, html(name), sample(groups[name])) for name, n in numbers.items())
-    return Chart(panels, switches, len(panels) > 1)
+    direct = set(groups) == {name for panel in shown for name in at_ends(panel)}
+    return Chart(panels, switches, len(panels) > 1, direct)
 
 
 def heats_of(panels: Sequence[Panel]) -> Heats:
@@ -410,6 +414,16 @@ def named(line: Line) -> str:
     return line.name or line.label
 
 
+def at_ends(panel: Panel) -> list[str]:
+    """The names that stand at the ends of a panel's lines, as in the files; none where not all of them fit."""
+    lines = [m for m in panel.marks if isinstance(m, Line) and m.label and np.isfinite(m.y).any()]
+    names = [named(line) for line in lines]
+    short = max((len(spoken(name)) for name in names), default=0) * LETTER <= ENDS_SHARE * WIDTH
+    drawn = all(line.style.dash is not None for line in lines) and not any(isinstance(m, Heat) for m in panel.marks)
+    fits = panel.direct and short and drawn and len(names) * ROW <= HEIGHT - BOTTOM - 3 * SIZE
+    return names if fits else []
+
+
 def _panel(figure: Figure, panel: Panel, numbers: dict[str, int], points: int, heats: Heats) -> Drawn:
     frame = _Frame(panel, heats)
     marks = Markup("").join(frame.draw(mark, numbers, points) for mark in panel.marks)
@@ -418,8 +432,8 @@ def _panel(figure: Figure, panel: Panel, numbers: dict[str, int], points: int, h
     svg = Markup(
         '<svg class="chart" viewBox="0 0 {:g} {:g}" role="img" tabindex="0" aria-label="{}: {}">{}'
         '<svg x="{:g}" y="{:g}" width="{:g}" height="{:g}" viewBox="{:g} {:g} {:g} {:g}">{}</svg>'
-        '<g class="cursor"></g></svg>'
-    ).format(WIDTH, HEIGHT, whole, axes, frame.axes(), *(2 * frame.inside()), marks)
+        '{}<g class="cursor"></g></svg>'
+    ).format(WIDTH, HEIGHT, whole, axes, frame.axes(), *(2 * frame.inside()), marks, frame.ends)
     remark = Markup("<br>").join(html(line) for line in panel.remark.split("\n")) if panel.remark else Markup("")
     return Drawn(html(panel.title), remark, svg, frame.data)
 
@@ -439,7 +453,9 @@ class _Frame:
         self.y = ys
         widest = max((len(line) for _, text in self.y_ticks for line in text.split("\n")), default=1)
         self.left = max(30.0, 12.0 + LETTER * min(widest, 22))
-        self.x: Scale = scale(panel.x, [x for x, _ in extent], "x", self.left, WIDTH - RIGHT)
+        self.names, self.ends = at_ends(panel), Markup("")
+        self.right = WIDTH - RIGHT - max((1.1 * LETTER * len(spoken(name)) for name in self.names), default=0.0)
+        self.x: Scale = scale(panel.x, [x for x, _ in extent], "x", self.left, self.right)
         if panel.equal:
             self.x, self.y = equal(self.x, self.y)
             self.y_ticks = list(panel.y.ticks) or self.y.ticks(5)
@@ -460,11 +476,11 @@ class _Frame:
 
     def inside(self) -> tuple[float, float, float, float]:
         """Left, top, width and height of the plot, a little wider than the axes for markers at their ends."""
-        return self.left - 4, self.top - 4, WIDTH - RIGHT - self.left + 8, HEIGHT - BOTTOM - self.top + 8
+        return self.left - 4, self.top - 4, self.right - self.left + 8, HEIGHT - BOTTOM - self.top + 8
 
     def axes(self) -> Markup:
         """Grid, axes, ticks and labels."""
-        left, right, top, bottom = self.left, WIDTH - RIGHT, self.top, HEIGHT - BOTTOM
+        left, right, top, bottom = self.left, self.right, self.top, HEIGHT - BOTTOM
         xs = [(float(self.x.place(v)), text, v) for v, text in self.x_ticks]
         ys = [(float(self.y.place(v)), text, v) for v, text in self.y_ticks]
         xs = [(x, text, v) for x, text, v in xs if left - 1 <= x <= right + 1]
@@ -499,6 +515,10 @@ class _Frame:
     def _line(self, line: Line, numbers: dict[str, int], points: int) -> Markup:
         whole = thinned(line, points)
         group = numbers.get(named(line), -1)
+        if self.names and line.label:
+            end = '<g class="end" display="none" data-n="{}" data-group="{}"{}><path class="l"{}/><text>{}</text></g>'
+            words = tspans(named(line), SIZE)
+            self.ends += Markup(end).format(len(self.data["lines"]), group, ink(line.style), dashed(line.style), words)
         self._keep(spoken(named(line)), whole, group, line.style)
         x, y = self.x.place(whole["x"]), self.y.place(whole["y"])
         made = Markup("")
@@ -548,7 +568,7 @@ class _Frame:
         self.data["lines"].append(kept)
 
     def _reference(self, mark: Reference) -> Markup:
-        left, right, top, bottom = self.left, WIDTH - RIGHT, self.top, HEIGHT - BOTTOM
+        left, right, top, bottom = self.left, self.right, self.top, HEIGHT - BOTTOM
         if mark.across == "y":
             y = float(self.y.place(mark.value))
             made = Markup('<path class="ref" d="M{:.1f} {:.1f}H{:.1f}"/>').format(left, y, right)

@@ -165,13 +165,14 @@ def as_text(name: str, value: object) -> str:
 NOT_SETTLED = term("not settled in the run")
 SCRIPT = (
     *(term("Light page"), term("Dark page"), term("exact"), term("Copied"), term("Not allowed here")),
-    *(term("Logarithmic x"), term("Logarithmic y"), term("Show all")),
+    *(term("Logarithmic axes"), term("Linear axes"), term("Show all")),
 )
 ROWS = 200  # of a table shown in the page
 ALL_ROWS = 800  # of all of them together: the page stays under 1.5 MB
 MOST_POINTS = 16_000  # of all curves of a page together, which keeps it small
 LEAST_POINTS = 50  # of one curve, however many there are
 MOST_SEEN = 200  # letters of an answer above its figure
+FIRST, FIRST_PANELS = 2, 4  # figures that are not folded, and their panels
 LONG = 300  # letters of a sentence that is shown in its clauses
 MOST_CASES = 12  # written out as YAML
 SHOWN_FACTS = ("threads", "seconds", "kernel_seconds", "realisations_computed", "realisations_from_store")
@@ -215,6 +216,7 @@ def report_page(
         claims=claims,
         verdicts=claims_page.counted(made["claims"].to_dict("records")),
         figures=_figures(figures),
+        first=_first(figures),
         files=_files(figures, record["outputs"]),
         sources=sources,
         titles={one.name: spoken(one.title) for one in figures},
@@ -223,6 +225,12 @@ def report_page(
         facts=[(name.replace("_", " "), cell(record[name])) for name in SHOWN_FACTS if name in record],
         command=command(experiment, record),
     )
+
+
+def _first(figures: Sequence[Figure]) -> int:
+    """How many figures are seen without unfolding: the first one, others while their panels are few together."""
+    panels = [sum(bool(panel.marks) for panel in one.panels) for one in figures[:FIRST] if one.name != "claims"]
+    return max(1, sum(sum(panels[: n + 1]) <= FIRST_PANELS for n in range(len(panels))))
 
 
 def in_clauses(answer: Sequence[str]) -> list[str]:

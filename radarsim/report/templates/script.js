@@ -10,7 +10,8 @@ const CLOSEST = 500; // times that a panel can be magnified: its numbers have fi
 const MARKED = 16; // at most about so many markers or crosses of a line are seen
 const SEEN = 0.7; // units from the line from which its band is drawn
 const WIDE = 1000, LONG = 600; // pixels of a window that has room for all of an answer, letters that are not too many
-const SIZE = 12, LETTER = 0.62 * SIZE, BOTTOM = 44, RIGHT = 12; // of a panel, as in report/chart.py
+const SIZE = 12, LETTER = 0.62 * SIZE, ROW = 1.15 * SIZE; // of a panel, as in report/chart.py
+const LEAD = 12; // units from a line's end to its name
 const MARGIN = { x: 0.02, y: 0.06 };
 const NUMERAL = /^−?[\d.,]+(·10[⁰¹²³⁴-⁹⁻]+)?$|^−?10[⁰¹²³⁴-⁹⁻]+$/; // of a tick
 const COMMA = document.documentElement.lang !== "en"; // in place of the point
@@ -221,7 +222,7 @@ class Panel {
   }
 
   down(event) {
-    if (event.button !== 0) return;
+    if (event.button !== 0 || event.target.closest(".end")) return;
     this.from = this.at(event);
     this.dragging = false;
     this.svg.setPointerCapture(event.pointerId);
@@ -350,13 +351,16 @@ class Panel {
       return { marker: shape(one), cross: shape(cross) };
     });
     svg.classList.add("closer");
+    this.ends = [...svg.querySelectorAll(".end")];
+    this.named();
   }
 
-  // Whether an axis can be logarithmic: every value is above zero, and its ticks are numbers.
-  positive(axis) {
-    if (!this.draw || this.draw.equal || this.draw.ticks[axis === "x" ? 0 : 1]) return this.draw && this.log[axis];
-    const values = this.lines.flatMap((line) => (axis === "x" ? this.xs[line.x] : line.y)).filter((v) => v !== null);
-    return values.length > 0 && values.every((v) => v > 0);
+  // Whether a logarithm of y serves: all is above zero, over a decade or more, on an axis that is none yet.
+  decades() {
+    if (this.log.y || this.draw.equal || this.draw.ticks[1]) return false;
+    const values = this.lines.flatMap((line) => line.y).filter((v) => v !== null);
+    const least = values.reduce((a, b) => Math.min(a, b), Infinity), most = values.reduce((a, b) => Math.max(a, b), 0);
+    return least > 0 && most / least >= 10;
   }
 
   // All values along an axis that are to be seen; of y within a range of x.
@@ -425,6 +429,30 @@ class Panel {
       if (moved.every(Number.isFinite)) one.setAttribute("transform", `translate(${moved.join(" ")})`);
     }
     this.lines.forEach((line, n) => this.curve(line, this.curves[n], this.shapes[n]));
+    this.named();
+  }
+
+  // The names at the ends of the lines, as far as these are seen, apart from each other.
+  named() {
+    const [right, bottom, top] = [this.x[4], this.y[3], this.y[4]];
+    const found = [];
+    for (const node of this.ends) {
+      const line = this.lines[Number(node.dataset.n)], xs = this.xs[line.x];
+      const i = xs.findLastIndex((v, n) => line.y[n] !== null && place(this.x, v) <= right + 1);
+      const from = i < 0 ? NaN : place(this.y, line.y[i]);
+      node.style.display = Number.isFinite(from) ? "inline" : "none";
+      if (Number.isFinite(from)) found.push({ node, x: place(this.x, xs[i]), from: Math.min(Math.max(from, top), bottom) });
+    }
+    found.sort((a, b) => a.from - b.from);
+    let last = top - ROW;
+    for (const one of found) one.y = last = Math.max(one.from, last + ROW);
+    last = bottom + ROW;
+    for (const one of found.reverse()) one.y = last = Math.min(one.y, last - ROW);
+    for (const { node, x, from, y } of found) {
+      node.firstChild.setAttribute("d", `M${x + 3} ${from}L${Math.max(x, right) + LEAD - 3} ${y}`);
+      node.lastChild.setAttribute("x", Math.max(x, right) + LEAD);
+      node.lastChild.setAttribute("y", y + 0.35 * SIZE);
+    }
   }
 
   away(axis, value) {
@@ -520,7 +548,7 @@ class Panel {
 
   // The axis by the logarithm, or not; what is magnified stays so where it can.
   logarithmic(axis, on) {
-    if (!this.draw || !this.positive(axis) || this.log[axis] === on) return;
+    if (this.log[axis] === on) return;
     this.log[axis] = on;
     this.redraw();
   }
@@ -594,11 +622,12 @@ function figure(node) {
   tip.setAttribute("role", "status");
   const whole = { node, tip, pinned: null, changed() {} };
   const panels = [...node.querySelectorAll("svg.chart")].map((svg, i) => new Panel(whole, svg, data[i]));
-  for (const button of node.querySelectorAll(".switches button")) {
-    button.disabled = false;
-    button.addEventListener("click", () => {
-      const on = button.getAttribute("aria-pressed") !== "true", group = Number(button.dataset.group);
-      button.setAttribute("aria-pressed", String(on));
+  for (const name of node.querySelectorAll(".switches button, .end")) {
+    const group = Number(name.dataset.group), alike = node.querySelectorAll(`[data-group="${group}"]`);
+    name.disabled = false;
+    name.addEventListener("click", () => {
+      const on = name.getAttribute("aria-pressed") === "false";
+      for (const one of alike) one.setAttribute("aria-pressed", String(on));
       for (const panel of panels) {
         panel.off[on ? "delete" : "add"](group);
         for (const drawn of panel.svg.querySelectorAll(`[data-g="${group}"]`)) drawn.style.display = on ? "" : "none";
@@ -606,32 +635,26 @@ function figure(node) {
       }
     });
   }
-  if (panels.some((panel) => panel.draw)) tools(whole, panels);
-}
-
-// Buttons of a figure: its axes by the logarithm, and everything again.
-function tools(whole, panels) {
-  const bar = document.createElement("div");
-  bar.className = "tools";
-  whole.node.querySelector(".panels").after(bar);
-  for (const [axis, name] of [["y", "Logarithmic y"], ["x", "Logarithmic x"]]) {
-    const able = panels.filter((panel) => panel.positive(axis));
-    if (!able.length) continue;
-    const button = make("button", said(name), bar);
-    button.type = "button";
-    const told = () => button.setAttribute("aria-pressed", String(able.every((panel) => panel.log[axis])));
-    button.addEventListener("click", () => {
-      const on = button.getAttribute("aria-pressed") !== "true";
-      for (const panel of able) panel.logarithmic(axis, on);
-      told();
-    });
-    told();
-  }
-  const back = make("button", said("Show all"), bar);
+  const back = make("button", said("Show all"), null, "back");
   back.type = "button";
+  node.querySelector(".panels").after(back);
   whole.changed = () => { back.hidden = !panels.some((panel) => panel.zoom); };
   back.addEventListener("click", () => { for (const panel of panels) if (panel.zoom) panel.look(null); });
   whole.changed();
+  return panels;
+}
+
+// One button of the page: the axes of y by the logarithm, where that serves, or as they were.
+function scales(button, panels) {
+  const able = panels.filter((panel) => panel.draw && panel.decades());
+  const told = () => { button.textContent = said(button.value ? "Linear axes" : "Logarithmic axes"); };
+  button.hidden = !able.length;
+  button.addEventListener("click", () => {
+    button.value = button.value ? "" : "on";
+    for (const panel of able) panel.logarithmic("y", Boolean(button.value));
+    told();
+  });
+  told();
 }
 
 const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
@@ -689,10 +712,11 @@ async function copy(text) {
   }
 }
 
-for (const node of document.querySelectorAll("figure")) figure(node);
+const drawn = [...document.querySelectorAll("figure")].flatMap(figure);
+const axes = document.getElementById("axes");
+if (axes) scales(axes, drawn);
 for (const more of document.querySelectorAll(".answer details, details.warning")) {
   more.open = innerWidth >= WIDE && more.textContent.length < LONG;
-  addEventListener("beforeprint", () => { more.open = true; });
 }
 for (const table of document.querySelectorAll("table.sortable")) sortable(table);
 for (const button of document.querySelectorAll("button.copy")) {

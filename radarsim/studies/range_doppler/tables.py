@@ -93,23 +93,32 @@ def steady(results: Sequence[Result]) -> "pd.DataFrame":
     return table
 
 
+def steady_sigma(axes: RangeDopplerAxes, f: int) -> np.ndarray | None:
+    """Exact σ (3,) that a filter comes to where every scan has its plot; None of a package's that comes to none."""
+    period = axes.scan_period_s
+    if noise := axes.process_noise[f]:
+        variance = float(axes.manoeuvre_variance[f])
+        true = filters.steady_state(int(axes.observes[f]), variance, axes.sigma, period, noise)[1]
+    elif (found := given.steady_state(axes.settled_gain[f], axes.sigma, period)) is not None:
+        true = found
+    else:
+        return None
+    return np.sqrt(np.diag(true))
+
+
 def _steady(result: Result) -> list[tuple]:
     axes = result.axes
     of = statistics.errors(result.sums["error"], common.realisations(result)).sigma
     t, period, rows = np.asarray(axes.t_s, dtype=float), axes.scan_period_s, []
     for f, name in enumerate(axes.filters):
-        variance = float(axes.manoeuvre_variance[f])
-        if axes.process_noise[f]:
-            _, true = filters.steady_state(int(axes.observes[f]), variance, axes.sigma, period, axes.process_noise[f])
-        elif (steady := given.steady_state(axes.settled_gain[f], axes.sigma, period)) is not None:
-            true = steady
-        else:
+        variance, in_the_long_run = float(axes.manoeuvre_variance[f]), steady_sigma(axes, f)
+        if in_the_long_run is None:
             continue
         for c, (component, unit) in enumerate(axes.components):
             at = np.flatnonzero(axes.available[f, :, c])
             if not at.size:
                 continue
-            last, known = float(np.sqrt(true[c, c])), axes.exact_sigma[f, at, c]
+            last, known = float(in_the_long_run[c]), axes.exact_sigma[f, at, c]
             when = settling(statistics.Estimate(known, known, known), t[at], last).value
             rows.append(
                 (

@@ -5,13 +5,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from radarsim.config.experiment import Experiment
+from radarsim.config.experiment import Case, Experiment
 from radarsim.language import listed, numeral, plural, term, tr
 from radarsim.report import panels, tables, wording
 from radarsim.report.quantities import RADIAL
 from radarsim.studies.range_doppler import tuning
 from radarsim.studies.range_doppler.config import Best, variance_of
-from radarsim.studies.range_doppler.tables import PERIODS, Result, follows_the_model, span_mps
+from radarsim.studies.range_doppler.study import prepare
+from radarsim.studies.range_doppler.tables import PERIODS, Result, follows_the_model, span_mps, steady_sigma
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,15 +103,50 @@ def _gain_sentence(
             )
         else:
             words = tr("{quantity}: {when} σ is {least} ({low}) to {most} ({high}) {base}", **said)
-        return "; ".join([words, *_loss(every, low, labels)]) + "."
+        later = [f"{gain} ({_who(row, labels, several)})" for row in (low, high) if (gain := _later(results, row))]
+        return "; ".join([words, *_not_settled(listed(later)), *_loss(every, low, labels)]) + "."
     row = last.iloc[0]
     best = rows.iloc[int(_decides(rows).argmax())]
     clauses = [
         tr("{quantity}: at {t_s:g} s, the last scan, σ is {gain} {base}", t_s=row["t_s"], gain=_gain(row), **said)
     ]
+    clauses += _not_settled(_later(results, row))
     if best["k"] != row["k"]:
         clauses.append(tr("at best {gain}, at {t_s:g} s", gain=_gain(best), t_s=best["t_s"]))
     return "; ".join([*clauses, *_loss(every, row, labels)]) + "."
+
+
+UNSETTLED = 1.0  # per cent: a gain further than this from that of the long run has not settled
+
+
+def _not_settled(later: str) -> list[str]:
+    """The clause on gains of the long run, where there are such."""
+    return [tr("not settled: {gains} in the long run", gains=later)] if later else []
+
+
+def _later(results: Sequence[Result], row: "pd.Series[Any]") -> str:
+    """What a gain comes to in the long run, exact, in words; nothing where it has settled or that is not known.
+
+    Where plots may be missed it is of the same radar with every plot, now and in the long run.
+    """
+    result = next(one for one in results if one.name == row["case"])
+    axes, spec = result.axes, result.spec
+    whole = spec.radar.model_copy(update={"detection_probability": 1.0})
+    if not follows_the_model(result) or not whole.as_the_papers:
+        return ""
+    if not axes.plain:
+        spec = spec.model_copy(update={"radar": whole})
+        axes = prepare(Case(result.name, panels.stem(result), result.study, spec, (), 1, 1)).axes
+    f, c = axes.filters.index(row["filter"]), [name for name, _ in axes.components].index(row["component"])
+    own, base = (steady_sigma(axes, one) for one in (f, axes.baseline))
+    if own is None or base is None:
+        return ""
+    gain = 100 * (1 - float(own[c] / base[c]))
+    if not abs(axes.exact_gains[f, row["k"] - 1, c] - gain) > UNSETTLED:
+        return ""
+    percent = f"{numeral(f'{abs(gain):.1f}')} %"
+    said = tr("{percent} lower", percent=percent) if gain > 0 else tr("{percent} higher", percent=percent)
+    return said if result.axes.plain else tr("{gain} with every plot", gain=said)
 
 
 def _decides(gains: "pd.DataFrame", end: str = "gain_percent") -> np.ndarray:

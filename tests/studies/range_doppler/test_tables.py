@@ -10,6 +10,7 @@ import pytest
 from radarsim.report import panels, statistics, tables
 from radarsim.report.drawing import Line, Style
 from radarsim.studies.range_doppler import figures as range_doppler_figures
+from radarsim.studies.range_doppler import filters
 from radarsim.studies.range_doppler import tables as range_doppler
 from radarsim.studies.range_doppler import words as range_doppler_words
 
@@ -179,6 +180,36 @@ def test_answer_tells_the_last_gain_of_each_component(paper):
     assert "at best 34.6 % [" in told[0]
     assert "RLS 1" in range_doppler_words.answer(paper, made_of(paper))[2]
     assert "higher (RLS 1)" in range_doppler_words.answer(paper, made_of(paper))[2]
+
+
+S_BAND = {"sigma_range_m": 60, "sigma_velocity_mps": 3, "scan_period_s": 4}
+
+
+@pytest.mark.parametrize(("detection", "words"), [(1, " in the long run;"), (0.9, " with every plot in the long run;")])
+def test_a_gain_that_has_not_settled_is_quoted_with_that_of_the_long_run(expected_radar, detection, words):
+    """Against another solution of the steady state, by doubling."""
+    C_theta, Lambda = 60**2 / (4 * 3) ** 2, 4**3 * 1e-3**0.5 / 60
+    known = filters.exact_gains(np.array([C_theta]), np.array([Lambda]))[:, 0]
+    results = [expected_radar("rls2", radar=S_BAND | {"detection_probability": detection})]
+    told = range_doppler_words.answer(results, made_of(results))[:3]
+    for sentence, gain in zip(told, known, strict=True):
+        assert f"; not settled: {gain:.1f} % lower{words}" in sentence
+    longer = [expected_radar("rls2", radar=S_BAND | {"detection_probability": detection}, scans=40)]
+    if detection == 1:
+        assert "settled" not in " ".join(range_doppler_words.answer(longer, made_of(longer)))
+
+
+def test_a_target_that_breaks_the_model_has_no_gain_of_the_long_run(expected_radar):
+    target = {"kind": "jerk_pulse", "coefficients": [1e5, -250], "start_s": 20, "jerk_mps3": 1, "duration_s": 20}
+    results = [expected_radar("rls2", radar=S_BAND, target=target)]
+    assert "settled" not in " ".join(range_doppler_words.answer(results, made_of(results)))
+
+
+def test_of_several_radars_those_are_named_that_have_not_settled(expected_radar):
+    results = [expected_radar("rls2", name="mine", radar=S_BAND), expected_radar("rls4", name="rls4")]
+    told = range_doppler_words.answer(results, made_of(results))[0]
+    assert told.count("in the long run") == 1
+    assert "not settled: 36.5 % lower (" in told
 
 
 def test_answer_names_a_baseline_that_observes_more(expected_radar):
