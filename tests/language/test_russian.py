@@ -41,7 +41,7 @@ def told(page: str):
     """All texts of a report but what is typed, counted or quoted as it is: code, keys, tables that are files."""
     page = re.sub(r"(?s)<(style|script|pre|code|svg|i)\b.*?</\1>", "", page)
     page = re.sub(r"(?s)<table class=\"sortable\" id=\"table-asked.*?</table>", meanings, page)
-    page = re.sub(r"(?s)<h2 id=\"tables\">.*?<h2 id=\"provenance\">", "", page)
+    page = re.sub(r"(?s)<details id=\"tables\">.*?<details id=", "<details id=", page)
     page = re.sub(r"(?s)<dd>.*?</dd>", "", page)
     yield from (html.unescape(words) for words in re.findall(r'aria-label="([^"]*)"', page))
     yield from (html.unescape(words) for words in re.findall(r">([^<]+)<", page))
