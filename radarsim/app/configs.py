@@ -10,6 +10,7 @@ The command that computes a result again, as run.json and messages give it.
 import math
 import operator
 import os
+import re
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache, cached_property
@@ -108,24 +109,45 @@ def schema_json() -> str:
 Inventory = Sequence[tuple[str, Sequence[str], Sequence[tuple[str, ...]]]]  # title, columns, rows
 
 
-def described(file: Path | None) -> str:
-    """The first line of a YAML file's leading comment, without its own name; empty where there is no such file."""
-    if file is None:
-        return ""
-    with file.open(encoding="utf-8") as lines:
-        for line in lines:
-            words = line.lstrip("#").strip()
-            if not line.startswith("#"):
-                break
-            if not words.startswith("yaml-language-server"):
-                return words.partition(" — ")[2] or words
+STUDY_OR_INCLUDED = re.compile(r"""^(study|include):[\s\[\-"']*([\w.-]+)""", re.MULTILINE)  # the first one included
+
+
+def described(text: str) -> str:
+    """The first line of a YAML file's leading comment, without its own name; empty where there is none."""
+    for line in text.splitlines():
+        words = line.lstrip("#").strip()
+        if not line.startswith("#"):
+            break
+        if not words.startswith("yaml-language-server"):
+            return words.partition(" — ")[2] or words
     return ""
+
+
+def _configs() -> list[tuple[str, str, str]]:
+    """Name, paper (P1; of a study without one its name) and line of each config, in the order of the studies."""
+    papers = {name: key or name for name, key in registry.parts(lambda one: one.paper_key()).items()}
+    texts = {stem: _text(document.config_file(stem)) for stem in document.stems("configs")}
+    found = []
+    for stem, text in texts.items():
+        kind, study = "include", stem
+        for _ in texts:  # no further than there are configs: what includes itself is refused when it is run
+            match = STUDY_OR_INCLUDED.search(texts.get(study, ""))
+            if kind != "include" or match is None:
+                break
+            kind, study = match.groups()
+        found.append((study, stem, described(text)))
+    order = [*papers, *(study for study, _, _ in found)]
+    found.sort(key=lambda one: (order.index(one[0]), one[1]))
+    return [(stem, papers.get(study, ""), words) for study, stem, words in found]
+
+
+def _text(file: Path | None) -> str:
+    return file.read_text(encoding="utf-8", errors="replace") if file else ""
 
 
 def inventory() -> Inventory:
     """What `radarsim list` shows: title, columns and rows of each kind of thing at hand."""
-    configs = [(stem, described(document.config_file(stem))) for stem in document.stems("configs")]
-    scenarios = [(stem, described(document.scenario_file(stem, None))) for stem in document.stems("scenarios")]
+    scenarios = [(stem, described(_text(document.scenario_file(stem, None)))) for stem in document.stems("scenarios")]
     studies = registry.parts(lambda study: (study.about, dict(study.filters)))
     about = [(name, words) for name, (words, _) in studies.items()]
     about += [(name, f"cannot be used: {words}") for name, words in registry.unusable().items()]
@@ -138,7 +160,7 @@ def inventory() -> Inventory:
     ]
     filters += [("", f"kind: {kind}", f"cannot be used: {words}") for kind, words in unusable.items()]
     return [
-        (term("Configs (radarsim run NAME)"), ("name", "what it is"), configs),
+        (term("Configs (radarsim run NAME)"), ("name", "paper", "what it is"), _configs()),
         (term("Scenarios (target: NAME)"), ("name", "what it is"), scenarios),
         (term("Studies (study: NAME)"), ("name", "paper and question"), about),
         (term("Filters"), ("study", "keys", "what it is"), filters),

@@ -167,11 +167,11 @@ def asked(given: "Mapping[str, str]", filter_name: str | None, at_s: float | Non
 def chart(
     configs: tuple[str, ...], overrides: tuple[str, ...], out: str, drawing: group.Drawing, as_json: bool
 ) -> None:
-    """What Doppler gains for every radar, and yours on it; simulates nothing.
+    """What Doppler gains for every radar, with yours marked.
 
-    Gains over time and in the long run against c = (σ_r/σ_V)² (D_M/σ_r²)^(1/3), on which alone they depend as the scan
-    period becomes short, a map with the period in it, and a sentence where each case of CONFIG lies. Also
-    DIR/chart/chart.html, a page of its own with sliders, which computes σ(k) and gains of any radar as they move.
+    Simulates nothing. Gains over time and in the long run against c = (σ_r/σ_V)² (D_M/σ_r²)^(1/3), on which alone they
+    depend as the scan period becomes short, a map with the period in it, and a sentence where each case of CONFIG lies.
+    Also DIR/chart/chart.html, a page of its own with sliders, which computes σ(k) and gains of any radar as they move.
 
     \b
     Examples
@@ -219,11 +219,12 @@ def sensitivity(
     drawing: group.Drawing,
     as_json: bool,
 ) -> None:
-    """What +10 % of each key changes: σ and gain, or another quantity; the largest effect first.
+    """What +10 % of each key changes, the largest effect first.
 
-    Every key that holds a number is raised by a tenth, one at a time; whole numbers by at least one. Exact where the
-    quantity is; else paired, with the same noise, and with 95 % intervals. All filters and components are in
-    DIR/sensitivity/CONFIG/sensitivity.csv, the leading component is drawn beside it as tornado.svg.
+    Changes of σ and gain, or of another quantity. Every key that holds a number is raised by a tenth, one at a time;
+    whole numbers by at least one. Exact where the quantity is; else paired, with the same noise, and with 95 %
+    intervals. All filters and components are in DIR/sensitivity/CONFIG/sensitivity.csv, the leading component is drawn
+    beside it as tornado.svg.
 
     \b
     Examples

@@ -50,7 +50,7 @@ def run(
     quiet: bool,
     as_json: bool,
 ) -> None:
-    """Run experiments; resumes by itself.
+    """Run experiments; what was stopped goes on.
 
     CONFIG is a YAML file, or the name of a shipped experiment (`radarsim list`). Finished blocks are kept under
     DIR/.blocks: a run that was stopped continues, a larger N continues, an edited config starts from zero. A precision
@@ -216,10 +216,10 @@ def check(
     out: str | None,
     as_json: bool,
 ) -> None:
-    """Validate configs; say what would run: cases, filters, realisations, time, memory.
+    """Validate configs, and forecast the time of a run.
 
-    A few realisations are timed for that, unless all are surely done within a second. With --out the time is that of
-    what the results directory lacks.
+    Also cases, filters, realisations, memory. A few realisations are timed, unless all are surely done within a second.
+    With --out the time is that of what the results directory lacks, with --shard that of one share.
 
     With a precision, also how many realisations it takes, and how long: from exact values where the filters are linear,
     else from a pilot of a second or two.
@@ -267,7 +267,7 @@ def report(
     drawing: group.Drawing,
     as_json: bool,
 ) -> None:
-    """Tables, figures and report from what is stored; computes nothing.
+    """Tables, figures and report of stored runs, without computing.
 
     \b
     Examples
@@ -291,20 +291,21 @@ def report(
 @click.option("--parts", is_flag=True, help="What was measured of each.")
 @click.option("--figure", metavar="FILE", help="Also draw them, in margins of what the papers say, to this file.")
 def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figure: str | None, parts: bool) -> None:
-    """The papers' claims and how far each stands, a line each; what was measured of a CLAIM; computes nothing.
+    """The papers' claims, a line each, and how far each stands.
+
+    Computes nothing. Of a CLAIM (P1.3) also its words in full and what was measured. PAPER is P1, P2, P3 or P4; without
+    any, all claims of all papers. For those that are not run the command that would judge them is given. Of a CONFIG
+    that is not a paper's experiment, the claims that it cannot judge, and why.
 
     How they are judged stands in docs/verdicts.md: exact values first, each number with a margin, and over every
     reading that the paper allows. "refuted as shipped; depends on start": false with the choices that the config takes
     where the paper leaves them open, and true with another start.
 
-    PAPER is P1, P2, P3 or P4. Without any, all claims of all papers; those without stored results are listed as not
-    run, with the command that would judge them. Of a CONFIG that is not a paper's experiment, the claims that it cannot
-    judge, and why.
-
     \b
     Examples
       radarsim claims range_doppler
-      radarsim claims P1.3 P4                 with what was measured of P1.3
+      radarsim claims P1                      a line each
+      radarsim claims P1.3                    in full, with what was measured
       radarsim claims --json
       radarsim claims --figure claims.svg
     """

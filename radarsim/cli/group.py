@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 SECTIONS = {
-    "Run": ("run", "check"),
-    "Read": ("report", "compare", "claims", "readings", "chart"),
-    "Design": ("solve", "sensitivity"),
-    "Own data": ("new", "import", "simulate", "track", "fit", "new-study"),
-    "Maintenance": ("list", "schema", "compile", "doctor", "clean"),
+    "A question": ("list", "check", "run", "report", "compare"),
+    "Your own radar": ("new", "solve", "sensitivity", "chart", "new-study"),
+    "Your own data": ("import", "simulate", "track", "fit"),
+    "The papers": ("claims", "readings"),
+    "Upkeep": ("schema", "compile", "doctor", "clean"),
 }
 ORDER = tuple(name for names in SECTIONS.values() for name in names)
 PATIENCE_S = 1.0  # from a signal to the end of whatever a command is doing

@@ -15,15 +15,17 @@ if TYPE_CHECKING:
 @click.argument("words", nargs=-1, metavar="[WORD…]")
 @json_option
 def list_(words: tuple[str, ...], as_json: bool) -> None:
-    """Available configs, scenarios, studies and filters.
+    """What there is: configs, scenarios, studies, filters.
 
-    WORD is one of these kinds, or what an entry's name or line has to contain.
+    Their names on one screen; with WORD a line on each that it selects: configs, scenarios, studies or filters, a
+    paper (P2), or what a name or line has to contain.
 
     \b
     Examples
       radarsim list
-      radarsim list sonar
-      radarsim list filters
+      radarsim list configs
+      radarsim list P2
+      radarsim list sonar clutter
       radarsim list --json | jq -r '.configs[].name'
     """
     from radarsim.app.configs import inventory, selected
@@ -33,15 +35,15 @@ def list_(words: tuple[str, ...], as_json: bool) -> None:
         from radarsim.app import documents
 
         click.echo(documents.text(documents.inventory(found)))
-    else:
-        from radarsim.cli import outcomes
+        return
+    from radarsim.cli import outcomes
 
-        outcomes.print_inventory(found)
+    outcomes.print_inventory(found) if words else outcomes.print_names(found)
 
 
 @main.command()
 def schema() -> None:
-    """JSON Schema of the YAML, for editors and other programs.
+    """Print the JSON Schema of the YAML, for editors.
 
     \b
     Example
@@ -56,10 +58,11 @@ def schema() -> None:
 @click.argument("configs", nargs=-1, metavar="[CONFIG…]")
 @json_option
 def compile_(configs: tuple[str, ...], as_json: bool) -> None:
-    """Compile the kernels of all shipped configs, or of some, so that their first run need not.
+    """Compile kernels now, so that no first run has to wait.
 
-    The machine code is kept for this processor, where `radarsim doctor` says. After an installation or an upgrade it
-    takes about a minute of CPU time, else next to none; a line for each config says how much.
+    Without CONFIG those of all shipped configs. The machine code is kept for this processor, where `radarsim doctor`
+    says. After an installation or an upgrade it takes about a minute of CPU time, else next to none; a line for each
+    config says how much.
 
     \b
     Examples
@@ -83,7 +86,7 @@ def compile_(configs: tuple[str, ...], as_json: bool) -> None:
 @click.option("--recompute", type=Count(), default=0, metavar="N", help="Compute N stored pieces of each case again.")
 @json_option
 def doctor(result: str | None, recompute: int, as_json: bool) -> None:
-    """The machine, and a self-test with known answers; of RESULT: is all that is stored of it whole?
+    """Test this machine; check that what is stored of RESULT is whole.
 
     RESULT is a folder such as results/rls2. Every output is checked against run.json, every stored block of its cases
     against its checksum, every total against its blocks; --recompute computes the N smallest pieces of each case again.
@@ -133,7 +136,7 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
 def clean(
     configs: tuple[str, ...], seed: int | None, overrides: tuple[str, ...], out: str, dry_run: bool, as_json: bool
 ) -> None:
-    """Drop stored blocks, all or of some configs; tables, figures and reports stay.
+    """Drop stored blocks; tables, figures and reports stay.
 
     Without CONFIG all blocks below DIR/.blocks, those of older configs and older versions too. Nothing else is touched.
 

@@ -272,6 +272,21 @@ def print_cleaned(cleaned: "Cleaned", dry_run: bool) -> None:
     say(would if dry_run else done)
 
 
+def print_names(inventory: "Inventory") -> None:
+    """How many configs, scenarios, studies and filters there are, and their names, those of configs by paper."""
+    (_, _, configs), (_, _, scenarios), (_, _, studies), (_, _, filters) = inventory
+    say(plural("{count} config (radarsim run NAME)", "{count} configs (radarsim run NAME)", len(configs)))
+    for paper in dict.fromkeys(paper for _, paper, _ in configs):
+        say(f"{paper}  {', '.join(name for name, of, _ in configs if of == paper)}")
+    told = (
+        plural("{count} scenario (target: NAME)", "{count} scenarios (target: NAME)", len(scenarios)),
+        plural("{count} study (study: NAME)", "{count} studies (study: NAME)", len(studies)),
+        plural("{count} filter", "{count} filters", len(filters)),
+    )
+    say(", ".join(told))
+    say(tr("A line each: `radarsim list configs`, scenarios, studies, filters, P2, any word"))
+
+
 def print_inventory(inventory: "Inventory") -> None:
     """Filters, studies, scenarios and configs, with a line on each: what is asked for most stands last."""
     for n, (title, columns, rows) in enumerate(reversed(inventory)):

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     help="The config to begin from: `radarsim list` names them.",
 )
 def new(name: str, like: str) -> None:
-    """A commented config of one's own: ./NAME.yaml.
+    """Write a commented config of your own: ./NAME.yaml.
 
     It repeats CONFIG, with the unit and the meaning of every key beside it, and adds the optional keys as comments.
     An existing file is never overwritten.
@@ -47,7 +47,7 @@ def new(name: str, like: str) -> None:
 @click.option("--step", is_flag=True, help="Of filters that are not linear: the step of one realisation.")
 @click.option("--folder", is_flag=True, help="A study in a folder of files, for what no base derives.")
 def new_study(name: str, step: bool, folder: bool) -> None:
-    """A package with a small whole study, to be made one's own: ./NAME.
+    """Write a package with a small study, to make your own: ./NAME.
 
     It compares two filters on a random walk: one file with keys, matrices, claims and a reading, from which kernel,
     exact values, tables, figures and recorded plots follow; a config; a test. With --step the filters are functions of
@@ -78,10 +78,10 @@ def new_study(name: str, step: bool, folder: bool) -> None:
 @click.option("-i", "--realisation", type=Count(), default=0, show_default=True, help="Which realisation, from 0.")
 @set_option
 def simulate(config: str, output: str, realisation: int, overrides: tuple[str, ...]) -> None:
-    """One realisation's measurements, with the truth in columns true_….
+    """Write the measurements of one realisation, with the truth.
 
     The plots are those that a run of CONFIG draws in this realisation, number for number: `radarsim track` over them
-    gives the errors that the run adds up. A missed plot is an empty cell.
+    gives the errors that the run adds up. A missed plot is an empty cell; the truth stands in columns true_….
 
     \b
     Example
@@ -139,7 +139,7 @@ def import_(
     tracks: tuple[str, ...],
     **further: "Any",
 ) -> None:
-    """A recording into plots: ASTERIX, transponder data (ADS-B) in CSV, AIS, or a spreadsheet.
+    """Read a recording into plots: ASTERIX, ADS-B, AIS or a table.
 
     PLOTS.csv has a row a plot and all tracks of the recording, each named in the column `track`; `radarsim track` and
     `radarsim fit` read it. Its first lines say what the columns are. Nothing is written of a damaged file.
@@ -202,7 +202,7 @@ def track(
     overrides: tuple[str, ...],
     **further: "Any",
 ) -> None:
-    """The config's filters over recorded measurements.
+    """Run the config's filters over recorded measurements.
 
     PLOTS.csv has a header and one row a plot, its times rising at any spacing; an empty cell is a missing value, other
     columns are ignored. Its columns are t_s and what the study's sensor measures, as `radarsim simulate` writes them:
@@ -278,7 +278,7 @@ def track(
 @click.option("--json", "as_json", is_flag=True, help="One JSON document in place of the lines.")
 @set_option
 def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -> None:
-    """What recorded plots say of σ and of the manoeuvre variance, with 95 % intervals.
+    """Estimate σ and manoeuvre variance from recorded plots.
 
     The plots are as for `radarsim track`; of a file with several tracks all count together. Each key's value is that
     under which the filter's predictions make the plots most likely; its interval holds what is not much less likely,

@@ -11,12 +11,12 @@ from radarsim.cli import group
 @group.drawing_options
 @group.json_option
 def compare(sources: tuple[str, ...], out: str, drawing: group.Drawing, as_json: bool) -> None:
-    """Runs side by side on common axes: differences with intervals; computes nothing.
+    """Stored runs side by side: differences with intervals.
 
     Each of A, B, … is a config, whose stored result is read from DIR, or the folder of a result: two radars, two
-    configs, two versions of one. The first is what the others are compared with. Where both are of the same
-    measurements (study, seed, target, sensor) and share their baseline filter, the difference is paired. Writes
-    DIR/compare/comparison.csv, compare.html and figures.
+    configs, two versions of one. Nothing is computed. The first is what the others are compared with. Where both are of
+    the same measurements (study, seed, target, sensor) and share their baseline filter, the difference is paired.
+    Writes DIR/compare/comparison.csv, compare.html and figures.
 
     \b
     Examples

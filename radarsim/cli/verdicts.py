@@ -1,12 +1,14 @@
 """What the terminal shows of tracks over recorded plots, and of claims: what was found, measured and expected."""
 
 import shlex
+import shutil
 import sys
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any, TextIO
 
 from radarsim.app import configs
-from radarsim.cli.console import field, say
+from radarsim.cli.console import PIPED_WIDTH, field, say
 from radarsim.language import listed, plural, term, tr
 from radarsim.report.wording import interval, known, labelled, printable, significant_digits
 
@@ -91,10 +93,9 @@ def report_fit(found: "Fit") -> None:
 
 # ---- verdicts --------------------------------------------------------------------------------------------------------
 SHORT = 12  # words of a claim in a list
-MOST_CONFIGS = 6  # that a command names
-NOTHING_RUN = term("nothing is run here: `{command}` runs what they are judged by")
+MOST_CONFIGS = 6  # from which on it is said what runs them all
 NOTHING_OF_ALL = term(
-    "nothing is run here: each line names its config; `make reproduce-figures` runs those of the four papers; "
+    "nothing is run here: `make reproduce-figures` runs all configs of the four papers; "
     "docs/claims.md, which `make docs` builds, has their results at full size"
 )
 
@@ -128,7 +129,7 @@ def print_claims(
     out: str = configs.RESULTS,
     names: Sequence[str] = (),
 ) -> None:
-    """A line a claim: its number, how far it stands, what it says; of those that are detailed what was measured too.
+    """A line a claim: number, class, first words; of those that are detailed all of it and what was measured.
     The commands that it names are those for the directory `out`, and for the names that were asked for.
 
     Of experiments that are not the paper's a line for each reason, with the claims that cannot be judged for it.
@@ -142,16 +143,31 @@ def print_claims(
             foreign.setdefault((row["config"], row["why"]), []).append(row["claim"])
         else:
             stated.append(row)
-    for own in page.grouped(stated):
-        _print_claim(own, own[0]["claim"] in detailed, configs.into(out))
-    for (stem, why), names in foreign.items():
-        told = {"stem": stem, "names": page.in_a_row(names), "reason": rule.said(why)}
+    every = page.grouped(stated)
+    width = max((len(_standing(own)) for own in every if own[0]["claim"] not in detailed), default=0)
+    room = (shutil.get_terminal_size().columns if sys.stdout.isatty() else PIPED_WIDTH) - width - 9
+    for own in every:
+        if own[0]["claim"] in detailed:
+            _print_claim(own)
+        else:
+            words = tr(own[0]["statement"]).split()
+            begun = " ".join([*words[:SHORT], *["…"] * (len(words) > SHORT)])
+            begun = shorten(begun, room, placeholder=" …", break_on_hyphens=False)
+            say(f"{own[0]['claim']:<6} {_standing(own):<{width}}  {begun}")
+    for (stem, why), foreigners in foreign.items():
+        told = {"stem": stem, "names": page.in_a_row(foreigners), "reason": rule.said(why)}
         say(tr("{stem}: not judged: {names}: {reason}", **told))
-    say(page.counted(stated) or tr("no claims are judged by this"))
-    if stated and all(row["class"] == NOT_RUN for row in stated):
-        stems = list(dict.fromkeys(str(row["config"]) for row in stated))
-        command = f"radarsim run {shlex.join(stems)}{configs.into(out)}"
-        say(tr(NOTHING_RUN, command=command) if len(stems) <= MOST_CONFIGS else tr(NOTHING_OF_ALL))
+    missing: dict[str, dict[str, None]] = {}
+    for row in stated:
+        if row["class"] == NOT_RUN:
+            missing.setdefault(str(row["config"]), {})[row["claim"]] = None
+    for stem, lacking in missing.items():
+        command = f"radarsim run {shlex.quote(stem)}{configs.into(out)}"
+        say(tr("`{command}` judges {names}", command=command, names=page.in_a_row(list(lacking))))
+    bracketed = any(page.extension(own) and own[0]["claim"] not in detailed for own in every)
+    say((page.counted(stated) or tr("no claims are judged by this")) + bracketed * tr(" (in brackets)"))
+    if len(missing) > MOST_CONFIGS and all(row["class"] == NOT_RUN for row in stated):
+        say(tr(NOTHING_OF_ALL))
     elif any(row["class"] != NOT_RUN and row["claim"] not in detailed for row in stated):
         if names:
             command = f"radarsim claims {shlex.join(names)} --parts{configs.into(out)}"
@@ -166,26 +182,26 @@ def _named(row: Mapping[str, Any]) -> str:
     return ": ".join(filter(None, (str(row["case"]), tr(str(row["what"])))))
 
 
-def _print_claim(parts: Sequence[Mapping[str, Any]], detailed: bool, into: str) -> None:
-    """A claim in a line; detailed, its place, config, original sentence and a line a part."""
+def _standing(parts: Sequence[Mapping[str, Any]]) -> str:
+    """The class of a claim in a few words; in brackets of one that is not counted."""
+    from radarsim.report.claims import page, rule
+
+    own = parts[0]["class"]
+    kind = tr("depends") if own == rule.DEPENDS else tr(own)
+    kind = tr("{own} as shipped", own=kind) if page.alone(parts[0]) else kind
+    return f"({kind})" if page.extension(parts) else kind
+
+
+def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
+    """A claim with its place, config, original sentence and a line a part."""
     from radarsim.report.claims import NOT_JUDGED, NOT_RUN, page, rule
 
     first = parts[0]
-    verdict = page.verdict_of(parts).replace("*", "")
-    if not detailed:
-        words = tr(first["statement"]).split()
-        short = " ".join(words[:SHORT]) + (" …" if len(words) > SHORT else "")
-        by = f" (radarsim run {first['config']}{into})" if first["class"] == NOT_RUN else ""
-        say(f"{first['claim']:<6} {verdict}{by}: {short}")
-        return
-    place = f"{tr(first['paper'])}, {tr(first['place'])}"
+    verdict, place = page.verdict_of(parts).replace("*", ""), f"{tr(first['paper'])}, {tr(first['place'])}"
     say(f"{first['claim']:<6} {verdict}: {tr(first['statement'])} [{place}; {first['config']}]")
     if first["original"]:
         say(f"       «{first['original']}»")
-    if first["class"] == NOT_RUN:
-        say(f"       radarsim run {first['config']}{into}")
-        return
-    for row in parts:
+    for row in parts if first["class"] != NOT_RUN else ():
         said = [_named(row)]
         if page.number(row["measured"]) is not None:
             said.append(page.measured(row) + tr("; expected {words}", words=page.expected(row["expected"])))

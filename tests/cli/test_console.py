@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from radarsim.cli import console, outcomes, verdicts
+from radarsim.config import document
 from radarsim.report import notes
 from radarsim.report.claims.judge import SAID
 from radarsim.report.wording import significant_digits
@@ -37,10 +38,11 @@ def test_a_number_that_is_not_known_has_no_unit():
 
 def test_claims_without_results_say_where_to_find_them(tmp_path):
     *claims, counted, pointer = command("claims", "--out", tmp_path / "none").stdout.splitlines()
+    judges = {line.partition(" judges ")[2]: line for line in claims if " judges " in line}
+    assert "radarsim run range_doppler --out" in judges["P1.1–P1.36"]
     assert not {f"P1.{number}" for number in range(1, 26)} - {line.split()[0] for line in claims}
-    assert any("radarsim run range_doppler" in line for line in claims)
     assert "36 not run" in command("claims", "range_doppler", "--out", tmp_path / "none").stdout
-    assert re.fullmatch(r"\d+ not run; \d+ extensions not counted", counted.strip())
+    assert re.fullmatch(r"\d+ not run; \d+ extensions not counted \(in brackets\)", counted.strip())
     assert "make reproduce-figures" in pointer
     assert "docs/claims.md" in pointer
 
@@ -67,11 +69,27 @@ def test_a_list_of_claims_is_a_line_each(capsys):
     long = "one two three four five six seven eight nine ten eleven twelve thirteen"
     verdicts.print_claims([*parts(False, False), *[one | {"claim": "P9.2", "statement": long} for one in parts(False)]])
     first, second, counted, hint = capsys.readouterr().out.splitlines()
-    assert first == "P9.1   confirmed: It is so"
-    assert second == f"P9.2   confirmed: {long.removesuffix('thirteen')}…"
+    assert first == "P9.1   confirmed  It is so"
+    assert second == f"P9.2   confirmed  {long.removesuffix('thirteen')}…"
     assert counted == "2 confirmed"
     assert "radarsim claims P9.1" in hint
     assert "--parts" in hint
+
+
+def test_every_claim_is_one_line_of_a_terminal(monkeypatch):
+    """Whatever its class: one that depends, and one that is not counted."""
+    monkeypatch.setenv("COLUMNS", "60")
+    screen = Terminal()
+    monkeypatch.setattr("sys.stdout", screen)
+    long = "a claim of very many words that no line of such a terminal could ever hold"
+    of = [("P9.1", "depends on", False), ("P9.2", "the print contradicts itself", False), ("P9.3", "refuted", True)]
+    rows = [one | {"claim": claim, "class": kind, "statement": long} for claim, kind, ours in of for one in parts(ours)]
+    verdicts.print_claims(rows)
+    claims, told = screen.getvalue().splitlines()[:3], screen.getvalue().splitlines()[3:]
+    assert [line.split()[0] for line in claims] == ["P9.1", "P9.2", "P9.3"]
+    assert [line[6:36].strip() for line in claims] == ["depends", "the print contradicts itself", "(refuted)"]
+    assert all(line[37:].startswith("a claim of") and line.endswith("…") and len(line) <= 60 for line in claims)
+    assert "(in brackets)" in " ".join(told)
 
 
 @pytest.mark.parametrize(
@@ -112,13 +130,24 @@ def test_a_bar_moves_within_a_second_though_nothing_is_reported(monkeypatch):
     assert console.SILENT_S < 1
 
 
-def test_list_ends_with_configs_and_takes_words():
+def test_list_is_one_screen_and_takes_words(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
     def listed(*words, code=0):
         result = command("list", *words, code=code)
         return result.stdout if code == 0 else result.stderr
 
-    titles = [line for line in listed().splitlines() if line.startswith(("Configs", "Scenarios", "Studies", "Filters"))]
-    assert [title.split()[0] for title in titles] == ["Filters", "Studies", "Scenarios", "Configs"]
+    shown = listed().splitlines()
+    assert sum(len(console.wrapped(line, 80)) for line in shown) <= 24
+    assert [line.split("  ")[0] for line in shown[1:5]] == ["P1", "P2", "P3", "P4"]
+    names = [name for line in shown[1:5] for name in line[4:].split(", ")]
+    assert sorted(names) == list(document.stems("configs"))
+    assert {"rls2", "ambiguous", "orders"} <= set(shown[1][4:].split(", "))
+    assert shown[0].startswith(f"{len(names)} configs ")
+    titles = [line for line in listed("P2").splitlines() if line.startswith(("Configs", "Scenarios", "Studies"))]
+    assert [title.split()[0] for title in titles] == ["Studies", "Scenarios", "Configs"]
+    assert "multimodel_1hz" in listed("P2")
+    assert "sonar" not in listed("P2")
     assert "rls2" not in listed("sonar")
     assert "sonar_clutter" in listed("sonar")
     assert listed("filters").startswith("Filters")

@@ -66,9 +66,11 @@ def test_the_chart_table_is_the_same(tmp_path):
 
 def test_the_list_says_what_things_are_and_leaves_their_names():
     with speaking("ru"):
-        ended = command("list")
-    for _, _, rows in configs.inventory():
+        names = command("list")
+        ended = command("list", "configs", "scenarios", "studies", "filters")
+    for title, _, rows in configs.inventory():
         for row in rows:
+            assert row[0] in names.stdout or "Configs" not in title
             assert row[0] in ended.stdout
             assert tr(row[-1]) == row[-1]
             with speaking("ru"):

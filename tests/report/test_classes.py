@@ -56,7 +56,7 @@ def agree(out):
     assert rows.keys() == lines.keys() == stands.keys() == PAPERS.keys()
     for claim, row in rows.items():
         kind, phrase = told(row)
-        assert lines[claim].split(maxsplit=1)[1].startswith(phrase), claim
+        assert lines[claim].split(maxsplit=1)[1].lstrip("(").startswith(kind.removesuffix(" on")), claim
         assert stands[claim].strip("*").startswith(phrase), claim
         assert marks.get(claim, kind) == kind  # none where every part is void
         config = out / row["config"]
@@ -68,7 +68,7 @@ def agree(out):
     kinds = {claim: row["class"] for claim, row in rows.items()}
     counted, count = page.counted(every), sum(page.counts(every)[0].values())
     assert f"claims   {count}: {counted}" in reproduce.summary([reproduce.Done("rls2", 1.0, "")], str(out), 1.0)
-    assert printed("claims", "--out", out).splitlines()[-2] == counted
+    assert printed("claims", "--out", out).splitlines()[-2].removesuffix(" (in brackets)") == counted
     for line in page.headline(every)[2:]:
         said, _, names = line.rpartition(": ")
         kind = kinds[re.match(r"P\d\.\w+", names)[0]]
@@ -115,7 +115,8 @@ def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
     assert document["claims_as_shipped"] == {"confirmed": ["P1.23", "P1.28"], "refuted": ["P1.18"]}
     phrase = "refuted as shipped; depends on shown_variance, start (true under 1 of 15 readings)"
     assert reported(tmp_path / "rls2")["P1.18"] == phrase
-    assert f"P1.18  {phrase}: RLS 2" in printed("claims", "rls2", "--out", tmp_path)
+    assert "P1.18  depends    RLS 2" in printed("claims", "rls2", "--out", tmp_path)
+    assert f"P1.18  {phrase}: RLS 2" in printed("claims", "rls2", "--parts", "--out", tmp_path)
     html.write(tmp_path)
     assert "1 confirmed, 2 depend on what the paper leaves open" in (tmp_path / "index.html").read_text()
     rows = run.claims(("rls2",), tmp_path)
@@ -155,7 +156,10 @@ def test_a_run_without_any_class_says_that_it_is_judged_as_shipped_alone(monkeyp
     monkeypatch.setattr(stored_readings, "shipped_classes", lambda: ())
     text = printed("run", "rls2", "-n", 60, "--no-figures", "--out", tmp_path)
     assert "as shipped alone: P1.18, P1.23, P1.28; `radarsim readings P1` judges" in text
-    assert "P1.18  refuted as shipped; other readings not judged: RLS" in printed("claims", "rls2", "--out", tmp_path)
+    assert "P1.18  refuted as shipped    RLS" in printed("claims", "rls2", "--out", tmp_path)
+    assert "P1.18  refuted as shipped; other readings not judged: RLS" in printed(
+        "claims", "rls2", "--parts", "--out", tmp_path
+    )
 
 
 def test_classes_that_were_worked_out_beside_the_run_count(tmp_path):
@@ -165,7 +169,9 @@ def test_classes_that_were_worked_out_beside_the_run_count(tmp_path):
     path = tmp_path / CLASSES
     path.write_text(path.read_text().replace(f",{rule.CONFIRMED},", f",{rule.IMMATERIAL},"))
     assert own.kind == rule.CONFIRMED
-    assert f"P1.23  confirmed as shipped; {rule.IMMATERIAL} over all" in printed("claims", "rls2", "--out", tmp_path)
+    assert f"P1.23  confirmed as shipped; {rule.IMMATERIAL} over all" in printed(
+        "claims", "rls2", "--parts", "--out", tmp_path
+    )
     printed("report", "rls2", "-n", 300, "--no-figures", "--out", tmp_path)
     rows = csv.DictReader((tmp_path / "rls2/claims.csv").read_text(encoding="utf-8").splitlines())
     assert {row["class"] for row in rows if row["claim"] == "P1.23"} == {rule.IMMATERIAL}

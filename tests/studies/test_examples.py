@@ -214,7 +214,8 @@ def test_what_the_compiler_refuses_is_its_reason_and_the_line_that_it_names():
 
 def test_what_a_package_is_told_is_of_its_own_configs_and_of_options_that_were_given(radarsim, tmp_path):
     said = radarsim("claims", "chirp", "bearings.1", "--out", tmp_path).stdout
-    assert f"nothing is run here: `radarsim run chirp bearings --out {tmp_path}` runs what they are judged by" in said
+    assert f"`radarsim run chirp --out {tmp_path}` judges chirp.1" in said
+    assert f"`radarsim run bearings --out {tmp_path}` judges bearings.1" in said
     assert "is no claim of bearings; its claims: bearings.1," in radarsim("claims", "bearings.9", code=2).stderr
     for name in ("bearings", "bearings.1"):
         words = (
