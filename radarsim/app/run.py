@@ -323,7 +323,7 @@ def seconds(experiment: Experiment, figures: bool | str | Sequence[str], width_m
     for name in dict.fromkeys((names[0], names[-1])):
         save(described[name], formats, width_mm, "")
     each = (time.perf_counter() - started) / len(dict.fromkeys((names[0], names[-1])))
-    return SPARE * (tables + each * len(names))
+    return SPARE * (tables + each * (len(experiment.figures) or len(names)))
 
 
 # ---- run -------------------------------------------------------------------------------------------------------------

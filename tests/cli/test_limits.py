@@ -24,7 +24,7 @@ PLAIN = ("--no-figures", "--quiet")
 
 def few(case):
     """A result of a case from few realisations, its tables, and the experiment of it alone."""
-    one = load("range_doppler", ["realisations=2000"])
+    one = load("range_doppler", ["realisations=2000", "figures=[]"])
     work = CaseWork(case)
     result = case_result(case, work, collect(work, 2))
     return [result], output.case_tables([result], stem=one.stem), one
@@ -169,16 +169,16 @@ def test_a_limit_leaves_time_for_tables_and_figures(monkeypatch):
     assert limit.reserving(5.0)() == "time limit of 60 s"
 
 
-@pytest.mark.parametrize("figures", [True, False])
-def test_what_writing_takes_is_measured_by_case_and_figure(monkeypatch, figures):
+@pytest.mark.parametrize(("figures", "overrides"), [(True, []), (False, []), (True, ["figures=[]"])])
+def test_what_writing_takes_is_measured_by_case_and_figure(monkeypatch, figures, overrides):
     ticks = iter(range(100))
     monkeypatch.setattr(writing.time, "perf_counter", lambda: float(next(ticks)))
     saved = []
     monkeypatch.setattr("radarsim.report.figures.save", lambda *given: saved.append(given) or {})
-    experiment = load("range_doppler", ["realisations=2000"])
+    experiment = load("range_doppler", ["realisations=2000", *overrides])
     found = writing.seconds(experiment, figures, None)
     assert len(saved) == 2 * figures
-    names = len(output.case_figures(*few(experiment.cases[0])))
+    names = len(experiment.figures or output.case_figures(*few(experiment.cases[0])))
     assert found == pytest.approx(1.25 * (len(experiment.cases) + (0.5 * names if figures else 0)))
 
 
