@@ -7,8 +7,9 @@
 >>> result.figure("gain_r")  # doctest: +ELLIPSIS
 <Figure size ...>
 
-In a notebook a result shows its answer and the last scan; `radarsim.load("rls2")` gives one that was run before.
-`radarsim.simulate`, `read_plots`, `track` and `fit` are for recorded plots.
+In a notebook a result shows its answer and first figure; `radarsim.load("rls2")` gives one that was run before.
+`check`, `solve`, `sensitivity`, `compare`, `chart`, `claims` and `readings` answer what the commands of these names do;
+`simulate`, `read_plots`, `track` and `fit` are for recorded plots.
 """
 
 from importlib import import_module
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from radarsim.app.own_data import fit, read_plots, simulate, track
+    from radarsim.app.python import chart, check, claims, compare, readings, sensitivity, solve
     from radarsim.app.result import Result
     from radarsim.app.run import load_result as load
     from radarsim.app.run import run
@@ -27,17 +29,26 @@ __all__ = [
     "RadarsimError",
     "Result",
     "__version__",
+    "chart",
+    "check",
+    "claims",
+    "compare",
     "fit",
     "load",
     "read_plots",
+    "readings",
     "run",
+    "sensitivity",
     "simulate",
+    "solve",
     "track",
 ]
 
 _HOMES = {
     **{"run": "app.run:run", "load": "app.run:load_result", "Result": "app.result:Result"},
     **{name: f"app.own_data:{name}" for name in ("fit", "read_plots", "simulate", "track")},
+    **{name: f"app.python:{name}" for name in ("chart", "check", "claims", "compare", "readings")},
+    **{name: f"app.python:{name}" for name in ("sensitivity", "solve")},
     **{"ConfigError": "errors:ConfigError", "RadarsimError": "errors:RadarsimError"},
 }
 

@@ -4,23 +4,24 @@
 """
 
 import os
-from collections.abc import Callable, Collection, Hashable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.app import stored
-from radarsim.app.configs import command, directory, load
-from radarsim.app.result import captions, recorded_case
+from radarsim.app.configs import RESULTS, Config, Overrides, command, directory, load
+from radarsim.app.result import Result, captions, recorded_case
 from radarsim.app.run import namesakes
+from radarsim.app.shown import Shown
 from radarsim.config.experiment import Case, Experiment, canonical, digest, world
 from radarsim.errors import ConfigError
 from radarsim.report import compare as sides
 from radarsim.report import files
 from radarsim.report import tables as common
 from radarsim.report.compare import Side
-from radarsim.report.drawing import Chart
+from radarsim.report.drawing import Chart, Figure
 from radarsim.report.quantities import COMMON, Quantity
 from radarsim.studies import registry
 
@@ -34,23 +35,27 @@ FOLDER = "compare"
 
 @dataclass(frozen=True)
 class Run:
-    """A stored result: what it is called, its folder and its run.json; the config that asked for it, if one did."""
+    """A result: what it is called, its folder and its run.json; the config that asked for it, if one did.
+
+    made: the tables of one that is not stored.
+    """
 
     label: str
     folder: Path
     record: dict[str, Any]
     experiment: Experiment | None = None
+    made: "Mapping[str, pd.DataFrame] | None" = None
 
 
-@dataclass(frozen=True)
-class Compared:
-    """What was written: the folder and its files; the sentences, what to know beside them, and comparison.csv's rows.
+@dataclass(frozen=True, repr=False)
+class Compared(Shown):
+    """What was compared: the sentences, what to know beside them, comparison.csv's rows; the folder and files, if any.
 
     last are the rows at the last common time; told the quantities that the terminal shows, as rows name them, and their
     words.
     """
 
-    folder: Path
+    folder: Path | None
     files: tuple[str, ...]
     sentences: tuple[str, ...]
     notes: tuple[str, ...]
@@ -58,37 +63,65 @@ class Compared:
     rows: tuple[dict[Hashable, Any], ...]
     last: tuple[dict[Hashable, Any], ...]
     told: tuple[tuple[str, str], ...]
+    drawn: Mapping[str, Figure] = field(default_factory=dict)
+
+    @property
+    def table(self) -> "pd.DataFrame":
+        """comparison.csv: every common time, with the differences and their intervals."""
+        return common.frame({str(name): [row[name] for row in self.rows] for name in self.rows[0]})
+
+    @property
+    def _described(self) -> Mapping[str, Figure]:
+        return self.drawn
+
+    def _said(self) -> tuple[str, ...]:
+        return self.sentences
+
+
+Source = str | os.PathLike[str] | Result
 
 
 def compare(
-    sources: Sequence[str | os.PathLike[str]],
-    out: str | os.PathLike[str] = "results",
+    sources: Sequence[Source] | Mapping[str, Source],
+    out: str | os.PathLike[str] | None = RESULTS,
     *,
     formats: Sequence[str] = ("svg", "png"),
     width_mm: float | None = None,
 ) -> Compared:
-    """Put stored results side by side: tables, figures and one page in `out`/compare; nothing is simulated.
+    """Put results side by side: tables, figures and one page in `out`/compare; nothing is simulated.
 
-    A source is a config (path, or name of a shipped one), whose results are looked for under `out`, or the folder of a
-    result. The first is what the others are compared with. width_mm is the width of the figures' files in place of
-    their own. Raises ConfigError where one is missing, with the command
-    that computes it, or where they share nothing; StoreError where a stored table is damaged.
+    A source is a result, the folder of one, or a config (path, or name of a shipped one), whose results are looked for
+    under `out`; in a mapping each has the name by which it is called. The first is what the others are compared with.
+    Without `out` they are looked for in results/, and nothing is written. width_mm is the width of the figures' files
+    in place of their own. Raises ConfigError where one is missing, with the command that computes it, or where they
+    share nothing; StoreError where a stored table is damaged.
     """
-    directory(out)
+    if out is not None:
+        directory(out)
     if len(sources) < 2:
         raise ConfigError(f"compare: takes two results or more, got {len(sources)}")
-    runs = _named(_found(sources, Path(out)))
+    given = list(sources.values()) if isinstance(sources, Mapping) else sources
+    runs = _found(given, Path(RESULTS if out is None else out))
+    if isinstance(sources, Mapping):
+        runs = [replace(run, label=str(name)) for run, name in zip(runs, sources, strict=True)]
+    runs = _named(runs)
     every = [_sides(run) for run in runs]
     pairs, alone = sides.pairs(_labelled(every))
     made = sides.compared(pairs)
     if not len(made):
         raise ConfigError(f"{' and '.join(run.label for run in runs)} share no filter and component to compare")
-    folder = Path(out) / FOLDER
     shared = sides.shared(side for run in every for side in run)
     sentences = sides.sentences(made, shared)
     notes = [*sides.pairings(made), *alone]
-    warnings = [line for run in runs for line in _stale(run)] + _replaced(folder, runs)
+    warnings = [line for run in runs for line in _stale(run)]
     described = sides.figures([side for run in _labelled(every) for side in run], made)
+    rows, last = (tuple(table.to_dict("records")) for table in (made, sides.at_the_end(made)))
+    told = tuple((of.value, of.words) for of in sides.told(made, shared))
+    found = Compared(None, (), tuple(sentences), tuple(notes), tuple(warnings), rows, last, told, described)
+    if out is None:
+        return found
+    folder = Path(out) / FOLDER
+    warnings += _replaced(folder, runs)
     contents = {"comparison.csv": common.to_csv(made)}
     if formats:
         from radarsim.report.figures import save  # Matplotlib
@@ -103,24 +136,29 @@ def compare(
     ).encode()
     contents["compare.json"] = files.to_json(_record(runs, contents))
     files.replace_all(folder, contents, stale=partial(files.outputs, name="compare.json"))
-    rows, last = (tuple(table.to_dict("records")) for table in (made, sides.at_the_end(made)))
-    told = tuple((of.value, of.words) for of in sides.told(made, shared))
-    written = folder, tuple(sorted(contents)), tuple(sentences), tuple(notes), tuple(warnings)
-    return Compared(*written, rows, last, told)
+    return replace(found, folder=folder, files=tuple(sorted(contents)), warnings=tuple(warnings))
 
 
-def _found(sources: Sequence[str | os.PathLike[str]], out: Path) -> list[Run]:
+def _found(sources: Sequence[Source], out: Path) -> list[Run]:
     """The stored results, or one ConfigError with what is missing of all."""
     found: list[Run] = []
     faults: list[str] = []
     for source in sources:
         try:
-            found.append(_folder(Path(source)) or _stored(source, out))
+            found.append(_made(source) if isinstance(source, Result) else _folder(Path(source)) or _stored(source, out))
         except ConfigError as error:
             faults += error.lines
     if faults:
         raise ConfigError(*faults)
     return found
+
+
+def _made(of: Result) -> Run:
+    """A result that Python holds, with what of its run.json is needed here."""
+    one = of.experiment
+    record: dict[str, Any] = {"config": one.stem, "study": one.study, "resolved": one.resolved, "outputs": {}}
+    record["cases"] = {case.name: {"done": case.count} for case in of.cases}
+    return Run(one.stem, Path(one.stem), record, made=of.tables)
 
 
 def _folder(path: Path) -> Run | None:
@@ -143,10 +181,14 @@ def _stored(source: str | os.PathLike[str], out: Path) -> Run:
 
 
 def _named(runs: Sequence[Run]) -> list[Run]:
-    """The runs with names of their own: of one config's twice the folder too."""
+    """The runs with names of their own: of one config's twice the folder too, or a number where there is none."""
     names = [run.label for run in runs]
+    apart = [run.label if run.made is not None else f"{run.label} in {run.folder.parent}" for run in runs]
+    apart = [
+        f"{name} ({apart[: n + 1].count(name)})" if apart.count(name) > 1 else name for n, name in enumerate(apart)
+    ]
     return [
-        replace(run, label=f"{run.label} in {run.folder.parent}") if names.count(run.label) > 1 else run for run in runs
+        replace(run, label=other) if names.count(run.label) > 1 else run for run, other in zip(runs, apart, strict=True)
     ]
 
 
@@ -155,7 +197,8 @@ def _sides(run: Run) -> list[Side]:
     measured = _measured(str(run.record.get("study")))
     wanted = {one.table for one in measured}
     outputs = run.record["outputs"]
-    tables = {name: rows for name in sorted(wanted) if (rows := stored.table(run.folder, name, outputs)) is not None}
+    kept = run.made.get if run.made is not None else partial(stored.table, run.folder, outputs=outputs)
+    tables = {name: rows for name in sorted(wanted) if (rows := kept(name)) is not None}
     made = []
     for name, counts in run.record["cases"].items():
         own = {key: rows[rows["case"] == name] for key, rows in tables.items()}
@@ -258,21 +301,29 @@ def _cases(run: Run) -> list[Case]:
 CHART_FOLDER = "chart"
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """What was written: the folder, the files in it, a sentence for each case, and the rows of chart.csv."""
+@dataclass(frozen=True, repr=False)
+class Drawn(Shown):
+    """What was drawn: a sentence for each case, the rows of chart.csv, figures; the folder and its files, if any."""
 
-    folder: Path
+    folder: Path | None
     files: tuple[str, ...]
     sentences: tuple[str, ...]
-    rows: tuple[dict[Hashable, object], ...]
+    table: "pd.DataFrame"
+    drawn: Mapping[str, Figure]
+
+    @property
+    def _described(self) -> Mapping[str, Figure]:
+        return self.drawn
+
+    def _said(self) -> tuple[str, ...]:
+        return self.sentences
 
 
 def chart(
-    configs: Sequence[str | os.PathLike[str]],
-    out: str | os.PathLike[str] = "results",
+    configs: Sequence[Config],
+    out: str | os.PathLike[str] | None = RESULTS,
     *,
-    overrides: Sequence[str] = (),
+    overrides: Overrides = (),
     formats: Sequence[str] = ("svg", "png"),
     width_mm: float | None = None,
     progress: Callable[[int, int, int], None] | None = None,
@@ -280,14 +331,19 @@ def chart(
     """Draw the chart of the configs' study, with their cases on it, into `out`/chart; nothing is simulated.
 
     Without configs, of the study that has a chart, with its paper's own devices; a config that is given twice counts
-    once. width_mm is the width of the figures' files in place of their own. progress is told of each figure. Raises
-    ConfigError where the study has none, configs are of several, or two have one name.
+    once. Without `out` nothing is written. width_mm is the width of the figures' files in place of their own. progress
+    is told of each figure. Raises ConfigError where the study has none, configs are of several, or two have one name.
     """
-    directory(out)
-    experiments = [load(config, overrides) for config in dict.fromkeys(configs)]
+    if out is not None:
+        directory(out)
+    once = [config for n, config in enumerate(configs) if config not in configs[:n]]
+    experiments = [load(config, overrides) for config in once]
     if faults := namesakes(experiments):
         raise ConfigError(*faults)
     made = described([case for one in experiments for case in one.cases])
+    found = Drawn(None, (), made.sentences, made.table, made.figures)
+    if out is None:
+        return found
     contents = {"chart.csv": common.to_csv(made.table), "chart.html": made.page.encode()}
     if formats:
         from radarsim.report.figures import save  # Matplotlib
@@ -299,7 +355,7 @@ def chart(
         contents["captions.md"] = captions(made.figures).encode()
     folder = Path(out) / CHART_FOLDER
     files.replace_all(folder, contents)
-    return Drawn(folder, tuple(sorted(contents)), made.sentences, tuple(made.table.to_dict("records")))
+    return replace(found, folder=folder, files=tuple(sorted(contents)))
 
 
 def described(cases: Sequence[Case]) -> Chart:

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-    from radarsim.app.compare import Drawn
+    from radarsim.app.compare import Compared, Drawn
     from radarsim.app.configs import Inventory
     from radarsim.app.outlook import Outlook
     from radarsim.app.question import Answer
     from radarsim.app.result import Result
     from radarsim.app.run import Shares
+    from radarsim.app.sensitivity import Sensitivity
     from radarsim.config.experiment import Experiment
 
 
@@ -78,15 +79,21 @@ def answer(one: "Answer") -> dict[str, Any]:
     return {**asdict(one), "quantity": one.quantity.words}
 
 
-def sensitivity(one: "DataclassInstance") -> dict[str, Any]:
+def sensitivity(one: "Sensitivity") -> dict[str, Any]:
     """What each key changes, the quantities by name."""
-    made = fields(one)
-    return made | {"of": [of["name"] for of in made["of"]]}
+    return {**asdict(one), "of": [of.name for of in one.of]}
+
+
+def compared(one: "Compared") -> dict[str, Any]:
+    """A comparison: the sentences, notes and warnings, the rows of comparison.csv, and the files."""
+    made = {name: getattr(one, name) for name in ("files", "sentences", "notes", "warnings", "rows", "last", "told")}
+    return {"folder": str(one.folder), **made}
 
 
 def drawn(one: "Drawn") -> dict[str, Any]:
     """A chart: the sentences, the rows of chart.csv, and the files."""
-    return {"folder": str(one.folder), "sentences": one.sentences, "cases": one.rows, "files": one.files}
+    rows = one.table.to_dict("records")
+    return {"folder": str(one.folder), "sentences": one.sentences, "cases": rows, "files": one.files}
 
 
 def inventory(tables: "Inventory") -> dict[str, list[dict[str, str]]]:

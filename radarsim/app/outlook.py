@@ -5,20 +5,30 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from radarsim.app.configs import CaseWork
 from radarsim.app.run import case_result, check_precision, table_of, tailed, unknown
+from radarsim.app.shown import Shown
 from radarsim.config.experiment import Experiment
 from radarsim.engine.blocks import Total
 from radarsim.engine.run import collect
 from radarsim.engine.store import Stock, Store, available_cores, stock
 from radarsim.errors import ConfigError
-from radarsim.language import few, listed, tr
+from radarsim.language import few, listed, plural, term, tr
 from radarsim.report.quantities import SIGMA, Quantity
+from radarsim.report.tables import frame
+from radarsim.report.wording import clock
 from radarsim.studies import registry
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+TOTAL = term(
+    "{cases}, {realisations}, {seconds} on {threads}, {memory:.0f} MB; figures and tables take some seconds more"
+)
 PILOT_S = 0.3  # of all cases together, unless single realisations take longer
 LADDER, FOR_NOTHING = 8, 1.2  # so many times more realisations at a look; times as good as equal
 SHORT_S = 0.01
@@ -56,8 +66,8 @@ class CaseOutlook:
     stock: Stock | None = None
 
 
-@dataclass(frozen=True)
-class Outlook:
+@dataclass(frozen=True, repr=False)
+class Outlook(Shown):
     """What running an experiment, or a share of it such as (2, 3), would take, on `threads` threads."""
 
     cases: tuple[CaseOutlook, ...]
@@ -68,6 +78,41 @@ class Outlook:
     of: Quantity = SIGMA
     warnings: tuple[str, ...] = ()
     share: tuple[int, int] | None = None
+
+    @property
+    def table(self) -> "pd.DataFrame":
+        """A row a case: filters, scans, realisations, seconds of one thread, what of it is stored, what it needs."""
+        return frame(
+            {
+                **{"case": [case.name for case in self.cases], "filters": [case.filters for case in self.cases]},
+                **{name: [getattr(case, name) for case in self.cases] for name in ("scans", "realisations", "seconds")},
+                "stored": [case.stock.stored if case.stock else None for case in self.cases],
+                "needed": [case.need.realisations if case.need else None for case in self.cases],
+            }
+        )
+
+    @property
+    def total(self) -> str:
+        """Cases, realisations, seconds and memory of all, in words."""
+        asked = sum(case.realisations for case in self.cases)
+        told = {
+            "cases": plural("{count} case", "{count} cases", len(self.cases)),
+            "realisations": plural("{count:,} realisation", "{count:,} realisations", asked),
+            "threads": plural("{count} thread", "{count} threads", self.threads),
+        }
+        stored, seconds = sum(case.stock.stored for case in self.cases if case.stock), about(self.seconds)
+        if stored:
+            told["realisations"] = tr("{stored:,} of {realisations} stored", stored=stored, **told)
+            seconds = tr("nothing left to compute") if stored == asked else tr("the rest {seconds}", seconds=seconds)
+        return tr(TOTAL, **told, seconds=seconds, memory=self.memory_mb)
+
+    def _said(self) -> tuple[str, ...]:
+        return (self.total,)
+
+
+def about(seconds: float) -> str:
+    """A time foretold."""
+    return tr("under a second") if seconds < 1 else tr("about {time}", time=clock(seconds))
 
 
 def outlook(

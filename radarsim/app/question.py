@@ -7,12 +7,13 @@ import os
 import shlex
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from radarsim.app import quantities
 from radarsim.app.configs import CaseWork, Config, load
 from radarsim.app.quantities import UNKNOWN, Asked
 from radarsim.app.run import case_result
+from radarsim.app.shown import Shown
 from radarsim.config import fields
 from radarsim.config.check import label
 from radarsim.config.document import did_you_mean
@@ -22,7 +23,12 @@ from radarsim.engine.results import Axes, CaseResult
 from radarsim.engine.run import collect
 from radarsim.errors import ConfigError, argument
 from radarsim.language import term, tr
+from radarsim.report import tables
 from radarsim.report.statistics import Estimate
+from radarsim.report.wording import labelled, significant_digits
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FACTOR = 1000.0  # the search goes from a thousandth of a positive key's value to a thousand times it
 WHOLE = term("of whole numbers the one beside the target that does at least as well")
@@ -33,8 +39,8 @@ ROUGH = -1  # in place of a number of realisations
 LONG_S = 2.0  # of an answer, from which it is predicted what it takes
 
 
-@dataclass(frozen=True)
-class Answer:
+@dataclass(frozen=True, repr=False)
+class Answer(Shown):
     """What was found.
 
     value is None where the target is not attained; then limit is the nearest that was, at limit_at. lo and hi bound the
@@ -62,6 +68,104 @@ class Answer:
     high: float
     command: str
     notes: tuple[str, ...] = ()
+
+    @property
+    def table(self) -> "pd.DataFrame":
+        """What `radarsim solve --json` prints, as one row."""
+        from radarsim.app import documents
+
+        return tables.frame({name: [value] for name, value in documents.answer(self).items()})
+
+    @property
+    def lines(self) -> list[tuple[str, str]]:
+        """The value, then what it attains, the slope, other values and notes: a label and words each."""
+        value, lo, hi = self.value, self.lo, self.hi
+        if value is None or lo is None or hi is None:
+            return [("", line) for line in self.unattained]
+        interval = tr("exact") if self.exact else f"95 % {shown(lo)} … {shown(hi)}"
+        attained = math.nan if self.attained is None else self.attained
+        if abs(attained - self.equals) < NEAR_ZERO * max(abs(self.equals), abs(self.attained_now)):
+            attained = self.equals  # of a root at zero rounding is all that is left
+        made = [("", f"{self.key} = {with_unit(value, self.unit)}   {interval}")]
+        made.append(("attains", f"{self.quantity.said}: {self._quantity(attained)}{self._now}"))
+        if self.slope is not None:
+            made.append(("slope", self._slope(value, self.slope)))
+        if self.others:
+            made.append(("also at", ", ".join(with_unit(other, self.unit) for other in self.others)))
+        return made + [("note", tr(note)) for note in self.notes]
+
+    @property
+    def unattained(self) -> tuple[str, ...]:
+        """Why there is no value: the nearest that was found, and where; empty where there is one."""
+        limit, at = self.limit, self.limit_at
+        if self.value is not None or limit is None or at is None:
+            return ()
+        told = {
+            **{"quantity": self.quantity.said, "key": self.key, "wanted": self._quantity(self.equals)},
+            **{"low": shown(self.low), "high": with_unit(self.high, self.unit)},
+            **{"limit": self._quantity(limit), "at": with_unit(at, self.unit)},
+        }
+        line = tr(AT_MOST, **told) if limit < self.equals else tr(AT_LEAST, **told)
+        return (line, *(tr("note: {words}", words=tr(note)) for note in self.notes))
+
+    def _said(self) -> list[str]:
+        return [labelled(label, words).strip() for label, words in self.lines]
+
+    def _slope(self, value: float, per_unit: float) -> str:
+        """What a little more of the key changes: `1 m/s more costs 1.7 points`."""
+        step = 10.0 ** math.floor(math.log10(abs(value) / 2)) if value else 1.0
+        step = max(step, 1.0) if float(value).is_integer() and step >= 0.5 else step
+        change, more_is_better = per_unit * step, self.quantity.of.more_is_better
+        better = (change > 0) == more_is_better
+        size = shown(abs(change), "#.3g")
+        points = tr("{size} points", size=size)
+        changed = points if self.quantity_unit == "%" else f"{size} {tr(self.quantity_unit)}".rstrip()
+        told = {"step": with_unit(step, self.unit), "change": changed}
+        if more_is_better:
+            return tr("{step} more brings {change}", **told) if better else tr("{step} more costs {change}", **told)
+        return tr("{step} more takes off {change}", **told) if better else tr("{step} more adds {change}", **told)
+
+    @property
+    def _now(self) -> str:
+        if math.isnan(self.attained_now):
+            return ""
+        value = self._quantity(self.attained_now)
+        if self.now is None:
+            return tr(" (as the config is: {value})", value=value)
+        return tr(" (at {at}: {value})", at=with_unit(self.now, self.unit), value=value)
+
+    def _quantity(self, value: float) -> str:
+        number = _rate(value) if self.quantity.of.kind == "share" else shown(value, ".4g")
+        return f"{number} {tr(self.quantity_unit)}".rstrip()
+
+
+AT_MOST = term("{quantity}: {wanted} is not attainable by {key} from {low} to {high}: at most {limit}, at {at}")
+AT_LEAST = term("{quantity}: {wanted} is not attainable by {key} from {low} to {high}: at least {limit}, at {at}")
+PLAIN = ".6g"
+MOST_DIGITS = 12  # behind the point: beyond, rounding shows
+NEAR_ZERO = 1e-9  # of a quantity: how near an exact root comes
+
+
+def _rate(percent: float) -> str:
+    """A share in per cent: of one that is nearly all so many digits that three are of the rest.
+
+    >>> _rate(99.9990021)
+    '99.999002'
+    """
+    rest = 100.0 - percent
+    if not 0.0 < rest < 1.0:
+        return shown(percent, ".4g")
+    return shown(percent, f".{min(2 - math.floor(math.log10(rest)), MOST_DIGITS)}f")
+
+
+def with_unit(value: float, unit: str) -> str:
+    """A number with its unit, in words."""
+    return f"{shown(value)} {tr(unit)}".rstrip()
+
+
+def shown(value: float, form: str = PLAIN) -> str:
+    """A number in words."""
+    return significant_digits(value, form)
 
 
 @dataclass

@@ -20,15 +20,17 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from radarsim.app import configs, result, run
 from radarsim.app import stored as stored_claims
 from radarsim.app.run import Progress, RunOptions, SimulatedCases
+from radarsim.app.shown import Shown
 from radarsim.app.stored import CLASSES, PLACE, stored_classes, stored_readings
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.run import Signals
 from radarsim.errors import ConfigError, StoreError, TargetUnmet, argument
+from radarsim.language import tr
 from radarsim.report import files
 from radarsim.report.claims import PaperClaims, page
 from radarsim.report.claims.declared import Claim
@@ -49,8 +51,13 @@ from radarsim.report.claims.over import (
     under,
 )
 from radarsim.report.claims.rule import UNDECIDED, roughly
+from radarsim.report.drawing import Figure
 from radarsim.report.precision import looks
+from radarsim.report.tables import frame
 from radarsim.studies import registry
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 # ---- reading runs ----------------------------------------------------------------------------------------------------
@@ -304,8 +311,8 @@ class Read:
     counted: Search | Joint | None = None
 
 
-@dataclass
-class Done:
+@dataclass(repr=False)
+class Done(Shown):
     """What `readings` made: of each paper asked for, and the files written, by their path under `folder`.
 
     left has a line for each claim that was to be decided and is not. outdated: the configs beside them, run as they
@@ -317,6 +324,32 @@ class Done:
     files: tuple[str, ...] = field(default=())
     left: tuple[str, ...] = field(default=())
     outdated: tuple[str, ...] = field(default=())
+
+    @property
+    def over(self) -> list[Over]:
+        """The claims, each with its verdicts."""
+        return [over for read in self.read for over in read.over]
+
+    @property
+    def table(self) -> "pd.DataFrame":
+        """The rows of readings.csv for these claims: a row a claim, reading and part."""
+        names = columns(read.paper.readings for read in self.read)
+        made = [row for over in self.over for one in over.under for row in rows(one, names, over.outcome)]
+        return frame({name: [row[name] for row in made] for name in names})
+
+    @property
+    def _described(self) -> dict[str, Figure]:
+        every = ((read.paper.readings, over) for read in self.read for over in read.over)
+        return {over.claim.id: page.specification(of, over) for of, over in every if drawable(over)}
+
+    def _said(self) -> list[str]:
+        lines = [f"{over.claim.id} {tr(over.outcome.kind)}: {over.sentence()}" for over in self.over if over.outcome]
+        return lines + [read.counted.sentence() for read in self.read if read.counted is not None]
+
+
+def drawable(over: Over) -> bool:
+    """Whether a claim has a specification curve: verdicts under more than one reading."""
+    return len(over.under) > 1 and over.outcome is not None
 
 
 def papers(keys: Collection[str] = ()) -> dict[str, Paper]:
@@ -401,8 +434,9 @@ def readings(
     progress: Progress | None = None,
     figures: bool = True,
     stop: Signals | None = None,
+    write: bool = True,
 ) -> Done:
-    """Judge claims under every reading and write table and specification curves into out/readings.
+    """Judge claims under every reading and, unless told not to, write table and specification curves into out/readings.
 
     wanted is of `asked`. realisations of each run, where runs are needed; default: what the paper's readings declare.
     decide: the runs on which an undecided claim hangs grow on, to 2000·2^m realisations, until it is decided;
@@ -423,7 +457,7 @@ def readings(
         done += plan.total
         read.append(Read(one.paper, over, _counted(one.paper, over) if one.whole and not one.only else None))
     made = Done(read, Path(out) / FOLDER, left=tuple(left))
-    if not any(one.only for one in wanted):
+    if write and not any(one.only for one in wanted):
         made.files = _write(made, figures)
         made.outdated = _outdated(made)
     return made
@@ -461,8 +495,8 @@ def _write(done: Done, figures: bool) -> tuple[str, ...]:
     contents = {TABLE: _table(done).encode(), CLASSES.name: _classes(done).encode()}
     if figures:
         drawn = _drawn(done.folder)
-        for over in (over for read in done.read for over in read.over):
-            if len(over.under) > 1 and over.outcome is not None:
+        for over in done.over:
+            if drawable(over):
                 contents |= _curve(done, over, drawn)
         contents[DRAWN] = (json.dumps(drawn, indent=1, sort_keys=True) + "\n").encode()
     files.replace_all(done.folder, contents)
@@ -499,9 +533,8 @@ def _drawn(folder: Path) -> dict[str, str]:
 
 def _table(done: Done) -> str:
     names = columns(paper.readings for paper in papers().values())
-    every = [over for read in done.read for over in read.over]
-    new = [row for over in every for one in over.under for row in rows(one, names, over.outcome)]
-    return _with(names, stored_readings(done.folder.parent), new, {over.claim.id for over in every})
+    new = [row for over in done.over for one in over.under for row in rows(one, names, over.outcome)]
+    return _with(names, stored_readings(done.folder.parent), new, {over.claim.id for over in done.over})
 
 
 def _classes(done: Done) -> str:
@@ -517,7 +550,7 @@ def _outdated(done: Done) -> tuple[str, ...]:
 
     Not those that have changed since they were run: of these no report can be made of what is stored.
     """
-    new = {over.claim.id: over for read in done.read for over in read.over if over.outcome}
+    new = {over.claim.id: over for over in done.over if over.outcome}
     found = []
     for config in dict.fromkeys(over.claim.config for over in new.values()):
         if not files.is_of(done.folder.parent / config, configs.load(config)):
@@ -562,7 +595,7 @@ def pages(done: Done) -> str:
 def documents(done: Done) -> list[dict[str, Any]]:
     """What --json prints: a document a claim, with every reading."""
     found = []
-    for over in (over for read in done.read for over in read.over):
+    for over in done.over:
         outcome = over.outcome
         found.append(
             {

@@ -101,8 +101,7 @@ class Result(Shown):
         self.cases: tuple[CaseResult, ...] = Several(cases)
         self.written: Written | None = None
 
-    @property
-    def sentences(self) -> Sequence[str]:
+    def _said(self) -> Sequence[str]:
         """What was run, then the answer."""
         count, cases = files.span(sorted({case.count for case in self.cases})), len(self.cases)
         told = {"config": self._label, "cases": plural("{count} case", "{count} cases", cases), "count": count}

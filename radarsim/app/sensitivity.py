@@ -18,6 +18,7 @@ from radarsim.app.configs import CaseWork
 from radarsim.app.quantities import UNPAIRED, Asked
 from radarsim.app.question import Cases, Config
 from radarsim.app.run import case_result
+from radarsim.app.shown import Shown
 from radarsim.config import fields
 from radarsim.config.check import Label, label
 from radarsim.config.experiment import Case
@@ -30,6 +31,7 @@ from radarsim.report import files, panels, statistics
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.report.quantities import Quantity
+from radarsim.report.wording import significant_digits
 from radarsim.studies import registry
 
 if TYPE_CHECKING:
@@ -54,15 +56,15 @@ def _value(of: Quantity) -> str:
     return f"{of.name}_percent" if of.shown_unit() == "%" else of.name
 
 
-@dataclass(frozen=True)
-class Sensitivity:
+@dataclass(frozen=True, repr=False)
+class Sensitivity(Shown):
     """What was found: one row a key, filter and component, by falling effect of the key on the component that leads.
 
     of are the quantities, the first of which decides; leading is empty where that has no components. at says when,
     empty where it has no scans; without_effect are keys that change nothing, left_out those that cannot be raised, with
     the reason. without_estimate are filters that no row is about, as they have no estimate there. not_paired are
     sampled keys that change when the scans are. labels: what people call each key of the rows, with its symbol and
-    unit.
+    unit. files: what was written, if anything.
     """
 
     stem: str
@@ -75,18 +77,41 @@ class Sensitivity:
     not_paired: tuple[str, ...]
     left_out: dict[str, str]
     labels: dict[str, Label]
+    files: tuple[str, ...] = ()
+
+    @property
+    def table(self) -> "pd.DataFrame":
+        """sensitivity.csv: every key, filter and component, by falling effect on the component that leads."""
+        return common.frame({name: [row[name] for row in self.rows] for name in columns(self.of)})
+
+    @property
+    def _described(self) -> dict[str, Figure]:
+        return {"tornado": tornado(self)} if self.rows else {}
+
+    def _said(self) -> list[str]:
+        first, change = self.of[0], self.of[0].changes[0]
+        what = first.place(self.leading, tr) or tr(first.words)
+        what = " ".join(filter(None, (what, self.at)))
+        lines = [tr("{stem}: change of {component} for +10 %", stem=self.stem, component=what)]
+        for key in dict.fromkeys(row["key"] for row in self.rows):
+            own = [row for row in self.rows if row["key"] == key and row["component"] == self.leading]
+            each = (
+                f"{significant_digits(row[change], '+.3g')} {tr(first.changed_unit)} ({row['filter']})" for row in own
+            )
+            lines.append(f"{key}: {', '.join(each)}")
+        return lines
 
 
 def sensitivity(
     config: Config,
     *,
-    overrides: Sequence[str] = (),
+    overrides: configs.Overrides = (),
     at_s: float | None = None,
     at_k: int | None = None,
     of: str | None = None,
     component: str | None = None,
     case: str | None = None,
-    realisations: int | None = None,
+    realisations: float | None = None,
     progress: Callable[[int, int, int], None] | None = None,
 ) -> Sensitivity:
     """The changes of a quantity, or of σ and gain, at a time, at a scan, or at the time of the last scan, for +10 % of
@@ -94,7 +119,7 @@ def sensitivity(
 
     Whole numbers grow by at least one. component leads the order: by default the first. Raises ConfigError.
     """
-    cases = Cases(config, tuple(overrides), case)
+    cases = Cases(config, configs.reading.texts(overrides), case)
     study = registry.study(cases.base.study)
     every = registry.quantities(cases.base.study, cases.base.spec)
     kinds = tuple(one for one in every if quantities.planned(one)) or every[:1]
@@ -108,7 +133,7 @@ def sensitivity(
     axes = study.prepare(cases.base).axes
     timed = study.exact_errors and at_s is None and at_k is None and quantities.planned(kinds[0])
     asked = Asked(kinds[0], at_s=float(axes.t_s[-1]) if timed else at_s, at_k=at_k)
-    look = Look(asked, kinds, axes, parts, realisations or cases.base.realisations)
+    look = Look(asked, kinds, axes, parts, int(realisations or cases.base.realisations))
     base = look.of(cases.base)
     if not np.isfinite(base.whole[0]).any():
         raise ConfigError("there is no estimate there")
@@ -318,11 +343,6 @@ def interval(but_one: np.ndarray, value: float) -> tuple[float, float, float]:
     return value, value - half, value + half
 
 
-def table(found: Sensitivity) -> "pd.DataFrame":
-    """sensitivity.csv."""
-    return common.frame({name: [row[name] for row in found.rows] for name in columns(found.of)})
-
-
 def tornado(found: Sensitivity) -> Figure:
     """Bars of the changes of the leading component by key: each quantity of each filter."""
     rows = [row for row in found.rows if row["component"] == found.leading]
@@ -374,13 +394,13 @@ def tick(name: Label) -> str:
 
 def write(
     found: Sensitivity, out: str | os.PathLike[str], formats: Sequence[str], width_mm: float | None = None
-) -> tuple[str, ...]:
-    """sensitivity.csv and the tornado figure, into `out`/sensitivity/CONFIG; their paths.
+) -> Sensitivity:
+    """The same with its files: sensitivity.csv and the tornado figure, in `out`/sensitivity/CONFIG.
 
     width_mm is the figure's width in place of its own.
     """
     configs.directory(out)
-    contents = {"sensitivity.csv": common.to_csv(table(found))}
+    contents = {"sensitivity.csv": common.to_csv(found.table)}
     if formats and found.rows:
         from radarsim.report import figures  # Matplotlib
 
@@ -388,4 +408,4 @@ def write(
         contents |= {f"tornado.{kind}": data for kind, data in saved.items()}
     folder = Path(out) / FOLDER / found.stem
     files.replace_all(folder, contents)
-    return tuple(str(folder / name) for name in contents)
+    return replace(found, files=tuple(str(folder / name) for name in contents))

@@ -13,8 +13,7 @@ MOST_LINES, MOST_LETTERS = 3, 200  # of a text that stands for the whole
 class Shown:
     """An answer with sentences, maybe with a table and with figures, which are drawn when they are asked for."""
 
-    @property
-    def sentences(self) -> Sequence[str]:
+    def _said(self) -> Sequence[str]:
         """The answer in words."""
         raise NotImplementedError
 
@@ -33,10 +32,10 @@ class Shown:
         """What a notebook shows: HTML above the first figure, and below it."""
         from html import escape
 
-        return "".join(f"<p>{escape(line)}</p>" for line in self.sentences), ""
+        return "".join(f"<p>{escape(line)}</p>" for line in self._said()), ""
 
     def __repr__(self) -> str:
-        return brief(self.sentences)
+        return brief(self._said())
 
     def _repr_html_(self) -> str:
         above, below = self._html

@@ -9,7 +9,6 @@ import click
 from radarsim.cli import group
 
 if TYPE_CHECKING:
-    from radarsim.app.quantities import Wanted
     from radarsim.report.quantities import Quantity
 
 OF = "of_"  # what the parameters of quantities begin with
@@ -120,42 +119,22 @@ def solve(
       radarsim solve sonar_clutter sensor.detection_probability --loss nearest --equals 5 --between 0.6 1 \\
           --case "sonar_clutter sensor.false_plots_per_km2=1" -n 2000
     """
-    from radarsim.app import documents, run
-    from radarsim.app import solve as solving
+    from radarsim.app import documents, python
     from radarsim.cli import answers, console
     from radarsim.errors import TargetUnmet
 
-    wanted = asked({name: value for name, value in quantities.items() if value is not None}, filter_name, at_s, at_k)
-    overrides = run.merged(overrides, None, seed)
+    asked: dict[str, Any] = {name.removeprefix(OF): value for name, value in quantities.items()}
+    asked |= {"filter": filter_name, "at_s": at_s, "at_k": at_k, "between": between, "case": case}
+    asked |= {"overrides": overrides, "realisations": realisations, "seed": seed, "threads": threads}
     with console.Progress(key, quiet=as_json, what="values") as progress:
-        answer = solving.solve(
-            *(config, key, wanted, equals),
-            overrides=overrides,
-            between=between,
-            case=case,
-            realisations=realisations,
-            threads=threads,
-            progress=progress.update,
-            told=None if as_json else console.say_aside,
-        )
+        said = None if as_json else console.say_aside
+        answer = python.solve(config, key, equals=equals, progress=progress.update, told=said, **asked)
     if as_json:
         click.echo(documents.text(documents.answer(answer)))
     elif answer.value is not None:
         answers.print_answer(answer)
     if answer.value is None:
-        raise TargetUnmet(*answers.unattained(answer))
-
-
-def asked(given: "Mapping[str, str]", filter_name: str | None, at_s: float | None, at_k: int | None) -> "Wanted":
-    """The quantity that the options name. Raises UsageError unless it is one."""
-    from radarsim.app.quantities import Wanted
-
-    if len(given) != 1:
-        raise click.UsageError("name one quantity, as `radarsim solve --help` lists them: --sigma, --gain, …")
-    if at_s is not None and at_k is not None:
-        raise click.UsageError("--at and --at-k do not go together: a time or a scan")
-    ((name, value),) = given.items()
-    return Wanted(name.removeprefix(OF), filter_name, value, at_s, at_k)
+        raise TargetUnmet(*answer.unattained)
 
 
 @group.main.command()
@@ -178,12 +157,11 @@ def chart(
       radarsim chart                              the first paper's five radars
       radarsim chart rls2 --set radar.sigma_velocity_mps=5
     """
-    from radarsim.app import compare, documents
+    from radarsim.app import documents, python
     from radarsim.cli import answers, console
 
     with console.Progress("chart", quiet=as_json, what="figures") as progress:
-        shown: dict[str, Any] = {"formats": drawing.formats, "width_mm": drawing.width_mm}
-        drawn = compare.chart(configs, out, overrides=overrides, progress=progress.update, **shown)
+        drawn = python.chart(*configs, overrides=overrides, out=out, progress=progress.update, **drawing.arguments)
     if as_json:
         click.echo(documents.text(documents.drawn(drawn)))
     else:
@@ -232,26 +210,14 @@ def sensitivity(
       radarsim sensitivity rls2 --at 60 --component Vr
       radarsim sensitivity discriminator --of lock -n 2000
     """
-    from radarsim.app import documents, run
-    from radarsim.app import sensitivity as finding
+    from radarsim.app import documents, python
     from radarsim.cli import answers, console
 
-    if at_s is not None and at_k is not None:
-        raise click.UsageError("--at and --at-k do not go together: a time or a scan")
-    asked_for: dict[str, Any] = {
-        "at_s": at_s,
-        "at_k": at_k,
-        "of": of,
-        "component": component,
-        "case": case,
-        "realisations": realisations,
-    }
+    asked: dict[str, Any] = {"at_s": at_s, "at_k": at_k, "of": of, "component": component, "case": case}
+    asked |= {"overrides": overrides, "realisations": realisations, "seed": seed}
     with console.Progress(config, quiet=as_json, what="keys") as progress:
-        found = finding.sensitivity(
-            config, overrides=run.merged(overrides, None, seed), progress=progress.update, **asked_for
-        )
-    written = finding.write(found, out, *drawing)
+        found = python.sensitivity(config, out=out, progress=progress.update, **asked, **drawing.arguments)
     if as_json:
-        click.echo(documents.text(documents.sensitivity(found) | {"files": written}))
+        click.echo(documents.text(documents.sensitivity(found)))
     else:
-        answers.print_sensitivity(found, written)
+        answers.print_sensitivity(found)

@@ -90,7 +90,7 @@ def run(
             means: dict[str, Any] = {"out": out, "threads": threads, "executor": pool}
             means |= {"time_limit": limit, "stop": stop}
             compute: Callable[..., Result | Shares]
-            draw = partial(simulation.run, figures=drawing.formats, width_mm=drawing.width_mm)
+            draw = partial(simulation.run, **drawing.arguments)
             compute = partial(draw, overrides=overrides, precision=precision, of=of, decide=decide)
             if shard:
                 compute = partial(simulation.run_share, part=shard)
@@ -234,15 +234,15 @@ def check(
     """
     _refuse_together(shard, precision, None, None)
     _refuse_of_nothing(of, precision)
-    from radarsim.app import documents
-    from radarsim.app import outlook as overview
+    from radarsim.app import documents, python
     from radarsim.app import run as simulation
     from radarsim.cli import console, outcomes
 
+    asked: dict[str, Any] = {"precision": precision, "of": of, "share": shard, "out": out}
     made = []
     for one in simulation.load_all(configs, simulation.merged(overrides, realisations, seed)):
         with console.Progress(one.stem, quiet=as_json, what="cases") as bar:
-            outlook = overview.outlook(one, None, precision, bar.update, of, out, shard)
+            outlook = python.check(one, progress=bar.update, **asked)
         made.append(documents.outlook(one, outlook))
         if not as_json:
             outcomes.print_outlook(one, outlook)
@@ -277,8 +277,7 @@ def report(
     from radarsim.app import run as simulation
 
     overrides = simulation.merged(overrides, realisations, seed)
-    shown: dict[str, Any] = {"figures": drawing.formats, "width_mm": drawing.width_mm}
-    read = partial(simulation.report, out=out, overrides=overrides, **shown)
+    read = partial(simulation.report, out=out, overrides=overrides, **drawing.arguments)
     loaded = simulation.load_all(configs, overrides)
     _compute_each(loaded, lambda one, progress: read(experiment=one), out, False, as_json, None)
 
@@ -309,13 +308,14 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
       radarsim claims --json
       radarsim claims --figure claims.svg
     """
-    from radarsim.app import documents
+    from radarsim.app import documents, python
     from radarsim.app import run as simulation
     from radarsim.cli import verdicts
 
-    rows = simulation.claims(names, out)
+    found = python.claims(*names, out=out)
+    rows = found.rows
     if figure is not None:
-        simulation.draw_claims(rows, figure)
+        found.draw(figure)
     if as_json:
         click.echo(documents.text(rows))
     elif markdown:

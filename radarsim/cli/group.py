@@ -321,6 +321,11 @@ class Drawing(NamedTuple):
     formats: tuple[str, ...]
     width_mm: float | None
 
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """As functions that draw take it."""
+        return {"figures": self.formats, "width_mm": self.width_mm}
+
 
 def drawing_options(command: Callable[..., None]) -> Callable[..., None]:
     """--no-figures, --format and --width, which the command takes together as `drawing`."""

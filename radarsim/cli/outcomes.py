@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.cli.console import counted_cases, field, print_warnings, say, say_aside, show
 from radarsim.language import few, listed, numeral, plural, term, tr
-from radarsim.report.wording import clock, known, significant_digits
+from radarsim.report.wording import known, significant_digits
 from radarsim.report.wording import unit as unit_of
 
 if TYPE_CHECKING:
@@ -99,10 +99,12 @@ def print_comparison(compared: "Compared") -> None:
         say(line)
     for line in compared.notes:
         field("note", line)
-    field("table", str(compared.folder / "comparison.csv"))
+    folder = compared.folder
+    assert folder is not None  # the command writes what it prints
+    field("table", str(folder / "comparison.csv"))
     if drawn := {Path(n).stem for n in compared.files if n.startswith("figures/") and not n.endswith(".md")}:
-        field("figures", f"{compared.folder / 'figures'} ({len(drawn)})")
-    field("page", str(compared.folder / "compare.html"))
+        field("figures", f"{folder / 'figures'} ({len(drawn)})")
+    field("page", str(folder / "compare.html"))
     print_warnings(compared.warnings)
 
 
@@ -135,28 +137,10 @@ def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
         say(tr("and {cases} more that are stored in part", cases=counted_cases(len(begun) - MOST_BEGUN)))
     if outlook.precision is not None:
         print_needs(experiment, outlook)
-    told = {
-        "cases": counted_cases(len(outlook.cases)),
-        "realisations": plural(
-            "{count:,} realisation", "{count:,} realisations", sum(case.realisations for case in outlook.cases)
-        ),
-        "threads": plural("{count} thread", "{count} threads", outlook.threads),
-    }
-    stored, seconds = sum(case.stock.stored for case in outlook.cases if case.stock), _about(outlook.seconds)
-    if stored:
-        told["realisations"] = tr("{stored:,} of {realisations} stored", stored=stored, **told)
-        whole = stored == sum(case.realisations for case in outlook.cases)
-        seconds = tr("nothing left to compute") if whole else tr("the rest {seconds}", seconds=seconds)
-    words = tr(
-        "{cases}, {realisations}, {seconds} on {threads}, {memory:.0f} MB; figures and tables take some seconds more",
-        **told,
-        seconds=seconds,
-        memory=outlook.memory_mb,
-    )
     if outlook.share is not None:
         number, of = outlook.share
         field("share", tr("{number} of {of}", number=number, of=of))
-    field("total", words)
+    field("total", outlook.total)
     print_warnings(outlook.warnings)
 
 
@@ -167,21 +151,16 @@ def _seconds(case: "CaseOutlook") -> str:
     return tr("under {t_s:.2g} s", t_s=case.seconds)
 
 
-def _about(seconds: float) -> str:
-    """A time foretold."""
-    return tr("under a second") if seconds < 1 else tr("about {time}", time=clock(seconds))
-
-
 def print_lacking(experiment: "Experiment", lacking: "Lacking", whole: bool) -> None:
     """That the store of a run has gaps, and how long they take; whole: whether the run surely computes all of them."""
-    from radarsim.app.outlook import missing
+    from radarsim.app.outlook import about, missing
 
     told = {
         "config": experiment.stem,
         "stored": lacking.stored,
         "asked": lacking.asked,
         "missing": missing(lacking.first),
-        "seconds": _about(lacking.seconds),
+        "seconds": about(lacking.seconds),
         "threads": plural("{count} thread", "{count} threads", lacking.threads),
     }
     words = tr("{config}: {stored:,} of {asked:,} realisations are stored; missing: {missing}", **told)

@@ -1,5 +1,7 @@
 """The commands on stored results beside one another, and on the papers' claims under every reading."""
 
+from typing import Any
+
 import click
 
 from radarsim.cli import group
@@ -24,15 +26,14 @@ def compare(sources: tuple[str, ...], out: str, drawing: group.Drawing, as_json:
       radarsim compare rls2.yaml mine.yaml --json
       radarsim compare results/rls2 results-before/rls2
     """
-    from radarsim.app import compare as comparing
-    from radarsim.app import documents
+    from radarsim.app import documents, python
     from radarsim.cli import outcomes
 
     if len(sources) < 2:
         raise click.UsageError(f"compare takes two results or more, got {len(sources)}")
-    compared = comparing.compare(sources, out, formats=drawing.formats, width_mm=drawing.width_mm)
+    compared = python.compare(*sources, out=out, **drawing.arguments)
     if as_json:
-        click.echo(documents.text(documents.fields(compared)))
+        click.echo(documents.text(documents.compared(compared)))
     else:
         outcomes.print_comparison(compared)
 
@@ -90,25 +91,14 @@ def readings(
 
     limit = run.TimeLimit(time_limit) if time_limit else None
     with run.Signals() as stop:
-        from radarsim.app import documents
+        from radarsim.app import documents, python
         from radarsim.app import readings as app
-        from radarsim.app.run import RunOptions
         from radarsim.cli import console, verdicts
 
-        wanted = app.asked(names, only)
-        silent = quiet or as_json or markdown
-        with console.Progress("readings", quiet=silent) as progress:
-            options = RunOptions(out, threads, run.Either(stop, limit))
-            done = app.readings(
-                wanted,
-                out=out,
-                realisations=realisations,
-                decide=decide,
-                options=options,
-                progress=progress.update,
-                figures=not no_figures,
-                stop=stop,
-            )
+        asked: dict[str, Any] = {"only": only, "realisations": realisations, "decide": decide, "threads": threads}
+        asked |= {"time_limit": limit, "out": out, "figures": not no_figures, "stop": stop}
+        with console.Progress("readings", quiet=quiet or as_json or markdown) as progress:
+            done = python.readings(*names, progress=progress.update, **asked)
         if as_json:
             click.echo(documents.text(app.documents(done)))
         elif markdown:
