@@ -178,7 +178,7 @@ def test_unknown_names_say_what_is_allowed():
 
 
 def test_no_realisations_are_refused(tmp_path):
-    with pytest.raises(ConfigError, match="^realisations: must be >= 1, got 0"):
+    with pytest.raises(ConfigError, match=r"^realisations: must be >= 1, got 0"):
         app.readings(app.asked(["P3.8"]), out=tmp_path, realisations=0, figures=False)
 
 
