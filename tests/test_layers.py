@@ -28,7 +28,8 @@ ROOMS = {
     "failures": ("errors",),
     "language": ("errors",),
     "config": ("errors", "constants"),
-    "engine": ("errors",),
+    "threads": (),
+    "engine": ("errors", "threads"),
     "kernels": (),
     "constants": (),
     "physics": ("constants",),
@@ -56,18 +57,18 @@ ROOMS = {
     "studies.judged": ("errors", "config", *DATA, "report"),  # claims and readings of studies in one file
     "studies.registry": ("errors", "failures", "config", "report.quantities", "studies.interface"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry"),
-    "recorded": ("errors", "config", "language", "engine", "kernels", "physics", "report", "studies"),
-    "app": ("errors", "config", "language", "engine", "kernels", "physics", "report", "studies", "recorded"),
+    "recorded": ("errors", "threads", "config", "language", "engine", "kernels", "physics", "report", "studies"),
+    "app": ("errors", "threads", "config", "language", "engine", "kernels", "physics", "report", "studies", "recorded"),
     "cli": (
         *("errors", "config", "language", "engine", "kernels", "physics", "report", "studies", "recorded", "app"),
-        "__init__",
+        *("__init__", "threads"),
     ),
     "__init__": ("errors", "app"),
     "__main__": ("cli",),
 }
 
 # Inside a study: what of the shared rooms a role stands on, and on which roles of its own study.
-GROUND = ("errors", "failures", "constants", "kernels", "physics", "bursts", *CASE)
+GROUND = ("errors", "failures", "threads", "constants", "kernels", "physics", "bursts", *CASE)
 KEYS = ("errors", "constants", "config.document", "config.fields", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")

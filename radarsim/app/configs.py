@@ -206,8 +206,8 @@ def check(
 ) -> tuple[str, ...]:
     """The overrides as texts. ConfigError with a line for each invalid argument of `run`."""
     faults = [
-        *_count("threads", threads),
-        *_count("workers", workers),
+        *_count("threads", threads, least=0),
+        *_count("workers", workers, least=1),
         *_number("precision", precision, 100),
         *([] if callable(time_limit) else _number("time_limit", time_limit, math.inf)),
     ]
@@ -257,12 +257,12 @@ def _formats(figures: object) -> list[str]:
     return [f"figures: must be True, False or of {allowed}, got {one!r}" for one in given if one not in FORMATS]
 
 
-def _count(name: str, value: object) -> list[str]:
+def _count(name: str, value: object, least: int) -> list[str]:
     scalar = not isinstance(value, bool) and not getattr(value, "ndim", 0)
-    number = operator.index(value) if isinstance(value, SupportsIndex) and scalar else 0
-    if value is None or 1 <= number <= MOST_THREADS:
+    number = operator.index(value) if isinstance(value, SupportsIndex) and scalar else -1
+    if value is None or least <= number <= MOST_THREADS:
         return []
-    return [f"{name}: must be a whole number from 1 to {MOST_THREADS}, got {value!r}"]
+    return [f"{name}: must be a whole number from {least} to {MOST_THREADS}, got {value!r}"]
 
 
 def _number(name: str, value: object, most: float) -> list[str]:

@@ -130,7 +130,7 @@ def outlook(
     compiler is not loaded. With a precision, in per cent, of a kind of quantity: a case ends when that is reached, or
     at its N. progress(done, total, 0) is called after each case.
     """
-    threads = threads or available_cores()
+    threads = available_cores() if threads is None else max(threads, 1)
     if precision is not None:
         check_precision([experiment], precision, of)
     cases: list[CaseOutlook] = []
@@ -286,7 +286,7 @@ def lacking(experiment: Experiment, out: str | os.PathLike[str], threads: int | 
         seconds += each * (held.asked - held.stored)
     asked, stored = (sum(getattr(held, name) for _, held in found.values()) for name in ("asked", "stored"))
     work, held = next(iter(found.values()))
-    threads = threads or available_cores()
+    threads = available_cores() if threads is None else max(threads, 1)
     return Lacking(len(found), asked, stored, work.case.name, held, threads, seconds / threads)
 
 

@@ -33,6 +33,7 @@ from radarsim.report import files
 from radarsim.report.quantities import GAIN, SIGMA, Quantity
 from radarsim.studies import registry
 from radarsim.studies.registry import study
+from radarsim.threads import limited
 
 if TYPE_CHECKING:
     from radarsim.app.result import Result
@@ -418,7 +419,7 @@ def run(
     if out is not None and isinstance(limit, stopping.TimeLimit) and limit.left >= WORTH_MEASURING_S:
         limit = limit.reserving(kept := seconds(experiment, figures, width_mm))
     with cluster(workers, scheduler) if executor is None else nullcontext(executor) as pool:
-        threads = pool.workers if pool else int(threads or available_cores())
+        threads = pool.workers if pool else available_cores() if threads is None else int(threads)
         options = RunOptions(out, threads, stopping.Either(stop, limit), pool)
         if decide:
             simulated = readings.simulated(experiment, options, progress)
@@ -428,7 +429,8 @@ def run(
             stop.raise_if_received()
     if not simulated.cases:
         raise TargetUnmet(f"{experiment.stem}: {simulated.stopped}: nothing was done by then")
-    facts = facts_of(simulated, threads, time.perf_counter() - started)
+    with limited(threads):
+        facts = facts_of(simulated, threads, time.perf_counter() - started)
     if kept is not None:
         facts["seconds_kept_for_writing"] = kept
     if decide:

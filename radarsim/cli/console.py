@@ -12,15 +12,17 @@ from typing import TYPE_CHECKING, Any, Self, TextIO
 
 from radarsim.language import numeral, plural, term, tr
 from radarsim.report.wording import clock, labelled, printable, unbroken
+from radarsim.threads import forbidden
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.live import Live
     from rich.progress import Progress as Bar
     from rich.progress import TaskID
-    from rich.status import Status
 
 
 SILENT_S = 0.7  # a run shorter than this shows no progress
+REFRESH_S = 0.1
 PIPED_WIDTH = 10_000  # whatever reads it wraps it, or not
 COLUMNS = (  # of tables
     *(term("case"), term("filter"), term("component"), term("at"), term("sigma"), term("exact"), term("gain")),
@@ -53,7 +55,8 @@ def console(stderr: bool = False) -> "Console":
 class Progress:
     """What is done, its rate and the time left, on stderr if that is a terminal, once it has lasted most of a second.
 
-    Until the first report, while kernels are compiled, the bar moves without saying how much.
+    Until the first report, while kernels are compiled, the bar moves without saying how much; by a thread, so where
+    threads are forbidden it begins with that report.
     """
 
     def __init__(self, title: str, quiet: bool, what: str = "realisations"):
@@ -66,7 +69,7 @@ class Progress:
         self.timer.daemon = True
 
     def __enter__(self) -> Self:
-        if not self.quiet and sys.stderr.isatty():
+        if not self.quiet and not forbidden() and sys.stderr.isatty():
             self.timer.start()
         return self
 
@@ -93,14 +96,14 @@ class Progress:
         left = clock((total - done) / rate) if rate > 0 else "–"
         share, speed = numeral(f"{100 * done / max(total, 1):5.1f}"), numeral(f"{rate:,.0f}")
         told = tr("{share} %  {rate} {what}/s  {left} left", share=share, rate=speed, what=self.what, left=left)
-        self.bar.update(self.task, total=total, completed=done, told=told)
+        self.bar.update(self.task, total=total, completed=done, told=told, refresh=forbidden())
 
     def _begun(self) -> "Bar":
         from rich.progress import BarColumn, TextColumn
         from rich.progress import Progress as Bar
 
         columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[told]}"))
-        bar = Bar(*columns, console=console(stderr=True), transient=True)
+        bar = Bar(*columns, console=console(stderr=True), transient=True, auto_refresh=not forbidden())
         self.task = bar.add_task(self.title, total=None, told=tr("begins"))
         bar.start()
         return bar
@@ -111,32 +114,29 @@ class Counter:
 
     def __init__(self, title: str, what: str):
         self.title, self.what, self.started = tr(title), tr(what), time.monotonic()
-        self.status: Status | None = None
+        self.due = self.started + SILENT_S
+        self.line: Live | None = None
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
-        if self.status is not None:
-            self.status.stop()
+        if self.line is not None:
+            self.line.stop()
 
     def update(self, done: int) -> None:
         """How many are done."""
-        elapsed = time.monotonic() - self.started
-        if elapsed < SILENT_S or not sys.stderr.isatty():
+        now = time.monotonic()
+        if now < self.due or not sys.stderr.isatty():
             return
-        if self.status is None:
-            self.status = console(stderr=True).status("")
-            self.status.start()
-        self.status.update(
-            tr(
-                "{title}: {done:,} {what}, {rate:,.0f}/s",
-                title=self.title,
-                done=done,
-                what=self.what,
-                rate=done / elapsed,
-            )
-        )
+        self.due = now + REFRESH_S
+        if self.line is None:
+            from rich.live import Live
+
+            self.line = Live(console=console(stderr=True), transient=True, auto_refresh=False)
+            self.line.start()
+        told = {"title": self.title, "done": done, "what": self.what, "rate": done / (now - self.started)}
+        self.line.update(tr("{title}: {done:,} {what}, {rate:,.0f}/s", **told), refresh=True)
 
 
 def show(

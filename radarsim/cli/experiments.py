@@ -118,7 +118,7 @@ def _refuse_together(shard: object, precision: object, cluster: object, threads:
     """Raises UsageError for options that do not go together."""
     if shard and precision:
         raise click.UsageError("--shard and --precision do not go together: a precision is judged on all blocks")
-    if threads and cluster:
+    if threads is not None and cluster:
         raise click.UsageError("--threads and a cluster do not go together: its workers compute, not this process")
 
 

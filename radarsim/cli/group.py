@@ -16,6 +16,7 @@ import click
 import radarsim
 from radarsim import language
 from radarsim.errors import ON_COMMAND_LINE, ConfigError, Interrupted, RadarsimError, StoreError
+from radarsim.threads import limited
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -28,6 +29,7 @@ SECTIONS = {
     "Upkeep": ("schema", "compile", "doctor", "clean"),
 }
 ORDER = tuple(name for names in SECTIONS.values() for name in names)
+NO_THREAD = "can't start new thread"  # in Python's words
 PATIENCE_S = 1.0  # from a signal to the end of whatever a command is doing
 SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 
@@ -67,6 +69,8 @@ class Commands(click.Group):
             what = f"{error.filename}: cannot be read or written" if error.filename else "output: cannot be written"
             fail(StoreError(f"{what}: {error.strerror or error}"))
         except (Exception, SystemExit) as error:  # a study may call sys.exit
+            if str(error) == NO_THREAD:
+                fail(ConfigError("no thread can be started here; --threads 0 does without"))
             from radarsim.studies.registry import fault_of
 
             if (fault := fault_of(error)) is None:
@@ -284,8 +288,21 @@ precision_option = click.option(
 time_limit_option = click.option(
     "--time-limit", type=Positive("SECONDS"), metavar="SECONDS", help="Stop cleanly then, keep what is done."
 )
+
+
+def _obeyed(context: click.Context, option: click.Parameter, count: int | None) -> int | None:
+    """The number of threads, which the whole command keeps to."""
+    context.with_resource(limited(count))
+    return count
+
+
 threads_option = click.option(
-    "--threads", type=click.IntRange(1, 1024), metavar="T", help="Threads; default: all cores."
+    "--threads",
+    type=click.IntRange(0, 1024),
+    metavar="T",
+    callback=_obeyed,
+    is_eager=True,
+    help="Threads; default: all cores. 0: none is started, all is done in the one there is.",
 )
 of_option = click.option(
     "--of",

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from radarsim.cli import group
 from radarsim.cli.group import Count, completed, config_argument, main, set_option
 from radarsim.language import plural, tr
 
@@ -190,7 +191,7 @@ def import_(
 @click.option("-o", "--output", metavar="TRACK.csv", help="Where the track is written; default: to the terminal.")
 @click.option("--report", metavar="DIR", help="Write a report into DIR: report.html, and its figures as files.")
 @click.option("--figures", metavar="DIR", help="Draw the figures alone into DIR.")
-@click.option("--threads", type=click.IntRange(min=1), metavar="T", help="Tracks followed at once; default: all cores.")
+@group.threads_option
 @click.option("-q", "--quiet", is_flag=True, help="Report neither gaps nor how well the accuracies fit.")
 @set_option
 def track(

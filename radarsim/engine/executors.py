@@ -122,7 +122,7 @@ class Threads:
 
 
 class Serial:
-    """Everything in the calling thread, a task at a time: for debuggers and profilers."""
+    """Everything in the calling thread, a task at a time: for debuggers, profilers, and where threads are forbidden."""
 
     workers, depth, shortest_s, longest_s = 1, 1, Threads.shortest_s, Threads.longest_s
 

@@ -13,12 +13,14 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import NoReturn
 
 from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, Work, added, gaps, share_of, widest
 from radarsim.engine.executors import Executor, Outcome, Serial, Threads
 from radarsim.engine.results import Sums
 from radarsim.engine.store import Keeper, Store, mixture
 from radarsim.errors import Interrupted, StoreError
+from radarsim.threads import forbidden, limited
 
 # ---- stopping --------------------------------------------------------------------------------------------------------
 Stop = Callable[[], str | None]
@@ -69,6 +71,7 @@ class Signals:
 
     Python runs handlers between two bytecodes of the main thread, which may be far away inside compiled code. So
     handlers do nothing here, and a thread of its own waits for the numbers that the interpreter writes to a pipe.
+    Where threads are forbidden the handlers do it, with an alarm for the 1.5 s: later by what compiled code takes.
     """
 
     grace_s = 1.0
@@ -87,6 +90,10 @@ class Signals:
             raise Interrupted(self.received)
 
     def __enter__(self) -> "Signals":
+        self._alone = forbidden()
+        if self._alone:
+            self._before = {number: signal.signal(number, self._handle) for number in (*self.numbers, signal.SIGALRM)}
+            return self
         self._pipe, self._write_end = os.pipe()
         os.set_blocking(self._write_end, False)
         self._wakeup_before = signal.set_wakeup_fd(self._write_end, warn_on_full_buffer=False)
@@ -98,16 +105,29 @@ class Signals:
     def __exit__(self, *_: object) -> None:
         for number, handler in self._before.items():
             signal.signal(number, handler)
+        if self._alone:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            return
         signal.set_wakeup_fd(self._wakeup_before)
         os.close(self._write_end)
         self._watcher.join()
         os.close(self._pipe)
 
+    def _handle(self, number: int, frame: object) -> None:
+        if self.received is not None:
+            self._end(self.received, 0 if number == signal.SIGALRM else number)
+        self.received = number
+        signal.setitimer(signal.ITIMER_REAL, self.limit_s)
+
     def _watch(self) -> None:
         self.received = self._next(None)
         if self.received is not None and (second := self._next(self.limit_s)) is not None:
-            os.write(2, f"{Interrupted(self.received)}\n".encode())
-            os._exit(128 + (second or self.received))
+            self._end(self.received, second)
+
+    @staticmethod
+    def _end(first: int, second: int) -> NoReturn:
+        os.write(2, f"{Interrupted(first)}\n".encode())
+        os._exit(128 + (second or first))
 
     def _next(self, patience_s: float | None) -> int | None:
         """The next of our signals, 0 when patience runs out first, None when the context is left."""
@@ -409,15 +429,17 @@ def collect(
     """Sums over realisations 0 … realisations-1 of the work; the same bytes however they are obtained.
 
     store is the results directory: what it holds of this work is used, what is computed is kept there. threads defaults
-    to all cores; 0 runs everything in the calling thread. progress(done, total, from_store) is called at most ten times
-    a second, and at the end. stop() is asked between tasks; once it gives a reason, no task starts, those that run are
-    finished (for at most stop.grace_s, if it has that), and the result is of the blocks done without a gap.
+    to all cores; with 0 none is started, and the calling thread does everything. progress(done, total, from_store) is
+    called at most ten times a second, and at the end. stop() is asked between tasks; once it gives a reason, no task
+    starts, those that run are finished (for at most stop.grace_s, if it has that), and the result is of the blocks done
+    without a gap.
 
     Whatever ends a run, what it has done is stored. NonFiniteError names the first realisations whose sums are
     not finite, which are not stored; StoreError the file that cannot be written.
     """
-    run = Run(work, realisations, store, progress)
-    return run.finished(None if run.restored() else _computed(run, threads, stop, executor))
+    with limited(threads):
+        run = Run(work, realisations, store, progress)
+        return run.finished(None if run.restored() else _computed(run, threads, stop, executor))
 
 
 def share(
@@ -436,13 +458,14 @@ def share(
     Shares are runs of blocks, as equal as blocks can be cut; the last holds the cut block. Stores in which all shares
     are done are united by copying: `collect` then finds every block. The other arguments are those of `collect`.
     """
-    run = Share(work, realisations, part, store, progress)
-    return run.finished(None if run.restored() else _computed(run, threads, stop, executor))
+    with limited(threads):
+        run = Share(work, realisations, part, store, progress)
+        return run.finished(None if run.restored() else _computed(run, threads, stop, executor))
 
 
 def _computed(run: Dispatch, threads: int | None, stop: Stop | None, executor: Executor | None) -> str | None:
     """Compute what a run lacks; the reason, if it was stopped. Whatever ends it, what is done is stored."""
-    pool = executor or (Serial() if threads == 0 else Threads(threads))
+    pool = executor or (Serial() if forbidden() else Threads(threads))
     try:
         return run.compute(pool, stop)
     except StoreError:

@@ -68,6 +68,7 @@ from radarsim.engine.blocks import (
 )
 from radarsim.engine.results import Sums
 from radarsim.errors import StoreError
+from radarsim.threads import forbidden
 
 # ---- machine ---------------------------------------------------------------------------------------------------------
 # Those that change which fused or vector instructions a compiler chooses, from the widest.
@@ -545,11 +546,14 @@ class Keeper:
             return
         self._raise()
         self._durable &= nodes.keys()
-        fresh = {node: sums for node, sums in nodes.items() if node not in self._durable}
+        fresh: dict[Piece, Sums] = {node: sums for node, sums in nodes.items() if node not in self._durable}
         largest = max((sums.count for sums in fresh.values()), default=0)
         fresh = {node: sums for node, sums in fresh.items() if sums.count * SMALLEST >= largest}
-        self._thread = threading.Thread(target=self._put, args=(fresh,), name="keeper", daemon=True)
-        self._thread.start()
+        if forbidden():
+            self._put(fresh)
+        else:
+            self._thread = threading.Thread(target=self._put, args=(fresh,), name="keeper", daemon=True)
+            self._thread.start()
         self._due = time.monotonic() + PERIOD_S
 
     def finish(self, pieces: Mapping[Piece, Sums]) -> None:

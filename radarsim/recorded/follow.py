@@ -13,7 +13,6 @@ import json
 import os
 import shlex
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -32,6 +31,7 @@ from radarsim.recorded.plots import Path as Places
 from radarsim.studies.interface import RecordedPlots, Tracker, true_column
 from radarsim.studies.registry import module as home_of
 from radarsim.studies.registry import study
+from radarsim.threads import mapping
 
 if TYPE_CHECKING:
     from radarsim.report.drawing import Figure
@@ -430,8 +430,9 @@ def follow(
 
     A file with a column `track` holds several tracks: the filters follow each by itself, and the sink is given its
     name; rows without a name belong to none and are passed over. Tracks are followed in several threads (all cores
-    where None), and come to the sink in the order of the file. Memory does not grow with a track's rows where the
-    study's filters go from row to row; others take so many rows at most. progress is called with the rows done.
+    where None, none where 0), and come to the sink in the order of the file. Memory does not grow with a track's rows
+    where the study's filters go from row to row; others take so many rows at most. progress is called with the rows
+    done.
 
     Raises ConfigError for an experiment of several cases, a study without recorded plots, and faults in the file.
     """
@@ -443,7 +444,7 @@ def follow(
     size = tracker.most_rows or plots.CHUNK
     followers: dict[str | None, Follower] = {}
     passed_over = rows = 0
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    with mapping(os.cpu_count() or 1 if threads is None else threads) as mapped:
         for piece in plots.pieces(source, of.columns(case.spec), size, tracker.several, of.from_any_origin):
             if followers and tracker.most_rows:
                 raise ConfigError(f"{source}: must be of at most {size} rows for the study {case.study}")
@@ -452,7 +453,7 @@ def follow(
             for own in named_parts:
                 if own.name not in followers:
                     followers[own.name] = Follower(case, source, own.name)
-            done = pool.map(lambda own: followers[own.name].feed(own), named_parts)
+            done = mapped(lambda own: followers[own.name].feed(own), named_parts)
             for own, track in zip(named_parts, done, strict=True):
                 sink(track, own.name)
                 rows += own.rows

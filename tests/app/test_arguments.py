@@ -9,17 +9,20 @@ import pytest
 import radarsim
 from radarsim.engine.executors import Threads
 
-COUNT, ABOVE = "must be a whole number from 1 to 1024, got", "must be > 0"
+COUNT, NONE_TOO, ABOVE = (
+    "must be a whole number from 1 to 1024, got",
+    "must be a whole number from 0 to 1024, got",
+    "must be > 0",
+)
 
 
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        ({"threads": -1}, f"threads: {COUNT} -1"),
-        ({"threads": 0}, f"threads: {COUNT} 0"),
-        ({"threads": "2"}, f"threads: {COUNT} '2'"),
-        ({"threads": 1.5}, f"threads: {COUNT} 1.5"),
-        ({"threads": True}, f"threads: {COUNT} True"),
+        ({"threads": -1}, f"threads: {NONE_TOO} -1"),
+        ({"threads": "2"}, f"threads: {NONE_TOO} '2'"),
+        ({"threads": 1.5}, f"threads: {NONE_TOO} 1.5"),
+        ({"threads": True}, f"threads: {NONE_TOO} True"),
         ({"workers": 0}, f"workers: {COUNT} 0"),
         ({"workers": "a"}, f"workers: {COUNT} 'a'"),
         ({"time_limit": math.nan}, f"time_limit: {ABOVE}, got nan"),
@@ -49,7 +52,7 @@ def test_an_argument_that_is_none(arguments, line):
 
 def test_all_of_them_at_once():
     with pytest.raises(radarsim.ConfigError) as caught:
-        radarsim.run("rls2", threads=0, workers=0, out="")
+        radarsim.run("rls2", threads=-1, workers=0, out="")
     assert [line.split(":")[0] for line in caught.value.lines] == ["threads", "workers", "out"]
 
 

@@ -12,6 +12,7 @@ from radarsim.config import document
 from radarsim.report import notes
 from radarsim.report.claims.judge import SAID
 from radarsim.report.wording import significant_digits
+from radarsim.threads import limited
 from tests.program import Terminal, command
 
 
@@ -128,6 +129,20 @@ def test_a_bar_moves_within_a_second_though_nothing_is_reported(monkeypatch):
         progress.update(50, 200, 0)
         assert (progress.bar.tasks[0].total, progress.bar.tasks[0].completed) == (200, 50)
     assert console.SILENT_S < 1
+
+
+def test_without_threads_a_bar_begins_with_the_first_report(monkeypatch):
+    screen = Terminal()
+    monkeypatch.setattr("sys.stderr", screen)
+    monkeypatch.setattr("threading.Thread.start", None)
+    monkeypatch.setattr(console, "SILENT_S", 0)
+    with limited(0), console.Progress("rls2", quiet=False) as progress:
+        progress.update(50, 200, 0)
+        assert (progress.bar.tasks[0].total, progress.bar.tasks[0].completed) == (200, 50)
+        assert "25.0 %" in screen.getvalue()
+    with console.Counter("tracking", "rows") as counter:
+        counter.update(50)
+        assert "tracking: 50 rows" in screen.getvalue()
 
 
 def test_list_is_one_screen_and_takes_words(tmp_path, monkeypatch):

@@ -13,6 +13,7 @@ import numpy as np
 from radarsim.engine import store
 from radarsim.engine.results import Sums
 from radarsim.engine.run import Signals, collect
+from radarsim.threads import limited
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,7 @@ def main() -> None:
     parser.add_argument("--stuck-at", type=int, default=-1)
     parser.add_argument("--period", type=float, default=store.PERIOD_S)
     parser.add_argument("--linger", action="store_true")
+    parser.add_argument("--threads", type=int, default=2)
     asked = parser.parse_args()
     store.PERIOD_S = asked.period
     said = []
@@ -102,12 +104,14 @@ def main() -> None:
         if done >= total / 10 and not said:
             said.append(say("running"))
 
-    with Signals() as signals:
+    with limited(asked.threads), Signals() as signals:
         if asked.linger:
             say("running")
             time.sleep(60)
         work = Fake(pause_s=asked.pause, stuck_at=asked.stuck_at)
-        result = collect(work, asked.realisations, store=asked.store, threads=2, progress=progress, stop=signals)
+        result = collect(
+            work, asked.realisations, store=asked.store, threads=asked.threads, progress=progress, stop=signals
+        )
         say(result.count, hashlib.sha256(result.values.tobytes()).hexdigest(), *result.warnings)
         sys.exit(128 + signals.received if signals.received else 0)
 

@@ -15,6 +15,7 @@ from radarsim.engine.blocks import Node
 from radarsim.engine.run import Signals, collect, stored
 from radarsim.engine.store import Store
 from radarsim.errors import Interrupted
+from radarsim.threads import limited
 from tests.engine.fake import Fake, textbook
 
 ROOT = Path(__file__).parents[2]
@@ -51,9 +52,9 @@ def whole(store, realisations):
     return result.from_store
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_stops_the_run_and_all_it_did_is_stored(tmp_path, number):
-    with started(tmp_path, 16 * 4_000, "--pause", 1e-3) as process:
+@pytest.mark.parametrize(("number", "threads"), [(signal.SIGINT, 2), (signal.SIGTERM, 2), (signal.SIGINT, 0)])
+def test_a_signal_stops_the_run_and_all_it_did_is_stored(tmp_path, number, threads):
+    with started(tmp_path, 16 * 4_000, "--pause", 1e-3, "--threads", threads) as process:
         time.sleep(0.3)
         process.send_signal(number)
         assert process.wait(PATIENCE_S) == 128 + number
@@ -75,14 +76,17 @@ def test_a_stuck_task_does_not_hold_up_the_stop(tmp_path):
     assert whole(tmp_path, 16 * 4_000) >= count
 
 
-def test_a_main_thread_that_never_asks_is_ended(tmp_path):
-    with started(tmp_path, 1, "--linger") as process:
+@pytest.mark.parametrize("threads", [2, 0])
+def test_a_main_thread_that_never_asks_is_ended(tmp_path, threads):
+    with started(tmp_path, 1, "--linger", "--threads", threads) as process:
         process.send_signal(signal.SIGTERM)
         assert process.wait(PATIENCE_S) == 143
         assert "stopped by SIGTERM" in process.stderr.read()
 
 
-@pytest.mark.parametrize("options", [["--linger"], ["--pause", 1e-3, "--stuck-at", 16 * 900]])
+@pytest.mark.parametrize(
+    "options", [["--linger"], ["--linger", "--threads", 0], ["--pause", 1e-3, "--stuck-at", 16 * 900]]
+)
 def test_a_second_signal_ends_it_on_the_spot(tmp_path, options):
     """The exit code is the second signal's: the first alone would have ended it later, with its own."""
     with started(tmp_path, 16 * 4_000, *options) as process:
@@ -93,23 +97,27 @@ def test_a_second_signal_ends_it_on_the_spot(tmp_path, options):
         assert process.wait(PATIENCE_S) == 143
 
 
-def test_other_signals_are_left_alone_and_the_handlers_put_back():
-    before = [signal.getsignal(number) for number in Signals.numbers]
+@pytest.mark.parametrize("threads", [None, 0])
+def test_other_signals_are_left_alone_and_the_handlers_put_back(threads):
+    numbers = *Signals.numbers, signal.SIGALRM
+    before = [signal.getsignal(number) for number in numbers]
     other = signal.signal(signal.SIGUSR1, lambda *_: None)
     try:
-        with Signals() as signals:
+        with limited(threads), Signals() as signals:
             signal.raise_signal(signal.SIGUSR1)
             time.sleep(0.1)
             assert signals() is None
             signals.raise_if_received()
     finally:
         signal.signal(signal.SIGUSR1, other)
-    assert [signal.getsignal(number) for number in Signals.numbers] == before
+    assert [signal.getsignal(number) for number in numbers] == before
     assert signal.set_wakeup_fd(-1) == -1
+    assert signal.getitimer(signal.ITIMER_REAL) == (0, 0)
 
 
-def test_a_signal_is_told_as_a_reason_and_as_an_exception():
-    with Signals() as signals:
+@pytest.mark.parametrize("threads", [None, 0])
+def test_a_signal_is_told_as_a_reason_and_as_an_exception(threads):
+    with limited(threads), Signals() as signals:
         signal.raise_signal(signal.SIGTERM)
         while signals() is None:
             time.sleep(0.01)

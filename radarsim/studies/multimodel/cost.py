@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from radarsim.studies.multimodel import world as filters
 from radarsim.studies.multimodel.config import Filter
 from radarsim.studies.multimodel.kernels.records import MODEL_NUMBERS, OUTPUT, PLOT, SIZE, START
 from radarsim.studies.multimodel.study import Plan
+from radarsim.threads import mapping
 
 # Additions, subtractions, multiplications, divisions, roots and exponentials of one step, all three axes, counted on
 # the formulas of `radarsim.kernels.algebra` and `kernels.hypothesis` (a test counts them again); PREDICT, UPDATE by
@@ -56,7 +57,8 @@ def operations_of(options: Filter, merged_first: bool = True) -> tuple[float, fl
 def seconds_per_update(plan: Plan) -> dict[str, float]:
     """CPU seconds of one update of one realisation by filter, outputs included, noise, plots and sums not.
 
-    The least of some passes over the first scans of the flight, in a thread of a pool as kernels run.
+    The least of some passes over the first scans of the flight, in a thread of a pool, as kernels run, or in this one
+    where threads are forbidden.
     """
     from radarsim.kernels.lanes import WIDTH, rows
     from radarsim.studies.multimodel.kernels import strip
@@ -65,10 +67,9 @@ def seconds_per_update(plan: Plan) -> dict[str, float]:
     count = min(len(world.truth), MOST_SCANS)
     found = rows(count * PLOT)
     strip.fill_plots(world.keys, world.frame, world.plot_truth[:count], START, 0, rows(strip.RANDOM), found)
-    with ThreadPoolExecutor(1) as pool:
+    with mapping(1) as mapped:
         seconds = [
-            min(pool.submit(_seconds, plan, f, found, count).result() for _ in range(PASSES))
-            for f in range(len(plan.axes.filters))
+            min(mapped(partial(_seconds, plan, f, found), [count] * PASSES)) for f in range(len(plan.axes.filters))
         ]
     return {name: s / (WIDTH * (count - START)) for name, s in zip(plan.axes.filters, seconds, strict=True)}
 

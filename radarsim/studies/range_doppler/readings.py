@@ -1,7 +1,6 @@
 """What P1 leaves open, and its claims under each reading: all by the exact recursion, nothing is run."""
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -16,6 +15,7 @@ from radarsim.report.claims.over import PaperReadings, Reading, Search, Seen, ch
 from radarsim.report.statistics import Estimate
 from radarsim.studies.range_doppler import measures, recursion
 from radarsim.studies.range_doppler.measures import RADARS
+from radarsim.threads import mapping
 
 ENDS = "P1.5"
 FALLING = ("P1.26", "P1.27")  # as far as a settled curve may rise again
@@ -93,8 +93,8 @@ def _table() -> Mapping[int, Mapping[recursion.Version, "_Sigmas"]]:
             for i, one in enumerate(versions)
         }
 
-    with ThreadPoolExecutor() as pool:  # NumPy computes outside the interpreter's lock
-        return dict(zip(RADARS, pool.map(of_radar, RADARS), strict=True))
+    with mapping() as mapped:  # NumPy computes outside the interpreter's lock
+        return dict(zip(RADARS, mapped(of_radar, RADARS), strict=True))
 
 
 class _Sigmas(NamedTuple):

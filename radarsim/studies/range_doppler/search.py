@@ -7,7 +7,6 @@ and with as long a run of the fast ones or as many scans.
 
 import itertools
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from radarsim.report.claims.over import Fine, Printed, Search
 from radarsim.studies.range_doppler import recursion
 from radarsim.studies.range_doppler.measures import RADARS
 from radarsim.studies.range_doppler.recursion import FORMS, START_NAMES
+from radarsim.threads import mapping
 
 VARIANCES = tuple(float(f"{v:.4g}") for v in np.logspace(-5, 1, 121))  # twenty a decade, with the paper's 10⁻³
 FINE = np.logspace(-5, 1, 1201)  # of the windows in D_M
@@ -113,10 +113,8 @@ class _Chunk(NamedTuple):
 
 def _chunks(versions: Sequence[recursion.Version]) -> Iterator[_Chunk]:
     """By truth, in the order of TRUTHS."""
-    with ThreadPoolExecutor() as pool:  # NumPy computes outside the interpreter's lock
-        found = dict(
-            zip(RADARS, pool.map(lambda n: recursion.both(RADARS[n], versions, _scans(n)), RADARS), strict=True)
-        )
+    with mapping() as mapped:  # NumPy computes outside the interpreter's lock
+        found = dict(zip(RADARS, mapped(lambda n: recursion.both(RADARS[n], versions, _scans(n)), RADARS), strict=True))
     begins = np.array([recursion.first_scan(start, 2) for _, _, start in versions])
     alone = _settled(versions)
     for truth in range(len(TRUTHS)):

@@ -1,0 +1,35 @@
+"""Whether threads may be started: `--threads 0` and `threads=0` forbid it, in all that a call does."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
+
+_forbidden: ContextVar[bool] = ContextVar("forbidden", default=False)
+
+
+def forbidden() -> bool:
+    """Whether everything is to be done in the calling thread."""
+    return _forbidden.get()
+
+
+@contextmanager
+def limited(count: int | None) -> Iterator[None]:
+    """While entered no thread is started, if the count is 0."""
+    before = _forbidden.set(forbidden() or count == 0)
+    try:
+        yield
+    finally:
+        _forbidden.reset(before)
+
+
+@contextmanager
+def mapping(count: int | None = None) -> Iterator[Callable[..., Iterator[Any]]]:
+    """`map`, in so many threads (Python's own number where None), in this one where threads are forbidden."""
+    if forbidden() or count == 0:
+        yield map
+        return
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(count) as pool:
+        yield pool.map

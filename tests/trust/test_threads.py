@@ -1,0 +1,75 @@
+"""Where no thread can be started, `--threads 0` does all, to the same bytes; without it a line says so."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+import radarsim
+from radarsim.threads import forbidden, limited, mapping
+from tests.program import command
+
+BARRED = """
+import sys, threading, _thread
+
+def refuse(*_, **__):
+    raise RuntimeError("can't start new thread")
+
+threading.Thread.start = threading._start_new_thread = _thread.start_new_thread = refuse
+"""
+COMMAND = "from radarsim.cli import entry; entry()"
+BUSY = "from radarsim.engine import store; store.PERIOD_S = 0; "  # it writes after every task, not once a second
+NATIVE = "print(*(line.split()[1] for line in open('/proc/self/status') if line.startswith('Threads:')))"
+
+
+def barred(program, *arguments):
+    """What a program prints to both streams in an interpreter that starts no thread, and its exit code."""
+    words = [sys.executable, "-c", f"{BARRED}{program}", *map(str, arguments)]
+    one = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(words, capture_output=True, text=True, check=False, env=one)
+    return done.stdout + done.stderr, done.returncode
+
+
+def test_run_and_track_without_a_thread_give_the_same_bytes(tmp_path):
+    few = ("-n", 3000, "--no-figures", "--threads", 0)
+    told, code = barred(BUSY + COMMAND, "run", "rls2", *few, "--out", tmp_path / "none")
+    assert (code, "Traceback" in told) == (0, False), told
+    radarsim.run("rls2", realisations=3000, threads=2, out=tmp_path / "two", figures=False)
+    tables = sorted((tmp_path / "two/rls2").glob("*.csv"))
+    assert len(tables) > 3
+    for table in tables:
+        assert (tmp_path / "none/rls2" / table.name).read_bytes() == table.read_bytes()
+    plots, tracks = tmp_path / "plots.csv", [tmp_path / "none.csv", tmp_path / "all.csv"]
+    radarsim.simulate("rls2").to_csv(plots, index=False)
+    told, code = barred(COMMAND, "track", "rls2", plots, "-o", tracks[0], "--threads", 0)
+    assert code == 0, told
+    command("track", "rls2", plots, "-o", tracks[1])
+    assert tracks[0].read_bytes() == tracks[1].read_bytes()
+
+
+def test_python_runs_without_a_thread_where_updates_are_timed_too():
+    """`multimodel` measures what an update costs, in a thread of its own where it may."""
+    ran = "import radarsim; radarsim.run('multimodel', realisations=20, threads=0)"
+    told, code = barred(f"{ran}\n{NATIVE}")
+    assert (code, told.split()[-1]) == (0, "1"), told
+
+
+def test_a_command_that_lacks_its_threads_says_what_does_without():
+    told, code = barred(COMMAND, "solve", "rls2", "radar.sigma_velocity_mps", "--gain", "r", "--at-k", 3, "--equals", 9)
+    assert code == 0, told  # in closed form: no thread is asked for
+    told, code = barred(COMMAND, "run", "rls2", "-n", 10)
+    assert code == 2
+    assert told == "no thread can be started here; --threads 0 does without\n"
+
+
+def test_what_is_forbidden_within_is_allowed_after():
+    with limited(0):
+        assert forbidden()
+        with limited(2), mapping() as mapped:
+            assert forbidden()
+            assert mapped is map
+    assert not forbidden()
+    with pytest.raises(KeyError), limited(0):
+        raise KeyError
+    assert not forbidden()
