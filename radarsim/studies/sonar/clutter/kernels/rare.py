@@ -8,8 +8,11 @@ zero. Positions in the box are uniform, as they are in the field; what is in the
 The ratio of the laws is that of the answers "zero or not" alone, (1 - h) / (1 - p) or h / p each scan.
 
 h is the number of plots that the rule m of n still needs over the scans that are left, at least p: were p the same at
-all scans, and small, all patterns of plots that confirm the track would have equal weights. Of a confirmed track it is
-one over the misses in a row that still drop it. Letters as in `field`, and
+all scans, and small, all patterns of plots that confirm the track would have equal weights. No h is better then: with i
+plots to come in j scans, η the chance that a plot of the box is in the gate, the least second moment of the weight is
+M(i, j) = min over h of M(i-1, j-1)/(ηh) + M(i, j-1)/(1-h) = (√(M(i-1, j-1)/η) + √M(i, j-1))² in units of (ηp)^(2i), so
+√M(i, j) = η^(-i/2) C(j, i) by Pascal's rule, at h = i/j. Of a confirmed track h is one over the misses in a row that
+still drop it. Letters as in `field`, and
 
     p, h        probability that the box contains a false plot: as it is, and as it is drawn
     ratio       a law that is drawn from over the law itself
