@@ -79,6 +79,9 @@ def shipped(stem: str) -> tuple[Model, ...] | None:
     return None
 
 
+EDITORS, SCHEMA = "# yaml-language-server: $schema=", "schema.json"
+
+
 def new(
     name: str,
     like: str | os.PathLike[str],
@@ -87,10 +90,13 @@ def new(
 ) -> Path:
     """Write folder/NAME.yaml, the suffix given or not, after a known config with some values changed; its path.
 
-    Raises ConfigError where it is there already, StoreError where it cannot be written.
+    Where the folder holds a schema.json, the first line tells editors to check by it. Raises ConfigError where the
+    config is there already, StoreError where it cannot be written.
     """
     name, text = reading.new(name, like, registry, values)
     path = Path(folder) / name
+    if path.with_name(SCHEMA).is_file():
+        text = f"{EDITORS}{SCHEMA}\n{text}"
     try:
         files.create(path, text.encode())
     except FileExistsError:

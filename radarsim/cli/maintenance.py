@@ -47,7 +47,7 @@ def schema() -> None:
 
     \b
     Example
-      radarsim schema > schema.json
+      radarsim schema > schema.json     then editors check what `radarsim new` writes beside it
     """
     from radarsim.app.configs import schema_json
 

@@ -1,5 +1,6 @@
 """The schema itself: described, fresh in docs/, named by every shipped file; and the `_deg` twins."""
 
+import fnmatch
 import json
 import math
 import re
@@ -11,7 +12,7 @@ from typing import Annotated, Literal
 import pytest
 from pydantic import BaseModel, Field
 
-from radarsim.app.configs import load, schema_json
+from radarsim.app.configs import load, new, schema_json
 from radarsim.config import schema
 from radarsim.config.check import check, models_in
 from radarsim.config.document import Document, Faults, Origin
@@ -193,3 +194,27 @@ def test_a_bare_key_means_those_members_that_have_it(fans):
     (case,) = load(config).cases
     assert case.name == "config spread_deg=45"
     assert [getattr(ray, "spread_rad", None) for ray in case.spec.rays] == [math.pi / 4, None, math.pi / 4]
+
+
+def test_a_new_config_names_the_schema_that_lies_beside_it(tmp_path):
+    without = new("bare.radarsim", "rls2", tmp_path).read_text(encoding="utf-8")
+    assert "yaml-language-server" not in without
+    (tmp_path / "schema.json").write_text(schema_json(), encoding="utf-8")
+    file = new("told.radarsim", "rls2", tmp_path)
+    first, rest = file.read_text(encoding="utf-8").split("\n", 1)
+    named = re.fullmatch(r"# yaml-language-server: \$schema=(\S+)", first)[1]
+    assert json.loads((file.parent / named).read_text(encoding="utf-8"))["oneOf"]
+    assert rest == without.replace("bare.radarsim", "told.radarsim")
+    assert load(file).stem == "told.radarsim"
+
+
+def test_the_catalogue_for_editors_has_the_form_that_they_read():
+    """As SchemaStore's own: entries of name, description, patterns of files, address; a new config may be so named."""
+    page = (ROOT / "docs/reference/yaml.md").read_text(encoding="utf-8")
+    settings, catalogue = (json.loads(text) for text in re.findall(r"```json\n(.*?)```", page, re.S))
+    assert catalogue["$schema"] == "https://json.schemastore.org/schema-catalog.json"
+    (entry,) = catalogue["schemas"]
+    assert set(entry) == {"name", "description", "fileMatch", "url"}
+    (pattern,) = entry["fileMatch"]
+    assert settings == {"yaml.schemas": {entry["url"].rpartition("/")[2]: pattern}}
+    assert fnmatch.fnmatch("told.radarsim.yaml", pattern)
