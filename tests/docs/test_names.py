@@ -9,8 +9,22 @@ import pytest
 from tests.docs.test_links import PAGES, ROOT
 
 NAME = re.compile(r"`([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+)(?:\([^`]*\))?`|(?<![\w/.])([\w/]+\.py)\b")
-FILES = r"\.(?:ast|bin|blocks|csv|html|json|md|pdf|png|po|pyc?|svg|toml|txt|typed|cff|yaml|yml)$"
-FOREIGN = ("concurrent", "csv", "dask", "json", "math", "np", "numpy", "os", "pd", "pydantic", "scipy", "Security")
+FILES = r"\.(?:ast|bib|bin|blocks|csv|html|json|md|pdf|png|po|pyc?|svg|toml|txt|typed|cff|yaml|yml)$"
+FOREIGN = (
+    "concurrent",
+    "csv",
+    "dask",
+    "json",
+    "math",
+    "np",
+    "numpy",
+    "os",
+    "pd",
+    "pydantic",
+    "scipy",
+    "Security",
+    "yaml",
+)
 OTHERS = (
     "radarsim.filters",
     "scans.errors",
