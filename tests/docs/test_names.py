@@ -43,7 +43,7 @@ TEXTS += [path for path in SOURCES if path.relative_to(ROOT).parts[0] in ("radar
 @cache
 def bound() -> dict[str, set[str]]:
     """What each dotted name may be followed by: modules by any end of their path, and classes."""
-    found = defaultdict(set)
+    found, bases = defaultdict(set), defaultdict(set)
     for path in SOURCES:
         text = path.read_text(encoding="utf-8")
         parts = path.relative_to(ROOT).with_suffix("").parts
@@ -55,6 +55,9 @@ def bound() -> dict[str, set[str]]:
             found[".".join(parts[start:-1])].add(parts[-1])
         for name, body in re.findall(r"^class (\w+)(.*?)(?=^\S|\Z)", text, re.M | re.S):
             found[name] |= set(re.findall(r"^    (?:def )?(\w+)", body, re.M))
+            bases[name] |= set(re.findall(r"\w+", body.partition(":")[0]))
+    for name, of in bases.items():
+        found[name] = found[name].union(*(found[base] for base in of if base in found))
     return found
 
 
