@@ -22,7 +22,7 @@ from radarsim.config.experiment import DRAWN_FOR_ALL, Case, Experiment, matches
 from radarsim.engine import store
 from radarsim.engine.results import CaseResult
 from radarsim.errors import DisagreementError, MeasureError, RadarsimError
-from radarsim.language import ENGLISH, called, current, plural, tr
+from radarsim.language import ENGLISH, called, current, few, plural, tr
 from radarsim.report import claims, files, notes, seen
 from radarsim.report import tables as common
 from radarsim.report.claims import page
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 # ---- records ---------------------------------------------------------------------------------------------------------
 LABELS = ("case", "swept")  # of a resolved case, beside its keys
-NAMED = 3  # cases in a line
+NAMED = 3  # cases in a line, or one more
 SURE = 3  # a change that shows in one of m / 3 realisations is missed by m of them with a probability of e⁻³ = 5 %
 
 
@@ -64,26 +64,30 @@ def of_other_sources(names: Mapping[str, str]) -> list[str]:
     store.settled[:] = [one for one in store.settled if one.identity not in names]
     lines = []
     if kept := [one for one in found if one.same]:
-        again, stored = sum(one.again for one in kept), sum(one.stored for one in kept)
-        line = (
-            f"stored blocks of {_listed(kept, names)} were made by other sources; {again:,} of {stored:,} realisations "
-            "were computed again and have the same bytes: all are kept"
+        line = tr(
+            "stored blocks of {cases} were made by other sources; {again:,} of {stored:,} realisations were computed "
+            "again and have the same bytes: all are kept",
+            cases=_listed(kept, names),
+            again=sum(one.again for one in kept),
+            stored=sum(one.stored for one in kept),
         )
         if unseen := [one.again for one in kept if one.again < one.stored]:
-            line += f". A change in one realisation of {min(unseen) // SURE:,} would have shown, rarer ones may not"
+            some = min(unseen) // SURE
+            line += tr(". A change in one realisation of {some:,} would have shown, rarer ones may not", some=some)
         lines.append(line)
     if begun := [one for one in found if not one.same]:
         lines.append(
-            f"stored blocks of {_listed(begun, names)} were made by other sources that give other bytes, and are not "
-            "used; `radarsim clean` removes them"
+            tr(
+                "stored blocks of {cases} were made by other sources that give other bytes, and are not used; "
+                "`radarsim clean` removes them",
+                cases=_listed(begun, names),
+            )
         )
     return lines
 
 
 def _listed(found: list[store.Settled], names: Mapping[str, str]) -> str:
-    cases = list(dict.fromkeys(names[one.identity] for one in found))
-    more = f" and {len(cases) - NAMED} more" if len(cases) > NAMED else ""
-    return f"{', '.join(cases[:NAMED])}{more}"
+    return few(list(dict.fromkeys(names[one.identity] for one in found)), NAMED)
 
 
 # ---- result ----------------------------------------------------------------------------------------------------------

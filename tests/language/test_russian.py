@@ -5,10 +5,11 @@ import re
 
 import pytest
 
+from radarsim import language
 from radarsim.app import result as output
 from radarsim.app.run import run
 from radarsim.config.document import SHIPPED
-from radarsim.language import speaking
+from radarsim.language import called, speaking
 from radarsim.report.drawing import Figure
 from radarsim.report.tables import to_csv
 from radarsim.studies import registry
@@ -24,6 +25,8 @@ NAMES = {
     *("RLS", "IEEE", "Std", "asin", "combined", "modified", "moment", "best", "samples", "sinc"),
     *("python", "numpy", "numba", "llvmlite", "scipy", "pandas", "matplotlib", "pydantic", "pyyaml"),
 }
+
+SYMBOLS = {"Vr", "ar", "PDA", "NEES", "NIS", "IMM", "exp", "var", "cov"}  # in sentences: of papers and of formulas
 
 
 def shown(figure: Figure):
@@ -60,6 +63,15 @@ def untranslated(words: str, names: set[str]) -> list[str]:
     return [word for word in re.findall(r"[A-Za-z]{3,}", bare) if word not in names]
 
 
+def latin(words: str, stems: set[str]) -> list[str]:
+    """Latin words in a sentence that are no symbols, formulas, keys or names of config files."""
+    bare = re.sub(r"\$[^$]*\$|`[^`]*`|\w+[._]\w[\w.]*", " ", words)
+    return [word for word in re.findall(r"[A-Za-z][A-Za-z\d]+", bare) if word not in SYMBOLS | stems]
+
+
+UNPARTED = re.compile(r"\[[^];]*\d,\d[^];]*, ")  # an interval of decimal commas that only commas part
+
+
 def check(stem: str, realisations: int, folder) -> None:
     result = run(stem, realisations=realisations, out=folder, figures=False)
     names = NAMES | {part for text in own_names(result) for part in re.findall("[A-Za-z]+", text)}
@@ -75,6 +87,10 @@ def check(stem: str, realisations: int, folder) -> None:
         written = output.write_files(result.experiment, result.cases, folder / "ru", {}, draw=False, made=made)
         page = (written.folder / "report.html").read_text(encoding="utf-8")
         texts = [words for figure in figures.values() for words in shown(figure)]
+        said = [result.question, *type(result).answer.func(result), *texts]
+    stems = {stem, *(case.name.partition(" ")[0] for case in result.cases)}
+    assert {words: found for words in said if (found := latin(words, stems))} == {}
+    assert [words for words in said if UNPARTED.search(words)] == []
     left = {words: found for words in [*texts, *told(page)] if (found := untranslated(words, names))}
     assert left == {}
 
@@ -106,6 +122,39 @@ def test_nothing_is_left_in_english(stem, tmp_path):
 @pytest.mark.parametrize("stem", ALL)
 def test_nothing_is_left_in_english_in_any_shipped_config(stem, tmp_path):
     check(stem, 20, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("said", "left"),
+    [
+        ("РЛС 2, цель: turn", ["turn"]),
+        ("nearest, 4 of 6 подтверждает", ["nearest", "of"]),
+        ("r+Vr: 10 plots, $\\sigma$ of P_D, rls2_wide", ["plots", "of"]),
+        ("rls2: r+Vr, PDA, `radarsim run`, F_r = 700 Гц", []),
+    ],
+)
+def test_the_check_sees_what_is_latin(said, left):
+    assert latin(said, {"rls2"}) == left
+    assert UNPARTED.search("12 % [10,5, 21]")
+    assert not UNPARTED.search("12 % [10,5; 21]")
+
+
+def test_names_of_a_config_are_said_as_whole_words_alone():
+    names = frozenset({"memory", "memory test", "no memory", "turn", "modified combined"})
+    with speaking("ru"):
+        assert called("no memory; memory, memory test", names) == "без памяти; с памятью, memory test"
+        assert called("`turn.yaml`, target=turn, turn_2: turn.", names) == "`turn.yaml`, target=turn, turn_2: разворот."
+        assert called("modified\ncombined", names) == "модифицированный\nкомбинированный"
+        assert [called(name) for name in ("memory", "memory test")] == ["с памятью", "memory test"]
+    assert called("no memory", names) == "no memory"
+
+
+@pytest.mark.parametrize("code", [code for code in language.known() if code != language.ENGLISH])
+def test_names_of_a_config_stay_apart_and_hold_commas_where_they_did(code):
+    """Two filters must not get one name, and a list of names must part where it did."""
+    labels = {one.id: one.said[0] for one in language.messages(code) if one.context == language.LABEL}
+    assert len(set(labels.values())) == len(labels) > 100
+    assert [name for name, said in labels.items() if (", " in name) != (", " in said)] == []
 
 
 def test_the_check_sees_what_is_english():

@@ -122,7 +122,7 @@ def test_one_line_says_what_was_compared_of_all_cases(monkeypatch, again, stored
     names = {f"{number}": f"case {number}" for number in range(5)}
     monkeypatch.setattr(store, "settled", [store.Settled(one, one != "4", again, stored) for one in (*names, "else")])
     kept, begun = of_other_sources(names)
-    assert f"case 0, case 1, case 2 and 1 more were made by other sources; {4 * again:,} of 3,600 " in kept
+    assert f"case 0, case 1, case 2 and case 3 were made by other sources; {4 * again:,} of 3,600 " in kept
     assert ("A change in one realisation of 100 would have shown" in kept) is rarer
     assert "blocks of case 4 were made by other sources that give other bytes" in begun
     assert [one.identity for one in store.settled] == ["else"]

@@ -11,6 +11,7 @@ The forest plot of claims: of each the worst part, its interval and exact value,
 """
 
 import math
+import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -452,13 +453,26 @@ def shown(row: Mapping) -> str:
     exact = number(row["exact"])
     if number(row["measured"]) is None:
         return "–"
-    unit = tr(str(row["unit"]))
-    return measured(row) if exact is None else tr("{value} exactly", value=f"{plain(exact)} {unit}".rstrip())
+    if exact is None:
+        return measured(row)
+    return tr("{value} exactly", value=f"{plain(exact)} {unit_after(exact, row['unit'])}".rstrip())
 
 
-def expected(words: str) -> str:
-    """What is expected of a part, in the language spoken: `about 20 to 30 ± 10`."""
-    return " ".join(tr(one) if one.isalpha() else numeral(one) for one in words.split())
+def unit_after(value: float, unit: str) -> str:
+    """A unit as it stands after a number: what is counted is in the form of it, that of two after a fraction."""
+    count = abs(int(value)) if value == value // 1 else 2
+    if unit == "scans":
+        return plural("scan", "scans", count)
+    if unit == "plots":
+        return plural("plot", "plots", count)
+    return plural("point", "points", count) if unit == "points" else tr(unit)
+
+
+def expected(words: str, unit: str = "") -> str:
+    """What is expected of a part, in the language spoken: `about 20 to 30 ± 10`; with the unit where one is given."""
+    said = " ".join(tr(one) if one.isalpha() else numeral(one) for one in words.split())
+    last = re.findall(r"\d[\d.]*", words)[-1:]
+    return f"{said} {unit_after(float(last[0]), unit) if last else tr(unit)}".rstrip() if unit else said
 
 
 EXPECTED = (term("about"), term("to"), term("few"))  # the words in it
@@ -480,7 +494,7 @@ def measured(row: Mapping) -> str:
         place = 0 if whole else max(0, 1 - math.floor(math.log10(half)))
         middle, low, high = (numeral(f"{round(one, place) + 0.0:.{place}f}") for one in (value, lo, hi))
         text = f"{middle} {interval(low, high)}"
-    return f"{text} {tr(str(row['unit']))}".rstrip().replace("-", "\N{MINUS SIGN}")
+    return f"{text} {unit_after(value, row['unit'])}".rstrip().replace("-", "\N{MINUS SIGN}")
 
 
 def bounds(row: Mapping) -> tuple[float, float]:

@@ -127,7 +127,7 @@ def _printed(of: Joint) -> str:
     places = {name: one for i, (name, one) in enumerate(places.items()) if one not in list(places.values())[:i]}
     rows = []
     for key, number in of.numbers.items():
-        printed = f"{expected(number.words)} {tr(number.unit)}".strip()
+        printed = expected(number.words, number.unit)
         rows.append((number.claim, tr(number.what), printed, *(_came(one, key) for one in places.values())))
     words = [f"*{tr(name)}*: {one.name}." for name, one in places.items() if one != of.shipped]
     return "\n\n".join([table((*PRINTED, *places), rows), *words])
@@ -167,7 +167,7 @@ def _numbers(search: Search) -> str:
     rows = []
     for number, one in enumerate(search.printed):
         cells = [_value(search, number, place) for place in places.values()]
-        rows.append((one.claim, tr(one.what), f"{expected(one.printed)} {tr(one.unit)}".strip(), *cells))
+        rows.append((one.claim, tr(one.what), expected(one.printed, one.unit), *cells))
     for rule, name in ((False, tr("come out to the digit")), (True, tr("come out to the print's steps"))):
         counts = [str(int(search.count(rule)[place])) for place in places.values()]
         rows.append(("", name, str(len(search.printed)), *counts))
@@ -188,7 +188,7 @@ def _windows(search: Search) -> str:
     rows = [
         (
             one.claim,
-            f"{tr(one.what)}: {expected(one.printed)} {tr(one.unit)}".strip(),
+            f"{tr(one.what)}: {expected(one.printed, one.unit)}",
             *(_listed(own[number]) for own in kept.values()),
         )
         for number, one in enumerate(search.printed)
