@@ -35,7 +35,7 @@ def keeping(results: Results) -> list[tuple]:
 
 def erring(results: Results) -> list[tuple]:
     """σ_r at the last scan and the normalised error there, by density."""
-    names = (*BOTH, "told its plots")
+    names = (*BOTH, "known association")
     made: list[tuple] = [
         ("false plots per km²", *(f"σ_r, {name}, m" for name in names), *(f"normalised error, {name}" for name in BOTH))
     ]

@@ -297,4 +297,4 @@ def missing(held: Stock) -> str:
         return tr("realisations {runs}", runs=runs)
     numbers, of = held.shares
     share = tr("share {number} of {of}", number=listed([str(number) for number in numbers]), of=of)
-    return tr("realisations {runs}, as if {share} had not been copied", runs=runs, share=share)
+    return tr("realisations {runs}; perhaps {share} was not copied", runs=runs, share=share)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FACTOR = 1000.0  # the search goes from a thousandth of a positive key's value to a thousand times it
-WHOLE = term("of whole numbers the one beside the target that does at least as well")
+WHOLE = term("the nearest whole number that is at least as good as the target")
 MOST_NAMED = 6  # cases that a message lists
 JUMPS = term("the quantity jumps over the target there")
 SAME = 1e-12  # of a quantity: what rounding may make of no change
@@ -139,8 +139,12 @@ class Answer(Shown):
         return f"{number} {tr(self.quantity_unit)}".rstrip()
 
 
-AT_MOST = term("{quantity}: {wanted} is not attainable by {key} from {low} to {high}: at most {limit}, at {at}")
-AT_LEAST = term("{quantity}: {wanted} is not attainable by {key} from {low} to {high}: at least {limit}, at {at}")
+AT_MOST = term(
+    "{quantity}: {wanted} is not attainable with {key} from {low} to {high}: the largest is {limit}, at {at}"
+)
+AT_LEAST = term(
+    "{quantity}: {wanted} is not attainable with {key} from {low} to {high}: the smallest is {limit}, at {at}"
+)
 PLAIN = ".6g"
 MOST_DIGITS = 12  # behind the point: beyond, rounding shows
 NEAR_ZERO = 1e-9  # of a quantity: how near an exact root comes
@@ -463,4 +467,4 @@ def boundary(asked: Question, curve: Curve, x: float) -> tuple[str, ...]:
     if x in (asked.over.low, asked.over.high):
         return (tr("the end of what was searched; {between} searches elsewhere", between=_between()),)
     beyond = [other for other in curve.refused if abs(other - x) <= 0.05 * abs(x)]
-    return (term("the end of what the config allows"),) if beyond else ()
+    return (term("the limit of what the config allows"),) if beyond else ()

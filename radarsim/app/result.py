@@ -345,7 +345,7 @@ MOST_FURTHER = 6  # sentences on further baselines
 
 def answered(results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"]) -> tuple[str, ...]:
     """The answer of an experiment: the study's, and the gains at the last scan against further baselines."""
-    more = [tr("Further gains stand in gains.csv.")] if any(one.against for one in results) else []
+    more = [tr("Further gains are in gains.csv.")] if any(one.against for one in results) else []
     names = names_in(results)
     return (*(called(sentence, names) for part in answers(results) for sentence in part(made)), *more)
 
@@ -432,7 +432,7 @@ def case_figures(
 
 def _said(figure: Figure) -> Figure:
     """The figure whose caption says why a band is missing."""
-    said = tr("No band where few large errors decide.")
+    said = tr("No band is drawn where a few large errors dominate.")
     return replace(figure, caption=f"{figure.caption} {said}")
 
 

@@ -376,12 +376,12 @@ def tornado(found: Sensitivity) -> Figure:
     if found.leading:
         what = tr("{quantity} of {symbol}", quantity=what, symbol=found.of[0].place(found.leading, tr))
     caption = tr(
-        "Change of {quantity} for a tenth more of each key, the largest first.",
+        "Change of {quantity} when each key grows by 10 %, largest first.",
         quantity=" ".join(filter(None, (what, found.at))),
     )
     if not all(row["exact"] for row in rows):
         caption += " " + tr("Thin lines: 95 % intervals.")
-    title = tr("What a tenth more of each key changes, {stem}", stem=found.stem)
+    title = tr("Effect of +10 % of each key, {stem}", stem=found.stem)
     height = 24 + 6.5 * max(3, len(keys))
     return Figure("tornado", title, caption, tuple(made), len(made), PAGE_MM, height)
 

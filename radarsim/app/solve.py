@@ -97,7 +97,8 @@ def unpaired(asked: Question, curve: Curve) -> tuple[str, ...]:
     if len(curve.scans) < 2:
         return ()
     words = tr(
-        "{key} moves the scans, whose noise differs: each value has {count} realisations, {times} times as many",
+        "{key} moves the scans, so the noise differs between values: each value gets {count} "
+        "realisations, {times} times as many",
         key=asked.key,
         count=UNPAIRED * curve.realisations,
         times=UNPAIRED,

@@ -64,9 +64,7 @@ def print_sensitivity(found: "Sensitivity") -> None:
     if found.without_estimate:
         field("no estimate", ", ".join(found.without_estimate))
     if found.not_paired:
-        what = tr(
-            "{keys}: the scans are at other times, so each has noise of its own", keys=", ".join(found.not_paired)
-        )
+        what = tr("{keys}: the scan times differ, so the noise is not common", keys=", ".join(found.not_paired))
         field("not paired", what)
     for key, reason in found.left_out.items():
         field("left out", f"{key}: {reason}")

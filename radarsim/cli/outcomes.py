@@ -48,7 +48,7 @@ def print_result(result: "Result") -> None:
     field("report", str(written.folder / "report.html"))
     if written.removed:
         gone = few(written.removed, 3)
-        field("removed", tr("of an earlier run, not made by this one: {names}", names=gone))
+        field("removed", tr("left by an earlier run, not written by this one: {names}", names=gone))
     print_warnings(result.warnings)
 
 
@@ -134,7 +134,7 @@ def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
         told = {"stored": held.stored, "asked": held.asked, "missing": missing(held)}
         field(name, tr("{stored:,} of {asked:,} stored; missing: {missing}", **told))
     if len(begun) > MOST_BEGUN:
-        say(tr("and {cases} more that are stored in part", cases=counted_cases(len(begun) - MOST_BEGUN)))
+        say(tr("and {cases} more stored in part", cases=counted_cases(len(begun) - MOST_BEGUN)))
     if outlook.precision is not None:
         print_needs(experiment, outlook)
     if outlook.share is not None:
@@ -208,7 +208,7 @@ def print_needs(experiment: "Experiment", outlook: "Outlook") -> None:
 
 def _unreached(need: "Need") -> str:
     """Why a pilot foretells no number of realisations."""
-    return tr("out of reach") if need.below is None else tr("none seen: below {rate:.2g}", rate=need.below)
+    return tr("out of reach") if need.below is None else tr("none observed: below {rate:.2g}", rate=need.below)
 
 
 def print_share(share: "Shares", out: str | os.PathLike[str]) -> None:
@@ -233,7 +233,7 @@ def print_inspection(found: "Inspection") -> None:
     for note in found.notes:
         say(tr("note: {words}", words=note))
     say(
-        tr("all whole")
+        tr("all intact")
         if not found.faults
         else plural("{count} fault found", "{count} faults found", len(found.faults))
     )

@@ -40,7 +40,7 @@ def new(name: str, like: str) -> None:
 
     path = configs.new(name, like)
     console.field("config", str(path))
-    console.field("", tr("change its numbers, then `radarsim check {path}` and `radarsim run {path}`", path=str(path)))
+    console.field("", tr("edit its values, then `radarsim check {path}` and `radarsim run {path}`", path=str(path)))
 
 
 @main.command(name="new-study")
@@ -70,7 +70,7 @@ def new_study(name: str, step: bool, folder: bool) -> None:
     guide = path / "README.md" if folder else path / "src" / name / "__init__.py"
     console.field("package", str(path))
     told = {"path": str(path), "name": name, "guide": str(guide)}
-    console.field("", tr("`pip install -e {path}`, then `radarsim run {name}`; {guide} says what goes where", **told))
+    console.field("", tr("`pip install -e {path}`, then `radarsim run {name}`; {guide} explains what to edit", **told))
 
 
 @main.command()

@@ -57,11 +57,13 @@ def report_fit(found: "Fit") -> None:
         value, stated = significant_digits(one.value), significant_digits(one.stated)
         lo, hi = (
             significant_digits(one.lo),
-            tr("no upper end") if one.hi == float("inf") else significant_digits(one.hi),
+            tr("no upper bound") if one.hi == float("inf") else significant_digits(one.hi),
         )
         least = one.lo == 0
         doubt = (
-            tr("; the plots do not tell it from zero") if least else tr("; the plots do not tell it from larger ones")
+            tr("; the plots cannot distinguish it from zero")
+            if least
+            else tr("; the plots cannot distinguish it from larger values")
         )
         line = tr(
             "{key}: {value} {interval}, stated {stated}",
@@ -75,18 +77,18 @@ def report_fit(found: "Fit") -> None:
         lines.append(tr("outliers: {share} % of the plots", share=significant_digits(100 * found.outliers, "#.2g")))
     settings = " ".join(f"--set {key}={value:g}" for key, value in fit.settings(found).items())
     if found.beside is not None:
-        lines.append(labelled("", tr("the intervals do not hold: {what}", what=page.what(*found.beside))))
+        lines.append(labelled("", tr("the intervals are not valid: {what}", what=page.what(*found.beside))))
     lines.append(
         labelled(
             "",
             tr(
-                "with these values the plots are {times} times as likely as with those stated",
+                "with these values the plots are {times} times as likely as with the stated ones",
                 times=page.times(found.gain),
             ),
         )
     )
     if settings:
-        lines.append(labelled("", tr("to use what the plots tell: {settings}", settings=settings)))
+        lines.append(labelled("", tr("to use the fitted values: {settings}", settings=settings)))
     for line in lines:
         write(sys.stdout, line)
 
@@ -115,12 +117,13 @@ def print_verdicts(result: "Result") -> None:
     if alone := result.as_shipped():
         told = {"names": page.in_a_row(alone), "paper": alone[0].partition(".")[0]}
         words = tr(
-            "as shipped alone: {names}; `radarsim readings {paper}` judges under all that the paper allows", **told
+            "only as shipped: {names}; `radarsim readings {paper}` judges under every reading that the paper allows",
+            **told,
         )
         field("", words)
     if verdicts and result.written is not None:
         told = {"command": configs.command(result.experiment, (), result.written.folder.parent, verb="claims")}
-        field("", tr("`{command}` says what each of them is", **told))
+        field("", tr("`{command}` describes each of them", **told))
 
 
 def print_claims(
@@ -165,16 +168,16 @@ def print_claims(
         command = f"radarsim run {shlex.quote(stem)}{configs.into(out)}"
         say(tr("`{command}` judges {names}", command=command, names=page.in_a_row(list(lacking))))
     bracketed = any(page.extension(own) and own[0]["claim"] not in detailed for own in every)
-    say((page.counted(stated) or tr("no claims are judged by this")) + bracketed * tr(" (in brackets)"))
+    say((page.counted(stated) or tr("this experiment judges no claims")) + bracketed * tr(" (in brackets)"))
     if len(missing) > MOST_CONFIGS and all(row["class"] == NOT_RUN for row in stated):
         say(tr(NOTHING_OF_ALL))
     elif any(row["class"] != NOT_RUN and row["claim"] not in detailed for row in stated):
         if names:
             command = f"radarsim claims {shlex.join(names)} --parts{configs.into(out)}"
-            say(tr("`{command}` says what was measured", command=command))
+            say(tr("`{command}` shows what was measured", command=command))
         else:
             command = f"radarsim claims {stated[0]['claim']}{configs.into(out)}"
-            say(tr("`{command}` says what was measured; --parts of all of them", command=command))
+            say(tr("`{command}` shows what was measured; --parts shows it for all of them", command=command))
 
 
 def _named(row: Mapping[str, Any]) -> str:
@@ -233,12 +236,10 @@ def print_readings(done: "Done", detailed: bool) -> None:
             say(f"{read.paper.readings.paper}: {read.counted.sentence()}")
     if done.files:
         curves = sum(name.endswith(".svg") for name in done.files)
-        drawn = plural("{count} figure drawn again", "{count} figures drawn again", curves)
+        drawn = plural("{count} figure redrawn", "{count} figures redrawn", curves)
         field("table", tr("{file}; curves: {drawn}", file=str(done.folder / "readings.csv"), drawn=drawn))
     if done.outdated:
         command = f"radarsim report {shlex.join(done.outdated)}{configs.into(done.folder.parent)}"
         told = {"configs": listed(done.outdated), "command": command}
-        words = tr(
-            "claims.csv and report.html of {configs} have the verdicts of before: `{command}` writes these", **told
-        )
+        words = tr("claims.csv and report.html of {configs} hold older verdicts: `{command}` updates them", **told)
         field("note", words)

@@ -602,7 +602,11 @@ def keys_of(
         "filters": (Members[filters], key("filters", "the filters; all see the same world")),  # type: ignore[valid-type]
         "baseline": (
             Baseline,
-            key("baseline filter", "filter that gains are against, or a list of several; default: the first", None),
+            key(
+                "baseline filter",
+                "filter against which gains are computed, or a list of several; default: the first",
+                None,
+            ),
         ),
         "scans": (Annotated[int, Whole(2, most_scans), Design()], key("number of scans", "number of plots")),
     }
@@ -857,16 +861,16 @@ def polynomial_reach_m(coefficients: tuple[float, ...], t: float) -> float:
 class Starting(Model):
     """What targets that break the model share: a moment at which they do."""
 
-    start_s: NonNegative = key("start time", "time from the first plot at which it begins, s")
+    start_s: NonNegative = key("start time", "start time, counted from the first plot, s")
 
 
 class AccelerationStart(Starting):
     """A polynomial that begins to accelerate (or brake) at a moment."""
 
-    kind: Literal["acceleration_start"] = key("kind", "a constant acceleration that sets in at a moment")
+    kind: Literal["acceleration_start"] = key("kind", "a constant acceleration that starts at a given time")
     coefficients: Coefficients = key("derivatives of the range at the first plot", COEFFICIENTS)
     acceleration_mps2: Annotated[Number, Field(ge=-HARDEST_MPS2, le=HARDEST_MPS2)] = key(
-        "acceleration", "radial acceleration added from then on, m/s²", symbol="a"
+        "acceleration", "radial acceleration added from the start time on, m/s²", symbol="a"
     )
 
     def reach_m(self, t: float) -> float:
@@ -889,7 +893,7 @@ class Turn(Starting):
         symbol="a",
         unit="g",
     )
-    duration_s: Positive = key("duration", "length of the turn, s")
+    duration_s: Positive = key("duration", "duration of the turn, s")
 
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
@@ -947,7 +951,7 @@ class Recorded(Model):
     kind: Literal["recorded"] = key(
         "kind", "a flight from a CSV file with columns t_s, x_m, y_m, z_m, the radar at the origin"
     )
-    file: Annotated[str, DataFile()] = key("file", "the file, from the folder of this one")
+    file: Annotated[str, DataFile()] = key("file", "path of the file, relative to this one")
 
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s): of what is in the file none is known here."""

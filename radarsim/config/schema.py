@@ -19,11 +19,9 @@ LARGEST_SEED = 2**64 - 1
 class Common(Model):
     """Keys that every config may have, whatever its study."""
 
-    study: Stem | None = key("study", "the study, which decides the other keys", None)
+    study: Stem | None = key("study", "the study; it determines the other keys", None)
     include: Annotated[tuple[Stem, ...], Field(min_length=1)] | None = key(
-        "included configs",
-        "stems of other configs, run together; keys of the study beside it are laid over each of them",
-        None,
+        "included configs", "stems of other configs to run together; study keys given beside it override theirs", None
     )
     sweep: Annotated[dict[str, Annotated[tuple[Anything, ...], Field(min_length=1)]], Field(min_length=1)] | None = key(
         "swept keys", "a case for each combination of values: key or dotted path, and its list of values", None

@@ -117,14 +117,16 @@ def plan(track: Track, paths: Mapping[str, Path]) -> Figure | None:
         made.append(Panel(_time(), _time(), (), keys=((tr("radar"), RADAR), *keys)))
     caption = (
         tr(
-            "Where the plots are: triangle, the radar; start and end of the longest track with their "
-            "times. Where a file tells no heights, the slant range stands for the range over ground."
+            "Positions of the plots. Triangle: the radar; start and end of the longest track with their "
+            "times. Where a file has no heights, slant range replaces ground range."
         )
         if len(made) > 1 + several
-        else tr("The range of the plots over time; the file does not tell their bearing.")
+        else tr("The range of the plots over time; the file does not give their bearing.")
     )
     columns = min(len(made), 2)
-    return Figure("plan", tr("Where"), caption, tuple(made), columns, PAGE_MM if columns > 1 else COLUMN_MM, TALL_MM)
+    return Figure(
+        "plan", tr("Positions"), caption, tuple(made), columns, PAGE_MM if columns > 1 else COLUMN_MM, TALL_MM
+    )
 
 
 def _drawn_paths(track: Track, paths: Mapping[str, Path]) -> list[Path]:
@@ -177,8 +179,8 @@ def estimates(track: Track) -> Figure:
             y = Axis(panels.with_unit(panels.letter(component), unit), limits=_usual(track.estimate[..., c]))
             made.append(Panel(_time(), y, tuple(marks), direct=False))
     caption = tr(
-        "Estimates over the recorded plots; bands: twice the standard deviation that each filter "
-        "believes (95 % if it is right)."
+        "Estimates over the recorded plots; bands: twice each filter's own standard deviation (95 % if "
+        "the filter is consistent)."
     )
     keys = [(panels.literal(name), Style(f, f)) for f, name in enumerate(track.filters[:MOST_FILTERS])]
     return _several("track", tr("Track"), caption, made, [(tr("plots"), PLOT), *keys])
@@ -207,8 +209,8 @@ def residuals(track: Track) -> Figure | None:
             )
             made.append(Panel(_time(), axis, tuple(marks), panels.literal(filter_name), direct=False))
     caption = tr(
-        "What each plot differs from the estimate after it; dashed, twice the standard deviation "
-        "that the filter believes of that: 95 % of the plots lie between if it is right."
+        "Difference of each plot from the estimate after it. Dashed: twice the filter's own standard "
+        "deviation of that difference; 95 % of the plots lie between if the filter is consistent."
     )
     if len(track.filters) > fitting:
         caption += tr(
@@ -243,9 +245,9 @@ def innovations(track: Track) -> Figure | None:
                 )
             )
     caption = tr(
-        "Normalised innovations squared, the mean of {window} plots: 1 for a filter that is right "
-        "about its errors; 95 % of such means lie between the dashed bounds. Above: plots worse than "
-        "stated, or a manoeuvre.",
+        "Normalised innovation squared, averaged over {window} plots: 1 for a consistent filter, whose "
+        "averages lie between the dashed bounds in 95 % of cases. Above: plots worse than stated, or a "
+        "manoeuvre.",
         window=WINDOW,
     )
     keys = [(panels.literal(name), Style(f, f)) for f, name in enumerate(track.filters[:MOST_FILTERS])]

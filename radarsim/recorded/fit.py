@@ -201,13 +201,13 @@ def said(found: Folding, source: str | os.PathLike, case: Case | None = None) ->
     )
     span = "" if found.span_mps is None else significant_digits(found.span_mps, "#.3g")
     if found.span_mps is None:
-        by = tr("the plots do not tell the span")
+        by = tr("the plots do not determine the span")
     elif found.known:
         by = tr("the config's span is {span} m/s", span=span)
     elif found.span_mps >= 4 * found.velocity_mps:
-        by = tr("by the plots the span is about {span} m/s, or a whole part of that", span=span)
+        by = tr("the plots suggest a span of about {span} m/s, or an integer fraction of it", span=span)
     else:
-        by = tr("by the plots the span is about {span} m/s", span=span)
+        by = tr("the plots suggest a span of about {span} m/s", span=span)
     return "; ".join([seen, by, *_unfolded(found, source, case)])
 
 
@@ -225,7 +225,7 @@ def _unfolded(found: Folding, source: str | os.PathLike, case: Case | None) -> l
     settings = " ".join(f"--set {one}" for one in (ways[0][1], *stated))
     plots = shlex.quote(os.fspath(source))
     command = f"radarsim track {ways[0][0]} {plots} -o unfolded.csv {settings}"
-    return [tr("filters that unfold them: {command}", command=command)]
+    return [tr("for filters that unfold them: {command}", command=command)]
 
 
 def _rates(tracks: Sequence[np.ndarray], least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:

@@ -41,19 +41,22 @@ def rows(followed: Followed) -> list[str]:
         longest = counted(max(one.rows for one in followed.tracks.values()))
         lines.append(labelled("tracks", tr("{count}, the longest of {rows}", count=len(followed.tracks), rows=longest)))
     if followed.passed_over:
-        lines.append(labelled("passed", tr("{rows} of no track", rows=counted(followed.passed_over))))
+        lines.append(labelled("passed", tr("{rows} outside any track", rows=counted(followed.passed_over))))
     missing = [tr("{count} of {name}", count=count, name=name) for name, count in followed.missing.items() if count]
     if missing:
         lines.append(labelled("missing", ", ".join(missing)))
     for name, columns in followed.without_plots.items():
         told = {"name": name, "columns": listed(columns)}
-        lines.append(labelled("missing", tr("{name} took no plot, as it needs {columns}: predictions alone", **told)))
+        lines.append(
+            labelled("missing", tr("{name} used no plot, because it needs {columns}: predictions only", **told))
+        )
     if followed.silent:
         names = ", ".join(followed.silent)
-        lines.append(labelled("no rows", tr("{names}: never an estimate from these plots", names=names)))
+        lines.append(labelled("no rows", tr("{names}: no estimate from these plots", names=names)))
     if followed.gaps:
         words = tr(
-            "{count} of over three times the usual interval, {usual:g} s; the longest {longest:g} s, after {at:g} s",
+            "{count} longer than three times the usual interval of {usual:g} s; the longest {longest:g} s, "
+            "after {at:g} s",
             count=followed.gaps,
             usual=followed.median_s,
             longest=followed.longest_gap_s,
@@ -72,9 +75,9 @@ def errors(followed: Followed) -> list[str]:
     """What the filters missed the truth by, where the file has it."""
     return [
         plural(
-            "{filter}, {component}: error against the truth {rms} {unit} RMS, {ratio} of what the filter believes "
+            "{filter}, {component}: error against the truth {rms} {unit} RMS, {ratio} of the filter's own σ "
             "({count} estimate)",
-            "{filter}, {component}: error against the truth {rms} {unit} RMS, {ratio} of what the filter believes "
+            "{filter}, {component}: error against the truth {rms} {unit} RMS, {ratio} of the filter's own σ "
             "({count} estimates)",
             one.count,
             filter=one.filter,
@@ -90,8 +93,12 @@ def errors(followed: Followed) -> list[str]:
 
 FINDINGS = {
     accuracy.FITS: term("the stated σ fits"),
-    accuracy.SMALL: term("the plots err more than stated, or the target manoeuvres harder than the filter allows"),
-    accuracy.LARGE: term("the plots err less than stated, or the filter allows for harder manoeuvres than there are"),
+    accuracy.SMALL: term(
+        "the plots are less accurate than stated, or the target manoeuvres harder than the filter allows for"
+    ),
+    accuracy.LARGE: term(
+        "the plots are more accurate than stated, or the filter allows for harder manoeuvres than occur"
+    ),
     accuracy.UNKNOWN: term("too few plots to decide"),
 }
 
@@ -99,7 +106,7 @@ FINDINGS = {
 def tested(one: accuracy.Judged, cured: bool) -> str:
     """One test; cured: with the σ under which it would be passed, where it is not."""
     bounds = tr(
-        "NIS {nis:.3g} of {plots}, 95 % of right filters [{lo:.3g}, {hi:.3g}]",
+        "NIS {nis:.3g} over {plots}; 95 % of consistent filters: [{lo:.3g}, {hi:.3g}]",
         nis=one.nis,
         plots=plural("{count} plot", "{count} plots", one.tests),
         lo=one.lo,
@@ -116,7 +123,7 @@ def nearest(judged: Sequence[accuracy.Judged]) -> list[str]:
     for one in judged:
         verdicts.setdefault(one.filter, set()).add(one.verdict)
     if fitting := [name for name, found in verdicts.items() if found == {accuracy.FITS}]:
-        words = tr("{names}: all tests fit", names=", ".join(fitting))
+        words = tr("{names}: consistent in all tests", names=", ".join(fitting))
         return [labelled("", words)] if len(fitting) < len(verdicts) else []
     wrong = [one for one in judged if one.better]
     if not wrong or len({one.filter for one in wrong}) < 2:
@@ -124,7 +131,7 @@ def nearest(judged: Sequence[accuracy.Judged]) -> list[str]:
     best = min((one for one in wrong), key=lambda one: abs(one.nis - 1))
     own = {key: value for one in wrong if one.filter == best.filter for key, value in one.better.items()}
     settings = " ".join(f"--set {key}={value:.4g}" for key, value in own.items())
-    words = tr("nearest is {filter}; with its better values: {settings}", filter=best.filter, settings=settings)
+    words = tr("closest is {filter}; with its fitted values: {settings}", filter=best.filter, settings=settings)
     return [labelled("", words)]
 
 
@@ -146,8 +153,8 @@ def likely(followed: Followed, advised: Advice) -> list[str]:
         lines.append(labelled("advice", fit.said(advised.folding, followed.source, followed.case)))
     elif not advised.findings:
         words = plural(
-            "nothing is wrong with the stated numbers of {filter}, as far as {count} row tell",
-            "nothing is wrong with the stated numbers of {filter}, as far as {count} rows tell",
+            "the stated values of {filter} agree with {count} row",
+            "the stated values of {filter} agree with {count} rows",
             advised.asked.rows,
             filter=compared.fullest,
         )
@@ -161,10 +168,10 @@ def _partly(followed: Followed, asked: Asked) -> list[str]:
     if asked.rows >= followed.rows:
         return []
     if asked.tracks is None:
-        words = tr("this is of the first {rows}, of {all}", rows=counted(asked.rows), all=followed.rows)
+        words = tr("from the first {rows} of {all}", rows=counted(asked.rows), all=followed.rows)
     else:
         words = tr(
-            "this is of {rows}, of {all}: the first {each} of each of {tracks} tracks, of {count}",
+            "from {rows} of {all}: the first {each} of each of {tracks} tracks out of {count}",
             rows=counted(asked.rows),
             all=followed.rows,
             each=asked.each,
@@ -189,7 +196,7 @@ def explained(one: Finding, filter_name: str) -> str:
     told = {"what": what(one.what, one.value), "times": times(one.gain)}
     if not one.from_zero:
         told["key"] = one.what
-        words = tr("{key}: the plots do not tell it from zero, which is no reason to lower it", **told)
+        words = tr("{key}: the plots cannot distinguish it from zero; that is no reason to lower it", **told)
     else:
         words = tr("{what}; the plots are then {times} times as likely", **told)
     turn = one.turning
@@ -214,13 +221,13 @@ def what(name: str, value: float) -> str:
     """What is wrong, in words: a key, or one of EXPLANATIONS, and its value."""
     if name == OUTLIERS:
         share = significant_digits(100 * value, "#.2g")
-        return tr("outliers: {share} % of the plots err by ten times their σ", share=share)
+        return tr("outliers: {share} % of the plots have errors of ten times their σ", share=share)
     if name == BIAS:
         size = significant_digits(value, "#.3g")
-        return tr("the measured velocities are off by {size} of their σ, all alike", size=size)
+        return tr("the measured velocities have a common bias of {size} of their σ", size=size)
     if name == CORRELATION:
         size = significant_digits(value, "#.2g")
-        return tr("errors last from plot to plot: those of neighbours are correlated by {size}", size=size)
+        return tr("errors persist from plot to plot: the correlation of neighbours is {size}", size=size)
     return f"--set {name}={value:.3g}"
 
 
@@ -287,7 +294,7 @@ def _tests(judged: Sequence[accuracy.Judged]) -> list[dict[str, object]]:
             "number": one.name,
             "plots": one.tests,
             "mean NIS": one.nis,
-            "of right filters from": one.lo,
+            "95 % from": one.lo,
             "to": one.hi,
             "stated σ": one.verdict,
         }

@@ -97,7 +97,7 @@ INDEPENDENT, LINKED, UNLINKED, SAME = "independent", "paired", "common noise", "
 MEANING = {
     INDEPENDENT: term("independent noise"),
     LINKED: term("paired on common noise through the common baseline; the interval covers 95 % or more"),
-    UNLINKED: term("common noise but no common baseline filter; the interval holds whatever the correlation"),
+    UNLINKED: term("common noise but no common baseline filter; the interval is valid for any correlation"),
     SAME: term("the same numbers"),
 }
 DIGITS = 9  # of a time, by which rows find one another

@@ -357,12 +357,17 @@ def extent(record: Mapping) -> str:
     short = any(case["done"] < case["asked"] for case in cases)
     if len(cases) > 1 and short:
         words = plural(
-            "{done} realisation a case of {asked} asked", "{done} realisations a case of {asked} asked", most, **said
+            "{done} realisation a case of {asked} requested",
+            "{done} realisations a case of {asked} requested",
+            most,
+            **said,
         )
     elif len(cases) > 1:
         words = plural("{done} realisation a case", "{done} realisations a case", most, **said)
     elif short:
-        words = plural("{done} realisation of {asked} asked", "{done} realisations of {asked} asked", most, **said)
+        words = plural(
+            "{done} realisation of {asked} requested", "{done} realisations of {asked} requested", most, **said
+        )
     else:
         words = plural("{done} realisation", "{done} realisations", most, **said)
     named = ", ".join(map(str, seeds[:MOST_SEEDS])) + (", …" if len(seeds) > MOST_SEEDS else "")

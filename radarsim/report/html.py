@@ -101,9 +101,9 @@ def asked(cases: Sequence[Case]) -> "dict[str, pd.DataFrame]":
             values = (keys_of[case.name].get(key, ("–", ""))[0] for key in keys)
             rows.append((case.name, *values, numeral(f"{case.realisations:,}"), case.seed))
         left = len(cases) - len(rows)
-        title = tr("In what the cases differ")
+        title = tr("How the cases differ")
         if left:
-            title = tr("In what the cases differ (first {shown}; {left} more in run.json)", shown=len(rows), left=left)
+            title = tr("How the cases differ (first {shown}; {left} more in run.json)", shown=len(rows), left=left)
         made[title] = _frame(("case", *keys, "realisations", "seed"), rows)
     return made
 

@@ -173,9 +173,10 @@ def faults(
             place = ", ".join(filter(None, (*(str(row[key]) for key in PLACE if key in row), scan)))
             said.append(
                 tr(
-                    "{table}.csv: {place}: {column} measured {measured:.6g}, exactly {exact:.6g}: {apart:.3g} standard "
-                    "errors apart; {count:,} of {rows:,} rows of this column are over {bound:.3g}, the most that "
-                    "chance makes of {many:,}: the simulation or the exact value is computed wrongly",
+                    "{table}.csv: {place}: {column} measured {measured:.6g}, exactly {exact:.6g}: "
+                    "{apart:.3g} standard errors apart; {count:,} of {rows:,} rows of this column exceed "
+                    "{bound:.3g}, the most that chance explains in {many:,}: the simulation or the exact value is "
+                    "wrong",
                     table=name,
                     place=place,
                     column=of.value,
@@ -504,7 +505,7 @@ def few(results: Sequence[CaseResult]) -> list[str]:
     if not rough:
         return []
     words = tr(
-        "{cases}: intervals of {counts} realisations are rough, use at least {least}",
+        "{cases}: intervals from {counts} realisations are rough: run at least {least}",
         cases=_named(list(rough)),
         counts=files.span(list(rough.values())),
         least=FEW,
@@ -521,20 +522,20 @@ def rests(results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", ans
     enough = np.max(np.concatenate([needed(rows, made, results) for rows in found]))  # not-a-number if one is
     if np.isfinite(enough):
         words = plural(
-            "{count} interval of the answer is too narrow, as few realisations decide it ({filters}): -n {needed} "
-            "would do",
-            "{count} intervals of the answer are too narrow, as few realisations decide them ({filters}): -n {needed} "
-            "would do",
+            "{count} interval of the answer is too narrow because few realisations decide it ({filters}): "
+            "run with -n {needed}",
+            "{count} intervals of the answer are too narrow because few realisations decide them "
+            "({filters}): run with -n {needed}",
             count,
             filters=names,
             needed=roughly(float(enough)),
         )
     else:
         words = plural(
-            "{count} interval of the answer may be too narrow: rare realisations decide it, and few or none were seen "
-            "({filters}); it takes more of them, -n",
-            "{count} intervals of the answer may be too narrow: rare realisations decide them, and few or none were "
-            "seen ({filters}); it takes more of them, -n",
+            "{count} interval of the answer may be too narrow because rare realisations decide it and few or "
+            "none occurred ({filters}): raise -n",
+            "{count} intervals of the answer may be too narrow because rare realisations decide them and few "
+            "or none occurred ({filters}): raise -n",
             count,
             filters=names,
         )

@@ -244,8 +244,8 @@ def reported(results: Sequence[CaseResult], most: int = 3) -> tuple[list[CaseRes
     if len(results) <= most:
         return list(results), []
     left = plural(
-        "The case between: in the report's tables.",
-        "The {count} cases between: in the report's tables.",
+        "The case in between is in the report's tables.",
+        "The {count} cases in between are in the report's tables.",
         len(results) - 2,
     )
     return [results[0], results[-1]], [left]
@@ -317,7 +317,7 @@ def left_out(every: Sequence[str], some: Sequence[str]) -> str:
     if not gone:
         return ""
     told = {"count": len(every) - len(gone), "all": len(every), "names": seen.named(map(plain, gone), MOST_GONE)}
-    return " " + tr("Shown: {count} of {all}; in the tables alone: {names}.", **told)
+    return " " + tr("Shown: {count} of {all}; only in the tables: {names}.", **told)
 
 
 def names_of(results: Sequence[CaseResult]) -> list[str]:
@@ -433,7 +433,7 @@ def differing(drawn: Sequence[Panel]) -> tuple[list[Panel], str]:
     """The panels, or the first alone where all show the same within their intervals; and words on that."""
     if len(drawn) < 2 or not all(_same(drawn[0], other) for other in drawn[1:]):
         return list(drawn), ""
-    said = tr("Alike within the intervals in all {count} cases: the first is shown.", count=len(drawn))
+    said = tr("Equal within the intervals in all {count} cases; the first is shown.", count=len(drawn))
     return [replace(drawn[0], title="")], f" {said}"
 
 
@@ -466,7 +466,7 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: 
     panels = [panel for panel in panels if panel.marks]
     caption = tr(
         "Root-mean-square error of the {quantity} about the truth against time, of {realisations}. "
-        "Bands: 95 % intervals, where not seen narrower than the line.",
+        "Bands: 95 % intervals; a band that is not visible is narrower than the line.",
         quantity=of.words,
         realisations=realisations(results),
     )
@@ -542,11 +542,11 @@ def nees_panels(results: Sequence[CaseResult], rows: Mapping) -> list[Panel]:
 def nees_figure(drawn: Sequence[Panel], left_out: str) -> Figure:
     """The figure `consistency` of such panels; what is left out of them goes into its caption."""
     caption = tr(
-        "Mean of the normalised squared error eᵀP⁻¹e per estimated component, P the covariance that "
-        "the filter believes; one (dotted) for a filter that is right about itself, more for an "
-        "optimistic one, less for a pessimistic one."
+        "Mean of the normalised squared error eᵀP⁻¹e per estimated component, with the filter's own "
+        "covariance P: one (dotted) for a consistent filter, more for an optimistic one, less for a "
+        "pessimistic one."
     )
-    title = tr("What the filters believe of themselves")
+    title = tr("Consistency of the filters")
     return in_columns(Figure("consistency", title, caption + left_out, tuple(drawn)))
 
 
@@ -686,8 +686,9 @@ def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of
     if not drawn:
         return None
     caption = tr(
-        "Errors of the {quantity} in cases whose mean error somewhere exceeds the spread: mean error (dynamic, bias) "
-        "and standard deviation (fluctuation, spread) of {realisations}; σ² is the sum of their squares.",
+        "Errors of the {quantity} in cases with a mean error above the spread at some time: mean error "
+        "(dynamic, bias) and standard deviation (fluctuation, spread) of {realisations}; σ² is the sum "
+        "of their squares.",
         quantity=of.words,
         realisations=realisations(results),
     )

@@ -156,7 +156,8 @@ def warnings(made: "pd.DataFrame | None") -> list[str]:
         return []
     return [
         tr(
-            "{case}: the mean weight is {mean:.4g} ± {error:.2g}, not one: no rate of a rare event is right here",
+            "{case}: the mean weight is {mean:.4g} ± {error:.2g} instead of one: do not use the rates of "
+            "rare events here",
             case=worst["case"],
             mean=worst["mean_weight"],
             error=worst["mean_weight_se"],

@@ -19,7 +19,7 @@ def test_a_rate_of_what_the_pilot_never_saw_has_its_bound():
     """Folds at 20 kHz are 300 m/s apart, 20 σ or more: none is wrong, however many the pilot has."""
     options = ("--precision", 10, "--of", "wrong", "-n", 2000, "--set", "radar.repetition_rate_hz=20000")
     text = command("check", "ambiguous_rls5", *options).output
-    assert "none seen: below 0.0" in text
+    assert "none observed: below 0.0" in text
     assert "out of reach" not in text
 
 

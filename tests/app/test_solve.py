@@ -222,7 +222,10 @@ def test_a_key_that_moves_the_scans_is_said_not_to_be_paired():
     sampled = {"sampled": True, "realisations": 200, "threads": 1}
     said = []
     found = solve("rls2", "radar.scan_period_s", SEEN, 190, told=said.append, **MOVED, **sampled)
-    words = "radar.scan_period_s moves the scans, whose noise differs: each value has 800 realisations, 4 times as many"
+    words = (
+        "radar.scan_period_s moves the scans, so the noise differs between values: "
+        "each value gets 800 realisations, 4 times as many"
+    )
     assert found.notes == (words,)
     assert said[-1] == words
     assert found.lo <= exact.value <= found.hi
@@ -425,7 +428,7 @@ def test_what_takes_long_is_foretold_with_its_time_and_what_it_is(monkeypatch):
     said = []
     late = {"overrides": [*MISSED, "scans=17"], "between": (10, 20), "told": said.append}
     found = solve("rls2", "radar.sigma_velocity_mps", Wanted("gain", None, "r"), 15, **late)
-    words = "a mean over patterns of plots, of which nearly equal ones are merged: right to about a ten-thousandth"
+    words = "averaged over detection patterns, similar ones merged; accurate to about 1e-4"
     assert found.notes == (f"σ is {words}",)
     assert found.attained == pytest.approx(15, abs=1e-6)  # first looked for roughly, then of the exact quantity
     monkeypatch.setattr(question, "LONG_S", 0.0)

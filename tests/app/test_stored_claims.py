@@ -114,4 +114,4 @@ def test_claims_that_cannot_be_judged_stand_in_one_line_a_reason(tmp_path):
     assert first.startswith(
         f"foreign: not judged: P1.1–{of.claims[-1].id}: not the paper's experiment: foreign: target.kind"
     )
-    assert last == "no claims are judged by this"
+    assert last == "this experiment judges no claims"

@@ -25,7 +25,7 @@ def test_a_decimal_comma_is_told(tmp_path):
     ]
 
 
-@pytest.mark.parametrize(("ranges", "silent"), [(("", "", "", ""), "no rows  r: never an estimate"), ("9876", None)])
+@pytest.mark.parametrize(("ranges", "silent"), [(("", "", "", ""), "no rows  r: no estimate from"), ("9876", None)])
 def test_a_filter_without_a_row_is_named(tmp_path, ranges, silent):
     rows = "".join(f"{10 * k},{r},-250\n" for k, r in enumerate(ranges))
     (tmp_path / "plots.csv").write_text("t_s,range_m,velocity_mps\n" + rows)

@@ -216,7 +216,7 @@ def united(shares, to, *numbers):
     return to
 
 
-MISSING = "realisations 32,768 to 65,535, as if share 2 of 3 had not been copied"
+MISSING = "realisations 32,768 to 65,535; perhaps share 2 of 3 was not copied"
 
 
 def test_a_run_says_which_share_its_store_lacks_and_computes_it(shares, tmp_path):
@@ -297,7 +297,7 @@ def test_doctor_names_what_is_not_stored_before_what_is(shares, tmp_path):
     command("run", "rls2", "-n", 3000, *PLAIN, "--out", united(shares, tmp_path, 1, 3))
     text = command("doctor", tmp_path / "rls2").stdout
     assert "realisations 32,768 to 65,535 are not stored, but later ones are" in text
-    assert "all whole" in text
+    assert "all intact" in text
     before = command("doctor", united(shares, tmp_path / "new", 1, 3) / "rls2", code=2)
     assert f"`radarsim check CONFIG --out {tmp_path / 'new'}` says what is stored there" in before.stderr
     command("run", "rls2", "-n", "1e5", *PLAIN, "--out", tmp_path)

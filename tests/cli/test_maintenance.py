@@ -50,7 +50,7 @@ def contents(out):
 def test_a_whole_result_is_told_so_and_nothing_is_changed(out):
     before = contents(out)
     result = command("doctor", out / "rls2", "--recompute", 3)
-    assert "all whole" in result.stdout
+    assert "all intact" in result.stdout
     assert "computed again: 3 pieces" in result.stdout
     found = json.loads(command("doctor", out / "rls2", "--recompute", 99, "--json").stdout)
     assert (found["realisations"], found["faults"], found["notes"]) == (50_001, [], [])
@@ -78,7 +78,7 @@ def test_a_hundred_of_a_hundred_damaged_files_are_named_and_come_again(out):
     assert {line.split(":")[0] for line in result.stderr.splitlines()} == set(map(str, files))
     command("run", "rls2", "-n", 50_001, "--no-figures", "--quiet", "--out", out)
     assert csv_bytes(out / "rls2") == {p.name: good[p] for p in outputs if p.suffix == ".csv"}
-    assert "all whole" in command("doctor", out / "rls2").stdout
+    assert "all intact" in command("doctor", out / "rls2").stdout
 
 
 def test_forged_sums_are_found_by_computing_them_again(out):
@@ -144,7 +144,7 @@ def test_a_record_beyond_reading_is_made_anew_as_told(out):
     command("report", "rls2", "-n", 50_001, "--no-figures", "--out", out)
     command("run", "rls1", "-n", 50_001, "--no-figures", "--quiet", "--out", out)  # the index reads all records
     assert contents(out / "rls2").keys() == whole
-    assert "all whole" in command("doctor", out / "rls2").stdout
+    assert "all intact" in command("doctor", out / "rls2").stdout
 
 
 def test_what_is_no_file_is_not_waited_for(out):
@@ -166,7 +166,7 @@ def test_outputs_that_a_run_is_writing_are_looked_at_again(out, monkeypatch):
     path.write_bytes(whole + b"\n")
     looks = iter([lambda: None, lambda: path.write_bytes(whole)])
     monkeypatch.setattr(doctor.time, "sleep", lambda seconds: next(looks)())
-    assert "all whole" in command("doctor", out / "rls2").stdout
+    assert "all intact" in command("doctor", out / "rls2").stdout
 
 
 def test_blocks_of_other_sources_cannot_be_computed_again(out, monkeypatch):

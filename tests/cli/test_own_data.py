@@ -183,7 +183,9 @@ def test_the_command_tells_gaps_missing_values_and_draws(tmp_path):
     result = command("track", "rls2", source, "-o", track, "--figures", figures)
     assert "plots    50 rows over 590 s, from 0 s" in result.stdout
     assert "missing  1 of velocity_mps" in result.stdout
-    assert "gaps     1 of over three times the usual interval, 10 s; the longest 110 s, after 180 s" in result.stdout
+    assert (
+        "gaps     1 longer than three times the usual interval of 10 s; the longest 110 s, after 180 s" in result.stdout
+    )
     assert "NIS" in result.stdout
     assert {path.name for path in figures.iterdir()} == {
         f"{n}.{k}" for n in ("plan", "track", "residuals", "nis") for k in ("svg", "png")

@@ -96,11 +96,11 @@ def test_readings_of_a_claim_and_their_curve(claim, tmp_path):
 REASONS = (
     "not the paper's experiment: rls1: radar.sigma_range_m is 30, the paper's 200, seed is 2, the paper's 1 …; "
     "and 2 more",
-    "not the paper's experiment: rls2 D_M=1: 2 of the paper's 3 filters changed or not there",
-    "not the paper's experiment: rls2: target another one than the paper's",
+    "not the paper's experiment: rls2 D_M=1: 2 of the paper's 3 filters changed or missing",
+    "not the paper's experiment: rls2: target differs from the paper's",
     "rls2 ends at 50 s, the paper's run at 140 s",
     "not the paper's experiment: no such experiment is shipped",
-    "a case that it needs is not there",
+    "a required case is missing",
     "exact value and simulation differ by more than 5.85 standard errors: exact 1.5, simulated 2 [1.9, 2.1]",
 )
 

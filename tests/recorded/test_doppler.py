@@ -58,7 +58,10 @@ def test_the_span_is_that_of_the_config_or_of_the_plots(flown, span):
 def test_track_and_fit_notice_folded_velocities(flown, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     plots.write_columns(folded(flown), "folded.csv")
-    for config, span in ((options(*KNOWING), "the config's span is 60.0 m/s"), (options(), "by the plots the span is")):
+    for config, span in (
+        (options(*KNOWING), "the config's span is 60.0 m/s"),
+        (options(), "the plots suggest a span of"),
+    ):
         text = command("track", "rls2", "folded.csv", "-o", "track.csv", *config).stdout
         assert "the velocities are folded: none is beyond ±" in text
         assert span in text

@@ -88,7 +88,7 @@ def test_the_report_shows_what_the_terminal_says(tmp_path):
     page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
     assert "What do the filters of sonar_smoothing make of plots &lt;b&gt;.csv?" in page
     assert "Best: " in page
-    assert re.search(r"Advice: nothing is wrong with the stated numbers of \w+.*, as far as 40 rows tell\.", page)
+    assert re.search(r"Advice: the stated values of \w+.* agree with 40 rows\.", page)
     for name in ("plan", "track", "residuals", "nis"):
         assert f'id="figure-{name}"' in page
         assert (tmp_path / f"out/figures/{name}.png").stat().st_size > 1000

@@ -267,7 +267,7 @@ def test_the_wrong_number_is_named_in_95_of_100(tmp_path, options, expected):
 def test_an_all_clear_says_whose_numbers_it_clears(tmp_path):
     found, followed = advised(tmp_path, recording(np.random.default_rng(4)))
     (line,) = (line for line in page.likely(followed, found) if line.startswith("advice"))
-    assert "nothing is wrong with the stated numbers of r+Vr, as far as 60 rows tell" in line
+    assert "the stated values of r+Vr agree with 60 rows" in line
 
 
 def test_a_quiet_recording_is_no_reason_to_lower_the_manoeuvre_variance(tmp_path):
@@ -279,7 +279,7 @@ def test_a_quiet_recording_is_no_reason_to_lower_the_manoeuvre_variance(tmp_path
     assert (one.what, one.from_zero) == ("manoeuvre_variance", False)
     text = "\n".join(page.likely(followed, found))
     assert "--set" not in text
-    assert "the plots do not tell it from zero" in text
+    assert "the plots cannot distinguish it from zero" in text
     assert "in a turn of 3 g without missed plots the largest error of r+Vr in r would be" in text
     # As `fit` has it, whose interval has no lower end.
     assert fit.fitted(likelihood(columns, config=config)).keys[2].lo == 0

@@ -33,7 +33,7 @@ EXTREMES = (
     "{quantity}: highest {high} ({name}), lowest {low} ({other}).",
     "{quantity}: from {low} to {high} ({name}).",
 )
-SHOWN = "Shown: {count} of {all}; in the tables alone: {names}."
+SHOWN = "Shown: {count} of {all}; only in the tables: {names}."
 
 
 class Row(NamedTuple):
@@ -97,7 +97,7 @@ def drawn(result, figure, caption):
     component = (table_of(figure, result.experiment.study) or (None,) * 3)[2]
     cases = [one for one in result.cases if one.name in {case.name for case in result.experiment.shown_in(figure)}]
     cases = [one for one in cases if component is None or component in dict(one.axes.components)]
-    if tr("Alike within the intervals in all {count} cases: the first is shown.", count=len(cases)) in caption:
+    if tr("Equal within the intervals in all {count} cases; the first is shown.", count=len(cases)) in caption:
         return cases[:1]
     if (left := found(SHOWN, caption + " ")) is None:
         return cases

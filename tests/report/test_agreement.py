@@ -62,7 +62,7 @@ def test_each_row_of_each_table_counts(expected_radar):
     wrong = changed(radar, exact_sigma=radar.axes.exact_sigma * one)
     (line,) = notes.faults(made(wrong))
     assert line.startswith("curves.csv: rls2, r+Vr, Vr, k = 8 (70 s): sigma measured ")
-    assert "1 of 85 rows of this column are over 5.85" in line
+    assert "1 of 85 rows of this column exceed 5.85" in line
     moved = changed(radar, exact_bias=radar.axes.exact_bias + 0.05 * radar.axes.exact_sigma * (one > 1))
     (line,) = notes.faults(made(moved))
     assert line.startswith("curves.csv: rls2, r+Vr, Vr, k = 8 (70 s): bias measured ")
@@ -165,11 +165,11 @@ def test_python_raises_with_the_result(monkeypatch):
         return replace(axes, exact_sigma=1.05 * axes.exact_sigma)
 
     monkeypatch.setattr(study, "axes", wrong)
-    with pytest.raises(DisagreementError, match=r"curves\.csv: rls2, .* computed wrongly") as raised:
+    with pytest.raises(DisagreementError, match=r"curves\.csv: rls2, .* the exact value is wrong") as raised:
         radarsim.run("rls2", realisations=100_000)
     assert isinstance(raised.value.result, Result)
     assert len(raised.value.result.curves) == 85
-    assert "computed wrongly" in raised.value.result.warnings[0]
+    assert "the exact value is wrong" in raised.value.result.warnings[0]
 
 
 def test_one_config_that_disagrees_does_not_stop_the_others(tmp_path, monkeypatch):

@@ -155,7 +155,7 @@ def test_what_was_judged_of_other_words_is_no_class():
 def test_a_run_without_any_class_says_that_it_is_judged_as_shipped_alone(monkeypatch, tmp_path):
     monkeypatch.setattr(stored_readings, "shipped_classes", lambda: ())
     text = printed("run", "rls2", "-n", 60, "--no-figures", "--out", tmp_path)
-    assert "as shipped alone: P1.18, P1.23, P1.28; `radarsim readings P1` judges" in text
+    assert "only as shipped: P1.18, P1.23, P1.28; `radarsim readings P1` judges" in text
     assert "P1.18  refuted as shipped    RLS" in printed("claims", "rls2", "--out", tmp_path)
     assert "P1.18  refuted as shipped; other readings not judged: RLS" in printed(
         "claims", "rls2", "--parts", "--out", tmp_path

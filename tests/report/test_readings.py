@@ -114,7 +114,7 @@ def test_a_claim_over_its_readings():
     assert one.sentence() == "holds in 1 of 2 readings; depends on: scale"
     never = over(of, claim(2, "10"))
     assert never.outcome.kind == REFUTED
-    assert "against the print it holds with scale: ten" in never.sentence()
+    assert "it holds, against the print, with scale: ten" in never.sentence()
 
 
 def test_the_rule_looks_at_all_readings_once(monkeypatch):
@@ -234,7 +234,7 @@ def test_the_best_combination(search):
     assert search.best(granular=False) == (1, 1)  # of two with two, none nearer the shipped: the first
     assert search.words((1, 1)) == "scale: 2; form: square"
     assert "6 readings" in search.sentence()
-    assert "1 of 2 come out as shipped, 2 with scale: 2; form: square" in search.sentence()
+    assert "as shipped 1 of 2 match to the printed digit, 2 with scale: 2; form: square" in search.sentence()
 
 
 def test_windows(search):
@@ -253,6 +253,6 @@ def test_the_page_holds_it_all(search):
     assert table
     every = [over(of, claim(2, "1"))]
     without = page(of, "Nobody 1900", every, joint(of, every))
-    assert "3 readings: to the print 1 of 1 numbers come out as shipped, and no reading" in without
+    assert "3 readings: as shipped 1 of 1 numbers match the print, and no reading" in without
     assert re.search(r"^\| as shipped \| E \| 1 of 1 \|", without, flags=re.MULTILINE)
     assert "| P9.2 | number 1 | 1 ± 0.5 m | **1** |" in without

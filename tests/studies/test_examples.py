@@ -57,7 +57,7 @@ def test_a_filter_whose_column_a_file_lacks_is_named(radarsim, tmp_path):
     (tmp_path / "up.csv").write_text("\n".join(lines) + "\n")
     said = radarsim("track", "chirp", "up.csv", "-o", "track.csv", cwd=tmp_path)
     words = said.stdout + said.stderr
-    assert "down took no plot, as it needs z_down_m: predictions alone" in words
+    assert "down used no plot, because it needs z_down_m: predictions only" in words
     assert "up took no plot" not in words
     whole = radarsim("track", "chirp", "plots.csv", "-o", "track.csv", cwd=tmp_path)
     assert "took no plot" not in whole.stdout + whole.stderr
@@ -238,7 +238,7 @@ def test_claims_and_reports_are_told_to_be_of_before_only_where_they_are_of_the_
     facts["outputs"]["claims.csv"] = hashlib.sha256(table.read_bytes()).hexdigest()
     record.write_text(json.dumps(facts))
     readings = ("readings", "chirp.1", "-n", 100, "--no-figures", "--out", tmp_path)
-    words = f"claims.csv and report.html of chirp have the verdicts of before: `radarsim report chirp --out {tmp_path}`"
+    words = f"claims.csv and report.html of chirp hold older verdicts: `radarsim report chirp --out {tmp_path}`"
     assert words in " ".join(radarsim(*readings).stdout.split())
     facts["resolved"]["cases"][0]["radar"]["sigma_range_m"] = 51.0  # run before the config was changed
     record.write_text(json.dumps(facts))

@@ -137,7 +137,7 @@ def test_the_tab_key_completes_its_configs(radarsim, tmp_path):
 
 def test_doctor_and_clean(radarsim, tmp_path):
     radarsim("run", "fifth", "-n", N, "--no-figures", "--out", tmp_path)
-    assert "all whole" in radarsim("doctor", tmp_path / "fifth", "--recompute", 2).stdout
+    assert "all intact" in radarsim("doctor", tmp_path / "fifth", "--recompute", 2).stdout
     assert "dropped" in radarsim("clean", "fifth", "--out", tmp_path).stdout
     assert not list((tmp_path / ".blocks").rglob("*.sums"))
 

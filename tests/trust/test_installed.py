@@ -68,7 +68,7 @@ def proved(python, place):
     assert {one["study"] for one in report["self-test"] if "known" in one["words"]} >= set(selftest.TOLERANCES)
     told(python, place, "radarsim", "run", "rls2", "-n", 10_000, "--out", "results")
     told(python, place, "radarsim", "run", "rls2", "-n", 20_000, "--out", "results", "--workers", 1, "--no-figures")
-    assert "all whole" in told(python, place, "radarsim", "doctor", "results/rls2", "--recompute", 1)
+    assert "all intact" in told(python, place, "radarsim", "doctor", "results/rls2", "--recompute", 1)
     told(python, place, "radarsim", "simulate", "sonar_smoothing", "-o", "plots.csv")
     told(python, place, "radarsim", "track", "sonar_smoothing", "plots.csv", "-o", "track.csv", "--figures", "drawn")
     told(python, place, "radarsim", "new", "mine", "--like", "multimodel")

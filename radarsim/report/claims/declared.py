@@ -349,9 +349,9 @@ def _lacking(mine: Described, papers: Described, may_grow: Sequence[str]) -> lis
     for key in may_grow:
         missing = len(papers.members[key]) - len(_places(papers.members[key], mine.members[key]))
         if missing:
-            said.append(f"{missing} of the paper's {len(papers.members[key])} {key} changed or not there")
+            said.append(f"{missing} of the paper's {len(papers.members[key])} {key} changed or missing")
     if not equal(mine.named, papers.named):
-        said.append(f"{', '.join(papers.named)} another one than the paper's")
+        said.append(f"{', '.join(papers.named)} differs from the paper's")
     return said
 
 

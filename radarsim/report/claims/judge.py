@@ -177,7 +177,7 @@ def _tried(part: Part, seen: Evidence | None, changed: str) -> _Tried:
         cases = [seen.case(key) for key in part.cases]
         of = weighed(part, seen, measured, min((case.count for case in cases), default=0))
     except Missing as missing:
-        other = NOT_THE_PAPERS.format(changed=changed) if changed else "a case that it needs is not there"
+        other = NOT_THE_PAPERS.format(changed=changed) if changed else "a required case is missing"
         reason = missing.why or other
         return _Tried(part, why=reason)
     except MeasureError as error:

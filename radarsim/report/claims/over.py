@@ -242,8 +242,8 @@ class Seen:
 
 
 # ---- search ----------------------------------------------------------------------------------------------------------
-TO_THE_DIGIT = term("to the printed digit {count} of {of} come out as shipped")
-TO_THE_STEPS = term("to the steps of the print {count} of {of} come out as shipped")
+TO_THE_DIGIT = term("as shipped {count} of {of} match to the printed digit")
+TO_THE_STEPS = term("as shipped {count} of {of} match to the steps of the print")
 
 
 @dataclass(frozen=True)
@@ -743,7 +743,7 @@ def _misfit(annotation: Any, value: Any) -> str:
 
 
 # ---- over ------------------------------------------------------------------------------------------------------------
-NOTHING = "there is nothing to measure it by"
+NOTHING = "there is nothing to measure it with"
 FIRST = ("claim", "part", "reading", "kind")
 LAST = (
     *("measured", "lo", "hi", "exact", "expected_lo", "expected_hi", "margin", "verdict"),
@@ -871,7 +871,7 @@ class Over:
         held = [one for one in self.against_print if one.outcome and one.outcome.kind == rule.CONFIRMED]
         if held and found.holds_in == 0:
             names = " | ".join(one.name for one in held)
-            words.append(tr("against the print it holds with {readings}", readings=names))
+            words.append(tr("it holds, against the print, with {readings}", readings=names))
         if self.impossible:
             words.append(tr("{count} not possible", count=len(self.impossible)))
         return "; ".join(words)
@@ -882,7 +882,10 @@ class Over:
             return ""
         told, needed = {"count": len(self.undecided), "n": f"{self.looked:,}"}, self.outcome.needed
         if needed is None:
-            return tr("{count} open at {n} realisations, a value on a border: no number would decide", **told)
+            return tr(
+                "{count} open at {n} realisations: a value lies on a border, and more realisations would not decide",
+                **told,
+            )
         return tr(
             "{count} open at {n} realisations, about {needed} would decide", **told, needed=f"{rule.roughly(needed):,}"
         )
@@ -947,8 +950,8 @@ def _depth(judged: Judged) -> tuple[float, float, float]:
 # ---- joint -----------------------------------------------------------------------------------------------------------
 Key = tuple[str, str]  # the claim, and the number within it
 
-TO_THE_PRINT = term("to the print {count} of {of} numbers come out as shipped")
-WITHIN = term("within the margins of the words {count} of {of} numbers come out as shipped")
+TO_THE_PRINT = term("as shipped {count} of {of} numbers match the print")
+WITHIN = term("as shipped {count} of {of} numbers are within the margins of the words")
 
 
 @dataclass(frozen=True)

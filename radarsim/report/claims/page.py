@@ -63,9 +63,9 @@ def specification(of: PaperReadings, over: Over) -> Figure:
         name=over.claim.id,
         title=tr("{claim} under every reading", claim=over.claim.id),
         caption=tr(
-            "{statement}. {outcome}. Above: how far the worst part of the claim is from what the paper says, in "
-            "margins of that part, cut at ± {furthest:g}; under 0 it holds, over 1 it fails beyond the margin. Below: "
-            "what each reading takes.",
+            "{statement}. {outcome}. Above: distance of the claim's worst part from the paper's words, in "
+            "margins of that part, cut at ± {furthest:g}; below 0 it holds, above 1 it fails beyond the "
+            "margin. Below: the choices of each reading.",
             statement=tr(over.claim.statement),
             outcome=over.sentence().capitalize(),
             furthest=FURTHEST,
@@ -539,9 +539,10 @@ def figure(rows: Sequence[Mapping]) -> Figure | None:
         title=tr("Claims, in margins of what their papers say"),
         caption=plural("Of {count} claim: {counted}. ", "Of {count} claims: {counted}. ", len(judged), counted=counted)
         + tr(
-            "Of each claim the part that lies furthest from the paper's words: measured, with the interval that is "
-            "judged, and exactly, in margins of that part, cut at ± {furthest:g}. Under 0 it is as the words say, "
-            "up to 1 within their margin. The mark is the class of the claim, over all readings that its paper allows.",
+            "For each claim, the part furthest from the paper's words: the measured value with the judged "
+            "interval, and the exact value, in margins of that part, cut at ± {furthest:g}. Below 0 it "
+            "agrees with the words, up to 1 it is within their margin. The marker shows the claim's class "
+            "over all readings that its paper allows.",
             furthest=FURTHEST_IN_FOREST,
         ),
         panels=tuple(panels),

@@ -18,15 +18,16 @@ RANGES = re.compile(r"[\d.,e… +-]+")
 PRINTED = (term("claim"), term("number"), term("printed"))  # columns
 KINDS = term("E: equivalent in every respect; U: the paper does not say; N: against its print.")
 COUNTED = term(
-    "Counted are the numbers, limits and comparisons that the claims of this page assert, each once. One comes out to "
-    "the print where its 95 % interval, all of a claim's at once, or its exact value lies in the range that the print "
-    "rounds to; within margins where it lies in the margin of the words; undecided where the interval is too wide to "
-    "say. Below: bold to the print, plain within margins, – beyond them, ? undecided."
+    "The count covers the numbers, limits and comparisons that the claims of this page assert, each "
+    "once. A number matches the print if its exact value, or its 95 % interval (joint over the "
+    "claim), lies in the range that rounds to the print. It is within margins if it lies in the "
+    "margin of the words, and undecided if the interval is too wide. Below: bold, matches the print; "
+    "plain, within margins; –, beyond them; ?, undecided."
 )
 INTRODUCTION = term(
-    "Written by `radarsim readings {paper} --markdown`; every number by reading stands in "
-    "`results/readings/readings.csv`, and beside it a specification curve a claim. The rule: "
-    "[how a claim is judged](verdicts.md)."
+    "Written by `radarsim readings {paper} --markdown`; every number by reading is in "
+    "`results/readings/readings.csv`, beside a specification curve for each claim. The rule: [how a "
+    "claim is judged](verdicts.md)."
 )
 
 
@@ -37,7 +38,7 @@ def page(of: PaperReadings, cited: str, over: Sequence[Over], counted: Search | 
     parts += [tr("## Claims over all readings"), _claims(over)]
     changed = _changed(over)
     if changed:
-        words = tr("What would have to be changed: readings against the print under which a claim comes out otherwise.")
+        words = tr("What would have to change: readings against the print that give a claim another verdict.")
         parts += [words, changed]
     impossible = _impossible(over)
     if impossible:
@@ -46,7 +47,7 @@ def page(of: PaperReadings, cited: str, over: Sequence[Over], counted: Search | 
         numbers, windows = f"{_best(counted)}\n\n{_printed(counted)}", _alternatives(counted)
     else:
         numbers, windows = _numbers(counted), _windows(counted)
-    parts += [tr("## Printed numbers by reading"), numbers, tr("## Where each number comes out"), windows]
+    parts += [tr("## Printed numbers by reading"), numbers, tr("## Where each number matches"), windows]
     parts += [*left_open(of)]
     return "\n\n".join(parts) + "\n"
 
@@ -87,7 +88,7 @@ def _changed(over: Sequence[Over]) -> str:
         for reading in one.against_print
         if reading.outcome is not None
     ]
-    return table((term("claim"), term("reading"), term("comes out")), rows) if rows else ""
+    return table((term("claim"), term("reading"), term("matches")), rows) if rows else ""
 
 
 def _impossible(over: Sequence[Over]) -> str:
@@ -152,7 +153,7 @@ def _alternatives(of: Joint) -> str:
         for key, number in of.numbers.items()
         if any(own[key] not in ("all", "none") for own in kept.values())
     ]
-    words = tr("Values of one choice, all others as shipped, with which a number comes out to the print.")
+    words = tr("Values of one choice, all others as shipped, for which a number matches the print.")
     return f"{words}\n\n{table((*PRINTED[:2], *kept), rows)}"
 
 
@@ -168,7 +169,7 @@ def _numbers(search: Search) -> str:
     for number, one in enumerate(search.printed):
         cells = [_value(search, number, place) for place in places.values()]
         rows.append((one.claim, tr(one.what), expected(one.printed, one.unit), *cells))
-    for rule, name in ((False, tr("come out to the digit")), (True, tr("come out to the print's steps"))):
+    for rule, name in ((False, tr("match to the digit")), (True, tr("match to the print's steps"))):
         counts = [str(int(search.count(rule)[place])) for place in places.values()]
         rows.append(("", name, str(len(search.printed)), *counts))
     words = [f"*{tr(name)}*: {search.words(place)}." for name, place in places.items() if place != search.place]
@@ -194,10 +195,10 @@ def _windows(search: Search) -> str:
         for number, one in enumerate(search.printed)
         if any(own[number] != "all" for own in kept.values())
     ]
-    words = tr("Values of one choice, all others as shipped, with which a number comes out to the printed digit.")
+    words = tr("Values of one choice, all others as shipped, for which a number matches to the printed digit.")
     never = int(np.sum(~search.strict.reshape(len(search.printed), -1).any(axis=1)))
     if never:
-        words += plural(" {count} comes out under no combination.", " {count} come out under no combination.", never)
+        words += plural(" {count} matches under no combination.", " {count} match under no combination.", never)
     return f"{words}\n\n{table((*PRINTED[:2], *kept), rows)}"
 
 
@@ -212,7 +213,7 @@ def _listed(window: str) -> str:
 
 def _choice(choice: Choice) -> str:
     rows = [(one.name, one.kind, tr(one.reason)) for one in choice.alternatives]
-    on = tr(" Bears on {claims}.", claims=", ".join(choice.claims)) if choice.claims else ""
+    on = tr(" Affects {claims}.", claims=", ".join(choice.claims)) if choice.claims else ""
     quoted = (
         choice.original
         if current() == PAPERS or choice.original == choice.english

@@ -430,17 +430,17 @@ WHOLE = (  # `changed` is made of differences, case by case
     term("filter {name} is the baseline: it has no gain"),
 )
 DIFFERENCES = (
-    term("{missing} of the paper's {count} {key} changed or not there"),
-    term("{key} another one than the paper's"),
+    term("{missing} of the paper's {count} {key} changed or missing"),
+    term("{key} differs from the paper's"),
     term("{key} is {own}, the paper's {printed}"),
 )
 AND_MORE = term("and {count} more")
 SAID_WHOLE = (
-    *(term("no such experiment is shipped"), term("a case that it needs is not there"), term("there is no gain")),
-    *(term("there is nothing to measure it by"), term("no such scans"), term("not known exactly")),
+    *(term("no such experiment is shipped"), term("a required case is missing"), term("there is no gain")),
+    *(term("there is nothing to measure it with"), term("no such scans"), term("not known exactly")),
     *(term("no Kalman filter with manoeuvre variance"), term("gains against growing memory")),
     *(term("the run ends before the manoeuvre does"),),
-    term("(15) has no root: with the phase in it, its left side is over c at every length"),
+    term("(15) has no root: with the phase in it, its left side exceeds c at every length"),
 )
 
 

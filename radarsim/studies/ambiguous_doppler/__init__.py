@@ -17,10 +17,10 @@ ABOVE_ORACLE = Quantity(
 STUDY = StudyFolder(
     package=__name__,
     name="ambiguous_doppler",
-    about="Beyond P1: Doppler that folds, unfolded by hypotheses that are kept from scan to scan.",
+    about="Beyond P1: folded Doppler, unfolded by hypotheses kept from scan to scan.",
     filters={
-        "doppler: none": "Kalman filter on range alone, order 0, 1 or 2: the upper bracket",
-        "doppler: unfolded": "the same with the velocity unfolded by the truth: the lower bracket",
+        "doppler: none": "Kalman filter on range alone, order 0, 1 or 2: the upper reference",
+        "doppler: unfolded": "the same with the velocity unfolded by the truth: the lower reference",
         "doppler: folded": "the same, unfolded by up to `hypotheses` sequences of folds; 1: the nearest fold",
         "merge: each_scan": "the same, hypotheses merged into one each scan (GPB1): no memory",
     },

@@ -59,8 +59,8 @@ class Radar(fields.Radar):
 
     repetition_rate_hz: Positive | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_RATES)] = key(
         "pulse repetition rate",
-        "pulse repetition rate, Hz; velocity folds into half the wavelength times it; a list is used in turn, scan "
-        "by scan (stagger)",
+        "pulse repetition rate, Hz; the velocity is folded modulo half the wavelength times this rate; a "
+        "list is used in turn, scan by scan (stagger)",
         symbol="F_r",
     )
     detection_probability: Annotated[Probability, Field(gt=0)] = key(
@@ -104,10 +104,10 @@ class Prior(Model):
     """What the filters know before the first plot: mean zero, and these standard deviations. The range is not known."""
 
     sigma_velocity_mps: Positive = key(
-        "prior σ of the radial velocity", "of the radial velocity, m/s", 300.0, symbol="σ_V0"
+        "prior σ of the radial velocity", "standard deviation of the radial velocity, m/s", 300.0, symbol="σ_V0"
     )
     sigma_acceleration_mps2: Positive = key(
-        "prior σ of the radial acceleration", "of the radial acceleration, m/s²", 10.0, symbol="σ_a0"
+        "prior σ of the radial acceleration", "standard deviation of the radial acceleration, m/s²", 10.0, symbol="σ_a0"
     )
 
 
@@ -117,7 +117,7 @@ class RandomPolynomial(Model):
     Both are normal with mean zero. Range counts from any origin, so that it may become negative.
     """
 
-    kind: Literal["random_polynomial"] = key("kind", "a polynomial of the second degree, drawn each realisation")
+    kind: Literal["random_polynomial"] = key("kind", "a polynomial of the second degree, drawn in each realisation")
     range_m: Positive = key("range", "range at the first scan, m", 100e3)
     sigma_velocity_mps: Annotated[NonNegative, Field(le=FASTEST_MPS)] | None = key(
         "σ of the target's radial velocity",
@@ -139,8 +139,8 @@ class AccelerationPulse(Model):
     acceleration_g: Annotated[Number, Field(ge=-100, le=100)] = key(
         "acceleration", "radial acceleration added, standard gravities", symbol="a", unit="g"
     )
-    start_s: NonNegative = key("start time", "time from the first scan at which it begins, s")
-    duration_s: Positive = key("duration", "how long it lasts, s")
+    start_s: NonNegative = key("start time", "start time, counted from the first scan, s")
+    duration_s: Positive = key("duration", "duration, s")
 
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
@@ -158,7 +158,7 @@ class Manoeuvres(Model):
     """A class of manoeuvres: a constant radial acceleration for a while, that begins at any scan, each as likely."""
 
     acceleration_mps2: Positive = key("acceleration", "size of the acceleration, m/s²", symbol="a")
-    duration_s: Positive = key("duration", "how long it lasts, s")
+    duration_s: Positive = key("duration", "duration, s")
 
 
 class Filter(Model):
@@ -172,7 +172,7 @@ class Filter(Model):
     )
     orders: Annotated[tuple[Order, ...], Field(min_length=1, max_length=3)] = key(
         "orders of the models",
-        "orders of its models: 2 has an acceleration, 1 a velocity, 0 a range that moves at random",
+        "orders of its models: 2 has an acceleration, 1 a velocity, 0 a randomly moving range",
         (2,),
     )
     manoeuvre_variance: NonNegative | tuple[NonNegative, ...] = key(
@@ -184,13 +184,13 @@ class Filter(Model):
     )
     hypotheses: Annotated[int, Whole(1, MOST_HYPOTHESES)] | None = key(
         "hypotheses kept",
-        "folded: most sequences of folds that it keeps; 1: the nearest fold; default: 300",
+        "folded: largest number of fold sequences kept; 1: the nearest fold; default: 300",
         300,
         only=LISTED,
     )
     prune_below: Annotated[Probability, Field(lt=1)] | None = key(
-        "ratio under which a hypothesis is dropped",
-        "folded: ratio to the probability of the best, under which a hypothesis is dropped; 0: none is; default: 1e-6",
+        "ratio below which a hypothesis is dropped",
+        "folded: a hypothesis is dropped below this ratio to the best one's probability; 0: never; default: 1e-6",
         1e-6,
         only=LISTED,
     )
@@ -208,18 +208,19 @@ class Filter(Model):
     )
     combine: Literal["likelihood", "expected_error", "intersection"] | None = key(
         "combination of orders",
-        "several orders: likelihood (IMM, with transitions between orders), expected_error (the linear combination "
-        "of least error over `manoeuvres`), intersection (the smoothest whose interval meets all rougher)",
+        "several orders: likelihood (IMM, with transitions between orders), expected_error (the linear "
+        "combination of least error over `manoeuvres`), intersection (the smoothest order whose interval "
+        "intersects those of all rougher ones)",
         None,
     )
     stay_probability: Annotated[Probability, Field(gt=0, lt=1)] | None = key(
-        "probability that an order lasts",
-        "likelihood: probability that an order lasts from scan to scan; default: 0.95",
+        "probability that an order persists",
+        "likelihood: probability that an order persists from scan to scan; default: 0.95",
         0.95,
         only={"combine": "likelihood"},
     )
     manoeuvres: Manoeuvres | None = key(
-        "expected manoeuvres", "expected_error: the manoeuvres that are expected", only={"combine": "expected_error"}
+        "expected manoeuvres", "expected_error: the expected manoeuvres", only={"combine": "expected_error"}
     )
 
     @property
@@ -259,7 +260,7 @@ class Filter(Model):
 class RareFolds(fields.RareEvent):
     """Wrong folds that are rare: realisations shifted towards them, and weights that make up for it."""
 
-    filter: Name = key("filter", "the filter whose wrong folds at the last scan are sought")
+    filter: Name = key("filter", "the filter whose wrong folds at the last scan are sampled")
 
     @property
     def aimed_at(self) -> str:
@@ -284,7 +285,7 @@ class Keys(Study):
     )
     filters: Members[Filter] = key("filters", "the filters; all see the same plots")
     baseline: Baseline = key(
-        "baseline filter", "filter that gains are against, or a list of several; default: the first", None
+        "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
     )
     scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = key("number of scans", "number of scans")
     rare: Annotated[RareFolds | None, Design(), Added()] = key(

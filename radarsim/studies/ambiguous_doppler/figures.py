@@ -85,9 +85,9 @@ SHARES = {  # figure: column of folds.csv, what it is, caption
         "right",
         term("P(all folds right)"),
         term(
-            "Share of realisations in which all folds so far are right, of the best hypothesis. Bands: "
-            "95 % intervals. Exact values are known of the nearest fold where truth and filter agree, and of the "
-            "Chinese remainder of two scans."
+            "Share of realisations in which all folds so far are right, for the best hypothesis. Bands: 95 % "
+            "intervals. Exact values are known for the nearest fold where truth and filter agree, and for "
+            "the Chinese remainder of two scans."
         ),
     ),
     "lost": (
@@ -133,8 +133,8 @@ def rare_figure(results: Sequence[Result], table: "pd.DataFrame") -> dict[str, F
     if not drawn:
         return {}
     caption = tr(
-        "Share of realisations in which a fold is wrong by the last scan, of the best hypothesis, of {realisations} "
-        "each. Bands: 95 % intervals.",
+        "Share of realisations in which a fold is wrong by the last scan, for the best hypothesis, of "
+        "{realisations} each. Bands: 95 % intervals.",
         realisations=panels.realisations(results),
     )
     figure = panels.in_columns(Figure("right", tr("P(a fold is wrong)"), caption, tuple(drawn)))
@@ -169,17 +169,14 @@ def hypotheses_figure(cases: Sequence[Case]) -> dict[str, Figure]:
         return {}
     counts = [len(velocities) for velocities, _, _ in next(iter(shown.values())).lists]
     caption = tr(
-        "Sequences of folds that are kept, {name}: {first} at first, {last} after {scans} scans. "
-        "The hypotheses of one realisation (number 7): after each scan a line for every sequence of "
-        "folds that is kept, at its velocity and with its acceleration, up to the next scan; the "
-        "brighter and broader, the more probable. Dots: the true velocity.",
+        "Fold sequences kept, {name}: {first} at first, {last} after {scans} scans. One realisation "
+        "(number 7): after each scan a line for every sequence kept, with its velocity and acceleration, "
+        "up to the next scan; brighter and broader lines are more probable. Dots: the true velocity.",
         **{"first": counts[0], "last": counts[-1], "scans": len(counts), "name": panels.plain(drawn[0].title)},
     ) + panels.left_out(stems, list(shown))
     columns = min(2, len(drawn))
     width = COLUMN_MM if columns == 1 else PAGE_MM
-    return {
-        "hypotheses": Figure("hypotheses", tr("How hypotheses thin out"), caption, tuple(drawn), columns, width, 70)
-    }
+    return {"hypotheses": Figure("hypotheses", tr("Pruning of hypotheses"), caption, tuple(drawn), columns, width, 70)}
 
 
 FANS, FAN_SCANS, FAN_LINES = 4, 8, 40  # panels; scans of one; most lines of a scan

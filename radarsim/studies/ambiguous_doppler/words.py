@@ -39,7 +39,7 @@ def question(experiment: Experiment) -> str:
     names = listed(list(dict.fromkeys(case.spec.device or case.stem for case in experiment.cases)))
     if any(one.folds for case in experiment.cases for one in case.spec.filters):
         return tr("How much is the folded velocity of {radars} worth, and from which scan on?", radars=names)
-    return tr("Which order of filter follows the target of {radars}, and how are several combined?", radars=names)
+    return tr("Which filter order follows the target of {radars}, and how should several be combined?", radars=names)
 
 
 def answer(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> list[str]:
@@ -99,14 +99,14 @@ def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> list
     if np.isfinite(best) and np.isfinite(whole):
         words.append(
             tr(
-                "who knew the target would have had {best:.4g} m by the best order of each scan, {whole:.4g} m by the "
-                "best combination",
+                "with the trajectory known, the best order of each scan gives {best:.4g} m, the best combination "
+                "{whole:.4g} m",
                 best=best,
                 whole=whole,
             )
         )
     elif np.isfinite(best):
-        words.append(tr("who knew the target would have had {best:.4g} m by the best order of each scan", best=best))
+        words.append(tr("with the trajectory known, the best order of each scan gives {best:.4g} m", best=best))
     return [f"{panels.plain_label(result)}: {'; '.join(words)}."]
 
 

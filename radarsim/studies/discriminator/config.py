@@ -48,7 +48,7 @@ class Burst(Model):
         "noise variance of a sample",
         "variance of the white noise in each real number sampled, in the samples' unit squared",
     )
-    samples: Literal["real", "complex"] = key("samples", "what the receiver gives", "real")
+    samples: Literal["real", "complex"] = key("samples", "output of the receiver", "real")
 
     @cross_check
     def _pulses_fit(self) -> Iterator[At]:
@@ -121,11 +121,13 @@ class Prior(Model):
         "standard deviations over the potential ones of the whole burst: phase, frequency, …",
         None,
     )
-    sigma: Spreads | None = key("prior σ", "standard deviations: rad, Hz, Hz/s, …; in place of the former", None)
+    sigma: Spreads | None = key(
+        "prior σ", "standard deviations: rad, Hz, Hz/s, …; in place of spread_over_potential", None
+    )
     scale: Positive = key("scale of the prior σ", "factor on all standard deviations", 1.0)
     error_scale: Positive = key(
         "true prior errors over the assumed ones",
-        "factor between the forecast's true errors and those that the estimators believe in",
+        "ratio of the forecast's true errors to those that the estimators assume",
         1.0,
     )
 
@@ -155,15 +157,15 @@ class Estimator(Model):
         "main-lobe threshold", "c, no unit: 1 as in (10) and (14), 0.5 as in (11)", 1.0, symbol="c"
     )
     tail: Literal["gaussian", "exact"] = key(
-        "law of the quadratic form",
-        "law of the quadratic form: the paper's Gaussian, or the weighted sum of χ² itself",
+        "distribution of the quadratic form",
+        "distribution of the quadratic form: the paper's Gaussian, or the exact weighted sum of χ²",
         "gaussian",
     )
     density: Annotated[int, Whole(1, 10)] = key(
-        "windows for each designed one", "windows for each designed one; 2: one at each geometric mean between", 1
+        "windows per designed window", "windows per designed window; 2: one more at each geometric mean", 1
     )
     first_windows: Annotated[int, Whole(1, MOST_WINDOWS)] | None = key(
-        "windows used", "stop after so many windows; default: all", None
+        "windows used", "number of windows after which to stop; default: all", None
     )
     start: Literal["prior", "truth"] = key("first window", "where the first window starts", "prior")
     phases: Annotated[int, Whole(0, 64)] = key(
@@ -179,7 +181,7 @@ class Estimator(Model):
     )
     coherence_step: Flag = key(
         "steps that account for the coherence",
-        "let steps account for the coherence: far from the maximum the curvature is less than Fisher's",
+        "steps account for the coherence: far from the maximum the curvature is less than Fisher's",
         False,
     )
     search_points: Annotated[int, Whole(0, 10)] = key(
@@ -200,7 +202,7 @@ class Estimator(Model):
 class Rare(fields.RareEvent):
     """Losses of lock that are rare: bursts shifted towards them, and weights that make up for it."""
 
-    estimator: Name = key("estimator", "the estimator whose losses of lock at its last window are sought")
+    estimator: Name = key("estimator", "the estimator whose losses of lock at its last window are sampled")
 
     @property
     def aimed_at(self) -> str:

@@ -175,8 +175,8 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
         own = rows[(result.name, name)]
         marks.append(panels.line(own, ("t_s", "lock_rate", "lock_lo", "lock_hi"), name, n))
     caption = tr(
-        "A burst is locked with every component within five potential spreads of the window (without "
-        "prior; the phase to the nearest turn); of {count:,} bursts. Bands: 95 % intervals.",
+        "A burst is locked if every component is within five potential spreads of the window (without "
+        "prior; the phase modulo one turn); of {count:,} bursts. Bands: 95 % intervals.",
         count=result.count,
     )
     panel, said = _shares(Axis(tr(WINDOW), "log"), marks, 0)
@@ -238,7 +238,7 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
     scale = "log" if x.min() > 0 and x.max() / x.min() > 20 else "linear"
     called = panels.key_label(members[0], key).text
     caption = tr(
-        "Bursts at the end of the burst against the {called}, of {count:,} each. Bands: 95 % intervals.",
+        "Share of bursts locked in the last window against the {called}, of {count:,} each. Bands: 95 % intervals.",
         called=called,
         count=members[0].count,
     )
@@ -246,7 +246,7 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
     panel, said = _shares(Axis(_called(key, members[0]), scale, ticks=ticks), marks)
     if designed and panel.y.scale == "log":
         panel = replace(panel, marks=(*panel.marks, Line(x[order], x[order], "", Style(GREY, 2, width_pt=0.7))))
-        said += " " + tr("Dotted: as often as one hand-over is designed to fail.")
+        said += " " + tr("Dotted: designed failure probability of one hand-over.")
     caption += said
     title = tr("Lock against the {called}", called=called)
     figure = Figure(name, title, caption, (panel,), width_mm=panels.WIDE_MM, panel_height_mm=70.0)
@@ -274,8 +274,8 @@ def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], ma
     first, second = (panels.key_label(members[0], key).text for key in keys)
     caption = tr(
         "Share of bursts locked at the end, over the {first} and the {second}, of {count:,} in each "
-        "cell. Last: the largest {second} at which the whole 95 % interval of that share, here and "
-        "below, lies above {sure:g}; an estimator without a line is nowhere so sure.",
+        "cell. Last: the largest {second} up to which the whole 95 % interval of that share lies above "
+        "{sure:g}; an estimator without a line reaches this nowhere.",
         first=first,
         second=second,
         count=members[0].count,

@@ -32,7 +32,7 @@ ITERATIONS = "12"  # the number of the part that counts windows
 LEAST_RATIO = 5.0  # μ_min
 EXACT = ("P4.1", "P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13", "P4.20")
 WINDOWS = ("P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13", "P4.20")
-NO_ROOT = "(15) has no root: with the phase in it, its left side is over c at every length"
+NO_ROOT = "(15) has no root: with the phase in it, its left side exceeds c at every length"
 
 
 class Readings(PaperReadings):

@@ -67,9 +67,9 @@ def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:
             before
             + plural(
                 "{estimator}: {count} window; σ of the locked over the bound (forecast included) {least:.3f} to "
-                "{most:.3f}, of {plain:,} bursts drawn as they are.",
+                "{most:.3f}, of {plain:,} bursts without importance sampling.",
                 "{estimator}: {count} windows; σ of the locked over the bound (forecast included) {least:.3f} to "
-                "{most:.3f}, of {plain:,} bursts drawn as they are.",
+                "{most:.3f}, of {plain:,} bursts without importance sampling.",
                 k,
                 plain=int(n),
                 **said,
@@ -91,7 +91,7 @@ def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:
         words.append(before + _rare(tables.groups(made["rare"], "case")[(result.name,)]))
     if others:
         locks = "; ".join(f"{name}, {_lock(last_locks(made, result, name))}" for name in others)
-        words.append(before + tr("the others lock in: {locks}.", locks=locks))
+        words.append(before + tr("locks of the others: {locks}.", locks=locks))
     return words
 
 

@@ -12,7 +12,7 @@ STUDY = StudyFolder(
     filters={
         "family": "kalman, gpb1 (MMA1), imm (MMA2), gpb2 (MMA3) with a bank of one to five motion models",
         "merge": "rule of the partial merges: moment, best, combined, modified_combined",
-        "output": "rule by which the estimate is made: moment, best",
+        "output": "rule that forms the estimate: moment, best",
         "covariance_at": "the plot's covariance at the plot or at its prediction",
     },
     paper=Paper(

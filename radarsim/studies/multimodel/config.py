@@ -49,37 +49,39 @@ class Sensor(Model):
         "σ of the measured range", "standard deviation of a measured range, m", None, symbol="σ_r"
     )
     sigma_elevation_rad: Wide | None = key(
-        "σ of the measured elevation", "of the biconical elevation asin(y_A / r), rad", None, symbol="σ_ε"
+        "σ of the measured elevation", "σ of the biconical elevation asin(y_A / r), rad", None, symbol="σ_ε"
     )
     sigma_azimuth_rad: Wide | None = key(
-        "σ of the measured azimuth", "of the biconical azimuth asin(z_A / r), rad", None, symbol="σ_α"
+        "σ of the measured azimuth", "σ of the biconical azimuth asin(z_A / r), rad", None, symbol="σ_α"
     )
     sigma_x_m: Positive | None = key(
-        "σ of the measured x", "of x (north), m: for plots measured in the local frame", None, symbol="σ_x"
+        "σ of the measured x", "σ of x (north), m: for plots measured in the local frame", None, symbol="σ_x"
     )
-    sigma_y_m: Positive | None = key("σ of the measured y", "of y (up), m", None, symbol="σ_y")
-    sigma_z_m: Positive | None = key("σ of the measured z", "of z (east), m", None, symbol="σ_z")
+    sigma_y_m: Positive | None = key("σ of the measured y", "σ of y (up), m", None, symbol="σ_y")
+    sigma_z_m: Positive | None = key("σ of the measured z", "σ of z (east), m", None, symbol="σ_z")
     scan_period_s: Annotated[Positive, Field(le=LONGEST_INTERVAL_S)] = key(
         "scan period", "time between two plots, s", symbol="Δt"
     )
     jitter_s: NonNegative = key(
-        "jitter of the scans", "each scan comes earlier or later by up to this, drawn once, s", 0.0
+        "jitter of the scans", "largest random shift of each scan, earlier or later, drawn once, s", 0.0
     )
     antenna_azimuth_rad: Angle = key(
-        "antenna azimuth", "of the antenna's normal, from north to east, rad", 0.0, symbol="α_A"
+        "antenna azimuth", "azimuth of the antenna's normal, from north to east, rad", 0.0, symbol="α_A"
     )
     antenna_elevation_rad: Angle = key(
-        "antenna elevation", "of the antenna's normal above the horizon, rad", 0.0, symbol="ε_A"
+        "antenna elevation", "elevation of the antenna's normal above the horizon, rad", 0.0, symbol="ε_A"
     )
-    antenna_height_m: Number = key("antenna height", "of the phase centre above the origin, m", 0.0, symbol="h")
+    antenna_height_m: Number = key("antenna height", "height of the phase centre above the origin, m", 0.0, symbol="h")
     detection_probability: Annotated[Probability, Field(gt=0)] = key(
         "detection probability",
-        "probability that the plot of a scan comes; the three that start the track always do",
+        "probability that a scan gives a plot; the three that start the track are never missed",
         1.0,
         symbol="P_D",
     )
     conversion: Annotated[Literal["plain", "unbiased"], Design()] = key(
-        "conversion of plots", "of plots to the local frame: as in the paper, or with its mean error taken off", "plain"
+        "conversion of plots",
+        "conversion of plots to the local frame: as in the paper, or with its mean error removed",
+        "plain",
     )
 
     @cross_check
@@ -110,7 +112,7 @@ class Stage(Model):
     """A named part of the flight, up to a time."""
 
     name: Name = key("stage", "start, ballistic, steady, manoeuvre, after, …")
-    end_s: Positive | None = key("end time", "when it ends, s from the first plot; only the last has no end", None)
+    end_s: Positive | None = key("end time", "end, s from the first plot; only the last stage has none", None)
 
 
 Stages = Annotated[tuple[Stage, ...], Field(min_length=1, max_length=12), AfterValidator(unique_names)]
@@ -140,7 +142,7 @@ class Target(Model):
 class Phase(Model):
     """Accelerations commanded from a moment on, m/s²."""
 
-    start_s: NonNegative = key("start time", "when it begins, s from the first plot")
+    start_s: NonNegative = key("start time", "start, s from the first plot")
     lateral_mps2: Acceleration = key("lateral acceleration", "to the right of the velocity, level, m/s²", 0.0)
     normal_mps2: Acceleration = key("normal acceleration", "upwards, normal to the velocity, m/s²", 0.0)
     axial_mps2: Acceleration = key("axial acceleration", "along the velocity, m/s²", 0.0)
@@ -181,7 +183,7 @@ class Recorded(Target):
     """A flight recorded in a file, smoothed by a spline whose derivatives are the true velocity and acceleration."""
 
     kind: Literal["recorded"] = key("kind", "a flight from a CSV file with columns t_s, x_m, y_m, z_m")
-    file: Annotated[str, DataFile()] = key("file", "the file, from the folder of this one")
+    file: Annotated[str, DataFile()] = key("file", "path of the file, relative to this one")
 
 
 AnyTarget = Annotated[Flight | Recorded, Field(discriminator="kind")]
@@ -219,12 +221,12 @@ class Filter(Model):
         ((1.0,),),
     )
     transition_interval_s: Positive = key(
-        "interval of the transition matrix", "time for which the matrix holds, s", 0.05
+        "interval of the transition matrix", "interval for which the matrix is valid, s", 0.05
     )
     merge: Literal["moment", "best", "combined", "modified_combined"] = key(
         "merging rule", "rule of the partial merges: eq. (4), eq. (5), or the paper's combinations of them", "combined"
     )
-    output: Literal["moment", "best"] = key("output rule", "rule by which the estimate is made", "best")
+    output: Literal["moment", "best"] = key("output rule", "rule that forms the estimate", "best")
     covariance_at: Literal["plot", "prediction"] = key(
         "where the plot's covariance is computed",
         "where the plot's covariance is computed: at the plot, as in the paper, or at its prediction",
@@ -261,7 +263,7 @@ class Keys(Study):
         tuple[Filter, ...], Field(min_length=1, max_length=32), AfterValidator(unique_names), Design()
     ] = key("filters", "the filters; all see the same plots")
     baseline: Baseline = key(
-        "baseline filter", "filter that gains are against, or a list of several; default: the first", None
+        "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
     )
     start_acceleration_mps2: Annotated[NonNegative, Design()] = key(
         "σ of the acceleration at the start of a track",
@@ -272,5 +274,5 @@ class Keys(Study):
         "number of scans", "number of plots; default: to the end of the flight", None
     )
     report_every: Annotated[int, Whole(1, MOST_SCANS), Design()] = key(
-        "every n-th scan reported", "tables and figures keep every such scan and the last; stages are made of all", 1
+        "every n-th scan reported", "tables and figures contain every n-th scan and the last; stages use all scans", 1
     )

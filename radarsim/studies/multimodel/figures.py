@@ -139,8 +139,8 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
     track, (height, *_), (acceleration, *_) = lines[0][0], lines[1], lines[3]
     far = np.hypot(track.x, track.y)
     caption = tr(
-        "{name}: from {begin:.0f} to {end:.0f} km of the radar over the ground, up to {height:.0f} km high and "
-        "{acceleration:.0f} m/s². ",
+        "{name}: ground range from {begin:.0f} to {end:.0f} km, height up to {height:.0f} km, "
+        "acceleration up to {acceleration:.0f} m/s². ",
         **{
             "name": track.name or track.label or panels.plain_label(results[0]),
             "begin": float(far[0]),
@@ -246,8 +246,8 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
         drawn = panels.in_legend(drawn)
     caption = (
         tr(
-            "Mean posterior probabilities of the models; the numbers behind the motions "
-            "are the spreads of the random acceleration, m/s². Dotted: ends of the stages."
+            "Mean posterior probabilities of the models; the numbers after the motions are the spreads of "
+            "the random acceleration, m/s². Dotted: ends of the stages."
         )
     ) + left
     return _of_the_paper(_several("probabilities", tr("Probabilities of the models"), caption, drawn, 58), results, "7")
@@ -333,7 +333,7 @@ MOTIONS = {"uniform": term("uniform"), "accelerated": term("accelerated"), "stil
 def _of_case(result: CaseResult, results: Sequence[CaseResult]) -> str:
     """A sentence on which of several cases is shown."""
     return (
-        tr(" Of {plain_label}; the other cases are in the tables alone.", plain_label=panels.plain_label(result))
+        tr(" For {plain_label}; the other cases are only in the tables.", plain_label=panels.plain_label(result))
         if len(results) > 1
         else ""
     )
@@ -364,8 +364,8 @@ def consistency(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure 
         drawn.append(Panel(axis, Axis(tr("mean per degree of freedom"), "log"), tuple(marks), title, direct=False))
     drawn = _beside(drawn, result, dash=None)
     caption = tr(
-        "Normalised errors squared, per degree of freedom, by stage: 1 where the filter's own "
-        "covariance is right, more where it is optimistic, less where it is pessimistic.{of_case}",
+        "Normalised squared errors per degree of freedom, by stage: 1 where the filter's own covariance "
+        "is correct, more where it is optimistic, less where it is pessimistic.{of_case}",
         of_case=_of_case(result, results),
     )
-    return _several("consistency", tr("What the filters believe of themselves"), caption, drawn, 66)
+    return _several("consistency", tr("Consistency of the filters"), caption, drawn, 66)

@@ -7,12 +7,12 @@ from radarsim.studies.interface import Paper
 STUDY = StudyFolder(
     package=__name__,
     name="pulses_to_tracks",
-    about="Beyond P1 and P4: bursts whose Doppler is estimated, and may not lock, and the tracks made of them.",
+    about="Beyond P1 and P4: Doppler estimated from bursts, which may fail to lock, and the resulting tracks.",
     filters={
         "observes: [range]": "Kalman filter on range alone, which needs no burst",
-        "estimator: sequence": "with the velocity, or velocity and acceleration, that P4's sequence finds in the burst",
+        "estimator: sequence": "with the velocity, or velocity and acceleration, that P4's sequence estimates",
         "estimator: dense": "the same with twice as many windows; cured: with a search where coherence is short",
-        "estimator: spectrum": "the same found classically: the peak of the spectrum, then scoring",
+        "estimator: spectrum": "the same by the classical method: the peak of the spectrum, then scoring",
         "estimator: fisher_bound": "the idealisation: Gaussian errors of the Fisher bound, which always lock",
     },
     paper=Paper("Uss, Baryshev & Djavad 2010, into Gorshkov & Zavizhenets 2017", page="pulses_to_tracks"),

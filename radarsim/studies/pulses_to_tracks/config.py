@@ -63,7 +63,9 @@ class Burst(Model):
     """The coherent burst of a scan, one complex sample a pulse behind the filter that is matched to it."""
 
     repetition_rate_hz: Positive = key(
-        "pulse repetition rate", "pulse repetition rate, Hz; velocity folds into λ/2 times it", symbol="F_r"
+        "pulse repetition rate",
+        "pulse repetition rate, Hz; the velocity is folded modulo λ/2 times this rate",
+        symbol="F_r",
     )
     pulses: Annotated[int, Whole(FEWEST_PULSES, MOST_PULSES)] | None = key(
         "pulses of a burst", "number of pulses; or give pulses_per_second", None, symbol="N"
@@ -87,7 +89,7 @@ class Burst(Model):
     )
     snr_range_m: Positive | None = key(
         "range of the signal-to-noise ratio",
-        "range at which snr_db holds, m: it then falls with the fourth power; default: everywhere",
+        "range at which snr_db applies, m: it falls with the fourth power of range; default: the same everywhere",
         None,
     )
 
@@ -127,18 +129,18 @@ class Filter(Model):
 
     name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
     observes: tuple[Literal["range", "velocity", "acceleration"], ...] = key(
-        "observes", "what it takes: [range], [range, velocity] or [range, velocity, acceleration]"
+        "observes", "measurements that it uses: [range], [range, velocity] or [range, velocity, acceleration]"
     )
     manoeuvre_variance: NonNegative = key(
         "manoeuvre variance",
-        "variance of the random jerk it allows for, (m/s³)²; as in P1 not over the scans of its start",
+        "variance of the random jerk it allows for, (m/s³)²; as in P1, not during its initial scans",
         symbol="D_M",
         unit="(m/s³)²",
     )
     process_noise: Literal["random_jerk", "white_jerk", "white_acceleration"] = key(
         "process noise",
-        "how the allowed manoeuvre lies within a scan: a constant jerk (P1's), of which the velocity tells the "
-        "acceleration, white jerk, or a step of the acceleration",
+        "form of the allowed manoeuvre within a scan: a constant jerk (P1's, where the velocity "
+        "determines the acceleration), white jerk, or a step of the acceleration",
         "random_jerk",
     )
     estimator: Literal["sequence", "dense", "cured", "spectrum", "fisher_bound"] | None = key(
@@ -161,33 +163,32 @@ class Filter(Model):
     )
     use: Literal["as_measured", "gated", "mixture"] | None = key(
         "use of an estimate",
-        "as_measured: every estimate as if it had locked; gated: those near the prediction; mixture: weighed by the "
-        "probability that it locked; default: as_measured",
+        "as_measured: every estimate as if it had locked; gated: those near the prediction; mixture: "
+        "weighted by the probability that it locked; default: as_measured",
         None,
     )
     gate_probability: Annotated[float, Field(gt=0, lt=1)] | None = key(
         "gate probability",
-        "gated: probability that an estimate that locked is within the gate; default: 0.999",
+        "gated: probability that a locked estimate is within the gate; default: 0.999",
         0.999,
         only={"use": "gated"},
     )
     lock_probability: Annotated[float, Field(gt=0, lt=1)] | None = key(
         "lock probability",
-        "mixture: probability before it is seen that an estimate has locked; default: 0.95",
+        "mixture: prior probability that an estimate has locked; default: 0.95",
         0.95,
         only={"use": "mixture"},
     )
 
     hypotheses: Annotated[int, Whole(1, MOST_HYPOTHESES)] | None = key(
         "hypotheses kept",
-        "most hypotheses that it keeps of the folds of its velocities (and, as a mixture, of the bursts that "
-        "locked), as folded velocity does; default: 1, the fold nearest to the prediction",
+        "largest number of hypotheses kept on the folds of its velocities (and, in a mixture, on which "
+        "bursts locked), as for folded velocity; default: 1, the fold nearest to the prediction",
         None,
     )
     prune_below: Annotated[Probability, Field(lt=1)] | None = key(
-        "ratio under which a hypothesis is dropped",
-        "several hypotheses: ratio to the probability of the best, under which one is dropped; 0: none is; default: "
-        "1e-6",
+        "ratio below which a hypothesis is dropped",
+        "several hypotheses: one is dropped below this ratio to the best one's probability; 0: never; default: 1e-6",
         None,
     )
     estimate: Literal["best", "mean"] | None = key(
@@ -273,7 +274,7 @@ class Keys(Lasting):
     prior: Prior = key("designation", "what is known when the track begins")
     filters: Members[Filter] = key("filters", "the filters; all see the same ranges and bursts")
     baseline: Baseline = key(
-        "baseline", "filter that gains are against, or a list of several; default: the first", None
+        "baseline", "filter against which gains are computed, or a list of several; default: the first", None
     )
     scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = key(
         "scans", "number of scans; or give duration_s", None

@@ -73,9 +73,9 @@ def threshold_figure(results: Sequence[Result], made: "Mapping[str, pd.DataFrame
     if not any(panel.marks for panel in drawn):
         return {}
     caption = tr(
-        "P(not locked): share of bursts that do not lock at the scan where most do not: velocity (or acceleration, "
-        "where it is taken) beyond five Fisher bounds of the truth; estimators that always lock have no line. σ of the "
-        "range at the last scan. Bands: 95 % intervals."
+        "P(not locked): share of bursts that do not lock, at the worst scan: velocity (or acceleration, "
+        "where used) in error by more than five Fisher bounds; estimators that always lock have no line. "
+        "σ of the range at the last scan. Bands: 95 % intervals."
     )
     figure = Figure("threshold", tr("The threshold"), caption, tuple(panels.in_legend(drawn)), 3, PAGE_MM, 60)
     return {"threshold": figure}
@@ -164,16 +164,17 @@ OWN: dict[str, tuple[Draw, str, str]] = {
         locks_panel,
         term("Bursts that do not lock"),
         term(
-            "Share of bursts whose velocity (or acceleration, where it is taken) is beyond five Fisher bounds of the "
-            "truth. Bands: 95 % intervals. Estimators that lost under 20 bursts in all are left out, and idealisations."
+            "Share of bursts whose velocity (or acceleration, where used) is in error by more than five "
+            "Fisher bounds. Bands: 95 % intervals. Idealisations, and estimators that lost fewer than 20 "
+            "bursts in all, are left out."
         ),
     ),
     "folds": (
         folds_panel,
         term("Folds that are right"),
         term(
-            "How often the best hypothesis of a filter has taken no velocity in a wrong fold so far. Bands: 95 % "
-            "intervals. Filters that take the nearest fold are left out."
+            "Share of realisations in which a filter's best hypothesis has used no velocity in a wrong fold "
+            "so far. Bands: 95 % intervals. Filters that use the nearest fold are left out."
         ),
     ),
     "measured": (
@@ -188,8 +189,8 @@ OWN: dict[str, tuple[Draw, str, str]] = {
         losses_panel,
         term("What a lost burst costs"),
         term(
-            "Root-mean-square error of the range at the last scan, of realisations by the number of "
-            "scans since their last burst that did not lock. Bands: 95 % intervals."
+            "Root-mean-square error of the range at the last scan, by the number of scans since the last "
+            "burst that did not lock. Bands: 95 % intervals."
         ),
     ),
 }

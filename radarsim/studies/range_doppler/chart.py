@@ -60,7 +60,7 @@ def chart(cases: Sequence[Case], references: Sequence[Case]) -> Chart:
     own = [place for _, place in found if place is not None]
     known = [place for place in known if all(place.of != one.of for one in own)]
     drawn = [over_time(own or known), in_the_long_run(own, known), over_groups(own, known)]
-    without = tr("no place on the chart without a filter of the range and one of range and velocity")
+    without = tr("not on the chart: it needs one filter of range and one of range and velocity")
     sentences = [
         f"{case.name}: {without}" if place is None else sentence(place) + beyond(place) + aside(case)
         for case, place in found
@@ -132,8 +132,8 @@ def beyond(place: Place) -> str:
     off = float(np.abs(place.exact - corrected(place)).max())
     away = tr("here it is {away} points off", away=significant_digits(off, ".2g"))
     return tr(
-        " Beyond c = 50 000 the closed form, corrected for the period too, is not promised to be near: {how}; the "
-        "gains above are exact.",
+        " Beyond c = 50 000 the closed form may be inaccurate even with the correction for the period: "
+        "{how}; the gains above are exact.",
         how=away if np.isfinite(off) else tr("here it has no value"),
     )
 
@@ -149,7 +149,7 @@ def aside(case: Case) -> str:
     left += [] if case.spec.target.kind == "polynomial" else [tr("the target's manoeuvre")]
     usual = {getattr(one, "process_noise", "random_jerk") for one in case.spec.filters} == {"random_jerk"}
     left += [] if usual else [tr("another process noise")]
-    return tr(" Left out of account in the long run: {what}.", what=", ".join(left)) if left else ""
+    return tr(" Not included in the long-run values: {what}.", what=", ".join(left)) if left else ""
 
 
 def table(places: Sequence[Place]) -> "pd.DataFrame":
@@ -241,10 +241,10 @@ def in_the_long_run(own: Sequence[Place], known: Sequence[Place]) -> Figure:
         marks.append(Note(top.of.c, float(top.exact.max()), "\n".join(one.name for one in group), "nw"))
     marks.append(Reference(filters.no_acceleration_gain(), "x", f"$c$ = {numeral('0.698')}"))
     caption = tr(
-        "Left of c = 0.698 Doppler makes the acceleration of a target that does not manoeuvre worse; right of it "
-        "everything gains, the more the larger c. Steady gain of the velocity against c = (τ₁/τ₂)². Lines: closed "
-        "form, as the period becomes short. Markers: the exact steady gain of a radar with its own period (large: "
-        "yours)."
+        "Left of c = 0.698 Doppler makes the acceleration estimate of a non-manoeuvring target worse; "
+        "right of it everything gains, the more the larger c. Steady gain of the velocity against c = "
+        "(τ₁/τ₂)². Lines: closed form in the limit of a short period. Markers: the exact steady gain of "
+        "a radar with its own period (large: yours)."
     )
     x = Axis("$c = (\\tau_1/\\tau_2)^2$", "log", (0.03, 300))
     panel = Panel(x, Axis(tr("steady gain, %"), limits=(-15, 100)), tuple(marks), tr("In the long run"))
@@ -299,9 +299,10 @@ def over_groups(own: Sequence[Place], known: Sequence[Place]) -> Figure:
         rows = (float(MAP_LAMBDA[0]), float(MAP_LAMBDA[-1]))
         made.append(Panel(Axis("$C_\\theta$", "log", limits), Axis("$\\Lambda$", "log", rows), tuple(marks), tr(name)))
     caption = tr(
-        "The limit of a short period holds where Λ is small; above, a long period changes what is gained. Steady "
-        "gain of the velocity, in per cent along the lines, over C_θ = (τ₁/Δt)² and Λ = (Δt/τ₂)³. Full lines: "
-        "exact, with the scan period in it. Dotted: the limit of a short period, c = C_θ Λ^(2/3)."
+        "The limit of a short period is valid where Λ is small; above, a long period changes the gain. "
+        "Steady gain of the velocity, in per cent along the lines, over C_θ = (τ₁/Δt)² and Λ = (Δt/τ₂)³. "
+        "Full lines: exact, with the scan period included. Dotted: the limit of a short period, c = C_θ "
+        "Λ^(2/3)."
     )
     return Figure("map", tr("What Doppler gains, by period too"), caption, tuple(made), 3, PAGE_MM, 66)
 

@@ -46,7 +46,7 @@ class Radar(fields.Radar):
 
     repetition_rate_hz: Positive = key(
         "pulse repetition rate",
-        "pulse repetition rate, Hz: gives the unambiguous velocity; nothing is folded by it",
+        "pulse repetition rate, Hz: gives the unambiguous velocity; velocities are not folded",
         1000.0,
         symbol="F_r",
     )
@@ -64,12 +64,12 @@ class Radar(fields.Radar):
     )
     sigma_bias_range_m: Annotated[NonNegative, Added()] = key(
         "σ of the random bias in range",
-        "standard deviation of a further error of range, drawn once a realisation, m",
+        "standard deviation of an additional error of range, drawn once per realisation, m",
         0.0,
     )
     sigma_bias_velocity_mps: Annotated[NonNegative, Added()] = key(
         "σ of the random bias in radial velocity",
-        "standard deviation of a further error of velocity, drawn once a realisation, m/s",
+        "standard deviation of an additional error of velocity, drawn once per realisation, m/s",
         0.0,
     )
 
@@ -132,9 +132,9 @@ Noise = Literal["random_jerk", "white_jerk", "white_acceleration"]
 class Best(Model):
     """A manoeuvre variance that is looked for: the one with which this filter's exact error on this target is least."""
 
-    minimise: Literal["sigma_r", "sigma_Vr", "sigma_ar"] = key("error to minimise", "the error that is to be least")
+    minimise: Literal["sigma_r", "sigma_Vr", "sigma_ar"] = key("error to minimise", "the error that is minimised")
     over: Literal["worst", "mean", "last"] = key(
-        "taken over scans as", "of its values from scan from_k on: the greatest, their mean, or the last"
+        "taken over scans as", "value over the scans from from_k on: the greatest, their mean, or the last"
     )
     from_k: Annotated[int, Whole(1, MOST_SCANS)] = key("first scan that counts", "first scan that counts", 3)
 
@@ -145,7 +145,7 @@ class FilterKeys(Model):
     name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
     kind: str = key("kind", "which filter it is")
     observes: tuple[Literal["range", "velocity"], ...] = key(
-        "observed quantities", "what it measures: [range] or [range, velocity]"
+        "observed quantities", "measurements that it uses: [range] or [range, velocity]"
     )
     initial_scans: Annotated[int, Whole(2, MOST_SCANS)] | None = key(
         "plots in the initialisation",
@@ -177,14 +177,15 @@ class Filter(FilterKeys):
     kind: Annotated[Literal["kalman"], Added()] = key("kind", "the Kalman filter of the study", "kalman")
     manoeuvre_variance: Positive | Best = key(
         "manoeuvre variance",
-        "variance of the random jerk it allows for, (m/s³)²: D_M; or what it is to make least",
+        "variance of the random jerk it allows for, (m/s³)²: D_M; or the error that it minimises",
         symbol="D_M",
         unit="(m/s³)²",
     )
     process_noise: Noise = key(
         "process noise",
-        "how the allowed manoeuvre lies within a scan: a constant jerk (the paper's), white jerk, or a step of the "
-        "acceleration; each lets its variance grow by D_M times the period squared a scan",
+        "form of the allowed manoeuvre within a scan: a constant jerk (the paper's), white jerk, or a "
+        "step of the acceleration; with each, the variance of the acceleration grows by D_M times the "
+        "squared period per scan",
         "random_jerk",
     )
 
@@ -207,7 +208,7 @@ class Keys(Lasting):
     target: Annotated[Target, Scenario()] = key("target", "the target: a scenario's stem, or inline")
     filters: Members[Filter] = key("filters", "the filters; all see the same plots")
     baseline: Baseline = key(
-        "baseline filter", "filter that gains are against, or a list of several; default: the first", None
+        "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
     )
     scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = key(
         "number of scans", "number of scans; or give duration_s", None

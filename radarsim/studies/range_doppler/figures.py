@@ -80,10 +80,10 @@ def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure 
     if not drawn:
         return None
     caption = _best_settled(drawn) + tr(
-        "Steady σ of the range against its settling time, both exact (within 5 % of the "
-        "steady value, for good); grey lines join equal manoeuvre variances D_M, named in (m/s³)². "
-        "Dotted: ten scan periods, the paper's limit; star: the least steady error under it. What "
-        "does not settle within the run is named and left out."
+        "Steady σ of the range against its settling time, both exact (within 5 % of the steady value, "
+        "for good); grey lines join equal manoeuvre variances D_M, labelled in (m/s³)². Dotted: ten scan "
+        "periods, the paper's limit; star: the least steady error within it. Filters that do not settle "
+        "within the run are named and left out."
     )
     caption += panels.left_out(titles, [panel.title for panel in drawn])
     return panels.in_columns(Figure("settling", tr("Steady error against settling time"), caption, tuple(drawn)))

@@ -105,7 +105,7 @@ def exact_but_for(case: Case) -> str:
 
     if 2**spec.plots <= patterns.WHOLE:
         return ""
-    return "a mean over patterns of plots, of which nearly equal ones are merged: right to about a ten-thousandth"
+    return "averaged over detection patterns, similar ones merged; accurate to about 1e-4"
 
 
 def costly(case: Case) -> bool:

@@ -98,7 +98,8 @@ def _gain_sentence(
         said |= {"most": _gain(high), "high": _who(high, labels, several)}
         if last["gain_lo"].max() <= last["gain_hi"].min():
             words = tr(
-                "{quantity}: {when} σ is {least} ({low}) to {most} ({high}), which do not differ for certain, {base}",
+                "{quantity}: {when} σ is {least} ({low}) to {most} ({high}), not significantly different from "
+                "each other, {base}",
                 **said,
             )
         else:
@@ -218,7 +219,7 @@ def _best_sentences(results: Sequence[Result], made: Made) -> list[str]:
 def _best(rows: "pd.DataFrame", name: str) -> str:
     best = rows[rows["best"]]
     if not len(best):
-        return tr("{filter} none of those tried", filter=name)
+        return tr("{filter} none of the values tried", filter=name)
     row = best.iloc[0]
     variance = panels.number(float(row["manoeuvre_variance"]), powers=True)
     return tr(
@@ -346,14 +347,12 @@ def _looked_for(results: Sequence[Result]) -> list[str]:
                 "rule": tr(OVER[wanted.over], error=wanted.minimise, k=wanted.from_k),
             }
             if tuning.at_a_limit(variance, len(axes.t_s), axes.sigma, axes.scan_period_s):
-                words.append(
-                    tr("{filter} {variance} ({rule}, the end of what is looked at: there is no best between)", **said)
-                )
+                words.append(tr("{filter} {variance} ({rule}, the limit of the search: no minimum inside)", **said))
             else:
                 words.append(tr("{filter} {variance} ({rule})", **said))
         sentences.append(
             tr(
-                "{case}: D_M, (m/s³)², looked for by the exact errors: {filters}.",
+                "{case}: D_M, (m/s³)², optimised on the exact errors: {filters}.",
                 case=panels.plain_label(result),
                 filters="; ".join(words),
             )
@@ -370,15 +369,13 @@ def _ambiguity(results: Sequence[Result]) -> list[str]:
             if 2 * speed < span:
                 words = tr("a span of {span:.4g} m/s", span=span)
             else:
-                words = tr(
-                    "a span of {span:.4g} m/s, which the target's {speed:.4g} m/s exceed", span=span, speed=speed
-                )
+                words = tr("a span of {span:.4g} m/s, exceeded by the target's {speed:.4g} m/s", span=span, speed=speed)
             sentences.setdefault(panels.plain(panels.device(result)), words)
     if not sentences:
         return []
     return [
         tr(
-            "Velocities are taken as unambiguous; the repetition rate alone tells apart λF/2 ({spans}).",
+            "Velocities are assumed unambiguous; the repetition rate alone distinguishes only λF/2 ({spans}).",
             spans="; ".join(f"{name}: {span}" for name, span in sentences.items()),
         )
     ]
@@ -406,13 +403,13 @@ def _gain(row: "pd.Series[Any]") -> str:
     """A gain in words: lower, higher, or neither for certain; where the sample cannot tell, by the exact one."""
     value, lo, hi = (round(float(row[name]), 1) + 0.0 for name in ("gain_percent", "gain_lo", "gain_hi"))
     if value == lo == hi == 0:
-        return tr("no lower nor higher by 0.1 %")
+        return tr("less than 0.1 % lower or higher")
     exact = float(row.get("exact_percent", np.nan))
     if row["gain_lo"] <= 0 <= row["gain_hi"] and abs(exact) >= TOLD:
         words = term("exactly {percent} lower") if exact > 0 else term("exactly {percent} higher")
         return tr(words, percent=f"{numeral(f'{abs(exact):.1f}')} %")
     if row["gain_lo"] <= 0 <= row["gain_hi"]:
-        return tr("neither lower nor higher for certain (gain {gain})", gain=_percent(value, lo, hi))
+        return tr("not significantly lower or higher (gain {gain})", gain=_percent(value, lo, hi))
     if value < -MANIFOLD:
         factor = wording.estimate((1 - value / 100, 1 - hi / 100, 1 - lo / 100), form=".3g")
         return tr("higher by a factor of {factor}", factor=factor)

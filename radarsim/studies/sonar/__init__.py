@@ -47,7 +47,7 @@ class Sonar(Study):
         "kind: fixed_gain": "α-β (degree 1) or α-β-γ (degree 2) with steady-state gains",
         "kind: kalman_augmented": "Kalman filter of the state and the plot's error, for correlated errors",
         "kind: kalman_differenced": "differences of neighbouring plots, for correlated errors",
-        "kind: adaptive": "growing memory that a manoeuvre detector (3) restarts, at a higher degree or kept short",
+        "kind: adaptive": "growing memory restarted by a manoeuvre detector (3), at a higher degree or with few plots",
         "association: nearest": "a tracker among false plots: the nearest plot in the gate; of kind kalman, degree 1",
         "association: pda": "a tracker with probabilistic data association",
         "association: known": "a filter that knows the target's plots, for comparison",

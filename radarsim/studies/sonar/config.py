@@ -195,8 +195,8 @@ class Polynomial(Model):
     )
     fluctuation_mps2: NonNegative = key(
         "σ of the random acceleration of the target",
-        "standard deviation, m/s², of a random acceleration that is new at every scan, so that the velocity is a "
-        "random walk",
+        "standard deviation, m/s², of a random acceleration drawn anew at every scan, so that the "
+        "velocity is a random walk",
         0.0,
     )
 
@@ -290,7 +290,8 @@ class Initiation(Model):
 
     m: Annotated[int, Whole(2, 20)] = key("plots that confirm a track", "number of plots that confirms a track")
     n: Annotated[int, Whole(2, 20)] = key(
-        "scans of the confirmation rule", "number of scans, from that of the first plot on, within which they must come"
+        "scans of the confirmation rule",
+        "number of scans, from that of the first plot on, within which they must occur",
     )
 
     @cross_check
@@ -480,12 +481,12 @@ class Filter(Model):
     )
     manoeuvre_variances: tuple[NonNegative, NonNegative] | None = key(
         "manoeuvre variances of the models",
-        "of the two models of an imm, steady and manoeuvring, (m/s²)², as manoeuvre_variance",
+        "imm: variances of its two models, steady and manoeuvring, (m/s²)², as manoeuvre_variance",
         only={"kind": "imm"},
     )
     stay_probabilities: tuple[Rate, Rate] | None = key(
-        "probabilities that a model lasts",
-        "of an imm: probabilities that the steady and the manoeuvring model last from scan to scan",
+        "probabilities that a model persists",
+        "imm: probabilities that the steady and the manoeuvring model persist from scan to scan",
         only={"kind": "imm"},
     )
 
@@ -529,10 +530,11 @@ class RareTracks(Model):
     """Events that are rare: realisations drawn where they are frequent, and weights that make up for it."""
 
     events: Annotated[tuple[Event, ...], Field(min_length=1)] = key(
-        "events that are sought",
-        "false_tracks: tracks that false plots begin, of all trackers, are drawn with more plots in their gates "
-        "until they are confirmed; long_false_tracks: until they end; ended_tracks: further realisations of the "
-        "target's track are drawn where it ends, with more misses, and worse or false plots while it is young",
+        "events to sample",
+        "false_tracks: tracks started by false plots, of all trackers, are drawn with more plots in "
+        "their gates until they are confirmed; long_false_tracks: until they end; ended_tracks: further "
+        "realisations of the target's track are drawn in which it ends, with more misses, and worse or "
+        "false plots while it is young",
     )
 
     def shares(self) -> tuple[float, float, float]:
@@ -567,16 +569,16 @@ class Keys(Study):
     target: Annotated[Target, Scenario()] = key("target", "the target: the stem of a scenario, or inline")
     frame: Annotated[Literal["polar", "cartesian", "cartesian_unbiased"], Design()] = key(
         "frame of coordinates",
-        "coordinates in which the filters work; plots are converted to x, y plainly, or without bias",
+        "coordinates of the filters; plots are converted to x, y plainly, or without bias",
         "polar",
     )
     filters: Members[Filter] = key("filters", "the filters; all of them process the same plots")
     baseline: Baseline = key(
-        "baseline filter", "filter that gains are against, or a list of several; default: the first", None
+        "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
     )
     scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = key("number of scans", "number of scans of the first sonar")
     detectors: Annotated[tuple[Detector, ...], Field(max_length=8), AfterValidator(unique_names), Design()] = key(
-        "detectors", "manoeuvre detectors that are measured on the plots", ()
+        "detectors", "manoeuvre detectors that are evaluated on the plots", ()
     )
     uses: Annotated[Uses | None, Design()] = key(
         "uses of the track",

@@ -104,8 +104,8 @@ def sigma_figure(
     drawn, same = panels.differing(drawn)
     caption = (
         tr(
-            "Root-mean-square error of the {name} about the truth against time, of {count:,} "
-            "realisations. Bands: 95 % intervals, where not seen narrower than the line.",
+            "Root-mean-square error of the {name} about the truth against time, of {count:,} realisations. "
+            "Bands: 95 % intervals; a band that is not visible is narrower than the line.",
             name=of.words,
             count=results[0].count,
         )
@@ -134,7 +134,7 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
         bought.append(Line(x, measured, tr(WHAT[str(what)]), Style(n, n, n), exact=formula))
     x_axis = panels.counts(tr("plots n"), float(rows["plots"].max()))
     left = Axis(tr("$\\sigma$ / $\\sigma$ of a plot"), limits=(0, None))
-    right = Axis(tr("bought by the n-th plot, %"), limits=(0, None))
+    right = Axis(tr("gained by the n-th plot, %"), limits=(0, None))
     drawn = (
         Panel(x_axis, left, tuple(accuracy), key_title=tr("measured"), direct=False, crosses=tr("the paper's formula")),
         Panel(x_axis, right, tuple(bought), direct=False, crosses=tr("the paper's formula")),
@@ -144,7 +144,7 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
         "of a single plot, growing memory of degree 1. Right: by how "
         "much the n-th plot lowers that σ."
     )
-    return Figure("plots", tr("What each further plot buys"), caption, drawn, 2, PAGE_MM)
+    return Figure("plots", tr("Benefit of each further plot"), caption, drawn, 2, PAGE_MM)
 
 
 def gains_figure(table: "pd.DataFrame") -> Figure:
@@ -191,13 +191,13 @@ def believed_figure(
         ends = ((rows[key] * rows["believed_sigma"]).to_numpy() / sigma for key in ("ratio_lo", "ratio_hi"))
         left.append(Line(rho, true, f, Style(n, n, n), *ends))
         if np.max(np.abs(claimed / true - 1)) > 0.05:
-            left.append(Line(rho, claimed, tr("{f}: believed", f=f), Style(n, None, n)))
+            left.append(Line(rho, claimed, tr("{f}: own σ", f=f), Style(n, None, n)))
         rows = consistency_rows.loc[places].assign(rho=rho)
         right.append(panels.line(rows, ("rho", "nees", "nees_lo", "nees_hi", "exact_nees"), f, n))
     caption = tr(
-        "Left: σ of the {name} at plot {last} in σ of a plot, true (lines) and as the filter "
-        "believes it (markers alone, where they differ by over 5 %). Right: normalised squared error "
-        "per component, 1 for a consistent filter.",
+        "Left: σ of the {name} at plot {last} in σ of a plot, true (lines) and the filter's own (markers "
+        "alone, where they differ by over 5 %). Right: normalised squared error per component, 1 for a "
+        "consistent filter.",
         name=BY_NAME[component].words,
         last=last,
     )
@@ -209,7 +209,7 @@ def believed_figure(
         Panel(x, y, tuple(left), direct=False, legend="upper left"),
         Panel(x, Axis(tr("normalised squared error"), "log"), tuple(right), direct=False),
     )
-    return Figure("believed", tr("What a filter believes of itself"), caption, drawn, 2, PAGE_MM)
+    return Figure("believed", tr("Consistency of a filter"), caption, drawn, 2, PAGE_MM)
 
 
 def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.DataFrame") -> Figure | None:
@@ -233,9 +233,9 @@ def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.Dat
         drawn.append(Panel(panels.time_axis(), y, tuple(marks), f, key_title="$P_D$", direct=False))
     gap = cases[0].spec.sensor.missed_scans
     caption = tr(
-        "σ of the {name} for several detection probabilities (legend), one panel a filter, of "
-        "{count:,} realisations. Exact values are means over all patterns of misses, where "
-        "these can be enumerated.",
+        "σ of the {name} for several detection probabilities (legend), one panel per filter, of "
+        "{count:,} realisations. Exact values are means over all patterns of misses, where these can be "
+        "enumerated.",
         name=of.words,
         count=cases[0].count,
     ) + (tr(" Scans {scans} never give a plot.", scans=", ".join(map(str, gap))) if gap else "")

@@ -115,7 +115,7 @@ def _width(result: CaseResult[GivenPlotsAxes]) -> int:
 
 @table("plots", textbook)
 def _plots(result: CaseResult[GivenPlotsAxes]) -> Columns:
-    """What each further plot buys to growing memory.
+    """Benefit of each further plot to growing memory.
 
     degree: of the polynomial
     what: smoothed, extrapolated by one scan, or for degree 2 the acceleration

@@ -70,7 +70,7 @@ def _most_optimistic(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[st
     swept = panels.plain(panels.swept(result))
     return [
         tr(
-            "Most optimistic: {filter}, whose true σ is {ratio} times the one it believes ({quantity}, scan {k}).",
+            "Most optimistic: {filter}; its true σ is {ratio} times its own estimate ({quantity}, scan {k}).",
             filter=f"{worst['filter']} ({swept})" if swept else str(worst["filter"]),
             ratio=wording.estimate((worst[key] for key in ("ratio", "ratio_lo", "ratio_hi")), form=".2f"),
             quantity=BY_NAME[worst["component"]].words,

@@ -117,7 +117,7 @@ def test_the_filter_as_printed_is_growing_memory(walking):
 
 def test_a_subscript_of_a_scan_contradicts_no_print(walking):
     assert set(walking.loc["P3.16", "class"]) == {"not judgeable as stated"}
-    assert walking.loc["P3.16", "why"].str.contains("one subscript of a scan").all()
+    assert walking.loc["P3.16", "why"].str.contains("one subscript of a machine-read scan").all()
 
 
 def test_coordinates_apart_are_those_at_once_on_a_linear_trajectory_alone(walking):

@@ -61,7 +61,7 @@ class Banks(NamedTuple):
     most: np.ndarray  #: (B,) hypotheses kept
     deepest: np.ndarray  #: (B,) logarithm of the largest ratio of the best hypothesis's probability to a kept one's
     reads: np.ndarray  #: (B,) WEIGHS, CHOOSES: MEAN or BEST of the parts
-    stay: np.ndarray  #: (B,) INTERACTS: probability that an order lasts from scan to scan
+    stay: np.ndarray  #: (B,) INTERACTS: probability that an order persists from scan to scan
     unfolding: np.ndarray  #: (B,) INTERACTS: what it does about the folds
     #: (B, K, MEMBERS, 3) WEIGHS: the parts' shares in each component; CHOOSES: half widths of their intervals, zero of
     #: a part that does not estimate the component

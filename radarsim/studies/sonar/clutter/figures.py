@@ -97,7 +97,7 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
     caption = (
         tr(
             "Probability that a track of the target was confirmed by that time, of {realisations}; thin "
-            "lines: that a confirmed track is there and on the target. Bands: 95 % intervals.",
+            "lines: that a confirmed track exists and is on the target. Bands: 95 % intervals.",
             realisations=panels.realisations(results),
         )
     ) + panels.cases_left_out(results, some)
@@ -132,9 +132,9 @@ def life_figure(results: Results, made: "Mapping[str, pd.DataFrame]") -> Figure 
         Panel(x, y, tuple(_lines(by_line(at_end, column, results[0]), column, "sigma", "sigma")), direct=False)
     )
     caption = tr(
-        "Mean time between ends of a confirmed track (no point: no end was seen), mean time to its "
-        "confirmation, weight of false plots among those taken, and root-mean-square error of the "
-        "range of the tracks kept at the end, of {realisations}. Bands: 95 % intervals.",
+        "Mean time between ends of a confirmed track (no point: no end occurred), mean time to its "
+        "confirmation, weight of false plots among those used, and root-mean-square error of the range "
+        "of the tracks kept at the end, of {realisations}. Bands: 95 % intervals.",
         realisations=panels.realisations(results),
     )
     return Figure("track_life", tr("Track life and accuracy"), caption, tuple(drawn), 2, PAGE_MM, 58)
@@ -164,8 +164,8 @@ def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
         false_lo=np.maximum(rows["false_lo"], rows[rate] / 10),
     )
     caption = tr(
-        "False tracks confirmed in an hour in the whole sector, every false plot beginning a "
-        "tentative track, of {realisations} a case. Bands: 95 % intervals.",
+        "False tracks confirmed per hour in the whole sector; every false plot starts a tentative track. "
+        "{realisations} per case. Bands: 95 % intervals.",
         realisations=panels.realisations(results),
     )
     x, y = axis_over(results[0], column, rows[column]), Axis(tr("false tracks per hour"), "log")
@@ -186,20 +186,21 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
     if false:
         longest = max(false, key=lambda mark: len(mark.x))
         bound = Line(longest.x, np.exp(-longest.x), tr("bound"), Style(GREY, 1, None))
-        y = Axis(tr("share of false tracks called true"), "log")
+        y = Axis(tr("share of false tracks declared true"), "log")
         drawn.append(Panel(x, y, (*false, bound), direct=False))
     if true:
-        y = Axis(tr("share of target's tracks called false"), limits=(0, None))
+        y = Axis(tr("share of target's tracks declared false"), limits=(0, None))
         drawn.append(Panel(x, y, tuple(true), direct=False))
     caption = tr(
-        "Error rates of calling a track true once its score (logarithm of the likelihood ratio) "
-        "reaches a threshold, of {realisations} of each kind. Left: of tracks that false plots began; "
-        "no more than exp(−threshold) of them can (bound). Right: of the target's first tracks. "
-        "Bands: 95 % intervals.",
+        "Error rates of declaring a track true once its score (logarithm of the likelihood ratio) "
+        "reaches a threshold, of {realisations} of each kind. Left: tracks started by false plots, at "
+        "most exp(−threshold) of them (bound). Right: the target's first tracks. Bands: 95 % intervals.",
         realisations=panels.realisations(results),
     ) + (tr(" Case: {swept}.", swept=_swept(case)) if case.swept else "")
     return (
-        Figure("track_classes", tr("True or false by the score"), caption, tuple(drawn), 2, PAGE_MM) if drawn else None
+        Figure("track_classes", tr("True and false tracks by score"), caption, tuple(drawn), 2, PAGE_MM)
+        if drawn
+        else None
     )
 
 
@@ -210,7 +211,7 @@ def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
     marks = [
         Line(shown.false[1] * km, shown.false[0] * km, tr("false plots"), Style(GREY, None, 0, 1.1, 1.0)),
         Line(shown.truth[1] * km, shown.truth[0] * km, tr("target"), Style(1, 1, None)),
-        Line(shown.plots[1] * km, shown.plots[0] * km, tr("its plots"), Style(1, None, 1, 1.1, 2.0)),
+        Line(shown.plots[1] * km, shown.plots[0] * km, tr("target plots"), Style(1, None, 1, 1.1, 2.0)),
     ]
     curves = ((tr("tracks"), shown.tracks, Style(2, 0, None, 1.3)), (tr("gates"), shown.gates, Style(3, 0, None, 0.6)))
     for label, drawn, style in curves:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 def question(specs: Sequence[Keys]) -> str:
     """The question of cases whose filters have to find their plots."""
     return tr(
-        "How surely and how soon is a target's track confirmed among false and missed plots, how long is it kept, and "
-        "how many false tracks does that cost?"
+        "How reliably and how soon is a target's track confirmed among false and missed plots, how long "
+        "is it kept, and how many false tracks does that cost?"
     )
 
 

@@ -124,7 +124,7 @@ def roc_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
         "{count:,} realisations, with 95 % intervals.",
         count=results[0].count,
     )
-    return _figure("roc", tr("What a detector sees, and what it imagines"), caption, drawn)
+    return _figure("roc", tr("Detections and false alarms"), caption, drawn)
 
 
 def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
@@ -150,12 +150,12 @@ def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | N
         x, y = Axis(panels.axis_of(members[0], key)), Axis(tr("detection probability"), limits=(0, 1))
         drawn.append(Panel(x, y, tuple(marks), title, direct=False))
     caption = tr(
-        "Probability of an alarm of detectors in the range at about {usual:g} false alarms a test, "
-        "at the last scan of the manoeuvre (of a steady target, at the last of all), against the "
-        "manoeuvre's strength. Bands: 95 % intervals, where not seen narrower than the line.",
+        "Probability of an alarm of detectors in the range at about {usual:g} false alarms a test, at "
+        "the last scan of the manoeuvre (for a steady target, at the last scan), against the manoeuvre's "
+        "strength. Bands: 95 % intervals; a band that is not visible is narrower than the line.",
         usual=USUAL,
     )
-    return _figure("detection", tr("Detection over the strength of the manoeuvre"), caption, drawn)
+    return _figure("detection", tr("Detection against the strength of the manoeuvre"), caption, drawn)
 
 
 def _at_strongest(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame", name: str) -> "pd.Series":
@@ -165,7 +165,7 @@ def _at_strongest(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame",
 
 
 def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
-    """Probability that an alarm has come, against the time since the manoeuvre began."""
+    """Probability that alarm raised, against the time since the manoeuvre began."""
     drawn: list[Panel] = []
     for result in results:
         rows, marks = delays[delays["case"] == result.name], []
@@ -177,16 +177,16 @@ def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
             if len(alarms):
                 marks.append(panels.line(alarms, ("delay_s", "probability", "lo", "hi", "exact"), name, n))
         if marks:
-            x, y = Axis(tr("time since it began, s"), limits=(0, None)), Axis(tr("an alarm has come"), limits=(0, 1))
+            x, y = Axis(tr("time since it began, s"), limits=(0, None)), Axis(tr("alarm raised"), limits=(0, 1))
             drawn.append(Panel(x, y, tuple(marks), _title(result), direct=False))
     caption = tr(
-        "Probability that the first alarm of a detector in the range has come, against the time "
-        "since the manoeuvre began, at about {usual:g} false alarms a test. It is known exactly where "
-        "windows are apart and tests independent; overlapping windows have no closed law. Bands: 95 "
-        "% intervals.",
+        "Probability that a detector in the range has raised its first alarm, against the time since the "
+        "manoeuvre began, at about {usual:g} false alarms a test. It is known exactly where windows do "
+        "not overlap and tests are independent; overlapping windows have no closed form. Bands: 95 % "
+        "intervals.",
         usual=USUAL,
     )
-    return _figure("delay", tr("How soon a manoeuvre is seen"), caption, drawn)
+    return _figure("delay", tr("How soon a manoeuvre is detected"), caption, drawn)
 
 
 def response_figure(results: Results, curves: "pd.DataFrame") -> Figure | None:
@@ -199,8 +199,8 @@ def response_figure(results: Results, curves: "pd.DataFrame") -> Figure | None:
         y = Axis(panels.sigma_of(component.symbol, component.unit), "log")
         drawn.append(Panel(panels.time_axis(), y, marks, _title(result), direct=False))
     caption = tr(
-        "Root-mean-square error of the first coordinate about the truth on the same plots, of "
-        "{count:,} realisations. Dotted: the manoeuvre begins and ends.",
+        "Root-mean-square error of the first coordinate about the truth on the same plots, of {count:,} "
+        "realisations. Dotted: beginning and end of the manoeuvre.",
         count=results[0].count,
     )
     return _figure("response", tr("Filters through a manoeuvre"), caption, drawn)
@@ -216,10 +216,10 @@ def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
         drawn.append(Panel(panels.time_axis(), y, (*_ends(result), *lines), _title(result), direct=False))
     caption = tr(
         "Share of realisations in which an adaptive filter is in its manoeuvring mode, and mean "
-        "probability of the manoeuvring model of an imm, first coordinate. Dotted: the manoeuvre "
-        "begins and ends."
+        "probability of the manoeuvring model of an imm, first coordinate. Dotted: beginning and end of "
+        "the manoeuvre."
     )
-    return _figure("modes", tr("What filters take the target to be doing"), caption, drawn)
+    return _figure("modes", tr("Manoeuvre state assumed by the filters"), caption, drawn)
 
 
 def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
@@ -236,7 +236,7 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
             marks.append(panels.line(part.assign(x=x), columns, str(f), Style(n, None, n)))
         low, high = at_time["ratio"].min(), at_time["ratio"].max()
         shown = tuple((float(value), numeral(f"{value:g}")) for value in RATIOS if low <= value <= high or value == 1)
-        y = Axis(tr("measured / believed $\\sigma$"), "log", ticks=shown)
+        y = Axis(tr("measured / computed $\\sigma$"), "log", ticks=shown)
         drawn.append(Panel(Axis("", ticks=ticks), y, tuple(marks), tr("t = {t_s:g} s", t_s=when), direct=False))
     case = f" ({panels.plain(_title(result))})" if result.swept else ""
     caption = (
@@ -247,7 +247,7 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
             count=result.count,
         )
     ) + panels.cases_left_out(results, results[:1])
-    return _figure("uses", tr("What a track is used for"), caption, drawn, 2)
+    return _figure("uses", tr("Quantities derived from a track"), caption, drawn, 2)
 
 
 def _ends(result: CaseResult[ManoeuvreAxes]) -> list[Reference]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def question(specs: Sequence[Keys]) -> str:
     """The question of cases with detectors, filters that respond to manoeuvres, or uses."""
     if any(spec.detectors for spec in specs):
-        return tr("How surely and how soon is a manoeuvre detected, and what do filters that respond to it gain?")
+        return tr("How reliably and how soon is a manoeuvre detected, and what do filters that respond to it gain?")
     if any(spec.uses for spec in specs):
         return tr("How well are course, speed, position ahead and closest approach known from a track?")
     return tr("What do filters that respond to manoeuvres gain?")

@@ -34,7 +34,7 @@ def test_the_example_is_realisation_3_of_the_shipped_config():
 
 
 def test_the_target_of_the_example_is_found():
-    """The track of the highest score is the target's, in every tracker; the one told its plots is left out."""
+    """The track of the highest score is the target's, in every tracker; the one of known association is left out."""
     _, track = whole.track(loaded(), EXAMPLE)
     assert set(track.filters) == {"nearest", "PDA", "nearest, 4 of 6"}
     truth = np.genfromtxt(EXAMPLE, delimiter=",", names=True)

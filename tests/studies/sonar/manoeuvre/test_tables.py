@@ -169,7 +169,7 @@ def test_claims_are_judged(result, tables):
 
 def test_words(result, tables):
     told = STUDY.answer(result.cases, tables)
-    assert STUDY.question(result.experiment).startswith("How surely and how soon is a manoeuvre detected")
+    assert STUDY.question(result.experiment).startswith("How reliably and how soon is a manoeuvre detected")
     assert any("10 plots" in sentence for sentence in told)
     assert any(
         sentence.startswith("Measured σ of the track's uses over that from its covariance (growing, ")
@@ -185,5 +185,5 @@ def test_of_many_cases_the_ends_are_shown():
 
 def test_an_answer_of_many_cases_tells_the_ends():
     assert panels.reported([1, 2, 3]) == ([1, 2, 3], [])
-    assert panels.reported([1, 2, 3], 2) == ([1, 3], ["The case between: in the report's tables."])
-    assert panels.reported([1, 2, 3, 4]) == ([1, 4], ["The 2 cases between: in the report's tables."])
+    assert panels.reported([1, 2, 3], 2) == ([1, 3], ["The case in between is in the report's tables."])
+    assert panels.reported([1, 2, 3, 4]) == ([1, 4], ["The 2 cases in between are in the report's tables."])

@@ -58,6 +58,6 @@ class Keys(Study):
     # Design(): cases that differ in nothing else have the same noise, so that their comparison is paired.
     filters: Members[Filter] = key("filters", "the filters; all see the same plots")
     baseline: Baseline = key(
-        "baseline filter", "filter that gains are against, or a list of several; default: the first", None
+        "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
     )
     scans: Annotated[int, Whole(1, MOST_SCANS), Design()] = key("number of scans", "number of plots")
