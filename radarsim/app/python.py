@@ -220,9 +220,9 @@ class Claims(Shown):
     @property
     def table(self) -> "pd.DataFrame":
         """The columns of claims.csv, and `config`, by which it is judged."""
-        from radarsim.report.tables import frame
+        from radarsim.report.tables import read_rows
 
-        return frame({name: [row[name] for row in self.rows] for name in (self.rows[0] if self.rows else ())})
+        return read_rows(self.rows, self.rows[0] if self.rows else ())
 
     @property
     def _described(self) -> "Mapping[str, Figure]":

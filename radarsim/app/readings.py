@@ -53,7 +53,7 @@ from radarsim.report.claims.over import (
 from radarsim.report.claims.rule import UNDECIDED, roughly
 from radarsim.report.drawing import Figure
 from radarsim.report.precision import looks
-from radarsim.report.tables import frame
+from radarsim.report.tables import read_rows
 from radarsim.studies import registry
 
 if TYPE_CHECKING:
@@ -335,7 +335,7 @@ class Done(Shown):
         """The rows of readings.csv for these claims: a row a claim, reading and part."""
         names = columns(read.paper.readings for read in self.read)
         made = [row for over in self.over for one in over.under for row in rows(one, names, over.outcome)]
-        return frame({name: [row[name] for row in made] for name in names})
+        return read_rows(made, names)
 
     @property
     def _described(self) -> dict[str, Figure]:

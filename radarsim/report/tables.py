@@ -271,6 +271,16 @@ def from_csv(content: bytes) -> "pd.DataFrame":
     return frame({name: _read(name, column) for name, column in zip(names, columns, strict=True)})
 
 
+def read_rows(rows: Sequence[Mapping[Any, Any]], names: Iterable[str]) -> "pd.DataFrame":
+    """Columns of rows that a CSV file has, or will have: numbers as numbers, not-a-number where a cell is empty."""
+    columns = {name: [row[name] for row in rows] for name in names}
+    return frame({name: _typed(name, column) for name, column in columns.items()})
+
+
+def _typed(name: str, column: Sequence[Any]) -> Sequence[Any] | np.ndarray:
+    return column if all(isinstance(one, bool) for one in column) else _read(name, list(map(str, column)))
+
+
 def _read(name: str, column: Sequence[str]) -> Sequence[str] | np.ndarray:
     """A column of text as what it was: numbers, but for labels and for words."""
     if name in LABEL_COLUMNS:
