@@ -25,7 +25,7 @@ from radarsim.config.experiment import Case, Experiment, in_name
 from radarsim.config.fields import unknown_to
 from radarsim.config.schema import LARGEST_REALISATIONS
 from radarsim.engine.results import Track
-from radarsim.errors import ConfigError, PlotFault
+from radarsim.errors import ConfigError, PlotFault, argument
 from radarsim.recorded import plots
 from radarsim.recorded.plots import Path as Places
 from radarsim.studies.interface import RecordedPlots, Tracker, true_column
@@ -177,27 +177,28 @@ def choice(experiment: Experiment, command: str) -> str:
     """What cases there are to choose from, and the command for the first: configs put together, or swept values."""
     stems = list(dict.fromkeys(case.stem for case in experiment.cases))
     if len(stems) > 1 and experiment.changes_included:
-        one = shlex.quote(f"include=[{stems[0]}]")
-        return f"choose one of {listed(stems)}: {command.format(named(experiment.path or ''))} --set {one}"
+        return f"choose one of {listed(stems)}: {_call(command, experiment.path or '', f'include=[{stems[0]}]')}"
     if len(stems) > 1:
-        name = named(str(Path(experiment.path or "").parent / f"{stems[0]}.yaml"))
-        return f"choose one of {listed(stems)}: {command.format(name)}"
+        path = str(Path(experiment.path or "").parent / f"{stems[0]}.yaml")
+        return f"choose one of {listed(stems)}: {_call(command, path)}"
     values: dict[str, list] = {}
     for case in experiment.cases:
         for key, value in case.swept:
             values.setdefault(key, []).append(value)
     each = {key: list({in_name(value): value for value in found}.values()) for key, found in values.items()}
     there = "; ".join(f"{key} = {listed([in_name(value) for value in found])}" for key, found in each.items())
-    first = [shlex.quote(f"sweep.{key}={json.dumps(found[:1], ensure_ascii=False)}") for key, found in each.items()]
-    chosen = " ".join([command.format(named(experiment.path or experiment.stem)), *(f"--set {s}" for s in first)])
-    return f"choose of {there}: {chosen}"
+    first = [f"sweep.{key}={json.dumps(found[:1], ensure_ascii=False)}" for key, found in each.items()]
+    return f"choose of {there}: {_call(command, experiment.path or experiment.stem, *first)}"
 
 
-def named(path: str) -> str:
-    """A config as a command names it: by its stem where that finds the same file, or where there is none."""
+def _call(command: str, path: str, *settings: str) -> str:
+    """A command of a config with settings, or what it is in Python; the config by its stem where that finds its file."""
     file = Path(path)
     found = document.config_file(file.stem)
-    return shlex.quote(path if file.is_file() and not (found and found.samefile(file)) else file.stem)
+    name = path if file.is_file() and not (found and found.samefile(file)) else file.stem
+    options = "".join(f" --set {shlex.quote(one)}" for one in settings)
+    overrides = f", overrides={list(settings)}" if settings else ""
+    return argument(f"{name!r}{overrides}", f"{command.format(shlex.quote(name))}{options}")
 
 
 def listed(names: list[str]) -> str:

@@ -153,7 +153,7 @@ def test_one_of_ones_own_after_a_config_that_changes_another(folder):
     assert canonical(load("fitted").cases[0].spec) == canonical(expected)
 
 
-def test_of_several_changed_cases_one_is_chosen_with_its_changes(folder):
+def test_of_several_changed_cases_one_is_chosen_with_its_changes(folder, command_line):
     folder("configs/yours.yaml", MINE)
     folder("configs/other.yaml", "include: [mine, yours]\nscans: 20\n")
     with pytest.raises(ConfigError, match=r"choose one of mine, yours: track other --set 'include=\[mine\]'"):
@@ -176,3 +176,10 @@ def test_what_own_keys_break_in_an_included_config_names_both(folder, said):
     assert "sonar_missed.yaml:" in line
     assert line.endswith("(with the keys of configs/over.yaml over it)")
     assert all("over it" not in one for one in said("rls2", "radar.detection_probability=2"))
+
+
+def test_in_python_a_case_is_chosen_by_its_arguments(folder):
+    folder("configs/yours.yaml", MINE)
+    folder("configs/other.yaml", "include: [mine, yours]\nscans: 20\n")
+    with pytest.raises(ConfigError, match=r"choose one of mine, yours: 'other', overrides=\['include=\[mine\]'\]$"):
+        one_case(load("other"), "track with", "track {}")
