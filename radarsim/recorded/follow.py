@@ -192,7 +192,7 @@ def choice(experiment: Experiment, command: str) -> str:
 
 
 def _call(command: str, path: str, *settings: str) -> str:
-    """A command of a config with settings, or what it is in Python; the config by its stem where that finds its file."""
+    """A command of a config with settings, or its arguments in Python; the config by its stem where that finds it."""
     file = Path(path)
     found = document.config_file(file.stem)
     name = path if file.is_file() and not (found and found.samefile(file)) else file.stem
