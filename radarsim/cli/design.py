@@ -69,20 +69,20 @@ def _option(by_study: "Mapping[str, Quantity]", everywhere: bool) -> click.Optio
 
 
 at_options = (
-    click.option("--at", "at_s", type=float, metavar="S", help="At this time, s; default: the last scan."),
-    click.option("--at-k", type=click.IntRange(1), metavar="K", help="At this scan, from 1, in place of --at."),
+    click.option("--at", "at_s", type=float, metavar="S", help="Time, s; default: the last scan."),
+    click.option("--at-k", type=click.IntRange(1), metavar="K", help="Scan, counted from 1, instead of --at."),
 )
 
 
 @group.main.command(cls=Asking)
 @group.config_argument
 @click.argument("key", metavar="KEY")
-@click.option("--filter", "filter_name", metavar="NAME", help="The filter, where there are several.")
+@click.option("--filter", "filter_name", metavar="NAME", help="The filter, if there are several.")
 @at_options[0]
 @at_options[1]
-@click.option("--equals", type=float, required=True, metavar="X", help="What it shall be: per cent of gains and rates.")
-@click.option("--between", type=(float, float), metavar="LO HI", help="Values of KEY that are searched.")
-@click.option("--case", metavar="CASE", help="The case, of a config that has several.")
+@click.option("--equals", type=float, required=True, metavar="X", help="Target value; in per cent for gains and rates.")
+@click.option("--between", type=(float, float), metavar="LO HI", help="Range of KEY to search.")
+@click.option("--case", metavar="CASE", help="The case, if the config has several.")
 @group.set_option
 @group.realisations_option
 @group.seed_option
@@ -104,12 +104,13 @@ def solve(
     as_json: bool,
     **quantities: str | None,
 ) -> None:
-    """The value of KEY at which a quantity reaches a target.
+    """Find the value of KEY at which a quantity reaches a target.
 
-    KEY is any key that holds a number, by its dotted path as for --set; a bare filter key means that of all filters.
-    Where the quantity is known exactly (linear filters), so is the answer. Else each value is simulated with the same
-    noise, and the answer has a 95 % interval. What is not attainable ends in exit code 3, with the nearest there is.
-    A positive key is searched from a thousandth to a thousand times its value, unless --between says otherwise.
+    KEY is any key that holds a number, by its dotted path as for --set; a bare filter key applies to all filters. If
+    the quantity is known exactly (linear filters), the answer is exact. Otherwise each value is simulated with the same
+    noise, and the answer has a 95 % interval. If the target is not attainable, the nearest attainable value is printed
+    and the exit code is 3. A positive key is searched from a thousandth to a thousand times its value, unless --between
+    is given.
 
     \b
     Examples
@@ -146,11 +147,11 @@ def solve(
 def chart(
     configs: tuple[str, ...], overrides: tuple[str, ...], out: str, drawing: group.Drawing, as_json: bool
 ) -> None:
-    """What Doppler gains for every radar, with yours marked.
+    """Chart the gain by Doppler for all radars, with yours marked.
 
-    Simulates nothing. Gains over time and in the long run against c = (σ_r/σ_V)² (D_M/σ_r²)^(1/3), on which alone they
-    depend as the scan period becomes short, a map with the period in it, and a sentence where each case of CONFIG lies.
-    Also DIR/chart/chart.html, a page of its own with sliders, which computes σ(k) and gains of any radar as they move.
+    Simulates nothing. Draws gains over time and in the long run against c = (σ_r/σ_V)² (D_M/σ_r²)^(1/3), the only
+    parameter that matters for a short scan period, and a map that includes the period. Prints where each case of CONFIG
+    lies. Also writes DIR/chart/chart.html, a page with sliders that computes σ(k) and gains of any radar.
 
     \b
     Examples
@@ -172,11 +173,9 @@ def chart(
 @group.config_argument
 @at_options[0]
 @at_options[1]
-@click.option(
-    "--of", metavar="NAME", help="Of this quantity (`radarsim solve --help` lists them); default: σ and gain."
-)
-@click.option("--component", metavar="COMPONENT", help="The component that is shown and leads; default: the first.")
-@click.option("--case", metavar="CASE", help="The case, of a config that has several.")
+@click.option("--of", metavar="NAME", help="Quantity (`radarsim solve --help` lists them); default: σ and gain.")
+@click.option("--component", metavar="COMPONENT", help="The component shown and used for sorting; default: the first.")
+@click.option("--case", metavar="CASE", help="The case, if the config has several.")
 @group.set_option
 @group.realisations_option
 @group.seed_option
@@ -197,12 +196,12 @@ def sensitivity(
     drawing: group.Drawing,
     as_json: bool,
 ) -> None:
-    """What +10 % of each key changes, the largest effect first.
+    """Show what +10 % of each key changes, largest effect first.
 
-    Changes of σ and gain, or of another quantity. Every key that holds a number is raised by a tenth, one at a time;
-    whole numbers by at least one. Exact where the quantity is; else paired, with the same noise, and with 95 %
-    intervals. All filters and components are in DIR/sensitivity/CONFIG/sensitivity.csv, the leading component is drawn
-    beside it as tornado.svg.
+    Prints changes of σ and gain, or of another quantity. Every numeric key is raised by a tenth, one at a time; whole
+    numbers by at least one. Changes are exact if the quantity is known exactly; otherwise they are paired, with the
+    same noise, and have 95 % intervals. All filters and components are in DIR/sensitivity/CONFIG/sensitivity.csv;
+    tornado.svg beside it shows the first component.
 
     \b
     Examples

@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 @group.set_option
 @group.precision_option
 @group.of_option
-@click.option("--decide", is_flag=True, help="Until each claim of the config is decided, at most N realisations.")
+@click.option("--decide", is_flag=True, help="Run until each claim of the config is decided, at most N realisations.")
 @group.time_limit_option
-@click.option("--shard", type=group.Share(), metavar="i/n", help="Compute this share of the blocks only; no tables.")
+@click.option("--shard", type=group.Share(), metavar="i/n", help="Compute only this share of the blocks; no tables.")
 @group.threads_option
 @click.option("--workers", type=click.IntRange(1, 1024), metavar="N", help="Worker processes on this machine (Dask).")
 @click.option("--scheduler", metavar="ADDR", help="Address of a Dask scheduler whose workers compute: tcp://host:8786.")
 @group.out_option
 @group.drawing_options
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
 @group.json_option
 def run(
     configs: tuple[str, ...],
@@ -50,11 +50,11 @@ def run(
     quiet: bool,
     as_json: bool,
 ) -> None:
-    """Run experiments; what was stopped goes on.
+    """Run experiments, or continue stopped ones.
 
     CONFIG is a YAML file, or the name of a shipped experiment (`radarsim list`). Finished blocks are kept under
-    DIR/.blocks: a run that was stopped continues, a larger N continues, an edited config starts from zero. A precision
-    or time limit that left something undone ends in exit code 3, with tables of what is done.
+    DIR/.blocks: a stopped run and a larger N continue from them, an edited config starts afresh. If a time limit ends
+    the run, or the precision is not reached, tables of the finished part are written and the exit code is 3.
 
     \b
     Examples
@@ -64,8 +64,8 @@ def run(
       radarsim run rls2 -n 1e7 --precision 0.5          until every σ is known to ± 0.5 %
       radarsim run rls2 -n 1e7 --precision 0.5 --of gain   every gain to ± 0.5 points
       radarsim run discriminator_rare -n 1e6 --precision 10 --of lost   every rate of lost locks to ± 10 % of it
-      radarsim run multimodel -n 1e5 --time-limit 600   for ten minutes; the same again continues
-      radarsim run discriminator_paper -n 1e6 --decide  which claims are left, and what N they would take: exit code 3
+      radarsim run multimodel -n 1e5 --time-limit 600   for ten minutes; repeat it to continue
+      radarsim run discriminator_paper -n 1e6 --decide  names undecided claims and the N that they need: exit code 3
       radarsim run rls2 -n 1e8 --shard 2/3              on the second of three machines
       radarsim run rls2 -n 1e8 --workers 8              or --scheduler tcp://host:8786
       radarsim run rls2 --json | jq '.[0].last_scan[0].sigma'
@@ -202,8 +202,10 @@ def _compute_each(
 @group.set_option
 @group.precision_option
 @group.of_option
-@click.option("--shard", type=group.Share(), metavar="i/n", help="Of this share of the blocks only.")
-@click.option("--out", type=group.Directory(), metavar="DIR", help="Also what of it is stored there, what is missing.")
+@click.option("--shard", type=group.Share(), metavar="i/n", help="Forecast only this share of the blocks.")
+@click.option(
+    "--out", type=group.Directory(), metavar="DIR", help="Also report what is stored there and what is missing."
+)
 @group.json_option
 def check(
     configs: tuple[str, ...],
@@ -216,13 +218,13 @@ def check(
     out: str | None,
     as_json: bool,
 ) -> None:
-    """Validate configs, and forecast the time of a run.
+    """Validate configs and estimate the time of a run.
 
-    Also cases, filters, realisations, memory. A few realisations are timed, unless all are surely done within a second.
-    With --out the time is that of what the results directory lacks, with --shard that of one share.
+    Also prints cases, filters, realisations and memory. A few realisations are timed, unless all take less than a
+    second. With --out the time covers what the results directory lacks, with --shard one share.
 
-    With a precision, also how many realisations it takes, and how long: from exact values where the filters are linear,
-    else from a pilot of a second or two.
+    With --precision, it also estimates the number of realisations and the time: from exact values where the filters are
+    linear, otherwise from a pilot run of a second or two.
 
     \b
     Examples
@@ -230,7 +232,7 @@ def check(
       radarsim check multimodel --precision 1
       radarsim check discriminator_rare -n 1e6 --precision 10 --of lost
       radarsim check multimodel -n 1e8 --shard 1/3        how long the first of three machines takes
-      radarsim check multimodel -n 1e8 --out results      what of it is stored there, and what is missing
+      radarsim check multimodel -n 1e8 --out results      what is stored there, and what is missing
     """
     _refuse_together(shard, precision, None, None)
     _refuse_of_nothing(of, precision)
@@ -267,7 +269,9 @@ def report(
     drawing: group.Drawing,
     as_json: bool,
 ) -> None:
-    """Tables, figures and report of stored runs, without computing.
+    """Write tables, figures and report of stored runs.
+
+    Computes nothing.
 
     \b
     Examples
@@ -286,15 +290,19 @@ def report(
 @click.argument("names", nargs=-1, metavar="[CONFIG | CLAIM | PAPER …]", shell_complete=group.completed)
 @group.out_option
 @group.json_option
-@click.option("--markdown", is_flag=True, help="The page of claims in Markdown on stdout in place of text.")
-@click.option("--parts", is_flag=True, help="What was measured of each.")
-@click.option("--figure", metavar="FILE", help="Also draw them, in margins of what the papers say, to this file.")
+@click.option("--markdown", is_flag=True, help="Print the page of claims in Markdown instead of text.")
+@click.option("--parts", is_flag=True, help="Also print what was measured for each claim.")
+@click.option(
+    "--figure",
+    metavar="FILE",
+    help="Also draw the claims to this file, as distances from the papers' words in margins.",
+)
 def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figure: str | None, parts: bool) -> None:
-    """The papers' claims, a line each, and how far each stands.
+    """List the papers' claims with their verdicts.
 
-    Computes nothing. Of a CLAIM (P1.3) also its words in full and what was measured. PAPER is P1, P2, P3 or P4; without
-    any, all claims of all papers. For those that are not run the command that would judge them is given. Of a CONFIG
-    that is not a paper's experiment, the claims that it cannot judge, and why.
+    Computes nothing. For a CLAIM (P1.3), prints its full text and what was measured. PAPER is P1, P2, P3 or P4; without
+    an argument, all claims are listed. For claims without results, prints the command that would judge them. For a
+    CONFIG that is not a paper's experiment, lists the claims that it cannot judge, and why.
 
     How they are judged stands in docs/verdicts.md: exact values first, each number with a margin, and over every
     reading that the paper allows. "refuted as shipped; depends on start": false with the choices that the config takes

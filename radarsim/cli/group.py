@@ -218,32 +218,38 @@ language_option = click.option(
     expose_value=False,
     is_eager=True,
     callback=_language,
-    help="Language of figures, reports, answers and claims; as RADARSIM_LANGUAGE. Tables are the same in all.",
+    help="Language of figures, reports, answers and claims; the same as RADARSIM_LANGUAGE. Tables do not change.",
 )
 
 
 @click.group(cls=Commands, context_settings=SETTINGS)
 @click.version_option(radarsim.__version__, prog_name="radarsim")
 @click.option(
-    "--no-color", is_flag=True, expose_value=False, is_eager=True, callback=_plain, help="No colours; as NO_COLOR=1."
+    "--no-color",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=_plain,
+    help="No colours; the same as NO_COLOR=1.",
 )
 @language_option
 def main() -> None:
     """Monte-Carlo experiments on radar and sonar track processing.
 
-    An experiment is a YAML file: a sensor, a target, the filters compared. radarsim runs 10⁵ and more realisations
-    of it and writes σ(k), relative gains with 95 % intervals, figures, a report, and a verdict on the papers' claims.
+    An experiment is a YAML file: a sensor, a target, and the filters to compare. radarsim runs 10⁵ and more
+    realisations of it and writes σ(k), relative gains with 95 % intervals, figures, a report, and a verdict on the
+    papers' claims.
 
     \b
     Examples
       radarsim run rls2                          the first paper's decimetre radar
       radarsim run rls2 --set radar.sigma_velocity_mps=5 -n 1e6
-      radarsim claims                            what the papers claim, and what came out
-      radarsim new mine --like rls2              a radar of one's own
+      radarsim claims                            the papers' claims and their verdicts
+      radarsim new mine --like rls2              a radar of your own
       radarsim solve rls2 radar.sigma_velocity_mps --gain r --at 60 --equals 30
 
-    Commands, options and configs complete with the tab key after
-    `eval "$(_RADARSIM_COMPLETE=bash_source radarsim)"` (bash; or zsh_source, fish_source).
+    Tab completes commands, options and configs after `eval "$(_RADARSIM_COMPLETE=bash_source radarsim)"` (bash; or
+    zsh_source, fish_source).
     """
 
 
@@ -269,24 +275,28 @@ def completed(ctx: click.Context, param: click.Parameter, incomplete: str) -> "l
 configs_argument = click.argument("configs", nargs=-1, required=True, metavar="CONFIG…", shell_complete=completed)
 config_argument = click.argument("config", metavar="CONFIG", shell_complete=completed)
 out_option = click.option(
-    "--out", type=Directory(), default="results", show_default=True, metavar="DIR", help="Where results are kept."
+    "--out", type=Directory(), default="results", show_default=True, metavar="DIR", help="Directory of the results."
 )
 set_option = click.option(
-    "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key by its dotted path; repeatable."
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Override a key, given by its dotted path; repeatable.",
 )
 realisations_option = click.option(
-    "-n", "--realisations", type=Count(), metavar="N", help="Realisations, overrides the config; 1e5 is a number."
+    "-n", "--realisations", type=Count(), metavar="N", help="Number of realisations, such as 1e5; overrides the config."
 )
-seed_option = click.option("--seed", type=Count(), metavar="S", help="Seed, overrides the config.")
+seed_option = click.option("--seed", type=Count(), metavar="S", help="Seed of the noise; overrides the config.")
 precision_option = click.option(
     "--precision",
     type=Positive("PCT", most=100),
     metavar="PCT",
-    help="Run until the 95 % half-width of every σ is under PCT %, at most N; looks at 2000, 4000, 8000, …, N, where "
-    "errors are not Gaussian from 64,000 on.",
+    help="Run until the 95 % half-width of every σ is under PCT %, at most N realisations. Checked at "
+    "2000, 4000, 8000, …, N; where errors are not Gaussian, from 64,000 on.",
 )
 time_limit_option = click.option(
-    "--time-limit", type=Positive("SECONDS"), metavar="SECONDS", help="Stop cleanly then, keep what is done."
+    "--time-limit", type=Positive("SECONDS"), metavar="SECONDS", help="Stop after this time and keep finished work."
 )
 
 
@@ -302,22 +312,22 @@ threads_option = click.option(
     metavar="T",
     callback=_obeyed,
     is_eager=True,
-    help="Threads; default: all cores. 0: none is started, all is done in the one there is.",
+    help="Number of threads; default: all cores. 0: no further thread is started.",
 )
 of_option = click.option(
     "--of",
     metavar="NAME",
     default="sigma",
-    help="What --precision is of, default sigma: gain (in points), or what else the study measures, as `radarsim "
-    "solve --help` names it (lock, false_tracks).",
+    help="Quantity that --precision applies to; default: sigma. Also gain (in points), or another "
+    "quantity of the study, as `radarsim solve --help` lists them (lock, false_tracks).",
 )
-json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout in place of text.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document instead of text.")
 format_option = click.option(
     "--format",
     "formats",
     type=click.Choice(["svg", "png", "pdf"]),
     multiple=True,
-    help="Formats of the figures' files, repeatable; default: svg and png.",
+    help="File format of the figures; repeatable; default: svg and png.",
 )
 width_option = click.option(
     "--width",
@@ -325,7 +335,7 @@ width_option = click.option(
     type=click.Choice(["85", "120", "175"]),
     callback=lambda _context, _option, chosen: None if chosen is None else float(chosen),
     metavar="85|120|175",
-    help="Width of the figures' files, mm; letters keep their size. Default: each its own.",
+    help="Width of the figures, mm; text keeps its size. Default: each figure's own width.",
 )
 
 

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 @click.argument("words", nargs=-1, metavar="[WORD…]")
 @json_option
 def list_(words: tuple[str, ...], as_json: bool) -> None:
-    """What there is: configs, scenarios, studies, filters.
+    """List configs, scenarios, studies and filters.
 
-    Their names on one screen; with WORD a line on each that it selects: configs, scenarios, studies or filters, a
-    paper (P2), or what a name or line has to contain.
+    Prints their names on one screen. With WORD, prints a line on each match: configs, scenarios, studies or filters, a
+    paper (P2), or text in a name or line.
 
     \b
     Examples
@@ -47,7 +47,7 @@ def schema() -> None:
 
     \b
     Example
-      radarsim schema > schema.json     then editors check what `radarsim new` writes beside it
+      radarsim schema > schema.json     editors then check what `radarsim new` writes beside it
     """
     from radarsim.app.configs import schema_json
 
@@ -58,11 +58,11 @@ def schema() -> None:
 @click.argument("configs", nargs=-1, metavar="[CONFIG…]")
 @json_option
 def compile_(configs: tuple[str, ...], as_json: bool) -> None:
-    """Compile kernels now, so that no first run has to wait.
+    """Compile kernels now, ahead of the first run.
 
-    Without CONFIG those of all shipped configs. The machine code is kept for this processor, where `radarsim doctor`
-    says. After an installation or an upgrade it takes about a minute of CPU time, else next to none; a line for each
-    config says how much.
+    Without CONFIG, compiles the kernels of all shipped configs. The machine code is kept for this processor; `radarsim
+    doctor` shows where. After an installation or an upgrade this takes about a minute of CPU time, otherwise almost
+    none; a line for each config gives the time.
 
     \b
     Examples
@@ -83,15 +83,15 @@ def compile_(configs: tuple[str, ...], as_json: bool) -> None:
 
 @main.command()
 @click.argument("result", required=False, metavar="[RESULT]")
-@click.option("--recompute", type=Count(), default=0, metavar="N", help="Compute N stored pieces of each case again.")
+@click.option("--recompute", type=Count(), default=0, metavar="N", help="Recompute N stored pieces of each case.")
 @json_option
 def doctor(result: str | None, recompute: int, as_json: bool) -> None:
-    """Test this machine; check that what is stored of RESULT is whole.
+    """Test this machine, or check that a stored RESULT is intact.
 
-    RESULT is a folder such as results/rls2. Every output is checked against run.json, every stored block of its cases
-    against its checksum, every total against its blocks; --recompute computes the N smallest pieces of each case again.
-    Damage ends in exit code 4 and names each file: `radarsim run` computes what is missing, `radarsim report` makes
-    tables again.
+    RESULT is a folder such as results/rls2. Every output is checked against run.json, every stored block against its
+    checksum, every total against its blocks; --recompute recomputes the N smallest pieces of each case. If there is
+    damage, each file is named and the exit code is 4: `radarsim run` computes what is missing, `radarsim report`
+    rewrites tables.
 
     \b
     Examples
@@ -131,14 +131,15 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
 @seed_option
 @set_option
 @out_option
-@click.option("--dry-run", is_flag=True, help="Remove nothing; say how much it would be.")
+@click.option("--dry-run", is_flag=True, help="Delete nothing; print how much would be deleted.")
 @json_option
 def clean(
     configs: tuple[str, ...], seed: int | None, overrides: tuple[str, ...], out: str, dry_run: bool, as_json: bool
 ) -> None:
-    """Drop stored blocks; tables, figures and reports stay.
+    """Delete stored blocks; tables, figures and reports stay.
 
-    Without CONFIG all blocks below DIR/.blocks, those of older configs and older versions too. Nothing else is touched.
+    Without CONFIG, deletes all blocks under DIR/.blocks, including those of older configs and versions. Nothing else is
+    changed.
 
     \b
     Examples

@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     required=True,
     metavar="CONFIG",
     shell_complete=completed,
-    help="The config to begin from: `radarsim list` names them.",
+    help="The config to start from; `radarsim list` lists them.",
 )
 def new(name: str, like: str) -> None:
     """Write a commented config of your own: ./NAME.yaml.
 
-    It repeats CONFIG, with the unit and the meaning of every key beside it, and adds the optional keys as comments.
-    An existing file is never overwritten.
+    The file repeats CONFIG, with the unit and meaning of every key, and lists the optional keys as comments. An
+    existing file is never overwritten.
 
     \b
     Example
@@ -45,15 +45,15 @@ def new(name: str, like: str) -> None:
 
 @main.command(name="new-study")
 @click.argument("name", metavar="NAME")
-@click.option("--step", is_flag=True, help="Of filters that are not linear: the step of one realisation.")
-@click.option("--folder", is_flag=True, help="A study in a folder of files, for what no base derives.")
+@click.option("--step", is_flag=True, help="For nonlinear filters: you write the step of one realisation.")
+@click.option("--folder", is_flag=True, help="A study in several files, for what the base classes do not cover.")
 def new_study(name: str, step: bool, folder: bool) -> None:
     """Write a package with a small study, to make your own: ./NAME.
 
     It compares two filters on a random walk: one file with keys, matrices, claims and a reading, from which kernel,
     exact values, tables, figures and recorded plots follow; a config; a test. With --step the filters are functions of
-    one plot and need not be linear. With --folder each part is a file of its own. A comment `Yours: …` says where one's
-    own goes. Installed beside radarsim it is a study like those shipped here. Nothing is ever overwritten.
+    one plot and may be nonlinear. With --folder each part is a separate file. Comments `Yours: …` mark the places to
+    edit. Once installed, the study works like the shipped ones. Nothing is ever overwritten.
 
     \b
     Example
@@ -75,14 +75,16 @@ def new_study(name: str, step: bool, folder: bool) -> None:
 
 @main.command()
 @config_argument
-@click.option("-o", "--output", required=True, metavar="PLOTS.csv", help="Where the plots are written.")
-@click.option("-i", "--realisation", type=Count(), default=0, show_default=True, help="Which realisation, from 0.")
+@click.option("-o", "--output", required=True, metavar="PLOTS.csv", help="File for the plots.")
+@click.option(
+    "-i", "--realisation", type=Count(), default=0, show_default=True, help="The realisation, counted from 0."
+)
 @set_option
 def simulate(config: str, output: str, realisation: int, overrides: tuple[str, ...]) -> None:
     """Write the measurements of one realisation, with the truth.
 
-    The plots are those that a run of CONFIG draws in this realisation, number for number: `radarsim track` over them
-    gives the errors that the run adds up. A missed plot is an empty cell; the truth stands in columns true_….
+    The plots are exactly those that a run of CONFIG draws in this realisation: `radarsim track` over them gives the
+    errors that the run accumulates. A missed plot is an empty cell; the truth is in columns true_….
 
     \b
     Example
@@ -105,32 +107,38 @@ def simulate(config: str, output: str, realisation: int, overrides: tuple[str, .
 
 @main.command(name="import")
 @click.argument("recording", metavar="FILE")
-@click.option("-o", "--output", required=True, metavar="PLOTS.csv", help="Where the plots are written.")
+@click.option("-o", "--output", required=True, metavar="PLOTS.csv", help="File for the plots.")
 @click.option(
     "--from",
     "kind",
     type=click.Choice(["asterix", "opensky", "ais", "csv"]),
-    help="The format; default: what the content shows.",
+    help="The format; default: detected from the content.",
 )
 @click.option(
     "--at",
     "places",
     multiple=True,
     metavar="[SAC/SIC=]LAT,LON,HEIGHT",
-    help="Where the radar stands: degrees, degrees, m (WGS 84); of a recording of several, each by its name.",
+    help="Position of the radar: degrees, degrees, m (WGS 84); with several radars, one option for each, by name.",
 )
-@click.option("--antenna", metavar="AZ,EL", help="Its normal, degrees: adds the angles that multimodel takes.")
-@click.option("--track", "tracks", multiple=True, metavar="ID", help="Only this track; may be given again.")
-@click.option("--truth", metavar="FILE", help="A recording of positions: columns true_… by aircraft and time.")
+@click.option(
+    "--antenna",
+    metavar="AZ,EL",
+    help="Direction of the antenna's normal, degrees: adds the angles that multimodel reads.",
+)
+@click.option("--track", "tracks", multiple=True, metavar="ID", help="Only this track; repeatable.")
+@click.option(
+    "--truth", metavar="FILE", help="A recording of positions; adds columns true_…, matched by aircraft and time."
+)
 @click.option(
     "--time-from",
     default="first",
     show_default=True,
     metavar="ZERO",
-    help="What t_s counts from: first (record), midnight, or a date and time (UTC).",
+    help="Zero of t_s: first (record), midnight, or a date and time (UTC).",
 )
-@click.option("--doppler-towards", is_flag=True, help="The recording counts Doppler as positive for approach.")
-@click.option("--column", "columns", multiple=True, metavar="OURS=THEIRS", help="A column of a CSV, named by hand.")
+@click.option("--doppler-towards", is_flag=True, help="In the recording, Doppler is positive for approach.")
+@click.option("--column", "columns", multiple=True, metavar="OURS=THEIRS", help="Name a CSV column explicitly.")
 def import_(
     recording: str,
     output: str,
@@ -142,18 +150,18 @@ def import_(
 ) -> None:
     """Read a recording into plots: ASTERIX, ADS-B, AIS or a table.
 
-    PLOTS.csv has a row a plot and all tracks of the recording, each named in the column `track`; `radarsim track` and
-    `radarsim fit` read it. Its first lines say what the columns are. Nothing is written of a damaged file.
+    PLOTS.csv has one row per plot and all tracks of the recording, each named in the column `track`; `radarsim track`
+    and `radarsim fit` read it. Its first lines describe the columns. For a damaged recording nothing is written.
 
     \b
     asterix  categories 048 and 001 (plots of a radar: range, bearing, height, Doppler speed
              and the span by which it is ambiguous) and 062 (positions: the truth of the plots
              of the same aircraft); needs radarsim[asterix]
     opensky  latitude, longitude, altitude and time of aircraft, in CSV; needs --at; in feet and
-             knots where the names are those of aviation (gs, alt, …)
+             knots if the column names are those of aviation (gs, alt, …)
     ais      sentences !AIVDM of ships; needs --at and radarsim[ais]
     csv      any table with a header: time, and range or latitude and longitude; units as in
-             `range_km` or `Altitude [ft]`; by commas, semicolons or tabulators
+             `range_km` or `Altitude [ft]`; separated by commas, semicolons or tabs
 
     \b
     Example
@@ -188,11 +196,11 @@ def import_(
 @main.command()
 @config_argument
 @click.argument("plots", metavar="PLOTS.csv")
-@click.option("-o", "--output", metavar="TRACK.csv", help="Where the track is written; default: to the terminal.")
-@click.option("--report", metavar="DIR", help="Write a report into DIR: report.html, and its figures as files.")
-@click.option("--figures", metavar="DIR", help="Draw the figures alone into DIR.")
+@click.option("-o", "--output", metavar="TRACK.csv", help="File for the track; default: the terminal.")
+@click.option("--report", metavar="DIR", help="Write a report into DIR: report.html and its figures.")
+@click.option("--figures", metavar="DIR", help="Write only the figures into DIR.")
 @group.threads_option
-@click.option("-q", "--quiet", is_flag=True, help="Report neither gaps nor how well the accuracies fit.")
+@click.option("-q", "--quiet", is_flag=True, help="Do not report gaps and accuracies.")
 @set_option
 def track(
     config: str,
@@ -205,21 +213,21 @@ def track(
 ) -> None:
     """Run the config's filters over recorded measurements.
 
-    PLOTS.csv has a header and one row a plot, its times rising at any spacing; an empty cell is a missing value, other
-    columns are ignored. Its columns are t_s and what the study's sensor measures, as `radarsim simulate` writes them:
-    `range_m, velocity_mps` (range_doppler), `range_m, bearing_rad` (sonar), `range_m, elevation_rad, azimuth_rad` or
-    `x_m, y_m, z_m` (multimodel).
+    PLOTS.csv has a header and one row per plot, with increasing times at any spacing. An empty cell is a missing value;
+    other columns are ignored. Its columns are t_s and the measurements of the study's sensor, as `radarsim simulate`
+    writes them: `range_m, velocity_mps` (range_doppler), `range_m, bearing_rad` (sonar), `range_m, elevation_rad,
+    azimuth_rad` or `x_m, y_m, z_m` (multimodel).
 
-    Also reported: gaps and missing values, and whether the accuracies that the config states fit the plots: the
-    filters' own innovations are tested (NIS, 1 for a filter that is right about its errors). A gap so long that
-    a filter's numbers after it would be only rounding errors is a fault, reported with its line: split the file there.
+    It also reports gaps and missing values, and whether the accuracies in the config agree with the plots: the filters'
+    innovations are tested (NIS, 1 for a consistent filter). If a gap is so long that only rounding errors would follow,
+    the command stops and names the line: split the file there.
 
-    A file with a column `track`, as `radarsim import` writes it, holds several tracks, each followed by itself; then
-    TRACK.csv begins with the column recorded_track, and figures are drawn of the longest. Where columns true_… give the
-    truth, as `radarsim simulate` and `radarsim import` write it, the errors against it are reported.
+    A file with a column `track`, as `radarsim import` writes it, holds several tracks, each processed separately; then
+    TRACK.csv begins with the column recorded_track, and figures show the longest. If columns true_… give the truth, as
+    `radarsim simulate` and `radarsim import` write it, the errors are reported.
 
-    The report shows where the plots are (plan view, range), the estimates, the residuals between their bounds, the
-    innovations over time, and all that is printed.
+    The report shows the plots (plan view, range), the estimates, the residuals with their bounds, the innovations over
+    time, and all printed results.
 
     \b
     Example
@@ -273,17 +281,26 @@ def track(
 @main.command()
 @config_argument
 @click.argument("plots", metavar="PLOTS.csv")
-@click.option("--filter", "filter_name", metavar="NAME", help="Whose model; default: that which takes most of a plot.")
-@click.option("--robust", is_flag=True, help="Allow for outliers: plots with ten times their σ.")
-@click.option("--write", metavar="MINE.yaml", help="Write the config with the fitted values; never overwritten.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON document in place of the lines.")
+@click.option(
+    "--filter",
+    "filter_name",
+    metavar="NAME",
+    help="The filter whose model is fitted; default: the one that uses most of a plot.",
+)
+@click.option("--robust", is_flag=True, help="Allow for outliers: plots with errors of ten times their σ.")
+@click.option(
+    "--write",
+    metavar="MINE.yaml",
+    help="Write the config with the fitted values; an existing file is never overwritten.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON document instead of text.")
 @set_option
 def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -> None:
     """Estimate σ and manoeuvre variance from recorded plots.
 
-    The plots are as for `radarsim track`; of a file with several tracks all count together. Each key's value is that
-    under which the filter's predictions make the plots most likely; its interval holds what is not much less likely,
-    whatever the other keys are. A key whose interval has no lower or no upper end cannot be told from these plots.
+    The plots are as for `radarsim track`; several tracks in a file are fitted together. The value of each key maximises
+    the likelihood of the plots under the filter's predictions; its interval is a profile-likelihood interval. A key
+    whose interval has no lower or no upper bound cannot be determined from these plots.
 
     \b
     Example

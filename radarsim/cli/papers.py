@@ -13,12 +13,12 @@ from radarsim.cli import group
 @group.drawing_options
 @group.json_option
 def compare(sources: tuple[str, ...], out: str, drawing: group.Drawing, as_json: bool) -> None:
-    """Stored runs side by side: differences with intervals.
+    """Compare stored runs: differences with intervals.
 
-    Each of A, B, … is a config, whose stored result is read from DIR, or the folder of a result: two radars, two
-    configs, two versions of one. Nothing is computed. The first is what the others are compared with. Where both are of
-    the same measurements (study, seed, target, sensor) and share their baseline filter, the difference is paired.
-    Writes DIR/compare/comparison.csv, compare.html and figures.
+    Each of A, B, … is a config with a stored result in DIR, or the folder of a result: two radars, two configs, or two
+    versions of one. Nothing is computed. All are compared with the first. If two runs use the same measurements (study,
+    seed, target, sensor) and the same baseline filter, the difference is paired. Writes DIR/compare/comparison.csv,
+    compare.html and figures.
 
     \b
     Examples
@@ -42,20 +42,20 @@ def compare(sources: tuple[str, ...], out: str, drawing: group.Drawing, as_json:
 @click.argument("names", nargs=-1, metavar="[CLAIM | PAPER …]")
 @group.realisations_option
 @click.option(
-    "--only", "only", multiple=True, metavar="CHOICE=VALUE", help="Readings that take this alone; writes no file."
+    "--only", "only", multiple=True, metavar="CHOICE=VALUE", help="Use only readings with this choice; writes no file."
 )
 @click.option(
     "--decide",
     is_flag=True,
-    help="Longer runs, of at most N realisations, until each claim is decided over all readings.",
+    help="Extend the runs, up to N realisations, until each claim is decided over all readings.",
 )
 @group.threads_option
 @group.time_limit_option
 @group.out_option
 @group.figures_option
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
 @group.json_option
-@click.option("--markdown", is_flag=True, help="The pages docs/readings_….md of these papers, in place of text.")
+@click.option("--markdown", is_flag=True, help="Print the pages docs/readings_….md of these papers instead of text.")
 def readings(
     names: tuple[str, ...],
     realisations: int | None,
@@ -69,20 +69,20 @@ def readings(
     as_json: bool,
     markdown: bool,
 ) -> None:
-    """A verdict under every reading that the paper allows.
+    """Judge claims under every reading that the paper allows.
 
     A paper leaves choices open: how a filter starts, which flight, which of two printed numbers. Each claim is judged
-    under all of them, exactly where that is possible, else by small runs that are stored and continued. E and U
-    readings (equivalent, unstated) decide how robust a verdict is; N (against the print) shows what would have to be
-    changed. PAPER is P1, P2, P3 or P4; without any, all. Writes DIR/readings/readings.csv and a specification curve a
-    claim; of whole papers it also searches for the choices that give most of the printed numbers.
+    under all of them: exactly where possible, otherwise by small runs, which are stored and can be continued. E and U
+    readings (equivalent, unstated) decide how robust a verdict is; N (against the print) shows what would have to
+    change. PAPER is P1, P2, P3 or P4; default: all. Writes DIR/readings/readings.csv and a specification curve for each
+    claim. For whole papers it also searches for the choices that reproduce most of the printed numbers.
 
     \b
     Examples
       radarsim readings P1
       radarsim readings P1.4                          with every reading of this claim
-      radarsim readings P2 -n 200 --threads 2         a quick look; the same with more continues
-      radarsim readings P2 --decide -n 3.2e4          as long as it takes, up to 32 000; what is left: exit code 3
+      radarsim readings P2 -n 200 --threads 2         a quick look; a larger N continues it
+      radarsim readings P2 --decide -n 3.2e4          up to 32 000 realisations; undecided claims: exit code 3
       radarsim readings P1.4 --only start=unweighted
       radarsim readings P1 --json | jq '.[] | select(.depends_on != [])'
     """
