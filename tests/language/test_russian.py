@@ -144,7 +144,7 @@ def test_names_of_a_config_are_said_as_whole_words_alone():
     with speaking("ru"):
         assert called("no memory; memory, memory test", names) == "без памяти; с памятью, memory test"
         assert called("`turn.yaml`, target=turn, turn_2: turn.", names) == "`turn.yaml`, target=turn, turn_2: разворот."
-        assert called("modified\ncombined", names) == "модифицированный\nкомбинированный"
+        assert called("modified\ncombined", names) == "мод.\nкомб."
         assert [called(name) for name in ("memory", "memory test")] == ["с памятью", "memory test"]
     assert called("no memory", names) == "no memory"
 
