@@ -6,8 +6,9 @@ From finished cases to files: tables, figures, claims, run.json and report.html 
 """
 
 import os
+import re
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property, partial
@@ -372,17 +373,11 @@ def names_in(cases: Sequence[Case] | Sequence[CaseResult]) -> frozenset[str]:
     """What configs call things, and their values in words; none where all is said as it stands."""
     if current() == ENGLISH:
         return frozenset()
-    found = {one for case in cases for one in (case.name, *_texts([case.spec.model_dump(), case.swept]))}
+    found = {case.name for case in cases}
+    for case in cases:
+        found.update(re.findall(r"'([^']+)'", f"{case.spec.model_dump()}{case.swept}"))
     found |= {case.name.partition(" ")[0] for case in cases}
     return frozenset(name for one in found for name in (one, one.replace("_", " ")) if name)
-
-
-def _texts(value: object) -> Iterator[str]:
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, Mapping | list | tuple):
-        for one in value.values() if isinstance(value, Mapping) else value:
-            yield from _texts(one)
 
 
 def _gained(result: CaseResult, made: Mapping[str, "pd.DataFrame"]) -> list[str]:

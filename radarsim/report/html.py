@@ -28,7 +28,7 @@ from urllib.parse import quote
 from radarsim.config.experiment import Case, Experiment
 from radarsim.config.fields import Model
 from radarsim.config.load import as_yaml
-from radarsim.language import current, numeral, plural, term, tr
+from radarsim.language import called, current, numeral, plural, term, tr
 from radarsim.report import chart, files, wording
 from radarsim.report import tables as common
 from radarsim.report.chart import spoken
@@ -412,10 +412,10 @@ def table_in_words(name: str, table: "pd.DataFrame") -> dict[str, Any]:
     made = _table(name, table)
     for column in made["columns"]:
         column["name"] = head(column["name"])
-    if "unit" in table:
-        place = list(table.columns).index("unit")
-        for row in made["rows"]:
-            row[place] = tr(wording.unit(row[place]))
+    said = {"unit": lambda name: tr(wording.unit(name)), "filter": called, "radar": called}
+    for place, column in enumerate(table.columns):
+        for row in made["rows"] if column in said else ():
+            row[place] = said[column](row[place])
     return made
 
 
