@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.app import stored
 from radarsim.app.configs import RESULTS, Config, Overrides, command, directory, load
-from radarsim.app.result import Result, captions, recorded_case
+from radarsim.app.result import Result, captions, names_in, recorded_case
 from radarsim.app.run import namesakes
 from radarsim.app.shown import Shown
 from radarsim.config.experiment import Case, Experiment, canonical, digest, world
 from radarsim.errors import ConfigError
+from radarsim.language import called
 from radarsim.report import compare as sides
 from radarsim.report import files
 from radarsim.report import tables as common
 from radarsim.report.compare import Side
-from radarsim.report.drawing import Chart, Figure
+from radarsim.report.drawing import Chart, Figure, reworded
 from radarsim.report.quantities import COMMON, Quantity
 from radarsim.studies import registry
 
@@ -111,10 +112,12 @@ def compare(
     if not len(made):
         raise ConfigError(f"{' and '.join(run.label for run in runs)} share no filter and component to compare")
     shared = sides.shared(side for run in every for side in run)
-    sentences = sides.sentences(made, shared)
+    said = partial(called, names=names_in(case for run in runs for case in _cases(run)))
+    sentences = list(map(said, sides.sentences(made, shared)))
     notes = [*sides.pairings(made), *alone]
     warnings = [line for run in runs for line in _stale(run)]
-    described = sides.figures([side for run in _labelled(every) for side in run], made)
+    drawn = sides.figures([side for run in _labelled(every) for side in run], made)
+    described = {name: reworded(figure, said) for name, figure in drawn.items()}
     rows, last = (tuple(table.to_dict("records")) for table in (made, sides.at_the_end(made)))
     told = tuple((of.value, of.words) for of in sides.told(made, shared))
     found = Compared(None, (), tuple(sentences), tuple(notes), tuple(warnings), rows, last, told, described)

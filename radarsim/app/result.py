@@ -369,14 +369,14 @@ def of_intervals(results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame
     return [called(line, names) for line in notes.of_intervals(results, made, answers(results))]
 
 
-def names_in(cases: Sequence[Case] | Sequence[CaseResult]) -> frozenset[str]:
+def names_in(cases: Iterable[Case | CaseResult]) -> frozenset[str]:
     """What configs call things, and their values in words; none where all is said as it stands."""
     if current() == ENGLISH:
         return frozenset()
-    found = {case.name for case in cases}
+    found: set[str] = set()
     for case in cases:
+        found |= {case.name, case.name.partition(" ")[0]}
         found.update(re.findall(r"'([^']+)'", f"{case.spec.model_dump()}{case.swept}"))
-    found |= {case.name.partition(" ")[0] for case in cases}
     return frozenset(name for one in found for name in (one, one.replace("_", " ")) if name)
 
 

@@ -454,7 +454,9 @@ def _apart(of: Quantity, sides: Sequence[Side], rows: "pd.DataFrame", filters: S
         label, against, f = map(str, key)
         if label not in numbers or against not in numbers:
             continue
-        name = f"{literal(label)}, {literal(f)}" + (f" against {literal(against)}" if several else "")
+        name = f"{literal(label)}, {literal(f)}"
+        if several:
+            name = tr("{name} against {other}", name=name, other=literal(against))
         i = filters.index(f)
         columns = ["t_s", value, f"{value}_lo", f"{value}_hi", *([exact] if exact else [])]
         marks.append(line(own, columns, "", Style(numbers[label], i, i), name))
