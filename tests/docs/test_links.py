@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from making import contents, house, links
+from making import contents, house, links, words
 
 ROOT = Path(__file__).parents[2]
 PAGES = [
@@ -61,3 +61,8 @@ def test_rooms_import_only_what_is_below_or_the_neighbour_that_is_drawn():
     assert not [(a, b) for a, b in house.arrows() if row[b] < row[a]]
     for a, b in house.beside():
         assert house.ROWS[row[a]].index(b) == house.ROWS[row[a]].index(a) + 1
+
+
+def test_what_is_written_by_hand_stays_readable():
+    assert words.count("One two, 3 | <!-- value: x -->12.3 %<!-- end --> – four.\n") == 4
+    assert sum(words.by_page().values()) <= 45_000, "take away what nobody needs before you add"
