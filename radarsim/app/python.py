@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from radarsim.app.configs import RESULTS, Config, Overrides
 from radarsim.app.shown import Shown
 from radarsim.errors import ConfigError, argument
+from radarsim.threads import limited
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -300,6 +301,6 @@ def readings(
     limit = time_limit if time_limit is None or callable(time_limit) else run.TimeLimit(time_limit)
     asked: dict[str, Any] = {"realisations": None if realisations is None else int(realisations), "decide": decide}
     asked |= {"progress": progress, "figures": figures, "stop": stop, "write": out is not None}
-    with TemporaryDirectory(prefix="radarsim-") as folder:
+    with TemporaryDirectory(prefix="radarsim-") as folder, limited(threads):
         options = RunOptions(None, threads, run.Either(stop, limit))
         return reading.readings(wanted, out=Path(folder if out is None else out), options=options, **asked)

@@ -48,9 +48,11 @@ def test_run_and_track_without_a_thread_give_the_same_bytes(tmp_path):
     assert tracks[0].read_bytes() == tracks[1].read_bytes()
 
 
-def test_python_runs_without_a_thread_where_updates_are_timed_too():
-    """`multimodel` measures what an update costs, in a thread of its own where it may."""
-    ran = "import radarsim; radarsim.run('multimodel', realisations=20, threads=0)"
+def test_python_runs_without_a_thread_where_updates_are_timed_and_readings_known_exactly():
+    """`multimodel` measures an update's cost, and P1's readings take a radar each, in threads where they may."""
+    ran = (
+        "import radarsim; radarsim.run('multimodel', realisations=20, threads=0); radarsim.readings('P1.4', threads=0)"
+    )
     told, code = barred(f"{ran}\n{NATIVE}")
     assert (code, told.split()[-1]) == (0, "1"), told
 
