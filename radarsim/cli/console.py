@@ -124,8 +124,8 @@ class Counter:
         if self.line is not None:
             self.line.stop()
 
-    def update(self, done: int) -> None:
-        """How many are done."""
+    def update(self, done: int, expected: int | None = None) -> None:
+        """How many are done, of how many where that is known: then with the time that is left."""
         now = time.monotonic()
         if now < self.due or not sys.stderr.isatty():
             return
@@ -135,8 +135,12 @@ class Counter:
 
             self.line = Live(console=console(stderr=True), transient=True, auto_refresh=False)
             self.line.start()
-        told = {"title": self.title, "done": done, "what": self.what, "rate": done / (now - self.started)}
-        self.line.update(tr("{title}: {done:,} {what}, {rate:,.0f}/s", **told), refresh=True)
+        rate = done / (now - self.started)
+        told = {"title": self.title, "done": done, "what": self.what, "rate": rate}
+        words = tr("{title}: {done:,} {what}, {rate:,.0f}/s", **told)
+        if expected is not None:
+            words += "  " + tr("about {left} left", left=clock((expected - done) / rate))
+        self.line.update(words, refresh=True)
 
 
 def show(

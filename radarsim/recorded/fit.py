@@ -15,6 +15,7 @@ with (Schweppe 1965). Estimates are where it is largest; an interval holds the v
 likelihood over all other keys is within half the 95 % point of chi-square of it (profile likelihood).
 """
 
+import itertools
 import math
 import os
 import shlex
@@ -22,7 +23,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,10 +45,10 @@ FAR_FROM_ZERO = 1e4  # times what counts as zero of a key
 IMPOSSIBLE = -1e300  # what counts as the logarithm of no likelihood: a search needs a number
 NOTHING: Mapping[str, float] = MappingProxyType({})
 STARTS = (-2.0, 0.0, 2.0)  # of a search
-Progress = Callable[[int], None]
+Progress = Callable[[int, int | None], None]  # likelihoods found, and how many it will be where that is known
 
 
-def silent(evaluations: int) -> None:
+def silent(evaluations: int, expected: int | None = None) -> None:
     """Progress that nobody sees."""
 
 
@@ -66,7 +67,7 @@ class Counted:
 
     def __call__(self, values: np.ndarray, explained: Mapping[str, float]) -> float:
         self.count += 1
-        self.progress(self.count)
+        self.progress(self.count, None)
         return self.of(values, **explained)
 
 
@@ -297,7 +298,16 @@ EVALUATIONS = 2000
 # is far finer than what is printed: which way a search goes hangs on last digits, and these differ between processors.
 CLOSE = 1e-6
 STEP = 1e-3  # over which a slope is taken, in the logarithm of a key
+WIDE_STEP = 1e-2  # the same on the way there, where curvature is taken too
+FLAT, LONGEST_STEP = 1e-3, 1.5  # curvature that counts as none, and the longest Newton step, of that logarithm
+MOST_TOGETHER = 0.999  # of the correlation of two keys
+MOST_STEPS = 40
+SHORT_SIMPLEX = (50, 100, 200)  # likelihoods that a simplex takes before Newton steps are tried again
+RISES = np.array([2.0, 4.0, 6.0])  # below where a key that may be zero is clearly not, in that logarithm
+NEAR_ZERO = 7.0  # above what counts as zero, in that logarithm: tried at zero
+ALMOST = 300.0  # times what is close enough: a Newton step that promises no more comes close enough
 LEAST_SHARE, MOST_SHARE = 1e-6, 0.5  # of outliers; less is none
+MOST_OUTLIERS = 0.3  # of plots that may have ten times their σ; where it takes more, their errors are of another law
 FINER, LEAP = 1e-3, 0.01  # what counts as zero is this part of before where the likelihood leaps by more there
 
 
@@ -402,9 +412,9 @@ def fitted(likelihood: Likelihood, robust: bool = False, progress: Progress = si
     if search.top <= IMPOSSIBLE:
         raise ConfigError(f"filter {likelihood.filter} cannot take the plots: `radarsim track` says at which row")
     share = float(search.natural(search.best)[-1]) if robust else None
-    if share is not None and share > 0.99 * MOST_SHARE:
-        raise ConfigError("robust: half of the plots would have to be outliers: their errors are of another law (few "
-                          "different values?); fit without it")  # fmt: skip
+    if share is not None and share > MOST_OUTLIERS:
+        raise ConfigError(f"robust: {100 * share:.0f} % of the plots would have to be outliers: their errors are of "
+                          "another law (few different values?); fit without it")  # fmt: skip
     keys = tuple(search.interval(i) for i in range(len(likelihood.keys)))
     stated = likelihood(np.array(likelihood.stated), 0.0)
     gain = search.top - stated
@@ -429,27 +439,68 @@ def _beside(search: "_Search", likelihood: Likelihood) -> tuple[str, float] | No
 
 
 def polished(value: Callable[[np.ndarray], float], at: np.ndarray) -> np.ndarray:
-    """The top of a likelihood near one that a simplex has found, by quasi-Newton steps. A simplex compares, and stands
+    """The top of a likelihood near one that a search has found, by two Newton steps. A search that compares stands
     still where last digits decide: at their root. A difference over STEP is 10⁻⁷ wrong by them, and so is the top."""
-    from scipy.optimize import minimize
+    shape, start = _Shape(value), at
+    here = value(at)
+    if not math.isfinite(shape.step(at, here, np.arange(at.size))[1]):
+        return start
+    for _ in range(2):
+        moves = STEP * np.eye(at.size)
+        at = at + shape.solved(np.array([(value(at + move) - value(at - move)) / (2 * STEP) for move in moves]))
+    return at if value(at) >= here - CLOSE and np.abs(at - start).max() < FIRST_STEP else start
 
-    def slope(at: np.ndarray) -> np.ndarray:
-        return np.array([(value(at - step) - value(at + step)) / (2 * STEP) for step in STEP * np.eye(at.size)])
 
-    def cost(at: np.ndarray) -> float:
-        return -value(at)
+class _Shape:
+    """How a likelihood is curved near a point, as Newton steps need it: that along each coordinate is found anew at
+    each step, from the differences that give the slope; how coordinates hang together, (n, n), is kept from before."""
 
-    bounds = [(x - FIRST_STEP, x + FIRST_STEP) for x in at]
-    found = minimize(cost, at, method="L-BFGS-B", jac=slope, bounds=bounds, options={"gtol": CLOSE, "ftol": 0.0})
-    return found.x if -found.fun >= value(at) else at
+    def __init__(self, value: Callable[[np.ndarray], float], together: np.ndarray | None = None):
+        self.value, self.together = value, together
+        self.H = np.zeros((0, 0))  # the curvature at the last step, of the coordinates that were free
+
+    def step(self, at: np.ndarray, here: float, free: np.ndarray) -> tuple[np.ndarray, float]:
+        """A step up from `at`, of the free coordinates alone, and the gain that it promises."""
+        moves = WIDE_STEP * np.eye(at.size)[free]
+        above, below = (np.array([self.value(at + sign * move) for move in moves]) for sign in (1, -1))
+        if not (np.isfinite(here) and min(above.min(), below.min(), here) > IMPOSSIBLE):
+            return np.zeros(at.size), math.nan
+        slope, curvature = (above - below) / (2 * WIDE_STEP), (above - 2 * here + below) / WIDE_STEP**2
+        scale = np.sqrt(np.maximum(np.abs(curvature), FLAT))
+        if self.together is None:
+            self.together = np.eye(at.size)
+            for i, j in itertools.combinations(range(free.size), 2):
+                cross = self.value(at + moves[i] + moves[j]) - above[i] - above[j] + here
+                share = float(np.clip(cross / WIDE_STEP**2 / (scale[i] * scale[j]), -MOST_TOGETHER, MOST_TOGETHER))
+                self.together[free[i], free[j]] = self.together[free[j], free[i]] = share
+        self.H = H = self.together[np.ix_(free, free)] * np.outer(scale, scale)
+        np.fill_diagonal(H, np.where(np.abs(curvature) < FLAT, -FLAT, curvature))
+        step = np.zeros(at.size)
+        step[free] = self.solved(slope)
+        return step, float(step[free] @ slope)
+
+    def solved(self, slope: np.ndarray) -> np.ndarray:
+        """The Newton step up a slope (n,), none longer than LONGEST_STEP along any axis of the curvature."""
+        sizes, axes = np.linalg.eigh(self.H)
+        along = axes.T @ slope / np.maximum(np.abs(sizes), FLAT)
+        return axes @ np.clip(along, -LONGEST_STEP, LONGEST_STEP)
+
+
+class _Point(NamedTuple):
+    """A point of a profile: the logarithm of the key held, the largest likelihood there, and where that is."""
+
+    at: float
+    top: float
+    best: np.ndarray
 
 
 class _Search:
     """The maximum of a likelihood, and its profile along each key. Searched are logarithms of the keys, and the logit
     of the share of outliers."""
 
-    def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress):
-        self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, 0
+    def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress, evaluations: int = 0):
+        self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, evaluations
+        self.ends_found, self.ends_begun_at = 0, 0
         start, self.lowest = np.log(units(likelihood)), np.log(likelihood.least)
         self.highest = start + math.log(REACH)
         if robust:
@@ -457,18 +508,24 @@ class _Search:
                 np.append(keys, _logit(share))
                 for keys, share in ((start, 0.05), (self.lowest, LEAST_SHARE), (self.highest, MOST_SHARE))
             )
-        self.best, self.top = self._climbed(start, None, FIRST_STEP, ROUGH)
+        self.shape = _Shape(self._value)
+        self.best, self.top = self._climbed(start, None, ROUGH)
         # A second start far away: the likelihood of manoeuvre and plot errors may have two hills.
         for factor in (0.1, 10.0):
-            moved = self.best + math.log(factor) * np.append(
-                np.ones(len(likelihood.stated)), np.zeros(int(self.robust))
-            )
-            other, top = self._climbed(moved, None, FIRST_STEP, ROUGH)
+            moved = np.where(self.best > self.lowest, self.best, start)
+            moved[: len(likelihood.stated)] += math.log(factor)
+            other, top = self._climbed(moved, None, ROUGHLY)
+            if top > self.top - ROUGHLY and np.abs(other - self.best).max() > FIRST_STEP:
+                other, top = self._climbed(other, None, ROUGH)
             if top > self.top + 1e-6:
                 self.best, self.top = other, top
-        self.best = polished(self._value, self._climbed(self.best, None, ROUGH, CLOSE)[0])
+        self.best = polished(self._value, self._climbed(self.best, None, CLOSE)[0])
         self.top = self._value(self.best)
+        self.shape = _Shape(self._value)
+        self.shape.step(self.best, self.top, np.arange(start.size))
+        self.curvature = self.shape.H
         self.raised = {i: self._raised(i) for i in range(start.size) if self._maybe_zero(i)}
+        self.ends_begun_at = self.evaluations
 
     def natural(self, searched: np.ndarray) -> np.ndarray:
         """The keys, and the share of outliers at the end where they are allowed for: at most MOST_SHARE, for all plots
@@ -477,49 +534,115 @@ class _Search:
         keys = np.exp(np.clip(searched[:count], -200, 200))
         keys = np.where(keys <= self.likelihood.least, 0.0, keys)
         share = 1 / (1 + np.exp(-searched[count:]))
-        return np.append(keys, np.minimum(share, MOST_SHARE)) if self.robust else keys
+        share = np.where(share <= LEAST_SHARE, 0.0, np.minimum(share, MOST_SHARE))
+        return np.append(keys, share) if self.robust else keys
 
     def _value(self, searched: np.ndarray) -> float:
         values = self.natural(searched)
         self.evaluations += 1
-        self.progress(self.evaluations)
+        self.progress(self.evaluations, self._expected())
         count = len(self.likelihood.stated)
         found = self.likelihood(values[:count], float(values[count]) if self.robust else 0.0)
         return found if math.isfinite(found) else IMPOSSIBLE
 
-    def _climbed(self, start: np.ndarray, held: int | None, step: float, close: float) -> tuple[np.ndarray, float]:
-        """The top reached from a start, one coordinate held or none, and the logarithm of the likelihood there; with
-        first steps of `step`, until the search stands still within `close`, and does so again when it begins anew from
-        there: on a plain a simplex may shrink before it has found the way up."""
+    def _expected(self) -> int | None:
+        """How many likelihoods it will be, by those that the ends found so far took; None before the first."""
+        if not self.ends_found:
+            return None
+        each = (self.evaluations - self.ends_begun_at) / self.ends_found
+        ends = 2 * len(self.likelihood.keys)
+        return max(round(self.ends_begun_at + each * ends), self.evaluations)
+
+    def _climbed(self, start: np.ndarray, held: int | None, close: float) -> tuple[np.ndarray, float]:
+        """The top reached from a start, one coordinate held or none, and the logarithm of the likelihood there: by
+        Newton steps, until one promises less than `close` of it; where they lead nowhere, by a simplex for a while."""
+        free = np.array([i for i in range(len(start)) if i != held])
+        at, here = start, self._value(start)
+        shape = self.shape if held is not None else _Shape(self._value)
+        for most in (*SHORT_SIMPLEX, EVALUATIONS):
+            at, here, arrived = self._newton(at, here, free, close, shape)
+            if arrived:
+                return at, here
+            at, here = self._by_simplex(at, free, close, most)
+            shape = _Shape(self._value)
+        return at, here
+
+    def _newton(
+        self, at: np.ndarray, here: float, free: np.ndarray, close: float, shape: _Shape
+    ) -> tuple[np.ndarray, float, bool]:
+        """As `_climbed`, by Newton steps alone: how far they lead, and whether that is the top."""
+        for _ in range(MOST_STEPS):
+            at, here = self._zeroed(at, here, free)
+            moved = free[at[free] > self.lowest[free]]
+            if not moved.size:
+                return at, here, True
+            step, promised = shape.step(at, here, moved)
+            if not promised >= 0:
+                break
+            if promised < close / 10:
+                return at, here, True
+            for shorter in (1.0, 0.5, 0.1, 0.01):
+                there = self._value(at + shorter * step)
+                if there > here:
+                    at, here = at + shorter * step, there
+                    break
+                if promised < ALMOST * close:
+                    return at, here, True
+            else:
+                break
+            if promised < ALMOST * close:
+                return at, here, True
+            if shorter < 1 or promised > ROUGHLY:
+                shape = _Shape(self._value)
+        return at, here, False
+
+    def _zeroed(self, at: np.ndarray, here: float, free: np.ndarray) -> tuple[np.ndarray, float]:
+        """A point and its likelihood, with those free coordinates that have come near zero at zero, where that is no
+        worse: there a logarithm is a plain, over which steps lead on and on."""
+        for j in free:
+            if self.lowest[j] < at[j] < self.lowest[j] + NEAR_ZERO:
+                zero = at.copy()
+                zero[j] = self.lowest[j] - FIRST_STEP
+                if (there := self._value(zero)) >= here:
+                    at, here = zero, there
+        return at, here
+
+    def _by_simplex(self, start: np.ndarray, free: np.ndarray, close: float, most: int) -> tuple[np.ndarray, float]:
+        """As `_climbed`, by a simplex: until it stands still within `close`, and does so again when it begins anew from
+        there: on a plain a simplex may shrink before it has found the way up; or after `most` likelihoods."""
         from scipy.optimize import minimize
 
-        free = np.array([i for i in range(len(start)) if i != held])
         whole = start.copy()
 
         def cost(part: np.ndarray) -> float:
             whole[free] = part
             return -self._value(whole)
 
-        if not free.size:
-            return start, self._value(start)
         at, top, gain = start[free], IMPOSSIBLE, math.inf
         while gain > close:
-            simplex = np.concatenate([at[None], at + step * np.eye(free.size)])
-            options: Any = {"initial_simplex": simplex, "xatol": close, "fatol": close / 10, "maxfev": EVALUATIONS}
+            simplex = np.concatenate([at[None], at + FIRST_STEP * np.eye(free.size)])
+            options: Any = {"initial_simplex": simplex, "xatol": close, "fatol": close / 10, "maxfev": most}
             found = minimize(cost, at, method="Nelder-Mead", options=options)
             at, top, gain = found.x, -float(found.fun), -float(found.fun) - top
+            if most < EVALUATIONS:
+                break
         whole[free] = at
         return whole, top
 
     def _profile(self, i: int, at: float, near: np.ndarray) -> tuple[float, np.ndarray]:
-        """The largest likelihood with key i held at the logarithm `at`, and where that is."""
+        """The largest likelihood with key i held at the logarithm `at`, and where that is; others that are zero rise
+        from there if that makes the plots likelier."""
         start = near.copy()
         start[i] = at
-        found = [self._climbed(start, i, FIRST_STEP, CLOSE)]
-        if others := {j: log for j, log in self.raised.items() if j != i}:
-            start[list(others)] = list(others.values())
-            found.append(self._climbed(start, i, FIRST_STEP, CLOSE))
-        where, top = max(found, key=lambda one: one[1])
+        where, top = self._climbed(start, i, CLOSE)
+        for j, log in self.raised.items():
+            if j != i and where[j] <= self.lowest[j]:
+                for risen in (log, *(log - RISES)):
+                    start = where.copy()
+                    start[j] = risen
+                    if self._value(start) > top:
+                        where, top = self._climbed(start, i, CLOSE)
+                        break
         return top, where
 
     def steps_at_zero(self, i: int) -> bool:
@@ -558,27 +681,51 @@ class _Search:
 
     def _end(self, i: int, direction: int, limit: float) -> float | None:
         """The logarithm of key i at which the profile falls to a limit; None where it does not within REACH."""
-        from scipy.optimize import brentq
-
-        least = float(self.lowest[i])
-        near, step = self.best, 0.1
-        home = inside = max(float(self.best[i]), least)
+        least, home, step = float(self.lowest[i]), max(float(self.best[i]), float(self.lowest[i])), self._far_as(i)
         if direction > 0 and i in self.raised:  # from zero the end may be farther than REACH: up to there it is not
-            home = inside = max(inside, self.raised[i] - 1.0)
-        while abs(inside - home) < math.log(REACH):
-            outside = inside + direction * step
-            top, found = self._profile(i, outside, near)
-            if top < limit:
-                start = near
-
-                def above(at: float, start: np.ndarray = start) -> float:
-                    return self._profile(i, at, start)[0] - limit
-
-                return float(brentq(above, min(inside, outside), max(inside, outside), xtol=CLOSE))
-            if outside < least:
+            home, step = max(home, self.raised[i] - 1.0), 0.1
+        inside = _Point(home, self._sliced(i, home), self.best)
+        while abs(inside.at - home) < math.log(REACH):
+            at = inside.at + direction * step
+            outside = _Point(at, *self._profile(i, at, inside.best))
+            if outside.top < limit:
+                self.ends_found += 1
+                return self._crossing(i, inside, outside, limit)
+            if at < least:
                 return None
-            near, inside, step = found, outside, 2 * step
+            inside, step = outside, 2 * step
         return None
+
+    def _crossing(self, i: int, inside: "_Point", outside: "_Point", limit: float) -> float:
+        """The logarithm of key i at which the profile crosses a limit between two points: by secants of the root of its
+        fall from the top, which is nearly a straight line (Illinois method)."""
+
+        def above(point: _Point) -> float:
+            fall = self.top - point.top
+            return math.sqrt(2 * (self.top - limit)) - math.copysign(math.sqrt(2 * abs(fall)), fall)
+
+        ends, values, replaced = [inside, outside], [above(inside), above(outside)], None
+        while True:
+            share, width = values[0] / (values[0] - values[1]), ends[1].at - ends[0].at
+            at = ends[0].at + share * width
+            found = _Point(at, *self._profile(i, at, ends[0].best + share * (ends[1].best - ends[0].best)))
+            miss = above(found)
+            side = int(miss <= 0)
+            if abs(miss * width) < CLOSE * abs(values[0] - values[1]) or abs(at - ends[side].at) < CLOSE:
+                return at
+            ends[side], values[side] = found, miss
+            if side == replaced:
+                values[1 - side] /= 2
+            replaced = side
+
+    def _far_as(self, i: int) -> float:
+        """A little more than how far from the top an end is, were the likelihood a parabola there."""
+        H = -self.curvature
+        try:
+            spread = float(np.linalg.inv(H)[i, i])
+        except np.linalg.LinAlgError:
+            return 0.1
+        return min(1.2 * math.sqrt(2 * HALF_CHI2_95 * spread), 1.0) if 0 < spread < math.inf else 0.1
 
 
 def _logit(share: float) -> float:

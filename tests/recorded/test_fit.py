@@ -147,7 +147,7 @@ def test_all_plots_as_outliers_are_no_fit():
     for share in (0.05, 0.95):
         search = fit._Search(one, True, silent)
         mirrored = search.best + np.array([*[np.log(0.1)] * 2, 0.0, np.log(share / (1 - share)) - search.best[3]])
-        at, top = search._climbed(mirrored, None, fit.FIRST_STEP, fit.CLOSE)
+        at, top = search._climbed(mirrored, None, fit.CLOSE)
         assert search.natural(at)[3] <= 0.5
         assert top <= search.top + 1e-6
 
@@ -465,5 +465,5 @@ def test_plots_that_tell_no_sigma_are_refused(tmp_path):
     (config,) = load_all(["rls2"], ("manoeuvre_variance=1e-6",))
     with pytest.raises(ConfigError, match="range_m: must differ between plots, or no σ can be told"):
         fit.fit(config, monitor(tmp_path, 50_000.0), "r")
-    with pytest.raises(ConfigError, match="robust: half of the plots would have to be outliers"):
+    with pytest.raises(ConfigError, match=r"robust: \d+ % of the plots would have to be outliers"):
         fit.fit(config, monitor(tmp_path, 50_000.0, 50_007.234375), "r", robust=True)

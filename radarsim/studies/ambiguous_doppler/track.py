@@ -6,6 +6,7 @@ these are under a filter.
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,6 +71,13 @@ def before_plots(one: filters.Member, spec: Any) -> tuple[float, ...]:
     """The packed covariance before the first plot; the range is not in it."""
     velocity, acceleration = filters.prior_variances(one.order, spec.prior)
     return 0.0, 0.0, 0.0, float(velocity), 0.0, float(acceleration)
+
+
+@lru_cache(maxsize=64)
+def _motion(order: int, variance: float, dt: float) -> tuple[np.ndarray, tuple[float, ...], tuple[np.ndarray, ...]]:
+    """The matrix F of a motion over dt, and F and Q packed: most intervals of a recording are alike."""
+    F, Q = filters.model(order, variance, dt)
+    return F, pack_transition(F), pack(Q)
 
 
 def _kept(w: np.ndarray, options: Any) -> np.ndarray:
@@ -161,8 +169,7 @@ class Single:
         self.nis, self.log_density = np.full(2, np.nan), np.zeros(2)
         F, gains, known = np.eye(3), [np.zeros(3), np.zeros(3)], self.started
         if self.began:
-            F, Q = filters.model(self.member.order, self.member.manoeuvre_variance, t - self.last)
-            f, q = pack_transition(F), pack(Q)
+            F, f, q = _motion(self.member.order, self.member.manoeuvre_variance, t - self.last)
             self.x = np.array(predicted(self.x, f))
             self.P, self.sure = predicted_covariance(self.P, f, q), predicted_covariance(self.sure, f, q)
         self.began, self.last = True, t
@@ -547,14 +554,15 @@ class PlotLikelihood:
         spec = self.spec.model_copy(update={"radar": radar})
         options = self.options.model_copy(update={"manoeuvre_variance": float(values[-1])})
         offset, total = bias * radar.sigma_velocity_mps, np.zeros(2)
-        for rows in self.recorded:
-            one = single(options, spec)
-            for t, z, v, span in rows:
-                try:
-                    one.step(t, z, v - offset, span)
-                except PlotFault:
-                    return np.full(2, -np.inf)
-                total += one.log_density
+        try:
+            with np.errstate(invalid="ignore", divide="ignore"):  # of σ next to nothing: not-a-number, which is no top
+                for rows in self.recorded:
+                    one = single(options, spec)
+                    for t, z, v, span in rows:
+                        one.step(t, z, v - offset, span)
+                        total += one.log_density
+        except PlotFault:
+            return np.full(2, -np.inf)
         return total
 
     def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
