@@ -81,7 +81,7 @@ class NonFiniteError(RadarsimError):
 
 
 class Interrupted(RadarsimError):
-    """A signal stopped the run; what was done is stored, where it goes on."""
+    """A signal stopped the run; what was finished is stored, where it goes on."""
 
     def __init__(self, signal_number: int, goes_on: bool = True):
         name = {2: "Ctrl-C", 15: "SIGTERM"}.get(signal_number, f"signal {signal_number}")

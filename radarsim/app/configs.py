@@ -100,7 +100,7 @@ def new(
     try:
         files.create(path, text.encode())
     except FileExistsError:
-        raise ConfigError(f"{path}: is there already and is never overwritten; choose another name") from None
+        raise ConfigError(f"{path}: already exists and is never overwritten; choose another name") from None
     return path
 
 
@@ -188,7 +188,7 @@ def selected(whole: Inventory, words: Sequence[str]) -> Inventory:
     ]
     if parts and not any(rows for _, _, rows in found):
         raise ConfigError(
-            f"{' '.join(words)}: nothing of this name; `radarsim list` shows all, or one of {', '.join(kinds)}"
+            f"{' '.join(words)}: no entry has this name; `radarsim list` shows all, or one of {', '.join(kinds)}"
         )
     return [(title, columns, rows) for title, columns, rows in found if rows or not parts]
 
@@ -367,7 +367,7 @@ def repeated(asked: Experiment, done: Mapping[str, int], overrides: Sequence[str
     precision decided where the cases ended, unless it is None.
     """
     if asked.path is None:
-        return "none: the config was given in Python, and stands below"
+        return "none: the config was given in Python, and is printed below"
     wanted = {case.name: case.realisations for case in asked.cases}
     counts = {done.get(name, 0) for name in wanted}
     if all(done.get(name) == count for name, count in wanted.items()):
@@ -377,7 +377,7 @@ def repeated(asked: Experiment, done: Mapping[str, int], overrides: Sequence[str
         return command(asked, [*kept, f"realisations={counts.pop()}"], RESULTS)
     if precision is not None:
         return command(asked, overrides, RESULTS, precision)
-    return "none: the run was stopped, its cases at different numbers of realisations, which stand below"
+    return "none: the run was stopped, its cases at different numbers of realisations, which are listed below"
 
 
 def command(

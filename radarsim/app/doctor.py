@@ -98,7 +98,7 @@ def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
     for name, stored_as in record["identities"].items():
         store = blocks / stored_as
         if not is_directory(store):
-            found.notes.append(f"{store}: no blocks of {name} are stored; the tables stand on their own")
+            found.notes.append(f"{store}: no blocks of {name} are stored, so the tables cannot be checked against them")
             continue
         audit = audited(store, int(record["cases"][name]["done"]))
         found.pieces += len(audit.pieces)
@@ -148,7 +148,7 @@ def _record(folder: Path) -> dict[str, Any]:
     except OSError as error:
         raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise StoreError(f"{path}: damaged, it is no record of a run; `radarsim run` makes it again") from error
+        raise StoreError(f"{path}: damaged, not a record of a run; `radarsim run` writes it again") from error
     return record
 
 
@@ -197,7 +197,7 @@ def _recomputed(found: Inspection, audit: Audit, case: Case | None, most: int) -
             continue
         elsewhere |= {*header["platforms"]} - {here}
         if not agree(work, simulated(work, piece), values, {*header["platforms"], here}):
-            found.faults.append(f"{path}: computed again, the sums are others")
+            found.faults.append(f"{path}: computed again, the sums differ")
     if elsewhere:
         allowed = f"{tolerance(case.study).sampled:.0e} of sigma"
         found.notes.append(f"{audit.path}: made on {'; '.join(sorted(elsewhere))}: compared to within {allowed}")

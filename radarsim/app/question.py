@@ -362,7 +362,7 @@ class Curve:
         """What the tables note of the interval at a value, in words."""
         note = quantities.noted(self.quantity, self._result(self.cases.at(self.key, value), self.realisations))
         more = argument("realisations=…", "-n")
-        return (f"the interval may be too narrow: {note}; more realisations, {more}, mend that",) if note else ()
+        return (f"the interval may be too narrow: {note}; use more realisations, {more}",) if note else ()
 
     def _kept(self, value: float | None, count: int, of: Callable[[Case], Estimate]) -> Estimate:
         place = (math.nan if value is None else value, count)

@@ -288,7 +288,11 @@ def undecided(rows: Sequence[dict[str, Any]]) -> list[str]:
         if parts[0]["as_shipped"] != UNDECIDED or page.extension(parts):
             continue
         needed = page.number(parts[0]["needed"])
-        would = "its value lies on a border: no number would" if needed is None else f"about {roughly(needed):,} would"
+        would = (
+            "its value lies on a border: more realisations would not decide"
+            if needed is None
+            else f"about {roughly(needed):,} would"
+        )
         lines.append(f"{parts[0]['claim']} not yet decided at {_most(parts):,.0f} realisations; {would}")
     return lines
 
@@ -400,7 +404,7 @@ def _unknown(name: str, every: Mapping[str, Paper], owner: Mapping[str, str]) ->
     paper = name.partition(".")[0]
     judged = {claim.id for of in run.papers([paper]) for claim in of.claims}
     if paper not in every and any(claim.partition(".")[0] == paper for claim in judged):
-        return f"readings: {name}: its study declares no choices that {paper} leaves open: nothing to read otherwise"
+        return f"readings: {name}: its study declares no choices that {paper} leaves open: there are no other readings"
     if name in judged:
         return f"readings: {name} is an extension, ours, of which no paper leaves anything open"
     ids = [claim for claim, key in owner.items() if key == paper]
@@ -475,7 +479,11 @@ def _left(over: Over) -> str:
     if over.outcome is None or over.outcome.kind != UNDECIDED:
         return ""
     needed = over.outcome.needed
-    would = "a value lies on a border: no number would" if needed is None else f"about {roughly(needed):,} would"
+    would = (
+        "a value lies on a border: more realisations would not decide"
+        if needed is None
+        else f"about {roughly(needed):,} would"
+    )
     open_, n = len(over.undecided), over.looked
     return f"{over.claim.id} not yet decided under {open_} readings at {n:,} realisations; {would}"
 

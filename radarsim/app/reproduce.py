@@ -155,7 +155,7 @@ class _Process:
                 self._answers.close()
                 self._close_stdin()
                 self._start()
-        fault = f"{task.stem}: its process ended with {code}; run again, what it had done is stored"
+        fault = f"{task.stem}: its process ended with {code}; run it again, what it finished is stored"
         return Done(task.stem, time.perf_counter() - began, f"FAILED: {fault}", (fault,), 1)
 
     def stop(self, at_once: bool) -> None:
@@ -274,7 +274,7 @@ def new_study(name: str, folder: str | os.PathLike = ".", form: str = "linear") 
     try:
         path.mkdir()
     except FileExistsError:
-        raise ConfigError(f"{path}: is there already and is never overwritten; choose another name") from None
+        raise ConfigError(f"{path}: already exists and is never overwritten; choose another name") from None
     except OSError as error:
         raise StoreError(f"{path}: cannot be written: {error.strerror}") from error
     for place, file in files(form).items():

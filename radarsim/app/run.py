@@ -428,7 +428,7 @@ def run(
         if stop is not None:
             stop.raise_if_received()
     if not simulated.cases:
-        raise TargetUnmet(f"{experiment.stem}: {simulated.stopped}: nothing was done by then")
+        raise TargetUnmet(f"{experiment.stem}: {simulated.stopped}: nothing was finished by then")
     with limited(threads):
         facts = facts_of(simulated, threads, time.perf_counter() - started)
     if kept is not None:

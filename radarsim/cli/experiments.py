@@ -111,7 +111,7 @@ def _say_what_lacks(out: str, threads: int | None, whole: bool, one: "Experiment
 def _refuse_of_nothing(of: str, precision: float | None) -> None:
     """Raises UsageError for what a precision is of where none is given."""
     if of != "sigma" and precision is None:
-        raise click.UsageError("--of says what a precision is of: give --precision too")
+        raise click.UsageError("--of applies to --precision: give --precision too")
 
 
 def _refuse_together(shard: object, precision: object, cluster: object, threads: object) -> None:

@@ -70,7 +70,7 @@ class Commands(click.Group):
             fail(StoreError(f"{what}: {error.strerror or error}"))
         except (Exception, SystemExit) as error:  # a study may call sys.exit
             if str(error) == NO_THREAD:
-                fail(ConfigError("no thread can be started here; --threads 0 does without"))
+                fail(ConfigError("no thread can be started here; --threads 0 needs none"))
             from radarsim.studies.registry import fault_of
 
             if (fault := fault_of(error)) is None:

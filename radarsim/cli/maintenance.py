@@ -150,7 +150,7 @@ def clean(
     from radarsim.cli import outcomes
 
     if not configs and (overrides or seed is not None):
-        raise click.UsageError("--set and --seed need a CONFIG whose blocks they mean")
+        raise click.UsageError("--set and --seed need a CONFIG")
     chosen = run.load_all(configs, run.merged(overrides, None, seed)) if configs else None
     cleaned = stored.clean(out, chosen, dry_run)
     if as_json:

@@ -292,7 +292,7 @@ class Cluster:
                 return [self._sums(future)]
             except TimeoutError as late:
                 raise ClusterError(
-                    f"{self._place}: a worker does not send its sums within {RESULT_S} s; what was done is stored"
+                    f"{self._place}: a worker does not send its sums within {RESULT_S} s; what was finished is stored"
                 ) from late
             except Exception:  # the worker died before it was asked: once more
                 pass
@@ -302,7 +302,9 @@ class Cluster:
             raise self._lost()
         error = future.exception()
         if isinstance(error, self._dead):
-            raise ClusterError(f"{self._place}: {DEATHS} workers died under the same blocks; what was done is stored")
+            raise ClusterError(
+                f"{self._place}: {DEATHS} workers died under the same blocks; what was finished is stored"
+            )
         if isinstance(error, ConfigError):
             raise error
         raise ClusterError(f"{self._place}: a worker cannot run the blocks: {type(error).__name__}: {error}")
@@ -339,10 +341,12 @@ class Cluster:
         if working:
             self._seen = now
         elif now > self._seen + WORKERS_S:
-            raise ClusterError(f"{self._place}: no worker for {WORKERS_S} s; what was done is stored")
+            raise ClusterError(f"{self._place}: no worker for {WORKERS_S} s; what was finished is stored")
 
     def _lost(self) -> ClusterError:
-        return ClusterError(f"{self._place}: the scheduler went away; what was done is stored, run again to continue")
+        return ClusterError(
+            f"{self._place}: the scheduler went away; what was finished is stored, run again to continue"
+        )
 
     def cancel(self) -> int:
         """Drop the tasks that are not yet started; how many those were."""

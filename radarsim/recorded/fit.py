@@ -355,7 +355,7 @@ def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name
     if not long:
         raise ConfigError(f"{source}: must have a track of at least {LEAST_ROWS} rows")
     if same := [name for name in long[0] if name != "t_s" and all(np.ptp(one[name]) == 0 for one in long)]:
-        raise ConfigError(f"{source}: {same[0]}: must differ between plots, or no σ can be told; all are the same")
+        raise ConfigError(f"{source}: {same[0]}: must differ between plots, or σ cannot be estimated; all are the same")
     found = of.likelihood(case, filter_name, long)
     folding = folded(case, long)
     if folding and found is not None and VELOCITY in found.by_number(np.asarray(found.stated)):

@@ -160,7 +160,7 @@ def _refuse_twins(folder: Path, names: Iterable[str]) -> None:
     for name in names:
         first = seen.setdefault(unicodedata.normalize("NFC", name).casefold(), name)
         if first != name:
-            raise StoreError(f"{folder}: {first} and {name} are one file to some file systems; nothing is written")
+            raise StoreError(f"{folder}: {first} and {name} are the same file on some file systems; nothing is written")
 
 
 def _refuse_special(path: Path) -> None:

@@ -20,7 +20,7 @@ def test_what_is_known_exactly_is_decided_at_the_first_look(tmp_path):
 def test_what_is_left_says_what_it_would_take():
     row = {"paper": "p", "claim": "P9.1", "as_shipped": UNDECIDED, "extension": False, "n": 4000, "needed": 12345.0}
     assert readings.undecided([row]) == ["P9.1 not yet decided at 4,000 realisations; about 13,000 would"]
-    assert "no number would" in readings.undecided([row | {"needed": math.nan}])[0]
+    assert "more realisations would not decide" in readings.undecided([row | {"needed": math.nan}])[0]
     assert readings.undecided([row | {"as_shipped": CONFIRMED}]) == []
     assert readings.undecided([row | {"extension": True}]) == []
     assert readings.undecided([row | {"class": CONFIRMED}])  # over all readings, by other runs than this

@@ -146,7 +146,7 @@ def test_a_time_limit_within_an_experiment_of_cases_tells_those_that_are_done(tm
 
 def test_a_limit_too_short_for_a_block_says_that_nothing_was_done(tmp_path):
     result = command("run", "rls1", "--time-limit", 1e-9, *PLAIN, "--out", tmp_path, code=3)
-    assert result.stderr == "rls1: time limit of 1e-09 s: nothing was done by then\n"
+    assert result.stderr == "rls1: time limit of 1e-09 s: nothing was finished by then\n"
     assert not (tmp_path / "rls1").exists()
     share = ("run", "rls2", "-n", "1e9", "--shard", "2/2", "--time-limit", 0.5, "--out", tmp_path)
     assert command(*share, code=3).stderr == "rls2: time limit of 0.5 s\n"
@@ -357,5 +357,5 @@ def test_python_takes_a_precision_and_a_limit():
     assert result.unmet == []
     assert result.cases[0].count == 8_000
     assert radarsim.run("rls2", realisations=2e9, time_limit=0.5).unmet == ["time limit of 0.5 s"]
-    with pytest.raises(TargetUnmet, match="nothing was done"):
+    with pytest.raises(TargetUnmet, match="nothing was finished"):
         radarsim.run("rls2", time_limit=1e-9)

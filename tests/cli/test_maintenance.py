@@ -90,7 +90,7 @@ def test_forged_sums_are_found_by_computing_them_again(out):
 
     reforged(cut, values=decoded(cut.read_bytes())[1] * 1.000001)
     result = command("doctor", out / "rls2", "--recompute", 1, code=4)
-    assert f"{cut}: computed again, the sums are others" in result.stderr
+    assert f"{cut}: computed again, the sums differ" in result.stderr
 
 
 def rewritten(path, alter):

@@ -219,7 +219,7 @@ def test_what_a_package_is_told_is_of_its_own_configs_and_of_options_that_were_g
     assert "is no claim of bearings; its claims: bearings.1," in radarsim("claims", "bearings.9", code=2).stderr
     for name in ("bearings", "bearings.1"):
         words = (
-            f"readings: {name}: its study declares no choices that bearings leaves open: nothing to read otherwise\n"
+            f"readings: {name}: its study declares no choices that bearings leaves open: there are no other readings\n"
         )
         assert radarsim("readings", name, code=2).stderr == words
     ask = ("solve", "chirp", "radar.detection_probability", "--sigma", "r", "--filter", "up", "--equals", 27)

@@ -62,7 +62,7 @@ def test_a_command_that_lacks_its_threads_says_what_does_without():
     assert code == 0, told  # in closed form: no thread is asked for
     told, code = barred(COMMAND, "run", "rls2", "-n", 10)
     assert code == 2
-    assert told == "no thread can be started here; --threads 0 does without\n"
+    assert told == "no thread can be started here; --threads 0 needs none\n"
 
 
 def test_what_is_forbidden_within_is_allowed_after():

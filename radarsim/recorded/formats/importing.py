@@ -346,7 +346,7 @@ class _Import:
         if self.truth is not None:
             done.notes += self.truth.notes()
         if unnamed := done.tracks.get("", 0):
-            done.notes.append(f"{unnamed} of {done.rows} plots belong to no track; `radarsim track` passes them over")
+            done.notes.append(f"{unnamed} of {done.rows} plots belong to no track; `radarsim track` skips them")
         if note := self.sign.note(self.options.towards):
             done.notes.append(note)
         if (folded := fit.folding(self.folds.tracks())) is not None:

@@ -336,7 +336,7 @@ class Ais:
             if len(gathered) >= BATCH:
                 yield gathered.taken()
         if damaged and damaged >= LEAST_GOOD * (self.records + damaged):
-            raise ConfigError(f"{first}: must be AIS sentences (!AIVDM,…); {damaged} lines are none or damaged, "
+            raise ConfigError(f"{first}: must be AIS sentences (!AIVDM,…); {damaged} lines are not, or are damaged; "
                               f"{self.records} messages were read")  # fmt: skip
         if damaged:
             self.skipped["damaged lines"] = damaged
@@ -378,14 +378,14 @@ class Ais:
         try:
             return utc_s(text)
         except ValueError:
-            must = "before the sentence must stand a time in s from 1970 or ISO 8601, or a tag block"
+            must = "the sentence must follow a time in s from 1970 or ISO 8601, or a tag block"
             read = f"{self.records} messages were read"
             raise ConfigError(f"{self.path}:{number}: {must}; got {text[:60]!r}; {read}") from None
 
     def _take(self, message: Any, stated: float, gathered: Gathered) -> None:
         latitude, longitude = getattr(message, "lat", None), getattr(message, "lon", None)
         if latitude is None or longitude is None or message.msg_type not in (1, 2, 3, 18, 19):
-            self.skipped["messages that are no ship's position"] += 1
+            self.skipped["messages other than ships' positions"] += 1
             return
         if None in (message.second, message.speed, message.course):
             self.skipped["messages cut short"] += 1

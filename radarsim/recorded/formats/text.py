@@ -135,7 +135,7 @@ class Table:
         units = {"range_m": "m", "bearing_rad": "degrees", "velocity_mps": "m/s", "span_mps": "m/s", "altitude_m": "m"}
         units |= {"speed_mps": "m/s", "up_mps": "m/s"} | {ours: c.unit for ours, c in self.columns.items() if c.unit}
         taken = ", ".join(f"{name} in {units[ours]}" for ours, name in plain.items() if ours in units)
-        found = [f"taken for want of a unit in the name: {taken}"] if taken else []
+        found = [f"assumed because the name has no unit: {taken}"] if taken else []
         time = self.columns["t_s"].name
         if others := [name for name in self.header if split(name)[0] in NAMES["t_s"] and name != time]:
             found.append(f"times are {time}; not used: {', '.join(others)}")
@@ -151,7 +151,7 @@ class Table:
         likely = [(i, len(cells)) for i, cells in self.cells.items() if 1 < len(cells) <= self.records / 2]
         named = ", ".join(f"{self.header[i]} ({count} different)" for i, count in likely) or "none has few names"
         return (
-            f"{self.path}: track: no column says whose each row is, and {late} rows are not later than the one before; "
+            f"{self.path}: track: no column identifies the tracks, and {late} rows are not later than the one before; "
             f"name the column, --column track=THEIRS; it may be: {named}"
         )
 

@@ -468,7 +468,7 @@ def _by_case(changed: str) -> Iterator[str]:
 
 def _apart(differences: str) -> list[str]:
     """Differences one by one; the second half of one begins with a comma as well."""
-    return re.split(r", (?!the paper's )(?=\S+ is |\d+ of the paper's |\S+ another one )", differences)
+    return re.split(r", (?!the paper's )(?=\S+ is |\d+ of the paper's |\S+ differs from )", differences)
 
 
 def _difference(text: str) -> str:

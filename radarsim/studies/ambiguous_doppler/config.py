@@ -245,7 +245,7 @@ class Filter(Model):
     @cross_check
     def _orders_differ(self) -> Iterator[At]:
         if list(self.orders) != sorted(set(self.orders)):
-            yield at("orders", "must rise, each once")
+            yield at("orders", "must increase, without repetition")
 
     @cross_check
     def _combined(self) -> Iterator[At]:

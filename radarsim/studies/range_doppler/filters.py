@@ -184,7 +184,7 @@ def true_motion(case: Case) -> tuple[np.ndarray, np.ndarray]:
     away = np.hypot(np.max(spread[:3]), np.max(spread[3:]) * t) * APART
     if (x[:, 0] < away).any():
         k = int(np.argmax(x[:, 0] < away))
-        fault = f"so widely drawn that it may meet the radar: at {t[k]:g} s it is {x[k, 0]:.4g} m away"
+        fault = f"its random spread may reach the radar: at {t[k]:g} s it is {x[k, 0]:.4g} m away"
         raise ConfigError(f"{case.name}: target: {fault}, {APART:g} standard deviations are {away[k]:.4g} m")
     return t, x
 

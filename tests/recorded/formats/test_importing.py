@@ -518,7 +518,7 @@ def test_exports_of_positions(tmp_path, header, row, feet):
     np.testing.assert_allclose(columns["altitude_m"], 10000 * (0.3048 if feet else 1), rtol=1e-12)
     speed = 200 * (NM / 3600 if feet else 1)
     assert 0.9 * speed < columns["velocity_mps"][0] < speed
-    taken = " ".join(note for note in done.notes if note.startswith("taken for want of a unit in the name"))
+    taken = " ".join(note for note in done.notes if note.startswith("assumed because the name has no unit"))
     assert (" in ft" in taken and " in kn" in taken) == feet
 
 
@@ -554,7 +554,7 @@ def test_ships_in_tables_count_in_knots_by_their_course(tmp_path, row, velocity)
     text = f"MMSI,BaseDateTime,LAT,LON,SOG,COG,Heading\n244660000,2020-01-01T00:00:00,52.4,4.76,{row}\n"
     done, columns, _ = imported(tmp_path, text.encode(), Options(site=Site(52.3, 4.76, 0.0)))
     np.testing.assert_allclose(columns["velocity_mps"], velocity, rtol=1e-4)
-    assert "taken for want of a unit in the name: SOG in kn" in done.notes
+    assert "assumed because the name has no unit: SOG in kn" in done.notes
 
 
 def test_rows_of_several_aircraft_are_asked_whose(tmp_path):
@@ -562,11 +562,11 @@ def test_rows_of_several_aircraft_are_asked_whose(tmp_path):
     text = "TIME(s),RHO,THETA,TA,MODE\n"
     text += "".join(f"{k // 2},{50 + k},{10 * (k % 2)},{'4CA1' if k % 2 else '3C64'},S{k}\n" for k in range(20))
     (line,) = refused(tmp_path, text.encode())
-    assert "track: no column says whose each row is, and 10 rows are not later than the one before" in line
+    assert "track: no column identifies the tracks, and 10 rows are not later than the one before" in line
     assert line.endswith("name the column, --column track=THEIRS; it may be: TA (2 different)")
     done, _, tracks = imported(tmp_path, text.encode(), Options(columns={"track": "TA"}))
     assert (done.rows, set(tracks)) == (20, {"4CA1", "3C64"})
-    assert "taken for want of a unit in the name: RHO in m, THETA in degrees" in done.notes
+    assert "assumed because the name has no unit: RHO in m, THETA in degrees" in done.notes
 
 
 def test_a_table_passes_midnight_and_may_be_sorted_by_track(tmp_path):

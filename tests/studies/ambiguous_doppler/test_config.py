@@ -21,7 +21,7 @@ from radarsim.studies import registry
         ("filters.1.estimate", "best", "filters.1.estimate: belongs to doppler: folded, not unfolded"),
         ("filters.3.hypotheses", "10", "filters.3.hypotheses: belongs to merge: never, not each_scan"),
         ("filters.5.orders", "[3]", "filters.5.orders.0: must be <= 2, got 3"),
-        ("filters.5.orders", "[2, 1]", "filters.5.orders: must rise, each once"),
+        ("filters.5.orders", "[2, 1]", "filters.5.orders: must increase, without repetition"),
         ("filters.5.orders", "[1, 2]", "filters.5.manoeuvre_variance: must be a list of 2, one for each order"),
         ("filters.5.combine", "likelihood", "filters.5.combine: has no effect on one order; leave it out"),
         ("filters.3.doppler", "remainder", "filters.3.merge: belongs to doppler: folded, not remainder"),

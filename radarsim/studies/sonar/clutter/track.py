@@ -255,7 +255,7 @@ class Tracker:
         chosen = [f for f, one in enumerate(specs) if one.association != "known"]
         if not chosen:
             raise ConfigError(
-                f"{self.case.name}: filters: it is not known which plots are the target's: nearest or pda is needed"
+                f"{self.case.name}: filters: it is not known which plots are the target's: use nearest or pda"
             )
         t, row = np.unique(columns["t_s"], return_inverse=True)
         plots = np.stack([columns["range_m"], columns["bearing_rad"]])

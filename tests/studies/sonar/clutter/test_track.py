@@ -93,5 +93,5 @@ def test_a_scan_without_plots_and_no_track_at_all(tmp_path):
 def test_an_oracle_alone_cannot_track(tmp_path):
     path = written(tmp_path / "plots.csv", [(0, 9e3, 0.3)])
     config = loaded("sonar_clutter", (*ONE, "filters=[{name: a, kind: kalman, association: known}]"))
-    with pytest.raises(ConfigError, match="nearest or pda is needed"):
+    with pytest.raises(ConfigError, match="use nearest or pda"):
         whole.track(config, path)
