@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -165,6 +165,8 @@ SIDE_MM = 14.0  # of those of an axis of y, with the gap to the next panel
 LETTER_EM = 0.62  # of a number, in its size: how wide a figure of the font is
 TICK_GAP_PT = 3.0  # between numbers of ticks
 REMEMBERED = ("_update_ticks", "_get_ticklabel_bboxes")  # methods of Matplotlib's axes: of no argument; ticks, renderer
+FEWEST_SCANS, LAST_APART = 5, 0.5  # scans from which ticks stand at them; of an interval, before the last tick
+BEYOND = ("↓", "↑")  # behind the name of a line that ends below or above its axis
 MARKED = 16  # at most about so many markers or crosses a line
 WHOLE = (0, 1)  # limits of a share
 SYMBOL = re.compile(r"\$\\?\w+\$")  # a label that is one letter: on its side Λ would read as <
@@ -399,6 +401,24 @@ def _bytes(canvas: Canvas, kind: str, figure: Figure, made_by: str) -> bytes:
     return out.getvalue()
 
 
+class Scans(NamedTuple):
+    """Even values from zero to the last."""
+
+    step: float
+    last: float
+
+
+def _scans(panel: Panel) -> Scans | None:
+    """The step and the last of even values from zero on (scans) that all lines of a panel stand at; None where not."""
+    every = [np.asarray(mark.x, float) for mark in panel.marks if isinstance(mark, Line)]
+    x = np.unique(np.concatenate(every or [np.zeros(0)]))
+    if panel.x.scale == "log" or len(x) < FEWEST_SCANS or x[0] < 0:
+        return None
+    step = float(x[-1] / np.round(x[-1] / np.diff(x).min()))
+    even = np.abs(x / step - np.round(x / step)).max() < 1e-6 and x[0] <= FEWEST_SCANS * step
+    return Scans(step, float(x[-1])) if even else None
+
+
 def _draw(axes: Axes, panel: Panel, maps: Colours) -> None:
     """Draw a panel's marks and axes."""
     axes.set_xscale(panel.x.scale)
@@ -426,7 +446,7 @@ def _draw(axes: Axes, panel: Panel, maps: Colours) -> None:
         whole = (*panel.x.limits, *panel.y.limits)
         axes.set_aspect("equal", adjustable="datalim" if None in whole else "box")
     placed = any(isinstance(mark, Bars | Heat) for mark in panel.marks)
-    _ticks(axes.xaxis, panel.x, placed)
+    _ticks(axes.xaxis, panel.x, placed, _scans(panel))
     _ticks(axes.yaxis, panel.y, any(isinstance(mark, Heat) for mark in panel.marks))
     if panel.y.limits == WHOLE and panel.x.limits[1] is None:  # a share of one is drawn whole
         for line in axes.lines:
@@ -435,26 +455,42 @@ def _draw(axes: Axes, panel: Panel, maps: Colours) -> None:
         axes.set_title(panel.remark, loc="right", fontsize=7)
 
 
-def _ticks(side: XAxis | YAxis, axis: Ends, placed: bool) -> None:
-    """The ticks of an axis: those given; those that its bars or its map have set; else round values."""
+def _ticks(side: XAxis | YAxis, axis: Ends, placed: bool, scans: Scans | None = None) -> None:
+    """The ticks of an axis: those given; those that its bars or its map have set; scans, the last too; else round."""
     if axis.ticks:
         where, labels = zip(*axis.ticks, strict=True)
         side.set_ticks(where, labels)
     elif not placed:
-        chosen = Round(axis.scale == "log", 6 if side.axis_name == "x" else 5)
+        chosen = Round(axis.scale == "log", 6 if side.axis_name == "x" else 5, scans)
         side.set_major_locator(chosen)
         side.set_major_formatter(FuncFormatter(lambda value, _: chosen.words.get(value, tick_text(value))))
     side.set_minor_formatter(NullFormatter())
 
 
+def at_scans(scans: Scans, intervals: int) -> list[tuple[float, str]]:
+    """Ticks at every few scans from zero, about so many intervals, and at the last scan.
+
+    One interval more, or fewer down to half, where so all are as long.
+    """
+    count = round(scans.last / scans.step)
+    every = [m * 10**p for p in range(9) for m in (1, 2, 3, 4, 5)]
+    whole = [n for n in every if count % n == 0 and intervals / 2 <= count / n <= intervals + 1]
+    chosen = (whole or [n for n in every if count / n <= intervals])[0]
+    found = list(range(0, count + 1, chosen))
+    if rest := count - found[-1]:
+        found = [*(found[:-1] if rest < LAST_APART * chosen and len(found) > 1 else found), count]
+    return [(n * scans.last / count, tick_text(n * scans.last / count)) for n in found]
+
+
 class Round(Locator):
     """Ticks at the round values that the page's charts have too (report/chart.py).
 
-    Of an axis of x so many, at most, that their numbers stand apart. words are the numbers of the last ones.
+    Of an axis of x so many, at most, that their numbers stand apart; where its values are scans, at these. words are
+    the numbers of the last ones.
     """
 
-    def __init__(self, log: bool, wanted: int):
-        self.log, self.wanted = log, wanted
+    def __init__(self, log: bool, wanted: int, scans: Scans | None = None):
+        self.log, self.wanted, self.scans = log, wanted, scans
         self.words: dict[float, str] = {}
         self._asked: tuple[float, float, float] | None = None
 
@@ -472,6 +508,9 @@ class Round(Locator):
 
     def _chosen(self, scale: Scale) -> list[tuple[float, str]]:
         """As many as wanted, or fewer that stand apart."""
+        if self.scans:
+            every = (at_scans(self.scans, count) for count in range(self.wanted, 1, -1))
+            return next((ticks for ticks in every if apart(scale, ticks)), at_scans(self.scans, 1))
         ticks = scale.ticks(self.wanted)
         for wanted in range(self.wanted - 1, 1, -1):
             if apart(scale, ticks):
@@ -613,7 +652,7 @@ def _at_ends(axes: Axes, panel: Panel) -> list[Annotation]:
         y = float(np.clip(m.y[last], low, high))  # a line may end beyond an axis that is cut
         texts.append(
             axes.annotate(
-                m.label,
+                f"{m.label} {BEYOND[int(m.y[last] > high)]}" if y != m.y[last] else m.label,
                 (m.x[last], y),
                 xytext=(1.015, y),
                 textcoords=axes.get_yaxis_transform(),

@@ -27,6 +27,7 @@ def right(config, n):
             faults, _ = captions.checked(result)
             assert faults == [], code
             assert cut(type(result).answer.func(result)) == [], code
+    return result
 
 
 @pytest.mark.parametrize("config", FEW)
@@ -37,7 +38,13 @@ def test_captions_and_answers_are_as_the_tables(config):
 @pytest.mark.slow
 @pytest.mark.parametrize("config", CONFIGS)
 def test_captions_and_answers_of_every_config_are_as_the_tables(config):
-    right(config, 200)
+    result = right(config, 200)
+    from radarsim.app import result as output
+
+    drawn = result.experiment.drawn(output.case_figures(result.cases, result.tables, result.experiment))
+    assert 1 <= len(drawn) <= 8  # a page that is read
+    named = result.experiment.figures
+    assert len(drawn) >= 0.5 * len(named)  # of so few realisations some have nothing to show
 
 
 @pytest.mark.parametrize(

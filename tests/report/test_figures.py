@@ -355,6 +355,39 @@ def test_panels_of_one_quantity_share_the_axis_that_holds_all_of_them(values, sc
     assert axes[0].get_ylim() == axes[1].get_ylim() == y.limits
 
 
+@pytest.mark.parametrize(
+    ("step", "count"), [(10.0, 15), (5.0, 29), (5.0, 30), (2.5, 89), (1.0, 100), (0.1, 2001), (1, 7)]
+)
+def test_ticks_stand_at_scans_and_at_the_last(step, count):
+    """Those between are even; no number is nearer to the next than half of that."""
+    x = step * np.arange(count)
+    axes = figures.render(one(Line(x, 1.0 + x, "a"))).axes[0]
+    ticks = np.asarray(axes.get_xticks())
+    assert (ticks[0], ticks[-1]) == (0.0, x[-1])
+    np.testing.assert_allclose(ticks / step, np.round(ticks / step), atol=1e-9)
+    gaps = np.diff(ticks)
+    np.testing.assert_allclose(gaps[:-1], gaps[0])
+    assert 0.5 <= gaps[-1] / gaps[0] < 1.5
+    assert 3 <= len(ticks) <= 8
+
+
+def test_uneven_times_have_round_ticks():
+    x = np.array([0.0, 1.0, 2.5, 7.1, 9.9, 13.7])
+    assert list(figures.render(one(Line(x, x, "a"))).axes[0].get_xticks()) == [0, 2.5, 5, 7.5, 10, 12.5]
+
+
+def test_a_line_that_ends_beyond_its_axis_is_marked_so():
+    x = np.arange(6.0)
+    lines = (
+        Line(x, -x, "in", Style(0, 0)),
+        Line(x, -100 * x, "below", Style(1, 0)),
+        Line(x, 90 * x, "above", Style(2, 0)),
+    )
+    figure = Figure("f", "F", "F.", (Panel(Axis("t"), Axis("gain", limits=(-100.0, 100.0)), lines),))
+    (axes,) = figures.render(figure).axes
+    assert {text.get_text() for text in axes.texts} == {"in", "below ↓", "above ↑"}
+
+
 def test_an_axis_of_sigma_shows_no_rounding():
     sigma = Line(np.arange(4.0), np.array([1e-9, 0.5, 5.0, 50.0]))
     axis = panels.fitting_axis("σ", [sigma])

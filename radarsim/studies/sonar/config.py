@@ -43,7 +43,7 @@ COMPONENTS = tuple(rate + coordinate for coordinate in "rbxyde" for rate in ("",
 FIGURES = (
     *(f"sigma_{name}" for name in COMPONENTS),
     *("plots", "smoothing_gains", "believed", "missed", "conversion"),
-    *("roc", "detection", "delay", "response", "modes", "uses"),
+    *("roc", "detection", "delay", "modes", "uses"),
     *("track_map", "confirmation", "track_life", "false_tracks", "track_classes"),
 )
 AngleSigma = Annotated[Positive, Field(le=0.5)]  # rad: beyond about 30 degrees the error of an angle is not Gaussian

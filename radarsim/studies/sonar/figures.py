@@ -84,6 +84,12 @@ def case_lines(
     return [panels.line(groups[place], columns, place[1], n) for n, place in places if place in groups]
 
 
+def ends(result: CaseResult) -> list[Reference]:
+    """Lines at the start and the end of a manoeuvre, where there is one."""
+    times = getattr(result.axes, "manoeuvre_s", None) or ()
+    return [Reference(when, "x") for when in times if 0 < when < result.axes.t_s[-1]]
+
+
 def sigma_figure(
     name: str,
     results: Sequence[CaseResult[SonarAxes]],
@@ -98,7 +104,8 @@ def sigma_figure(
         marks = [panels.scaled(one, factor) for one in case_lines(result, curves, of.name, panels.SIGMA)]
         if marks:
             y = panels.fitting_axis(panels.sigma_of(of.symbol, unit), marks)
-            drawn.append(Panel(panels.time_axis(), y, tuple(marks), panels.swept(result), direct=False))
+            shown: tuple[Mark, ...] = (*ends(result), *marks)
+            drawn.append(Panel(panels.time_axis(), y, shown, panels.swept(result), direct=False))
     if not drawn:
         return None
     drawn, same = panels.differing(drawn)
@@ -109,6 +116,7 @@ def sigma_figure(
             name=of.words,
             count=results[0].count,
         )
+        + (" " + tr("Dotted: beginning and end of the manoeuvre.") if any(map(ends, results)) else "")
         + same
         + left_out
     )

@@ -29,9 +29,9 @@ def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, F
     if not results:
         return {}
     drawn = {
+        "track_life": life_figure(results, made),
         "track_map": map_figure(middle(results)),
         "confirmation": confirmation_figure(results, made["tracks"]),
-        "track_life": life_figure(results, made),
         "false_tracks": false_figure(results, made["tracking"]),
         "track_classes": classes_figure(results, made["track_classes"]),
     }
@@ -68,7 +68,7 @@ def by_line(tracking: "pd.DataFrame", column: str, result: CaseResult[ClutterAxe
     result is one of the cases.
     """
     others = [other for other in KEYS if other != column and tracking[other].nunique() > 1]
-    names = tracking["filter"].astype(object)
+    names = tracking["filter"].map(panels.literal).astype(object)
     for other in others:
         symbol = panels.plain(panels.symbol_of(result, KEYS[other]))
         names = names + [f", {symbol} = {panels.with_its_unit(result, KEYS[other], v)}" for v in tracking[other]]
@@ -146,7 +146,7 @@ def _lines(table: "pd.DataFrame", x: str, value: str, ends: str) -> list[Line]:
     for n, (name, rows) in enumerate(table.groupby("filter", sort=False)):
         rows = rows[np.isfinite(rows[value])].sort_values(x)
         lo, hi = (rows[key].where(np.isfinite(rows[key]), rows[value]) for key in (f"{ends}_lo", f"{ends}_hi"))
-        lines.append(panels.line(rows.assign(lo=lo, hi=hi), (x, value, "lo", "hi"), panels.literal(str(name)), n))
+        lines.append(panels.line(rows.assign(lo=lo, hi=hi), (x, value, "lo", "hi"), str(name), n))
     return lines
 
 
@@ -179,6 +179,7 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
     table = classes[(classes["case"] == case.name) & (classes["n_false"] > 0)]
     if table.empty:
         return None
+    table = table.assign(filter=table["filter"].map(panels.literal))
     x = Axis(tr("threshold of the score"))
     false = _lines(table[table["false_called_true"] > 0], "threshold", "false_called_true", "false")
     true = _lines(table, "threshold", "true_called_false", "true")
@@ -208,19 +209,23 @@ def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
     """Plots, gates and tracks of realisation 0 of a case on a map."""
     shown = realisation_map(result)
     km = 1e-3
-    marks = [
-        Line(shown.false[1] * km, shown.false[0] * km, tr("false plots"), Style(GREY, None, 0, 1.1, 1.0)),
+    marks = [Line(shown.false[1] * km, shown.false[0] * km, tr("false plots"), Style(GREY, None, 0, 1.1, 1.0))]
+    curves = (
+        (tr("its gates"), shown.gates, Style(3, 0, None, 0.6)),
+        (tr("other tracks"), shown.tracks[1:], Style(GREY, 0, None, 1.0)),
+        (tr("track nearest to the course"), shown.tracks[:1], Style(2, 0, None, 1.8)),
+    )
+    for label, drawn, style in curves:
+        marks += [Line(y * km, x * km, "" if n else label, style) for n, (x, y) in enumerate(drawn)]
+    marks += [
         Line(shown.truth[1] * km, shown.truth[0] * km, tr("target"), Style(1, 1, None)),
         Line(shown.plots[1] * km, shown.plots[0] * km, tr("target plots"), Style(1, None, 1, 1.1, 2.0)),
     ]
-    curves = ((tr("tracks"), shown.tracks, Style(2, 0, None, 1.3)), (tr("gates"), shown.gates, Style(3, 0, None, 0.6)))
-    for label, drawn, style in curves:
-        marks += [Line(y * km, x * km, "" if n else label, style) for n, (x, y) in enumerate(drawn)]
     (south, north), (west, east) = shown.window
     caption = tr(
         "Confirmed tracks near the target: {tracks}, among {false} false plots in {k} scans. The target's course and "
-        "plots, the false plots of all scans, the tracks and their gates at every fourth scan, in realisation 0 of "
-        "{name}, tracker {tracker}.",
+        "plots, the false plots of all scans, the tracks, and at every fourth scan the gate of the one nearest to the "
+        "course, in realisation 0 of {name}, tracker {tracker}.",
         tracks=len(shown.tracks),
         false=len(shown.false[0]),
         name=panels.plain_label(result),

@@ -21,8 +21,8 @@ class RealisationMap:
     truth: Curve  #: the target's course, K points.
     plots: Curve  #: the target's plots.
     false: Curve  #: the false plots of all scans near the course.
-    tracks: list[Curve]  #: the confirmed tracks, one curve each.
-    gates: list[Curve]  #: edges of their gates at every `EVERY`-th scan, one curve each.
+    tracks: list[Curve]  #: the confirmed tracks, one curve each, first the one that lies nearest to the course.
+    gates: list[Curve]  #: edges of its gates at every `EVERY`-th scan, one curve each.
     #: southern and northern, western and eastern edge of the map.
     window: tuple[tuple[float, float], tuple[float, float]]
 
@@ -43,18 +43,23 @@ def realisation_map(result: CaseResult[ClutterAxes]) -> RealisationMap:
         plots = np.concatenate([own, np.stack([r[near], b[near]])], axis=1)
         scans.append((t, plots[0], plots[1]))
     f = next((i for i, one in enumerate(specs) if one.association != "known"), None)
-    tracks, gates = [], []
-    for track in [] if f is None else confirmed_tracks(specs[f], conditions(spec), scans):
-        states = np.array(track.states)
-        tracks.append(_flat(states[:, 0], states[:, 2]))
-        gates += [_ellipse(g, specs[f or 0]) for k, g in zip(track.scans, track.gates, strict=True) if not k % EVERY]
+    found = [] if f is None else confirmed_tracks(specs[f], conditions(spec), scans)
+    states = [np.array(track.states) for track in found]
+    tracks = [_flat(own[:, 0], own[:, 2]) for own in states]
+    order = sorted(range(len(found)), key=lambda n: _distance(tracks[n], course))
+    gates = [
+        _ellipse(gate, specs[f or 0])
+        for n in order[:1]
+        for k, gate in zip(found[n].scans, found[n].gates, strict=True)
+        if not k % EVERY
+    ]
     north_of_false, east_of_false = np.concatenate(false, axis=1)
     return RealisationMap(
         tracker="" if f is None else spec.filters[f].name,
         truth=course,
         plots=_flat(*z[np.isfinite(z[:, 0])].T),
         false=(north_of_false, east_of_false),
-        tracks=tracks,
+        tracks=[tracks[n] for n in order],
         gates=[gate for gate in gates if np.isfinite(gate[0]).all()],
         window=((south, north), (west, east)),
     )
@@ -63,6 +68,12 @@ def realisation_map(result: CaseResult[ClutterAxes]) -> RealisationMap:
 def _flat(r: np.ndarray, b: np.ndarray) -> Curve:
     """Distances north and east."""
     return r * np.cos(b), r * np.sin(b)
+
+
+def _distance(track: Curve, course: Curve) -> float:
+    """The median distance of a track's points to the course, m."""
+    north, east = (own[:, None] - other for own, other in zip(track, course, strict=True))
+    return float(np.median(np.hypot(north, east).min(axis=1)))
 
 
 def _ellipse(gate: np.ndarray, tracker: TrackerSpec) -> Curve:

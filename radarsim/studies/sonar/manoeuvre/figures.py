@@ -10,7 +10,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
 from radarsim.report import panels, seen, tables
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
-from radarsim.studies.sonar.figures import BY_NAME, case_lines
+from radarsim.studies.sonar.figures import case_lines, ends
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes
 
@@ -26,7 +26,7 @@ SYMBOLS = {
 RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # ticks of a measured over a believed σ
 STRENGTHS = ("acceleration_mps2", "rate_radps")  # keys that say how strong a manoeuvre is
 Results = Sequence[CaseResult[ManoeuvreAxes]]
-DRAWN_FROM = {"roc": ("detections",), "detection": ("detections",), "delay": ("delays",), "response": ("curves",)}
+DRAWN_FROM = {"roc": ("detections",), "detection": ("detections",), "delay": ("delays",)}
 
 
 def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, Figure | None]:
@@ -42,7 +42,6 @@ def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, F
         drawn["delay"] = _said(delay_figure(some, made["delays"]), left)
     if responding:
         some, left = shown(responding)
-        drawn["response"] = _said(response_figure(some, made["curves"]), left)
         drawn["modes"] = _said(modes_figure(some, made["modes"]), left)
     if "uses" in made:
         drawn["uses"] = uses_figure([result for result in results if "uses" in result.sums], made["uses"])
@@ -51,7 +50,7 @@ def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, F
 
 SEEN = {
     **{"detection": seen.extremes, "roc": seen.reading_at(0.01), "delay": seen.highest_at_the_end},
-    **{"response": seen.extremes, "modes": seen.extremes, "uses": seen.extremes},
+    **{"modes": seen.extremes, "uses": seen.extremes},
 }
 
 
@@ -189,23 +188,6 @@ def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
     return _figure("delay", tr("How soon a manoeuvre is detected"), caption, drawn)
 
 
-def response_figure(results: Results, curves: "pd.DataFrame") -> Figure | None:
-    """σ of the first coordinate during the manoeuvre, a line for each filter."""
-    groups = tables.groups(curves, "case", "filter", "component")
-    drawn = []
-    for result in results:
-        component = BY_NAME[result.axes.components[0][0]]
-        marks: tuple[Mark, ...] = (*_ends(result), *case_lines(result, groups, component.name, panels.SIGMA))
-        y = Axis(panels.sigma_of(component.symbol, component.unit), "log")
-        drawn.append(Panel(panels.time_axis(), y, marks, _title(result), direct=False))
-    caption = tr(
-        "Root-mean-square error of the first coordinate about the truth on the same plots, of {count:,} "
-        "realisations. Dotted: beginning and end of the manoeuvre.",
-        count=results[0].count,
-    )
-    return _figure("response", tr("Filters through a manoeuvre"), caption, drawn)
-
-
 def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
     """Probability that filters assign to a manoeuvre, against time."""
     groups = tables.groups(modes, "case", "filter", "component")
@@ -213,7 +195,7 @@ def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
     for result in results:
         lines = case_lines(result, groups, result.axes.components[0][0], ("t_s", "probability", "lo", "hi"))
         y = Axis(tr("probability of a manoeuvre"), limits=(0, 1))
-        drawn.append(Panel(panels.time_axis(), y, (*_ends(result), *lines), _title(result), direct=False))
+        drawn.append(Panel(panels.time_axis(), y, (*ends(result), *lines), _title(result), direct=False))
     caption = tr(
         "Share of realisations in which an adaptive filter is in its manoeuvring mode, and mean "
         "probability of the manoeuvring model of an imm, first coordinate. Dotted: beginning and end of "
@@ -248,12 +230,6 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
         )
     ) + panels.cases_left_out(results, results[:1])
     return _figure("uses", tr("Quantities derived from a track"), caption, drawn, 2)
-
-
-def _ends(result: CaseResult[ManoeuvreAxes]) -> list[Reference]:
-    """Lines at the start and the end of the manoeuvre."""
-    times = result.axes.manoeuvre_s or ()
-    return [Reference(when, "x") for when in times if 0 < when < result.axes.t_s[-1]]
 
 
 def _title(result: CaseResult[ManoeuvreAxes]) -> str:

@@ -7,13 +7,14 @@ import radarsim
 from radarsim.app import result as output
 from radarsim.app.configs import load
 from radarsim.report import claims, figures, notes, panels
+from radarsim.report.drawing import Reference
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.exact import sigma_acceleration
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre import measures as measured
 
 N = 2000
-OWN = {"roc", "detection", "delay", "response", "modes", "uses"}
+OWN = {"roc", "detection", "delay", "modes", "uses"}
 ACCELERATIONS = [0, 0.2138, 0.8]
 
 
@@ -123,7 +124,7 @@ def test_a_case_without_detectors_has_its_own_figures_alone():
     made = load("sonar_manoeuvre", changes)
     result = radarsim.run(made)
     described = output.case_figures(result.cases, result.tables, result.experiment)
-    assert OWN & set(described) == {"response", "modes", "uses"}
+    assert OWN & set(described) == {"modes", "uses"}
     assert "detections" not in result.tables
     assert STUDY.question(made).startswith("How well are course, speed")
 
@@ -133,9 +134,11 @@ def test_cases_in_several_frames_stand_side_by_side():
         load("sonar_manoeuvre_turning", ["sweep.target.turns.0.rate_radps=[0.07]", "realisations=64"])
     )
     described = output.case_figures(result.cases, result.tables, result.experiment)
-    panels = described["response"].panels
-    assert [panel.title for panel in panels[:2]] == ["4.01°/s, polar", "4.01°/s, cartesian unbiased"]
-    assert [panel.y.label for panel in panels[:2]] == ["$\\sigma$ of $r$, m", "$\\sigma$ of $x$, m"]
+    assert [panel.title for panel in described["modes"].panels[:2]] == ["4.01°/s, polar", "4.01°/s, cartesian unbiased"]
+    for name in ("sigma_r", "sigma_x"):
+        dotted = [mark.value for mark in described[name].panels[0].marks if isinstance(mark, Reference)]
+        assert dotted == list(result.cases[0].axes.manoeuvre_s)
+        assert "Dotted: beginning and end of the manoeuvre." in described[name].caption
     assert {"roc", "detection", "delay", "modes"} <= set(described)
     assert result.tables["detections"]["exact"].isna().mean() == 0.5
 
