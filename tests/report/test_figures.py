@@ -466,7 +466,7 @@ def test_a_sweep_is_shown_whole_in_figures_with_a_panel_for_each_config(expected
     assert [result.name for result in shown] == names
     assert left_out == ""
     some, left_out = panels.shown(results, names)
-    assert left_out == " Shown: 8 of 10; in the tables alone: rls1 D=3 and rls2 D=3."
+    assert left_out == " Shown: 8 of 10; only in the tables: rls1 D=3 and rls2 D=3."
     assert [some[0].name, some[-1].name] == [names[0], names[-1]]
 
 
