@@ -99,6 +99,7 @@ class Plan:
         self._impossible: dict[tuple[str, Reading], str] = {}
         self._judged: dict[tuple[str, Reading], Under] = {}
         self._claims = {claim.id: claim for claim in wanted.claims}
+        self.held = 0  # realisations that were not computed, but read or impossible
         for claim in wanted.claims:
             for reading in wanted.readings(claim):
                 if not self._paper.readings.exact(claim, reading):
@@ -132,11 +133,13 @@ class Plan:
         """Every claim under every reading."""
         done = 0
         for key, pairs in self._jobs.items():
+            count, before = len(pairs) * self._n, self.held
             try:
-                self._see(key, pairs, options, _shifted(progress, done), stop)
+                self._see(key, pairs, options, _shifted(progress, done, held=before), stop)
             except ConfigError as error:
                 self._fail(key, error.lines[0])
-            done += len(pairs) * self._n
+                self.held = before + count  # that many are not computed
+            done += count
         contradicting = frozenset(choice.key for choice in self._paper.readings.choices if choice.contradicts)
         return [
             Over(claim, tuple(self._under(claim, one) for one in self._wanted.readings(claim)), contradicting)
@@ -161,10 +164,10 @@ class Plan:
             keys = dict.fromkeys(key for place, key in self._key.items() if place in open_)
             if not keys:
                 break
-            self._n, total, done = n, sum(len(self._jobs[key]) for key in keys) * n, 0
+            self._n, total, done, self.held = n, sum(len(self._jobs[key]) for key in keys) * n, 0, 0
             for key in keys:
                 pairs = [(case, replace(changed, realisations=n)) for case, changed in self._jobs[key]]
-                self._see(key, pairs, options, _shifted(progress, done, total), stop, open_)
+                self._see(key, pairs, options, _shifted(progress, done, total, self.held), stop, open_)
                 done += len(pairs) * n
             over = [replace(one, under=tuple(self._under(one.claim, own.reading) for own in one.under)) for one in over]
         return over
@@ -196,6 +199,7 @@ class Plan:
         simulated = run.simulate(experiment, options, progress=progress)
         if simulated.stopped:
             raise TargetUnmet(f"readings: {simulated.stopped}: the same command continues")
+        self.held += sum(collected.from_store for _, _, collected in simulated.cases)
         results = run.finished(simulated)
         tables = result.measured(results)
         originals = [replace(own, spec=case.spec) for own, (case, _) in zip(results, pairs, strict=True)]
@@ -228,8 +232,9 @@ class Plan:
         return Under(claim, reading, of.name(reading), of.kind(reading), why=why)
 
 
-def _shifted(progress: Progress | None, before: int, of: int = 0) -> Progress | None:
-    return progress and (lambda done, total, held: progress(before + done, of or total, before + held))
+def _shifted(progress: Progress | None, before: int, of: int = 0, held: int = 0) -> Progress | None:
+    """The same after so many that are done, `held` of them without computing."""
+    return progress and (lambda done, total, own: progress(before + done, of or total, held + own))
 
 
 # ---- decide ----------------------------------------------------------------------------------------------------------
@@ -451,14 +456,14 @@ def readings(
         raise ConfigError(f"{argument('realisations')}: must be >= 1, got {realisations}")
     options = replace(options or RunOptions(), out=out)
     plans = [Plan(one, _first(one.paper.readings, realisations, decide)) for one in wanted]
-    total, done = sum(plan.total for plan in plans), 0
+    total, done, held = sum(plan.total for plan in plans), 0, 0
     read, left = [], []
     for plan, one in zip(plans, wanted, strict=True):
-        over = plan.judged(options, _shifted(progress, done, max(total, 1)), stop)
+        over = plan.judged(options, _shifted(progress, done, max(total, 1), held), stop)
         if decide:
             over = plan.decided(over, realisations or one.paper.readings.most, options, progress, stop)
             left += [line for each in over if (line := _left(each))]
-        done += plan.total
+        done, held = done + plan.total, held + plan.held
         read.append(Read(one.paper, over, _counted(one.paper, over) if one.whole and not one.only else None))
     made = Done(read, Path(out) / FOLDER, left=tuple(left))
     if write and not any(one.only for one in wanted):

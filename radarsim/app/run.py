@@ -140,7 +140,7 @@ def simulate(
         for case in experiment.cases:
             work = CaseWork(case)
             key = (work.identity, case.realisations)
-            if key not in made:
+            if not (known := key in made):
                 collector = _collector(work, options, over_all, collect)
                 wanted = None
                 if precision is not None:
@@ -153,7 +153,7 @@ def simulate(
             if cell is not None:
                 simulation.cells[case.name] = replace(cell, case=case.name)
             done += collected.count
-            held += collected.from_store
+            held += collected.count if known else collected.from_store
             if collected.stopped:
                 simulation.stopped = collected.stopped
                 break

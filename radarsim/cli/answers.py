@@ -42,7 +42,7 @@ def print_sensitivity(found: "Sensitivity") -> None:
     rows = [row for row in found.rows if row["component"] == found.leading]
     columns_of = [
         (of, one)
-        for of in found.of
+        for of in reversed(found.of)  # the gain first, which is the question
         for one in dict.fromkeys(row["filter"] for row in rows)
         if any(not math.isnan(row[of.changes[0]]) for row in rows if row["filter"] == one)
     ]
@@ -51,10 +51,10 @@ def print_sensitivity(found: "Sensitivity") -> None:
         own = {row["filter"]: row for row in rows if row["key"] == key}
         first = next(iter(own.values()))
         changed = with_unit(first["changed_value"], found.labels[str(key)].unit)
-        line = [key, f"{shown(first['value'])} → {changed}", *(_change(own.get(one), of) for of, one in columns_of)]
+        line = [key, *(_change(own.get(one), of) for of, one in columns_of), f"{shown(first['value'])} → {changed}"]
         cells.append(line)
     heads = [(tr("{kind} of {filter}", kind=of.words, filter=one), of.changed_unit) for of, one in columns_of]
-    columns = ["key", "value", *(head if unit == "%" else f"{head}, {tr(unit)}" for head, unit in heads)]
+    columns = ["key", *(head if unit == "%" else f"{head}, {tr(unit)}" for head, unit in heads), "value"]
     what = found.of[0].place(found.leading, tr) or tr(found.of[0].words)
     what = " ".join(filter(None, (what, found.at)))
     title = tr("{stem}: change of {component} for +10 %", stem=found.stem, component=what)

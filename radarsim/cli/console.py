@@ -56,12 +56,14 @@ class Progress:
     """What is done, its rate and the time left, on stderr if that is a terminal, once it has lasted most of a second.
 
     Until the first report, while kernels are compiled, the bar moves without saying how much; by a thread, so where
-    threads are forbidden it begins with that report.
+    threads are forbidden it begins with that report. The rate is that of what was computed since then: neither the
+    compiler's time counts nor what came from the store.
     """
 
     def __init__(self, title: str, quiet: bool, what: str = "realisations"):
         self.title, self.quiet, self.what = title, quiet, tr(what)
         self.started = time.monotonic()
+        self.first = self.last = (0.0, 0, 0)  # reports: when, computed, of how many
         self.bar: Bar | None = None
         self.task: TaskID
         self.lock = threading.Lock()
@@ -87,16 +89,28 @@ class Progress:
 
     def update(self, done: int, total: int, from_store: int) -> None:
         """How many are done, of how many, and how many of them were read from the store."""
-        elapsed = time.monotonic() - self.started
-        if self.quiet or elapsed < SILENT_S or not sys.stderr.isatty():
+        rate = self.rate(done - from_store, total)
+        if self.quiet or time.monotonic() - self.started < SILENT_S or not sys.stderr.isatty():
             return
         self._begin()
         assert self.bar is not None  # it has just begun
-        rate = (done - from_store) / elapsed
-        left = clock((total - done) / rate) if rate > 0 else "–"
-        share, speed = numeral(f"{100 * done / max(total, 1):5.1f}"), numeral(f"{rate:,.0f}")
-        told = tr("{share} %  {rate} {what}/s  {left} left", share=share, rate=speed, what=self.what, left=left)
+        share = numeral(f"{100 * done / max(total, 1):5.1f}")
+        told = tr("{share} %", share=share)
+        if done >= total:
+            told += tr("  tables and figures follow")
+        elif rate > 0:
+            speed = numeral(f"{rate:,.0f}" if rate >= 10 else f"{rate:.2g}")
+            left = clock((total - done) / rate)
+            told += tr("  {rate} {what}/s  {left} left", rate=speed, what=self.what, left=left)
         self.bar.update(self.task, total=total, completed=done, told=told, refresh=forbidden())
+
+    def rate(self, computed: int, total: int) -> float:
+        """How many are computed in a second, on average since the first report of so many in all; 0 if not known."""
+        now = time.monotonic()
+        if total != self.last[2] or computed < self.last[1]:
+            self.first = now, computed, total
+        self.last = now, computed, total
+        return (computed - self.first[1]) / (now - self.first[0]) if now > self.first[0] else 0.0
 
     def _begun(self) -> "Bar":
         from rich.progress import BarColumn, TextColumn

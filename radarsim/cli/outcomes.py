@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,7 +36,7 @@ def print_result(result: "Result") -> None:
     assert written is not None  # the commands write what they print
     for line in written.answer:
         say(line)
-    show_last_scan(result.last_scan)
+    show_last_scan(result)
     print_verdicts(result)
     drawn = [Path(name) for name in written.files if name.startswith("figures/") and not name.endswith(".md")]
     others = sum(name.endswith(".csv") for name in written.files) - 1
@@ -52,14 +52,24 @@ def print_result(result: "Result") -> None:
     print_warnings(result.warnings)
 
 
-def show_last_scan(last: "pd.DataFrame") -> None:
-    """σ with interval, exact σ and gain of each case, filter and component at the last scan, unless too many."""
-    if not 0 < len(last) <= MOST_ROWS:
-        return
+def show_last_scan(result: "Result") -> None:
+    """σ with interval, exact σ and gain of each case, filter and component at the last scan, unless too many.
+
+    A case is called by what it was swept to.
+    """
+    from radarsim.report import panels
+
+    if 0 < len(result.last_scan) <= MOST_ROWS:
+        names = dict(zip((case.name for case in result.cases), panels.names_of(result.cases), strict=True))
+        show_rows(result.experiment.stem, result.last_scan, names)
+
+
+def show_rows(stem: str, last: "pd.DataFrame", names: Mapping[str, str]) -> None:
+    """The table of rows of `Result.last_scan`, by names for the cases; what all have alike stands above."""
     found: Iterable[Any] = last.itertuples()  # named by column, which pandas' stubs do not know
     rows = [
         (
-            *(row.case, row.filter, row.component, tr("{t_s:g} s", t_s=row.t_s)),
+            *(names[row.case], row.filter, row.component, tr("{t_s:g} s", t_s=row.t_s)),
             f"{significant_digits(row.sigma)} {tr(unit_of(row.unit))}",
             f"{significant_digits(row.sigma_lo)} … {significant_digits(row.sigma_hi)}" + too_narrow(row, "note"),
             known(row.exact_sigma),
@@ -69,7 +79,23 @@ def show_last_scan(last: "pd.DataFrame") -> None:
         for row in found
     ]
     columns = ("case", "filter", "component", "at", "sigma", "95 %", "exact", "gain", "95 % of gain")
-    show("", columns, rows, right=columns[3:], spare=("95 % of gain", "exact", "95 %", "gain"))
+    show_but_alike(stem, ("case", "at"), columns, rows, columns[3:], ("exact", "95 %"))
+
+
+def show_but_alike(
+    title: str,
+    alike: Sequence[str],
+    columns: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    right: Sequence[str],
+    spare: Sequence[str],
+) -> None:
+    """Print a table without those columns of `alike` that have one value: that stands in the title."""
+    once = {i: rows[0][i] for i, name in enumerate(columns) if name in alike and len({row[i] for row in rows}) == 1}
+    kept = [i for i in range(len(columns)) if i not in once]
+    title = ", ".join(filter(None, dict.fromkeys((title, *once.values()))))
+    cells = [[row[i] for i in kept] for row in rows]
+    show(title, [columns[i] for i in kept], cells, right=right, spare=spare)
 
 
 def print_comparison(compared: "Compared") -> None:
@@ -87,14 +113,15 @@ def print_comparison(compared: "Compared") -> None:
                     "" if row["t_s"] != row["t_s"] else f"{row['t_s']:g} {tr('s')}",
                 ),
                 *(f"{compare.value(row[key])} {tr(unit_of(row['unit']))}".rstrip() for key in ("value", "against")),
-                compare.change(row),
+                *compare.changes(row),
             )
             for row in counted
             if row["quantity"] == quantity
         ]
         name = tr("{quantity} of {symbol}", quantity=tr(words), symbol=next(iter(against)))
         other = name if len(against) == 1 else tr("{quantity} against", quantity=tr(words))
-        show("", ("", "of", "at", words, other, "change"), rows, right=("at", words, other), spare=("at",))
+        columns = ("", "of", "at", words, other, "change", "exact")
+        show_but_alike("", ("at", "exact"), columns, rows, (*columns[2:5], "exact"), ("exact", "at"))
     for line in compared.sentences if len(counted) > MOST_ROWS else ():
         say(line)
     for line in compared.notes:

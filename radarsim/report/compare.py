@@ -315,6 +315,7 @@ def _sentence(words: str, row: dict[Any, Any]) -> str:
     unit = tr(UNITS.get(row["unit"], row["unit"]))
     other = f"{row['against_label']}" + ("" if row["against_filter"] == row["filter"] else f", {row['against_filter']}")
     what = tr("{quantity} of {symbol}", quantity=tr(words), symbol=of) if of else tr(words)
+    change, exact = changes(row)
     if row["t_s"] == row["t_s"]:
         what = tr("{what} at {t_s:g} s", what=what, t_s=row["t_s"])
     return tr(
@@ -325,25 +326,29 @@ def _sentence(words: str, row: dict[Any, Any]) -> str:
         value=f"{value(row['value'])} {unit}".rstrip(),
         against=f"{value(row['against'])} {unit}".rstrip(),
         other=other,
-        change=change(row),
+        change=change + (tr(", exactly {value}", value=exact) if exact else ""),
     )
 
 
-def change(row: dict[Any, Any]) -> str:
-    """By how much a value differs, with its interval, and the exact change where it is known."""
+def changes(row: dict[Any, Any]) -> tuple[str, str]:
+    """By how much a value differs, with its interval; and the exact change where it is known beside a sample."""
     if row["percent"] != row["percent"]:
         text = f"{signed(row['difference'])} {tr(UNITS.get(row['unit'], row['unit']))}".rstrip()
-        return f"{text} {interval(signed(row['difference_lo']), signed(row['difference_hi']))}"
+        return f"{text} {interval(signed(row['difference_lo']), signed(row['difference_hi']))}", ""
     exact = row["exact_percent"]
     if row["lo"] == row["hi"] and row["against_lo"] == row["against_hi"] and exact == exact:
-        return percent(exact)  # of a table of exact values: there is no interval
-    known = tr(", exactly {value}", value=percent(exact)) if exact == exact else ""
-    return f"{percent(row['percent'])} {interval(percent(row['percent_lo']), percent(row['percent_hi']))}{known}"
+        return percent(exact), ""  # of a table of exact values: there is no interval
+    ends = row["percent_lo"], row["percent_hi"]
+    said = [signed(one, "#.3g") if max(ends) < MULTIPLE else percent(one) for one in ends]
+    return f"{percent(row['percent'])} {interval(*said)}", percent(exact) if exact == exact else ""
+
+
+MULTIPLE = 300  # per cent, from which on a change is a multiple
 
 
 def percent(value: float) -> str:
     """A change in per cent with its sign; from four times on as a multiple."""
-    if value >= 300:
+    if value >= MULTIPLE:
         return tr("{factor} times", factor=significant_digits(1 + value / 100, ".3g"))
     return f"{signed(value, '.3g')} %"
 

@@ -181,7 +181,7 @@ def test_every_marked_interval_is_marked_on_the_terminal(capsys):
         {"filter": "i", "note": "", "gain_note": ""},
         {"filter": "j", "note": "", "gain_note": float("nan"), "gain_lo": float("nan"), "gain_hi": float("nan")},
     ]
-    outcomes.show_last_scan(pd.DataFrame([row | own for own in said]))
-    lines = capsys.readouterr().out.splitlines()[1:]
+    outcomes.show_rows("a", pd.DataFrame([row | own for own in said]), {"a": "a"})
+    lines = capsys.readouterr().out.splitlines()[2:]
     found = [re.findall(r"\((.*?)\)", line) for line in lines]
     assert found == [["heavy tails"] * 2, ["marked"] * 2, ["heavy tails"], [], []]

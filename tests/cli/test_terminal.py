@@ -1,5 +1,7 @@
 """What commands show on a terminal of 80 columns, in English and in Russian: whole lines, and nothing in English."""
 
+import itertools
+import random
 import re
 
 import pytest
@@ -14,6 +16,17 @@ FIRST = "rls2"
 COMMANDS = {
     "run": ["run", FIRST, "-n", "3000", "--no-figures"],
     "report": ["report", FIRST, "-n", "3000", "--no-figures"],
+    "sweep": [
+        "run",
+        FIRST,
+        "--set",
+        "sweep={radar.sigma_velocity_mps: [5, 15]}",
+        "-n",
+        "300",
+        "--no-figures",
+        "--out",
+        "swept",
+    ],
     "check": ["check", FIRST, "-n", "1e5"],
     "precision": ["check", "rls4", "--precision", "2"],
     "claims": ["claims", FIRST],
@@ -70,8 +83,14 @@ def test_every_command_is_whole_at_eighty_columns(results, monkeypatch, language
             whole = line.startswith(("check ", "проверка "))  # a command, to be copied
             assert len(line) <= WIDTH or whole or "/" in line, (name, line)
         assert "�" not in out, name
-    rows = [line for line in told["run"][0].split("\n") if line.startswith(f" {FIRST} ")]
+    rows = [line for line in told["run"][0].split("\n") if line.startswith((" r ", " r+Vr "))]
     assert len(rows) == 6
+    for name in ("run", "report", "sweep", "sensitivity"):
+        lines = told[name][0].split("\n")
+        head = next(above for above, line in itertools.pairwise(lines) if line.startswith(" ───"))
+        assert any(gain in head for gain in ("gain", "выигрыш")), (name, head)
+    assert "σ_V = 5 " in told["sweep"][0]
+    assert len([line for line in told["compare"][0].split("\n") if " %" in line and "[" in line]) == 6
     assert all(re.search(r" … [\d,.]+", row) for row in rows)  # no interval is broken
     if language == "ru":
         left = {
@@ -92,14 +111,54 @@ def test_what_is_piped_stays_in_one_line_and_speaks_english(results, monkeypatch
     assert re.search(r"off by [\d.]+ margins$", lines[2])
 
 
+class Clock:
+    """A clock that goes when it is told to."""
+
+    now = 1000.0
+
+    def monotonic(self):
+        return self.now
+
+
+def bar(monkeypatch):
+    """A clock of one's own, and a bar on a terminal that goes by it."""
+    clock = Clock()
+    monkeypatch.setattr("sys.stderr", Terminal())
+    monkeypatch.setattr(console, "time", clock)
+    return clock, console.Progress(FIRST, quiet=False)
+
+
 def test_a_bar_says_in_the_language_what_is_left(monkeypatch):
-    screen = Terminal()
     monkeypatch.setenv(VARIABLE, "ru")
-    monkeypatch.setattr("sys.stderr", screen)
-    monkeypatch.setattr(console, "SILENT_S", 0.0)
-    with console.Progress(FIRST, quiet=False) as progress:
+    clock, progress = bar(monkeypatch)
+    with progress:
+        progress.update(0, 200, 0)
+        clock.now += 2
         progress.update(50, 200, 0)
         told = progress.bar.tasks[0].fields["told"]
+        progress.update(200, 200, 0)
+        done = progress.bar.tasks[0].fields["told"]
     assert told.startswith(" 25,0 %")
-    assert "реализации/с" in told
-    assert "осталось" in told
+    assert "реализаций/с" in told or "реализации/с" in told
+    assert "осталось 0:00:06" in told
+    assert "осталось" not in done
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_bar_foretells_within_a_factor_of_two_what_is_left(monkeypatch, seed):
+    """After a slow compilation and what is stored, of runs that take up to four times as long as others."""
+    clock, progress = bar(monkeypatch)
+    draw = random.Random(seed)
+    runs = [0.0] * 20 + [draw.uniform(0.5, 2.0) for _ in range(40)]
+    ends, done, held = clock.now + 30 + sum(runs), 0, 0
+    clock.now += 30
+    with progress:
+        for seconds in runs:
+            progress.update(done, 6000, held)
+            clock.now += seconds
+            done, held = done + 100, held + 100 * (not seconds)
+            progress.update(done, 6000, held)
+            if 2500 <= done <= 5500:
+                told = re.search(r"(\d+):(\d+):(\d+) left", progress.bar.tasks[0].fields["told"]).groups()
+                hours, minutes, rest = map(int, told)
+                assert 0.5 <= (3600 * hours + 60 * minutes + rest) / (ends - clock.now) <= 2
