@@ -97,7 +97,7 @@ class Progress:
         share = numeral(f"{100 * done / max(total, 1):5.1f}")
         told = tr("{share} %", share=share)
         if done >= total:
-            told += tr("  tables and figures follow")
+            told += tr("  the results follow")
         elif rate > 0:
             speed = numeral(f"{rate:,.0f}" if rate >= 10 else f"{rate:.2g}")
             left = clock((total - done) / rate)

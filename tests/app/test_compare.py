@@ -24,7 +24,7 @@ def out(tmp_path_factory):
 def test_two_radars_side_by_side(out):
     said = command("compare", "rls2", "rls4", "--out", out).output
     exact = -76.9  # per cent: the exact σ_r of RLS 4 at 140 s against that of RLS 2
-    assert f"exactly −{-exact:g} %" in said
+    assert f"]  −{-exact:g} %" in said
     made = tables.from_csv((out / "compare" / "comparison.csv").read_bytes())
     last = made[(made["quantity"] == "sigma") & (made["component"] == "r") & (made["t_s"] == 140)]
     assert last["exact_percent"].round(1).tolist()[0] == exact
