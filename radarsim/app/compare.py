@@ -49,8 +49,8 @@ class Run:
 
 
 @dataclass(frozen=True, repr=False)
-class Compared(Shown):
-    """What was compared: the sentences, what to know beside them, comparison.csv's rows; the folder and files, if any.
+class Comparison(Shown):
+    """A comparison: its sentences, notes and warnings, the rows of comparison.csv; the folder and files, if any.
 
     last are the rows at the last common time; told the quantities that the terminal shows, as rows name them, and their
     words.
@@ -88,7 +88,7 @@ def compare(
     *,
     formats: Sequence[str] = ("svg", "png"),
     width_mm: float | None = None,
-) -> Compared:
+) -> Comparison:
     """Put results side by side: tables, figures and one page in `out`/compare; nothing is simulated.
 
     A source is a result, the folder of one, or a config (path, or name of a shipped one), whose results are looked for
@@ -120,7 +120,7 @@ def compare(
     described = {name: reworded(figure, said) for name, figure in drawn.items()}
     rows, last = (tuple(table.to_dict("records")) for table in (made, sides.at_the_end(made)))
     told = tuple((of.value, of.words) for of in sides.told(made, shared))
-    found = Compared(None, (), tuple(sentences), tuple(notes), tuple(warnings), rows, last, told, described)
+    found = Comparison(None, (), tuple(sentences), tuple(notes), tuple(warnings), rows, last, told, described)
     if out is None:
         return found
     folder = Path(out) / FOLDER
@@ -305,8 +305,8 @@ CHART_FOLDER = "chart"
 
 
 @dataclass(frozen=True, repr=False)
-class Drawn(Shown):
-    """What was drawn: a sentence for each case, the rows of chart.csv, figures; the folder and its files, if any."""
+class DopplerChart(Shown):
+    """The chart: a sentence for each case, the rows of chart.csv, figures; the folder and its files, if any."""
 
     folder: Path | None
     files: tuple[str, ...]
@@ -330,7 +330,7 @@ def chart(
     formats: Sequence[str] = ("svg", "png"),
     width_mm: float | None = None,
     progress: Callable[[int, int, int], None] | None = None,
-) -> Drawn:
+) -> DopplerChart:
     """Draw the chart of the configs' study, with their cases on it, into `out`/chart; nothing is simulated.
 
     Without configs, of the study that has a chart, with its paper's own devices; a config that is given twice counts
@@ -344,7 +344,7 @@ def chart(
     if faults := namesakes(experiments):
         raise ConfigError(*faults)
     made = described([case for one in experiments for case in one.cases])
-    found = Drawn(None, (), made.sentences, made.table, made.figures)
+    found = DopplerChart(None, (), made.sentences, made.table, made.figures)
     if out is None:
         return found
     contents = {"chart.csv": common.to_csv(made.table), "chart.html": made.page.encode()}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-    from radarsim.app.compare import Compared, Drawn
+    from radarsim.app.compare import Comparison, DopplerChart
     from radarsim.app.configs import Inventory
     from radarsim.app.outlook import Outlook
     from radarsim.app.question import Answer
@@ -84,13 +84,13 @@ def sensitivity(one: "Sensitivity") -> dict[str, Any]:
     return {**asdict(one), "of": [of.name for of in one.of]}
 
 
-def compared(one: "Compared") -> dict[str, Any]:
+def compared(one: "Comparison") -> dict[str, Any]:
     """A comparison: the sentences, notes and warnings, the rows of comparison.csv, and the files."""
     made = {name: getattr(one, name) for name in ("files", "sentences", "notes", "warnings", "rows", "last", "told")}
     return {"folder": str(one.folder), **made}
 
 
-def drawn(one: "Drawn") -> dict[str, Any]:
+def drawn(one: "DopplerChart") -> dict[str, Any]:
     """A chart: the sentences, the rows of chart.csv, and the files."""
     rows = one.table.to_dict("records")
     return {"folder": str(one.folder), "sentences": one.sentences, "cases": rows, "files": one.files}

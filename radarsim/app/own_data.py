@@ -17,9 +17,9 @@ Found = TypeVar("Found")
 
 
 def simulate(config: Config, realisation: int = 0, overrides: Overrides = ()) -> "pd.DataFrame":
-    """One realisation's plots and the truth in columns true_…, number for number those of a run.
+    """Return one realisation's plots, exactly those of a run, with the truth in columns true_….
 
-    Raises ConfigError for a wrong config, for one of several cases, and for a study without recorded plots.
+    Raises ConfigError for an invalid config, a config of several cases, or a study without recorded plots.
 
     >>> import radarsim
     >>> radarsim.simulate("rls2").columns.tolist()[:3]
@@ -31,9 +31,10 @@ def simulate(config: Config, realisation: int = 0, overrides: Overrides = ()) ->
 
 
 def read_plots(path: str | os.PathLike[str]) -> "pd.DataFrame":
-    """A file of plots as `radarsim import` and `radarsim simulate` write it: numbers, and the column `track` as text.
+    """Read a file of plots as `radarsim import` and `radarsim simulate` write it: numbers, and the column `track` as
+    text.
 
-    Raises ConfigError where it cannot be read.
+    Raises ConfigError if it cannot be read.
     """
     import pandas as pd
 
@@ -52,7 +53,7 @@ def read_plots(path: str | os.PathLike[str]) -> "pd.DataFrame":
 def track(
     config: Config, recorded: "str | os.PathLike[str] | pd.DataFrame", overrides: Overrides = ()
 ) -> "pd.DataFrame":
-    """The config's filters over recorded plots (a file or a table): the columns of `radarsim track`.
+    """Run the config's filters over recorded plots (a file or a table); returns the columns of `radarsim track`.
 
     Raises ConfigError with all faults of config and plots.
 
@@ -84,9 +85,9 @@ def fit(
     filter_name: str | None = None,
     robust: bool = False,
 ) -> "pd.DataFrame":
-    """What recorded plots (a file or a table) say of σ and of the manoeuvre variance, with 95 % intervals.
+    """Fit σ and the manoeuvre variance to recorded plots (a file or a table), with 95 % intervals.
 
-    Columns: key, stated, value, lo, hi, identifiable. robust: allowing for outliers. Raises ConfigError.
+    Columns: key, stated, value, lo, hi, identifiable. robust: allow for outliers. Raises ConfigError.
 
     >>> import radarsim
     >>> plots = radarsim.simulate("rls2", overrides=["scans=60"])

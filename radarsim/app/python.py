@@ -1,6 +1,6 @@
-"""What the commands answer, for Python: the commands call these functions too.
+"""The commands as Python functions; the command line calls these functions too.
 
-They write nothing unless `out` names a directory. What is stored in results/ is read there, or in `out`.
+They write nothing unless `out` names a directory. Stored results are read from `out`, by default results/.
 """
 
 import os
@@ -16,10 +16,10 @@ from radarsim.threads import limited
 if TYPE_CHECKING:
     import pandas as pd
 
-    from radarsim.app.compare import Compared, Drawn, Source
+    from radarsim.app.compare import Comparison, DopplerChart, Source
     from radarsim.app.outlook import Outlook
     from radarsim.app.question import Answer
-    from radarsim.app.readings import Done
+    from radarsim.app.readings import Readings
     from radarsim.app.sensitivity import Sensitivity
     from radarsim.engine.run import Signals, Stop
     from radarsim.report.drawing import Figure
@@ -42,10 +42,10 @@ def check(
     out: Out | None = None,
     progress: Progress | None = None,
 ) -> "Outlook":
-    """What a run would compute, and how long that takes: cases, filters, realisations, seconds of one thread, MB.
+    """Forecast a run: cases, filters, realisations, seconds on one thread, memory in MB.
 
-    The arguments are those of `run`. share: of one of several machines, (2, 3) for the second of three. out: less what
-    is stored there. Raises ConfigError for a wrong config or argument.
+    The arguments are those of `run`. share: the share of one of several machines, such as (2, 3) for the second of
+    three. out: a directory whose stored blocks are not counted. Raises ConfigError for a wrong config or argument.
 
     >>> outlook = check("range_doppler", realisations=1e4)
     >>> outlook.table.columns.tolist()[:4]
@@ -73,19 +73,19 @@ def solve(
     seed: int | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
-    told: Callable[[str], None] | None = None,
+    notify: Callable[[str], None] | None = None,
     **quantity: str | None,
 ) -> "Answer":
-    """The value of a key at which a quantity reaches `equals`: in its component's unit, or per cent of gains and rates.
+    """Find the value of a key at which a quantity equals `equals`, in its unit; gains and rates in per cent.
 
-    The quantity is one more argument, as an option of `radarsim solve`: `gain="r"` or `sigma="Vr"` of a component, for
-    the `filter`; of a study with filters' own rates `lock="sequence"`, `loss="nearest"`, … It is taken at time at_s, s,
-    or at scan at_k, from 1; of neither at the last scan. between: the values of the key that are searched. case: of a
-    config that has several. realisations: behind each value that is simulated, where nothing exact is known. told is
-    called with a line that says what a search of some seconds will do.
+    The quantity is given as an argument named after an option of `radarsim solve`: `gain="r"` or `sigma="Vr"` of a
+    component, for the `filter`; or a rate of a filter, `lock="sequence"`, `loss="nearest"`, … It is taken at time at_s,
+    s, or at scan at_k, counted from 1; default: the last scan. between: the range of the key to search. case: the case,
+    if the config has several. realisations: the number for each simulated value, if nothing exact is known. notify is
+    called with a line on what a search of some seconds will do.
 
-    `value` lies between `lo` and `hi` (95 %; equal where `exact`). Where the target cannot be attained value is None,
-    and limit, at limit_at, is the nearest. Raises ConfigError for a wrong config, key, filter or quantity.
+    `value` lies between `lo` and `hi` (95 %; equal where `exact`). If the target cannot be attained, value is None, and
+    limit, at limit_at, is the nearest attainable value. Raises ConfigError for a wrong config, key, filter or quantity.
 
     >>> answer = solve("rls2", "radar.sigma_velocity_mps", gain="r", filter="r+Vr", at_s=60, equals=30)
     >>> print(f"{answer.value:.4f} {answer.unit}", answer.exact)
@@ -110,7 +110,7 @@ def solve(
         realisations=None if realisations is None else int(realisations),
         threads=threads,
         progress=progress,
-        told=told,
+        notify=notify,
     )
 
 
@@ -137,11 +137,11 @@ def sensitivity(
     width_mm: float | None = None,
     progress: Progress | None = None,
 ) -> "Sensitivity":
-    """What +10 % of each key changes: σ and gain, or another quantity `of` the study; the largest effect first.
+    """Show what +10 % of each key changes in σ and gain, or in another quantity `of`; largest effect first.
 
-    At time at_s, s, or scan at_k, from 1; of neither at the last scan. component leads the order, by default the first.
-    `table` has a row a key, filter and component: the value, in the component's unit or per cent, and its change, in
-    per cent or points, with 95 % intervals where it is simulated. out: where table and figure are written.
+    Taken at time at_s, s, or at scan at_k, counted from 1; default: the last scan. Rows are sorted by `component`, by
+    default the first. `table` has a row for each key, filter and component: the value, in the component's unit or per
+    cent, and its change, in per cent or points, with a 95 % interval if simulated. out: directory for table and figure.
     Raises ConfigError.
 
     >>> found = sensitivity("rls2", at_s=60)
@@ -166,12 +166,12 @@ def compare(
     out: Out | None = None,
     figures: Figures = True,
     width_mm: float | None = None,
-) -> "Compared":
-    """Results side by side, the others against the first: differences with 95 % intervals, on common axes.
+) -> "Comparison":
+    """Compare results with the first one: differences with 95 % intervals, on common axes.
 
-    Each is a result of `run` or `load`, a config, whose result is stored in results/ or in `out`, or the folder of a
-    result; or one mapping gives them all by the names that they are called by. out: where table, page and figures are
-    written. Where two are of the same measurements and share their baseline filter, the difference is paired.
+    Each source is a result of `run` or `load`, a config with a stored result in results/ or `out`, or the folder of a
+    result; a single mapping gives them by name. out: directory for table, page and figures. If two results use the same
+    measurements and the same baseline filter, the difference is paired.
 
     `table` is comparison.csv: a row for each quantity, filter, component and common time. Raises ConfigError where
     results are missing or have nothing in common, StoreError where a stored one is damaged.
@@ -195,12 +195,12 @@ def chart(
     figures: Figures = True,
     width_mm: float | None = None,
     progress: Progress | None = None,
-) -> "Drawn":
-    """What Doppler gains for every radar, and those of some configs on it; simulates nothing.
+) -> "DopplerChart":
+    """Chart the gain by Doppler for all radars, with the configs' radars marked; simulates nothing.
 
-    Without configs the five radars of the first paper. `table` is chart.csv: a row a case and filter, with the gains in
-    the long run, per cent. out: where table, figures and the page with sliders are written. Raises ConfigError where
-    the configs' study has no chart.
+    Without configs, shows the five radars of the first paper. `table` is chart.csv: a row for each case and filter,
+    with the gains in the long run, per cent. out: directory for table, figures and the page with sliders. Raises
+    ConfigError if the configs' study has no chart.
 
     >>> chart("rls2").figures[0]
     'gain_against_time'
@@ -213,14 +213,14 @@ def chart(
 
 
 class Claims(Shown):
-    """Claims of papers and how far each stands; of each as many rows as there are parts that are measured."""
+    """Claims of papers and their verdicts; one row for each measured part of a claim."""
 
     def __init__(self, rows: Sequence[dict[str, Any]]):
         self.rows = tuple(rows)
 
     @property
     def table(self) -> "pd.DataFrame":
-        """The columns of claims.csv, and `config`, by which it is judged."""
+        """The columns of claims.csv, and `config`, which judges the claim."""
         from radarsim.report.tables import read_rows
 
         return read_rows(self.rows, self.rows[0] if self.rows else ())
@@ -243,18 +243,18 @@ class Claims(Shown):
         return lines
 
     def draw(self, path: Out) -> None:
-        """Write the figure to a file. ConfigError for a name that says no format, or where no claim is judged."""
+        """Write the figure to a file. Raises ConfigError if the name has no known format or no claim is judged."""
         from radarsim.app.run import draw_claims
 
         draw_claims(self.rows, path)
 
 
 def claims(*names: str, out: Out = RESULTS) -> Claims:
-    """The claims of the papers as far as they are judged by what is stored in `out`; computes nothing.
+    """List the papers' claims with verdicts from the results stored in `out`; computes nothing.
 
-    names are claims (P1.3), papers (P1) or configs; without any all claims of all papers. `table` has a row for each
-    part of a claim that is measured: measured value, 95 % interval, what the paper says, verdict. Those without stored
-    results are listed as not run. Raises ConfigError for what does not exist.
+    names are claims (P1.3), papers (P1) or configs; default: all claims of all papers. `table` has a row for each
+    measured part of a claim: measured value, 95 % interval, expected value, verdict. Claims without stored results are
+    listed as not run. Raises ConfigError for unknown names.
 
     >>> found = claims("P1.3", out="/nowhere")
     >>> found.table["verdict"].tolist()
@@ -276,16 +276,16 @@ def readings(
     figures: bool = True,
     progress: Progress | None = None,
     stop: "Signals | None" = None,
-) -> "Done":
-    """A verdict under every reading that the papers allow, of claims (P1.4) or of whole papers (P1); without, of all.
+) -> "Readings":
+    """Judge claims (P1.4) or whole papers (P1) under every reading that the papers allow; default: all.
 
-    Exact where that is possible, else by runs of so many realisations, by default as many as the paper's readings
-    declare; decide: of more, up to so many, until each claim is decided. only: readings that take these alternatives,
-    `{"start": "unweighted"}`. time_limit is in seconds. out: where readings.csv and a figure a claim are written, and
-    where runs are stored and continued.
+    Readings are judged exactly where possible, otherwise by runs of `realisations`, by default the number that the
+    paper's readings declare. decide: extend the runs, up to `realisations`, until each claim is decided. only: restrict
+    to readings with these alternatives, `{"start": "unweighted"}`. time_limit is in seconds. out: directory for
+    readings.csv, a figure for each claim, and the stored runs.
 
-    `table` is readings.csv: a row a claim, reading and part. Raises ConfigError for names that do not exist,
-    TargetUnmet where the time did not suffice.
+    `table` is readings.csv: a row for each claim, reading and part. Raises ConfigError for unknown names, TargetUnmet
+    if the time did not suffice.
 
     >>> readings("P1.4")
     P1.4 depends on: holds in 4 of 6 readings; depends on: start

@@ -399,10 +399,10 @@ class Curve:
         return case_result(case, work, collect(work, realisations, threads=self.threads))
 
 
-def predict(told: Callable[[str], None], what: str, seconds: float) -> None:
+def predict(notify: Callable[[str], None], what: str, seconds: float) -> None:
     """Say what a search will do and about how long it takes, where that is long."""
     if seconds > LONG_S:
-        told(tr("{what}: about {seconds:.0f} s", what=what, seconds=seconds))
+        notify(tr("{what}: about {seconds:.0f} s", what=what, seconds=seconds))
 
 
 def said_of(asked: Question) -> dict[str, str]:

@@ -321,7 +321,7 @@ class Read:
 
 
 @dataclass(repr=False)
-class Done(Shown):
+class Readings(Shown):
     """What `readings` made: of each paper asked for, and the files written, by their path under `folder`.
 
     left has a line for each claim that was to be decided and is not. outdated: the configs beside them, run as they
@@ -444,7 +444,7 @@ def readings(
     figures: bool = True,
     stop: Signals | None = None,
     write: bool = True,
-) -> Done:
+) -> Readings:
     """Judge claims under every reading and, unless told not to, write table and specification curves into out/readings.
 
     wanted is of `asked`. realisations of each run, where runs are needed; default: what the paper's readings declare.
@@ -465,7 +465,7 @@ def readings(
             left += [line for each in over if (line := _left(each))]
         done, held = done + plan.total, held + plan.held
         read.append(Read(one.paper, over, _counted(one.paper, over) if one.whole and not one.only else None))
-    made = Done(read, Path(out) / FOLDER, left=tuple(left))
+    made = Readings(read, Path(out) / FOLDER, left=tuple(left))
     if write and not any(one.only for one in wanted):
         made.files = _write(made, figures)
         made.outdated = _outdated(made)
@@ -499,7 +499,7 @@ def _counted(paper: Paper, over: list[Over]) -> Search | Joint:
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
-def _write(done: Done, figures: bool) -> tuple[str, ...]:
+def _write(done: Readings, figures: bool) -> tuple[str, ...]:
     """Write the table, with the stored rows of claims that were not asked for, and a curve a claim.
 
     A curve whose claim came out as it did before is not drawn again, unless what draws it has changed: `drawn.json`
@@ -516,7 +516,7 @@ def _write(done: Done, figures: bool) -> tuple[str, ...]:
     return tuple(sorted(name for name in contents if name != DRAWN))
 
 
-def _curve(done: Done, over: Over, drawn: dict[str, str]) -> dict[str, bytes]:
+def _curve(done: Readings, over: Over, drawn: dict[str, str]) -> dict[str, bytes]:
     """The files of a claim's specification curve; none where they stand there already."""
     of = next(read.paper.readings for read in done.read if over in read.over)
     content = repr([(one.name, one.kind, depth(one), one.why) for one in over.under]) + over.sentence()
@@ -544,13 +544,13 @@ def _drawn(folder: Path) -> dict[str, str]:
     return {str(name): str(mark) for name, mark in found.items()} if isinstance(found, dict) else {}
 
 
-def _table(done: Done) -> str:
+def _table(done: Readings) -> str:
     names = columns(paper.readings for paper in papers().values())
     new = [row for over in done.over for one in over.under for row in rows(one, names, over.outcome)]
     return _with(names, stored_readings(done.folder.parent), new, {over.claim.id for over in done.over})
 
 
-def _classes(done: Done) -> str:
+def _classes(done: Readings) -> str:
     """What each claim came to over its readings."""
     every = [(read.paper.readings, over) for read in done.read for over in read.over]
     new = [found.as_row() for of, over in every if (found := page.of_over(of, over)) is not None]
@@ -558,7 +558,7 @@ def _classes(done: Done) -> str:
     return _with(page.COLUMNS, kept, new, {over.claim.id for _, over in every})
 
 
-def _outdated(done: Done) -> tuple[str, ...]:
+def _outdated(done: Readings) -> tuple[str, ...]:
     """The configs whose stored claims have another class than their readings gave now.
 
     Not those that have changed since they were run: of these no report can be made of what is stored.
@@ -593,7 +593,7 @@ def _order(claim: str) -> tuple[str, float, str]:
     return paper, float(digits) if digits.isdigit() else 0.0, number
 
 
-def pages(done: Done) -> str:
+def pages(done: Readings) -> str:
     """The page of each paper, one after the other."""
     from radarsim.report.claims import readings_page
 
@@ -605,7 +605,7 @@ def pages(done: Done) -> str:
     )
 
 
-def documents(done: Done) -> list[dict[str, Any]]:
+def documents(done: Readings) -> list[dict[str, Any]]:
     """What --json prints: a document a claim, with every reading."""
     found = []
     for over in done.over:

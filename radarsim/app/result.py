@@ -96,9 +96,10 @@ MOST_ROWS = 40  # that a notebook shows
 
 
 class Result(Shown):
-    """A finished experiment: its cases, tables (pandas), figures (Matplotlib). Nothing is written unless asked for.
+    """A finished experiment: cases, tables (pandas) and figures (Matplotlib). It writes nothing unless `write` is
+    called.
 
-    written: what the last call of `write` wrote; None before the first.
+    written: the files of the last call of `write`; None before the first.
     """
 
     def __init__(self, experiment: Experiment, cases: Sequence[CaseResult], facts: Mapping[str, Any]):
@@ -131,7 +132,7 @@ class Result(Shown):
 
     @property
     def question(self) -> str:
-        """What the experiment asks, in one sentence."""
+        """The experiment's question, in one sentence."""
         return asked(self.experiment)
 
     @cached_property
@@ -148,7 +149,7 @@ class Result(Shown):
     def tables(self) -> dict:
         """Every table by the stem of its file: `curves`, `gains`, `claims`, and the study's own.
 
-        Copies, like those of `curves` and `gains`: whatever is done to them, `write` writes the numbers of the run.
+        They are copies, like `curves` and `gains`: `write` always writes the numbers of the run.
 
         >>> import radarsim
         >>> sorted(radarsim.run("rls2", realisations=2000).tables)
@@ -180,9 +181,10 @@ class Result(Shown):
 
     @property
     def last_scan(self) -> "pd.DataFrame":
-        """The rows of curves at the last scan of each case, filter and component, with those of gains beside them.
+        """The rows of curves at the last scan of each case, filter and component, joined with those of gains.
 
-        `note` says where σ's interval rests on too little, `gain_note` where the gain's does; either there if needed.
+        `note` warns where σ's interval is unreliable, `gain_note` where the gain's is; each column exists only if
+        needed.
         """
         keys = ["case", "filter", "component"]
         last = self.curves.groupby(keys, sort=False).tail(1)
@@ -219,7 +221,7 @@ class Result(Shown):
 
     @cached_property
     def faults(self) -> tuple[str, ...]:
-        """What no chance makes, a line each: exact and measured values apart."""
+        """Differences of exact and measured values that chance does not explain, a line each."""
         own, made = study(self.experiment.study), self._tables
         nearly = [case.name for case in self.experiment.cases if own.exact_but_for(case)]
         bounds = ("claims",) if own.exact_errors else ("claims", "curves", "gains")
@@ -229,7 +231,7 @@ class Result(Shown):
         )
 
     def check(self) -> None:
-        """Raises DisagreementError where there are `faults`, else MeasureError where the measure of a claim failed."""
+        """Raises DisagreementError if there are `faults`, or MeasureError if the measure of a claim failed."""
         if self.faults:
             error = DisagreementError(*self.faults)
             error.result = self
@@ -240,9 +242,9 @@ class Result(Shown):
             raise unmeasured
 
     def verdicts(self, column: str = "class") -> dict[str, list[str]]:
-        """The claims of a class over all readings that their papers allow, or `as_shipped`; empty where there are none.
+        """The claims by class over all readings that their papers allow, or `as_shipped`; empty if there are none.
 
-        What is of an extension stands apart.
+        Extensions are listed separately.
         """
         found: dict[str, list[str]] = {}
         grouped = page.grouped(self._tables["claims"].to_dict("records"))
@@ -262,18 +264,18 @@ class Result(Shown):
         return found
 
     def as_shipped(self) -> list[str]:
-        """The claims judged under the shipped reading alone although their paper leaves open what they hang on."""
+        """The claims judged only under the shipped reading although they depend on what their paper leaves open."""
         rows = claims.first_rows(self._tables["claims"].to_dict("records"))
         return [row["claim"] for row in rows if page.alone(row)]
 
     @property
     def unmet(self) -> list[str]:
-        """The targets of precision or time that the run did not reach, a text each; empty if all was done."""
+        """The targets of precision or time that the run did not reach, a text each; empty if all were reached."""
         return list(self.facts.get("unmet", ()))
 
     @property
     def warnings(self) -> list[str]:
-        """What a reader of the numbers must know: faults, damaged or mixed blocks, too few realisations."""
+        """Warnings on the numbers: faults, damaged or mixed blocks, too few realisations."""
         return [*self.faults, *self.facts["warnings"], *self._of_intervals]
 
     @cached_property

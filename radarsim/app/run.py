@@ -381,24 +381,24 @@ def run(
     progress: Progress | None = None,
     stop: Signals | None = None,
 ) -> "Result":
-    """Run an experiment and give its result; nothing is written unless `out` names a directory.
+    """Run an experiment and return its result; writes nothing unless `out` names a directory.
 
     config is a path, the name of a shipped config, a dict as YAML would give it, or an Experiment loaded with these
     overrides. overrides change keys of it: `{"radar": {"sigma_range_m": 300}}`, the same with dotted keys,
     `{"radar.sigma_range_m": 300}`, or texts, `["radar.sigma_range_m=300"]`.
 
     With a precision, in per cent, a case ends at the first of 2000, 4000, 8000 …, N realisations at which the 95 %
-    half-width of every σ is under it, or of every quantity of another name, `of`, that the study measures (gain, lock,
-    …); where errors are not known to be Gaussian, of σ and gains not before 64,000, or 512,000 where large ones have
-    come. decide: all cases end at the first of these at which every claim of the config is decided. time_limit is in
-    seconds, tables and figures counted in, or a condition that runs already. `result.unmet` says what of the two was
-    not reached. workers are processes of this machine, scheduler the address of a Dask scheduler, executor one that is
-    open already. width_mm is the width of the figures' files in place of their own.
+    half-width of every σ is below it; `of` names another quantity of the study (gain, lock, …). If errors are not known
+    to be Gaussian, σ and gains are not judged before 64,000, or before 512,000 after large errors. decide: all cases
+    end at the first of these numbers at which every claim of the config is decided. time_limit is in seconds, including
+    tables and figures, or a condition that is already running. `result.unmet` names the targets that were not reached.
+    workers: number of processes on this machine; scheduler: address of a Dask scheduler; executor: one that is already
+    open. width_mm: width of the figures, instead of their own.
 
-    Raises ConfigError for a wrong config, StoreError for a bad disk, NonFiniteError for a filter that diverged,
-    TargetUnmet where the time did not suffice for a single block, and Interrupted, with all that was done stored, if
-    `stop` saw a signal. Raises DisagreementError, after all is written, where measured and exact values differ by more
-    than chance makes: one of them is computed wrongly. Its `result` is what would have been returned.
+    Raises ConfigError for an invalid config, StoreError for a disk fault, NonFiniteError for a filter that diverged,
+    TargetUnmet if the time did not suffice for a single block, and Interrupted on a signal; finished blocks are then
+    stored. Raises DisagreementError, after writing everything, if measured and exact values differ by more than chance
+    explains: one of them is wrong. Its `result` is the result that would have been returned.
 
     >>> result = run("rls2", realisations=2000)
     >>> len(result.curves) > 50
@@ -474,7 +474,7 @@ def cluster(workers: int | None, scheduler: str | None) -> AbstractContextManage
 
 
 def trust(scheduler: str) -> str | None:
-    """What computing with a scheduler of another machine rests on, in one line."""
+    """The trust that computing with a scheduler of another machine requires, in one line."""
     from radarsim.engine.cluster import trust as line
 
     return line(scheduler)
@@ -505,9 +505,9 @@ def report(
 
 
 def load_result(config: Config, *, out: str | os.PathLike[str] = RESULTS, overrides: Overrides = ()) -> "Result":
-    """The result of an experiment that was run into `out`, from what is stored there: computes and writes nothing.
+    """Load the stored result of an experiment from `out`; computes and writes nothing.
 
-    config and overrides as for `run`. Raises ConfigError where something is missing, with the command that computes it.
+    config and overrides as for `run`. Raises ConfigError, with the command to run, if something is missing.
 
     >>> import radarsim, tempfile
     >>> with tempfile.TemporaryDirectory() as out:

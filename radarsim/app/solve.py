@@ -31,7 +31,7 @@ MOST_STEPS = 3  # of the scan, by which the pilot's noise may have moved a cross
 RESIDUE = 0.02  # of its interval: how near a sampled quantity is brought to the target, so that the noise decides
 
 
-def by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answer:
+def by_sampling(asked: Question, curve: Curve, notify: Callable[[str], None]) -> Answer:
     """The answer where the quantity is simulated, with the same noise at every value."""
     over, count = asked.over, curve.realisations
     grid, pilot = over.grid(PILOT_POINTS), min(count, max(PILOT_LEAST, count // PILOT_SHARE))
@@ -45,7 +45,7 @@ def by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> A
         **question.said_of(asked),
         **counts,
     )
-    question.predict(told, what, (WITH_ALL + len(grid) * pilot / count) * (time.monotonic() - begun))
+    question.predict(notify, what, (WITH_ALL + len(grid) * pilot / count) * (time.monotonic() - begun))
     scanned = [(x, curve.simulated(x, pilot).value - asked.equals) for x in grid]
     known = [one for one in scanned if not math.isnan(one[1])]
     if not known:
@@ -53,7 +53,7 @@ def by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> A
     question.refuse_without_effect(asked, [y + asked.equals for _, y in known])
     apart = unpaired(asked, curve)
     if apart:
-        told("; ".join(apart))
+        notify("; ".join(apart))
         count = curve.realisations = UNPAIRED * count
     answer = partial(question.answered, asked, attained_now, exact=False)
     best, _ = min(known, key=lambda one: abs(one[1]))
@@ -207,14 +207,13 @@ def solve(
     threads: int | None = None,
     sampled: bool = False,
     progress: Callable[[int, int, int], None] | None = None,
-    told: Callable[[str], None] | None = None,
+    notify: Callable[[str], None] | None = None,
 ) -> Answer:
     """The value of a key at which a quantity equals `equals`, in the quantity's unit (gains and rates in per cent).
 
     between: what is searched; by default what the key allows, and of one that has no two bounds a thousandth to a
     thousand times its value. realisations: behind each sampled value, by default the config's. sampled: simulate also
-    what is known exactly. told is called with a line, before the search, that says what it will do, if that takes some
-    seconds.
+    what is known exactly. notify is called with a line on what the search will do, before one of some seconds.
 
     Raises ConfigError for a wrong config, key, filter or component, and for a key without effect.
     """
@@ -232,10 +231,10 @@ def solve(
         cases, key, quantity, equals, over, now, quantities.unit(quantity, axes), tuple(overrides), realisations
     )
     work = _exactly if not sampled and curve.exact(axes) else by_sampling
-    return work(asked, curve, told or (lambda line: None))
+    return work(asked, curve, notify or (lambda line: None))
 
 
-def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answer:
+def _exactly(asked: Question, curve: Curve, notify: Callable[[str], None]) -> Answer:
     """The answer where the quantity is exact."""
     attained_now = curve.exactly(None)
     grid = asked.over.grid()
@@ -251,7 +250,7 @@ def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answ
     said = question.said_of(asked)
     what = tr("computes the {quantity} at about {count} values of {key}", **said, count=curve.expected)
     seconds = TO_CLOSE * each + len(grid) * (AROUND * roughly if curve.rough else each)
-    question.predict(told, what + (tr(", each {near}", near=tr(near)) if near else ""), seconds)
+    question.predict(notify, what + (tr(", each {near}", near=tr(near)) if near else ""), seconds)
     try:
         found = roots(asked, curve)
     except quantities.Undefined:

@@ -9,7 +9,7 @@ from radarsim.cli.console import command, field, say, show
 from radarsim.language import tr
 
 if TYPE_CHECKING:
-    from radarsim.app.compare import Drawn
+    from radarsim.app.compare import DopplerChart
     from radarsim.app.question import Answer
     from radarsim.app.sensitivity import Sensitivity
     from radarsim.report.quantities import Quantity
@@ -24,7 +24,7 @@ def print_answer(answer: "Answer") -> None:
     command("check", answer.command)
 
 
-def print_drawn(drawn: "Drawn") -> None:
+def print_drawn(drawn: "DopplerChart") -> None:
     """Where each case lies, a line each, and what was written."""
     folder = drawn.folder
     assert folder is not None  # the command writes what it prints

@@ -129,7 +129,7 @@ def solve(
     asked |= {"overrides": overrides, "realisations": realisations, "seed": seed, "threads": threads}
     with console.Progress(key, quiet=as_json, what="values") as progress:
         said = None if as_json else console.say_aside
-        answer = python.solve(config, key, equals=equals, progress=progress.update, told=said, **asked)
+        answer = python.solve(config, key, equals=equals, progress=progress.update, notify=said, **asked)
     if as_json:
         click.echo(documents.text(documents.answer(answer)))
     elif answer.value is not None:

@@ -14,7 +14,7 @@ from radarsim.report.wording import unit as unit_of
 if TYPE_CHECKING:
     import pandas as pd
 
-    from radarsim.app.compare import Compared
+    from radarsim.app.compare import Comparison
     from radarsim.app.configs import Inventory
     from radarsim.app.doctor import Inspection
     from radarsim.app.outlook import CaseOutlook, Lacking, Need, Outlook
@@ -98,7 +98,7 @@ def show_but_alike(
     show(title, [columns[i] for i in kept], cells, right=right, spare=spare)
 
 
-def print_comparison(compared: "Compared") -> None:
+def print_comparison(compared: "Comparison") -> None:
     """What stored results differ by at the last common time, and where the files are."""
     from radarsim.report import compare
 

@@ -13,7 +13,7 @@ from radarsim.language import listed, plural, term, tr
 from radarsim.report.wording import interval, known, labelled, printable, significant_digits
 
 if TYPE_CHECKING:
-    from radarsim.app.readings import Done
+    from radarsim.app.readings import Readings
     from radarsim.app.result import Result
     from radarsim.recorded.advice import Advice
     from radarsim.recorded.figures import Judged
@@ -219,7 +219,7 @@ def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
         say(f"       {tr(row['verdict']):<20} {'; '.join(said)}")
 
 
-def print_readings(done: "Done", detailed: bool) -> None:
+def print_readings(done: "Readings", detailed: bool) -> None:
     """A line a claim, of single claims a line a reading too, and what the joint search came to."""
     from radarsim.report.claims import rule
 

@@ -221,7 +221,7 @@ def test_a_key_that_moves_the_scans_is_said_not_to_be_paired():
     exact = solve("rls2", "radar.scan_period_s", SEEN, 190, **MOVED)
     sampled = {"sampled": True, "realisations": 200, "threads": 1}
     said = []
-    found = solve("rls2", "radar.scan_period_s", SEEN, 190, told=said.append, **MOVED, **sampled)
+    found = solve("rls2", "radar.scan_period_s", SEEN, 190, notify=said.append, **MOVED, **sampled)
     words = (
         "radar.scan_period_s moves the scans, so the noise differs between values: "
         "each value gets 800 realisations, 4 times as many"
@@ -433,7 +433,7 @@ def test_what_takes_long_is_foretold_with_its_time_and_what_it_is(monkeypatch):
     assert found.attained == pytest.approx(15, abs=1e-6)  # first looked for roughly, then of the exact quantity
     monkeypatch.setattr(question, "LONG_S", 0.0)
     solve("rls2", "radar.sigma_velocity_mps", Wanted("gain", None, "r", at_k=11), 15, **late)
-    solve("rls2", "radar.sigma_velocity_mps", GAIN, 30, sampled=True, realisations=400, told=said.append)
+    solve("rls2", "radar.sigma_velocity_mps", GAIN, 30, sampled=True, realisations=400, notify=said.append)
     assert said[-2].startswith(
         "computes the gain of r+Vr in r at k = 11 at about 37 values of radar.sigma_velocity_mps: "
     )
