@@ -7,6 +7,7 @@ out, new ones added empty, each with the file that says it. `python -m making.me
 import ast
 import re
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from radarsim.app.configs import inventory
 from radarsim.config.check import models_in
 from radarsim.config.fields import Model
 from radarsim.config.schema import Common
-from radarsim.language import catalogue
+from radarsim.language import ANY, NUMBERS, catalogue
 from radarsim.report.claims import judge, rule
 from radarsim.studies import registry
 from radarsim.studies.discriminator import search as discriminator
@@ -41,7 +42,17 @@ def found() -> dict[tuple[str, str, str], list[str]]:
             places = said.setdefault(("", text, plural), [])
             if place not in places:
                 places.append(place)
-    return said
+    return together(said)
+
+
+def together(said: dict[tuple[str, str, str], list[str]]) -> dict[tuple[str, str, str], list[str]]:
+    """The messages, of those that differ in their numbers alone one for all of them."""
+    like = {key: (key[0], key[1] if key[2] or "{" in key[1] else NUMBERS.sub(ANY, key[1]), key[2]) for key in said}
+    count = Counter(like.values())
+    merged: dict[tuple[str, str, str], list[str]] = {}
+    for key, places in said.items():
+        merged.setdefault(like[key] if count[like[key]] > 1 else key, []).extend(places)
+    return merged
 
 
 def in_sources() -> Iterator[tuple[str, str, str]]:

@@ -43,6 +43,8 @@ SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 POWER = re.compile(r"(?P<mantissa>\d[\d.,]*)e(?P<exponent>[+-]\d+)")  # of a number in Python's form
 NUMBER = "number"  # context of the point and of the separator of thousands
 LABEL = "label"  # context of names in shipped configs
+ANY = "#"  # stands in a catalogue for a number, where messages differ in their numbers alone
+NUMBERS = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)")  # in a message, none that belongs to a name
 
 
 class Term(str):
@@ -134,7 +136,7 @@ def term(message: str, package: str = "") -> Term:
 def tr(message: str, /, **values: Any) -> str:
     """A message in the language spoken, with its places filled."""
     found = _catalogue(message, sys._getframe(1)) if message else None  # an empty one is a catalogue's header
-    said = found.gettext(message) if found else message
+    said = found.gettext(message) if found else _numbered(message, sys._getframe(1))
     return _Filled().vformat(said, (), values) if values else str(said)
 
 
@@ -149,6 +151,17 @@ def in_form(word: Term, context: str) -> str:
     if context and (found := _catalogue(word, sys._getframe(), context)):
         return found.pgettext(context, word)
     return tr(word)
+
+
+def _numbered(message: str, caller: FrameType) -> str:
+    """A message that the catalogue has once for all its numbers; else as it is."""
+    if current() == ENGLISH or "{" in message or not NUMBERS.search(message):
+        return message
+    like = term(NUMBERS.sub(ANY, message), getattr(message, "package", "") or _top(caller))
+    if (found := _catalogue(like, caller)) is None:
+        return message
+    numbers = iter(NUMBERS.findall(message))
+    return re.sub(ANY, lambda _: numeral(next(numbers)), found.gettext(like))
 
 
 def called(text: str, names: frozenset[str] = frozenset()) -> str:

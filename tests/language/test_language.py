@@ -59,6 +59,22 @@ def test_a_word_has_the_form_that_its_place_asks_for():
         assert tr("σ of the {quantity}", quantity="range") == "СКО range"  # no word of ours
 
 
+def test_messages_that_differ_in_their_numbers_are_translated_once():
+    assert tr("σ of f# at -0.5 s of 3") == "σ of f# at -0.5 s of 3"
+    with speaking("ru"):
+        for n in (2, 20, 7):
+            assert tr(f"smoothed σ after {n} plots, over the formula").count(f" {n} ") == 1
+        assert tr("largest relative difference in σ of the two at ρ = -0.5").endswith("ρ = −0,5")
+        assert tr("smoothed σ after n2 plots, over the formula") == "smoothed σ after n2 plots, over the formula"
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_a_translation_has_as_many_numbers_as_its_message(code):
+    entries = [one for one in language.messages(code) if language.ANY in one.id]
+    assert len(entries) > 50
+    assert [one.id for one in entries if one.said[0].count(language.ANY) != one.id.count(language.ANY)] == []
+
+
 def test_what_is_not_translated_is_said_in_english():
     with speaking("ru"):
         assert tr("no such message") == "no such message"
