@@ -490,6 +490,8 @@ def write_files(
         described = case_figures(results, made, experiment) if draw else {}
         described = {name: described[name] for name in experiment.drawn(described)}
         answer = answered(results, made)
+        for name in [*described][:1]:
+            described[name] = replace(described[name], headline=html.headline(answer))
         question = asked(experiment)
     except RadarsimError:
         raise
@@ -544,5 +546,8 @@ def unnamed(own: Study, described: Iterable[str]) -> list[str]:
 
 def captions(described: Mapping[str, Figure]) -> str:
     """The captions of figures as Markdown: what each shows, then how it is drawn."""
-    parts = [f"## {name}\n\n**{spoken(one.title)}.** {spoken(one.caption)}\n" for name, one in described.items()]
+    parts = []
+    for name, one in described.items():
+        own = f"**{spoken(one.title)}.** {spoken(one.caption)}\n"
+        parts.append("\n\n".join(filter(None, (f"## {name}", one.headline, own))))
     return "\n".join([f"# {tr('Captions')}\n", *parts])

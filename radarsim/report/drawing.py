@@ -134,7 +134,10 @@ class Panel:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of one or more panels in rows of `columns`; the caption says what is drawn and what the marks mean."""
+    """A figure of one or more panels in rows of `columns`; the caption says what is drawn and what the marks mean.
+
+    headline is the run's answer in a sentence of plain text, over its first figure.
+    """
 
     name: str
     title: str
@@ -144,6 +147,7 @@ class Figure:
     width_mm: float = COLUMN_MM
     panel_height_mm: float = 62.0
     share_y: bool = False
+    headline: str = ""
 
 
 def reworded(figure: Figure, said: Callable[[str], str]) -> Figure:

@@ -159,6 +159,7 @@ DASHES = ("-", (0, (5, 1.8)), (0, (1.3, 1.3)), (0, (6, 1.6, 1.3, 1.6)), (0, (9, 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", "h", ">", "d", "p")  # no multiple of the colours
 POINTS = 2000  # of a line; longer ones are drawn at every n-th scan
 TITLE_LETTERS_PER_MM = 0.45  # of a panel's cell with its axis, in the bold of titles
+HEADLINE_LETTERS_PER_MM, HEADLINE_MM = 0.64, 3.6  # of a figure's width; a line of it
 LABEL_LETTERS_PER_MM = 0.62  # of an axis' side, in the letters of labels
 AXIS_MM = 9.0  # of the ticks and the label of an axis of x
 SIDE_MM = 14.0  # of those of an axis of y, with the gap to the next panel
@@ -271,9 +272,13 @@ def _laid_out(figure: Figure) -> Canvas:
     if common is not None and not inside and not plan.beside:
         height += common.height_mm(figure.width_mm)
     height += rows * max([one.height_mm(figure.width_mm / columns) for one in plan.own if one is not None], default=0.0)
+    headline = wrapped(figure.headline, HEADLINE_LETTERS_PER_MM * figure.width_mm, " ").replace("$", r"\$")
+    height += HEADLINE_MM * (headline.count("\n") + 1) if headline else 0.0
     layout = ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.05)
     canvas = Canvas(figsize=(figure.width_mm * MM, height * MM), dpi=PNG_DPI, layout=layout)
     FigureCanvasAgg(canvas)
+    if headline:
+        canvas.suptitle(headline, x=0.01, ha="left", fontsize=STYLE["font.size"])
     grid = canvas.subplots(rows, columns, squeeze=False, sharey=figure.share_y)
     ended: list[list[Annotation]] = []
     letters = TITLE_LETTERS_PER_MM * figure.width_mm / columns

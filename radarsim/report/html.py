@@ -4,7 +4,7 @@ What was asked: every key of the cases with its value and the schema's descripti
 
 report.html: one self-contained page of an experiment; the template escapes all text from configs and tables.
 
-results/index.html: all runs of a folder, newest first, each with its answer in one line.
+results/index.html: all runs of a folder by paper, newest first, each with its answer in one line.
 """
 
 import base64
@@ -239,6 +239,11 @@ def in_clauses(answer: Sequence[str]) -> list[str]:
     return [f"{part};" if part is not own[-1] else part for own in parts for part in own]
 
 
+def headline(answer: Sequence[str]) -> str:
+    """The first sentence of an answer as the page shows it, of a long one its first clause; empty without any."""
+    return in_clauses(answer)[0].removesuffix(";") if answer else ""
+
+
 def seen_at_once(answer: Sequence[str]) -> int:
     """How many sentences of an answer stand above its figure: the first one, others while they are short together."""
     lengths = [sum(len(sentence) for sentence in answer[: n + 1]) for n in range(len(answer))]
@@ -268,10 +273,26 @@ def comparison(
         warnings=warnings,
         figures=_figures(figures),
         files=_files(figures, outputs),
+        differ=_differences(differing),
         asked=[table_in_words(title, table) for title, table in differing.items()],
         table=_table("comparison", made.drop(columns=["label", "against_label"])),
         version=files.versions()["radarsim"],
     )
+
+
+MOST_KEYS = 4  # that a line names
+
+
+def _differences(differing: "Mapping[str, pd.DataFrame]") -> str:
+    """The first keys in which what is compared differs, with the values of each; empty where no key does."""
+    *_, table = (None, *differing.values()) if len(differing) > 1 else (None,)
+    if table is None:
+        return ""
+    values = {str(key): list(dict.fromkeys(map(cell, table[key]))) for key in table.columns[1:]}
+    differ = sorted((own[0][:1].isalpha(), n) for n, own in enumerate(values.values()) if len(own) > 1)  # numbers first
+    lines = [f"{head([*values][n])}: {' → '.join([*values.values()][n])}" for _, n in differ]
+    more = len(lines) - MOST_KEYS
+    return "; ".join([*lines[:MOST_KEYS], *([tr("{count} more", count=more)] if more > 0 else [])])
 
 
 def followed(
@@ -466,7 +487,12 @@ def _figures(figures: Sequence[Figure]) -> list[dict[str, Any]]:
     for figure in figures:
         drawn = chart.chart(figure, points)
         safe = _json([panel.data for panel in drawn.panels])
-        named = {"name": figure.name, "title": spoken(figure.title), "caption": spoken(figure.caption)}
+        named = {
+            "name": figure.name,
+            "title": spoken(figure.title),
+            "heading": chart.html(figure.title),
+            "caption": spoken(figure.caption),
+        }
         made.append({**named, "chart": drawn, "data": safe})
     return made
 
@@ -547,7 +573,7 @@ def write(out: Path) -> None:
     with files.locked(out):
         found = filter(None, map(_run, out.glob("*/run.json")))
         runs = sorted(found, key=lambda run: run["finished"], reverse=True)
-        page = whole("index.html.j2", runs=runs, version=files.versions()["radarsim"])
+        page = whole("index.html.j2", groups=_by_paper(runs), count=len(runs), version=files.versions()["radarsim"])
         files.replace_all(out, {NAME: page.encode()})
 
 
@@ -559,14 +585,23 @@ def _run(path: Path) -> dict | None:
         made = {
             "name": path.parent.name,
             "address": f"{quote(path.parent.name)}/report.html",
-            "answer": answer[0] if answer else "",
+            "answer": headline(answer),
             "study": str(record["study"]),
             "realisations": files.span(sorted({int(case["done"]) for case in record["cases"].values()})),
             "finished": _finished(record, path),
         }
     except (OSError, ArithmeticError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
-    return made | {"claims": _claims_of(path.parent / "claims.csv")}
+    return made | _claims_of(path.parent / "claims.csv")
+
+
+def _by_paper(runs: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:
+    """The runs by the paper whose claims they judge; one that judges none beside others of its study, or under that."""
+    papers = {run["study"]: run["paper"] for run in reversed(runs) if run["paper"]}
+    found: dict[str, list[Mapping[str, Any]]] = {}
+    for run in runs:
+        found.setdefault(run["paper"] or papers.get(run["study"], run["study"]), []).append(run)
+    return dict(sorted(found.items()))
 
 
 def _finished(record: Mapping, path: Path) -> str:
@@ -576,10 +611,13 @@ def _finished(record: Mapping, path: Path) -> str:
     return when.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
-def _claims_of(path: Path) -> str:
-    """How many claims of a table are of which class; nothing where there is none."""
+def _claims_of(path: Path) -> dict[str, Any]:
+    """Of a table of claims the paper of the first, how many are of which class in words, and as marks by their look."""
     try:
-        text = files.read(path).decode("utf-8")
-        return claims_page.counted(list(csv.DictReader(io.StringIO(text, newline=""))))
+        rows = list(csv.DictReader(io.StringIO(files.read(path).decode("utf-8"), newline="")))
+        looks = [_css(parts[0]["class"]) for parts in claims_page.grouped(rows)]
+        marks = {look: looks.count(look) for look in ("confirmed", "refuted", "unclear") if look in looks}
+        paper = rows[0]["paper"].partition(",")[0] if rows else ""
+        return {"paper": paper, "claims": claims_page.counted(rows), "marks": marks}
     except (OSError, ValueError, LookupError, csv.Error):
-        return ""
+        return {"paper": "", "claims": "", "marks": {}}

@@ -145,6 +145,21 @@ def test_page_is_whole_and_leads_nowhere(written):
     assert "P1.18" in text
 
 
+def test_the_first_figure_bears_the_first_sentence_of_the_answer_and_no_other_does(written):
+    def of(name):
+        """The texts of a figure, one after the other."""
+        return " ".join(re.findall(r"<text[^>]*>([^<]*)</text>", (written.folder / name).read_text()))
+
+    first, *others = re.findall(r"^## (\w+)$", (written.folder / "figures/captions.md").read_text(), re.MULTILINE)
+    sentence = html.headline(written.answer)
+    assert sentence == written.answer[0]
+    assert str(escape(sentence)) in of(f"figures/{first}.svg").replace("&quot;", "&#34;").replace("'", "&#39;")
+    assert not any("the last scan" in of(f"figures/{name}.svg") for name in others)
+    page = (written.folder / "report.html").read_text().replace("\u00a0", " ")
+    assert re.search(r'class="answer".*?<p>(.*?)</p>', page, re.DOTALL)[1] == str(escape(sentence))
+    assert html.headline(["a" * 200 + "; " + "b" * 200]) == "a" * 200
+
+
 def test_names_are_escaped(written):
     text = (written.folder / "report.html").read_text()
     scripts = {"<script>", '<script type="application/json">', '<script type="application/json" id="words">'}
@@ -188,7 +203,9 @@ def test_figures_have_the_width_asked_for_their_captions_and_what_they_were_made
     names = {path.name for path in (folder / "figures").iterdir()}
     assert "captions.md" in names
     captions = (folder / "figures" / "captions.md").read_text()
-    assert all(f"## {name}\n\n**" in captions for name in first.figures)
+    begun, *others = first.figures
+    assert f"## {begun}\n\n{first.answer[0]}\n\n**" in captions
+    assert all(f"## {name}\n\n**" in captions for name in others)
     svg = (folder / "figures" / "sigma_r.svg").read_text()
     assert ">time from the first plot, s</text>" in svg  # text, not paths
     record = json.loads((folder / "run.json").read_text())

@@ -91,7 +91,9 @@ def drawn(rows):
 def reported(config):
     """What the report says of each claim, by its number; the style of the cell is that of the class."""
     text = (config / "report.html").read_text(encoding="utf-8")
-    found = re.findall(r'<tr id="claim-(P\d\.\w+)">.*?<td class="([\w ]*)">([^<]*)</td></tr>', text, re.DOTALL)
+    found = re.findall(
+        r'<tr id="claim-(P\d\.\w+)">.*?</details></td><td class="([\w ]*)">([^<]*)</td></tr>', text, re.DOTALL
+    )
     return {claim: " ".join(unescape(said).split()) for claim, _, said in found}
 
 

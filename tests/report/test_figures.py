@@ -513,3 +513,15 @@ def test_a_gain_that_is_nowhere_known_is_drawn_as_nothing_and_cuts_no_axis():
 def test_a_letter_beside_an_axis_stands_upright(label, turned):
     figure = Figure("one", "One", "A figure.", (Panel(Axis("x, s"), Axis(label), (line(),)),))
     assert drawn(figure).yaxis.label.get_rotation() == turned
+
+
+def test_a_headline_stands_over_the_panels_and_inside_the_figure():
+    described = replace(one(line(), title="panel"), headline="a sentence of $ 5 and many words, " * 6)
+    canvas = figures.render(described)
+    box = canvas._suptitle.get_window_extent()
+    assert canvas._suptitle.get_text().count("\n") >= 3
+    assert box.y0 >= canvas.axes[0].title.get_window_extent().y1 >= canvas.axes[0].get_window_extent().y1
+    assert box.y1 <= canvas.bbox.height
+    assert 0 <= box.x0 < box.x1 <= canvas.bbox.width
+    plain = figures.render(replace(described, headline=""))
+    assert canvas.get_figheight() > plain.get_figheight()

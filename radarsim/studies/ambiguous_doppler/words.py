@@ -1,12 +1,12 @@
 """What the report of folded Doppler asks and answers, in words."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from radarsim.config.experiment import Experiment
-from radarsim.language import listed, numeral, tr
+from radarsim.language import listed, numeral, plural, tr
 from radarsim.report import panels, rare, tables, wording
 from radarsim.studies.ambiguous_doppler.tables import Result
 
@@ -46,9 +46,84 @@ def answer(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> lis
     """For each case: from which scan on folded velocity is as good as unfolded, within 5 %; how often it is right.
 
     Of filters of several orders: the largest error of each over the scans, beside that of the best single order.
+    First, of all cases: the filter of the least error, or in how many folded velocity is as good.
     """
     shown, others = panels.reported(results, 6)
-    return [*(sentence for result in shown for sentence in _sentences(result, made)), *others]
+    sentences = [sentence for result in shown for sentence in _sentences(result, made)]
+    first = [*_least_of_all(results, made), *_of_all(results, made)]
+    return [*first[:1], *sentences, *others]
+
+
+def _largest(result: Result, made: "Mapping[str, pd.DataFrame]") -> "pd.DataFrame":
+    """The row of each filter's largest σ of range over the scans; the first plot is common."""
+    curves = tables.where(made["curves"], case=result.name, component="r")
+    curves = curves[(curves["k"] > 1) & (curves["n"] > 0)]
+    curves = curves.assign(decides=tables.exact_first(curves, "sigma", "exact_sigma"))
+    return curves.loc[curves.groupby("filter", sort=False)["decides"].idxmax()]
+
+
+def _sigma_m(row: Mapping) -> str:
+    return wording.estimate((row["sigma"], row["sigma_lo"], row["sigma_hi"]), tr("m"))
+
+
+def _least_of_all(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> list[str]:
+    """The filter whose largest σ of range in any case is least, and the best of the other kind: one order, or several.
+
+    None where no filter combines orders, or none had a plot.
+    """
+    combining = [result for result in results if result.axes.combines.any()]
+    several = {one.name for result in combining for one in result.spec.filters if one.combine is not None}
+    worst: dict[str, tuple[Any, Result]] = {}
+    for result in combining:
+        for row in _largest(result, made).to_dict("records"):
+            if row["filter"] not in worst or row["decides"] > worst[row["filter"]][0]["decides"]:
+                worst[row["filter"]] = row, result
+    ranked = sorted(worst, key=lambda name: worst[name][0]["decides"])
+    others = [name for name in ranked if (name in several) != (ranked[0] in several)]
+    if not others:
+        return []
+    row, where = worst[others[0]]
+    return [
+        plural(
+            "{best} keeps σ of the range after the first plot within {least}; {kind}, {other}, comes to {most} "
+            "({where}).",
+            "{best} keeps σ of the range after the first plot within {least} in all {count} cases; {kind}, {other}, "
+            "comes to {most} ({where}).",
+            len(combining),
+            best=ranked[0],
+            least=_sigma_m(worst[ranked[0]][0]),
+            kind=tr("the best combination") if others[0] in several else tr("the best single order"),
+            other=others[0],
+            most=_sigma_m(row),
+            where=panels.plain_label(where),
+        )
+    ]
+
+
+def _of_all(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> list[str]:
+    """Of several cases: in how many the filter that unfolds best is as good as unfolded velocity; and the worst."""
+    found: dict[str, list[tuple[float, float, str]]] = {}
+    for result in results if len(results) > 1 else ():
+        for name in _told_of(result):
+            if words := _as_good(result, name, made):
+                above = _above(result, name, made)["above_oracle_percent"].iloc[-1]
+                since = _since(result, name, made) or np.inf
+                found.setdefault(name, []).append((since, above, f"{panels.plain_label(result)}: {words}"))
+    if not found:
+        return []
+    good = {name: sum(np.isfinite(since) for since, _, _ in own) for name, own in found.items()}
+    name = min(found, key=lambda one: (-good[one], max(found[one])))
+    return [
+        tr(
+            "{filter}: as good as unfolded velocity, within {percent:g} %, in {good} of {count} cases by the last scan; "
+            "{worst}.",
+            filter=name,
+            percent=AS_GOOD,
+            good=good[name],
+            count=len(found[name]),
+            worst=max(found[name])[2],
+        )
+    ]
 
 
 def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
@@ -77,19 +152,11 @@ def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> list
 
     None where no realisation had a plot.
     """
-    curves = tables.where(made["curves"], case=result.name, component="r")
-    curves = curves[(curves["k"] > 1) & (curves["n"] > 0)]
-    if not len(curves):
+    worst = _largest(result, made)
+    if not len(worst):
         return []
-    curves = curves.assign(decides=tables.exact_first(curves, "sigma", "exact_sigma"))
-    worst = curves.loc[curves.groupby("filter", sort=False)["decides"].idxmax()]
     said = [
-        tr(
-            "{filter}, {sigma} at scan {k}",
-            filter=row["filter"],
-            sigma=wording.estimate((row["sigma"], row["sigma_lo"], row["sigma_hi"]), tr("m")),
-            k=row["k"],
-        )
+        tr("{filter}, {sigma} at scan {k}", filter=row["filter"], sigma=_sigma_m(row), k=row["k"])
         for row in worst.to_dict("records")
     ]
     axes = result.axes
@@ -136,13 +203,10 @@ def _wrong(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str
 
 def _as_good(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str:
     """From which scan on σ of the velocity is within 5 % of the oracle's, for good; empty where it has none."""
-    gains, folds = (tables.where(made[t], case=result.name, filter=name) for t in ("gains", "folds"))
-    rows = gains[gains["component"] == "Vr"].dropna(subset=["above_oracle_percent"])
+    rows, folds = _above(result, name, made), tables.where(made["folds"], case=result.name, filter=name)
     if not len(rows):
         return ""
-    late = rows["above_oracle_hi"].to_numpy() > AS_GOOD
-    if not late[-1]:
-        since = rows["k"].to_numpy()[int(late.nonzero()[0][-1]) + 1 if late.any() else 0]
+    if since := _since(result, name, made):
         return tr("as good as unfolded velocity, within {percent:g} %, from scan {k} on", percent=AS_GOOD, k=since)
     last, end = folds.iloc[-1], rows.iloc[-1]
     if end["above_oracle_percent"] > LOST:
@@ -158,6 +222,19 @@ def _as_good(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> s
         above=_percent(*(float(f"{end[key]:.3g}") for key in keys)),
         k=end["k"],
     )
+
+
+def _above(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> "pd.DataFrame":
+    """The gains in the velocity of a filter that has an oracle beside it."""
+    rows = tables.where(made["gains"], case=result.name, filter=name, component="Vr")
+    return rows.dropna(subset=["above_oracle_percent"])
+
+
+def _since(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> int:
+    """The scan from which on a filter is as good as its oracle, for good; 0 where it is not at the last one."""
+    rows = _above(result, name, made)
+    late = rows["above_oracle_hi"].to_numpy() > AS_GOOD
+    return 0 if late[-1] else int(rows["k"].to_numpy()[int(late.nonzero()[0][-1]) + 1 if late.any() else 0])
 
 
 def _percent(value: float, low: float, high: float) -> str:

@@ -35,9 +35,37 @@ def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
         return [_over(results, made, name) for name in results[0].axes.filters]
     sentences = plain or list(results)
     return [
-        words
-        for result in sentences
-        for words in _of_one(result, made, f"{panels.plain_label(result)}, " if len(sentences) > 1 else "")
+        *_against_design(results, made),
+        *(
+            words
+            for result in sentences
+            for words in _of_one(result, made, f"{panels.plain_label(result)}, " if len(sentences) > 1 else "")
+        ),
+    ]
+
+
+def _against_design(results: Sequence[CaseResult], made: Mapping) -> list[str]:
+    """The case in which lock is lost the most often for its design, where losses are sought among several cases."""
+    found = []
+    for result in (one for one in results if one.spec.rare is not None and len(results) > 1):
+        rows = tables.groups(made["rare"], "case")[(result.name,)]
+        for _, row in rows[rows["sought"]].iterrows():
+            (of,) = (one for one in result.spec.estimators if one.name == row["filter"])
+            if of.schedule == "designed" and of.lock_probability < 1:
+                found.append((row["rate"] / (1 - of.lock_probability), 1 - of.lock_probability, row))
+    if not found:
+        return []
+    times, designed, row = max(found, key=lambda one: one[0])
+    return [
+        tr(
+            "{estimator} loses lock in {rate:.3g} [{low:.3g}, {high:.3g}] of the bursts where it was designed for "
+            "{designed:.3g}, {times:.3g} times as often, the most of {count} cases.",
+            estimator=row["filter"],
+            designed=designed,
+            times=times,
+            count=len(found),
+            **rare.told(row),
+        )
     ]
 
 

@@ -13,6 +13,7 @@ from radarsim.studies.pulses_to_tracks.tables import Result
 if TYPE_CHECKING:
     import pandas as pd
 
+OVER = ("over_ideal", "over_ideal_lo", "over_ideal_hi")
 ALIKE = 1.05  # σ over its idealisation's, up to which the idealisation holds
 
 
@@ -43,7 +44,7 @@ def question(experiment: Experiment) -> str:
 
 
 def answer(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> list[str]:
-    """For each case: the burst in numbers; of each filter its locks and its last σ beside the idealisation."""
+    """For each case: the filters nearest to their idealisation and furthest; of each its locks and σ; the burst."""
     shown, others = panels.reported(results, 3)
     return [*(sentence for result in shown for sentence in _sentences(result, made)), *others]
 
@@ -55,21 +56,32 @@ def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
         return []
     low, high = float(axes.energy_db.min()), float(axes.energy_db.max())
     energy = tr("{low:.3g} dB", low=low) if high - low < 0.05 else tr("{low:.3g} to {high:.3g} dB", low=low, high=high)
-    sentences = [
-        tr(
-            "{case}: {pulses} pulses in {burst_ms:.3g} ms, {energy} in all, allow σ_V = {sigma:.3g} m/s (Fisher "
-            "bound).",
-            case=panels.plain_label(result),
-            pulses=spec.pulses,
-            burst_ms=1e3 * spec.burst_s,
-            energy=energy,
-            sigma=bound.min(),
-        )
-    ]
-    for f, name in enumerate(axes.filters):
-        if axes.ideal[f] >= 0:
-            sentences.append(f"{panels.plain_label(result)}, {name}: {_filter(result, made, name)}.")
-    return sentences
+    case, names = panels.plain_label(result), [name for f, name in enumerate(axes.filters) if axes.ideal[f] >= 0]
+    burst = tr(
+        "{case}: {pulses} pulses in {burst_ms:.3g} ms, {energy} in all, allow σ_V = {sigma:.3g} m/s (Fisher bound).",
+        case=case,
+        pulses=spec.pulses,
+        burst_ms=1e3 * spec.burst_s,
+        energy=energy,
+        sigma=bound.min(),
+    )
+    ends = [f"{case}: {_ends(result, made, names)}."] if len(names) > 1 else []
+    return [*ends, *(f"{case}, {name}: {_filter(result, made, name)}." for name in names), burst]
+
+
+def _ends(result: Result, made: "Mapping[str, pd.DataFrame]", names: Sequence[str]) -> str:
+    """The filters whose last σ of the range is nearest to their idealisation's and furthest from it."""
+    last = tables.where(made["idealisations"], case=result.name, component="r").groupby("filter", sort=False).tail(1)
+    last = last[last["filter"].isin(names)].sort_values("over_ideal", kind="stable").iloc[[0, -1]]
+    near, far = (wording.estimate((row[key] for key in OVER), form=".3g") for row in last.to_dict("records"))
+    best, worst = last["filter"]
+    return tr(
+        "with {best} σ of the range at the last scan is {near} times its idealisation's, with {worst} {far} times",
+        best=best,
+        near=near,
+        worst=worst,
+        far=far,
+    )
 
 
 def _filter(result: Result, made: "Mapping[str, pd.DataFrame]", name: str) -> str:
@@ -81,11 +93,10 @@ def _filter(result: Result, made: "Mapping[str, pd.DataFrame]", name: str) -> st
         share=wording.estimate((100 * worst[key] for key in ("lock_rate", "lock_lo", "lock_hi")), "%"),
     )
     last = ideal[ideal["component"] == "r"].iloc[-1]
-    keys = ("over_ideal", "over_ideal_lo", "over_ideal_hi")
     if last["over_ideal_hi"] <= ALIKE:
-        ratio = wording.estimate((last[key] for key in keys), form=".4g")
+        ratio = wording.estimate((last[key] for key in OVER), form=".4g")
         words = tr("σ of the range at the last scan is that of its idealisation, {ratio} times", ratio=ratio)
     else:
-        ratio = wording.estimate((last[key] for key in keys), form=".3g")
+        ratio = wording.estimate((last[key] for key in OVER), form=".3g")
         words = tr("σ of the range at the last scan is {ratio} times its idealisation's", ratio=ratio)
     return f"{locked}; {words}"

@@ -71,9 +71,28 @@ def test_orders_and_their_sentence():
     assert set(table["filter"]) == {"likelihood", "expected error", "intersection"}
     assert len(made.tables["folds"]) == 0
     sentences = registry.study("ambiguous_doppler").answer(made.cases, made.tables)
+    first, *sentences = sentences
     assert len(sentences) == 3
     assert all("by the best combination" in sentence for sentence in sentences)
+    rows = made.curves.query("component == 'r' and k > 1")
+    largest = rows.assign(exact=rows["exact_sigma"].fillna(rows["sigma"])).groupby("filter")["exact"].max()
+    singles = largest[["order 0", "order 1", "order 2", "order 2 range only"]]
+    assert first.startswith(f"{largest.idxmin()} keeps σ of the range after the first plot within ")
+    assert f"the best single order, {singles.idxmin()}, comes to " in first
+    assert "in all 3 cases" in first
     assert {"orders", "sigma_r"} <= set(made.figures)
+
+
+def test_of_several_radars_the_answer_counts_those_in_which_folded_velocity_is_as_good():
+    made = radarsim.run("ambiguous", realisations=400)
+    first = made.answer[0]
+    gains = made.gains.query("component == 'Vr' and filter == 'memory'").groupby("case").tail(1)
+    good = int((gains["above_oracle_hi"] <= 5).sum())
+    assert first.startswith(
+        f"memory: as good as unfolded velocity, within 5 %, in {good} of 4 cases by the last scan; "
+    )
+    worst = gains.loc[gains["above_oracle_percent"].idxmax(), "case"]
+    assert first.split("; ")[1].startswith(worst.replace("ambiguous_rls", "RLS "))
 
 
 @pytest.mark.parametrize("combine", [False, True])

@@ -160,3 +160,15 @@ def test_a_case_is_found_by_its_reading(made):
     assert evidence.case(measures.COMPUTED) is made.cases[0]
     with pytest.raises(measures.Missing):
         evidence.case(measures.PRINTED)
+
+
+def test_losses_are_told_beside_the_design_first():
+    made = run.run("discriminator_rare", realisations=400)
+    rows = made.tables["rare"].query("sought").set_index("case")
+    designed = 1 - rows.index.str.rpartition("=").get_level_values(2).astype(float)
+    times = rows["rate"] / designed
+    first = made.answer[0]
+    assert first.startswith("exact tail loses lock in ")
+    assert f", {times.max():.3g} times as often, the most of 4 cases." in first
+    alone = run.run("discriminator_rare", realisations=400, overrides=["sweep.estimators.0.lock_probability=[0.999]"])
+    assert "times as often" not in alone.answer[0]

@@ -1,5 +1,7 @@
 """Tables, figures and sentences of a small run."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -91,8 +93,17 @@ def test_sentences(found):
     one, experiment = registry.study("pulses_to_tracks"), load("pulses")
     assert one.question(experiment).startswith("What are the bursts of RLS 4 worth to the track")
     told = one.answer(found.cases, found.tables)
-    assert told[0] == "RLS 4: 16 pulses in 0.8 ms, 17.3 dB in all, allow σ_V = 1 m/s (Fisher bound)."
-    assert len(told) == 6
+    assert told[-1] == "RLS 4: 16 pulses in 0.8 ms, 17.3 dB in all, allow σ_V = 1 m/s (Fisher bound)."
+    assert len(told) == 7
+    ratios = found.tables["idealisations"].query("component == 'r'").groupby("filter").tail(1)
+    ratios = ratios.set_index("filter")["over_ideal"]
+    near, best, worst, far = re.fullmatch(
+        r"RLS 4: with (.+) σ of the range at the last scan is ([\d.]+) .* times its idealisation's, with (.+) ([\d.]+) "
+        r"\[.*\] times\.",
+        told[0],
+    ).group(2, 1, 3, 4)
+    assert (best, worst) == (ratios.idxmin(), ratios.idxmax())
+    assert [float(near), float(far)] == pytest.approx([ratios.min(), ratios.max()], rel=5e-3)
     (spectrum,) = [line for line in told if line.startswith("RLS 4, spectrum: ")]
     assert "idealisation" in spectrum
 
