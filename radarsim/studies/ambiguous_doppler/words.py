@@ -115,8 +115,8 @@ def _of_all(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> li
     name = min(found, key=lambda one: (-good[one], max(found[one])))
     return [
         tr(
-            "{filter}: as good as unfolded velocity, within {percent:g} %, in {good} of {count} cases by the last scan; "
-            "{worst}.",
+            "{filter}: as good as unfolded velocity, within {percent:g} %, in {good} of {count} cases by the last "
+            "scan; {worst}.",
             filter=name,
             percent=AS_GOOD,
             good=good[name],
