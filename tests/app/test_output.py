@@ -172,7 +172,7 @@ def test_names_are_escaped(written):
 def test_few_realisations_are_warned_of(experiment, expected_case, tmp_path):
     output.write_files(experiment, [expected_case(experiment.cases[0], count=10)], tmp_path, RUN, draw=False)
     record = json.loads((tmp_path / "run.json").read_bytes())
-    assert "intervals of 10 realisations are rough" in record["warnings"][-1]
+    assert "intervals from 10 realisations are rough" in record["warnings"][-1]
     assert record["realisations_done"] == 10
 
 
@@ -185,7 +185,7 @@ def test_extent_in_words():
     differing = of_cases((100_000, 100_000, 2017), (200_000, 200_000, 1))
     assert files.extent(differing) == "100,000 to 200,000 realisations a case, seeds 1, 2017"
     short = of_cases((200_000, 100_000, 1), (200_000, 200_000, 1))
-    assert files.extent(short) == "100,000 to 200,000 realisations a case of 200,000 asked, seed 1"
+    assert files.extent(short) == "100,000 to 200,000 realisations a case of 200,000 requested, seed 1"
 
 
 def test_many_long_tables_share_the_room_of_a_page():

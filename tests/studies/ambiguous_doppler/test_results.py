@@ -73,7 +73,7 @@ def test_orders_and_their_sentence():
     sentences = registry.study("ambiguous_doppler").answer(made.cases, made.tables)
     first, *sentences = sentences
     assert len(sentences) == 3
-    assert all("by the best combination" in sentence for sentence in sentences)
+    assert all("the best combination" in sentence for sentence in sentences)
     rows = made.curves.query("component == 'r' and k > 1")
     largest = rows.assign(exact=rows["exact_sigma"].fillna(rows["sigma"])).groupby("filter")["exact"].max()
     singles = largest[["order 0", "order 1", "order 2", "order 2 range only"]]
