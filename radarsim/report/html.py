@@ -164,7 +164,7 @@ def as_text(name: str, value: object) -> str:
 # ---- html ------------------------------------------------------------------------------------------------------------
 NOT_SETTLED = term("not settled in the run")
 SCRIPT = (
-    *(term("Light page"), term("Dark page"), term("exact"), term("Copied"), term("Not allowed here")),
+    *(term("Light page"), term("Dark page"), term("exact")),
     *(term("Logarithmic axes"), term("Linear axes"), term("Show all")),
 )
 ROWS = 200  # of a table shown in the page

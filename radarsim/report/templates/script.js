@@ -1,5 +1,5 @@
 "use strict";
-// What a reader does with the page: switch curves, read values off them, look closer, sort and copy tables, light and
+// What a reader does with the page: switch curves, read values off them, look closer, sort tables, light and
 // dark. Panels of lines are drawn again here with other limits, as report/chart.py draws them.
 const REACH = 14; // units of a panel within which a point belongs to the pointer's place
 const MANY = 8; // curves told from which they stand in two columns
@@ -694,24 +694,6 @@ function sortable(table) {
   }
 }
 
-function copied(table) {
-  const cells = (row) => [...row.cells].map((one) => one.textContent.trim().replace(/\s+/g, " ")).join("\t");
-  return [...table.rows].map(cells).join("\n");
-}
-
-async function copy(text) {
-  try {
-    await navigator.clipboard.writeText(text);
-    return true;
-  } catch {
-    const area = make("textarea", text, document.body);
-    area.select();
-    const done = document.execCommand("copy");
-    area.remove();
-    return done;
-  }
-}
-
 const drawn = [...document.querySelectorAll("figure")].flatMap(figure);
 const axes = document.getElementById("axes");
 if (axes) scales(axes, drawn);
@@ -719,15 +701,5 @@ for (const more of document.querySelectorAll(".answer details, details.warning")
   more.open = innerWidth >= WIDE && more.textContent.length < LONG;
 }
 for (const table of document.querySelectorAll("table.sortable")) sortable(table);
-for (const button of document.querySelectorAll("button.copy")) {
-  button.hidden = false;
-  button.addEventListener("click", async () => {
-    const from = document.getElementById(button.dataset.of);
-    const done = await copy(from.tagName === "TABLE" ? copied(from) : from.textContent);
-    const before = button.textContent;
-    button.textContent = said(done ? "Copied" : "Not allowed here");
-    setTimeout(() => { button.textContent = before; }, 1500);
-  });
-}
 const switcher = document.getElementById("theme");
 if (switcher) theme(switcher);
