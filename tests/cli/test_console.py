@@ -167,7 +167,7 @@ def test_list_is_one_screen_and_takes_words(tmp_path, monkeypatch):
     assert "sonar_clutter" in listed("sonar")
     assert listed("filters").startswith("Filters")
     assert "Configs" not in listed("filters")
-    assert "nothing of this name" in listed("nosuchword", code=2)
+    assert "no entry has this name" in listed("nosuchword", code=2)
 
 
 def test_every_marked_interval_is_marked_on_the_terminal(capsys):
