@@ -421,7 +421,8 @@ def _scans(panel: Panel) -> Scans | None:
         return None
     step = float(x[-1] / np.round(x[-1] / np.diff(x).min()))
     even = np.abs(x / step - np.round(x / step)).max() < 1e-6 and x[0] <= FEWEST_SCANS * step
-    return Scans(step, float(x[-1])) if even else None
+    said = abs(float(f"{step:.3g}") - step) < 1e-9 * step  # by few digits
+    return Scans(step, float(x[-1])) if even and said else None
 
 
 def _draw(axes: Axes, panel: Panel, maps: Colours) -> None:

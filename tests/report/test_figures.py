@@ -374,6 +374,8 @@ def test_ticks_stand_at_scans_and_at_the_last(step, count):
 def test_uneven_times_have_round_ticks():
     x = np.array([0.0, 1.0, 2.5, 7.1, 9.9, 13.7])
     assert list(figures.render(one(Line(x, x, "a"))).axes[0].get_xticks()) == [0, 2.5, 5, 7.5, 10, 12.5]
+    x = 523.599 * np.arange(5)  # even, but no number that is said
+    assert list(figures.render(one(Line(x, x, "a"))).axes[0].get_xticks()) == [0, 500, 1000, 1500, 2000]
 
 
 def test_a_line_that_ends_beyond_its_axis_is_marked_so():
