@@ -11,7 +11,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from radarsim.app import readings, run, stored
+from radarsim.app import python, readings, run, stored
 from radarsim.errors import StoreError
 from radarsim.report.claims import NUMBERS, judge, page
 
@@ -61,7 +61,7 @@ def markdown(results: Path = RESULTS) -> str:
 def drawn(app, exception) -> None:
     """The figure of claims beside the page, when it is built as HTML."""
     if exception is None and app.builder.format == "html":
-        run.draw_claims(rows()[0], Path(app.outdir, "docs", FIGURE))
+        python.Claims(rows()[0]).draw(Path(app.outdir, "docs", FIGURE))
 
 
 def main(results: str) -> None:

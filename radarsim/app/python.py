@@ -244,9 +244,16 @@ class Claims(Shown):
 
     def draw(self, path: Out) -> None:
         """Write the figure to a file. Raises ConfigError if the name has no known format or no claim is judged."""
-        from radarsim.app.run import draw_claims
+        from radarsim.app.configs import FORMATS
+        from radarsim.report import files
+        from radarsim.report.figures import save
 
-        draw_claims(self.rows, path)
+        kind, drawn = Path(path).suffix[1:].lower(), self._described
+        if kind not in FORMATS:
+            raise ConfigError(f"{path}: must end in {', '.join(f'.{one}' for one in FORMATS)}")
+        if not drawn:
+            raise ConfigError(f"{path}: no claim is judged here, so there is nothing to draw")
+        files.replace_all(Path(path).parent, {Path(path).name: save(drawn["claims"], (kind,))[kind]})
 
 
 def claims(*names: str, out: Out = RESULTS) -> Claims:

@@ -13,7 +13,7 @@ import sys
 import tempfile
 import time
 import unicodedata
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
@@ -632,20 +632,6 @@ def seconds_per_update(works: Iterable[CaseWork]) -> dict[str, dict[str, float]]
 def finite(value: float) -> float | None:
     """The number, or None where JSON cannot hold it."""
     return value if math.isfinite(value) else None
-
-
-def draw_claims(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[str]) -> None:
-    """Write the forest plot of claims; raises ConfigError for a name that says no format, or where none is judged."""
-    from radarsim.report.claims import page
-    from radarsim.report.figures import save
-
-    kind = Path(path).suffix[1:].lower()
-    if kind not in configs.FORMATS:
-        raise ConfigError(f"{path}: must end in {', '.join(f'.{one}' for one in configs.FORMATS)}")
-    figure = page.figure(rows)
-    if figure is None:
-        raise ConfigError(f"{path}: no claim is judged here, so there is nothing to draw")
-    files.replace_all(Path(path).parent, {Path(path).name: save(figure, (kind,))[kind]})
 
 
 def papers(keys: Collection[str] = ()) -> "list[PaperClaims]":

@@ -88,11 +88,15 @@ class Sensitivity(Shown):
     def _described(self) -> dict[str, Figure]:
         return {"tornado": tornado(self)} if self.rows else {}
 
-    def _said(self) -> list[str]:
-        first, change = self.of[0], self.of[0].changes[0]
-        what = first.place(self.leading, tr) or tr(first.words)
+    @property
+    def title(self) -> str:
+        """What changes, and when."""
+        what = self.of[0].place(self.leading, tr) or tr(self.of[0].words)
         what = " ".join(filter(None, (what, self.at)))
-        lines = [tr("{stem}: change of {component} for +10 %", stem=self.stem, component=what)]
+        return tr("{stem}: change of {component} for +10 %", stem=self.stem, component=what)
+
+    def _said(self) -> list[str]:
+        first, change, lines = self.of[0], self.of[0].changes[0], [self.title]
         for key in dict.fromkeys(row["key"] for row in self.rows):
             own = [row for row in self.rows if row["key"] == key and row["component"] == self.leading]
             each = (

@@ -55,10 +55,7 @@ def print_sensitivity(found: "Sensitivity") -> None:
         cells.append(line)
     heads = [(tr("{kind} of {filter}", kind=of.words, filter=one), of.changed_unit) for of, one in columns_of]
     columns = ["key", *(head if unit == "%" else f"{head}, {tr(unit)}" for head, unit in heads), "value"]
-    what = found.of[0].place(found.leading, tr) or tr(found.of[0].words)
-    what = " ".join(filter(None, (what, found.at)))
-    title = tr("{stem}: change of {component} for +10 %", stem=found.stem, component=what)
-    show(title, columns, cells, right=columns[1:], spare=columns[:1:-1])
+    show(found.title, columns, cells, right=columns[1:], spare=columns[:1:-1])
     if found.without_effect:
         field("no effect", ", ".join(found.without_effect))
     if found.without_estimate:

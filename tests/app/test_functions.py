@@ -67,6 +67,7 @@ def test_sensitivity(study, tmp_path):
     told = document(documents.sensitivity(found))
     shown = printed("sensitivity", config, *case, "-n", 40, "--no-figures", "--out", tmp_path)
     assert told | {"files": shown["files"]} == shown
+    assert found.table["key"].tolist() == [row["key"] for row in shown["rows"]]
     (stored,) = tmp_path.rglob("sensitivity.csv")
     pd.testing.assert_frame_equal(found.table, pd.read_csv(stored), check_dtype=False, rtol=1e-11)
     assert found.figures == ("tornado",)

@@ -42,8 +42,10 @@ def drawn(axes, name):
     return line
 
 
+@pytest.mark.parametrize("order", [1, -1])
 @pytest.mark.parametrize(("figure", "first"), [("gain_r", ["r+Vr"]), ("sigma_r", ["r", "r+Vr"])])
-def test_two_results_on_one_pair_of_axes_are_told_apart(results, figure, first):
+def test_two_results_on_one_pair_of_axes_are_told_apart(results, figure, first, order):
+    results = dict(list(results.items())[::order])
     canvas = Canvas()
     axes = canvas.subplots()
     for result in results.values():
