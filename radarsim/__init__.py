@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from radarsim.app.own_data import fit, read_plots, simulate, track
-    from radarsim.app.python import chart, check, claims, compare, readings, sensitivity, solve
+    from radarsim.app.python import chart, check, claims, compare, load, readings, sensitivity, solve
     from radarsim.app.result import Result
-    from radarsim.app.run import load_result as load
     from radarsim.app.run import run
     from radarsim.errors import ConfigError, RadarsimError
 
@@ -45,10 +44,10 @@ __all__ = [
 ]
 
 _HOMES = {
-    **{"run": "app.run:run", "load": "app.run:load_result", "Result": "app.result:Result"},
+    **{"run": "app.run:run", "Result": "app.result:Result"},
     **{name: f"app.own_data:{name}" for name in ("fit", "read_plots", "simulate", "track")},
-    **{name: f"app.python:{name}" for name in ("chart", "check", "claims", "compare", "readings")},
-    **{name: f"app.python:{name}" for name in ("sensitivity", "solve")},
+    **{name: f"app.python:{name}" for name in ("chart", "check", "claims", "compare")},
+    **{name: f"app.python:{name}" for name in ("load", "readings", "sensitivity", "solve")},
     **{"ConfigError": "errors:ConfigError", "RadarsimError": "errors:RadarsimError"},
 }
 

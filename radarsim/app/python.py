@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from radarsim.app.outlook import Outlook
     from radarsim.app.question import Answer
     from radarsim.app.readings import Readings
+    from radarsim.app.result import Result
     from radarsim.app.sensitivity import Sensitivity
     from radarsim.engine.run import Signals, Stop
     from radarsim.report.drawing import Figure
@@ -27,6 +28,26 @@ if TYPE_CHECKING:
 Figures = bool | str | Sequence[str]  # whether to write figures, or in which formats
 Progress = Callable[[int, int, int], None]
 Out = str | os.PathLike[str]
+
+
+def load(config: Config, *, out: Out = RESULTS, overrides: Overrides = ()) -> "Result":
+    """Load the stored result of an experiment from `out`; computes and writes nothing.
+
+    config and overrides as for `run`; of as many realisations as the last run reported, unless overrides say. `write`
+    of the result makes tables, figures and report, as `radarsim report` does. Raises ConfigError, with the command to
+    run, if something is missing.
+
+    >>> import radarsim, tempfile
+    >>> with tempfile.TemporaryDirectory() as out:
+    ...     ran = radarsim.run("rls2", realisations=2000, out=out, figures=False)
+    ...     loaded = load("rls2", out=out)
+    >>> loaded.curves.equals(ran.curves)
+    True
+    """
+    from radarsim.app import run
+
+    overrides = run.merged(overrides)
+    return run.from_store(run.load(config, overrides), out, overrides)
 
 
 def check(

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from radarsim.app import configs
-from radarsim.app.configs import RESULTS, CaseWork, Config, Overrides, command, load, repeated, shipped
+from radarsim.app.configs import CaseWork, Config, Overrides, command, load, repeated, shipped
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine import run as stopping
 from radarsim.engine.executors import Executor
@@ -484,40 +484,6 @@ def merged(overrides: Overrides, realisations: float | None = None, seed: int | 
     """Overrides as texts, with realisations and seed, where given, as two more."""
     given = {"realisations": realisations, "seed": seed}
     return (*configs.reading.texts(overrides), *(f"{key}={value}" for key, value in given.items() if value is not None))
-
-
-def report(
-    experiment: Experiment,
-    *,
-    out: str | os.PathLike[str],
-    overrides: Sequence[str] = (),
-    figures: bool | str | Sequence[str] = True,
-    width_mm: float | None = None,
-) -> "Result":
-    """Tables, figures and report of a config from what is stored; raises ConfigError where something is missing.
-
-    Where overrides do not say how many realisations, it is as many as the last run reported, else as the config asks.
-    width_mm is the width of the figures' files in place of their own.
-    """
-    result = from_store(experiment, out, overrides)
-    result.write(out, figures, width_mm)
-    return result
-
-
-def load_result(config: Config, *, out: str | os.PathLike[str] = RESULTS, overrides: Overrides = ()) -> "Result":
-    """Load the stored result of an experiment from `out`; computes and writes nothing.
-
-    config and overrides as for `run`. Raises ConfigError, with the command to run, if something is missing.
-
-    >>> import radarsim, tempfile
-    >>> with tempfile.TemporaryDirectory() as out:
-    ...     ran = radarsim.run("rls2", realisations=2000, out=out, figures=False)
-    ...     loaded = radarsim.load("rls2", out=out)
-    >>> loaded.curves.equals(ran.curves)
-    True
-    """
-    overrides = configs.reading.texts(overrides)
-    return from_store(load(config, overrides), out, overrides)
 
 
 def from_store(experiment: Experiment, out: str | os.PathLike[str], overrides: Sequence[str]) -> "Result":

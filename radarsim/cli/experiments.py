@@ -278,12 +278,17 @@ def report(
       radarsim report rls2
       radarsim report rls2 --json --no-figures
     """
+    from radarsim.app import python
     from radarsim.app import run as simulation
 
     overrides = simulation.merged(overrides, realisations, seed)
-    read = partial(simulation.report, out=out, overrides=overrides, **drawing.arguments)
-    loaded = simulation.load_all(configs, overrides)
-    _compute_each(loaded, lambda one, progress: read(experiment=one), out, False, as_json, None)
+
+    def written(one: "Experiment", progress: object) -> "Result":
+        result = python.load(one, out=out, overrides=overrides)
+        result.write(out, **drawing.arguments)
+        return result
+
+    _compute_each(simulation.load_all(configs, overrides), written, out, False, as_json, None)
 
 
 @group.main.command()

@@ -9,8 +9,9 @@ import sys
 import time
 from collections.abc import Sequence
 
+from radarsim.app.configs import RESULTS
 from radarsim.app.reproduce import reproduce, summary
-from radarsim.app.run import RESULTS, load_all
+from radarsim.app.run import load_all
 from radarsim.cli import console
 from radarsim.config import document
 from radarsim.engine.run import Signals

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from radarsim.app import run, stored
+from radarsim.app import python, run, stored
 from radarsim.errors import StoreError
 from tests.program import command
 
@@ -29,7 +29,7 @@ def test_an_altered_verdict_is_refused_and_report_mends_it(out):
         table.write_text(altered)
         with pytest.raises(StoreError, match=r"rls2/claims\.csv: altered since it was written; `radarsim report`"):
             run.claims(["rls2"], out)
-    run.report(run.load("rls2"), out=out, figures=False)
+    python.load("rls2", out=out).write(out, figures=False)
     assert run.claims(["rls2"], out) == rows
 
 
