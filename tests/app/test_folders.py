@@ -182,7 +182,7 @@ def test_a_pipe_in_an_outputs_place_is_refused_and_a_link_replaced(tmp_path):
 
 
 def test_names_that_some_file_systems_take_for_one_are_refused(tmp_path):
-    with pytest.raises(StoreError, match=r"a\.csv and A\.csv are one file"):
+    with pytest.raises(StoreError, match=r"a\.csv and A\.csv are the same file"):
         files.replace_all(tmp_path, {"a.csv": b"", "A.csv": b""})
     assert not list(tmp_path.iterdir())
 
