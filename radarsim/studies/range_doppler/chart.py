@@ -297,14 +297,18 @@ def over_groups(own: Sequence[Place], known: Sequence[Place]) -> Figure:
             marks.append(Note(one.of.C_theta, one.of.Lambda, one.name, "se" if n % 2 else "ne"))
         limits = (float(MAP_C_THETA[0]), float(MAP_C_THETA[-1]))
         rows = (float(MAP_LAMBDA[0]), float(MAP_LAMBDA[-1]))
-        made.append(Panel(Axis("$C_\\theta$", "log", limits), Axis("$\\Lambda$", "log", rows), tuple(marks), tr(name)))
+        across, up = (
+            Axis("$C_\\theta = (\\tau_1/\\Delta t)^2$", "log", limits),
+            Axis("$\\Lambda = (\\Delta t/\\tau_2)^3$", "log", rows),
+        )
+        made.append(Panel(across, up, tuple(marks), tr(name)))
     caption = tr(
         "The limit of a short period is valid where Λ is small; above, a long period changes the gain. "
         "Steady gain of the velocity, in per cent along the lines, over C_θ = (τ₁/Δt)² and Λ = (Δt/τ₂)³. "
         "Full lines: exact, with the scan period included. Dotted: the limit of a short period, c = C_θ "
         "Λ^(2/3)."
     )
-    return Figure("map", tr("What Doppler gains, by period too"), caption, tuple(made), 3, PAGE_MM, 66)
+    return Figure("map", tr("What Doppler gains, by period too"), caption, tuple(made), 3, PAGE_MM, 66, True)
 
 
 def _level_note(places: np.ndarray, level: int) -> list[Mark]:
