@@ -90,8 +90,9 @@ def show_but_alike(
     right: Sequence[str],
     spare: Sequence[str],
 ) -> None:
-    """Print a table without those columns of `alike` that have one value: that stands in the title."""
-    once = {i: rows[0][i] for i, name in enumerate(columns) if name in alike and len({row[i] for row in rows}) == 1}
+    """Print a table without empty columns, and those of `alike` that have one value: that stands in the title."""
+    values = [{row[i] for row in rows} for i in range(len(columns))]
+    once = {i: rows[0][i] for i, own in enumerate(values) if own == {""} or (len(own) == 1 and columns[i] in alike)}
     kept = [i for i in range(len(columns)) if i not in once]
     title = ", ".join(filter(None, dict.fromkeys((title, *once.values()))))
     cells = [[row[i] for i in kept] for row in rows]
@@ -121,7 +122,7 @@ def print_comparison(compared: "Comparison") -> None:
         name = tr("{quantity} of {symbol}", quantity=tr(words), symbol=next(iter(against)))
         other = name if len(against) == 1 else tr("{quantity} against", quantity=tr(words))
         columns = ("", "of", "at", words, other, "change", "exact")
-        show_but_alike("", ("at", "exact"), columns, rows, (*columns[2:5], "exact"), ("exact", "at"))
+        show_but_alike("", ("at",), columns, rows, (*columns[2:5], "exact"), ("exact", "at"))
     for line in compared.sentences if len(counted) > MOST_ROWS else ():
         say(line)
     for line in compared.notes:

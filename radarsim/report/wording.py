@@ -27,6 +27,7 @@ KEPT = re.compile(  # the space between a number and its unit, in any language s
 )
 SPACES = "\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}"  # which a language may put into numbers
 PLAIN = 6  # digits before the point that are still written out
+MOST_NINES = 12  # digits of what is nearly one, or nearly all
 
 
 LABELS = (  # of lines
@@ -59,13 +60,17 @@ def plural(count: int, noun: str) -> str:
 def number(value: float, digits: int = 4) -> str:
     """A number for people at so many digits: 25600, 0.00012, 1.2·10⁻⁷, ∞; nothing for not-a-number.
 
-    >>> [number(one) for one in (25600.0, 1e10, 2.56e7, -0.00005, 0.25)]
-    ['25600', '10¹⁰', '2.56·10⁷', '−5·10⁻⁵', '0.25']
+    What is under one is never said to be one.
+
+    >>> [number(one) for one in (25600.0, 1e10, 2.56e7, -0.00005, 0.25, 0.99999)]
+    ['25600', '10¹⁰', '2.56·10⁷', '−5·10⁻⁵', '0.25', '0.99999']
     """
     if math.isnan(value):
         return ""
     if math.isinf(value):
         return "∞" if value > 0 else "−∞"
+    if 0 < 1 - value < 10.0**-digits:
+        digits = min(-math.floor(math.log10(1 - value)), MOST_NINES)
     mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
     if value == 0 or -4 <= int(exponent) < PLAIN:
         return numeral(f"{float(f'{value:.{digits}g}') + 0.0:.10g}")
@@ -83,6 +88,22 @@ def estimate(values: Iterable[float], unit: str = "", form: str = ".4g") -> str:
     """A value with its unit and its 95 % interval, from the value and the two ends: 12.3 m [12, 12.6]."""
     said, lo, hi = (numeral(format(one, form)) for one in values)
     return f"{' '.join(filter(None, (said, unit)))} {interval(lo, hi)}"
+
+
+def share(value: float, low: float, high: float) -> str:
+    """A share in per cent with its 95 % interval, at as many digits as tell the ends apart, and from none and all.
+
+    >>> share(100, 99.9962, 100), share(94.123, 93.9, 94.3), share(99.99, 99.9885, 99.9915)
+    ('100 % [99.996, 100]', '94.12 % [93.90, 94.30]', '99.990 % [99.989, 99.992]')
+    """
+    given, ends = [round(one, MOST_NINES) for one in (value, low, high)], (0.0, 100.0)
+    for digits in range(2, MOST_NINES):
+        said = [f"{one:.{digits}f}" for one in given]
+        blurred = any((float(text) in ends) != (one in ends) for text, one in zip(said, given, strict=True))
+        if (said[1] != said[2] or low == high) and not blurred:
+            break
+    of, *ends_said = (numeral(f"{one:.0f}" if one in ends else text) for one, text in zip(given, said, strict=True))
+    return f"{of} % {interval(*ends_said)}"
 
 
 def unit(name: str) -> str:

@@ -185,3 +185,15 @@ def test_every_marked_interval_is_marked_on_the_terminal(capsys):
     lines = capsys.readouterr().out.splitlines()[2:]
     found = [re.findall(r"\((.*?)\)", line) for line in lines]
     assert found == [["heavy tails"] * 2, ["marked"] * 2, ["heavy tails"], [], []]
+
+
+def test_a_table_has_no_empty_columns_and_says_once_what_all_rows_have(capsys):
+    """Of one filter there is no gain; of one case and time these stand above."""
+    row = {"case": "a b=1", "component": "x", "t_s": 1.0, "unit": "m", "exact_sigma": math.nan, "note": ""}
+    row |= dict.fromkeys(("gain_percent", "gain_lo", "gain_hi"), math.nan)
+    row |= {"sigma": 1.5, "sigma_lo": 1.0, "sigma_hi": 2.0, "gain_note": math.nan}
+    outcomes.show_rows("a", pd.DataFrame([row | {"filter": name} for name in "fg"]), {"a b=1": "b = 1"})
+    title, head, *lines = capsys.readouterr().out.splitlines()
+    assert title.strip() == "a, b = 1, 1 s"
+    assert head.split() == ["filter", "component", "σ", "95", "%"]
+    assert [line.split()[0] for line in lines] == ["f", "g"]

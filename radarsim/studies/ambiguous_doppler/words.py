@@ -183,7 +183,7 @@ def _right(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str
     if not len(rows):
         return ""
     last = rows.iloc[-1]
-    share = _percent(*(100 * last[key] for key in ("right", "right_lo", "right_hi")))
+    share = wording.share(*(100 * last[key] for key in ("right", "right_lo", "right_hi")))
     return tr("all folds are right in {share} of realisations at scan {k}", share=share, k=last["k"])
 
 
@@ -213,13 +213,13 @@ def _as_good(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> s
         off = tr(
             "at scan {k}, the last, the velocity is off by more than half the span in {share} of realisations",
             k=end["k"],
-            share=_percent(*(100 * last[key] for key in ("beyond", "beyond_lo", "beyond_hi"))),
+            share=wording.share(*(100 * last[key] for key in ("beyond", "beyond_lo", "beyond_hi"))),
         )
         return tr("lost: {off}", off=off) if last["beyond"] > HALF else off
     keys = ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")
     return tr(
         "σ of the velocity is still {above} above that of unfolded velocity at scan {k}, the last",
-        above=_percent(*(float(f"{end[key]:.3g}") for key in keys)),
+        above=wording.estimate((end[key] for key in keys), "%", ".3g"),
         k=end["k"],
     )
 
@@ -235,14 +235,3 @@ def _since(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> int
     rows = _above(result, name, made)
     late = rows["above_oracle_hi"].to_numpy() > AS_GOOD
     return 0 if late[-1] else int(rows["k"].to_numpy()[int(late.nonzero()[0][-1]) + 1 if late.any() else 0])
-
-
-def _percent(value: float, low: float, high: float) -> str:
-    """A percentage at four digits with the ends of its interval at three, or at as many as tell them apart.
-
-    >>> _percent(99.99, 99.985, 99.994), _percent(94.123, 93.9, 94.3)
-    ('99.99 % [99.98, 99.99]', '94.12 % [93.9, 94.3]')
-    """
-    digits = next((n for n in (3, 4, 5) if f"{low:.{n}g}" != f"{high:.{n}g}"), 3)
-    ends = wording.interval(*(numeral(f"{one:.{digits}g}") for one in (low, high)))
-    return f"{numeral(f'{value:.4g}')} % {ends}"

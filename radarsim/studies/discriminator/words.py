@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.language import few, numeral, plural, tr
+from radarsim.language import few, plural, tr
 from radarsim.report import panels, rare, tables, wording
 from radarsim.studies.discriminator.kernels.sums import LOCKS
 from radarsim.studies.discriminator.tables import last_locks
@@ -142,11 +142,8 @@ def _over(results: Sequence[CaseResult], made: Mapping, name: str) -> str:
 
 
 def _lock(row: "pd.Series") -> str:
-    """A share of bursts with its interval; of all or none the bound to as many digits as it has."""
-    value, low, high = (100 * row[name] for name in ("lock_rate", "lock_lo", "lock_hi"))
-    if 0 < value < 100:
-        return wording.estimate((value, low, high), "%", ".2f")
-    return f"{value:.0f} % {wording.interval(numeral(f'{low:.3f}'), numeral(f'{high:.3f}'))}"
+    """A share of bursts with its interval."""
+    return wording.share(*(100 * row[name] for name in ("lock_rate", "lock_lo", "lock_hi")))
 
 
 def _rare(rows: "pd.DataFrame") -> str:

@@ -90,7 +90,7 @@ def _filter(result: Result, made: "Mapping[str, pd.DataFrame]", name: str) -> st
     worst = locks.iloc[int(locks["lock_rate"].to_numpy().argmin())]
     locked = tr(
         "at least {share} of the bursts of a scan lock",
-        share=wording.estimate((100 * worst[key] for key in ("lock_rate", "lock_lo", "lock_hi")), "%"),
+        share=wording.share(*(100 * worst[key] for key in ("lock_rate", "lock_lo", "lock_hi"))),
     )
     last = ideal[ideal["component"] == "r"].iloc[-1]
     if last["over_ideal_hi"] <= ALIKE:
