@@ -195,5 +195,5 @@ def test_a_table_has_no_empty_columns_and_says_once_what_all_rows_have(capsys):
     outcomes.show_rows("a", pd.DataFrame([row | {"filter": name} for name in "fg"]), {"a b=1": "b = 1"})
     title, head, *lines = capsys.readouterr().out.splitlines()
     assert title.strip() == "a, b = 1, 1 s"
-    assert head.split() == ["filter", "component", "σ", "95", "%"]
+    assert head.split() == ["filter", "component", "sigma", "95", "%"]
     assert [line.split()[0] for line in lines] == ["f", "g"]
