@@ -68,9 +68,9 @@ def test_track_and_fit_notice_folded_velocities(flown, tmp_path, monkeypatch):
         assert "advice   --set" not in text
         told = command("fit", "rls2", "folded.csv", *config, code=2)
         assert span in told.stderr
-        assert "to use what the plots tell" not in told.output
+        assert "to use the fitted values" not in told.output
     # A filter of ranges alone has no folds.
-    assert "to use what the plots tell" in command("fit", "rls2", "folded.csv", "--filter", "r", *options()).stdout
+    assert "to use the fitted values" in command("fit", "rls2", "folded.csv", "--filter", "r", *options()).stdout
 
 
 def test_the_command_that_is_named_unfolds_them(flown, tmp_path, monkeypatch):

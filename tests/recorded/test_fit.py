@@ -315,14 +315,14 @@ def test_what_a_turn_costs_is_the_exact_error_in_it():
 def test_advice_of_part_of_the_rows_says_of_which(tmp_path, monkeypatch):
     monkeypatch.setattr(type(follow.recorded_of(loaded().cases[0])), "rows_asked", 40)
     found, followed = advised(tmp_path, recording(np.random.default_rng(5)))
-    assert "this is of the first 40 rows, of 60" in page.likely(followed, found)[-1]
+    assert "from the first 40 rows of 60" in page.likely(followed, found)[-1]
     rows = [row + (f",{name}" if i else ",track")
             for name in "abc" for i, row in enumerate((tmp_path / "advised.csv").read_text().splitlines())
             if i or name == "a"]  # fmt: skip
     (tmp_path / "several.csv").write_text("\n".join(rows))
     followed = follow.follow(loaded(), tmp_path / "several.csv", threads=1)
     said = page.likely(followed, advice.advised(followed))[-1]
-    assert "this is of 39 rows, of 180: the first 13 of each of 3 tracks, of 3" in said
+    assert "from 39 rows of 180: the first 13 of each of 3 tracks out of 3" in said
 
 
 def test_a_fit_of_errors_that_last_says_that_its_intervals_do_not_hold(tmp_path):
@@ -331,7 +331,9 @@ def test_a_fit_of_errors_that_last_says_that_its_intervals_do_not_hold(tmp_path)
         found = fit.fitted(likelihood(columns))
         assert (found.beside and found.beside[0]) == expected
         plots.write_columns(columns, tmp_path / "plots.csv")
-        assert ("the intervals do not hold" in command("fit", "rls2", tmp_path / "plots.csv").stdout) == bool(expected)
+        assert ("the intervals are not valid" in command("fit", "rls2", tmp_path / "plots.csv").stdout) == bool(
+            expected
+        )
 
 
 @pytest.mark.slow
@@ -463,7 +465,7 @@ def test_a_fixed_target_in_two_steps_is_fitted_whatever_the_config_states(tmp_pa
 
 def test_plots_that_tell_no_sigma_are_refused(tmp_path):
     (config,) = load_all(["rls2"], ("manoeuvre_variance=1e-6",))
-    with pytest.raises(ConfigError, match="range_m: must differ between plots, or no σ can be told"):
+    with pytest.raises(ConfigError, match="range_m: must differ between plots, or σ cannot be estimated"):
         fit.fit(config, monitor(tmp_path, 50_000.0), "r")
     with pytest.raises(ConfigError, match=r"robust: \d+ % of the plots would have to be outliers"):
         fit.fit(config, monitor(tmp_path, 50_000.0, 50_007.234375), "r", robust=True)
