@@ -294,16 +294,19 @@ class Expander:
 
     def experiment(self, document: Document) -> Experiment | None:
         """The whole experiment of the top config; None if faults were noted."""
+        over: Over = ()
         for setting in self.common:
             first, *rest = setting.key.split(".", 1)
             if rest and first not in DOTTED:
                 self.faults.add(setting.origin, (), f"{first} has no keys of its own")
+            elif first == "study" and document.data.get("study", setting.value) != setting.value:
+                over = (document.with_data((), {}).graft(("study",), setting.value, setting.origin),)
             else:
                 document = document.graft((first, *rest), setting.value, setting.origin)
-        common, drafts = self._expand(document, (), ())
+        common, drafts = self._expand(document, (), over)
         cases = [case for draft in drafts if (case := self._case(draft))]
         self._refuse_twins(cases, document)
-        self._refuse_mixture(drafts, common, document)
+        self._refuse_mixture(drafts, document)
         self._check_figure_names(common, drafts, document)
         self._check_figures(common, cases, document)
         if self.faults:
@@ -351,23 +354,44 @@ class Expander:
                     f"required key is missing: one of {', '.join(self.studies.names())}",
                 )
             elif common.study is not None:
-                known = self.studies.names()
-                message = f"must be one of {', '.join(known)}{did_you_mean(common.study, known)}"
-                self.faults.add(document.origin(("study",)), ("study",), message, common.study)
+                self._no_such_study(document, common.study)
             return []
-        own = document.without(COMMON_KEYS)
+        own, study = document.without(COMMON_KEYS), common.study
         for one in over:
-            own = overlaid(own, self.studies.keys(common.study), one, self.read, self.faults)
+            own, study = self._carried(own, study, one)
+            own = overlaid(own, self.studies.keys(study), one.without(COMMON_KEYS), self.read, self.faults)
         for setting in self.settings:
-            own = self._placed(own, common.study, setting)
-        own = scenarios_inlined(own, self.studies.keys(common.study), self.read, self.faults)
+            own = self._placed(own, study, setting)
+        own = scenarios_inlined(own, self.studies.keys(study), self.read, self.faults)
         stem = composed(document.file.stem) if document.file else "config"
-        return [Draft(own, stem, common.study, (), common.realisations, common.seed)]
+        return [Draft(own, stem, study, (), common.realisations, common.seed)]
+
+    def _no_such_study(self, document: Document, name: str) -> None:
+        known = self.studies.names()
+        message = f"must be one of {', '.join(known)}{did_you_mean(name, known)}"
+        self.faults.add(document.origin(("study",)), ("study",), message, name)
+
+    def _carried(self, document: Document, study: str, over: Document) -> tuple[Document, str]:
+        """A config of one study carried over to that which stands beside `include`, if one does, and its study."""
+        wanted = over.data.get("study", study)
+        if wanted == study:
+            return document, study
+        if not self.studies.has(wanted):
+            self._no_such_study(over, wanted)
+            return document, study
+        data = self.studies.keys(wanted).carried(study, document.data)
+        if data is None:
+            takers = [one for one in self.studies.usable() if self.studies.keys(one).carried(study, {}) is not None]
+            further = f", or one that takes over its keys: {', '.join(takers)}" if takers else ""
+            message = f"must be that of the config, {study}{further}"
+            self.faults.add(over.origin(("study",)), ("study",), message, wanted)
+            return document, study
+        return document.with_data((), data), wanted
 
     def _included(self, document: Document, common: Common, chain: tuple[FilePath, ...], over: Over) -> list[Draft]:
         """The drafts of all included configs, with the keys that stand beside `include` laid over each."""
-        if changes_included(document):
-            over = (document.without(COMMON_KEYS), *over)
+        if changes_included(document) or common.study is not None:
+            over = (document.without(set(COMMON_KEYS) - {"study"}), *over)
         chain = (*chain, document.file.resolve()) if document.file else chain
         drafts: list[Draft] = []
         for i, name in enumerate(common.include or ()):
@@ -511,14 +535,11 @@ class Expander:
                 self.faults.add(document.origin(key), key, f"makes the case {one_line(case.name)!r} twice")
             seen.add(case.name)
 
-    def _refuse_mixture(self, drafts: list[Draft], common: Common, document: Document) -> None:
+    def _refuse_mixture(self, drafts: list[Draft], document: Document) -> None:
         studies = {draft.study for draft in drafts}
         if len(studies) > 1:
             message = f"one study a run, these are of {', '.join(sorted(studies))}"
             self.faults.add(document.origin(("include",)), ("include",), message)
-        elif common.study is not None and studies - {common.study}:
-            message = f"must be that of the included configs, {', '.join(studies)}"
-            self.faults.add(document.origin(("study",)), ("study",), message, common.study)
 
     def _check_figure_names(self, common: Common, drafts: list[Draft], document: Document) -> None:
         """A figure must be one that the study may draw, where its schema says which these are."""

@@ -482,6 +482,12 @@ class Study(Model):
     figure_names: ClassVar[tuple[str, ...] | None] = None
     in_place_of: ClassVar[Mapping[str, str]] = {}
 
+    @classmethod
+    def carried(cls, study: str, data: Mapping[str, Any]) -> dict[str, Any] | None:
+        """The keys of a config of another study, as read, in this study's terms: the same experiment as far as both
+        have it, what this one has not as it stands, so that the check refuses it; None where no study is taken over."""
+        return None
+
     @property
     def device(self) -> str | None:
         """The display name of what measures: of the first part of the config that has a name."""

@@ -1,9 +1,9 @@
 """Keys of the ambiguous_doppler study: a radar whose velocity folds, a target in range, filters that unfold."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -20,6 +20,7 @@ from radarsim.config.fields import (
     Design,
     Display,
     FlyBy,
+    Lasting,
     Members,
     Model,
     Name,
@@ -30,7 +31,6 @@ from radarsim.config.fields import (
     Probability,
     Recorded,
     Scenario,
-    Study,
     Turn,
     Whole,
     at,
@@ -49,6 +49,8 @@ MOST_RATIO = 1000  # whole numbers that two repetition rates must be to each oth
 PROPORTION = 1e6  # largest ratio of what the prior leaves open to what a plot tells: beyond, rounding shows
 MOST_FOLDS = 1e4  # spans in a standard deviation of the prior: the first scan has so many folds to look at
 DISTINCT = 1e-9  # relative difference from which two spans are two
+BIASES = ("bias_range_m", "bias_velocity_mps", "sigma_bias_range_m", "sigma_bias_velocity_mps")  # of range_doppler
+KNOWN_FOLDS = "with known folds"  # after a filter's name
 LISTED = {"doppler": "folded", "merge": "never"}  # filters that keep several hypotheses
 
 Order = Annotated[int, Whole(0, 2)]
@@ -257,6 +259,16 @@ class Filter(Model):
             yield at("combine", "has no doppler: remainder, which unfolds for one order")
 
 
+def _carried_filter(one: Any) -> Any:
+    """A filter of range_doppler, as read, as one of this study; what this study cannot say is left as it is."""
+    use = {("range",): "none", ("range", "velocity"): "folded"}
+    if not isinstance(one, dict) or not isinstance(observed := one.get("observes"), list | tuple):
+        return one
+    told = {"observes": None, "initial_scans": None, "kind": "kalman", "process_noise": "random_jerk"}
+    kept = {name: value for name, value in one.items() if name not in told or told[name] not in (None, value)}
+    return {**kept, "doppler": use.get(tuple(observed), observed)}
+
+
 class RareFolds(fields.RareEvent):
     """Wrong folds that are rare: realisations shifted towards them, and weights that make up for it."""
 
@@ -267,7 +279,7 @@ class RareFolds(fields.RareEvent):
         return self.filter
 
 
-class Keys(Study):
+class Keys(Lasting):
     """Folded Doppler: what it is worth, and how many scans it takes."""
 
     figure_names = (
@@ -277,6 +289,7 @@ class Keys(Study):
         "hypotheses",
         "orders",
     )
+    most_scans: ClassVar[int] = MOST_SCANS
 
     radar: Radar = key("radar", "the radar")
     target: Annotated[Target, Scenario()] = key("target", "the target: a scenario's stem, or inline")
@@ -287,7 +300,12 @@ class Keys(Study):
     baseline: Baseline = key(
         "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
     )
-    scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = key("number of scans", "number of scans")
+    scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = key(
+        "number of scans", "number of scans; or give duration_s", None
+    )
+    duration_s: Annotated[Positive | None, Design(), Added()] = key(
+        "duration", "time from the first scan to the last, s, in place of scans: to the last scan within it", None
+    )
     rare: Annotated[RareFolds | None, Design(), Added()] = key(
         "rare wrong folds",
         "importance sampling of wrong folds, for filters that are almost always right: rare.csv",
@@ -296,15 +314,32 @@ class Keys(Study):
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
-        """The target with its spreads written out."""
+        """The number of scans, and the target with its spreads, written out."""
+        whole = {"scans": self.plots, "duration_s": None}
         if not isinstance(self.target, RandomPolynomial):
-            return self
+            return self.model_copy(update=whole)
         own = {
             name: getattr(self.prior, name)
             for name in ("sigma_velocity_mps", "sigma_acceleration_mps2")
             if getattr(self.target, name) is None
         }
-        return self.model_copy(update={"target": self.target.model_copy(update=own)}) if own else self
+        return self.model_copy(update=whole | {"target": self.target.model_copy(update=own)})
+
+    @classmethod
+    def carried(cls, study: str, data: Mapping[str, Any]) -> dict[str, Any] | None:
+        """A config of range_doppler: filters with velocity take it folded, and one is added that knows the folds of the
+        first of them. They start by the prior in place of least squares."""
+        if study != "range_doppler":
+            return None
+        carried, filters = dict(data), data.get("filters")
+        if isinstance(radar := data.get("radar"), dict):
+            carried["radar"] = {name: value for name, value in radar.items() if name not in BIASES or value != 0}
+        if isinstance(filters, list):
+            made = [_carried_filter(one) for one in filters]
+            folded = [one for one in made if isinstance(one, dict) and one.get("doppler") == "folded"]
+            known = [one | {"name": f"{one.get('name')} {KNOWN_FOLDS}", "doppler": "unfolded"} for one in folded[:1]]
+            carried["filters"] = [*made, *known]
+        return carried
 
     @cross_check
     def _prior_in_proportion(self) -> Iterator[At]:
@@ -320,7 +355,7 @@ class Keys(Study):
 
     @cross_check
     def _range_resolved(self) -> Iterator[At]:
-        radar, prior, last = self.radar, self.prior, (self.scans - 1) * self.radar.scan_period_s
+        radar, prior, last = self.radar, self.prior, (self.plots - 1) * self.radar.scan_period_s
         if prior.sigma_acceleration_mps2 * radar.scan_period_s > PROPORTION * radar.sigma_velocity_mps:
             few = f"{PROPORTION:g} times the velocity's accuracy a scan period"
             yield at("prior.sigma_acceleration_mps2", f"must be at most {few}")
@@ -358,8 +393,8 @@ class Keys(Study):
             yield at("rare.filter", f"must be the name of a filter of one order that lists its folds: {names}")
         if self.radar.detection_probability < 1:
             yield at("rare", "needs every plot: radar.detection_probability 1")
-        if self.scans > MOST_RARE_SCANS:
-            yield at("rare", f"needs at most {MOST_RARE_SCANS} scans, got {self.scans}")
+        if self.plots > MOST_RARE_SCANS:
+            yield at("rare", f"needs at most {MOST_RARE_SCANS} scans, got {self.plots}")
 
     @cross_check
     def _variances_in_proportion(self) -> Iterator[At]:

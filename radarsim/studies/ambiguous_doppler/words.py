@@ -8,6 +8,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.language import listed, numeral, plural, tr
 from radarsim.report import panels, rare, tables, wording
+from radarsim.studies.ambiguous_doppler.search import TRIED, cures
 from radarsim.studies.ambiguous_doppler.tables import Result
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def answer(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> lis
     shown, others = panels.reported(results, 6)
     sentences = [sentence for result in shown for sentence in _sentences(result, made)]
     first = [*_least_of_all(results, made), *_of_all(results, made)]
-    return [*first[:1], *sentences, *others]
+    return [*first[:1], *sentences, *_cures(shown, made), *others]
 
 
 def _largest(result: Result, made: "Mapping[str, pd.DataFrame]") -> "pd.DataFrame":
@@ -124,6 +125,24 @@ def _of_all(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> li
             worst=max(found[name])[2],
         )
     ]
+
+
+def _cures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> list[str]:
+    """What helps the first filter that is lost, where something does of what is tried."""
+    for result in results:
+        for name in _told_of(result):
+            folds = tables.where(made["folds"], case=result.name, filter=name)
+            if not len(folds) or folds.iloc[-1]["beyond"] <= HALF:
+                continue
+            shares = [
+                tr("{settings} ({share} % lost)", settings=settings, share=numeral(f"{100 * share:.2g}"))
+                for settings, share in cures(result.spec, name)
+            ]
+            if not shares:
+                return []
+            told = {"case": panels.plain_label(result), "filter": name, "cures": "; ".join(shares), "count": TRIED}
+            return [tr("{case}, {filter}: what helps, tried on {count} realisations: {cures}.", **told)]
+    return []
 
 
 def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
