@@ -248,7 +248,7 @@ def test_a_link_unfolds_what_it_leads_to(page, results, kind):
 
 STUDIES = (  # a config of each study, and of each part of the sonar's
     *("rls2", "range_doppler", "multimodel_1hz", "sonar_asynchronous", "sonar_manoeuvre", "sonar_clutter"),
-    *("discriminator", "pulses", "ambiguous", "multimodel"),
+    *("discriminator", "pulses", "ambiguous", "multimodel", "rls2_manoeuvres"),
 )
 
 
