@@ -25,6 +25,7 @@ WIDE_MM = 120.0  # one panel of many lines
 MOST_AT_ENDS = 6  # lines of one panel named at their ends; more by colour and dash
 MOST = 8  # cases of a panel; more are named in its caption
 MOST_PANELS = 12
+NEAR_ONE = 0.999  # probabilities from here on differ in their further digits
 RARE = 0.1  # of a share: what is lost of it, below which it is drawn by its logarithm
 MOST_GONE = 8  # names of what a figure leaves out
 WIDE = 20  # largest over least value from which an axis is logarithmic
@@ -64,7 +65,7 @@ def number(value: object, powers: bool = False) -> str:
         and (power >= (2 if powers else LONG) or power < (0 if powers else -1))
     ):
         return power_of_ten(power)
-    return wording.number(value)
+    return wording.number(value, 6 if NEAR_ONE < value < 1 else 4)
 
 
 def in_short(value: object, among: Sequence[object]) -> object:
