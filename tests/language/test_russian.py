@@ -4,12 +4,13 @@ import html
 import re
 
 import pytest
+from making import messages
 
 from radarsim import language
 from radarsim.app import result as output
 from radarsim.app.run import run
 from radarsim.config.document import SHIPPED
-from radarsim.language import called, speaking
+from radarsim.language import called, speaking, tr
 from radarsim.report.drawing import Figure
 from radarsim.report.tables import to_csv
 from radarsim.studies import registry
@@ -69,6 +70,7 @@ def latin(words: str, stems: set[str]) -> list[str]:
     return [word for word in re.findall(r"[A-Za-z][A-Za-z\d]+", bare) if word not in SYMBOLS | stems]
 
 
+LONG = re.compile("[A-Za-z]{3,}")
 UNPARTED = re.compile(r"\[[^];]*\d,\d[^];]*, ")  # an interval of decimal commas that only commas part
 
 
@@ -137,6 +139,16 @@ def test_the_check_sees_what_is_latin(said, left):
     assert latin(said, {"rls2"}) == left
     assert UNPARTED.search("12 % [10,5, 21]")
     assert not UNPARTED.search("12 % [10,5; 21]")
+
+
+def test_claims_are_in_russian_words():
+    """Statements, what their parts measure and how they are read; what is typed stands in quotes or as `a_key`."""
+    with speaking("ru"):
+        said = {text: tr(text) for text, _, _ in messages.in_claims() if text}
+    assert len(said) > 300
+    kept = {"phi"}
+    left = {text: found for text, words in said.items() if (found := [*filter(LONG.fullmatch, latin(words, kept))])}
+    assert left == {}
 
 
 def test_names_of_a_config_are_said_as_whole_words_alone():
