@@ -8,6 +8,7 @@ from making import messages
 
 from radarsim import language
 from radarsim.app import result as output
+from radarsim.app.configs import load
 from radarsim.app.run import run
 from radarsim.config.document import SHIPPED
 from radarsim.language import called, speaking, tr
@@ -139,6 +140,23 @@ def test_the_check_sees_what_is_latin(said, left):
     assert latin(said, {"rls2"}) == left
     assert UNPARTED.search("12 % [10,5, 21]")
     assert not UNPARTED.search("12 % [10,5; 21]")
+
+
+def test_all_names_of_shipped_configs_are_in_russian_and_no_others():
+    """No config is run: what its cases call things; a name that no config gives any more has no translation."""
+    with speaking("ru"):
+        names = output.names_in(case for stem in ALL for case in load(stem).cases)
+    labels = {one.id for one in language.messages("ru") if one.context == language.LABEL}
+    assert labels - names == set()
+    given = {own.name for stem in ALL for case in load(stem).cases for own in listed_in(case.spec)}
+    given |= {case.spec.device for stem in ALL for case in load(stem).cases if case.spec.device}
+    assert {name for name in given - labels if latin(name, set())} == set()
+
+
+def listed_in(spec):
+    """What has a name in a case: filters, detectors, estimators."""
+    for key in ("filters", "detectors", "estimators"):
+        yield from getattr(spec, key, None) or ()
 
 
 def test_claims_are_in_russian_words():
