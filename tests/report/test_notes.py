@@ -140,7 +140,7 @@ def test_what_is_said_above_an_answer_is_of_the_intervals_that_it_gives():
     assert not notes.of_intervals(results, made, [given(0, 59, 80)])
     (line,) = notes.of_intervals(results, made, [given(0, 14, 80)])
     assert line.startswith("1 interval of the answer is too narrow")
-    assert "(f): -n 2e4 would do" in line  # 5000 × 100/30
+    assert "(f): run with -n 2e4" in line  # 5000 × 100/30
     (line,) = notes.of_intervals(results, made, [given(14), given(15, 26, 27)])
     assert line.startswith("3 intervals of the answer are too narrow")
     (line,) = notes.of_intervals([SimpleNamespace(name="a", count=FEW - 1)], made, [given(14)])
