@@ -1,7 +1,8 @@
 """Positions of aircraft and plots in CSV: transponder data (OpenSky and its like) and spreadsheets of one's own.
 
 Columns are found by their names, whatever the case and the spaces; a unit may stand at the end of a name (`range_km`,
-`Altitude [ft]`). Times are seconds from 1970, or ISO 8601 with or without a zone (UTC is taken where there is none).
+`Altitude [ft]`). Times are seconds from 1970, times of day (which run on after midnight), dates as
+`20.11.2026 10:00:00,01` or ISO 8601, with or without a zone (UTC is taken where there is none).
 Cells are parted by commas, semicolons or tabulators, whatever the header has most of; parted by other than commas,
 numbers may have a decimal comma.
 
@@ -63,6 +64,9 @@ STILL_MPS = 1.0  # below it a position may be the same again
 NAMES_AT_MOST = 10_000  # different cells by which a column may name aircraft
 HIGHEST_M = 20_000.0  # of an aircraft; higher altitudes are feet
 DELIMITERS = ",;\t"
+OF_DAY = re.compile(r"(\d{1,2}):(\d\d)(?::(\d\d)(?:[.,:](\d+))?)?")
+DATED = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[ T]+(\S+)")
+TIMES = "a time of day, ISO 8601 or DD.MM.YYYY and a time"
 UNIT = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]$")
 
 
@@ -72,6 +76,24 @@ class Column:
     def __init__(self, place: int, name: str, factor: float, unit: str):
         """unit: that which was taken though the name has none."""
         self.place, self.name, self.factor, self.unit = place, name, factor, unit
+
+
+def _second_of_day(found: re.Match) -> float:
+    """The time that OF_DAY has found, s after midnight; raises ValueError where a day has none such."""
+    hours, minutes, seconds, fraction = found.groups(default="0")
+    if int(hours) > 23 or int(minutes) > 59 or int(seconds) > 60:
+        raise ValueError(found[0])
+    return 3600 * int(hours) + 60 * int(minutes) + float(f"{int(seconds)}.{fraction}")
+
+
+def _written_s(text: str) -> float:
+    """Seconds from 1970 of a date and time, `20.11.2026 10:00:00` or ISO 8601; raises ValueError."""
+    if not (found := DATED.fullmatch(text)):
+        return sites.utc_s(text)
+    day, month, year, clock = found.groups()
+    if not (time := OF_DAY.fullmatch(clock)):
+        raise ValueError(text)
+    return sites.utc_s(f"{year}-{int(month):02}-{int(day):02}") + _second_of_day(time)
 
 
 def split(name: str) -> tuple[str, str]:
@@ -195,7 +217,7 @@ class Table:
         if missing := [name for name in wanted if name not in self.columns]:
             hints = "; ".join(f"{name}: {', '.join(NAMES[name])}" for name in missing)
             got = ", ".join(name.strip() for name in header)[:200] or "nothing"
-            what = "columns of time, and of latitude and longitude or of range"
+            what = "columns of time, and of latitude and longitude or of range (name them: --column OURS=THEIRS)"
             raise ConfigError(f"{self.path}:1: must have {what}; missing ({hints}); got {got}")
 
     def batches(self) -> Iterator[sites.Batch]:
@@ -267,9 +289,11 @@ class Table:
         except ValueError:
             pass
         try:
-            return sites.utc_s(text)
+            if day := OF_DAY.fullmatch(text):
+                return self.clock(_second_of_day(day))
+            return _written_s(text)
         except ValueError:
-            self._fault("t_s", f"must be a time in s or ISO 8601, got {text[:60]!r}")
+            self._fault("t_s", f"must be a time in s, {TIMES}, got {text[:60]!r}")
             return math.nan
 
     def _number(self, cells: list[str], name: str) -> float:

@@ -448,7 +448,10 @@ def test_names_and_units():
     [
         ("a,b\n1,2\n", "recording:1: must have columns of time, and of latitude and longitude or of range"),
         ("time,range\n1,x\n2,3\n3,y\n", "recording:2:2: range: must be a number, got 'x'"),
-        ("time,range\nnoon,5\n", "recording:2:1: time: must be a time in s or ISO 8601, got 'noon'"),
+        (
+            "time,range\nnoon,5\n",
+            "recording:2:1: time: must be a time in s, a time of day, ISO 8601 or DD.MM.YYYY and a time, got 'noon'",
+        ),
         ("time,range\n1\n", "recording:2: must have 2 cells as the header, got 1"),
         ("time,range_parsec\n1,2\n", "recording:1: must have columns of time"),
         ("time,range [parsec]\n1,2\n", "the unit must be one of m, s, mps"),
@@ -698,3 +701,20 @@ def test_spoiled_files(tmp_path):
 @pytest.mark.slow
 def test_many_spoiled_files(tmp_path):
     fuzz(tmp_path, 10_000, 2)
+
+
+@pytest.mark.parametrize(
+    ("times", "expected"),
+    [
+        (("10:00:00,01", "10:00:04,51"), 4.5),
+        (("23:59:58.5", "00:00:02.25"), 3.75),
+        (("20.11.2026 23:59:58", "21.11.2026 00:00:02,5"), 4.5),
+    ],
+)
+def test_times_as_people_write_them(tmp_path, times, expected):
+    """A time of day runs on after midnight; a date says its day first."""
+    source, plots = tmp_path / "log.csv", tmp_path / "plots.csv"
+    source.write_text("Time;Range [km]\n" + "".join(f"{time};{20 + i},5\n" for i, time in enumerate(times)))
+    import_recording(str(source), str(plots), Options("csv"))
+    rows = list(csv.DictReader(line for line in plots.read_text().splitlines() if not line.startswith("#")))
+    assert [float(row["t_s"]) for row in rows] == pytest.approx([0.0, expected], abs=1e-6)
