@@ -14,6 +14,9 @@ def argument(name: str, option: str = "") -> str:
     return (option or f"--{name}") if ON_COMMAND_LINE.get() else name
 
 
+OF_AUTHORS = Exception, SystemExit  #: what code that is not radarsim's may raise: a package may call sys.exit
+
+
 class RadarsimError(Exception):
     """Any fault that is reported to the user; `lines` are printed one to a line."""
 

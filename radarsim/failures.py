@@ -17,7 +17,7 @@ from pathlib import Path
 from types import CodeType
 from typing import Any, NamedTuple
 
-from radarsim.errors import ConfigError, RadarsimError
+from radarsim.errors import OF_AUTHORS, ConfigError, RadarsimError
 
 LIBRARIES = (*(sysconfig.get_path(name) for name in ("stdlib", "platstdlib")), str(Path(__file__).parent))
 COMPILING = re.compile(r"Failed in |-+$|\[\d\] |During: ")  # lines of a compiler's message that say where it was
@@ -111,7 +111,7 @@ def call(function: Callable[..., Any], *arguments: Any, of: str = "") -> Any:
         return function(*arguments)
     except ConfigError:
         raise
-    except (Exception, SystemExit) as error:
+    except OF_AUTHORS as error:
         at = place(error, function=function)
         if at is None:
             raise fault(function, words(error), of=of) from error

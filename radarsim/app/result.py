@@ -22,7 +22,7 @@ from radarsim.app.stored import classes_of
 from radarsim.config.experiment import DRAWN_FOR_ALL, Case, Experiment, matches
 from radarsim.engine import store
 from radarsim.engine.results import CaseResult
-from radarsim.errors import DisagreementError, MeasureError, RadarsimError
+from radarsim.errors import OF_AUTHORS, DisagreementError, MeasureError, RadarsimError
 from radarsim.language import ENGLISH, called, current, few, plural, tr
 from radarsim.report import claims, files, notes, seen
 from radarsim.report import tables as common
@@ -495,7 +495,7 @@ def write_files(
         question = asked(experiment)
     except RadarsimError:
         raise
-    except (Exception, SystemExit):  # of a package's figures or words: the tables do not depend on them
+    except OF_AUTHORS:  # of a package's figures or words: the tables do not depend on them
         files.replace_all(folder, contents, stale=files.outputs)
         raise
     if draw:

@@ -15,7 +15,7 @@ import click
 
 import radarsim
 from radarsim import language
-from radarsim.errors import ON_COMMAND_LINE, ConfigError, Interrupted, RadarsimError, StoreError
+from radarsim.errors import OF_AUTHORS, ON_COMMAND_LINE, ConfigError, Interrupted, RadarsimError, StoreError
 from radarsim.threads import limited
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class Commands(click.Group):
             sys.stdout = open(os.devnull, "w")  # noqa: SIM115
             what = f"{error.filename}: cannot be read or written" if error.filename else "output: cannot be written"
             fail(StoreError(f"{what}: {error.strerror or error}"))
-        except (Exception, SystemExit) as error:  # a study may call sys.exit
+        except OF_AUTHORS as error:
             if str(error) == NO_THREAD:
                 fail(ConfigError("no thread can be started here; --threads 0 needs none"))
             from radarsim.studies.registry import fault_of

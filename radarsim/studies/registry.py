@@ -23,7 +23,7 @@ from radarsim.config.experiment import Case
 from radarsim.config.fields import Study as Keys
 from radarsim.config.fields import kinds_of, widened
 from radarsim.config.schema import COMMON_KEYS
-from radarsim.errors import ConfigError, RadarsimError, StudyError
+from radarsim.errors import OF_AUTHORS, ConfigError, RadarsimError, StudyError
 from radarsim.report.quantities import Quantity
 from radarsim.studies.interface import Study
 
@@ -85,9 +85,7 @@ def _loaded(name: str) -> Study | ConfigError:
     (entry,) = packages.values()
     try:
         found = entry.load()
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # a package may fail in any way of its own, also by sys.exit
+    except OF_AUTHORS as error:
         return _fault(name, f"cannot be loaded: {failures.summary(error)}")
     if not isinstance(found, Study):
         return _fault(name, f"must offer a radarsim.studies.interface.Study, got {type(found).__name__}")
@@ -111,9 +109,9 @@ def part(name: str, take: Callable[[Study], Part]) -> Part:
         return take(one)
     try:
         return take(one)
-    except (RadarsimError, KeyboardInterrupt):
+    except RadarsimError:
         raise
-    except BaseException as error:
+    except OF_AUTHORS as error:
         raise _fault(name, f"fails: {failures.summary(error)}") from error
 
 
@@ -303,7 +301,7 @@ def _filter(kind: str, entry: EntryPoint) -> tuple[Any, str]:
     """The keys of a filter that a package offers, and what is wrong with it; nothing, if it can be used."""
     try:
         found = entry.load()
-    except Exception as error:  # a package may fail in any way of its own
+    except OF_AUTHORS as error:
         return None, f"which cannot be loaded: {failures.summary(error)}"
     name = str(getattr(found, "study", None))
     base = study(name).own_filters() if name in SHIPPED else None

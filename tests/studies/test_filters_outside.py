@@ -26,6 +26,7 @@ class Own(GivenGains):
 )
 PACKAGES = {  # kind: source of its module, why it cannot be used
     "mine": ("import no_such_thing", "which cannot be loaded: ModuleNotFoundError: No module named 'no_such_thing'"),
+    "leaving": ("raise SystemExit('no licence')", "which cannot be loaded: SystemExit: no licence ("),
     "seven": ("Own = 7", "for the study None, which takes no filters of packages: range_doppler does"),
     "deep": (CLASS.format(kind="deep", body="pass") + "    study = 'sonar'\n", "for the study sonar, which takes no "),
     "loose": (

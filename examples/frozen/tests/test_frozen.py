@@ -67,7 +67,7 @@ def test_recorded_plots_are_filtered_as_a_textbook_does(uneven, last):
 
 
 def test_keys_are_those_of_the_filter():
-    with pytest.raises(radarsim.ConfigError, match=r"filters\.2\.freeze_at: unknown key; did you mean freeze_after"):
+    with pytest.raises(radarsim.ConfigError, match=r"freeze_at.*: unknown key; did you mean freeze_after"):
         load(CONFIG, ["filters.2.freeze_at=3"])
-    with pytest.raises(radarsim.ConfigError, match="detection_probability: must be 1 with filter frozen"):
+    with pytest.raises(radarsim.ConfigError, match=r"detection_probability.*: must be 1 with filter frozen"):
         load(CONFIG, ["radar.detection_probability=0.9"])

@@ -55,7 +55,7 @@ from radarsim.config.document import KeyPath as Keys
 from radarsim.config.fields import Anything, Flag, Model, Name, Stem
 from radarsim.config.load import parse, read
 from radarsim.engine.results import CaseResult
-from radarsim.errors import ConfigError, MeasureError, RadarsimError
+from radarsim.errors import OF_AUTHORS, ConfigError, MeasureError, RadarsimError
 from radarsim.language import term, tr
 from radarsim.report.claims import rule
 from radarsim.report.claims.declared import Claim, Evidence, Missing, NoSuchName, PaperClaims, Part, certain
@@ -467,7 +467,7 @@ class Call:
                 found = getattr(seen, self.name)(*self.cases, **self.arguments)
             else:
                 found = self.function(seen, *self.cases, **self.arguments)
-        except (Exception, SystemExit) as error:
+        except OF_AUTHORS as error:
             other = isinstance(error, RadarsimError) and not isinstance(error, ConfigError)
             if other or (isinstance(error, Missing | Unreadable) and not self._misspelt(error)):
                 raise

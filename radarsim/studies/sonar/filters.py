@@ -176,7 +176,9 @@ def window_weights(plots: Plots, k: int, length: int, size: int) -> tuple[int, n
     since = (plots.t[first : k + 1] - plots.t[k]) / plots.period
     A = np.stack([np.ones_like(since), since, since**2 / 2], axis=1)
     times = Plots(plots.t[first : k + 1], w, plots.period, plots.sigma).moments()[:, -1]
-    P = unpack(steps.leading_inverse(pack(np.einsum("mn,ni,nj->mij", w, A, A)), np.minimum(times, size)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        P = unpack(steps.leading_inverse(pack(np.einsum("mn,ni,nj->mij", w, A, A)), np.minimum(times, size)))
+    P[~np.isfinite(P).all(axis=(1, 2))] = 0.0  # weights so unequal that one plot alone counts: no rate is known
     scale = plots.period ** -np.arange(3.0)
     weights = np.einsum("i,mij,nj,mn->min", scale, P, A, w)
     return first, weights, P * plots.sigma**2 * np.outer(scale, scale)

@@ -83,3 +83,11 @@ def test_walk_of_velocity_by_both_ways_of_reckoning():
     C = world.error_covariance(np.full(9, 30.0), 0.0, t, 5.0)
     _, other = exact.weighted_errors(W, first, t, truth, C, walk, first)
     assert S[0, 8] == pytest.approx(other[0], rel=1e-9)
+
+
+@pytest.mark.filterwarnings("error")
+def test_plots_of_which_one_alone_counts_give_no_rate():
+    plots = filters.Plots(np.array([0.0, 0.5, 1.0]), np.array([[1e-40, 1.0, 0.0]]), 1.0, 30.0)
+    _, W, P = filters.window_weights(plots, 2, 5, 2)
+    assert not W.any()
+    assert not P.any()
