@@ -4,6 +4,7 @@ Records are read, placed and written some at a time, so that memory does not gro
 held, as it must be looked up by time. The file is there whole or not at all.
 """
 
+import codecs
 import datetime
 import io
 import math
@@ -90,6 +91,27 @@ class Imported:
     columns: tuple[str, ...] = ()
 
 
+NAMED = {"utf-16": "UTF-16", "cp1252": "Windows-1252"}  # encodings beside UTF-8 that spreadsheets write
+
+
+def encoding_of(path: str | os.PathLike) -> str:
+    """The encoding of a text file: UTF-16 by its mark, else UTF-8, or Windows-1252 where it is no UTF-8."""
+    if not os.path.isfile(path):  # a stream is read once
+        return "utf-8-sig"
+    with open(path, "rb") as file:
+        if file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+            return "utf-16"
+        file.seek(0)
+        decoder = codecs.getincrementaldecoder("utf-8")()
+        try:
+            while piece := file.read(1 << 20):
+                decoder.decode(piece)
+            decoder.decode(b"", final=True)
+        except UnicodeDecodeError:
+            return "cp1252"
+    return "utf-8-sig"
+
+
 @contextmanager
 def opened(path: str, options: Options, truth: bool = False) -> Iterator[tuple[Format, Reader]]:
     """The reader of a recording, by the format that is asked for or that its first bytes show; raises ConfigError.
@@ -104,8 +126,9 @@ def opened(path: str, options: Options, truth: bool = False) -> Iterator[tuple[F
             elif kind == "ais":
                 yield kind, Ais(path, file)
             else:
-                text = io.TextIOWrapper(file, encoding="utf-8-sig", newline="")
-                yield kind, Table(path, text, options.columns)
+                encoding = encoding_of(path)
+                text = io.TextIOWrapper(file, encoding=encoding, newline="")
+                yield kind, Table(path, text, options.columns, NAMED.get(encoding, ""))
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: is not UTF-8 text") from error
     except OSError as error:

@@ -718,3 +718,13 @@ def test_times_as_people_write_them(tmp_path, times, expected):
     import_recording(str(source), str(plots), Options("csv"))
     rows = list(csv.DictReader(line for line in plots.read_text().splitlines() if not line.startswith("#")))
     assert [float(row["t_s"]) for row in rows] == pytest.approx([0.0, expected], abs=1e-6)
+
+
+@pytest.mark.parametrize(("encoding", "name"), [("utf-8", ""), ("cp1252", "Windows-1252"), ("utf-16", "UTF-16")])
+def test_encodings_that_spreadsheets_write(tmp_path, encoding, name):
+    text = "t_s;range [km];azimuth [°];Höhe\n0;20,5;45;1\n4;21,5;46;2\n"
+    done, columns, _ = imported(tmp_path, text.encode(encoding), Options("csv"))
+    assert columns["bearing_rad"] == pytest.approx(np.radians([45, 46]), rel=1e-9)
+    assert [note for note in done.notes if "read as" in note] == (
+        [f"the text is read as {name}, as it is not UTF-8"] if name else []
+    )
