@@ -35,7 +35,6 @@ LONG = 5  # powers of ten from this one on are written raised
 NEAR_ZERO = 1e-5  # of the largest σ: below it a logarithmic axis would show rounding
 WIDEST_BAND, LOG_MARGIN, MARGIN = 2.0, 1.12, 0.05  # of a shared axis: how far bands count, and room at its ends
 LOSS = 100.0  # per cent at which gains far below are cut
-ALIKE = 0.97  # of the points of two panels: so many intervals overlap where the panels show the same
 LONGEST_INSIDE = 28  # letters of a name that may stand in a legend inside a panel of many lines
 GREEK = {"b": "\\beta", "e": "\\varepsilon"}  # bearing and elevation, as the components' names begin or end
 DEGREES = 180 / np.pi
@@ -428,33 +427,6 @@ def _holding(lines: Sequence[Line], y: Axis) -> tuple[float, float]:
     low = float(max(values.min() - span, bands.min(initial=values.min()))) - MARGIN * span
     high = float(min(values.max() + span, bands.max(initial=values.max()))) + MARGIN * span
     return low if y.limits[0] is None else y.limits[0], high
-
-
-def differing(drawn: Sequence[Panel]) -> tuple[list[Panel], str]:
-    """The panels, or the first alone where all show the same within their intervals; and words on that."""
-    if len(drawn) < 2 or not all(_same(drawn[0], other) for other in drawn[1:]):
-        return list(drawn), ""
-    said = tr("Equal within the intervals in all {count} cases; the first is shown.", count=len(drawn))
-    return [replace(drawn[0], title="")], f" {said}"
-
-
-def _same(one: Panel, other: Panel) -> bool:
-    """Whether two panels have the same lines within their intervals."""
-    pairs = list(zip(*([m for m in panel.marks if isinstance(m, Line)] for panel in (one, other)), strict=False))
-    if len(one.marks) != len(other.marks) or not pairs:
-        return False
-    found = [_overlapping(a, b) for a, b in pairs]
-    return all(part.size for part in found) and bool(np.mean(np.concatenate(found)) >= ALIKE)
-
-
-def _overlapping(one: Line, other: Line) -> np.ndarray:
-    """At each point whether the intervals of two lines overlap; nothing where they cannot be compared."""
-    ends = (one.lo, one.hi, other.lo, other.hi)
-    if any(end is None for end in ends) or not np.array_equal(one.x, other.x):
-        return np.zeros(0, dtype=bool)
-    lo, hi, other_lo, other_hi = (np.asarray(end, dtype=float) for end in ends)
-    known = np.isfinite(lo) & np.isfinite(hi) & np.isfinite(other_lo) & np.isfinite(other_hi)
-    return ((lo <= other_hi) & (other_lo <= hi))[known]
 
 
 def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: Component) -> Figure:

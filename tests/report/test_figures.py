@@ -322,16 +322,6 @@ def shown_together(*values, log=False):
     return [Panel(Axis("t"), axis, (one,), f"panel {n}") for n, one in enumerate(lines)]
 
 
-def test_panels_that_show_the_same_are_drawn_once():
-    kept, said = panels.differing(shown_together(1.0, 1.1, 1.05))
-    assert len(kept) == 1
-    assert "all 3 cases" in said
-    apart, said = panels.differing(shown_together(1.0, 1.3))
-    assert (len(apart), said) == (2, "")
-    without = [replace(panel, marks=(replace(panel.marks[0], lo=None),)) for panel in shown_together(1.0, 1.0)]
-    assert len(panels.differing(without)[0]) == 2  # nothing is known of their intervals
-
-
 def test_panels_side_by_side_have_one_kind_of_scale():
     linear, log = shown_together(1.0)[0], shown_together(2.0, log=True)[0]
     assert [panel.y.scale for panel in panels.shared([linear, log])] == ["log", "log"]

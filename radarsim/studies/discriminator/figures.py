@@ -56,7 +56,7 @@ DRAWN_FROM = {"accuracy": ("curves",), "lock": ("locks",), "residuals": ("residu
 
 
 def figures(results: Sequence[CaseResult], made: Mapping, experiment: Experiment) -> dict[str, Figure]:
-    """residuals, locks and accuracy of each case without a sweep; a figure for each family of swept cases."""
+    """residuals, locks and accuracy of the first case without a sweep; a figure for each family of swept cases."""
     drawn: dict[str, Figure] = {}
 
     def chosen(name: str, among: Sequence[CaseResult]) -> list[CaseResult]:
@@ -70,10 +70,10 @@ def figures(results: Sequence[CaseResult], made: Mapping, experiment: Experiment
         return residuals(result, made, cases[result.name])
 
     for name, draw in (("locks", locks), ("accuracy", accuracy), ("residuals", errors)):
-        for n, result in enumerate(chosen(name, plain)):
-            figure = draw(result, made)
-            named = figure if n == 0 else of_case(figure, result.name)
-            drawn[named.name] = named
+        if shown := chosen(name, plain):
+            figure = draw(shown[0], made)
+            left_out = panels.cases_left_out(shown, shown[:1])
+            drawn[name] = replace(figure, caption=figure.caption + left_out)
     for keys, family in swept_families(results).items():
         name = "_".join(["lock", *(key.split(".")[-1] for key in keys)])
         members = chosen(name, family)
@@ -84,11 +84,6 @@ def figures(results: Sequence[CaseResult], made: Mapping, experiment: Experiment
         elif len(keys) == 2:
             drawn[name] = lock_map(name, keys, members, made)
     return drawn
-
-
-def of_case(figure: Figure, case: str) -> Figure:
-    """The figure of one of several cases, under a name of its own."""
-    return replace(figure, name=f"{figure.name}_{case}", title=f"{figure.title}, {case}")
 
 
 def numbers(values: np.ndarray) -> tuple[tuple[float, str], ...]:

@@ -1,7 +1,6 @@
 """The study's figures: σ and gains, locks by scan, what the bursts measured, what a loss costs."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,16 +18,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FEW = 30  # realisations behind a point
-WIDE = 15  # largest over least σ from which its axis is logarithmic
 DRAWN_FROM = {"threshold": ("locks", "curves"), "measured": ("estimates",)}
 
 
 def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
     """sigma_r … gain_ar; folds; locks, measured, losses of what is not swept, threshold of what is."""
-    drawn = {
-        name: replace(figure, panels=tuple(map(wide, figure.panels))) if name.startswith("sigma") else figure
-        for name, figure in panels.per_component(results, made, RADIAL, experiment).items()
-    }
+    drawn = panels.per_component(results, made, RADIAL, experiment)
     for name, (draw, title, caption) in OWN.items():
         unswept = [result for result in panels.unswept(results) if not result.swept]
         some, left_out = panels.shown(results if name == "folds" else unswept, panels.named(experiment, name))
@@ -43,13 +38,6 @@ SEEN = {
     **{"locks": seen.extremes, "folds": seen.highest_at_the_end, "measured": seen.extremes},
     **{"losses": seen.extremes, "threshold": seen.extremes},
 }
-
-
-def wide(panel: Panel) -> Panel:
-    """A panel of σ with a logarithmic axis where a lost track would hide the others."""
-    values = np.concatenate([mark.y for mark in panel.marks if isinstance(mark, Line)] or [np.ones(1)])
-    least = values[values > 0].min(initial=np.inf)
-    return replace(panel, y=Axis(panel.y.label, "log")) if values.max() > WIDE * least else panel
 
 
 def _figure(name: str, title: str, caption: str, found: list[Panel]) -> Figure:
@@ -96,7 +84,8 @@ def _threshold_panels(
         if members[0].axes.ideal[n] >= 0:
             shares = np.array([_locked(result, made["locks"], name) for result in members])
             locks.append(Line(x, shares[:, 0], words, style, shares[:, 1], shares[:, 2]))
-    of_r = wide(Panel(axis, Axis(tr("$\\sigma$ of $r$ at the end, m")), tuple(sigmas), panels.device(members[0])))
+    y = panels.fitting_axis(tr("$\\sigma$ of $r$ at the end, m"), sigmas)
+    of_r = Panel(axis, y, tuple(sigmas), panels.device(members[0]))
     lost = tuple(line for line in map(panels.lost, locks) if (line.y > 0).any())
     axis_y = panels.loss_axis(tr("P(not locked)"), lost)
     return [*([Panel(axis, axis_y, lost, panels.device(members[0]))] if lost else []), of_r]
@@ -140,8 +129,8 @@ def measured_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     marks = [_line(result, name, own, columns) for (name,), own in rows.items()]
     if rows:
         marks.append(panels.line(next(iter(rows.values())), ("t_s", "bound"), tr("Fisher bound"), Style(9, 1)))
-    panel = Panel(panels.time_axis(), Axis(tr("$\\sigma$ of measured $V_r$, m/s")), tuple(marks), _title(result))
-    return wide(panel)
+    y = panels.fitting_axis(tr("$\\sigma$ of measured $V_r$, m/s"), marks)
+    return Panel(panels.time_axis(), y, tuple(marks), _title(result))
 
 
 def losses_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
@@ -155,7 +144,8 @@ def losses_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
             marks.append(_line(result, name, rows, ("since_loss", "sigma", "sigma_lo", "sigma_hi")))
     ticks = tuple((float(age), str(age) if age < AGES - 1 else f"{age}+") for age in range(AGES))
     x_axis = Axis(tr("scans since a burst was lost"), ticks=ticks)
-    return wide(Panel(x_axis, Axis(tr("$\\sigma$ of $r$ at the last scan, m")), tuple(marks), _title(result)))
+    y = panels.fitting_axis(tr("$\\sigma$ of $r$ at the last scan, m"), marks)
+    return Panel(x_axis, y, tuple(marks), _title(result))
 
 
 Draw = Callable[[Result, "Mapping[str, pd.DataFrame]"], Panel]

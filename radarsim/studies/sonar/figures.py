@@ -108,7 +108,6 @@ def sigma_figure(
             drawn.append(Panel(panels.time_axis(), y, shown, panels.swept(result), direct=False))
     if not drawn:
         return None
-    drawn, same = panels.differing(drawn)
     caption = (
         tr(
             "Root-mean-square error of the {name} about the truth against time, of {count:,} realisations. "
@@ -117,7 +116,6 @@ def sigma_figure(
             count=results[0].count,
         )
         + (" " + tr("Dotted: beginning and end of the manoeuvre.") if any(map(ends, results)) else "")
-        + same
         + left_out
     )
     figure = panels.in_columns(Figure(name, tr("σ of the {name}", name=of.words), caption, tuple(drawn)))
