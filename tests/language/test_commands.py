@@ -128,6 +128,19 @@ def test_every_reason_that_the_sources_give_is_known():
     assert differences  # its texts are the patterns of `reasons`
 
 
+def test_units_that_count_have_the_form_of_their_number():
+    found = {"measured": 1.0, "exact": 1.0, "judged_lo": "", "judged_hi": "", "lo": 0.0, "hi": 3.0, "unit": "scans"}
+    assert [curve.unit_after(n, "scans") for n in (1, 2, 0.5)] == ["scan", "scans", "scans"]
+    assert curve.shown(found) == "1 scan exactly"
+    with speaking("ru"):
+        said = [curve.unit_after(n, "scans") for n in (1, -2, 5, 1.5, 21, float("inf"))]
+        assert said == ["обзор", "обзора", "обзоров", "обзора", "обзор", "обзора"]
+        assert curve.shown(found) == "1 обзор точно"
+        assert curve.expected("about 2 to 5", "plots").endswith(" 5 отметок")
+        assert curve.expected("0.5", "%") == "0,5 %"
+        assert curve.expected("few") == tr("few")
+
+
 def test_what_solve_announces():
     said = []
     with speaking("ru"):

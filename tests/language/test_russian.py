@@ -28,7 +28,18 @@ NAMES = {
     *("python", "numpy", "numba", "llvmlite", "scipy", "pandas", "matplotlib", "pydantic", "pyyaml"),
 }
 
-SYMBOLS = {"Vr", "ar", "PDA", "NEES", "NIS", "IMM", "exp", "var", "cov"}  # in sentences: of papers and of formulas
+SYMBOLS = {
+    "Vr",
+    "ar",
+    "PDA",
+    "NEES",
+    "NIS",
+    "IMM",
+    "exp",
+    "var",
+    "cov",
+    *("P1", "P2", "P3", "P4"),
+}  # in sentences: of papers and of formulas
 
 
 def shown(figure: Figure):
@@ -61,13 +72,13 @@ def meanings(table: re.Match) -> str:
 
 def untranslated(words: str, names: set[str]) -> list[str]:
     """English words in a text: Latin ones that are no names, symbols, keys or formulas."""
-    bare = re.sub(r"\$[^$]*\$|`[^`]*`|\w+[._]\w[\w.]*|«[^»]*»|\b[a-z]+:", " ", words)  # option: what it does
+    bare = re.sub(r"--set \S+|\$[^$]*\$|`[^`]*`|\w+[._]\w[\w.]*|«[^»]*»|\b[a-z]+:", " ", words)  # option: what it does
     return [word for word in re.findall(r"[A-Za-z]{3,}", bare) if word not in names]
 
 
 def latin(words: str, stems: set[str]) -> list[str]:
     """Latin words in a sentence that are no symbols, formulas, keys or names of config files."""
-    bare = re.sub(r"\$[^$]*\$|`[^`]*`|\w+[._]\w[\w.]*", " ", words)
+    bare = re.sub(r"\$[^$]*\$|`[^`]*`|--set \S+|\w+[._]\w[\w.]*", " ", words)
     return [word for word in re.findall(r"[A-Za-z][A-Za-z\d]+", bare) if word not in SYMBOLS | stems]
 
 
@@ -133,7 +144,7 @@ def test_nothing_is_left_in_english_in_any_shipped_config(stem, tmp_path):
         ("РЛС 2, цель: turn", ["turn"]),
         ("nearest, 4 of 6 подтверждает", ["nearest", "of"]),
         ("r+Vr: 10 plots, $\\sigma$ of P_D, rls2_wide", ["plots", "of"]),
-        ("rls2: r+Vr, PDA, `radarsim run`, F_r = 700 Гц", []),
+        ("rls2: r+Vr, PDA, `radarsim run`, F_r = 700 Гц, --set filters.2.combine=likelihood, P4", []),
     ],
 )
 def test_the_check_sees_what_is_latin(said, left):
