@@ -13,6 +13,7 @@ import itertools
 import math
 import os
 import re
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
@@ -74,13 +75,37 @@ class Path:
 
 
 # ---- plots -----------------------------------------------------------------------------------------------------------
-MOST_FAULTS = 20  # reported at once; a file of the wrong kind would have one in each row
+NAMED = 3  # rows named of those that have the same fault
 LARGEST = 1e18  # of any number, as in configs
-SEPARATORS = {";": "semicolons", "\t": "tabulators"}  # of other programs
 DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?")
 TRACK = "track"  # the column that tells several tracks of a file apart
 PLACES = ("range_m", "bearing_rad", "x_m", "y_m", "z_m")  # columns that say where a plot is: for figures alone
 CHUNK = 20_000  # rows read, filtered and written at a time
+
+
+class Faults:
+    """What is wrong in the rows of a file: one line a kind of fault, with its first place, further rows that have it,
+    and what cures them all."""
+
+    def __init__(self, path: str):
+        self.path = path
+        self.kinds: dict[str, tuple[str, str, list[int]]] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self.kinds)
+
+    def add(self, line: int, where: str, must: str, got: object, cure: str = "") -> None:
+        """where: the column's number and name, or nothing, ending in what parts it from the rest."""
+        first = f"{self.path}:{line}:{where} {must}, got {got}"
+        self.kinds.setdefault(where + must, (first, cure and f"; {cure}", []))[2].append(line)
+
+    def lines(self) -> Iterator[str]:
+        for first, cure, (_, *more) in self.kinds.values():
+            if not more:
+                yield first
+                continue
+            named = ", ".join(map(str, more[:NAMED])) + (", …" if len(more) > NAMED else "")
+            yield f"{first} (and {len(more)} more, in {'lines' if len(more) > 1 else 'line'} {named}){cure}"
 
 
 class Piece(NamedTuple):
@@ -138,7 +163,7 @@ class _Reader:
     ):
         self.several, self.any_origin = several, any_origin
         self.path, self.rows, self.measured = path, rows, False
-        self.faults: list[str] = []
+        self.faults = Faults(path)
         try:
             header = [name.strip() for name in next((row for row in rows if not _comment(row)), [])]
         except csv.Error as error:
@@ -170,12 +195,12 @@ class _Reader:
                     {name: column for name, column in beside.items() if name.startswith(TRUE)},
                     {name: column for name, column in beside.items() if name in PLACES},
                 )
-        if not any_row and not self.faults:
-            self.faults.append(f"{self.path}: has no rows")
-        if not self.faults and not self.measured:
-            self.faults.append(f"{self.path}: has no measured value in {', '.join(self.wanted[1:])}")
         if self.faults:
-            raise ConfigError(*self.faults)
+            raise ConfigError(*self.faults.lines())
+        if not any_row:
+            raise ConfigError(f"{self.path}: has no rows")
+        if not self.measured:
+            raise ConfigError(f"{self.path}: has no measured value in {', '.join(self.wanted[1:])}")
 
     def _some(self, size: int) -> tuple[list[int], list[list[float]], list[str]]:
         """Line numbers, numbers and tracks of the next rows."""
@@ -190,58 +215,65 @@ class _Reader:
                     values.append(self._numbers(row, line))
                     whole = self.track is not None and len(row) == self.width
                     tracks.append(row[self.track].strip() if whole and self.track is not None else "")
-                if len(self.faults) >= MOST_FAULTS:
-                    raise ConfigError(*self.faults, f"{self.path}: more faults may follow")
                 if len(lines) == size:
                     break
         except csv.Error as error:
-            raise ConfigError(*self.faults, f"{self.path}:{self.rows.line_num}: not a CSV row: {error}") from error
+            fault = f"{self.path}:{self.rows.line_num}: not a CSV row: {error}"
+            raise ConfigError(*self.faults.lines(), fault) from error
         return lines, values, tracks
 
     def _judge(self, array: np.ndarray, lines: list[int]) -> None:
         """Note values that no sensor can have given."""
-        path, wanted, places = self.path, self.wanted, self.places
         self.measured |= bool(np.isfinite(array[:, 1:]).any())
-        for i, j in np.argwhere(impossible(array, wanted, self.any_origin))[:MOST_FAULTS]:
-            angle = wanted[j].endswith("_rad")
-            allowed = "must be in radians, from -2 pi to 2 pi" if angle else "must be > 0"
-            self.faults.append(f"{path}:{lines[i]}:{places[j] + 1}: {wanted[j]}: {allowed}, got {array[i, j]:g}")
+        for i, j in np.argwhere(impossible(array, self.wanted, self.any_origin)):
+            name = self.wanted[j]
+            must = "must be in radians, from -2 pi to 2 pi" if name.endswith("_rad") else "must be > 0"
+            degrees = f"if these are degrees, name it bearing_deg and {_imported(self.path)}"
+            cure = degrees if name == "bearing_rad" else ""
+            self.faults.add(lines[i], self._where(j), must, f"{array[i, j]:g}", cure)
 
     def _in_order(self, t: np.ndarray, lines: list[int], tracks: list[str]) -> None:
         """Note times that do not rise from row to row of a track."""
         for name, rows in grouped(tracks).items():
             own = np.append(self.last.get(name, math.nan), t[rows])
             rises = np.diff(own) >= 0 if self.several else np.diff(own) > 0
-            for i in np.flatnonzero(~rises)[:MOST_FAULTS]:
-                if np.isfinite(own[i : i + 2]).all():
-                    place = f"{self.path}:{lines[rows[i]]}:{self.places[0] + 1}: t_s"
-                    must = "not be earlier" if self.several else "be later"
-                    before = f"the row before of track {name}" if name else "the row before"
-                    self.faults.append(f"{place}: must {must} than {before}, got {own[i + 1]:g} after {own[i]:g}")
+            for i in np.flatnonzero(~rises & np.isfinite(own[:-1]) & np.isfinite(own[1:])):
+                must = f"must {'not be earlier' if self.several else 'be later'} than the row before"
+                got = f"{own[i + 1]:g} after {own[i]:g}{f' in track {name}' if name else ''}"
+                cure = "" if name else f"if there are several tracks, name their column {TRACK}"
+                self.faults.add(lines[rows[i]], self._where(0), must, got, cure)
             self.last[name] = own[-1]
 
     def _numbers(self, row: list[str], line: int) -> list[float]:
         """The wanted numbers of a row; faults are noted and stand as not-a-number."""
         if len(row) != self.width:
-            self.faults.append(f"{self.path}:{line}: must have {self.width} cells as the header, got {len(row)}")
+            self.faults.add(line, "", f"must have {self.width} cells as the header", len(row))
             return [math.nan] * (len(self.wanted) + len(self.beside))
-        wanted = zip(self.wanted, self.places, strict=True)
-        measured = [self._number(row[place].strip(), line, place, name) for name, place in wanted]
+        measured = [self._number(row[place].strip(), line, j) for j, place in enumerate(self.places)]
         return [*measured, *(_number_or_missing(row[place]) for place in self.beside.values())]
 
-    def _number(self, text: str, line: int, place: int, name: str) -> float:
-        if not text and name != "t_s":
+    def _number(self, text: str, line: int, j: int) -> float:
+        if not text and j:
             return math.nan
         try:
             value = float(text)
         except ValueError:
             value = math.nan
         if not abs(value) <= LARGEST or "_" in text:
-            where = f"{self.path}:{line}:{place + 1}: {name}"
-            hint = " (a decimal point, not a comma)" if DECIMAL_COMMA.fullmatch(text) else ""
-            self.faults.append(f"{where}: must be a finite number, got {text[:60]!r}{hint}")
+            hint = " with a decimal point, not a comma" if DECIMAL_COMMA.fullmatch(text) else ""
+            cure = "" if j else f"for times of day and dates, {_imported(self.path)}"
+            self.faults.add(line, self._where(j), f"must be a finite number{hint}", repr(text[:60]), cure)
             return math.nan
         return value
+
+    def _where(self, j: int) -> str:
+        """The column that is wrong, as `Faults` names it."""
+        return f"{self.places[j] + 1}: {self.wanted[j]}:"
+
+
+def _imported(path: str) -> str:
+    """The command that makes columns of ours of what other programs write."""
+    return f"radarsim import {shlex.quote(path)} -o imported.csv"
 
 
 def _number_or_missing(text: str) -> float:
@@ -290,8 +322,7 @@ def _chosen(path: str, header: list[str], choices: Sequence[Sequence[str]]) -> l
             return list(choice)
     allowed = " or ".join(", ".join(choice) for choice in choices)
     given = "".join(c if c.isprintable() else "�" for c in ", ".join(header)[:200])
-    between = next((name for sign, name in SEPARATORS.items() if len(header) == 1 and sign in header[0]), None)
-    hint = f" (commas must stand between cells, not {between}, and a point in numbers)" if between else ""
+    hint = f"; ranges and positions with other names, separators or units: {_imported(path)}" if given else ""
     raise ConfigError(f"{path}:1: must have the columns {allowed}; got {given or 'nothing'}{hint}")
 
 

@@ -5,22 +5,29 @@ import pytest
 from radarsim.app import configs
 from radarsim.errors import ConfigError
 from tests.program import command
-from tests.recorded.test_plots import faults
+from tests.recorded import whole
+from tests.recorded.test_plots import CHOICES, faults
 
 COLUMNS = "plots.csv:1: must have the columns t_s, range_m, bearing_rad or t_s, x_m, y_m; got "
 
 
-@pytest.mark.parametrize(("sign", "shown", "words"), [(";", ";", "semicolons"), ("\t", "�", "tabulators")])
-def test_other_separators_are_told(tmp_path, sign, shown, words):
-    (line,) = faults(tmp_path, f"t_s{sign}x_m{sign}y_m\n0{sign}1{sign}2\n")
-    hint = f" (commas must stand between cells, not {words}, and a point in numbers)"
-    assert line == f"{COLUMNS}t_s{shown}x_m{shown}y_m{hint}"
+@pytest.mark.parametrize(("sign", "shown"), [(";", ";"), ("\t", "�")])
+def test_a_raw_file_is_shown_the_way(tmp_path, sign, shown, monkeypatch):
+    """And the command, as given, cures it."""
+    text = f"Zeit{sign}range [km]{sign}azimuth [°]\n10:00:00{sign}20.5{sign}45\n10:00:04{sign}20.4{sign}45\n"
+    (line,) = faults(tmp_path, text)
+    given = f"Zeit{shown}range [km]{shown}azimuth [°]"
+    command_given = "radarsim import plots.csv -o imported.csv"
+    assert line == f"{COLUMNS}{given}; ranges and positions with other names, separators or units: {command_given}"
+    monkeypatch.chdir(tmp_path)
+    command(*command_given.split()[1:], "--column", "t_s=Zeit")
+    assert list(whole.read(tmp_path / "imported.csv", CHOICES)["range_m"]) == [20500, 20400]
 
 
 def test_a_decimal_comma_is_told(tmp_path):
     lines = faults(tmp_path, 't_s,x_m,y_m\n0,"1,5",2\n1,"a,5",2\n')
     assert lines == [
-        "plots.csv:2:2: x_m: must be a finite number, got '1,5' (a decimal point, not a comma)",
+        "plots.csv:2:2: x_m: must be a finite number with a decimal point, not a comma, got '1,5'",
         "plots.csv:3:2: x_m: must be a finite number, got 'a,5'",
     ]
 

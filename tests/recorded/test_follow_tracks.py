@@ -68,7 +68,7 @@ def test_times_must_rise_within_a_track_alone(tmp_path, realisations):
     lines[2], lines[4] = lines[4], lines[2]  # two rows of track a
     path.write_text("\n".join(lines))
     with pytest.raises(
-        ConfigError, match=r"plots.csv:\d+:1: t_s: must be later than the row before of track a, got 0 after 10"
+        ConfigError, match=r"plots.csv:\d+:1: t_s: must be later than the row before, got 0 after 10 in track a"
     ):
         tracks_of(path)
 

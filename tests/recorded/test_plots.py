@@ -43,7 +43,11 @@ def test_the_second_choice_of_columns(tmp_path):
     ("text", "expected"),
     [
         ("", "plots.csv:1: must have the columns t_s, range_m, bearing_rad or t_s, x_m, y_m; got nothing"),
-        ("t_s,x_m\n", "plots.csv:1: must have the columns t_s, range_m, bearing_rad or t_s, x_m, y_m; got t_s, x_m"),
+        (
+            "t_s,x_m\n",
+            "plots.csv:1: must have the columns t_s, range_m, bearing_rad or t_s, x_m, y_m; got t_s, x_m"
+            "; ranges and positions with other names, separators or units: radarsim import plots.csv -o imported.csv",
+        ),
         ("t_s,x_m,y_m\n", "plots.csv: has no rows"),
         ("t_s,x_m,y_m,x_m\n", "plots.csv:1: the column x_m is there twice"),
         ("t_s,x_m,y_m\n0,1,2\n1,abc,2\n", "plots.csv:3:2: x_m: must be a finite number, got 'abc'"),
@@ -68,11 +72,32 @@ def test_what_is_wrong_is_told_with_its_place(tmp_path, text, expected):
     assert faults(tmp_path, text) == [expected]
 
 
-def test_all_faults_at_once_but_not_without_end(tmp_path):
-    assert len(faults(tmp_path, "t_s,x_m,y_m\na,1,1\n1,b,c\n")) == 3
-    many = faults(tmp_path, "t_s,x_m,y_m\n" + "a,b,c\n" * 1000)
-    assert len(many) <= 24
-    assert many[-1] == "plots.csv: more faults may follow"
+IMPORT = "radarsim import plots.csv -o imported.csv"
+
+
+@pytest.mark.parametrize("chunk", [3, plots.CHUNK])
+def test_equal_faults_are_one_line_with_their_cure(tmp_path, chunk):
+    rows = ["10:00,1,45", "1,b,1", "10:00,-1,45", "2,1", "1,1,1", "10:00,1,45", "10:00,1,45", "10:00,c,1", "0,1,1"]
+    path = tmp_path / "plots.csv"
+    path.write_text("t_s,range_m,bearing_rad\n" + "\n".join(rows))
+    with pytest.raises(ConfigError) as caught:
+        list(plots.pieces(path, CHOICES, chunk))
+    assert sorted(line.replace(f"{tmp_path}/", "") for line in caught.value.lines) == [
+        f"plots.csv:2:1: t_s: must be a finite number, got '10:00' (and 4 more, in lines 4, 7, 8, …); for times of day "
+        f"and dates, {IMPORT}",
+        f"plots.csv:2:3: bearing_rad: must be in radians, from -2 pi to 2 pi, got 45 (and 3 more, in lines 4, 7, 8); "
+        f"if these are degrees, name it bearing_deg and {IMPORT}",
+        "plots.csv:3:2: range_m: must be a finite number, got 'b' (and 1 more, in line 9)",
+        "plots.csv:4:2: range_m: must be > 0, got -1",
+        "plots.csv:5: must have 3 cells as the header, got 2",
+    ]
+
+
+def test_times_that_do_not_rise_may_be_of_several_tracks(tmp_path):
+    assert faults(tmp_path, "t_s,x_m,y_m\n" + "0,1,1\n4,1,1\n" * 1000) == [
+        "plots.csv:4:1: t_s: must be later than the row before, got 0 after 4 (and 998 more, in lines 6, 8, 10, …); "
+        "if there are several tracks, name their column track"
+    ]
 
 
 def test_a_missing_file(tmp_path):

@@ -21,8 +21,8 @@ from typing import TextIO
 
 from radarsim.errors import ConfigError
 from radarsim.recorded.formats import sites
+from radarsim.recorded.plots import Faults
 
-MOST_FAULTS = 20
 LARGEST = 1e15
 RowOf = Callable[[list[str]], tuple[float, ...]]  # a row of numbers from the cells of a line
 UNITS = {
@@ -115,7 +115,7 @@ class Table:
         """encoding: the name of one that is not UTF-8."""
         self.path, self.records, self.highest, self.encoding = path, 0, 0.0, encoding
         self.skipped: Counter[str] = Counter()
-        self.faults: list[str] = []
+        self.faults = Faults(path)
         header = self._opened(file)
         self.width = len(header)
         names = {split(name) for name in header}
@@ -234,18 +234,16 @@ class Table:
                 if len(gathered) >= sites.BATCH and not self.faults:
                     yield gathered.taken()
         except csv.Error as error:
-            self.faults.append(f"{self.path}:{self.line}: not a CSV row: {error}")
+            raise ConfigError(*self.faults.lines(), f"{self.path}:{self.line}: not a CSV row: {error}") from error
         if self.faults:
-            raise ConfigError(*self.faults)
+            raise ConfigError(*self.faults.lines())
         if len(gathered):
             yield gathered.taken()
 
     def _take(self, cells: list[str], gathered: sites.Gathered, row_of: RowOf) -> None:
-        if len(self.faults) >= MOST_FAULTS:
-            raise ConfigError(*self.faults, f"{self.path}: more faults may follow")
         self.records += 1
         if len(cells) != self.width:
-            self.faults.append(f"{self.path}:{self.line}: must have {self.width} cells as the header, got {len(cells)}")
+            self.faults.add(self.line, "", f"must have {self.width} cells as the header", len(cells))
             return
         row = row_of(cells)
         if any(math.isnan(row[i]) for i in ((0, 1, 2) if self.kind == sites.POSITIONS else (0, 1))):
@@ -272,7 +270,7 @@ class Table:
         lat, lon = self._number(cells, "latitude_deg"), self._number(cells, "longitude_deg")
         for name, value, most in (("latitude_deg", lat, 90), ("longitude_deg", lon, 360)):
             if abs(value) > most:
-                self._fault(name, f"must be from -{most} to {most} degrees, got {value:g}")
+                self._fault(name, f"must be from -{most} to {most} degrees", f"{value:g}")
         altitude = self._number(cells, "altitude_m")
         self.highest = max(self.highest, altitude)  # not-a-number is not larger
         return t, lat, lon, altitude, speed * math.sin(course), speed * math.cos(course), up
@@ -295,7 +293,7 @@ class Table:
                 return self.clock(_second_of_day(day))
             return _written_s(text)
         except ValueError:
-            self._fault("t_s", f"must be a time in s, {TIMES}, got {text[:60]!r}")
+            self._fault("t_s", f"must be a time in s, {TIMES}", repr(text[:60]))
             return math.nan
 
     def _number(self, cells: list[str], name: str) -> float:
@@ -310,7 +308,7 @@ class Table:
         except ValueError:
             value = math.inf
         if not abs(value) <= LARGEST:
-            self._fault(name, f"must be a number, got {text[:60]!r}")
+            self._fault(name, "must be a number", repr(text[:60]))
             return math.nan
         return value * column.factor
 
@@ -318,6 +316,7 @@ class Table:
         """A number with a decimal point."""
         return text.replace(",", ".") if self.decimal_comma and text.count(",") == 1 and "." not in text else text
 
-    def _fault(self, name: str, what: str) -> None:
-        column = self.columns[name]
-        self.faults.append(f"{self.path}:{self.line}:{column.place + 1}: {column.name}: {what}")
+    def _fault(self, ours: str, must: str, got: str) -> None:
+        column = self.columns[ours]
+        cure = f"if this is not {ours}, name the column: --column {ours}=THEIRS"
+        self.faults.add(self.line, f"{column.place + 1}: {column.name}:", must, got, cure)
