@@ -139,6 +139,9 @@ def simulate(config: str, output: str, realisation: int, overrides: tuple[str, .
 )
 @click.option("--doppler-towards", is_flag=True, help="In the recording, Doppler is positive for approach.")
 @click.option("--column", "columns", multiple=True, metavar="OURS=THEIRS", help="Name a CSV column explicitly.")
+@click.option(
+    "--encoding", default="", metavar="NAME", help="Of text that is not UTF-8, as cp1251; default: Windows-1252."
+)
 def import_(
     recording: str,
     output: str,
@@ -180,6 +183,7 @@ def import_(
         further["truth"],
         further["doppler_towards"],
         importing.columns_of(further["columns"]),
+        importing.encoding_named(further["encoding"]),
     )
     with console.Counter("reading", "records") as counter:
         done = importing.import_recording(recording, output, options, counter.update)

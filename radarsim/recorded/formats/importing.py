@@ -64,7 +64,8 @@ class Options:
     several stands, by SAC/SIC, others being left out. antenna: its normal, for the angles that `multimodel` takes.
     tracks: those to be written, all where empty. zero: what t_s counts from, "first" (record),
     "midnight" (of the first record's day, UTC) or s from 1970. truth: a second recording, of positions. towards:
-    Doppler speeds count as positive where the range falls. columns: of a CSV, theirs by ours.
+    Doppler speeds count as positive where the range falls. columns: of a CSV, theirs by ours. encoding: of text that is
+    neither UTF-8 nor UTF-16, Windows-1252 where none is named.
     """
 
     format: Format | None = None
@@ -76,6 +77,7 @@ class Options:
     truth: str | None = None
     towards: bool = False
     columns: Mapping[str, str] = field(default_factory=dict)
+    encoding: str = ""
 
 
 @dataclass
@@ -91,15 +93,16 @@ class Imported:
     columns: tuple[str, ...] = ()
 
 
-NAMED = {"utf-16": "UTF-16", "cp1252": "Windows-1252"}  # encodings beside UTF-8 that spreadsheets write
+MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+NAMED = {"utf-8-sig": "UTF-8", "utf-16": "UTF-16", "cp1252": "Windows-1252"}  # as spreadsheets write them
 
 
-def encoding_of(path: str | os.PathLike) -> str:
-    """The encoding of a text file: UTF-16 by its mark, else UTF-8, or Windows-1252 where it is no UTF-8."""
+def encoding_of(path: str | os.PathLike, named: str) -> str:
+    """The encoding of a text file: UTF-16 by its mark, else UTF-8, or the one that was named where it is no UTF-8."""
     if not os.path.isfile(path):  # a stream is read once
-        return "utf-8-sig"
+        return named or "utf-8-sig"
     with open(path, "rb") as file:
-        if file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        if file.read(2) in MARKS:
             return "utf-16"
         file.seek(0)
         decoder = codecs.getincrementaldecoder("utf-8")()
@@ -108,7 +111,7 @@ def encoding_of(path: str | os.PathLike) -> str:
                 decoder.decode(piece)
             decoder.decode(b"", final=True)
         except UnicodeDecodeError:
-            return "cp1252"
+            return named or "cp1252"
     return "utf-8-sig"
 
 
@@ -117,6 +120,7 @@ def opened(path: str, options: Options, truth: bool = False) -> Iterator[tuple[F
     """The reader of a recording, by the format that is asked for or that its first bytes show; raises ConfigError.
 
     truth: only the positions of an ASTERIX file are wanted."""
+    encoding = "utf-8-sig"
     try:
         with open(path, "rb") as file:
             head = file.peek(HEAD)[:HEAD]
@@ -126,11 +130,11 @@ def opened(path: str, options: Options, truth: bool = False) -> Iterator[tuple[F
             elif kind == "ais":
                 yield kind, Ais(path, file)
             else:
-                encoding = encoding_of(path)
+                encoding = encoding_of(path, options.encoding)
                 text = io.TextIOWrapper(file, encoding=encoding, newline="")
-                yield kind, Table(path, text, options.columns, NAMED.get(encoding, ""))
+                yield kind, Table(path, text, options.columns, NAMED.get(encoding, encoding))
     except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: is not UTF-8 text") from error
+        raise ConfigError(f"{path}: is not {NAMED.get(encoding, encoding)} text: --encoding NAME names it") from error
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
 
@@ -139,6 +143,8 @@ def found(path: str, head: bytes) -> Format:
     """The format that the first bytes of a file show; raises ConfigError."""
     if not head:
         raise ConfigError(f"{path}: is empty")
+    if head[:2] in MARKS:
+        head = head.decode("utf-16", "ignore").encode()
     if ais.SENTENCE.search(head):
         return "ais"
     text = b"\0" not in head and sum(byte < 9 or 13 < byte < 32 for byte in head) == 0
@@ -364,6 +370,8 @@ class _Import:
             each = ", ".join(f"{name} ({count})" for name, count in self.radars.items())
             done.notes.append(f"plots of {len(self.radars)} radars, SAC/SIC (rows): {each}; the tracks of all but the "
                               "first have its name before their number")  # fmt: skip
+        if isinstance(self.reader, Table | Asterix) and (turns := self.reader.clock.turns):
+            done.notes.append(f"the times of day pass midnight: t_s runs on ({turns} × 24 h)")
         if isinstance(self.reader, Table):
             done.notes += self.reader.notes()
         if self.truth is not None:
@@ -395,7 +403,7 @@ class _Truth:
             self._read_own(path, options)
         else:
             assert options.truth is not None
-            with opened(options.truth, Options(), truth=True) as (_, reader):
+            with opened(options.truth, Options(encoding=options.encoding), truth=True) as (_, reader):
                 self._read(reader, options.site)
             if not self.tables:
                 raise ConfigError(f"{options.truth}: must have positions on the earth of aircraft with an address; "
@@ -583,6 +591,17 @@ def zero_of(text: str) -> str | float:
         return utc_s(text)
     except ValueError:
         raise ConfigError(f"time-from: must be first, midnight or a date and time (ISO 8601), got {text!r}") from None
+
+
+def encoding_named(name: str) -> str:
+    """An encoding of text that was asked for."""
+    try:
+        "".encode(name or "utf-8")
+    except (LookupError, ValueError):
+        raise ConfigError(
+            f"encoding: must be an encoding such as cp1251, iso8859-2 or mac-roman, got {name!r}"
+        ) from None
+    return name
 
 
 def columns_of(texts: Sequence[str]) -> dict[str, str]:

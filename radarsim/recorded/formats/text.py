@@ -111,8 +111,8 @@ class Table:
 
     of_day = False
 
-    def __init__(self, path: str, file: TextIO, given: Mapping[str, str] | None = None, encoding: str = ""):
-        """encoding: the name of one that is not UTF-8."""
+    def __init__(self, path: str, file: TextIO, given: Mapping[str, str] | None = None, encoding: str = "UTF-8"):
+        """encoding: what the file was decoded by."""
         self.path, self.records, self.highest, self.encoding = path, 0, 0.0, encoding
         self.skipped: Counter[str] = Counter()
         self.faults = Faults(path)
@@ -159,7 +159,8 @@ class Table:
         units |= {"speed_mps": "m/s", "up_mps": "m/s"} | {ours: c.unit for ours, c in self.columns.items() if c.unit}
         taken = ", ".join(f"{name} in {units[ours]}" for ours, name in plain.items() if ours in units)
         found = [f"assumed because the name has no unit: {taken}"] if taken else []
-        found += [f"the text is read as {self.encoding}, as it is not UTF-8"] if self.encoding else []
+        if self.encoding != "UTF-8":
+            found.append(f"the text is read as {self.encoding}, as it is not UTF-8; for another: --encoding NAME")
         time = self.columns["t_s"].name
         if others := [name for name in self.header if split(name)[0] in NAMES["t_s"] and name != time]:
             found.append(f"times are {time}; not used: {', '.join(others)}")

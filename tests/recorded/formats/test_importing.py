@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from radarsim.errors import ConfigError
-from radarsim.recorded.formats.importing import Options, import_recording
+from radarsim.recorded.formats.importing import Options, encoding_named, import_recording
 from radarsim.recorded.formats.sites import Antenna, Site, Unrolled, biconical, described
 from radarsim.recorded.formats.text import split
 
@@ -731,5 +731,29 @@ def test_encodings_that_spreadsheets_write(tmp_path, encoding, name):
     done, columns, _ = imported(tmp_path, text.encode(encoding), Options("csv"))
     assert columns["bearing_rad"] == pytest.approx(np.radians([45, 46]), rel=1e-9)
     assert [note for note in done.notes if "read as" in note] == (
-        [f"the text is read as {name}, as it is not UTF-8"] if name else []
+        [f"the text is read as {name}, as it is not UTF-8; for another: --encoding NAME"] if name else []
     )
+
+
+def test_columns_named_in_another_code_page(tmp_path):
+    """Which 8-bit page it is the bytes do not say; what is UTF-8 stays so."""
+    text = "Время;Дальность [km]\n23:59:58;20,5\n00:00:02;21,5\n"
+    named = {"t_s": "Время", "range_m": "Дальность [km]"}
+    for encoding in ("cp1251", "koi8-r", "utf-8", "utf-16"):
+        other = "" if encoding == "utf-16" else encoding.replace("utf-8", "cp1251")
+        done, columns, _ = imported(tmp_path, text.encode(encoding), Options(None, columns=named, encoding=other))
+        assert columns["t_s"].tolist() == [0, 4]
+        assert columns["range_m"].tolist() == [20500, 21500]
+        assert [note for note in done.notes if "midnight" in note] == [
+            "the times of day pass midnight: t_s runs on (1 × 24 h)"
+        ]
+        (tmp_path / "plots.csv").unlink()
+    (line,) = refused(tmp_path, text.encode("cp1251"), Options("csv", columns=named))
+    assert "must name a column of Âðåìÿ" in line
+    (line,) = refused(tmp_path, b"t_s,range,\x81\n0,1,2\n", Options("csv"))
+    assert line.endswith("is not Windows-1252 text: --encoding NAME names it")
+
+
+def test_an_unknown_encoding_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match="encoding: must be an encoding such as cp1251"):
+        encoding_named("base64")
