@@ -1,4 +1,4 @@
-"""What proves the study. Yours: a test for each way in which it could be wrong."""
+"""Tests that prove the study. Yours: a test for each way in which it could be wrong."""
 
 import math
 
@@ -11,8 +11,8 @@ from random_walk import STUDY
 CASE = load("random_walk").cases[0]
 
 
-def test_the_kernel_makes_what_the_textbook_says():
-    """A few lines without any relation to the kernel, over the kernel's own plots."""
+def test_the_kernel_agrees_with_the_textbook():
+    """A few lines independent of the kernel, over the kernel's own plots."""
     columns = STUDY.recorded().simulated(CASE, 7)
     plan = STUDY.prepare(CASE)
     error = plan.layout.unpack(STUDY.simulate(plan, 7, 1))["error"]

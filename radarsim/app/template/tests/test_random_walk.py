@@ -1,4 +1,4 @@
-"""What proves the study. Yours: a test for each way in which it could be wrong."""
+"""Tests that prove the study. Yours: a test for each way in which it could be wrong."""
 
 import numpy as np
 import pytest
@@ -17,8 +17,8 @@ def test_errors_are_the_exact_ones():
     assert (abs(curves["sigma"] - curves["exact_sigma"]) < 5 * standard_error).all()
 
 
-def test_the_kernel_makes_what_the_textbook_says():
-    """A few lines of NumPy without any relation to the kernel, over the kernel's own plots."""
+def test_the_kernel_agrees_with_the_textbook():
+    """A few lines of NumPy independent of the kernel, over the kernel's own plots."""
     for i in (0, 4099):
         columns = STUDY.recorded().simulated(CASE, i)
         plan = STUDY.prepare(CASE)

@@ -1,7 +1,7 @@
 """A Kalman filter against a fixed gain on a random walk: a study in one file.
 
-Yours: the question of your study, and where it comes from. What may be given beside what is here is said at the head of
-radarsim.studies.onefile and radarsim.studies.linear.
+Yours: the question of your study, and where it comes from. The docstrings of radarsim.studies.onefile and
+radarsim.studies.linear list all further options.
 """
 
 from typing import Annotated
@@ -33,21 +33,21 @@ class Target(Model):
 class Filter(Member):
     """A filter of the position."""
 
-    gain: Annotated[Positive, Field(le=1)] | None = key("gain", "share of the innovation that is taken, no unit", None)
+    gain: Annotated[Positive, Field(le=1)] | None = key("gain", "share of the innovation used, no unit", None)
 
 
 class Walk(LinearStudy):
     """A random walk and the filters that follow it."""
 
-    # Yours: the entry point's name, one line for `radarsim list`, what a user may choose among the filters.
+    # Yours: the entry point's name, one line for `radarsim list`, what distinguishes the filters.
     name, about = "random_walk", "Random walk (textbook): a Kalman filter against a filter of fixed gain."
     filters = {"gain": "exponential smoothing with this gain; without it a Kalman filter"}
-    asks = "How well is a random walk followed?"
+    asks = "How well do filters follow a random walk?"
     components = (Component("x", "m", "$x$", "position"),)  # the errors shown: name, unit, letter, words
     parts, Filter = {"sensor": Sensor, "target": Target}, Filter
     scan_period = "sensor.scan_period_s"
     measured = (Measured("x_m", "m", ("sensor.sigma_x_m",)),)  # of a recorded plot: column, unit, keys of its σ
-    fitted = ("sensor.sigma_x_m", "target.sigma_step_m")  # what `radarsim fit` looks for
+    fitted = ("sensor.sigma_x_m", "target.sigma_step_m")  # what `radarsim fit` estimates
     paper = Paper("Kalman 1960", may_grow=("filters",))
 
     # Yours: how the state moves, and what a filter sees at scan k: rows H and their σ.
@@ -60,13 +60,13 @@ class Walk(LinearStudy):
         """z = x + v."""
         return [1], spec.sensor.sigma_x_m
 
-    # Yours, where filters differ: gains of their own here; a wrong model by assumed_motion and assumed_plot.
+    # Yours, where filters differ: other gains here; a mismatched model by assumed_motion and assumed_plot.
     def own_gains(self, spec, one):
         """The fixed gain; None makes a Kalman filter."""
         return None if one.gain is None else np.full((spec.scans, 1, 1), one.gain)
 
-    # Yours: the paper's claims, each with the range that its words leave, and what it leaves open. Measures are the
-    # functions of radarsim.studies.judged, and those of this file whose first argument is `seen`.
+    # Yours: the paper's claims, each with the range its wording allows, and the choices the paper leaves open.
+    # Measures are the functions of radarsim.studies.judged and those in this file whose first argument is `seen`.
     claims_yaml = """
 paper: random_walk
 config: random_walk
@@ -87,7 +87,7 @@ claims:
      expected: {same: [1, 0.01]}}
 choices:
 - key: start
-  asks: what is known at first
+  asks: what is known at the start
   original: nothing
   alternatives:
   - {name: hardly anything, kind: U, reason: the usual}
@@ -96,7 +96,7 @@ choices:
 
 
 def settled(seen, case, filter):
-    """σ at the last scan over that which it tends to."""
+    """σ at the last scan over its limit."""
     last = seen.curve(case, filter, "x").last()
     limit = STUDY.limits(seen.case(case).spec)[[one.name for one in seen.case(case).spec.filters].index(filter), 0]
     return type(last)(*(value / limit for value in last))

@@ -1,7 +1,7 @@
 """An extended Kalman filter against a fixed gain: a random walk on the ground whose slant range is measured.
 
-Yours: the question of your study, and where it comes from. What may be given beside what is here is said at the head of
-radarsim.studies.onefile and radarsim.studies.stepwise; what steps may calculate with, in radarsim.kernels.traced.
+Yours: the question of your study, and where it comes from. The docstrings of radarsim.studies.onefile and
+radarsim.studies.stepwise list all further options; radarsim.kernels.traced, the operations allowed in a step.
 """
 
 from collections import namedtuple
@@ -35,14 +35,14 @@ class Filter(Member):
     """A filter of the distance."""
 
     kind: Literal["fixed", "kalman"] = key("kind", "how it weighs a plot")
-    gain: Positive | None = key("gain", "share of the innovation that is taken, no unit", only={"kind": "fixed"})
+    gain: Positive | None = key("gain", "share of the innovation used, no unit", only={"kind": "fixed"})
 
 
 Numbers = namedtuple("Numbers", "h r2 x0 p2 q2 gain")  # height and first distance, m; variances, m²
 
 
 def numbers(spec, one=None):
-    """What truth and filters need of a config."""
+    """The numbers of a config that truth and filters use."""
     s, t, gain = spec.sensor, spec.target, getattr(one, "gain", None) or 0.0
     return Numbers(s.height_m, s.sigma_range_m**2, t.distance_m, t.sigma_start_m**2, t.sigma_step_m**2, gain)
 
@@ -51,7 +51,7 @@ def slant(x, c):
     return sqrt(x * x + c.h * c.h)
 
 
-# Yours: the filters. A step is plain Python on numbers and tuples; what would be an `if` on a number is a `where`.
+# Yours: the filters. A step is plain Python on numbers and tuples; write `where` instead of an `if` on a number.
 class Kalman(Steps):
     """The extended Kalman filter: its state is the estimate and its variance."""
 
@@ -78,7 +78,7 @@ class Kalman(Steps):
 class Fixed(Kalman):
     """A fixed share of the innovation, as a distance on the ground, from the same start."""
 
-    covariance = None  # it tells none
+    covariance = None  # it has none
 
     def update(s, z, u, c):
         r = slant(s[0], c)
@@ -86,10 +86,10 @@ class Fixed(Kalman):
 
 
 class Walk(StepStudy):
-    # Yours: the entry point's name, one line for `radarsim list`, what a user may choose among the filters.
+    # Yours: the entry point's name, one line for `radarsim list`, what distinguishes the filters.
     name, about = "random_walk", "Random walk seen by slant range: an extended Kalman filter against a fixed gain."
-    filters = {"kind": "kalman or fixed, which takes a gain"}
-    asks = "How well is a random walk followed by its slant range?"
+    filters = {"kind": "kalman, or fixed with a gain"}
+    asks = "How well do filters follow a random walk by its slant range?"
     components = (Component("x", "m", "$x$", "distance"),)  # the errors shown: name, unit, letter, words
     parts, Filter = {"sensor": Sensor, "target": Target}, Filter
     scan_period = "sensor.scan_period_s"
@@ -107,7 +107,7 @@ class Walk(StepStudy):
     def plot(self, x, u, c, w):
         return (slant(x[0], c) + sqrt(c.r2) * w[0],)
 
-    # Yours: the paper's claims, each with the range that its words leave.
+    # Yours: the paper's claims, each with the range of values its wording allows.
     claims_yaml = """
 paper: random_walk
 config: random_walk

@@ -1,4 +1,4 @@
-"""The YAML keys of the study. Whatever can be wrong in a config is found here, with line and column."""
+"""The YAML keys of the study. Faults of a config are found here and reported with line and column."""
 
 from typing import Annotated, Literal
 
@@ -20,7 +20,7 @@ from radarsim.config.fields import (
 MOST_SCANS = 100_000
 
 
-# Yours: what measures. A key ends in its unit (_m, _s, _mps, _rad, …) and its description names it.
+# Yours: the sensor. A key ends in its unit (_m, _s, _mps, _rad, …) and its description names it.
 class Sensor(Model):
     """A sensor that measures the position."""
 
@@ -29,21 +29,21 @@ class Sensor(Model):
     scan_period_s: Positive = key("scan period", "time between two plots, s", symbol="Δt")
 
 
-# Yours: what is observed. `Scenario()` beside the field below would let it be named by a file in scenarios/.
+# Yours: the target. With `Scenario()` in the annotation of its field below, a config may name a file in scenarios/.
 class Target(Model):
     """A target whose position is a random walk."""
 
     sigma_step_m: NonNegative = key("σ of a step", "standard deviation of its step from one scan to the next, m")
 
 
-# Yours: the filters that are compared, each key with a default or without.
+# Yours: the filters compared; a key may have a default.
 class Filter(Model):
     """A filter of the position."""
 
     name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
-    kind: Literal["kalman", "fixed_gain"] = key("kind", "how its gain is made")
+    kind: Literal["kalman", "fixed_gain"] = key("kind", "how its gain is computed")
     gain: Annotated[Positive, Field(le=1)] | None = key(
-        "gain", "fixed_gain: share of the innovation that is taken over, no unit", only={"kind": "fixed_gain"}
+        "gain", "fixed_gain: share of the innovation used, no unit", only={"kind": "fixed_gain"}
     )
 
 
@@ -55,7 +55,7 @@ class Keys(Study):
 
     sensor: Sensor = key("sensor", "the sensor")
     target: Target = key("target", "the target")
-    # Design(): cases that differ in nothing else have the same noise, so that their comparison is paired.
+    # Design(): cases that differ only here have the same noise, so their comparison is paired.
     filters: Members[Filter] = key("filters", "the filters; all see the same plots")
     baseline: Baseline = key(
         "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None

@@ -1,4 +1,4 @@
-"""What is known without sampling.
+"""Exact values, known without sampling.
 
 Yours: exact values where there are any; the tables show them beside the measured ones.
 """
@@ -9,7 +9,7 @@ import numpy as np
 def error_variance(gains: np.ndarray, sigma: float, step: float) -> np.ndarray:
     """Variance of the error of a filter with these gains (K,) after each scan, (K,); sigma and step in m.
 
-    The error is e⁺ = (1 - K)(e - w) + K v, so S⁺ = (1 - K)² (S + q) + K² R, whether or not the gains are the best.
+    The error is e⁺ = (1 - K)(e - w) + K v, so S⁺ = (1 - K)² (S + q) + K² R, whether or not the gains are optimal.
     """
     variance, S = np.empty(len(gains)), 0.0
     for k, K in enumerate(gains):

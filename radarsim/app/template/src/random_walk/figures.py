@@ -1,4 +1,4 @@
-"""The study's figures, as data: how they are drawn, on paper and in the report, is radarsim's.
+"""The study's figures, as data; radarsim draws them, on paper and in the report.
 
 Yours: further figures, of the marks in radarsim.report.drawing; their names go into `figure_names` of the config too.
 """
@@ -12,7 +12,7 @@ from radarsim.report import panels
 from radarsim.report.drawing import Figure
 from radarsim.report.quantities import Component
 
-# Yours: of each component its name, unit, letter and what it is called.
+# Yours: each component's name, unit, letter and words.
 COMPONENTS = (Component("x", "m", "$x$", term("position")),)
 
 

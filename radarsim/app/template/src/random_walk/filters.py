@@ -9,8 +9,8 @@ from random_walk import config
 
 
 def design(options: config.Filter, sigma: float, step: float, scans: int) -> np.ndarray:
-    """The gains K (scans,) of a filter, the first of which takes over the first plot. sigma and step in m."""
-    # Yours: a line for each kind of filter. Gains that depend on the data belong into the kernel.
+    """The gains K (scans,) of a filter, the first of which takes the first plot as it is. sigma and step in m."""
+    # Yours: a line for each kind of filter. Gains that depend on the data belong in the kernel.
     match options.kind:
         case "kalman":
             return kalman_gains(sigma, step, scans)

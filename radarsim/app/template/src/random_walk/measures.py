@@ -1,4 +1,4 @@
-"""What is measured for the claims. Yours: a function for each `measure` of claims.yaml."""
+"""The quantities measured for the claims. Yours: a function for each `measure` of claims.yaml."""
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import claims
@@ -6,10 +6,10 @@ from radarsim.report.statistics import Estimate
 
 
 class Evidence(claims.Evidence):
-    """What the paper's experiment measured: only cases whose keys are those of the claim's config are seen here."""
+    """Results of the paper's experiment: only cases with the keys of the claims' config are visible here."""
 
     def case(self, key: object) -> CaseResult:
-        """Yours: the case that a key means, as `of` has them. Here the paper has but one."""
+        """Yours: the case that a key under `of` means. Here the paper has only one."""
         for result in self.results:
             return result
         raise claims.Missing(key)

@@ -10,13 +10,13 @@ from radarsim.studies.noise import noise_key
 from random_walk import exact, filters
 from random_walk.kernels import walk
 
-COMPONENTS = (("x", "m"),)  # Yours: names and units of the errors that are shown
-BLOCK = 4096  # Yours: realisations in a block, from the study alone; some milliseconds of work
+COMPONENTS = (("x", "m"),)  # Yours: names and units of the errors shown
+BLOCK = 4096  # Yours: realisations in a block, fixed for the study; some milliseconds of work
 
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a block needs, F filters over K scans; see `kernels.walk.simulate_block`."""
+    """The data of a block, F filters over K scans; see `kernels.walk.simulate_block`."""
 
     layout: Layout
     axes: Axes
@@ -43,10 +43,10 @@ def prepare(case: Case) -> Plan:
         t_s=np.arange(scans) * spec.sensor.scan_period_s,
         available=np.ones(shape, dtype=bool),
         baseline=names.index(spec.baseline) if spec.baseline else 0,
-        exact_sigma=exact_sigma,  # not-a-number where no exact value is known
+        exact_sigma=exact_sigma,  # NaN where no exact value is known
         exact_bias=np.zeros(shape),
     )
-    # Yours: the sums. With `error` and `paired` the tables curves and gains are made for you; others are your own.
+    # Yours: the sums. From `error` and `paired` radarsim makes the tables curves and gains; others you make yourself.
     layout = Layout(error=(*shape, 4), paired=shape)
     return Plan(layout, axes, noise_key(case, "plots"), sigma, step, gains)
 

@@ -1,4 +1,4 @@
-"""The study's own tables, beside `curves`, `gains` and `claims`, which radarsim makes of the sums."""
+"""The study's own tables, beside `curves`, `gains` and `claims`, which radarsim makes from the sums."""
 
 import numpy as np
 from radarsim.engine.results import CaseResult
@@ -10,9 +10,9 @@ from random_walk import exact, filters
 table = common.Tables()
 
 
-@table("steady")  # Yours: a function a table, of one case; its docstring says what each column is
+@table("steady")  # Yours: a function per table, for one case; its docstring explains each column
 def _steady(result: CaseResult) -> common.Columns:
-    """σ at the last scan, and the exact one that it tends to if the gain stays as it is.
+    """σ at the last scan, and its exact limit if the gain stays constant.
 
     last_gain: gain of the filter at the last scan
     last_sigma ± last [unit]: as measured

@@ -1,6 +1,6 @@
 """The study's filters over recorded plots: `radarsim simulate` and `radarsim track`.
 
-Yours: the columns of your sensor. A study without recorded plots needs no such file, nor `recorded` in its class.
+Yours: the columns of your sensor. A study without recorded plots needs neither this file nor the offer `recorded`.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from random_walk.study import COMPONENTS, prepare
 
 
 class Tracker:
-    """The filters of a case over recorded plots, chunk by chunk; an empty cell is a plot that is missing."""
+    """The filters of a case over recorded plots, chunk by chunk; an empty cell is a missing plot."""
 
     most_rows = None
     several = False
@@ -24,7 +24,7 @@ class Tracker:
         self.filters = [_One(one, spec) for one in spec.filters]
 
     def feed(self, columns) -> Track:
-        """The estimates over the next rows: columns (n,), not-a-number where a value is missing."""
+        """The estimates over the next rows: columns (n,), NaN where a value is missing."""
         t, z = columns["t_s"], columns["x_m"]
         rows = np.array([[one.step(at, plot) for at, plot in zip(t, z, strict=True)] for one in self.filters])
         estimate, sigma, nis = np.moveaxis(rows[..., None], 2, 0)  # each (F, n, 1)

@@ -1,4 +1,4 @@
-"""What the report asks and answers. Yours: sentences with numbers and 95 % intervals, from the tables, through `tr`."""
+"""The report's question and answer. Yours: sentences with numbers and 95 % intervals from the tables, through `tr`."""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,7 +8,7 @@ from radarsim.language import tr
 
 
 def question(experiment: Experiment) -> str:
-    """What an experiment asks, in one sentence."""
+    """The question of an experiment, in one sentence."""
     names = list(dict.fromkeys(one.name for case in experiment.cases for one in case.spec.filters))
     return tr("How well do the filters {names} follow a random walk?", names=", ".join(names))
 

@@ -1,10 +1,10 @@
 """One block of realisations, compiled.
 
 Yours: the loops of your study. Three rules keep results the same for any number of threads, workers and shards:
-realisation i draws its noise from i alone (pair k of normals at scan k); sums are added up in a fixed order; nothing is
-kept from one block to the next. Realisations lie in chunks that stay in cache, with one plain loop over the chunk per
-formula, which the compiler turns into vector instructions: seven times as fast as realisation after realisation. Where
-a filter branches, radarsim.kernels.lanes runs eight realisations at a time.
+realisation i draws its noise from i alone (pair k of normals at scan k); sums are added in a fixed order; nothing is
+kept from one block to the next. Realisations lie in chunks that stay in cache, with one plain loop per formula, which
+the compiler turns into vector instructions: seven times as fast as one realisation after another. Where a filter
+branches, radarsim.kernels.lanes runs eight realisations at a time.
 """
 
 import numpy as np
@@ -32,7 +32,7 @@ def smooth(estimate, z, gain):
 
 @summing
 def powers(estimate, beside, x, n):
-    """Sums over the first n realisations of e, e², e³, e⁴, and of e² times the squared error of the filter beside."""
+    """Sums over the first n realisations of e, e², e³, e⁴, and of e² times the other filter's squared error."""
     s1 = s2 = s3 = s4 = paired = 0.0
     for i in range(n):
         e, d = estimate[i] - x[i], beside[i] - x[i]
@@ -46,7 +46,7 @@ def simulate_block(key, first, count, sigma, step, gains, baseline, error, paire
     """Add the errors of realisations first … first + count - 1 to the sums.
 
     key (2,) of the noise; sigma of a plot and step of the walk, m; gains (F, K) of F filters over K scans; baseline the
-    filter that gains are against. error (F, K, 1, 4) takes the sums of e, e², e³, e⁴; paired (F, K, 1) those of e²
+    filter to which gains refer. error (F, K, 1, 4) takes the sums of e, e², e³, e⁴; paired (F, K, 1) those of e²
     times the baseline's e².
     """
     filters, scans = gains.shape
