@@ -1,9 +1,10 @@
-"""`radarsim sensitivity`: by how much σ and gains change for a tenth more of each key.
+"""`radarsim sensitivity`: by how much σ and gains change for a tenth more of each key, or less where more is refused.
 
 Exact where the case's σ are. Else both cases are simulated with the same noise, batch by batch, and the interval of a
 change is by how much it differs without one of the batches.
 """
 
+import contextlib
 import math
 import os
 from collections.abc import Callable, Hashable, Sequence
@@ -43,6 +44,7 @@ MOST_BARS = 16
 NOTHING = 1e-9  # per cent: what rounding may make of no change
 ROUNDED = NOTHING / 100  # the same of a ratio; of gains, in points, still less
 FOLDER = "sensitivity"
+LESS = ", −10 %"  # after a key that is lowered
 LABELS = ("case", "filter", "component", "unit", "key", "value", "changed_value")
 
 
@@ -61,10 +63,10 @@ class Sensitivity(Shown):
     """What was found: one row a key, filter and component, by falling effect of the key on the component that leads.
 
     of are the quantities, the first of which decides; leading is empty where that has no components. at says when,
-    empty where it has no scans; without_effect are keys that change nothing, left_out those that cannot be raised, with
-    the reason. without_estimate are filters that no row is about, as they have no estimate there. not_paired are
-    sampled keys that change when the scans are. labels: what people call each key of the rows, with its symbol and
-    unit. files: what was written, if anything.
+    empty where it has no scans; without_effect are keys that change nothing, left_out those that can be neither raised
+    nor lowered, with the reason. without_estimate are filters that no row is about, as they have no estimate there.
+    not_paired are sampled keys that change when the scans are. labels: what people call each key of the rows, with its
+    symbol and unit. files: what was written, if anything.
     """
 
     stem: str
@@ -85,6 +87,11 @@ class Sensitivity(Shown):
         return common.frame({name: [row[name] for row in self.rows] for name in columns(self.of)})
 
     @property
+    def lowered(self) -> tuple[str, ...]:
+        """The keys of the rows whose value is a tenth less, as the config refuses more."""
+        return tuple(dict.fromkeys(row["key"] for row in self.rows if abs(row["changed_value"]) < abs(row["value"])))
+
+    @property
     def _described(self) -> dict[str, Figure]:
         return {"tornado": tornado(self)} if self.rows else {}
 
@@ -102,7 +109,7 @@ class Sensitivity(Shown):
             each = (
                 f"{significant_digits(row[change], '+.3g')} {tr(first.changed_unit)} ({row['filter']})" for row in own
             )
-            lines.append(f"{key}: {', '.join(each)}")
+            lines.append(f"{key}{LESS * (key in self.lowered)}: {', '.join(each)}")
         return lines
 
 
@@ -119,9 +126,9 @@ def sensitivity(
     progress: Callable[[int, int, int], None] | None = None,
 ) -> Sensitivity:
     """The changes of a quantity, or of σ and gain, at a time, at a scan, or at the time of the last scan, for +10 % of
-    each numeric key.
+    each numeric key, for −10 % where the config refuses more.
 
-    Whole numbers grow by at least one. component leads the order: by default the first. Raises ConfigError.
+    Whole numbers change by at least one. component leads the order: by default the first. Raises ConfigError.
     """
     cases = Cases(config, configs.reading.texts(overrides), case)
     study = registry.study(cases.base.study)
@@ -145,9 +152,9 @@ def sensitivity(
     rows, left_out, apart = [], {}, list[str]()
     for n, key in enumerate(keys):
         try:
-            raised = cases.at(key.path, more(key))
-            before, after = look.pair(cases.base, base, raised)
-            rows += look.rows(cases.base, key, before, after)
+            value, changed = other(cases, key)
+            before, after = look.pair(cases.base, base, changed)
+            rows += look.rows(cases.base, key, value, before, after)
             apart += [key.path] if before is not base else []
         except ConfigError as error:
             left_out[key.path] = error.lines[0].removeprefix(f"{key.path}: ")
@@ -201,10 +208,19 @@ def named(spec: Study, path: str) -> Label:
     return found._replace(text=text)
 
 
-def more(key: fields.NumericKey) -> float:
-    """A tenth more of a key's value, in size; of whole numbers at least one more."""
+def other(cases: Cases, key: fields.NumericKey) -> tuple[float, Case]:
+    """A tenth more of a key's value, in size, or less where the config refuses more; and the case with it.
+
+    Whole numbers change by at least one. Raises ConfigError, which says why there is no more.
+    """
     assert key.value is not None
-    return key.value + max(1, round(MORE * key.value)) if key.whole else key.value * (1 + MORE)
+    step = max(1, round(MORE * key.value)) if key.whole else MORE * key.value
+    try:
+        return key.value + step, cases.at(key.path, key.value + step)
+    except ConfigError:
+        with contextlib.suppress(ConfigError):
+            return key.value - step, cases.at(key.path, key.value - step)
+        raise
 
 
 def when(asked: Asked) -> str:
@@ -251,17 +267,17 @@ class Look:
         """Filters and components, by their places."""
         return [(f, c) for f in range(len(self.axes.filters)) for c in range(len(self.parts))]
 
-    def pair(self, case: Case, base: Seen, raised: Case) -> tuple[Seen, Seen]:
-        """What a case, `base` with the usual realisations, and a raised one show. Raises ConfigError.
+    def pair(self, case: Case, base: Seen, changed: Case) -> tuple[Seen, Seen]:
+        """What a case, `base` with the usual realisations, and a changed one show. Raises ConfigError.
 
         With more of them where both are sampled at a time and the scan times differ: that time then has noise of other
         scans in each, so that the interval of the change is that of two runs of their own.
         """
-        seen = self.of(raised)
+        seen = self.of(changed)
         if base.exact or self.asked.at_s is None or np.array_equal(base.t_s, seen.t_s):
             return base, seen
         longer = replace(self, realisations=UNPAIRED * self.realisations)
-        return longer.of(case), longer.of(raised)
+        return longer.of(case), longer.of(changed)
 
     def of(self, case: Case) -> Seen:
         """What a case shows. Raises ConfigError."""
@@ -308,10 +324,12 @@ class Look:
 
         return self._each(value)
 
-    def rows(self, case: Case, key: fields.NumericKey, base: Seen, raised: Seen) -> list[dict[Hashable, Any]]:
-        """A row for each filter and component that has an estimate, with the changes from base to raised."""
+    def rows(
+        self, case: Case, key: fields.NumericKey, value: float, base: Seen, changed: Seen
+    ) -> list[dict[Hashable, Any]]:
+        """A row for each filter and component that has an estimate, with the changes from base to that of a value."""
         changes = [
-            (_change(of, base.whole[q], raised.whole[q]), _change(of, base.but_one[q], raised.but_one[q]))
+            (_change(of, base.whole[q], changed.whole[q]), _change(of, base.but_one[q], changed.but_one[q]))
             for q, of in enumerate(self.kinds)
         ]
         made: list[dict[Hashable, Any]] = []
@@ -319,7 +337,7 @@ class Look:
             if not np.isfinite(changes[0][0][f, c]):
                 continue
             name, unit = self.parts[c]
-            values = [case.name, self.axes.filters[f], name, unit, key.path, key.value, more(key)]
+            values = [case.name, self.axes.filters[f], name, unit, key.path, key.value, value]
             for q, (of, (change, but_one)) in enumerate(zip(self.kinds, changes, strict=True)):
                 ends = interval(but_one[:, f, c], change[f, c])
                 values += [base.whole[q, f, c], *(100 * math.expm1(end) if of.kind == "size" else end for end in ends)]
@@ -370,7 +388,8 @@ def tornado(found: Sensitivity) -> Figure:
                 if math.isfinite(value) and not own[key]["exact"]:
                     ends = np.array([own[key][bound] for bound in bounds])
                     marks.append(Line(ends, y, "", Style(i, 0, width_pt=1.0, flat=True), name=f"{one}, {key}, 95 %"))
-        ticks = tuple((float(j), tick(found.labels[key]) if n == 0 else "") for j, key in enumerate(keys))
+        texts = [tick(found.labels[key]) + LESS * (key in found.lowered) if n == 0 else "" for key in keys]
+        ticks = tuple((float(j), text) for j, text in enumerate(texts))
         y_axis = Axis("", limits=(-0.6, len(keys) - 0.4), ticks=ticks)
         names = [(panels.literal(one), Style(i, 0, width_pt=4.0, flat=True)) for i, one in enumerate(filters)]
         styles = tuple(names) if n == len(kinds) - 1 else ()
@@ -383,6 +402,8 @@ def tornado(found: Sensitivity) -> Figure:
         "Change of {quantity} when each key grows by 10 %, largest first.",
         quantity=" ".join(filter(None, (what, found.at))),
     )
+    if set(keys) & set(found.lowered):
+        caption += " " + tr("Keys with −10 % cannot grow and fall instead.")
     if not all(row["exact"] for row in rows):
         caption += " " + tr("Thin lines: 95 % intervals.")
     title = tr("Effect of +10 % of each key, {stem}", stem=found.stem)

@@ -39,6 +39,8 @@ def print_drawn(drawn: "DopplerChart") -> None:
 
 def print_sensitivity(found: "Sensitivity") -> None:
     """A table of the leading component: key, its values, and the change of each quantity of each filter."""
+    from radarsim.app.sensitivity import LESS
+
     rows = [row for row in found.rows if row["component"] == found.leading]
     columns_of = [
         (of, one)
@@ -51,7 +53,11 @@ def print_sensitivity(found: "Sensitivity") -> None:
         own = {row["filter"]: row for row in rows if row["key"] == key}
         first = next(iter(own.values()))
         changed = with_unit(first["changed_value"], found.labels[str(key)].unit)
-        line = [key, *(_change(own.get(one), of) for of, one in columns_of), f"{shown(first['value'])} → {changed}"]
+        line = [
+            f"{key}{LESS * (key in found.lowered)}",
+            *(_change(own.get(one), of) for of, one in columns_of),
+            f"{shown(first['value'])} → {changed}",
+        ]
         cells.append(line)
     heads = [(tr("{kind} of {filter}", kind=of.words, filter=one), of.changed_unit) for of, one in columns_of]
     columns = ["key", *(head if unit == "%" else f"{head}, {tr(unit)}" for head, unit in heads), "value"]

@@ -199,9 +199,10 @@ def sensitivity(
     """Show what +10 % of each key changes, largest effect first.
 
     Prints changes of σ and gain, or of another quantity. Every numeric key is raised by a tenth, one at a time; whole
-    numbers by at least one. Changes are exact if the quantity is known exactly; otherwise they are paired, with the
-    same noise, and have 95 % intervals. All filters and components are in DIR/sensitivity/CONFIG/sensitivity.csv;
-    tornado.svg beside it shows the first component.
+    numbers by at least one; a key that cannot grow, such as a probability of 1, is lowered and marked −10 %. Changes
+    are exact if the quantity is known exactly; otherwise they are paired, with the same noise, and have 95 % intervals.
+    All filters and components are in DIR/sensitivity/CONFIG/sensitivity.csv; tornado.svg beside it shows the first
+    component.
 
     \b
     Examples

@@ -56,10 +56,24 @@ def test_the_largest_effect_on_the_leading_component_comes_first(exact):
     keys = list(dict.fromkeys(r["key"] for r in exact.rows))
     effect = [max(abs(row(exact, key, name)["sigma_change_percent"]) for name in ("r", "r+Vr")) for key in keys]
     assert effect == sorted(effect, reverse=True)
-    assert keys[0] == "radar.sigma_range_m"
+    assert keys[:2] == ["radar.detection_probability", "radar.sigma_range_m"]
     assert "radar.wavelength_m" in exact.without_effect
     assert not set(exact.without_effect) & set(keys)
-    assert all("detection_probability" in key or "coefficients" in key for key in exact.left_out)
+    assert not exact.left_out
+
+
+def test_a_key_that_cannot_grow_is_lowered_and_marked(exact, tmp_path):
+    """The change is that of a run with the lower value, with its sign."""
+    one = row(exact, "radar.detection_probability")
+    assert (one["value"], one["changed_value"], exact.lowered) == (1, 0.9, ("radar.detection_probability",))
+    lower = row(sensitivity("rls2", at_s=60.0, overrides=["radar.detection_probability=0.9"]), "radar.sigma_range_m")
+    assert one["sigma_change_percent"] == pytest.approx(100 * (lower["sigma"] / one["sigma"] - 1), rel=1e-9)
+    assert one["sigma_change_percent"] > 0
+    marked = "radar.detection_probability, −10 %"
+    lines = command("sensitivity", "rls2", "--at", "60", "--out", tmp_path, "--no-figures").stdout.splitlines()
+    assert [line.startswith(marked) for line in lines[2:5]] == [True, False, False]
+    assert marked in str(exact)
+    assert finding.tornado(exact).caption.endswith("Keys with −10 % cannot grow and fall instead.")
 
 
 def test_whole_numbers_grow_by_one(exact):
@@ -102,8 +116,12 @@ def test_the_command_writes_table_and_figure(tmp_path):
     assert rows["exact"].all()
     lines = ended.stdout.splitlines()
     assert lines[0] == "rls2: change of r at 60 s for +10 %"
-    assert lines[2].split()[:5] == ["radar.sigma_range_m", "250", "→", "275", "m"]
-    assert any(line.startswith("filters.1.manoeuvre_variance  0.001 → 0.0011 (m/s³)² ") for line in lines)
+    assert lines[3].startswith("radar.sigma_range_m  ")
+    assert lines[3].endswith("  250 → 275 m")
+    assert any(
+        line.startswith("filters.1.manoeuvre_variance  ") and line.endswith("  0.001 → 0.0011 (m/s³)²")
+        for line in lines
+    )
 
 
 def test_the_command_gives_one_json_document(tmp_path):
@@ -143,7 +161,8 @@ def test_with_missed_plots_gains_are_those_of_the_run():
 def test_a_figure_names_keys_as_people_do(exact):
     (panel, _) = finding.tornado(exact).panels
     names = [text for _, text in panel.y.ticks]
-    assert names[-1] == "\u03c3 of the measured range $\u03c3_r$, m"
+    assert names[-1].endswith(", −10 %")
+    assert names[-2] == "\u03c3 of the measured range $\u03c3_r$, m"
     assert "r+Vr: manoeuvre variance $D_M$, (m/s\u00b3)\u00b2" in names
     assert not any("_mps" in name or "filters" in name for name in names)
 
