@@ -168,7 +168,7 @@ def sensitivity(
     >>> found = sensitivity("rls2", at_s=60)
     >>> first = found.table.iloc[0]
     >>> print(first["key"], first["filter"], first["component"], f"{first['sigma_change_percent']:.2f}")
-    radar.sigma_range_m r r 10.00
+    radar.detection_probability r r 34.40
     """
     from radarsim.app import configs
     from radarsim.app import sensitivity as finding

@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 
 MOST_BEGUN = 4  # cases of which is said what of them is stored
 MOST_ROWS = 36  # of the last scan's table; of a larger experiment the answer and the files are enough
+MARKS = {  # behind intervals that are too narrow
+    " *": term("heavy tails: the interval is too narrow"),
+    " †": term("the interval is too narrow: the column note of curves.csv or gains.csv says why"),
+}
 DROPPED = term("dropped {files} of {cases}, {size:.1f} MB in {folder}")
 
 
@@ -80,6 +84,9 @@ def show_rows(stem: str, last: "pd.DataFrame", names: Mapping[str, str]) -> None
     ]
     columns = ("case", "filter", "component", "at", "sigma", "95 %", "exact", "gain", "95 % of gain")
     show_but_alike(stem, ("case", "at"), columns, rows, columns[3:], ("exact", "95 %"))
+    for mark, why in MARKS.items():
+        if any(mark in cell for row in rows for cell in row[-4:]):
+            field("", f"{mark.strip()} {tr(why)}")
 
 
 def show_but_alike(
@@ -143,7 +150,8 @@ def too_narrow(row: Any, column: str) -> str:
     note = getattr(row, column, "")
     if not isinstance(note, str) or not note:  # not a text: of a gain that a row does not have
         return ""
-    return tr(" (heavy tails)") if note == notes.HEAVY else tr(" (marked)")
+    tails, other = MARKS
+    return tails if note == notes.HEAVY else other
 
 
 def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:

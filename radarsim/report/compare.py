@@ -25,7 +25,8 @@ from radarsim.report.drawing import PAGE_MM, Axis, Figure, Mark, Panel, Referenc
 from radarsim.report.panels import MOST, left_out, letter, line, literal, time_axis, with_unit
 from radarsim.report.quantities import COMMON, SIGMA, Quantity
 from radarsim.report.statistics import Estimate, difference
-from radarsim.report.wording import UNITS, interval, significant_digits
+from radarsim.report.wording import interval, significant_digits
+from radarsim.report.wording import unit as unit_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -312,7 +313,7 @@ def at_the_end(made: "pd.DataFrame") -> "pd.DataFrame":
 
 def _sentence(words: str, row: dict[Any, Any]) -> str:
     of = str(row["component"] or row["model"])
-    unit = tr(UNITS.get(row["unit"], row["unit"]))
+    unit = tr(unit_of(row["unit"]))
     other = f"{row['against_label']}" + ("" if row["against_filter"] == row["filter"] else f", {row['against_filter']}")
     what = tr("{quantity} of {symbol}", quantity=tr(words), symbol=of) if of else tr(words)
     change, exact = changes(row)
@@ -333,7 +334,7 @@ def _sentence(words: str, row: dict[Any, Any]) -> str:
 def changes(row: dict[Any, Any]) -> tuple[str, str]:
     """By how much a value differs, with its interval; and the exact change where it is known beside a sample."""
     if row["percent"] != row["percent"]:
-        text = f"{signed(row['difference'])} {tr(UNITS.get(row['unit'], row['unit']))}".rstrip()
+        text = f"{signed(row['difference'])} {tr(unit_of(row['unit']))}".rstrip()
         return f"{text} {interval(signed(row['difference_lo']), signed(row['difference_hi']))}", ""
     exact = row["exact_percent"]
     if row["lo"] == row["hi"] and row["against_lo"] == row["against_hi"] and exact == exact:

@@ -9,20 +9,14 @@ from collections.abc import Iterable, Iterator
 
 from radarsim.language import numeral, power_of_ten, term, tr
 
-UNITS = {
-    "m/s2": "m/s²",
-    "rad/s2": "rad/s²",
-    "°/s2": "°/s²",
-    "m/s3": "m/s³",
-    "hz": "Hz",
-}  # of tables, as people write them
+POWERS = str.maketrans("234", "²³⁴")  # of units in tables, as people write them
 SAID = (  # units that a language may write otherwise
-    *(term("m"), term("s"), term("m/s"), term("m/s²"), term("rad"), term("rad/s"), term("rad/s²")),
+    *(term("m"), term("m²"), term("s"), term("m/s"), term("m/s²"), term("rad"), term("rad/s"), term("rad/s²")),
     *(term("Hz"), term("Hz/s"), term("Hz/s²"), term("Hz/s³"), term("Hz/s⁴"), term("km"), term("°/s"), term("°/s²")),
 )
 NBSP = "\N{NO-BREAK SPACE}"
 KEPT = re.compile(  # the space between a number and its unit, in any language spoken here; and around ±
-    r"(?<=\d) (?=(?:%|°|k?m|к?м|m?s|м?с|[kM]?Hz|[кМ]?Гц|dB|дБ|rad|рад)(?:[/²³]\S*)?(?:\W|$))"
+    r"(?<=\d) (?=(?:%|°|k?m|к?м|m?s|м?с|[kM]?Hz|[кМ]?Гц|dB|дБ|rad|рад)(?:[/²³⁴]\S*)?(?:\W|$))"
     r"|(?<=\S) (?=± )|(?<=±) (?=\d)"
 )
 SPACES = "\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}"  # which a language may put into numbers
@@ -108,7 +102,7 @@ def share(value: float, low: float, high: float) -> str:
 
 def unit(name: str) -> str:
     """A unit of a table as people write it: m/s² of m/s2."""
-    return UNITS.get(name, name)
+    return "Hz" if name == "hz" else name.translate(POWERS)
 
 
 def unbroken(words: str) -> str:
