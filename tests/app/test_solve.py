@@ -321,7 +321,7 @@ def test_the_command_ends_with_3_where_it_is_not_attainable():
     assert ended.exit_code == 3
     assert ended.stdout == ""
     assert "60 % is not attainable" in ended.stderr
-    assert "at most 56.7 %, at 0.015 m/s" in ended.stderr
+    assert "the largest is 56.7 %, at 0.015 m/s" in ended.stderr
     document = json.loads(command(*words, "--json").stdout)
     assert document["value"] is None
     assert document["limit"] == pytest.approx(56.7, abs=0.05)
@@ -426,7 +426,7 @@ def test_what_takes_long_is_foretold_with_its_time_and_what_it_is(monkeypatch):
     monkeypatch.setattr(patterns, "WHOLE", 1 << 15)
     monkeypatch.setattr(patterns, "FOUND", {})
     said = []
-    late = {"overrides": [*MISSED, "scans=17"], "between": (10, 20), "told": said.append}
+    late = {"overrides": [*MISSED, "scans=17"], "between": (10, 20), "notify": said.append}
     found = solve("rls2", "radar.sigma_velocity_mps", Wanted("gain", None, "r"), 15, **late)
     words = "averaged over detection patterns, similar ones merged; accurate to about 1e-4"
     assert found.notes == (f"σ is {words}",)

@@ -1,12 +1,6 @@
-"""The documentation's own tools, which live beside it."""
-
-import sys
-from pathlib import Path
+"""What tests of the documentation share."""
 
 import pytest
-
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "docs"))
 
 
 @pytest.fixture

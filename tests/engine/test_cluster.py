@@ -149,7 +149,7 @@ def test_a_worker_prepares_a_work_once(monkeypatch):
 
 @pytest.mark.parametrize("address", ["foo bar", "", "xyz://a:1", "tcp://no-such-host.invalid:8786"])
 def test_an_address_that_is_none_is_told(address):
-    with pytest.raises(ConfigError, match=r"--scheduler: must be an address such as tcp://host:8786, got"):
+    with pytest.raises(ConfigError, match=r"scheduler: must be an address such as tcp://host:8786, got"):
         Cluster(scheduler=address)
 
 

@@ -107,7 +107,7 @@ def test_its_claims_are_listed_among_all(ran, radarsim, tmp_path):
 def test_it_speaks_the_language_of_its_catalogue(ran, radarsim, tmp_path):
     radarsim("run", "fifth_step", "-n", 500, "--language", "ru", "--out", tmp_path)
     page = (tmp_path / "fifth_step/report.html").read_text(encoding="utf-8")
-    assert "Как фильтры fixed, kalman следят за случайным блужданием?" in page
+    assert "Как фильтры fixed, Калман следят за случайным блужданием?" in page
     assert "СКО координаты" in page  # radarsim's title, the word in the form that it asks for
     assert "Ошибка фильтра Калмана более чем на 10 % меньше" in radarsim("claims", "fifth", "--language", "ru").stdout
     assert "How well do the filters" in (ran / "report.html").read_text(encoding="utf-8")

@@ -342,8 +342,8 @@ def test_every_window_is_marked_by_its_own_weights():
 
 def test_weights_whose_mean_is_not_one_are_told():
     made = result_of(300, RARELY).tables["rare"]
-    assert not any("not one" in line for line in report.warnings(made))
-    assert any("not one" in line for line in report.warnings(made.assign(mean_weight=1.5, mean_weight_se=0.1)))
+    assert not any("instead of one" in line for line in report.warnings(made))
+    assert any("instead of one" in line for line in report.warnings(made.assign(mean_weight=1.5, mean_weight_se=0.1)))
 
 
 def test_the_interval_of_a_weighted_rate_follows_the_weights():

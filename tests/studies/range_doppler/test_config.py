@@ -122,7 +122,7 @@ OTHERS = [
     ("sweep", {"scans": 15}, "config: sweep.scans: must be a list, got 15"),
     ("sweep", {"scans": []}, "config: sweep.scans: must hold at least 1, got []"),
     ("include", "rls2", "must be a list, got 'rls2'"),
-    ("figures", [], "must be a mapping of keys, got []"),
+    ("figures", 3, "must be a list, got 3"),
     ("figures", {"sigma_r": "x"}, "config: figures.sigma_r: must be a list, got 'x'"),
     ("figures", {"sigma_r": []}, "config: figures.sigma_r: must hold at least 1, got []"),
     ("figures", {"sigma_r": ["rls*"]}, "config: figures.sigma_r.0: no case has this name, got 'rls*'"),

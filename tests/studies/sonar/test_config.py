@@ -190,7 +190,7 @@ def test_correlation_by_coordinate():
 def test_a_scan_beyond_the_last_cannot_be_missed():
     with pytest.raises(ConfigError) as caught:
         load("sonar_smoothing", ["scans=10", "sensor.missed_scans=[3, 11]"])
-    assert caught.value.lines == ("--set sensor.missed_scans: must be <= 10, the last scan, got [3, 11]",)
+    assert caught.value.lines == ("overrides['sensor.missed_scans']: must be <= 10, the last scan, got [3, 11]",)
 
 
 def test_what_is_taken():
