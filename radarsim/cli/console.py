@@ -200,7 +200,7 @@ def fitting(
         max(len(line) for text in (name, *(row[i] for row in cells)) for line in text.split("\n"))
         for i, name in enumerate(heads or columns)
     ]
-    places, leave = list(range(len(columns))), list(spare)
+    places, leave = list(range(len(columns))), [name for name in spare if name in columns]
     while leave and sum(wide[i] + 2 for i in places) > width:
         places.remove(list(columns).index(leave.pop(0)))
     return places

@@ -119,6 +119,19 @@ def test_a_table_says_which_columns_it_leaves_out(monkeypatch):
     assert "188.1 m … 191.5 m" in screen.getvalue()
 
 
+def test_a_narrow_table_leaves_out_what_is_there(monkeypatch):
+    """A spare column that the table has not, such as exact values that no row has, is no fault."""
+    monkeypatch.setenv("COLUMNS", "40")
+    screen = Terminal()
+    monkeypatch.setattr("sys.stdout", screen)
+    row = {"filter": "f", "case": "a", "component": "x", "t_s": 1.0, "unit": "m", "exact_sigma": math.nan, "note": ""}
+    row |= {"sigma": 1.5, "sigma_lo": 1.0, "sigma_hi": 2.0, "gain_note": notes.HEAVY, "n_eff": 900.0}
+    last = pd.DataFrame([row | {"gain_percent": 3.25, "gain_lo": 1.0, "gain_hi": 5.0}])
+    outcomes.show_rows("a", last, {"a": "a"})
+    assert "3.25 %" in screen.getvalue()
+    assert "left out at 40 columns: 95 %" in screen.getvalue()
+
+
 def test_a_bar_moves_within_a_second_though_nothing_is_reported(monkeypatch):
     screen = Terminal()
     monkeypatch.setattr("sys.stderr", screen)
