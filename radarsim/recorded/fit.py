@@ -43,6 +43,7 @@ MOST_BIAS = 50.0  # in σ of the velocity
 SHARES = {OUTLIERS: (1e-3, 0.4, 3.0), CORRELATION: (1e-3, 0.99, 0.0)}  # least, most, logit from which it is searched
 FAR_FROM_ZERO = 1e4  # times what counts as zero of a key
 IMPOSSIBLE = -1e300  # what counts as the logarithm of no likelihood: a search needs a number
+TOP, END, BESIDE = 130, 15, 60  # likelihoods that a key costs on the way to the top and to an end; an explanation
 NOTHING: Mapping[str, float] = MappingProxyType({})
 STARTS = (-2.0, 0.0, 2.0)  # of a search
 Progress = Callable[[int, int | None], None]  # likelihoods found, and how many it will be where that is known
@@ -61,13 +62,13 @@ def units(likelihood: Likelihood) -> np.ndarray:
 class Counted:
     """A likelihood that counts how often it is found."""
 
-    def __init__(self, of: Likelihood, progress: Progress, count: int = 0):
-        self.of, self.progress, self.count = of, progress, count
+    def __init__(self, of: Likelihood, progress: Progress, count: int = 0, expected: int | None = None):
+        self.of, self.progress, self.count, self.expected = of, progress, count, expected
         self.keys, self.stated = of.keys, of.stated
 
     def __call__(self, values: np.ndarray, explained: Mapping[str, float]) -> float:
         self.count += 1
-        self.progress(self.count, None)
+        self.progress(self.count, self.expected and max(self.expected, self.count))
         return self.of(values, **explained)
 
 
@@ -408,7 +409,7 @@ def fitted(likelihood: Likelihood, robust: bool = False, progress: Progress = si
     search = _Search(likelihood, robust, progress)
     while any(coarse := [search.steps_at_zero(i) for i in range(len(likelihood.keys))]):
         likelihood.least = np.where(coarse, FINER * np.asarray(likelihood.least), likelihood.least)
-        search = _Search(likelihood, robust, progress)
+        search = _Search(likelihood, robust, progress, search.evaluations)
     if search.top <= IMPOSSIBLE:
         raise ConfigError(f"filter {likelihood.filter} cannot take the plots: `radarsim track` says at which row")
     share = float(search.natural(search.best)[-1]) if robust else None
@@ -426,10 +427,11 @@ def _beside(search: "_Search", likelihood: Likelihood) -> tuple[str, float] | No
     more than chance does in one recording of twenty."""
     from scipy.stats import chi2
 
-    counted = Counted(likelihood, search.progress, search.evaluations)
     fitted = search.natural(search.best).tolist()
     held = dict(zip((*likelihood.keys, OUTLIERS), fitted, strict=False))
     asked = [what for what in likelihood.explains if what not in held]
+    expected = search.evaluations + BESIDE * len(asked)
+    counted = Counted(likelihood, search.progress, search.evaluations, expected)
     found = [best(counted, [what], {}, held) for what in asked]
     if not found:
         return None
@@ -508,10 +510,12 @@ class _Search:
                 np.append(keys, _logit(share))
                 for keys, share in ((start, 0.05), (self.lowest, LEAST_SHARE), (self.highest, MOST_SHARE))
             )
+        self.top_at = evaluations + TOP * start.size * (1 + robust)
         self.shape = _Shape(self._value)
         self.best, self.top = self._climbed(start, None, ROUGH)
         # A second start far away: the likelihood of manoeuvre and plot errors may have two hills.
-        for factor in (0.1, 10.0):
+        for climbs, factor in enumerate((0.1, 10.0), 1):
+            self.top_at = max(self.top_at, evaluations + (self.evaluations - evaluations) * 3 // climbs)
             moved = np.where(self.best > self.lowest, self.best, start)
             moved[: len(likelihood.stated)] += math.log(factor)
             other, top = self._climbed(moved, None, ROUGHLY)
@@ -545,13 +549,13 @@ class _Search:
         found = self.likelihood(values[:count], float(values[count]) if self.robust else 0.0)
         return found if math.isfinite(found) else IMPOSSIBLE
 
-    def _expected(self) -> int | None:
-        """How many likelihoods it will be, by those that the ends found so far took; None before the first."""
-        if not self.ends_found:
-            return None
-        each = (self.evaluations - self.ends_begun_at) / self.ends_found
-        ends = 2 * len(self.likelihood.keys)
-        return max(round(self.ends_begun_at + each * ends), self.evaluations)
+    def _expected(self) -> int:
+        """How many likelihoods it will be: the top and each end as they usually take, or as those found so far took."""
+        ends, size = 2 * len(self.likelihood.keys), len(self.likelihood.keys) + self.robust
+        beside = BESIDE * (len(self.likelihood.explains) - self.robust)
+        top = self.ends_begun_at or max(self.top_at, self.evaluations)
+        each = (self.evaluations - self.ends_begun_at) / self.ends_found if self.ends_found else END * size
+        return max(round(top + each * ends), self.evaluations) + beside
 
     def _climbed(self, start: np.ndarray, held: int | None, close: float) -> tuple[np.ndarray, float]:
         """The top reached from a start, one coordinate held or none, and the logarithm of the likelihood there: by

@@ -114,6 +114,18 @@ def test_last_digits_do_not_show_in_the_fit(track, robust):
             assert there.value == pytest.approx(here.value, rel=1e-5)
 
 
+def test_the_end_is_foretold_from_the_beginning():
+    """Within a factor of two of all likelihoods, at each of them, and never under what is done."""
+    told = []
+    of = likelihood(recording(np.random.default_rng(5)))
+    fit.fitted(of, progress=lambda done, expected: told.append((done, expected)))
+    done, expected = np.array(told).T
+    np.testing.assert_array_equal(done, np.arange(1, len(done) + 1))
+    assert (expected >= done).all()
+    assert len(done) / 2 < expected.min()
+    assert expected.max() < 2 * len(done)
+
+
 @pytest.mark.parametrize(
     "options",
     [
