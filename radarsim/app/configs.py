@@ -24,7 +24,7 @@ from radarsim.config import load as reading
 from radarsim.config.experiment import Case, Experiment
 from radarsim.config.fields import Model
 from radarsim.errors import ConfigError
-from radarsim.language import term
+from radarsim.language import term, tr
 from radarsim.report import files
 from radarsim.studies import registry
 from radarsim.studies.interface import Plan
@@ -72,11 +72,28 @@ def shipped(stem: str) -> tuple[Model, ...] | None:
 
     Never of a file of that name that the user has: claims are judged by what is shipped.
     """
-    for folder in (document.SHIPPED, *registry.folders()):
-        file = folder / "configs" / f"{stem}.yaml"
-        if stem and file.is_file():
-            return tuple(case.spec for case in reading.load(file, (), registry).cases)
-    return None
+    file = shipped_file(stem)
+    return None if file is None else tuple(case.spec for case in reading.load(file, (), registry).cases)
+
+
+def shipped_file(stem: str) -> Path | None:
+    """The file of the shipped config of a stem."""
+    files = (folder / "configs" / f"{stem}.yaml" for folder in (document.SHIPPED, *registry.folders()))
+    return next((file for file in files if stem and file.is_file()), None)
+
+
+def shipped_stem(experiment: Experiment) -> str:
+    """The stem of the shipped config that an experiment is of, whatever was set; empty for a config of the user's."""
+    file = shipped_file(experiment.stem)
+    own = file and experiment.path and Path(experiment.path).resolve() == file.resolve()
+    return experiment.stem if own else ""
+
+
+def shadows(experiment: Experiment) -> list[str]:
+    """That an experiment is of a user's file though a config of its name is shipped."""
+    if not experiment.path or shipped_stem(experiment) or not shipped_file(experiment.stem):
+        return []
+    return [tr("{file}: used in place of the shipped config {config}", file=experiment.path, config=experiment.stem)]
 
 
 EDITORS, SCHEMA = "# yaml-language-server: $schema=", "schema.json"

@@ -121,7 +121,7 @@ class Plan:
 
     def _experiment(self, config: str) -> Experiment:
         if config not in self._experiments:
-            self._experiments[config] = configs.load(config)
+            self._experiments[config] = configs.load(configs.shipped_file(config) or config)
         return self._experiments[config]
 
     @property
@@ -271,7 +271,7 @@ def rows_of(experiment: Experiment, found: SimulatedCases) -> list[dict[str, Any
     results = run.finished(found)
     if len(results) < len(experiment.cases):
         return []
-    table = result.case_tables(results, stem=experiment.stem)["claims"]
+    table = result.case_tables(results, configs.shipped_stem(experiment))["claims"]
     return list(table.to_dict("records"))
 
 

@@ -160,7 +160,7 @@ class Result(Shown):
     @cached_property
     def _tables(self) -> dict:
 
-        return case_tables(self.cases, self.experiment.stem)
+        return case_tables(self.cases, configs.shipped_stem(self.experiment))
 
     @property
     def curves(self) -> "pd.DataFrame":
@@ -290,7 +290,7 @@ def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
     """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims.
 
     A study whose errors are not of all realisations at common scans makes its own curves and gains. stem is the
-    config's: all claims of it are in the table of claims, also those that it cannot judge any more.
+    shipped config's: all claims of it are in the table of claims, also those that it cannot judge any more.
     """
     of = study(results[0].study)
     made = measured(results)
@@ -483,7 +483,7 @@ def write_files(
     """
     from radarsim.report import html
 
-    made = case_tables(results, stem=experiment.stem) if made is None else made
+    made = case_tables(results, configs.shipped_stem(experiment)) if made is None else made
     contents = {f"{name}.csv": common.to_csv(table) for name, table in made.items() if len(table) or name in ALWAYS}
     own, began = study(experiment.study), time.perf_counter()
     try:

@@ -311,7 +311,7 @@ def seconds(experiment: Experiment, figures: bool | str | Sequence[str], width_m
     result = case_result(case, work, collect(work, REALISATIONS))
     output.case_tables([result])  # what it loads is not to be counted for every case
     started = time.perf_counter()
-    made = output.case_tables([result], experiment.stem)
+    made = output.case_tables([result], configs.shipped_stem(experiment))
     tables = (time.perf_counter() - started) * len(experiment.cases)
     formats = configs.formats(figures)
     described = output.case_figures([result], made, experiment) if formats else {}
@@ -523,7 +523,7 @@ def result_of(experiment: Experiment, simulated: SimulatedCases, facts: dict[str
     """The result, `again` the command that repeats it; with what is to be warned of in the config."""
     from radarsim.app.result import Result
 
-    facts["warnings"] += registry.study(experiment.study).warnings(experiment)
+    facts["warnings"] += [*configs.shadows(experiment), *registry.study(experiment.study).warnings(experiment)]
     return Result(experiment, finished(simulated), facts | {"command": again})
 
 
@@ -663,9 +663,10 @@ def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, 
     held = {stem: rows for stem in stems if (rows := kept.stored(Path(out) / stem / "claims.csv")) is not None}
     rows = []
     for one in asked:
-        own = held.get(one.stem) or [row for row in listed(every, {}) if row["config"] == one.stem]
+        shipped_as = configs.shipped_stem(one)
+        own = held.get(one.stem) or [row for row in listed(every, {}) if row["config"] == shipped_as]
         if not own and one.cases and (paper := registry.study(one.cases[0].study).claims()) is not None:
-            own = unstored(paper, one.cases, shipped, one.stem)
+            own = unstored(paper, one.cases, shipped, shipped_as)
         rows += [row | {"config": one.stem} for row in own]
     there = {(row["claim"], row["config"]) for row in rows}
     own = [row for row in listed(every, held) if row["claim"] in shown]

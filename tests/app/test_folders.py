@@ -273,3 +273,14 @@ def test_without_the_compiler_it_is_told(monkeypatch):
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     with pytest.raises(ConfigError, match="NUMBA_DISABLE_JIT is set"):
         radarsim.run("rls2", realisations=200)
+
+
+def test_a_config_of_ones_own_is_not_judged_as_the_shipped_one_of_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = (SHIPPED / "configs" / "orders.yaml").read_text(encoding="utf-8")
+    assert set(radarsim.run("orders", realisations=200).tables["claims"]["claim"]) == {"P1.E4", "P1.E5", "P1.E6"}
+    (tmp_path / "orders.yaml").write_text(text.replace("sigma_range_m: 250", "sigma_range_m: 60"), encoding="utf-8")
+    own = radarsim.run("orders", realisations=200)
+    assert not len(own.tables["claims"])
+    assert "orders.yaml: used in place of the shipped config orders" in own.warnings
+    assert set(radarsim.claims("orders").table["verdict"]) == {"not judged here"}

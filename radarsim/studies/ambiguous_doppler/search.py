@@ -1,6 +1,6 @@
 """What brings a filter that loses its folds back to them: remedies tried on realisations of the same case."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from radarsim.config.experiment import Case
@@ -14,8 +14,11 @@ LARGER = 100.0  # times the manoeuvre variance
 STAGGER = (1.0, 7 / 6, 4 / 3)  # times the repetition rate, used in turn
 
 
-def cures(spec: Any, name: str) -> Iterator[tuple[str, float]]:
-    """The remedies that help a filter, as settings of the config, and the share of realisations it then loses."""
+def cures(spec: Any, name: str, swept: Iterable[str] = ()) -> Iterator[tuple[str, float]]:
+    """The remedies that help a filter, as settings of the config, and the share of realisations it then loses.
+
+    swept: keys that the config sweeps, which no setting may change beside it.
+    """
     number, one = next((i, one) for i, one in enumerate(spec.filters) if one.name == name)
     key = f"filters.{number}"
     (variance, *_), rates = one.variances, spec.radar.rates_hz
@@ -33,6 +36,8 @@ def cures(spec: Any, name: str) -> Iterator[tuple[str, float]]:
         said = f"--set radar.repetition_rate_hz=[{','.join(f'{rate:g}' for rate in several)}]"
         tried.append((said, one, spec.radar.model_copy(update={"repetition_rate_hz": several})))
     for said, changed, radar in tried:
+        if any(f"--set {key}{end}" in said for key in swept for end in "=."):
+            continue
         share = _lost(spec.model_copy(update={"radar": radar, "filters": (changed,), "baseline": None, "rare": None}))
         if share <= HELPS:
             yield said, share

@@ -136,7 +136,7 @@ def _cures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> lis
                 continue
             shares = [
                 tr("{settings} ({share} % lost)", settings=settings, share=numeral(f"{100 * share:.2g}"))
-                for settings, share in cures(result.spec, name)
+                for settings, share in cures(result.spec, name, dict(result.swept))
             ]
             if not shares:
                 return []

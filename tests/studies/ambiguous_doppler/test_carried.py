@@ -92,3 +92,16 @@ def test_what_helps_is_what_was_tried():
         cured = radarsim.run(MINE, overrides=overrides)
         # Two independent samples of 400: five standard deviations of their difference at a tenth.
         assert abs(at_the_end(cured) - share) < 5 * (2 * 0.1 * 0.9 / 400) ** 0.5
+
+
+def test_what_helps_does_not_touch_what_the_config_sweeps():
+    """Where it would, the setting is refused beside the sweep."""
+    key = "filters.1.manoeuvre_variance"
+    swept = load({**MINE, "sweep": {key: [0.1, 0.2]}}, FOLDED)
+    one = swept.cases[0]
+    touching = {said for said, _ in cures(one.spec, "r+Vr") if key in said}
+    assert touching
+    for settings in touching:
+        with pytest.raises(ConfigError, match="sweep"):
+            load({**MINE, "sweep": {key: [0.1, 0.2]}}, (*FOLDED, *settings.replace("--set ", "").split()))
+    assert not touching & {said for said, _ in cures(one.spec, "r+Vr", dict(one.swept))}
