@@ -187,6 +187,28 @@ def test_an_end_is_found_where_another_key_has_to_rise_from_zero():
     assert profile(0.997 * lo) < limit < profile(1.003 * lo)
 
 
+def test_an_end_is_found_where_outliers_have_to_rise_from_none():
+    """At the top there are none. Where the manoeuvre variance is held too low, some make the plots likelier: the
+    profile by simplexes from several shares."""
+    from scipy.optimize import minimize
+
+    one = likelihood(recording(np.random.default_rng(3)))
+    found = fit.fitted(one, robust=True)
+    assert found.outliers == 0
+    best, lo = np.array([key.value for key in found.keys]), found.keys[2].lo
+
+    def profile(variance):
+        def cost(at):
+            return -one(np.array([*np.exp(at[:2]), variance]), min(np.exp(at[2]), 0.5))
+
+        starts = [[*np.log(best[:2]), np.log(share)] for share in (1e-7, 0.01, 0.05)]
+        options = {"xatol": 1e-4, "fatol": 1e-6}
+        return -min(minimize(cost, start, method="Nelder-Mead", options=options).fun for start in starts)
+
+    limit = one(best) - fit.HALF_CHI2_95
+    assert profile(0.997 * lo) < limit < profile(1.003 * lo)
+
+
 def test_a_straight_flight_has_no_manoeuvre_variance(tmp_path):
     """The plots of the config's own target: an upper end, and no lower one."""
     columns = follow.simulated(loaded())
