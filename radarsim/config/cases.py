@@ -374,7 +374,7 @@ class Expander:
     def _carried(self, document: Document, study: str, over: Document) -> tuple[Document, str]:
         """A config of one study carried over to that which stands beside `include`, if one does, and its study."""
         wanted = over.data.get("study", study)
-        if wanted == study:
+        if wanted == study or not isinstance(wanted, str):  # what is no text is a fault already noted
             return document, study
         if not self.studies.has(wanted):
             self._no_such_study(over, wanted)

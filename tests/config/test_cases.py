@@ -300,6 +300,8 @@ def test_a_study_may_be_named_beside_include_but_must_agree(folder, said):
         (fault,) = said("both")
         assert fault.startswith(line + must)
         assert fault.endswith(f"got '{other}'")
+    folder("configs/both.yaml", "include: [a, b]\nstudy: {a: 1}\n")
+    assert said("both") == ["configs/both.yaml:2:8: study: must be text, got {a: 1}"]
 
 
 def test_one_study_a_run(folder, said):
