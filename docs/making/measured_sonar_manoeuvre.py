@@ -152,14 +152,14 @@ def threshold(more: int, few: int) -> Callable[[Results], str]:
 def switched(case: str, degree: int) -> Callable[[Results], str]:
     """σ of a held degree over that of the degree switched by five plots (P3.10)."""
     what = (
-        f"σ of the range over the run in the {case} manoeuvre, degree {degree} held over degree switched by five plots"
+        f"σ of the range over the run in the {case} manoeuvre, degree {degree} fixed over degree switched by five plots"
     )
     return part(STEM, "P3.10", what, "")
 
 
 def delay_ratio(case: str) -> Callable[[Results], str]:
     """Mean time to see beginning and end of a manoeuvre, eight plots over five (P3.8)."""
-    what = f"mean time to see beginning and end of the {case} manoeuvre at k = 1, 8 plots over 5"
+    what = f"mean time to detect beginning and end of the {case} manoeuvre at k = 1, 8 plots over 5"
     return part(STEM, "P3.8", what, "")
 
 
@@ -193,9 +193,7 @@ MEASURED = {
     "manoeuvre_threshold_8_5": threshold(8, 5),
     "manoeuvre_delay_weakest": delay_ratio("weakest"),
     "manoeuvre_delay_strongest": delay_ratio("strongest"),
-    "manoeuvre_at_one": part(
-        STEM, "P3.9", "alarms a test at k = 1, five plots, acceleration as large as its own spread", ""
-    ),
+    "manoeuvre_at_one": part(STEM, "P3.9", "alarms a test at k = 1, five plots, acceleration of one σ_a", ""),
     **{
         f"manoeuvre_held_{degree}_{case}": switched(case, degree)
         for degree in (1, 2)

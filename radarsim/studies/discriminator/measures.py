@@ -153,7 +153,7 @@ class Evidence(claims.Evidence):
         return np.array(offsets)
 
     def phase_lost(self, key: str, at: Literal["first", "later"]) -> float:
-        """Probability that the start's phase is over a quarter of a turn off the best: at first, or largest afterwards.
+        """Probability that the starting phase is over a quarter turn off the best: at first, or largest afterwards.
 
         Over the phase alone the likelihood is a cosine, so that from nearer scoring finds its maximum.
         """

@@ -44,7 +44,7 @@ class Readings(PaperReadings):
         if claim.id == SINGLE:
             strength = self.sets(reading)["shift"]
             probability = float(exact.detection(1.0, strength))
-            what = f"alarms a test at k = 1, five plots, acceleration of {strength:g} times its own spread"
+            what = f"alarms a test at k = 1, five plots, acceleration of {strength:g} σ_a"
             if strength == 1:
                 what = claim.parts[0].what
             return [
@@ -85,7 +85,7 @@ def _enough(criterion: str) -> tuple[int, str]:
     n = np.arange(2, 100)
     smoothed, ahead = 2 * (2 * n - 1) / (n * (n + 1)), 2 * (2 * n + 1) / (n * (n - 1))  # variances, of a plot's
     met, what = {
-        "predicted as measured": (ahead <= 1, "that extrapolate no worse than a plot measures"),
+        "predicted as measured": (ahead <= 1, "whose extrapolation is no worse than a plot"),
         "half the variance": (smoothed <= 0.5, "that smooth to half of a plot's variance"),
         "under 5 % more": (
             np.append(np.sqrt(smoothed[1:] / smoothed[:-1]) > 0.95, True),
@@ -110,7 +110,7 @@ def _with_rate(one: Any, rate: float) -> Any:
 def _delay(part: Part, until: str, rate: float) -> Part:
     """A part on times to see a manoeuvre, at the reading's rate and of what it wants to be seen."""
     at = "k = 1" if rate == measures.AT_ONE else f"{rate:g} false alarms a test"
-    seen = f"mean time to see {'the beginning' if until == 'beginning' else until} of the {part.cases[0]} at {at}"
+    seen = f"mean time to detect {'the beginning' if until == 'beginning' else until} of the {part.cases[0]} at {at}"
     if part.statement == "time":
         return with_arguments(replace(part, what=f"{seen}, 8 plots over 5"), until=until, rate=rate)
     if part.statement == "not worth while":

@@ -39,10 +39,12 @@ def test_a_part_is_called_what_it_is_under_its_reading():
     for claim in ("P3.3", "P3.8", "P3.9", "P3.10"):
         assert named(claim) == [part.what for part in CLAIMS[claim].parts if part.asserted]
     assert named("P3.3", high_accuracy="two thirds") == ["fewest plots that smooth to two thirds of a plot's σ"]
-    assert named("P3.9", strength="half σ_a")[0].endswith("acceleration of 0.5 times its own spread")
+    assert named("P3.9", strength="half σ_a")[0].endswith("acceleration of 0.5 σ_a")
     assert named("P3.10", memory="six plots")[0].endswith("degree switched by six plots")
     late = named("P3.8", false_alarms="0.01", seen="beginning")
-    assert "mean time to see the beginning of the weakest manoeuvre at 0.01 false alarms a test, 8 plots over 5" in late
+    assert (
+        "mean time to detect the beginning of the weakest manoeuvre at 0.01 false alarms a test, 8 plots over 5" in late
+    )
     assert not any("k = 1" in what for what in late)
 
 
