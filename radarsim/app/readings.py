@@ -129,8 +129,10 @@ class Plan:
         """Realisations over all runs."""
         return sum(len(pairs) for pairs in self._jobs.values()) * self._n
 
-    def judged(self, options: RunOptions, progress: Progress | None, stop: Signals | None) -> list[Over]:
-        """Every claim under every reading."""
+    def judged(
+        self, options: RunOptions, progress: Progress | None, stop: Signals | None, judging: Progress | None = None
+    ) -> list[Over]:
+        """Every claim under every reading; progress is told of the runs, judging of the verdicts after them."""
         done = 0
         for key, pairs in self._jobs.items():
             count, before = len(pairs) * self._n, self.held
@@ -141,10 +143,12 @@ class Plan:
                 self.held = before + count  # that many are not computed
             done += count
         contradicting = frozenset(choice.key for choice in self._paper.readings.choices if choice.contradicts)
-        return [
-            Over(claim, tuple(self._under(claim, one) for one in self._wanted.readings(claim)), contradicting)
-            for claim in self._wanted.claims
-        ]
+        found, every = list[Over](), sum(len(self._wanted.readings(claim)) for claim in self._wanted.claims)
+        for claim in self._wanted.claims:
+            verdicts = tuple(self._under(claim, one) for one in self._wanted.readings(claim))
+            found.append(Over(claim, verdicts, contradicting))
+            _without_runs(judging, sum(len(over.under) for over in found), every)
+        return found
 
     def decided(
         self, over: list[Over], most: int, options: RunOptions, progress: Progress | None, stop: Signals | None
@@ -235,6 +239,12 @@ class Plan:
 def _shifted(progress: Progress | None, before: int, of: int = 0, held: int = 0) -> Progress | None:
     """The same after so many that are done, `held` of them without computing."""
     return progress and (lambda done, total, own: progress(before + done, of or total, held + own))
+
+
+def _without_runs(progress: Progress | None, done: int, total: int) -> None:
+    """Say how many verdicts or figures are made: no realisation of theirs is computed now, so they have no rate."""
+    if progress is not None:
+        progress(done, total, done)
 
 
 # ---- decide ----------------------------------------------------------------------------------------------------------
@@ -459,7 +469,7 @@ def readings(
     total, done, held = sum(plan.total for plan in plans), 0, 0
     read, left = [], []
     for plan, one in zip(plans, wanted, strict=True):
-        over = plan.judged(options, _shifted(progress, done, max(total, 1), held), stop)
+        over = plan.judged(options, _shifted(progress, done, max(total, 1), held), stop, progress)
         if decide:
             over = plan.decided(over, realisations or one.paper.readings.most, options, progress, stop)
             left += [line for each in over if (line := _left(each))]
@@ -467,7 +477,7 @@ def readings(
         read.append(Read(one.paper, over, _counted(one.paper, over) if one.whole and not one.only else None))
     made = Readings(read, Path(out) / FOLDER, left=tuple(left))
     if write and not any(one.only for one in wanted):
-        made.files = _write(made, figures)
+        made.files = _write(made, figures, progress)
         made.outdated = _outdated(made)
     return made
 
@@ -499,7 +509,7 @@ def _counted(paper: Paper, over: list[Over]) -> Search | Joint:
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
-def _write(done: Readings, figures: bool) -> tuple[str, ...]:
+def _write(done: Readings, figures: bool, progress: Progress | None) -> tuple[str, ...]:
     """Write the table, with the stored rows of claims that were not asked for, and a curve a claim.
 
     A curve whose claim came out as it did before is not drawn again, unless what draws it has changed: `drawn.json`
@@ -507,10 +517,10 @@ def _write(done: Readings, figures: bool) -> tuple[str, ...]:
     """
     contents = {TABLE: _table(done).encode(), CLASSES.name: _classes(done).encode()}
     if figures:
-        drawn = _drawn(done.folder)
-        for over in done.over:
-            if drawable(over):
-                contents |= _curve(done, over, drawn)
+        drawn, shown = _drawn(done.folder), [over for over in done.over if drawable(over)]
+        for n, over in enumerate(shown, 1):
+            contents |= _curve(done, over, drawn)
+            _without_runs(progress, n, len(shown))
         contents[DRAWN] = (json.dumps(drawn, indent=1, sort_keys=True) + "\n").encode()
     files.replace_all(done.folder, contents)
     return tuple(sorted(name for name in contents if name != DRAWN))
