@@ -241,8 +241,12 @@ def inputs(results: Sequence[Result]) -> "pd.DataFrame":
     for (_, *radar), members in radars.items():
         tried = sorted({float(v) for result in members for v in result.axes.manoeuvre_variance if not np.isnan(v)})
         scans = sorted({result.spec.scans for result in members})
-        rows.append((*radar, ", ".join(panels.number(v, powers=True) for v in tried), ", ".join(map(str, scans))))
-    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(INPUTS)})
+        seen = ", ".join(map(panels.number, sorted({result.spec.radar.detection_probability for result in members})))
+        last = (", ".join(panels.number(v, powers=True) for v in tried), ", ".join(map(str, scans)), seen)
+        rows.append((*radar, *last))
+    missed = any(row[-1] != "1" for row in rows)
+    names = INPUTS if missed else INPUTS[:-1]
+    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(names)})
 
 
-INPUTS = ("radar", "σ_r, m", "σ_V, m/s", "Δt, s", "λ, m", "C_θ", "D_M, (m/s³)²", "scans")
+INPUTS = ("radar", "σ_r, m", "σ_V, m/s", "Δt, s", "λ, m", "C_θ", "D_M, (m/s³)²", "scans", "P_D")

@@ -232,6 +232,9 @@ def test_inputs_have_a_row_for_each_radar_that_differs(expected_radar, swept):
     np.testing.assert_array_equal(table["C_θ"], range_doppler.tables(results)["radar"]["C_theta"])
     (row,) = range_doppler.inputs(swept).to_dict("records")
     assert row["D_M, (m/s³)²"] == "10⁻⁵, 10⁻⁴, 10⁻³, 10⁻², 10⁻¹"
+    assert "P_D" not in row
+    results = [expected_radar("rls2", name=f"rls2 {v}", radar={"detection_probability": v}) for v in (1, 0.9)]
+    assert list(range_doppler.inputs(results)["P_D"]) == ["0.9, 1"]  # missed plots are on the page
 
 
 BRAKING = {"kind": "acceleration_start", "coefficients": [1e5, -250], "start_s": 50, "acceleration_mps2": 20}
