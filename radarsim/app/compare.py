@@ -102,6 +102,10 @@ def compare(
     if len(sources) < 2:
         raise ConfigError(f"compare: takes two results or more, got {len(sources)}")
     given = list(sources.values()) if isinstance(sources, Mapping) else sources
+    if wrong := [one for one in given if not isinstance(one, Result | str | os.PathLike)]:
+        raise ConfigError(
+            *(f"compare: must be a result, a config or the folder of a result, got {one!r}" for one in wrong)
+        )
     runs = _found(given, Path(RESULTS if out is None else out))
     if isinstance(sources, Mapping):
         runs = [replace(run, label=str(name)) for run, name in zip(runs, sources, strict=True)]

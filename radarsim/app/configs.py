@@ -16,14 +16,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex
+from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex, TypeGuard
 
 from radarsim import language
 from radarsim.config import document
 from radarsim.config import load as reading
 from radarsim.config.experiment import Case, Experiment
 from radarsim.config.fields import Model
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, argument
 from radarsim.language import term, tr
 from radarsim.report import files
 from radarsim.studies import registry
@@ -211,7 +211,7 @@ def selected(whole: Inventory, words: Sequence[str]) -> Inventory:
 
 
 # ---- arguments -------------------------------------------------------------------------------------------------------
-MOST_THREADS = 1024
+MOST_THREADS, WIDEST_MM = 1024, 1000
 FORMATS = ("svg", "png", "pdf")  # of the figures' files
 NEEDED = ("workers", "depth", "shortest_s", "longest_s", "submit", "finished", "cancel", "forget")  # of an executor
 
@@ -226,14 +226,18 @@ def check(
     executor: object = None,
     out: object = None,
     figures: object = True,
+    width_mm: object = None,
+    **numbers: object,
 ) -> tuple[str, ...]:
-    """The overrides as texts. ConfigError with a line for each invalid argument of `run`."""
+    """The overrides as texts. ConfigError with a line for each invalid argument; what is not named is a number."""
     faults = [
         *_count("threads", threads, least=0),
         *_count("workers", workers, least=1),
-        *_number("precision", precision, 100),
+        *_number("precision", precision, 100, " %"),
         *([] if callable(time_limit) else _number("time_limit", time_limit, math.inf)),
+        *_number("width_mm", width_mm, WIDEST_MM),
     ]
+    faults += [f"{name}: must be a number, got {value!r}" for name, value in numbers.items() if not _is_number(value)]
     if executor is not None and not all(hasattr(executor, name) for name in NEEDED):
         faults.append(f"executor: must be an executor of radarsim.engine, got {executor!r}")
     if out is not None:
@@ -259,6 +263,23 @@ def formats(figures: bool | str | Iterable[str]) -> tuple[str, ...]:
     if isinstance(figures, bool) or figures is None:
         return FORMATS[:2] if figures else ()
     return (figures,) if isinstance(figures, str) else tuple(figures)
+
+
+def whole(realisations: object) -> int | None:
+    """A number of realisations, which may be a float. Raises ConfigError for what is none."""
+    if realisations is None:
+        return None
+    if not _is_number(realisations) or not float(realisations).is_integer():
+        raise ConfigError(f"{argument('realisations')}: must be a whole number, got {realisations!r}")
+    if float(realisations) < 1:
+        raise ConfigError(f"{argument('realisations')}: must be >= 1, got {realisations}")
+    return int(float(realisations))
+
+
+def texts(names: Iterable[object]) -> None:
+    """ConfigError for names that are none."""
+    if faults := [f"{name!r}: must be text" for name in names if not isinstance(name, str | os.PathLike)]:
+        raise ConfigError(*faults)
 
 
 def directory(out: object) -> None:
@@ -288,12 +309,15 @@ def _count(name: str, value: object, least: int) -> list[str]:
     return [f"{name}: must be a whole number from {least} to {MOST_THREADS}, got {value!r}"]
 
 
-def _number(name: str, value: object, most: float) -> list[str]:
-    scalar = not isinstance(value, bool) and not getattr(value, "ndim", 0)
-    number = float(value) if isinstance(value, SupportsFloat) and scalar else math.nan
+def _is_number(value: object) -> TypeGuard[SupportsFloat]:
+    return isinstance(value, SupportsFloat) and not isinstance(value, bool) and not getattr(value, "ndim", 0)
+
+
+def _number(name: str, value: object, most: float, unit: str = "") -> list[str]:
+    number = float(value) if _is_number(value) else math.nan
     if value is None or (0 < number <= most and math.isfinite(number)):
         return []
-    bound = f" and ≤ {most:g} %" if math.isfinite(most) else ""
+    bound = f" and ≤ {most:g}{unit}" if math.isfinite(most) else ""
     return [f"{name}: must be > 0{bound}, got {value!r}"]
 
 

@@ -4,10 +4,11 @@ They write nothing unless `out` names a directory. Stored results are read from 
 """
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex
 
+from radarsim.app import configs
 from radarsim.app.configs import RESULTS, Config, Overrides
 from radarsim.app.shown import Shown
 from radarsim.errors import ConfigError, argument
@@ -75,6 +76,9 @@ def check(
     from radarsim.app import outlook as overview
     from radarsim.app.run import load, merged
 
+    overrides = configs.check(overrides, threads=threads, precision=precision, out=out)
+    if share is not None and not (_is_pair(share, SupportsIndex) and 1 <= share[0] <= share[1]):
+        raise ConfigError(f"share: must be two whole numbers i, n with 1 ≤ i ≤ n, got {share!r}")
     experiment = load(config, merged(overrides, realisations, seed))
     return overview.outlook(experiment, threads, precision, progress, of, out, share)
 
@@ -121,25 +125,35 @@ def solve(
         given = ", ".join(named) or "none"
         examples = f"{argument('sigma=…', '--sigma')}, {argument('gain=…', '--gain')}"
         raise ConfigError(f"name one quantity, as `radarsim solve --help` lists them: {examples}, …; got {given}")
-    _one_place(at_s, at_k)
+    checked = configs.check(overrides, threads=threads, equals=equals, **_place(at_s, at_k))
+    if not isinstance(key, str):
+        raise ConfigError(f"key: must be text, got {key!r}")
+    if between is not None and not _is_pair(between):
+        raise ConfigError(f"between: must be two rising numbers, got {between!r}")
     ((name, component),) = named.items()
     return solving.solve(
         *(config, key, Wanted(name, filter, component, at_s, at_k), equals),
-        overrides=merged(overrides, None, seed),
+        overrides=merged(checked, None, seed),
         between=between,
         case=case,
-        realisations=None if realisations is None else int(realisations),
+        realisations=configs.whole(realisations),
         threads=threads,
         progress=progress,
         notify=notify,
     )
 
 
-def _one_place(at_s: float | None, at_k: int | None) -> None:
-    """Raises ConfigError for a time and a scan at once."""
+def _place(at_s: float | None, at_k: int | None) -> dict[str, object]:
+    """The time or scan, where given. Raises ConfigError for both at once."""
     if at_s is not None and at_k is not None:
         both = f"{argument('at_s', '--at')} and {argument('at_k', '--at-k')}"
         raise ConfigError(f"{both} do not go together: a time or a scan")
+    return {name: value for name, value in (("at_s", at_s), ("at_k", at_k)) if value is not None}
+
+
+def _is_pair(given: object, kind: Any = SupportsFloat) -> bool:
+    """Whether it is two numbers."""
+    return isinstance(given, Iterable) and len(two := list(given)) == 2 and all(isinstance(one, kind) for one in two)
 
 
 def sensitivity(
@@ -170,15 +184,14 @@ def sensitivity(
     >>> print(first["key"], first["filter"], first["component"], f"{first['sigma_change_percent']:.2f}")
     radar.detection_probability r r 34.40
     """
-    from radarsim.app import configs
     from radarsim.app import sensitivity as finding
     from radarsim.app.run import merged
 
-    _one_place(at_s, at_k)
+    checked = configs.check(overrides, out=out, figures=figures, width_mm=width_mm, **_place(at_s, at_k))
     formats = configs.formats(figures)
     asked: dict[str, Any] = {"at_s": at_s, "at_k": at_k, "of": of, "component": component, "case": case}
-    asked |= {"realisations": realisations, "progress": progress}
-    found = finding.sensitivity(config, overrides=merged(overrides, None, seed), **asked)
+    asked |= {"realisations": configs.whole(realisations), "progress": progress}
+    found = finding.sensitivity(config, overrides=merged(checked, None, seed), **asked)
     return found if out is None else finding.write(found, out, formats, width_mm)
 
 
@@ -203,8 +216,8 @@ def compare(
     ['mine']
     """
     from radarsim.app import compare as comparing
-    from radarsim.app import configs
 
+    configs.check(out=out, figures=figures, width_mm=width_mm)
     given: Any = sources[0] if len(sources) == 1 and isinstance(sources[0], Mapping) else sources
     return comparing.compare(given, out, formats=configs.formats(figures), width_mm=width_mm)
 
@@ -227,8 +240,11 @@ def chart(
     'gain_against_time'
     """
     from radarsim.app import compare as drawing
-    from radarsim.app.configs import formats
+    from radarsim.app.configs import check, formats
 
+    checked = check(overrides, out=out, figures=figures, width_mm=width_mm)
+    if checked and not configs:
+        raise ConfigError(f"{argument('overrides', '--set')}: without a config there is nothing to change")
     shown: dict[str, Any] = {"formats": formats(figures), "width_mm": width_mm, "progress": progress}
     return drawing.chart(configs, out, overrides=overrides, **shown)
 
@@ -290,6 +306,8 @@ def claims(*names: str, out: Out = RESULTS) -> Claims:
     """
     from radarsim.app.run import claims as rows
 
+    configs.check(out=out)
+    configs.texts(names)
     return Claims(rows(names, out))
 
 
@@ -324,10 +342,12 @@ def readings(
     from radarsim.app.run import RunOptions
     from radarsim.engine import run
 
+    configs.check(threads=threads, time_limit=time_limit, out=out, figures=figures)
     alternatives = [f"{key}={value}" for key, value in only.items()] if isinstance(only, Mapping) else only
+    configs.texts(names)
     wanted = reading.asked(names, alternatives)
     limit = time_limit if time_limit is None or callable(time_limit) else run.TimeLimit(time_limit)
-    asked: dict[str, Any] = {"realisations": None if realisations is None else int(realisations), "decide": decide}
+    asked: dict[str, Any] = {"realisations": configs.whole(realisations), "decide": decide}
     asked |= {"progress": progress, "figures": figures, "stop": stop, "write": out is not None}
     with TemporaryDirectory(prefix="radarsim-") as folder, limited(threads):
         options = RunOptions(None, threads, run.Either(stop, limit))

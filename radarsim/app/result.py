@@ -207,6 +207,7 @@ class Result(Shown):
         """
         from radarsim.report import html
 
+        configs.check(out=out, figures=figures, width_mm=width_mm)
         folder = Path(out) / self.experiment.stem
         self._tables["claims"] = over_readings(self._tables["claims"], self.experiment.study, Path(out))
         formats = configs.formats(figures)

@@ -407,7 +407,7 @@ def run(
     from radarsim.app import readings  # with it the parts that judge and draw, which `check` does without
 
     checked: dict[str, Any] = {"threads": threads, "workers": workers, "precision": precision, "time_limit": time_limit}
-    checked |= {"executor": executor, "out": out, "figures": figures}
+    checked |= {"executor": executor, "out": out, "figures": figures, "width_mm": width_mm}
     overrides = merged(configs.check(overrides, **checked), realisations, seed)
     experiment = load(config, overrides)
     if precision is not None:

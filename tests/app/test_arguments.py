@@ -84,3 +84,36 @@ def test_a_key_that_is_no_text_is_named():
 def test_no_directory_without_a_name():
     with pytest.raises(radarsim.ConfigError, match="out: must name a directory"):
         radarsim.load("rls2", out="")
+
+
+SOLVED = {"key": "radar.sigma_velocity_mps", "gain": "r", "filter": "r+Vr", "at_s": 60, "equals": 30}
+
+
+@pytest.mark.parametrize(
+    ("call", "line"),
+    [
+        (lambda: radarsim.run("rls2", realisations=10, width_mm="85"), "width_mm: must be > 0 and ≤ 1000, got '85'"),
+        (lambda: radarsim.run("rls2", realisations=10, width_mm=1e6), "width_mm: must be > 0 and ≤ 1000"),
+        (lambda: radarsim.solve("rls2", **(SOLVED | {"equals": "30"})), "equals: must be a number, got '30'"),
+        (lambda: radarsim.solve("rls2", **(SOLVED | {"at_s": "60"})), "at_s: must be a number, got '60'"),
+        (lambda: radarsim.solve("rls2", **(SOLVED | {"key": 5})), "key: must be text, got 5"),
+        (lambda: radarsim.solve("rls2", **SOLVED, between=(1,)), "between: must be two rising numbers, got (1,)"),
+        (lambda: radarsim.solve("rls2", **SOLVED, realisations="x"), "realisations: must be a whole number, got 'x'"),
+        (lambda: radarsim.solve("rls2", **SOLVED, threads=-1), f"threads: {NONE_TOO} -1"),
+        (lambda: radarsim.sensitivity("rls2", at_k="2"), "at_k: must be a number, got '2'"),
+        (lambda: radarsim.sensitivity("rls2", realisations=0), "realisations: must be >= 1, got 0"),
+        (lambda: radarsim.readings("P1.4", time_limit=-1), f"time_limit: {ABOVE}, got -1"),
+        (lambda: radarsim.readings(5), "5: must be text"),
+        (lambda: radarsim.claims(["P1"]), "['P1']: must be text"),
+        (lambda: radarsim.claims(out=5), "out: must name a directory, got 5"),
+        (lambda: radarsim.check("rls2", share=(0, 0)), "share: must be two whole numbers i, n with 1 ≤ i ≤ n"),
+        (lambda: radarsim.check("rls2", share="2/3"), "share: must be two whole numbers"),
+        (lambda: radarsim.compare("rls2", None), "compare: must be a result, a config or the folder of a result"),
+        (lambda: radarsim.chart(overrides={"radar.sigma_range_m": 5}), "overrides: without a config there is nothing"),
+    ],
+)
+def test_other_functions_refuse_as_run_does(call, line):
+    with pytest.raises(radarsim.ConfigError) as caught:
+        call()
+    (said,) = caught.value.lines
+    assert said.startswith(line)

@@ -114,7 +114,7 @@ def test_a_table_says_which_columns_it_leaves_out(monkeypatch):
     screen = Terminal()
     monkeypatch.setattr("sys.stdout", screen)
     columns = ("case", "sigma", "95 %", "exact")
-    console.show("", columns, [("rls2", "189.8 m", "188.1 m … 191.5 m", "189.7 m")], spare=("exact", "95 %"))
+    console.show("", columns, [("rls2", "189.8 m", "188.1 m … 191.5 m", "189.7 m")], spare=("at", "exact", "95 %"))
     assert "left out at 40 columns: exact" in screen.getvalue()
     assert "188.1 m … 191.5 m" in screen.getvalue()
 

@@ -94,16 +94,23 @@ class Imported:
 
 
 MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-NAMED = {"utf-8-sig": "UTF-8", "utf-16": "UTF-16", "cp1252": "Windows-1252"}  # as spreadsheets write them
+NAMED = {  # as spreadsheets write them
+    **dict.fromkeys(("utf-16", "utf-16-le", "utf-16-be"), "UTF-16"),
+    **{"utf-8-sig": "UTF-8", "cp1252": "Windows-1252"},
+}
 
 
 def encoding_of(path: str | os.PathLike, named: str) -> str:
-    """The encoding of a text file: UTF-16 by its mark, else UTF-8, or the one that was named where it is no UTF-8."""
+    """The encoding of a text file: UTF-16 by its mark or zeros, else UTF-8, or the one named where it is no UTF-8."""
     if not os.path.isfile(path):  # a stream is read once
         return named or "utf-8-sig"
     with open(path, "rb") as file:
-        if file.read(2) in MARKS:
+        head = file.read(HEAD)
+        if head[:2] in MARKS:
             return "utf-16"
+        even, odd = head[::2].count(0), head[1::2].count(0)
+        if max(even, odd) > max(10 * min(even, odd), len(head) / 10):  # of digits and commas one byte is zero
+            return "utf-16-le" if odd > even else "utf-16-be"
         file.seek(0)
         decoder = codecs.getincrementaldecoder("utf-8")()
         try:

@@ -174,9 +174,13 @@ class Table:
         if not late or "track" in self.columns:
             return None
         likely = [(i, len(cells)) for i, cells in self.cells.items() if 1 < len(cells) <= self.records / 2]
-        named = ", ".join(f"{self.header[i]} ({count} different)" for i, count in likely) or "none has few names"
+        named = (
+            ", ".join(f"{self.header[i]} ({count} different)" for i, count in likely)
+            or "none: each has too many different values"
+        )
+        rows = "1 row is" if late == 1 else f"{late} rows are"
         return (
-            f"{self.path}: track: no column identifies the tracks, and {late} rows are not later than the one before; "
+            f"{self.path}: track: no column identifies the tracks, and {rows} not later than the one before; "
             f"name the column, --column track=THEIRS; it may be: {named}"
         )
 
@@ -184,7 +188,7 @@ class Table:
         """Which of our columns the header has; those that were given by name first."""
         found: dict[str, Column] = {}
         names = [name.strip() for name in header]
-        for ours, theirs in given.items():
+        for ours, theirs in given.items() if header else ():
             if ours not in NAMES or theirs not in names:
                 allowed = f"one of {', '.join(NAMES)}" if ours not in NAMES else f"a column of {', '.join(names)}"
                 raise ConfigError(f"{self.path}:1: column {ours}={theirs}: must name {allowed}")
@@ -202,18 +206,20 @@ class Table:
         return found
 
     def _column(self, ours: str, place: int, header: list[str]) -> Column:
-        unit = split(header[place])[1]
+        name, unit = header[place].strip(), split(header[place])[1]
+        if [one.strip() for one in header].count(name) > 1:
+            raise ConfigError(f"{self.path}:1: {name}: must be the name of one column; several have it")
         taken = ""
         if not unit and self.aviation:
             unit = taken = AVIATION_UNITS.get(ours, "")
         if not unit and self.maritime and ours == "speed_mps":
             unit = taken = "kn"
         if unit not in UNITS and ours not in ("track", "t_s"):
-            raise ConfigError(f"{self.path}:1: {header[place].strip()}: the unit must be one of "
+            raise ConfigError(f"{self.path}:1: {name}: the unit must be one of "
                               f"{', '.join(name for name in UNITS if name)}; got {unit!r}")  # fmt: skip
         angle = ours == "bearing_rad"
         factor = math.pi / 180 if angle and unit != "rad" else UNITS.get(unit, 1.0)
-        return Column(place, header[place].strip(), factor, taken)
+        return Column(place, name, factor, taken)
 
     def _complete(self, header: list[str]) -> None:
         wanted = ("t_s", *ON_EARTH) if self.kind == sites.POSITIONS else ("t_s", "range_m")

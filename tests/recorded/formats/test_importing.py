@@ -725,7 +725,10 @@ def test_times_as_people_write_them(tmp_path, times, expected):
     assert [float(row["t_s"]) for row in rows] == pytest.approx([0.0, expected], abs=1e-6)
 
 
-@pytest.mark.parametrize(("encoding", "name"), [("utf-8", ""), ("cp1252", "Windows-1252"), ("utf-16", "UTF-16")])
+@pytest.mark.parametrize(
+    ("encoding", "name"),
+    [("utf-8", ""), ("cp1252", "Windows-1252"), ("utf-16", "UTF-16"), ("utf-16-le", "UTF-16"), ("utf-16-be", "UTF-16")],
+)
 def test_encodings_that_spreadsheets_write(tmp_path, encoding, name):
     text = "t_s;range [km];azimuth [°];Höhe\n0;20,5;45;1\n4;21,5;46;2\n"
     done, columns, _ = imported(tmp_path, text.encode(encoding), Options("csv"))
@@ -757,3 +760,16 @@ def test_columns_named_in_another_code_page(tmp_path):
 def test_an_unknown_encoding_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="encoding: must be an encoding such as cp1251"):
         encoding_named("base64")
+
+
+@pytest.mark.parametrize(
+    ("data", "line"),
+    [
+        (b"t_s,range,range\n0,1,5\n1,2,6\n", ":1: range: must be the name of one column; several have it"),
+        (b"", ":1: must have columns of time"),
+        (b"\xff\xfet\x00,\x00\x00\xd8\n\x00", ": is not UTF-16 text"),
+    ],
+)
+def test_a_table_that_is_none(tmp_path, data, line):
+    (said,) = refused(tmp_path, data, Options("csv", columns={} if data else {"t_s": "t"}))
+    assert line in said
