@@ -79,7 +79,7 @@ class Plan:
 
 
 class LinearStudy(OneFile):
-    """A study of linear filters; what a subclass gives is said at the head of this module.
+    """A study of linear filters; the module's docstring says what a subclass gives.
 
     motion(spec): how the truth moves; its first components are those of the study. plot(spec, one, k): what filter
     `one` sees at scan k, from 0: the rows H (D, n), and the standard deviations (D,) of its numbers; a single number
@@ -120,11 +120,11 @@ class LinearStudy(OneFile):
 
     # ---- the model ---------------------------------------------------------------------------------------------------
     def assumed_motion(self, spec: Any, one: Any) -> Motion:
-        """How the state moves as a filter believes. Default: as it does."""
+        """The motion that a filter assumes. Default: the true one."""
         return self.motion(spec)
 
     def assumed_plot(self, spec: Any, one: Any, k: int) -> tuple[Any, Any]:
-        """What a filter believes to see. Default: what it does."""
+        """What a filter assumes of its plots. Default: the truth."""
         return self.plot(spec, one, k)
 
     def own_gains(self, spec: Any, one: Any) -> Any:

@@ -89,7 +89,7 @@ NEEDED: Mapping[str, tuple[type, str]] = {
 
 
 class OneFile(Study):
-    """A study that one class of one file declares; what a subclass gives is said at the head of this module.
+    """A study that one class of one file declares; the module's docstring says what a subclass gives.
 
     realisation(case, i): the plots of realisation i as a run draws them, columns (K,), and the true components (K, C).
     tracker(case): the filters of a case before their first plot. Without either, or without `measured`, the numbers of

@@ -72,7 +72,7 @@ class Steps:
 
 @dataclass(frozen=True)
 class Followed:
-    """A filter of a case: its kernel, numbers (n,), rows of its state, whether it tells its covariance."""
+    """A filter of a case: its kernel, numbers (n,), rows of its state, whether it has a covariance."""
 
     kernel: Callable[..., None]
     numbers: np.ndarray
@@ -101,7 +101,7 @@ class Plan:
 
 
 class StepStudy(OneFile):
-    """A study by the steps of one realisation; what a subclass gives is said at the head of this module."""
+    """A study by the steps of one realisation; the module's docstring says what a subclass gives."""
 
     kinds: Mapping[str, type[Steps]]
     normals: tuple[int, int, int]
