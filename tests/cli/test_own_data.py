@@ -250,7 +250,8 @@ def test_a_realisation_that_no_run_has(tmp_path, realisation):
 def test_a_wrong_file_is_told_by_line_and_column_and_no_track_is_left(tmp_path, text, expected):
     (tmp_path / "plots.csv").write_text(text)
     result = command("track", "rls2", tmp_path / "plots.csv", "-o", tmp_path / "track.csv", code=2)
-    assert result.stderr.splitlines() == [f"{tmp_path}/{expected}"]
+    (line,) = result.stderr.splitlines()
+    assert line.startswith(f"{tmp_path}/{expected}")
     assert [path.name for path in tmp_path.iterdir()] == ["plots.csv"]
 
 

@@ -144,7 +144,7 @@ def test_a_quantity_that_both_studies_measure_has_figures_of_its_own(errors):
     drawn = compare.figures(sides, compare.compared([compare.Pair(sides[1], sides[0])]))
     assert set(drawn) == {"sigma_r", "area_r"}
     values, apart = drawn["area_r"].panels
-    assert (values.y.label, apart.y.label) == ("mean square error $r$, m2", "change against a, %")
+    assert (values.y.label, apart.y.label) == ("mean square error $r$, m²", "change against a, %")
     assert [mark.name for mark in values.marks] == ["a, base", "a, one", "b, base", "b, one"]
 
 

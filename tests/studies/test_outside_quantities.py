@@ -107,7 +107,7 @@ def test_solve_finds_the_root_of_an_exact_one(radarsim):
     known = solve("rls2", KEY, Wanted("sigma", "r+Vr", "r", at_k=9), 100.0, overrides=["scans=9"])
     assert found["exact"]
     assert found["value"] == pytest.approx(known.value, rel=1e-9)
-    assert (found["quantity"], found["quantity_unit"]) == ("mean square error of r+Vr in r at k = 9", "m2")
+    assert (found["quantity"], found["quantity_unit"]) == ("mean square error of r+Vr in r at k = 9", "m²")
 
 
 def test_solve_takes_one_from_a_table_of_exact_values_alone(radarsim):
