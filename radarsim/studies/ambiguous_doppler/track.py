@@ -232,9 +232,13 @@ class Single:
         return np.array(gain)
 
     def _judge(self, number: int, e: np.ndarray, S: np.ndarray) -> None:
-        """Note a number's innovations e (n, folds) before they are taken in: the square over the variance S of that of
-        the most probable hypothesis, and the logarithm of the density that all of them give the number."""
-        self.nis[number] = np.min(e[np.argmax(self.w)] ** 2) / S
+        """Note a number's innovations e (n, folds) before they are taken in: the logarithm of the density that all
+        hypotheses give the number; and the square over the variance S, of a range that of their mean, whose
+        variance has their spread, of a velocity that of the most probable one."""
+        p = np.exp(self.w - self.w.max())
+        mean = p @ e[:, 0] / p.sum()
+        spread = p @ (e[:, 0] - mean) ** 2 / p.sum()
+        self.nis[number] = np.min(e[np.argmax(self.w)] ** 2) / S if number else mean**2 / (S + spread)
         powers = (self.w[:, None] - e**2 / (2 * S)).ravel()
         most, whole = powers.max(), self.w.max()
         given = most + np.log(np.exp(powers - most).sum()) - whole - np.log(np.exp(self.w - whole).sum())
@@ -314,10 +318,12 @@ class Interacting:
         self._weigh(np.log(np.maximum(self.mu, LEAST)) - e**2 / (2 * S) - np.log(S) / 2)
 
     def _judge(self, number: int, e: np.ndarray, S: np.ndarray) -> None:
-        """Note the innovations (n, M) of a number and their variances before they are taken in."""
-        best = np.argmax(self.w)
-        mean = self.mu[best] @ e[best]
-        variance = self.mu[best] @ (S[best] + (e[best] - mean) ** 2)
+        """Note the innovations (n, M) of a number and their variances before they are taken in: of a range over all
+        hypotheses, of a velocity over the orders of the most probable one."""
+        p = np.exp(self.w - self.w.max()) if number == 0 else np.arange(len(self.w)) == np.argmax(self.w)
+        p = (p / p.sum())[:, None] * self.mu
+        mean = np.sum(p * e)
+        variance = np.sum(p * (S + (e - mean) ** 2))
         if number == 1 and self.options.doppler == "folded":
             if not self.folds.certain(float(variance)):
                 return
@@ -468,20 +474,22 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
 class Tracker:
     """The filters of a case over recorded plots at any times, chunk by chunk in flat memory.
 
-    A recorded velocity counts as folded where a filter says `folded` or `remainder`, and as it stands where it says
-    `unfolded`. It is folded by the span that stands beside it, else by the config's; with several repetition rates the
-    scan that a row is of follows from its time. Innovations of the velocity are tested where the fold is certain.
+    A recorded velocity counts as folded. A filter that says `unfolded` has no estimate: it needs the true folds, which
+    a recording lacks; only where no filter unfolds does it take the velocity as it stands. The span is that which
+    stands beside the velocity, else the config's; with several repetition rates the scan that a row is of follows from
+    its time. Innovations of the velocity are tested where the fold is certain.
     """
 
     most_rows: int | None = None
     several: bool = False
 
     def __init__(self, case: Case):
-        self.names = tuple(one.name for one in case.spec.filters)
-        self.filters = [follower(one, case.spec) for one in case.spec.filters]
+        own = serving(case.spec)
+        self.names = tuple(one.name for one in own)
+        self.filters = [follower(one, case.spec) for one in own]
         self.errors = np.array([case.spec.radar.sigma_range_m, case.spec.radar.sigma_velocity_mps])
         # A number that was taken in has drawn the estimate to itself; of another the errors add.
-        self.drawn = np.array([[-1.0, 1.0 if one.doppler == "none" else -1.0] for one in case.spec.filters])
+        self.drawn = np.array([[-1.0, 1.0 if one.doppler == "none" else -1.0] for one in own])
 
     def feed(self, columns: Mapping[str, np.ndarray]) -> Track:
         """The estimates over the next rows: columns (n,), not-a-number where a value is missing.
@@ -502,6 +510,12 @@ class Tracker:
             residual_sigma=np.where(finite, np.sqrt(np.maximum(spread, 0.0)), np.nan),
             **gathered,
         )
+
+
+def serving(spec: Any) -> list[Any]:
+    """The filters that a recording of folded velocities serves: not those that need the true folds."""
+    folded = any(one.doppler in ("folded", "remainder") for one in spec.filters)
+    return [one for one in spec.filters if one.doppler != "unfolded" or not folded]
 
 
 def stepped(one: Any, rows: Sequence[tuple[float, ...]]) -> list[Row]:
@@ -599,7 +613,7 @@ class Recorded(RecordedPlots):
     def likelihood(
         self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]
     ) -> PlotLikelihood | None:
-        known = [one for one in case.spec.filters if one.combine is None]
+        known = [one for one in serving(case.spec) if one.combine is None]
         if filter_name is None:  # of what a recording has, velocities that fold, that which keeps most hypotheses
             known = [one for one in known if one.doppler == "folded"] or known
             known.sort(key=lambda one: (one.merge == "never", one.hypotheses or 0, one.estimate == "mean"))
