@@ -59,6 +59,7 @@ AVIATION = ("gs", "groundspeed", "ground_speed", "alt", "alt_baro", "alt_geom", 
 AVIATION_UNITS = {"altitude_m": "ft", "speed_mps": "kn", "up_mps": "fpm"}
 MARITIME = ("sog", "cog", "mmsi")  # names of AIS: speeds without a unit are in knots, and these are no numbers:
 NO_SPEED_KN, NO_COURSE_DEG = 102.2, 360.0
+THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")  # a number that may be a thousand, or a decimal
 MIDNIGHT_S = 3600.0  # a time of day that falls has passed midnight if both are as near; else a file is sorted by track
 STILL_MPS = 1.0  # below it a position may be the same again
 NAMES_AT_MOST = 10_000  # different cells by which a column may name aircraft
@@ -114,6 +115,7 @@ class Table:
     def __init__(self, path: str, file: TextIO, given: Mapping[str, str] | None = None, encoding: str = "UTF-8"):
         """encoding: what the file was decoded by."""
         self.path, self.records, self.highest, self.encoding = path, 0, 0.0, encoding
+        self.commas: set[str] = set()  # numbers with a comma, until one cannot be of thousands
         self.skipped: Counter[str] = Counter()
         self.faults = Faults(path)
         header = self._opened(file)
@@ -161,6 +163,9 @@ class Table:
         found = [f"assumed because the name has no unit: {taken}"] if taken else []
         if self.encoding != "UTF-8":
             found.append(f"the text is read as {self.encoding}, as it is not UTF-8; for another: --encoding NAME")
+        if self.commas and "" not in self.commas:
+            number = min(self.commas)
+            found.append(f"commas are decimal: {number} is read as {float(number.replace(',', '.')):g}")
         time = self.columns["t_s"].name
         if others := [name for name in self.header if split(name)[0] in NAMES["t_s"] and name != time]:
             found.append(f"times are {time}; not used: {', '.join(others)}")
@@ -321,7 +326,11 @@ class Table:
 
     def _pointed(self, text: str) -> str:
         """A number with a decimal point."""
-        return text.replace(",", ".") if self.decimal_comma and text.count(",") == 1 and "." not in text else text
+        if not self.decimal_comma or text.count(",") != 1 or "." in text:
+            return text
+        if "" not in self.commas and not (self.commas and THOUSANDS.fullmatch(text)):
+            self.commas.add(text if THOUSANDS.fullmatch(text) else "")
+        return text.replace(",", ".")
 
     def _fault(self, ours: str, must: str, got: str) -> None:
         column = self.columns[ours]

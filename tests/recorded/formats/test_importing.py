@@ -725,6 +725,13 @@ def test_times_as_people_write_them(tmp_path, times, expected):
     assert [float(row["t_s"]) for row in rows] == pytest.approx([0.0, expected], abs=1e-6)
 
 
+@pytest.mark.parametrize(("second", "told"), [("2,000", True), ("2,50", False), ("0,500", False)])
+def test_commas_that_may_part_thousands_are_told(tmp_path, second, told):
+    done, columns, _ = imported(tmp_path, f"t_s;range [m]\n0;1,000\n4;{second}\n".encode(), Options("csv"))
+    assert columns["range_m"][0] == 1
+    assert ("commas are decimal: 1,000 is read as 1" in done.notes) == told
+
+
 @pytest.mark.parametrize(
     ("encoding", "name"),
     [("utf-8", ""), ("cp1252", "Windows-1252"), ("utf-16", "UTF-16"), ("utf-16-le", "UTF-16"), ("utf-16-be", "UTF-16")],
