@@ -1,7 +1,8 @@
 """The messages that a catalogue translates, found in the sources; and the catalogues, brought up to date.
 
 `python -m making.messages` rewrites every catalogue: its translations kept, messages that nothing says any more left
-out, new ones added empty, each with the file that says it. `python -m making.messages ru` lists what is not translated.
+out, new ones added empty, those of a file together under its name. `python -m making.messages ru` lists what is not
+translated.
 """
 
 import ast
@@ -152,12 +153,13 @@ def brought_up(text: str) -> str:
     entries = catalogue.entries(text)
     old = {one.key: one for one in entries}
     made = [one for one in entries if one.context or not one.id]
-    forms = 3 if "nplurals=3" in text else 2
+    forms, file = 3 if "nplurals=3" in text else 2, ""
     for (context, message, plural), places in sorted(found().items(), key=lambda pair: (pair[1][0], pair[0])):
         before = old.get((context, message))
         said = dict(before.said) if before and before.plural == plural else {}
         said = said or dict.fromkeys(range(forms if plural else 1), "")
-        made.append(catalogue.Entry(message, context, plural, said, [f"#: {places[0]}"]))
+        made.append(catalogue.Entry(message, context, plural, said, [f"#: {places[0]}"] * (places[0] != file)))
+        file = places[0]
     return catalogue.written(made)
 
 
