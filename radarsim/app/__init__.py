@@ -1,1 +1,1 @@
-"""What the command and Python share: run, result, outlook, claims, doctor, clean, reproduce."""
+"""What the command line and the Python functions share: run, result, outlook, claims, doctor, clean, reproduce."""

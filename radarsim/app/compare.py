@@ -1,6 +1,6 @@
-"""`radarsim compare`: stored results side by side on common axes, with their differences. Computes nothing.
+"""`radarsim compare`: stored results on common axes, with their differences; simulates nothing.
 
-`radarsim chart`: one chart for every device, with the cases of some configs marked on it.
+`radarsim chart`: one chart for all radars, with the cases of some configs marked on it.
 """
 
 import os
@@ -36,9 +36,9 @@ FOLDER = "compare"
 
 @dataclass(frozen=True)
 class Run:
-    """A result: what it is called, its folder and its run.json; the config that asked for it, if one did.
+    """A result: its name, its folder, its run.json and, if known, the config that describes it.
 
-    made: the tables of one that is not stored.
+    made: the tables of a result that is not stored.
     """
 
     label: str
@@ -50,10 +50,9 @@ class Run:
 
 @dataclass(frozen=True, repr=False)
 class Comparison(Shown):
-    """A comparison: its sentences, notes and warnings, the rows of comparison.csv; the folder and files, if any.
+    """A comparison: sentences, notes and warnings, the rows of comparison.csv; the folder and files, if any.
 
-    last are the rows at the last common time; told the quantities that the terminal shows, as rows name them, and their
-    words.
+    last: the rows at the last common time; told: the quantities that the terminal shows, with their wording.
     """
 
     folder: Path | None
@@ -89,13 +88,13 @@ def compare(
     formats: Sequence[str] = ("svg", "png"),
     width_mm: float | None = None,
 ) -> Comparison:
-    """Put results side by side: tables, figures and one page in `out`/compare; nothing is simulated.
+    """Compare results: tables, figures and one page in `out`/compare; nothing is simulated.
 
-    A source is a result, the folder of one, or a config (path, or name of a shipped one), whose results are looked for
-    under `out`; in a mapping each has the name by which it is called. The first is what the others are compared with.
-    Without `out` they are looked for in results/, and nothing is written. width_mm is the width of the figures' files
-    in place of their own. Raises ConfigError where one is missing, with the command that computes it, or where they
-    share nothing; StoreError where a stored table is damaged.
+    A source is a result, the folder of one, or a config (path, or name of a shipped one), whose result is looked up
+    under `out`; a mapping gives each a name. The others are compared with the first. Without `out`, results are read
+    from results/, and nothing is written. width_mm overrides the width of the figures' files. Raises ConfigError where
+    a result is missing, with the command that computes it, or where results have nothing in common; StoreError where a
+    stored table is damaged.
     """
     if out is not None:
         directory(out)
@@ -147,7 +146,7 @@ def compare(
 
 
 def _found(sources: Sequence[Source], out: Path) -> list[Run]:
-    """The stored results, or one ConfigError with what is missing of all."""
+    """The stored results, or one ConfigError that names all missing ones."""
     found: list[Run] = []
     faults: list[str] = []
     for source in sources:
@@ -161,7 +160,7 @@ def _found(sources: Sequence[Source], out: Path) -> list[Run]:
 
 
 def _made(of: Result) -> Run:
-    """A result that Python holds, with what of its run.json is needed here."""
+    """A result held in Python, with the part of its run.json that is needed here."""
     one = of.experiment
     record: dict[str, Any] = {"config": one.stem, "study": one.study, "resolved": one.resolved, "outputs": {}}
     record["cases"] = {case.name: {"done": case.count} for case in of.cases}
@@ -169,7 +168,7 @@ def _made(of: Result) -> Run:
 
 
 def _folder(path: Path) -> Run | None:
-    """The result in a folder; None where the path is no folder. Raises ConfigError for one that holds no result."""
+    """The result in a folder; None where the path is no folder. Raises ConfigError for a folder without a result."""
     record = stored.record(path)
     if record is None:
         if path.is_dir() and path.name != str(path):
@@ -188,7 +187,7 @@ def _stored(source: str | os.PathLike[str], out: Path) -> Run:
 
 
 def _named(runs: Sequence[Run]) -> list[Run]:
-    """The runs with names of their own: of one config's twice the folder too, or a number where there is none."""
+    """The runs with distinct names: two of one config get their folder added, or a number without one."""
     names = [run.label for run in runs]
     apart = [run.label if run.made is not None else f"{run.label} in {run.folder.parent}" for run in runs]
     apart = [
@@ -200,7 +199,7 @@ def _named(runs: Sequence[Run]) -> list[Run]:
 
 
 def _sides(run: Run) -> list[Side]:
-    """The cases of a result that are there, with their rows."""
+    """The cases that a result has, with their rows."""
     measured = _measured(str(run.record.get("study")))
     wanted = {one.table for one in measured}
     outputs = run.record["outputs"]
@@ -209,7 +208,7 @@ def _sides(run: Run) -> list[Side]:
     made = []
     for name, counts in run.record["cases"].items():
         own = {key: rows[rows["case"] == name] for key, rows in tables.items()}
-        if len(gains := own.get("gains", ())):  # of several baselines the first
+        if len(gains := own.get("gains", ())):  # of several baselines, the first
             own["gains"] = gains[gains["baseline"] == gains["baseline"].iloc[0]]
         if len(own.get("curves", ())):
             made.append(Side(run.label, name, name, _noise(run, name), int(counts["done"]), own, measured))
@@ -217,7 +216,7 @@ def _sides(run: Run) -> list[Side]:
 
 
 def _measured(study: str) -> tuple[Quantity, ...]:
-    """What a study measures; of one that is no longer there σ and gain."""
+    """What a study measures; for a study no longer installed, σ and gain."""
     try:
         return registry.quantities(study, None)
     except (ConfigError, KeyError):
@@ -225,13 +224,15 @@ def _measured(study: str) -> tuple[Quantity, ...]:
 
 
 def _noise(run: Run, name: str) -> str | None:
-    """A hash of what a case's measurements depend on: study, seed, world; None where the record no longer reads."""
+    """A hash of what a case's measurements depend on: study, seed, world; None if the record is not readable now."""
     case = recorded_case(run.record, name)
     return None if case is None else digest([case.study, case.seed, world(case.spec)])
 
 
 def _labelled(every: Sequence[Sequence[Side]]) -> list[list[Side]]:
-    """The sides with names of their own: a lone case its run's, others the case's, and the run's where two share it."""
+    """The sides with distinct names: a single case takes its run's, others the case's, with the run's where two
+    coincide.
+    """
     first = [[replace(side, label=side.run if len(run) == 1 else side.case) for side in run] for run in every]
     names = [side.label for run in first for side in run]
     return [
@@ -244,7 +245,7 @@ def _labelled(every: Sequence[Sequence[Side]]) -> list[list[Side]]:
 
 
 def _stale(run: Run) -> list[str]:
-    """A warning where a config asks for something else by now than its stored result holds."""
+    """A warning where a config no longer matches its stored result."""
     if run.experiment is None:
         return []
     held = {name: recorded_case(run.record, name) for name in run.record["cases"]}
@@ -257,7 +258,7 @@ def _stale(run: Run) -> list[str]:
 
 
 def _replaced(folder: Path, runs: Sequence[Run]) -> list[str]:
-    """A note where a folder held another comparison, which is lost."""
+    """A note where another comparison in the folder is overwritten."""
     before = files.earlier(folder, "compare.json").get("compared")
     now = [str(run.folder) for run in runs]
     if not isinstance(before, list) or before == now:
@@ -266,7 +267,6 @@ def _replaced(folder: Path, runs: Sequence[Run]) -> list[str]:
 
 
 def _record(runs: Sequence[Run], contents: "dict[str, bytes]") -> dict[str, Any]:
-    """compare.json: what was compared, with what."""
     held = {
         str(run.folder): {key: run.record.get(key) for key in ("config", "resolved_sha256", "identities", "versions")}
         for run in runs
@@ -286,7 +286,6 @@ def _page(
     made: "pd.DataFrame",
     outputs: Collection[str],
 ) -> str:
-    """compare.html."""
     from radarsim.report import html
 
     cases = [case for run in runs for case in _cases(run)]
@@ -298,7 +297,7 @@ def _page(
 
 
 def _cases(run: Run) -> list[Case]:
-    """The cases of a result as recorded, those that still read."""
+    """The cases of a result as recorded, if still valid."""
     found = ((name, recorded_case(run.record, name)) for name in run.record["cases"])
     label = run.label if len(run.record["cases"]) == 1 else ""
     return [replace(case, name=label or name) for name, case in found if case is not None]
@@ -335,11 +334,11 @@ def chart(
     width_mm: float | None = None,
     progress: Callable[[int, int, int], None] | None = None,
 ) -> DopplerChart:
-    """Draw the chart of the configs' study, with their cases on it, into `out`/chart; nothing is simulated.
+    """Draw the chart of the configs' study, with their cases marked, into `out`/chart; nothing is simulated.
 
-    Without configs, of the study that has a chart, with its paper's own devices; a config that is given twice counts
-    once. Without `out` nothing is written. width_mm is the width of the figures' files in place of their own. progress
-    is told of each figure. Raises ConfigError where the study has none, configs are of several, or two have one name.
+    Without configs: the study that has a chart, with its paper's own radars. A config given twice counts once. Without
+    `out` nothing is written. width_mm overrides the width of the figures' files. progress is called for each figure.
+    Raises ConfigError where the study has no chart, the configs are of several studies, or two have one name.
     """
     if out is not None:
         directory(out)
@@ -378,7 +377,7 @@ def described(cases: Sequence[Case]) -> Chart:
 
 
 def references(study: str) -> list[Case]:
-    """The devices that a study's chart shows beside one's own: the unswept cases of the shipped config of its name."""
+    """The reference radars of a study's chart: the unswept cases of the shipped config of its name."""
     try:
         found = load(study)
     except ConfigError:

@@ -1,10 +1,6 @@
-"""Configs, read with all available studies.
+"""Configs, read with all available studies; cases as the engine sees them; the command that repeats a result.
 
-Arguments that Python gives, refused as the command refuses its options.
-
-A case as the engine sees it.
-
-The command that computes a result again, as run.json and messages give it.
+Arguments of Python functions are refused as the command refuses its options.
 """
 
 import math
@@ -35,7 +31,7 @@ if TYPE_CHECKING:
 
 
 # ---- configs ---------------------------------------------------------------------------------------------------------
-BLAMED = {  # sums that may not be finite, and what is then wrong
+BLAMED = {  # sums that may not be finite, and the fault then
     "error": "not finite",
     "believed": "with a covariance that is not positive and finite",
 }
@@ -46,11 +42,11 @@ language.packages = registry.packages
 
 
 def load(source: Config, overrides: Overrides = ()) -> Experiment:
-    """The experiment that a config describes, all of it checked.
+    """The experiment that a config describes, fully checked.
 
-    source is a path, the stem of a config (here, in ./configs, or shipped), a mapping as YAML would give it, or an
-    experiment loaded with these overrides; these are as config.load.texts takes them. Raises ConfigError, one line for
-    each fault of the whole, and of the claims of a study of an installed package.
+    source is a path, the stem of a config (here, in ./configs, or shipped), a mapping like the YAML, or an experiment
+    loaded with these overrides; overrides are as in config.load.texts. Raises ConfigError, one line for each fault,
+    also in the claims of an installed package's study.
     """
     if isinstance(source, Experiment):
         return source
@@ -62,15 +58,15 @@ def load(source: Config, overrides: Overrides = ()) -> Experiment:
 
 @cache
 def _claim_faults(name: str) -> Sequence[str]:
-    """What claims of a package's study name and nothing has."""
+    """Names in the claims of a package's study that nothing has."""
     return registry.part(name, lambda one: tuple(dict.fromkeys(one.claim_faults(shipped))))
 
 
 @cache
 def shipped(stem: str) -> tuple[Model, ...] | None:
-    """The checked keys of the cases of a shipped config; None where no config of that stem is shipped.
+    """The checked keys of the cases of a shipped config; None where none of that stem is shipped.
 
-    Never of a file of that name that the user has: claims are judged by what is shipped.
+    Never of a user's file of that name: claims are judged by the shipped config.
     """
     file = shipped_file(stem)
     return None if file is None else tuple(case.spec for case in reading.load(file, (), registry).cases)
@@ -83,14 +79,14 @@ def shipped_file(stem: str) -> Path | None:
 
 
 def shipped_stem(experiment: Experiment) -> str:
-    """The stem of the shipped config that an experiment is of, whatever was set; empty for a config of the user's."""
+    """The stem of the shipped config behind an experiment, whatever was overridden; empty for a user's config."""
     file = shipped_file(experiment.stem)
     own = file and experiment.path and Path(experiment.path).resolve() == file.resolve()
     return experiment.stem if own else ""
 
 
 def shadows(experiment: Experiment) -> list[str]:
-    """That an experiment is of a user's file though a config of its name is shipped."""
+    """Whether an experiment is of a user's file although a config of its name is shipped."""
     if not experiment.path or shipped_stem(experiment) or not shipped_file(experiment.stem):
         return []
     file = Path(experiment.path).resolve()
@@ -108,10 +104,10 @@ def new(
     folder: str | os.PathLike[str] = ".",
     values: Mapping[str, float] = MappingProxyType({}),
 ) -> Path:
-    """Write folder/NAME.yaml, the suffix given or not, after a known config with some values changed; its path.
+    """Write folder/NAME.yaml, with or without suffix given, from a known config with some values changed; its path.
 
-    Where the folder holds a schema.json, the first line tells editors to check by it. Raises ConfigError where the
-    config is there already, StoreError where it cannot be written.
+    Where the folder holds a schema.json, the first line points editors to it. Raises ConfigError where the config
+    exists already, StoreError where it cannot be written.
     """
     name, text = reading.new(name, like, registry, values)
     path = Path(folder) / name
@@ -125,7 +121,7 @@ def new(
 
 
 def schema_json() -> str:
-    """JSON Schema of the YAML, of all studies, as text."""
+    """JSON Schema of the YAML of all studies, as text."""
     from radarsim.config import schema  # pydantic's part takes a tenth of a second to load
 
     return schema.schema_json(registry)
@@ -139,7 +135,7 @@ STUDY_OR_INCLUDED = re.compile(r"""^(study|include):[\s\[\-"']*([\w.-]+)""", re.
 
 
 def described(text: str) -> str:
-    """The first line of a YAML file's leading comment, without its own name; empty where there is none."""
+    """The first line of a YAML file's leading comment, without the file's name; empty where there is none."""
     for line in text.splitlines():
         words = line.lstrip("#").strip()
         if not line.startswith("#"):
@@ -150,13 +146,13 @@ def described(text: str) -> str:
 
 
 def _configs() -> list[tuple[str, str, str]]:
-    """Name, paper (P1; of a study without one its name) and line of each config, in the order of the studies."""
+    """Name, paper (P1; or the study's name) and line of each config, in the order of the studies."""
     papers = {name: key or name for name, key in registry.parts(lambda one: one.paper_key()).items()}
     texts = {stem: _text(document.config_file(stem)) for stem in document.stems("configs")}
     found = []
     for stem, text in texts.items():
         kind, study = "include", stem
-        for _ in texts:  # no further than there are configs: what includes itself is refused when it is run
+        for _ in texts:  # no more often than there are configs: a circular include is refused at run time
             match = STUDY_OR_INCLUDED.search(texts.get(study, ""))
             if kind != "include" or match is None:
                 break
@@ -172,7 +168,7 @@ def _text(file: Path | None) -> str:
 
 
 def inventory() -> Inventory:
-    """What `radarsim list` shows: title, columns and rows of each kind of thing at hand."""
+    """What `radarsim list` shows: title, columns and rows of each kind."""
     scenarios = [(stem, described(_text(document.scenario_file(stem, None)))) for stem in document.stems("scenarios")]
     studies = registry.parts(lambda study: (study.about, dict(study.filters)))
     about = [(name, words) for name, (words, _) in studies.items()]
@@ -194,7 +190,7 @@ def inventory() -> Inventory:
 
 
 def selected(whole: Inventory, words: Sequence[str]) -> Inventory:
-    """Of an inventory the kinds that some words name, and the rows that hold all other words, in any case of letters.
+    """The kinds of an inventory that the words name, with the rows that contain all other words; case is ignored.
 
     Raises ConfigError where nothing is left.
     """
@@ -232,7 +228,7 @@ def check(
     width_mm: object = None,
     **numbers: object,
 ) -> tuple[str, ...]:
-    """The overrides as texts. ConfigError with a line for each invalid argument; what is not named is a number."""
+    """The overrides as texts. ConfigError with a line for each invalid argument; others than named are numbers."""
     faults = [
         *_count("threads", threads, least=0),
         *_count("workers", workers, least=1),
@@ -257,9 +253,9 @@ def check(
 
 
 def formats(figures: bool | str | Iterable[str]) -> tuple[str, ...]:
-    """The formats of the figures' files that an argument asks for: True for svg and png; none for False or None.
+    """The file formats of the figures: True for svg and png; none for False or None.
 
-    Raises ConfigError for a format that there is not.
+    Raises ConfigError for an unknown format.
     """
     if faults := _formats(figures):
         raise ConfigError(*faults)
@@ -269,7 +265,7 @@ def formats(figures: bool | str | Iterable[str]) -> tuple[str, ...]:
 
 
 def whole(realisations: object) -> int | None:
-    """A number of realisations, which may be a float. Raises ConfigError for what is none."""
+    """A number of realisations, which may be a float. Raises ConfigError for anything else."""
     if realisations is None:
         return None
     if not _is_number(realisations) or not float(realisations).is_integer():
@@ -280,13 +276,13 @@ def whole(realisations: object) -> int | None:
 
 
 def texts(names: Iterable[object]) -> None:
-    """ConfigError for names that are none."""
+    """ConfigError for names that are not texts."""
     if faults := [f"{name!r}: must be text" for name in names if not isinstance(name, str | os.PathLike)]:
         raise ConfigError(*faults)
 
 
 def directory(out: object) -> None:
-    """ConfigError for what names no directory."""
+    """ConfigError for an argument that names no directory."""
     if faults := _directory(out):
         raise ConfigError(*faults)
 
@@ -326,7 +322,7 @@ def _number(name: str, value: object, most: float, unit: str = "") -> list[str]:
 
 # ---- work ------------------------------------------------------------------------------------------------------------
 class CaseWork:
-    """A case as the engine sees it: an identity, a block length, and sums to be made. Pickles as the case alone."""
+    """A case as the engine sees it: identity, block length and sums. Pickles as the case alone."""
 
     def __init__(self, case: Case):
         self.case = case
@@ -343,7 +339,7 @@ class CaseWork:
 
     @cached_property
     def plans(self) -> tuple[Plan, ...]:
-        """The plan, and that of each further baseline; their sums lie one after the other."""
+        """The plan, and that of each further baseline; their sums are concatenated."""
         return (self.plan, *(study(self.case.study).prepare(one) for one in self.case.companions))
 
     @cached_property
@@ -377,8 +373,8 @@ class CaseWork:
             values = values[plan.layout.size :]
 
     def explain(self, first: int, count: int) -> list[str]:
-        """Where the sums of these realisations are not finite, one line a filter, scan and number of realisations."""
-        import numpy as np  # which `radarsim list` does without
+        """Where the sums of these realisations are not finite: a line for each filter, scan and count."""
+        import numpy as np  # `radarsim list` does without it
 
         axes, layout = self.plan.axes, self.plan.layout
         shape = len(axes.filters), len(axes.k)
@@ -401,14 +397,14 @@ RESULTS = "results"  # the command's default directory
 SHORT = {"realisations": "-n", "seed": "--seed"}
 
 
-Precision = tuple[float, str]  # in per cent, and of which kind of quantity
+Precision = tuple[float, str]  # in per cent, and for which kind of quantity
 
 
 def repeated(asked: Experiment, done: Mapping[str, int], overrides: Sequence[str], precision: Precision | None) -> str:
-    """The command that makes the same tables, or a sentence that says why there is none.
+    """The command that reproduces the tables, or a sentence that says why there is none.
 
-    asked is the experiment as config and overrides give it, done the realisations of each case that the tables hold;
-    precision decided where the cases ended, unless it is None.
+    asked is the experiment as config and overrides give it, done the realisations of each case in the tables; precision
+    ended the cases, unless it is None.
     """
     if asked.path is None:
         return "none: the config was given in Python, and is printed below"
@@ -431,7 +427,7 @@ def command(
     precision: Precision | None = None,
     verb: str = "run",
 ) -> str:
-    """The command that runs an experiment, or reads what it came to; a shipped config by its stem."""
+    """The command that runs an experiment or reads its result; a shipped config by its stem."""
     # In a checkout the shipped folder is a link to configs/.
     folders = {(folder / "configs").resolve() for folder in (document.SHIPPED, *document.further_folders())}
     shipped = not experiment.path or Path(experiment.path).resolve().parent in folders
@@ -446,10 +442,10 @@ def command(
 
 
 def into(out: str | os.PathLike) -> str:
-    """The end of a command that reads or writes a directory of results."""
+    """The option for the results directory at the end of a command."""
     return f" {shlex.join(['--out', as_text(os.fspath(out))])}" if str(out) != RESULTS else ""
 
 
 def as_text(path: str) -> str:
-    """A path as text that can be written; bytes of it that are no UTF-8 escaped."""
+    """A path as printable text; bytes that are not UTF-8 escaped."""
     return os.fsencode(path).decode("utf-8", "backslashreplace")

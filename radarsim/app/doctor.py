@@ -1,6 +1,6 @@
-"""What `radarsim doctor` looks at: the machine, and everything that is stored of a result.
+"""`radarsim doctor`: the machine, and all that is stored of a result.
 
-Compiling before the first run: what `radarsim compile` does.
+`radarsim compile`: compilation before the first run.
 """
 
 import hashlib
@@ -72,7 +72,7 @@ def cluster() -> str:
 
 @dataclass
 class Inspection:
-    """What a look over a result found: how much was checked, faults that each name a file, and notes."""
+    """Findings about a result: how much was checked, faults that each name a file, and notes."""
 
     folder: Path
     outputs: int = 0
@@ -84,10 +84,10 @@ class Inspection:
 
 
 def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
-    """Check a folder of results against its run.json, and all stored blocks of its cases; compute some of them again.
+    """Check a folder of results against its run.json, and all stored blocks of its cases; recompute some of them.
 
-    recompute is how many stored pieces of each case to compute again, the smallest first. Raises ConfigError for what
-    is no folder of results, and where blocks cannot be computed again because the sources that compute have changed.
+    recompute is the number of stored pieces to recompute for each case, the smallest first. Raises ConfigError where
+    the folder holds no results, and where blocks cannot be recomputed because the sources have changed.
     """
     found = Inspection(Path(folder))
     blocks = _blocks(found.folder)
@@ -115,13 +115,13 @@ def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
 
 
 def _blocks(folder: Path) -> Path:
-    """Where the blocks of a folder of results lie, which may be `.` or a link: beside its name, or what it leads to."""
+    """Where the blocks of a folder of results lie (the folder may be `.` or a link): beside its name, or its target."""
     beside = [Path(os.path.abspath(folder)).parent, folder.resolve().parent]
     return next((one / ".blocks" for one in beside if is_directory(one / ".blocks")), folder.parent / ".blocks")
 
 
 def _settled(found: Inspection) -> dict[str, Any]:
-    """The record, and its outputs checked; a few times, since another run may be writing others at the same time."""
+    """The record with its outputs checked; repeated a few times, since another run may be writing just now."""
     for look in range(LOOKS):
         time.sleep(LOOK_S if look else 0)
         record, found.outputs, found.faults = _record(found.folder), 0, []
@@ -153,7 +153,7 @@ def _record(folder: Path) -> dict[str, Any]:
 
 
 def _digest(value: object) -> str | None:
-    """SHA-256 of what run.json holds, in hexadecimal; None for what no run writes, such as NaN."""
+    """SHA-256 of the content of run.json, in hexadecimal; None for content that no run writes, such as NaN."""
     from radarsim.report.files import to_json
 
     try:
@@ -181,7 +181,7 @@ def _outputs(found: Inspection, outputs: dict[str, str]) -> None:
 
 
 def _recomputed(found: Inspection, audit: Audit, case: Case | None, most: int) -> bool:
-    """Compute some pieces again and compare; False if this program's sums are kept elsewhere."""
+    """Recompute some pieces and compare; False if this program's sums are stored elsewhere."""
     if case is None or folder_of(audit.path.parent, CaseWork(case)) != audit.path:
         return False
     work, here = CaseWork(case), platform_name()
@@ -205,11 +205,11 @@ def _recomputed(found: Inspection, audit: Audit, case: Case | None, most: int) -
 
 
 def agree(work: CaseWork, made: Sums, stored: np.ndarray, platforms: set[str]) -> bool:
-    """Whether sums are those that are stored: to the last bit on one platform, else to what conditioning allows.
+    """Whether sums agree with the stored ones: to the last bit on one platform, else as far as conditioning allows.
 
-    An estimate may differ by the study's `Tolerance` in σ, so a sum of n errors to the power p by about n p σᵖ times as
-    much; other sums by as much of the largest in their array. σ is the largest of a filter and component over scans: of
-    few realisations that of a single scan may be tiny by chance.
+    An estimate may differ by the study's `Tolerance` in σ, so a sum of n errors to the power p by about n p σᵖ times
+    that; other sums by that part of the largest in their array. σ is the largest of a filter and component over scans:
+    with few realisations that of a single scan may be tiny by chance.
     """
     if len(platforms) < 2:
         return made.values.tobytes() == stored.tobytes()
@@ -220,7 +220,7 @@ def agree(work: CaseWork, made: Sums, stored: np.ndarray, platforms: set[str]) -
         if name == "error":
             sigma = np.sqrt(one[..., 1].max(axis=1, keepdims=True) / made.count)
             powers = np.stack([sigma, sigma**2, sigma**3, sigma**4], axis=-1) * made.count
-            scale = np.maximum(powers, np.abs(one) * [0, 1, 1, 1])  # a sum of e itself may be of opposite signs
+            scale = np.maximum(powers, np.abs(one) * [0, 1, 1, 1])  # the sum of e itself may have either sign
         if not (np.abs(one - other) <= allowed * scale).all():
             return False
     return True
@@ -228,16 +228,16 @@ def agree(work: CaseWork, made: Sums, stored: np.ndarray, platforms: set[str]) -
 
 # ---- precompile ------------------------------------------------------------------------------------------------------
 class Compiled(NamedTuple):
-    """What the kernels of a config took: CPU seconds, next to nothing where their machine code was kept."""
+    """Compilation of a config's kernels: CPU seconds, almost none where machine code was cached."""
 
     config: str
     seconds: float
 
 
 def compiled(configs: Sequence[str]) -> Iterator[Compiled]:
-    """Compile the kernels of configs, of all shipped ones where none is named, and keep their machine code.
+    """Compile the kernels of configs (default: all shipped ones) and cache their machine code.
 
-    A realisation of each case is simulated and forgotten. Raises ConfigError where the machine code cannot be kept.
+    One realisation of each case is simulated and discarded. Raises ConfigError where the machine code cannot be cached.
     """
     from radarsim.kernels import compile
 

@@ -1,4 +1,4 @@
-"""What the commands print with --json: plain data, one document a command, with the content of their text output."""
+"""The output of --json: plain data, one document for each command, with the content of the text output."""
 
 import json
 import math
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def text(document: object) -> str:
-    """A document as JSON; what is not a number, or not finite, is null."""
+    """A document as JSON; NaN and infinities become null."""
     return json.dumps(_plain(document), indent=2, ensure_ascii=False, allow_nan=False)
 
 
@@ -36,12 +36,12 @@ def _plain(value: object) -> object:
 
 
 def fields(one: "DataclassInstance") -> dict[str, Any]:
-    """A dataclass as it is, paths as text."""
+    """A dataclass as a dict, paths as text."""
     return {key: str(value) if isinstance(value, Path) else value for key, value in asdict(one).items()}
 
 
 def result(one: "Result") -> dict[str, Any]:
-    """A finished run or report: what was asked and done, the answer, σ at the last scan, verdicts, files."""
+    """A finished run or report: request, counts, answer, σ at the last scan, verdicts, files."""
     written = one.written
     assert written is not None  # the commands write what they print
     names = {case.name: case.count for case in one.cases}
@@ -65,27 +65,27 @@ def result(one: "Result") -> dict[str, Any]:
 
 
 def share_record(done: "Shares") -> dict[str, Any]:
-    """What a share came to, in realisations, by case."""
+    """Realisations of a share, by case."""
     return {**asdict(done), "unmet": done.unmet, "warnings": done.warnings}
 
 
 def outlook(experiment: "Experiment", one: "Outlook") -> dict[str, Any]:
-    """What a run would take."""
+    """The cost of a run."""
     return {"config": experiment.stem, "path": experiment.path, **asdict(one), "of": one.of.name}
 
 
 def answer(one: "Answer") -> dict[str, Any]:
-    """What was solved for: the value with its interval, or the limit where it is not attainable."""
+    """The answer of `solve`: the value with its interval, or the limit where it is not attainable."""
     return {**asdict(one), "quantity": one.quantity.words}
 
 
 def sensitivity(one: "Sensitivity") -> dict[str, Any]:
-    """What each key changes, the quantities by name."""
+    """The effect of each key, the quantities by name."""
     return {**asdict(one), "of": [of.name for of in one.of]}
 
 
 def compared(one: "Comparison") -> dict[str, Any]:
-    """A comparison: the sentences, notes and warnings, the rows of comparison.csv, and the files."""
+    """A comparison: sentences, notes and warnings, the rows of comparison.csv, and the files."""
     made = {name: getattr(one, name) for name in ("files", "sentences", "notes", "warnings", "rows", "last", "told")}
     return {"folder": str(one.folder), **made}
 

@@ -1,4 +1,4 @@
-"""What running an experiment would take."""
+"""The cost of an experiment before it is run: seconds, memory, and the realisations that a precision needs."""
 
 import os
 import time
@@ -30,16 +30,17 @@ TOTAL = term(
     "{cases}, {realisations}, {seconds} on {threads}, {memory:.0f} MB; figures and tables take some seconds more"
 )
 PILOT_S = 0.3  # of all cases together, unless single realisations take longer
-LADDER, FOR_NOTHING = 8, 1.2  # so many times more realisations at a look; times as good as equal
+LADDER, FOR_NOTHING = 8, 1.2  # factor between numbers of realisations tried; times that count as equal
 SHORT_S = 0.01
-SURELY_SHORT_S, SURELY_SMALL = 1.0, 1000  # CPU time of all cases, estimates of a case: then nothing is timed
-PILOT_OF_PRECISION_S, LEAST, MOST = 1.0, 256, 16_384  # realisations that a precision is judged from
+SURELY_SHORT_S, SURELY_SMALL = 1.0, 1000  # CPU time of all cases, estimates of a case: below these nothing is timed
+PILOT_OF_PRECISION_S, LEAST, MOST = 1.0, 256, 16_384  # realisations of the pilot for a precision
 
 
 @dataclass(frozen=True)
 class Need:
-    """What a precision takes: realisations (None beyond all bounds), from `exact` values or a `pilot` of how many, and
-    the name of what reaches it last; below: the bound of its rate, if the pilot had no such event."""
+    """What a precision takes: realisations (None if unattainable), from `exact` values or a `pilot` of that many, and
+    the name of the quantity that reaches it last; below: upper bound of its rate if the pilot had no such event.
+    """
 
     realisations: int | None
     known_by: str
@@ -49,11 +50,10 @@ class Need:
 
 @dataclass(frozen=True)
 class CaseOutlook:
-    """What running a case would take: labels, counts, seconds of one thread's work.
+    """The cost of a case: labels, counts, seconds of one thread.
 
-    stock is what a results directory has of these realisations; where one is given, seconds are of those it lacks.
-    timed: whether a few realisations were; else it takes at most so many seconds, which is short.
-    need is what a precision takes.
+    stock: what a results directory already holds; seconds then cover the missing realisations only. timed: whether a
+    few realisations were timed; otherwise the seconds are an upper bound, which is short. need: what a precision takes.
     """
 
     name: str
@@ -68,7 +68,7 @@ class CaseOutlook:
 
 @dataclass(frozen=True, repr=False)
 class Outlook(Shown):
-    """What running an experiment, or a share of it such as (2, 3), would take, on `threads` threads."""
+    """The cost of an experiment, or of a share of it such as (2, 3), on `threads` threads."""
 
     cases: tuple[CaseOutlook, ...]
     threads: int
@@ -81,7 +81,9 @@ class Outlook(Shown):
 
     @property
     def table(self) -> "pd.DataFrame":
-        """A row a case: filters, scans, realisations, seconds of one thread, what of it is stored, what it needs."""
+        """A row for each case: filters, scans, realisations, seconds of one thread, stored part, what a precision
+        takes.
+        """
         return frame(
             {
                 **{"case": [case.name for case in self.cases], "filters": [case.filters for case in self.cases]},
@@ -93,7 +95,7 @@ class Outlook(Shown):
 
     @property
     def total(self) -> str:
-        """Cases, realisations, seconds and memory of all, in words."""
+        """Cases, realisations, seconds and memory in total, in words."""
         asked = sum(case.realisations for case in self.cases)
         told = {
             "cases": plural("{count} case", "{count} cases", len(self.cases)),
@@ -111,7 +113,7 @@ class Outlook(Shown):
 
 
 def about(seconds: float) -> str:
-    """A time foretold."""
+    """A predicted duration, in words."""
     return tr("under a second") if seconds < 1 else tr("about {time}", time=clock(seconds))
 
 
@@ -124,11 +126,11 @@ def outlook(
     out: str | os.PathLike[str] | None = None,
     share: tuple[int, int] | None = None,
 ) -> Outlook:
-    """Prepare every case and say what the whole would take, or a share of it; less what is stored in `out`.
+    """Prepare every case and predict the cost of the whole, or of a share; less what is stored in `out`.
 
-    A few realisations are timed, compiled beforehand, unless the study knows that all of them are short; then the
-    compiler is not loaded. With a precision, in per cent, of a kind of quantity: a case ends when that is reached, or
-    at its N. progress(done, total, 0) is called after each case.
+    A few realisations are timed after compilation, unless the study knows that all are short; then the compiler is not
+    loaded. With a precision, in per cent, for a kind of quantity, a case ends when that is reached, or at its N.
+    progress(done, total, 0) is called after each case.
     """
     threads = available_cores() if threads is None else max(threads, 1)
     if precision is not None:
@@ -137,7 +139,7 @@ def outlook(
     quantity = SIGMA if precision is None else registry.quantity(of, experiment.cases[0])
     largest, preparing = 0, 0.0
     study = registry.study(experiment.study)
-    study.prepare(experiment.cases[0])  # what it loads is not to be timed
+    study.prepare(experiment.cases[0])  # imports are not to be timed
     for done, case in enumerate(experiment.cases, 1):
         work, started = CaseWork(case), time.perf_counter()
         axes = work.plan.axes
@@ -155,7 +157,7 @@ def outlook(
             largest = max(largest, work.size)
         if progress is not None:
             progress(done, len(experiment.cases), 0)
-    # Vectors of sums in flight: two a thread, one a level of the tree; beside them the interpreter and its libraries.
+    # Vectors of sums in flight: two for each thread, one for each level of the tree; plus interpreter and libraries.
     memory = 200 + 8e-6 * largest * (2 * threads + 32)
     seconds = preparing + sum(c.seconds for c in cases) / threads
     return Outlook(
@@ -164,8 +166,9 @@ def outlook(
 
 
 def surely_short(work: CaseWork, most_s: float) -> float | None:
-    """Seconds of one thread that all realisations of a case take at most, where that is surely short, and the sums are
-    small beside the interpreter; else None."""
+    """Upper bound on one thread's seconds for all realisations of a case, where it is surely short and the sums are
+    small beside the interpreter; else None.
+    """
     if work.plan.axes.available.size > SURELY_SMALL:
         return None
     each = registry.study(work.case.study).seconds_at_most(work.plan)
@@ -180,7 +183,7 @@ def measured(
     precision: float | None,
     of: str,
 ) -> CaseOutlook:
-    """The outlook of a case of which a few realisations are timed; stocked gives what is stored of so many."""
+    """The outlook of a case by timing a few realisations; stocked returns what is stored of a number of them."""
     case = work.case
     work.simulate(0, 1)
     each = seconds_each(work, case.realisations, pilot_s)
@@ -192,8 +195,7 @@ def measured(
 def needed(work: CaseWork, percent: float, seconds_each: float, of: str) -> Need:
     """How many realisations a precision takes.
 
-    From exact values for σ, where errors are Gaussian with these, else from a pilot. Raises ConfigError where the case
-    has no such quantity.
+    From exact σ where errors are Gaussian, else from a pilot. Raises ConfigError where the case has no such quantity.
     """
     from radarsim.report import precision
 
@@ -222,10 +224,10 @@ def ending(need: Need, most: int) -> int:
 
 
 def seconds_each(work: CaseWork, realisations: int, pilot_s: float) -> float:
-    """Seconds of one thread for one realisation, from ever more of them, at most a block, in about pilot_s.
+    """Seconds of one thread for one realisation, from growing numbers of them, at most a block, in about pilot_s.
 
-    Kernels calculate whole chunks: one realisation may take as long as hundreds, and more are tried while they come for
-    nothing, whatever that takes.
+    Kernels calculate whole chunks: one realisation may take as long as hundreds. So larger numbers are tried as long as
+    they take no longer.
     """
     most, count, taken, free = min(work.block, realisations), 1, timed(work, 1), True
     while count < most and (free or LADDER * taken < pilot_s):
@@ -237,7 +239,7 @@ def seconds_each(work: CaseWork, realisations: int, pilot_s: float) -> float:
 
 
 def timed(work: CaseWork, count: int) -> float:
-    """Seconds of the processor that `count` realisations take; of short ones the lesser of two."""
+    """CPU seconds of `count` realisations; of short ones the lesser of two measurements."""
     seconds: list[float] = []
     while not seconds or (len(seconds) < 2 and seconds[0] < SHORT_S):
         started = time.thread_time()
@@ -248,10 +250,10 @@ def timed(work: CaseWork, count: int) -> float:
 
 @dataclass(frozen=True)
 class Lacking:
-    """Cases whose blocks lie as shares do that were not all copied, or as a killed run left them.
+    """Cases with gaps in their stored blocks, from shares not all copied or from a killed run.
 
-    How many they are, the realisations asked of them and stored, name and stock of the first one, and seconds for the
-    rest on `threads` threads.
+    Their number, their realisations requested and stored, name and stock of the first, and seconds for the rest on
+    `threads` threads.
     """
 
     cases: int
@@ -264,10 +266,9 @@ class Lacking:
 
 
 def lacking(experiment: Experiment, out: str | os.PathLike[str], threads: int | None = None) -> Lacking | None:
-    """What a run would compute first of a store with gaps, and how long that takes; None of a store without.
+    """What a run would compute first of a store with gaps, and how long that takes; None without gaps.
 
-    A few realisations are timed, as for `outlook`. What no run has stored so far, or all of which is there, is not even
-    prepared.
+    A few realisations are timed, as for `outlook`. Cases with nothing stored, or complete, are not even prepared.
     """
     found: dict[str, tuple[CaseWork, Stock]] = {}
     for case in experiment.cases:
@@ -291,7 +292,7 @@ def lacking(experiment: Experiment, out: str | os.PathLike[str], threads: int | 
 
 
 def missing(held: Stock) -> str:
-    """What a store lacks: which realisations, and which shares these look like."""
+    """Which realisations a store lacks, and which shares these look like."""
     runs = few([tr("{first:,} to {last:,}", first=first, last=last) for first, last in held.missing], 3)
     if held.shares is None:
         return tr("realisations {runs}", runs=runs)

@@ -31,7 +31,7 @@ def simulate(config: Config, realisation: int = 0, overrides: Overrides = ()) ->
 
 
 def read_plots(path: str | os.PathLike[str]) -> "pd.DataFrame":
-    """Read a file of plots as `radarsim import` and `radarsim simulate` write it: numbers, and the column `track` as
+    """Read a file of plots as written by `radarsim import` or `radarsim simulate`: numbers, and the column `track` as
     text.
 
     Raises ConfigError if it cannot be read.
@@ -42,7 +42,7 @@ def read_plots(path: str | os.PathLike[str]) -> "pd.DataFrame":
 
     try:
         texts = pd.read_csv(path, comment="#", dtype=str, keep_default_na=False)
-        # By Python's own reading of numbers, which loses no digit.
+        # Python's own parsing of numbers loses no digit.
         measured = [str(name) for name in texts if name != plots.TRACK]
         numbers = {name: texts[name].replace("", "nan").astype(float) for name in measured}
     except (OSError, ValueError) as error:
@@ -103,7 +103,7 @@ def fit(
 
 
 def _with_file(recorded: "str | os.PathLike[str] | pd.DataFrame", act: Callable[[str], Found]) -> Found:
-    """What is done with the file of recorded plots; a table is written into one of its own first."""
+    """Call with the file of recorded plots; a table is first written into a temporary one."""
     if isinstance(recorded, str | os.PathLike):
         return act(os.fspath(recorded))
     with tempfile.TemporaryDirectory() as folder:

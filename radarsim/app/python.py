@@ -152,7 +152,6 @@ def _place(at_s: float | None, at_k: int | None) -> dict[str, object]:
 
 
 def _is_pair(given: object, kind: Any = SupportsFloat) -> bool:
-    """Whether it is two numbers."""
     return isinstance(given, Iterable) and len(two := list(given)) == 2 and all(isinstance(one, kind) for one in two)
 
 

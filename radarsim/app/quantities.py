@@ -1,12 +1,11 @@
-"""One number that a case is asked for: a gain, a σ, a rate of locks; exact where that is known, else sampled.
+"""Quantities of a case, such as a gain, a σ or a rate of locks: exact where known, otherwise sampled.
 
-Exact numbers come from the plan of a case, without a realisation. Sampled ones are read from the tables by the names
-that these have in every study: whatever study makes a table `locks` can be asked for its locks.
+Exact values come from the plan of a case, without a realisation. Sampled ones are read from the tables by column names
+that all studies share: any study with a table `locks` has the quantity lock.
 
-Where a function of one number reaches a target: every root on a range, or the nearest that it comes.
-
-The function may be undefined in places (not-a-number), as a config's keys are where they do not go together. Positive
-ranges of more than a factor of 20 are searched on a logarithmic scale.
+Roots of a function of one number on a range, or the place nearest to a root. The function may be undefined (NaN) in
+places where keys of a config exclude each other. Positive ranges of more than a factor of 20 are searched on a
+logarithmic scale.
 """
 
 import math
@@ -32,13 +31,13 @@ if TYPE_CHECKING:
 
 # ---- quantities ------------------------------------------------------------------------------------------------------
 UNKNOWN = Estimate(np.nan, np.nan, np.nan)
-UNPAIRED = 4  # times the realisations where a change moves the scans, so that the noise compared is of other scans
+UNPAIRED = 4  # factor on the realisations where a change moves the scans, so that the noise is not common
 
 
 class Wanted(NamedTuple):
-    """A quantity by names: its own, that of a filter, and which of the filter's values (a component).
+    """A quantity by names: its own, that of a filter, and the component.
 
-    Where it has a course over scans: at a time at_s, linear between two scans, or at scan at_k; neither: at the last.
+    For a quantity over scans: at time at_s, linear between two scans, or at scan at_k; neither: at the last.
     """
 
     name: str
@@ -50,7 +49,7 @@ class Wanted(NamedTuple):
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked for: a quantity that a case measures, the others as in `Wanted`."""
+    """A quantity that a case measures; the other fields as in `Wanted`."""
 
     of: Quantity
     filter: str | None = None
@@ -68,7 +67,7 @@ class Asked:
 
     @property
     def said(self) -> str:
-        """The same in the language spoken."""
+        """The same in the current language."""
         told = {"kind": term(self.of.words), "filter": self.filter}
         told["component"] = self.of.place(self.component or "", tr)
         what = tr("{kind} of {filter} in {component}", **told) if self.component else tr("{kind} of {filter}", **told)
@@ -86,7 +85,7 @@ class Series(NamedTuple):
 
 
 def checked(wanted: Wanted, case: Case) -> Asked:
-    """What is asked of a case, before anything is prepared. ConfigError for a quantity or filter that it has not."""
+    """The request, checked before anything is prepared. ConfigError for an unknown quantity or filter."""
     name, chosen, component, at_s, at_k = wanted
     of = registry.quantity(name, case)
     if not of.per:
@@ -99,14 +98,14 @@ def checked(wanted: Wanted, case: Case) -> Asked:
 
 
 def named(name: str, names: Sequence[str], what: str = "filter") -> None:
-    """ConfigError unless one of the filters, or of what else, has this name."""
+    """ConfigError unless a filter, or another item, has this name."""
     if name not in names:
         near = did_you_mean(name, names) or f"; there are: {', '.join(names)}"
         raise ConfigError(f"no {what} {name!r}{near}")
 
 
 def resolved(asked: Asked, axes: Axes) -> Asked:
-    """The same with its filter, found where there is but one. ConfigError for names that the case has not."""
+    """The request with its filter filled in if there is only one. ConfigError for unknown names."""
     names, chosen = list(axes.filters), asked.filter
     gain = asked.of.paired and planned(asked.of)
     if chosen is None:
@@ -126,19 +125,19 @@ def resolved(asked: Asked, axes: Axes) -> Asked:
 
 
 def unit(asked: Asked, axes: Axes) -> str:
-    """The unit in which a quantity is given."""
+    """The unit of a quantity."""
     from radarsim.report import wording
 
     return wording.unit(asked.of.shown_unit(dict(axes.components).get(str(asked.component), "")))
 
 
 def shortened(quantity: Asked, case: Case) -> Case:
-    """The case as far as a quantity asks for it. Raises ConfigError where the whole case cannot be."""
+    """The case shortened to the scans that a quantity needs. Raises ConfigError where the whole case is invalid."""
     return registry.study(case.study).shortened(case, quantity.at_s, quantity.at_k)
 
 
 def labels(quantity: Asked, case: Case) -> Axes:
-    """The labels of a case's plan, with the exact errors as far as a quantity asks for them. Raises ConfigError."""
+    """The labels of a case's plan, with exact errors up to the scans that a quantity needs. Raises ConfigError."""
     return registry.study(case.study).prepare(shortened(quantity, case)).axes
 
 
@@ -146,12 +145,12 @@ PLANNED = {("curves", "sigma"): "exact_sigma", ("gains", "gain_percent"): "exact
 
 
 def planned(of: Quantity) -> bool:
-    """Whether a plan has its exact values, where they are known: σ and gain, of the common tables."""
+    """Whether a plan holds its exact values: σ and gain of the common tables."""
     return (of.table, of.value) in PLANNED
 
 
 def exact(asked: Asked, case: Case, axes: Axes) -> float:
-    """The exact value from the labels of a case's plan; not-a-number where none is known without sampling."""
+    """The exact value from the labels of a case's plan; NaN where none is known without sampling."""
     if not planned(asked.of) or not registry.study(case.study).exact_errors:
         return np.nan
     f = axes.filters.index(str(asked.filter))
@@ -168,7 +167,7 @@ def exact(asked: Asked, case: Case, axes: Axes) -> float:
 
 
 def sampled(asked: Asked, result: CaseResult) -> tuple[Estimate, float]:
-    """Value and 95 % interval from a case's tables, and its exact value where the table has one, else not-a-number."""
+    """Value and 95 % interval from a case's tables, and its exact value if the table has one, else NaN."""
     table = table_of(asked.of, result)
     table = table[table["filter"] == asked.filter]
     if not len(table):
@@ -180,7 +179,7 @@ def sampled(asked: Asked, result: CaseResult) -> tuple[Estimate, float]:
 
 
 def table_of(of: Quantity, result: CaseResult) -> "pd.DataFrame":
-    """The table of a case that holds a quantity. Raises ConfigError where the study makes none."""
+    """The table of a case that holds a quantity. Raises ConfigError where the study has none."""
     made = registry.study(result.study).table(of.table, [result], of.value)
     if made is None:
         raise ConfigError(f"{result.name}: no {of.words}: study {result.study} makes no {of.table}.csv")
@@ -188,7 +187,7 @@ def table_of(of: Quantity, result: CaseResult) -> "pd.DataFrame":
 
 
 def courses(of: Quantity, table: "pd.DataFrame", exactly: bool = False) -> dict[tuple[str, str], Series]:
-    """A quantity, or its exact values, over scans in its table, by filter and component, which is empty without any."""
+    """A quantity, or its exact values, over the scans of its table, by filter and component (empty if it has none)."""
     values, known = of.read(table)
     ends = Estimate(known, known, known) if exactly else values
     size = len(table)
@@ -203,7 +202,7 @@ def courses(of: Quantity, table: "pd.DataFrame", exactly: bool = False) -> dict[
 
 
 def noted(quantity: Asked, result: CaseResult) -> str:
-    """What the tables would note of the interval there, no exact value beside it: why it is too narrow, or nothing."""
+    """The note that tables would put on the interval without an exact value: why it is too narrow, or nothing."""
     from radarsim.report import notes
 
     study, name = registry.study(result.study), quantity.of.table
@@ -223,7 +222,7 @@ def noted(quantity: Asked, result: CaseResult) -> str:
 
 
 def scan(quantity: Asked, axes: Axes) -> int:
-    """The scan that a quantity at a time is read at, or the later of two; 0 where it is asked for by its number."""
+    """The scan at which a quantity at a time is read, or the later of two; 0 where the scan number is given."""
     k, t_s = np.asarray(axes.k), np.asarray(axes.t_s, dtype=float)
     if quantity.at_k is not None or not len(k):
         return 0
@@ -232,7 +231,7 @@ def scan(quantity: Asked, axes: Axes) -> int:
 
 
 def at(quantity: Asked, series: Series) -> Estimate:
-    """The series at the time or scan that is asked for: not-a-number where there is no estimate.
+    """The series at the requested time or scan: NaN where there is no estimate.
 
     Raises ConfigError for a time or scan beyond the run.
     """
@@ -262,12 +261,12 @@ def at(quantity: Asked, series: Series) -> Estimate:
 
 
 # ---- search ----------------------------------------------------------------------------------------------------------
-WIDE = 20  # high over low from which a range is searched logarithmically
+WIDE = 20  # ratio of high to low from which a range is searched logarithmically
 PER_DECADE, LEAST_POINTS, MOST_POINTS = 5, 25, 61
-EXACTLY = 1e-13  # of a root's size, to which brackets are closed: far below the 1e-9 that is promised
+EXACTLY = 1e-13  # relative width to which brackets are closed: far below the documented 1e-9
 BILLIONTH = 1e-9
-POLISHED, MOST_POLISHED = 1e-10, 8  # of a root's size, to which secants go on; how many
-FIRST_STEP = 1e-4  # of the range, to the second place at which a root is looked for near another
+POLISHED, MOST_POLISHED = 1e-10, 8  # relative step at which secants end; how many
+FIRST_STEP = 1e-4  # of the range: distance of the second start in a search near a known root
 GOLDEN = (math.sqrt(5) - 1) / 2
 
 Function = Callable[[float], float]
@@ -275,7 +274,7 @@ Function = Callable[[float], float]
 
 @dataclass(frozen=True)
 class Range:
-    """What is searched: low to high, on a scale that is logarithmic or not, of whole numbers or not."""
+    """A range to search: low to high, logarithmic or not, of whole numbers or not."""
 
     low: float
     high: float
@@ -287,7 +286,7 @@ class Range:
         return math.log(x) if self.logarithmic else x
 
     def outer(self, u: float) -> float:
-        """The value at a place of the scale, within the range; the nearest whole one where only these are."""
+        """The value at a place of the scale, within the range; rounded where only whole numbers are allowed."""
         x = math.exp(u) if self.logarithmic else u
         return min(max(float(round(x)) if self.whole else x, self.low), self.high)
 
@@ -305,13 +304,13 @@ class Range:
 
 
 def searched(low: float, high: float, whole: bool = False) -> Range:
-    """The range from low to high, on the scale that fits it."""
+    """The range from low to high, on a suitable scale."""
     return Range(low, high, low > 0 and high / low > WIDE, whole)
 
 
 @dataclass(frozen=True)
 class Found:
-    """The roots on a range, rising; without any, the place where the function comes nearest to zero and its value."""
+    """The roots on a range, ascending; without any, the place where the function is nearest to zero and its value."""
 
     roots: tuple[float, ...]
     nearest: float
@@ -325,10 +324,8 @@ class Undefined(ValueError):
 def roots_of(function: Function, over: Range, width: float = EXACTLY) -> Found:
     """All roots that a scan of the range shows: changes of sign, and touching ones where it turns near zero.
 
-    Where the function jumps over zero, the place of the jump counts as one, unless it is undefined between. Brackets
-    are closed to a part `width` of the root, by default to rounding.
-
-    Raises Undefined where the function is so everywhere on the scan.
+    A jump over zero counts as a root, unless the function is undefined between. Brackets are closed to the relative
+    width `width`, by default to rounding. Raises Undefined where the function has no value anywhere on the scan.
     """
     places = [(x, function(x)) for x in over.grid()]
     places = _with_edges(function, over, places)
@@ -346,9 +343,9 @@ def roots_of(function: Function, over: Range, width: float = EXACTLY) -> Found:
 
 
 def polished(function: Function, over: Range, root: float, rising: float, near_enough: float) -> float | None:
-    """The root of a smooth function near that of a rougher one, by secants on the scale of the search.
+    """The root of a smooth function near that of an approximation, by secants on the scale of the search.
 
-    rising is the first slope. To ten digits, or to rounding; of a function that jumps where |function| <= near_enough.
+    rising is the first slope. To ten digits, or to rounding; for a function that jumps where |function| <= near_enough.
     None where a step does not bring it nearer.
     """
     u, y = over.inner(root), function(root)
@@ -365,9 +362,9 @@ def polished(function: Function, over: Range, root: float, rising: float, near_e
 
 
 def near(function: Function, over: Range, root: float, near_enough: float) -> float | None:
-    """The root of a function near that of a rougher one: to a billionth, or where |function| <= near_enough.
+    """The root of a function near that of an approximation: to 1e-9, or where |function| <= near_enough.
 
-    None where the function keeps its sign for as far as a tenth of the range.
+    None where the function keeps its sign within a tenth of the range.
     """
     u, reach = over.inner(root), over.inner(over.high) - over.inner(over.low)
 
@@ -399,8 +396,8 @@ def closed(
 ) -> float:
     """The root between two places (x, y) of opposite signs (Chandrupatla, Adv. Eng. Software 28, 1997, 145-149).
 
-    Ends where near_enough(x, y), at a root, or where the bracket is closed to a part `width` of it, by default to
-    rounding; where the function jumps over zero, at the jump. Of whole numbers the one beside the change of sign with
+    Ends where near_enough(x, y), at a root, or where the bracket is closed to the relative width `width`, by default to
+    rounding; where the function jumps over zero, at the jump. For whole numbers: the one beside the change of sign with
     the smaller value.
     """
     (a, fa), (b, fb) = (over.inner(one[0]), one[1]), (over.inner(other[0]), other[1])
@@ -425,7 +422,7 @@ def closed(
 
 
 def _next(a: float, b: float, c: float, fa: float, fb: float, fc: float) -> float:
-    """Where to look next between a and b, as a share: inverse quadratic interpolation where it is safe, else half."""
+    """The next place between a and b, as a share: inverse quadratic interpolation where it is safe, else half."""
     if c in (a, b) or fc in (fa, fb):
         return 0.5
     xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
@@ -437,7 +434,7 @@ def _next(a: float, b: float, c: float, fa: float, fb: float, fc: float) -> floa
 
 
 def _with_edges(function: Function, over: Range, places: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The places with those at which the function begins or ceases to be defined, to a thousandth of a step."""
+    """The places plus those where the function starts or stops being defined, to a thousandth of a step."""
     made = list(places)
     if over.whole:
         return made
@@ -454,10 +451,10 @@ def _with_edges(function: Function, over: Range, places: list[tuple[float, float
 
 
 def _with_turns(function: Function, over: Range, places: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The places with the extremes, found by golden sections, at which the function turns back before it reaches zero.
+    """The places plus the extremes, by golden sections, where the function turns back before it reaches zero.
 
-    Only where it may reach it: beyond a turn the parabola through the three places comes at most so much nearer; and,
-    where it reaches zero nowhere, the turn that comes nearest.
+    Only where zero may be reached: beyond a turn, the parabola through the three places comes at most that much nearer;
+    and, without any zero, the turn that comes nearest.
     """
     made = list(places)
     if over.whole:
@@ -473,12 +470,12 @@ def _with_turns(function: Function, over: Range, places: list[tuple[float, float
 
 
 def _least(places: Sequence[tuple[float, float]], x: float) -> bool:
-    """Whether of all places this is where the function is nearest to zero: the limit, if it is never reached."""
+    """Whether the function is nearest to zero here: the limit, if zero is never reached."""
     return x == min((abs(y), x) for x, y in places if not math.isnan(y))[1]
 
 
 def _turn(function: Function, over: Range, low: float, high: float, sign: float) -> tuple[float, float]:
-    """The least of sign · function between two places; ends early where it crosses zero."""
+    """The minimum of sign · function between two places; ends early where it crosses zero."""
     a, b = over.inner(low), over.inner(high)
     u, v = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
     fu, fv = sign * function(over.outer(u)), sign * function(over.outer(v))

@@ -1,6 +1,4 @@
-"""What `radarsim solve` is asked: which key of which cases, which quantity it shall bring where; the quantity as a
-function of the key; and the answer.
-"""
+"""The question of `radarsim solve`: cases, key, target; the quantity as a function of the key; the answer."""
 
 import math
 import os
@@ -32,20 +30,21 @@ if TYPE_CHECKING:
 
 FACTOR = 1000.0  # the search goes from a thousandth of a positive key's value to a thousand times it
 WHOLE = term("the nearest whole number that is at least as good as the target")
-MOST_NAMED = 6  # cases that a message lists
+MOST_NAMED = 6  # cases listed in a message
 JUMPS = term("the quantity jumps over the target there")
-SAME = 1e-12  # of a quantity: what rounding may make of no change
-ROUGH = -1  # in place of a number of realisations
-LONG_S = 2.0  # of an answer, from which it is predicted what it takes
+SAME = 1e-12  # relative change of a quantity that may be rounding
+ROUGH = -1  # stands for a number of realisations
+LONG_S = 2.0  # duration of a search from which it is predicted
 
 
 @dataclass(frozen=True, repr=False)
 class Answer(Shown):
-    """What was found.
+    """The answer of `radarsim solve`.
 
-    value is None where the target is not attained; then limit is the nearest that was, at limit_at. lo and hi bound the
-    value at 95 %, and equal it where exact. slope is the quantity's change for one unit of the key; others are further
-    values that attain the target. low and high are what was searched, command the run that confirms.
+    value is None where the target is not attained; then limit is the nearest attainable value, at limit_at. lo and hi
+    bound the value at 95 %, and equal it where exact. slope is the change of the quantity for one unit of the key;
+    others are further values that attain the target. low and high are the searched range, command the run that
+    confirms.
     """
 
     key: str
@@ -71,14 +70,14 @@ class Answer(Shown):
 
     @property
     def table(self) -> "pd.DataFrame":
-        """What `radarsim solve --json` prints, as one row."""
+        """The output of `radarsim solve --json` as one row."""
         from radarsim.app import documents
 
         return tables.frame({name: [value] for name, value in documents.answer(self).items()})
 
     @property
     def lines(self) -> list[tuple[str, str]]:
-        """The value, then what it attains, the slope, other values and notes: a label and words each."""
+        """The value, the quantity there, the slope, other values and notes: label and words of each."""
         value, lo, hi = self.value, self.lo, self.hi
         if value is None or lo is None or hi is None:
             return [("", line) for line in self.unattained]
@@ -96,7 +95,7 @@ class Answer(Shown):
 
     @property
     def unattained(self) -> tuple[str, ...]:
-        """Why there is no value: the nearest that was found, and where; empty where there is one."""
+        """Why there is no value: the nearest attainable one, and where; empty where there is one."""
         limit, at = self.limit, self.limit_at
         if self.value is not None or limit is None or at is None:
             return ()
@@ -112,7 +111,7 @@ class Answer(Shown):
         return [labelled(label, words).strip() for label, words in self.lines]
 
     def _slope(self, value: float, per_unit: float) -> str:
-        """What a little more of the key changes: `1 m/s more costs 1.7 points`."""
+        """The effect of a small increase of the key: `1 m/s more costs 1.7 points`."""
         step = 10.0 ** math.floor(math.log10(abs(value) / 2)) if value else 1.0
         step = max(step, 1.0) if float(value).is_integer() and step >= 0.5 else step
         change, more_is_better = per_unit * step, self.quantity.of.more_is_better
@@ -146,12 +145,12 @@ AT_LEAST = term(
     "{quantity}: {wanted} is not attainable with {key} from {low} to {high}: the smallest is {limit}, at {at}"
 )
 PLAIN = ".6g"
-MOST_DIGITS = 12  # behind the point: beyond, rounding shows
-NEAR_ZERO = 1e-9  # of a quantity: how near an exact root comes
+MOST_DIGITS = 12  # behind the point: beyond is rounding
+NEAR_ZERO = 1e-9  # of a quantity: accuracy of an exact root
 
 
 def _rate(percent: float) -> str:
-    """A share in per cent: of one that is nearly all so many digits that three are of the rest.
+    """A share in per cent, with digits enough to show three of its complement where it is near 100 %.
 
     >>> _rate(99.9990021)
     '99.999002'
@@ -174,7 +173,7 @@ def shown(value: float, form: str = PLAIN) -> str:
 
 @dataclass
 class Cases:
-    """The cases that a config stands for with other values at a key; `base` as it is.
+    """The cases of a config with other values at a key; `base` as it is.
 
     The others share the base's noise, whatever their world.
     """
@@ -212,7 +211,7 @@ class Cases:
             raise ConfigError(*(_not_by_argument(line, key) for line in error.lines)) from error
 
     def _setting(self, key: str, value: float) -> str:
-        """A key's setting; of an item of a list the whole list, which the config may give in degrees or not at all."""
+        """A key's setting; for an item of a list the whole list, which the config may give in degrees or leave out."""
         holder, _, place = key.rpartition(".")
         if not place.isdecimal():
             return f"{key}={_yaml(value)}"
@@ -225,7 +224,7 @@ class Cases:
 
 
 def _not_by_argument(line: str, key: str) -> str:
-    """A fault of a key's value that nobody gave as an argument, without that argument.
+    """A message about a key's value without the name of an argument that the user did not give.
 
     >>> _not_by_argument("overrides['filters.0.orders']: filters.0.orders.0: must be <= 2, got 3", "filters.0.orders")
     'filters.0.orders.0: must be <= 2, got 3'
@@ -238,13 +237,13 @@ def _not_by_argument(line: str, key: str) -> str:
 
 
 def _yaml(value: float) -> str:
-    """A number as a config holds it: whole ones without a point."""
+    """A number as in a config: whole ones without a point."""
     return repr(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))
 
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked, with its config read: of which cases, which key, what it shall do, over which range."""
+    """A parsed question: cases, key, target and range."""
 
     cases: Cases
     key: str
@@ -257,7 +256,7 @@ class Question:
     realisations: int | None = None
 
     def command(self, value: float) -> str:
-        """The run that shows what a value attains, of noise of its own, with as many realisations as were asked for."""
+        """The run that confirms a value, with independent noise and the requested number of realisations."""
         name = self.cases.config if isinstance(self.cases.config, str | os.PathLike) else "CONFIG.yaml"
         settings = [*self.overrides, f"{self.key}={number(value)}"]
         count = [] if self.realisations is None else ["-n", str(self.realisations)]
@@ -271,12 +270,12 @@ def number(value: float) -> str:
 
 
 def rounded(value: float) -> float:
-    """A number without what lies beyond its twelfth digit."""
+    """A number rounded to twelve digits."""
     return float(f"{value:.12g}")
 
 
 def range_of(found: Sequence[fields.NumericKey], name: str, between: tuple[float, float] | None) -> quantities.Range:
-    """What is searched of a key. Raises ConfigError where it has neither bounds nor a value to begin from."""
+    """The search range of a key. Raises ConfigError where it has neither bounds nor a starting value."""
     key, values = found[0], [one.value for one in found if one.value]
     if between is not None:
         low, high = between
@@ -303,14 +302,14 @@ def range_of(found: Sequence[fields.NumericKey], name: str, between: tuple[float
 
 
 def _between() -> str:
-    """The argument that says where to search."""
+    """The argument that sets the search range."""
     return argument("between=(low, high)", "--between LO HI")
 
 
 class Curve:
     """The quantity as a function of the key, each value computed once.
 
-    progress is told of each; `simulated` counts those that were simulated.
+    progress is called for each; `simulated` counts the simulated ones.
     """
 
     def __init__(
@@ -326,9 +325,9 @@ class Curve:
         self.threads, self.progress, self.realisations = threads, progress, realisations
         self.known: dict[tuple[float, int], Estimate] = {}
         self.refused: dict[float, ConfigError] = {}
-        self.scans = set[int]()  # of the values that were simulated, where the quantity was read
+        self.scans = set[int]()  # scans at which the quantity was read, of simulated values
         self.from_tables = False
-        self.rough = False  # whether there are values for less work, for a search to look about
+        self.rough = False  # whether cheaper approximate values exist, for a first search
         self.expected = 1
 
     def exact(self, axes: Axes) -> bool:
@@ -345,21 +344,21 @@ class Curve:
         return self.from_tables
 
     def exactly(self, value: float | None) -> float:
-        """The exact quantity at a value (None: as the config has it); not-a-number where there is none."""
+        """The exact quantity at a value (None: the config's own); NaN where there is none."""
         return self._kept(value, 0, self._exact_of).value
 
     def roughly(self, value: float) -> float:
-        """The same for less work, to a thousandth of σ, where the study has it so; else the exact quantity."""
+        """A cheaper value, to a thousandth of σ, if the study has one; else the exact quantity."""
         if not self.rough:
             return self.exactly(value)
         return self._kept(value, ROUGH, lambda case: self._exact_of(replace(case, roughly=True))).value
 
     def simulated(self, value: float | None, realisations: int) -> Estimate:
-        """The quantity with its interval, from so many realisations."""
+        """The quantity with its interval, from this number of realisations."""
         return self._kept(value, realisations, lambda case: self._sampled(case, realisations)[0])
 
     def noted(self, value: float) -> tuple[str, ...]:
-        """What the tables note of the interval at a value, in words."""
+        """The note of the tables on the interval at a value, in words."""
         note = quantities.noted(self.quantity, self._result(self.cases.at(self.key, value), self.realisations))
         more = argument("realisations=…", "-n")
         return (f"the interval may be too narrow: {note}; use more realisations, {more}",) if note else ()
@@ -400,18 +399,18 @@ class Curve:
 
 
 def predict(notify: Callable[[str], None], what: str, seconds: float) -> None:
-    """Say what a search will do and about how long it takes, where that is long."""
+    """Predict the work and the duration of a search, where that is long."""
     if seconds > LONG_S:
         notify(tr("{what}: about {seconds:.0f} s", what=what, seconds=seconds))
 
 
 def said_of(asked: Question) -> dict[str, str]:
-    """What is asked, for a sentence."""
+    """The quantity in a sentence."""
     return {"quantity": asked.quantity.said, "key": asked.key}
 
 
 def answered(asked: Question, attained_now: float, **given: Any) -> Answer:
-    """An answer of what was asked; what is not given is none."""
+    """An answer to the question; omitted fields are empty."""
     empty: dict[str, Any] = dict.fromkeys(("value", "lo", "hi", "attained", "slope", "limit", "limit_at"))
     whole = empty | {"others": ()} | given
     shown = whole["limit_at"] if whole["value"] is None else whole["value"]
@@ -431,7 +430,7 @@ def answered(asked: Question, attained_now: float, **given: Any) -> Answer:
 
 
 def nowhere(asked: Question, curve: Curve) -> ConfigError:
-    """Why the quantity has no value anywhere on the range: the config's own reason where it gives one."""
+    """Why the quantity has no value anywhere on the range: the config's own reason if it gives one."""
     reasons = [error for _, error in sorted(curve.refused.items())]
     if reasons:
         return ConfigError(*dict.fromkeys(line for error in reasons[:1] for line in error.lines))
@@ -439,7 +438,7 @@ def nowhere(asked: Question, curve: Curve) -> ConfigError:
 
 
 def refuse_without_effect(asked: Question, values: Iterable[float]) -> None:
-    """ConfigError where the quantity is the same at every value that was tried."""
+    """ConfigError where the quantity is the same at every value tried."""
     known = [value for value in values if not math.isnan(value)]
     if known and max(known) - min(known) <= SAME * max(abs(max(known)), abs(min(known)), 1e-300):
         everywhere = f"{known[0]:.6g} {asked.unit} at every value from {asked.over.low:g} to {asked.over.high:g}"
@@ -447,7 +446,7 @@ def refuse_without_effect(asked: Question, values: Iterable[float]) -> None:
 
 
 def fulfilling(asked: Question, x: float, of: Callable[[float], float]) -> float:
-    """Of the whole numbers about a change of sign the first that does at least as well as is asked."""
+    """Of the whole numbers around a change of sign, the first that meets the target."""
     better = 1 if asked.quantity.of.more_is_better else -1
     near = [n for n in (x, x - 1, x + 1) if asked.over.low <= n <= asked.over.high]
     good = [n for n in near if better * (of(n) - asked.equals) >= 0]
@@ -463,7 +462,7 @@ def nearest(values: Sequence[float], asked: Question) -> float:
 
 
 def boundary(asked: Question, curve: Curve, x: float) -> tuple[str, ...]:
-    """Whether the nearest value lies at an end of what was searched, or of what the config allows, in words."""
+    """Whether the nearest value lies at an end of the search range, or of the config's bounds, in words."""
     if x in (asked.over.low, asked.over.high):
         return (tr("the end of what was searched; {between} searches elsewhere", between=_between()),)
     beyond = [other for other in curve.refused if abs(other - x) <= 0.05 * abs(x)]
