@@ -1,12 +1,10 @@
-"""The runs that readings of a paper need, each once, judged as they are done.
+"""The runs that a paper's readings need, each once, judged as they finish; verdicts under every reading, computed
+exactly or by small stored runs, and their files.
 
-`radarsim run --decide`: as many realisations as it takes until each claim of the config is decided.
-
-It looks at declared numbers of realisations only, 2000·2^m, as a precision does, and each verdict is one of all these
-looks (report.claims.rule.LOOKS): were each judged at 95 %, chance would refute up to a fifth of the claims that are
-true at a border.
-
-Verdicts under every reading that the papers allow: computed exactly or by small stored runs, and written.
+`radarsim run --decide`: as many realisations as it takes until each claim of the config is decided. It looks at
+declared numbers of realisations only, 2000·2^m, as a precision does, and each verdict accounts for all these looks
+(report.claims.rule.LOOKS): were each look judged at 95 %, chance would refute up to a fifth of the claims that are true
+at a border.
 """
 
 import csv
@@ -63,7 +61,7 @@ if TYPE_CHECKING:
 # ---- reading runs ----------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Paper:
-    """A paper with readings: what it leaves open, its claims, and the study that judges them."""
+    """A paper with readings: its open choices, its claims, and the study that judges them."""
 
     readings: PaperReadings
     claims: PaperClaims
@@ -72,7 +70,7 @@ class Paper:
 
 @dataclass(frozen=True)
 class Asked:
-    """What is wanted of a paper: its claims, which readings of them, and whether it is wanted as a whole."""
+    """The part of a paper to judge: its claims, which readings of them, and whether the whole paper was requested."""
 
     paper: Paper
     claims: list[Claim]
@@ -80,7 +78,7 @@ class Asked:
     only: Mapping[str, str] = field(default_factory=dict)
 
     def readings(self, claim: Claim) -> list[Reading]:
-        """The readings of a claim, the default one first, and with `only` those that take these alternatives."""
+        """The readings of a claim, the default one first; `only` selects those with these alternatives."""
         default, *others = self.paper.readings.of_claim(claim.id)
         return [default, *(one for one in others if all(one[key] == value for key, value in self.only.items()))]
 
@@ -88,7 +86,7 @@ class Asked:
 class Plan:
     """The runs that a paper's readings need, each once, and the verdicts from them.
 
-    A run is judged as soon as it is done, and not kept: memory is that of one, however many readings there are.
+    A run is judged as soon as it is done and then dropped: memory is that of one run, however many readings there are.
     """
 
     def __init__(self, wanted: Asked, realisations: int):
@@ -99,7 +97,7 @@ class Plan:
         self._impossible: dict[tuple[str, Reading], str] = {}
         self._judged: dict[tuple[str, Reading], Under] = {}
         self._claims = {claim.id: claim for claim in wanted.claims}
-        self.held = 0  # realisations that were not computed, but read or impossible
+        self.held = 0  # realisations not computed, but read or impossible
         for claim in wanted.claims:
             for reading in wanted.readings(claim):
                 if not self._paper.readings.exact(claim, reading):
@@ -132,7 +130,7 @@ class Plan:
     def judged(
         self, options: RunOptions, progress: Progress | None, stop: Signals | None, judging: Progress | None = None
     ) -> list[Over]:
-        """Every claim under every reading; progress is told of the runs, judging of the verdicts after them."""
+        """Every claim under every reading; progress is called for the runs, judging for the verdicts after them."""
         done = 0
         for key, pairs in self._jobs.items():
             count, before = len(pairs) * self._n, self.held
@@ -140,7 +138,7 @@ class Plan:
                 self._see(key, pairs, options, _shifted(progress, done, held=before), stop)
             except ConfigError as error:
                 self._fail(key, error.lines[0])
-                self.held = before + count  # that many are not computed
+                self.held = before + count  # these are not computed
             done += count
         contradicting = frozenset(choice.key for choice in self._paper.readings.choices if choice.contradicts)
         found, every = list[Over](), sum(len(self._wanted.readings(claim)) for claim in self._wanted.claims)
@@ -153,10 +151,10 @@ class Plan:
     def decided(
         self, over: list[Over], most: int, options: RunOptions, progress: Progress | None, stop: Signals | None
     ) -> list[Over]:
-        """The claims again, those that are not decided by longer runs of the readings that leave them so.
+        """The claims again, undecided ones after longer runs of the readings that leave them undecided.
 
-        They look at declared numbers only, as `run --decide` does; each claim is judged at its own last look, so that
-        what else was asked for changes nothing.
+        Looks are at declared numbers only, as in `run --decide`; each claim is judged at its own last look, so that
+        other requests change nothing.
         """
         for n in (n for n in looks(most) if n > self._n):
             open_ = {
@@ -185,7 +183,7 @@ class Plan:
         stop: Signals | None,
         only: Collection[tuple[str, Reading]] | None = None,
     ) -> None:
-        """Run the cases of a key, or continue them, and judge what is seen by them, of `only` these places."""
+        """Run or continue the cases of a key, and judge what they show; `only`: for these places."""
         try:
             seen = self._run(key[0], pairs, options, progress)
         except TargetUnmet:
@@ -212,13 +210,13 @@ class Plan:
         return Seen(originals, results, tables, places)
 
     def _fail(self, key: tuple[str, ...], why: str) -> None:
-        """A run that could not be prepared: a target that hits the ground, a schedule that does not exist."""
+        """A run that could not be prepared: a target that hits the ground, an impossible schedule."""
         for place, own in list(self._key.items()):
             if own == key:
                 self._impossible[place] = why
 
     def _under(self, claim: Claim, reading: Reading) -> Under:
-        """A claim under a reading: as its run was judged, or exactly, or why not."""
+        """A claim under a reading: the verdict of its run, or the exact one, or why there is none."""
         place = claim.id, reading
         if place not in self._judged:
             self._judged[place] = self._judge(claim, reading, None)
@@ -237,12 +235,12 @@ class Plan:
 
 
 def _shifted(progress: Progress | None, before: int, of: int = 0, held: int = 0) -> Progress | None:
-    """The same after so many that are done, `held` of them without computing."""
+    """Progress offset by the realisations done before, `held` of them without computing."""
     return progress and (lambda done, total, own: progress(before + done, of or total, held + own))
 
 
 def _without_runs(progress: Progress | None, done: int, total: int) -> None:
-    """Say how many verdicts or figures are made: no realisation of theirs is computed now, so they have no rate."""
+    """Report the count of verdicts or figures as progress without a rate: no realisations are computed for them."""
     if progress is not None:
         progress(done, total, done)
 
@@ -258,7 +256,7 @@ def check(experiment: Experiment) -> None:
 
 
 def simulated(experiment: Experiment, options: RunOptions, progress: Progress | None = None) -> SimulatedCases:
-    """The cases at the first look at which every claim is decided, or at the last one that they may have."""
+    """The cases at the first look at which every claim is decided, or at the last permitted look."""
     most = max(case.realisations for case in experiment.cases)
     with ExitStack() as stack:
         if options.out is None:
@@ -277,7 +275,7 @@ def simulated(experiment: Experiment, options: RunOptions, progress: Progress | 
 
 
 def rows_of(experiment: Experiment, found: SimulatedCases) -> list[dict[str, Any]]:
-    """The rows of claims.csv of what is done."""
+    """The rows of claims.csv so far."""
     results = run.finished(found)
     if len(results) < len(experiment.cases):
         return []
@@ -286,7 +284,7 @@ def rows_of(experiment: Experiment, found: SimulatedCases) -> list[dict[str, Any
 
 
 def left(experiment: Experiment, found: SimulatedCases) -> list[str]:
-    """What is to be said of claims that were not decided, or, where the time was up before all cases, not judged."""
+    """Lines on claims that stayed undecided or, where the time was up before all cases, unjudged."""
     if len(found.cases) == len(experiment.cases):
         return undecided(rows_of(experiment, found))
     of = registry.study(experiment.study).claims()
@@ -297,7 +295,7 @@ def left(experiment: Experiment, found: SimulatedCases) -> list[str]:
 
 
 def undecided(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """A line for each claim that is not yet decided, with the realisations that it would take."""
+    """A line for each undecided claim, with the realisations that it would take."""
     lines = []
     for parts in page.grouped(rows):
         if parts[0]["as_shipped"] != UNDECIDED or page.extension(parts):
@@ -323,7 +321,7 @@ DRAW = (("claims", "page.py"), ("figures.py",), ("drawing.py",), ("chart.py",))
 
 @dataclass(frozen=True)
 class Read:
-    """What came of the readings of a paper, and of its joint search where the whole paper was asked for."""
+    """Verdicts over the readings of a paper, and its joint search if the whole paper was requested."""
 
     paper: Paper
     over: list[Over]
@@ -332,10 +330,10 @@ class Read:
 
 @dataclass(repr=False)
 class Readings(Shown):
-    """What `readings` made: of each paper asked for, and the files written, by their path under `folder`.
+    """Result of `readings`: for each paper, and the files written, by their path under `folder`.
 
-    left has a line for each claim that was to be decided and is not. outdated: the configs beside them, run as they
-    are now, whose stored claims have another class.
+    left: a line for each claim that stayed undecided although `decide` was set. outdated: configs whose stored claims
+    have another class.
     """
 
     read: list[Read]
@@ -351,7 +349,7 @@ class Readings(Shown):
 
     @property
     def table(self) -> "pd.DataFrame":
-        """The rows of readings.csv for these claims: a row a claim, reading and part."""
+        """The rows of readings.csv for these claims: one for each claim, reading and part."""
         names = columns(read.paper.readings for read in self.read)
         made = [row for over in self.over for one in over.under for row in rows(one, names, over.outcome)]
         return read_rows(made, names)
@@ -367,12 +365,12 @@ class Readings(Shown):
 
 
 def drawable(over: Over) -> bool:
-    """Whether a claim has a specification curve: verdicts under more than one reading."""
+    """Whether a claim has a specification curve: verdicts under several readings."""
     return len(over.under) > 1 and over.outcome is not None
 
 
 def papers(keys: Collection[str] = ()) -> dict[str, Paper]:
-    """The papers with readings, by their key (P1); with keys those, and maybe others."""
+    """The papers with readings, by key (P1); `keys` adds or restricts papers."""
     found = {}
     for name, of in registry.papers(lambda study: study.readings(), keys).items():
         claims = None if of is None else registry.study(name).claims()
@@ -382,10 +380,9 @@ def papers(keys: Collection[str] = ()) -> dict[str, Paper]:
 
 
 def asked(names: Sequence[str] = (), only: Sequence[str] = ()) -> list[Asked]:
-    """What names of papers (P1) and claims (P1.4) ask for; all papers, where there is no name.
+    """Requests from names of papers (P1) and claims (P1.4); without names, all papers.
 
-    only: texts CHOICE=VALUE. Raises ConfigError for a paper, claim, choice or value that is not there, saying which
-    are.
+    only: texts CHOICE=VALUE. Raises ConfigError for an unknown paper, claim, choice or value, with the known ones.
     """
     every = papers()
     owner = {claim.id: key for key, paper in every.items() for claim in paper.claims.claims}
@@ -406,7 +403,7 @@ def asked(names: Sequence[str] = (), only: Sequence[str] = ()) -> list[Asked]:
 
 
 def _closed(paper: Paper, names: Sequence[str]) -> list[str]:
-    """Faults of claims that are asked for by name, and on which nothing bears that the paper leaves open."""
+    """Faults of requested claims that depend on nothing that the paper leaves open."""
     kept = [one.id for one in paper.claims.claims if paper.readings.open(one)]
     return [
         f"readings: {one.id} depends on nothing that its paper leaves open; claims that do: {', '.join(kept)}"
@@ -455,12 +452,12 @@ def readings(
     stop: Signals | None = None,
     write: bool = True,
 ) -> Readings:
-    """Judge claims under every reading and, unless told not to, write table and specification curves into out/readings.
+    """Judge claims under every reading and, unless disabled, write table and specification curves into out/readings.
 
-    wanted is of `asked`. realisations of each run, where runs are needed; default: what the paper's readings declare.
-    decide: the runs on which an undecided claim hangs grow on, to 2000·2^m realisations, until it is decided;
-    `realisations` is then the most. Runs go through the store of blocks under out, so that a second call continues.
-    Raises TargetUnmet where a time limit left something undone, Interrupted where `stop` saw a signal.
+    wanted: of `asked`. realisations of each run, where runs are needed; default: the number declared by the paper's
+    readings. decide: runs behind undecided claims are extended, up to 2000·2^m realisations, until each claim is
+    decided; `realisations` is then the limit. Runs go through the store of blocks under out, so that a second call
+    continues. Raises TargetUnmet where a time limit left something undone, Interrupted on a signal seen by `stop`.
     """
     if realisations is not None and realisations < 1:
         raise ConfigError(f"{argument('realisations')}: must be >= 1, got {realisations}")
@@ -483,14 +480,14 @@ def readings(
 
 
 def _first(of: PaperReadings, realisations: int | None, decide: bool) -> int:
-    """Realisations of the first runs: those asked for, or declared; to decide, at most those asked for."""
+    """Realisations of the first runs: those requested, or declared; with `decide`, at most those requested."""
     if realisations is None:
         return of.realisations
     return min(of.realisations, realisations) if decide else realisations
 
 
 def _left(over: Over) -> str:
-    """What is to be said of a claim that is not decided: under how many readings, and what it would take."""
+    """The line on an undecided claim: under how many readings, and what it would take."""
     if over.outcome is None or over.outcome.kind != UNDECIDED:
         return ""
     needed = over.outcome.needed
@@ -504,16 +501,16 @@ def _left(over: Over) -> str:
 
 
 def _counted(paper: Paper, over: list[Over]) -> Search | Joint:
-    """The joint search of a paper: over all it computes at once, else over its declared readings."""
+    """The joint search of a paper: over all readings that are computed at once, else over its declared ones."""
     return paper.readings.search() or joint(paper.readings, over)
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
 def _write(done: Readings, figures: bool, progress: Progress | None) -> tuple[str, ...]:
-    """Write the table, with the stored rows of claims that were not asked for, and a curve a claim.
+    """Write the table, with the stored rows of other claims, and a curve for each claim.
 
-    A curve whose claim came out as it did before is not drawn again, unless what draws it has changed: `drawn.json`
-    keeps what the files were drawn of.
+    A curve whose claim is unchanged is not drawn again, unless the drawing code has changed: `drawn.json` keeps what
+    the files were drawn from.
     """
     contents = {TABLE: _table(done).encode(), CLASSES.name: _classes(done).encode()}
     if figures:
@@ -527,7 +524,7 @@ def _write(done: Readings, figures: bool, progress: Progress | None) -> tuple[st
 
 
 def _curve(done: Readings, over: Over, drawn: dict[str, str]) -> dict[str, bytes]:
-    """The files of a claim's specification curve; none where they stand there already."""
+    """The files of a claim's specification curve; none where they exist already."""
     of = next(read.paper.readings for read in done.read if over in read.over)
     content = repr([(one.name, one.kind, depth(one), one.why) for one in over.under]) + over.sentence()
     mark = hashlib.sha256(content.encode() + _sources()).hexdigest()
@@ -542,7 +539,7 @@ def _curve(done: Readings, over: Over, drawn: dict[str, str]) -> dict[str, bytes
 
 @cache
 def _sources() -> bytes:
-    """What draws the curves."""
+    """The sources of the code that draws the curves."""
     return b"".join(resources.files("radarsim.report").joinpath(*name).read_bytes() for name in DRAW)
 
 
@@ -561,7 +558,7 @@ def _table(done: Readings) -> str:
 
 
 def _classes(done: Readings) -> str:
-    """What each claim came to over its readings."""
+    """The class of each claim over its readings."""
     every = [(read.paper.readings, over) for read in done.read for over in read.over]
     new = [found.as_row() for of, over in every if (found := page.of_over(of, over)) is not None]
     kept = [one.as_row() for one in stored_classes(done.folder.parent)]
@@ -569,16 +566,16 @@ def _classes(done: Readings) -> str:
 
 
 def _outdated(done: Readings) -> tuple[str, ...]:
-    """The configs whose stored claims have another class than their readings gave now.
+    """Configs whose stored claims differ in class from their readings now.
 
-    Not those that have changed since they were run: of these no report can be made of what is stored.
+    Except configs that have changed since their run: their stored results make no report.
     """
     new = {over.claim.id: over for over in done.over if over.outcome}
     found = []
     for config in dict.fromkeys(over.claim.config for over in new.values()):
         if not files.is_of(done.folder.parent / config, configs.load(config)):
             continue
-        with suppress(StoreError):  # `radarsim claims` tells of a damaged one
+        with suppress(StoreError):  # `radarsim claims` reports a damaged one
             for row in stored_claims.stored(done.folder.parent / config / "claims.csv") or ():
                 outcome = new[row["claim"]].outcome if row["claim"] in new else None
                 if outcome and row["class"] not in (NOT_JUDGED, outcome.kind):
@@ -587,7 +584,7 @@ def _outdated(done: Readings) -> tuple[str, ...]:
 
 
 def _with(names: Sequence[str], stored: Sequence[Mapping], new: Sequence[Mapping], own: set[str]) -> str:
-    """A table of new rows and those that are stored of claims that were not asked for."""
+    """New rows and the stored rows of other claims."""
     text = io.StringIO(newline="")
     table = csv.writer(text, lineterminator="\n")
     table.writerow(names)
@@ -616,7 +613,7 @@ def pages(done: Readings) -> str:
 
 
 def documents(done: Readings) -> list[dict[str, Any]]:
-    """What --json prints: a document a claim, with every reading."""
+    """The documents of --json: one for each claim, with every reading."""
     found = []
     for over in done.over:
         outcome = over.outcome

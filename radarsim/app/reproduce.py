@@ -1,15 +1,13 @@
-"""`make reproduce-figures`: every shipped config at its full size, a line each, and what came of the papers' claims.
+"""`make reproduce-figures`: every shipped config at full size, a line for each, and the verdicts on the papers' claims.
 
 Two processes share the configs, so that one computes while the other draws: drawing keeps a single core busy, and takes
-about as long as computing. They are new processes, which take a line of JSON for each config and answer with
-one; the store is safe with both. One works from the first config on, the other from the last one back: neighbours by
-name are mostly of one study, and the two would compile its kernels at the same time, each for itself.
+about as long as computing. They are new processes, which read a line of JSON for each config and answer with one; the
+store is safe with both. One works from the first config on, the other backwards from the last: configs with similar
+names are mostly of one study, and both would compile its kernels at the same time.
 
-`radarsim new-study`: a package with a small whole study, written once and never over anything.
-
-It is a copy of radarsim/app/one_file, with the files of radarsim/app/one_step in place of its own, or of
-radarsim/app/template, under another name. These are packages that work as they stand: the same linter reads them as all
-else, and tests run them.
+`radarsim new-study`: a package with a small complete study. It is a copy of radarsim/app/one_file, with the files of
+radarsim/app/one_step in place of its own, or of radarsim/app/template, under another name; these packages work as they
+stand, and are linted and tested. Nothing is overwritten.
 """
 
 import json
@@ -40,14 +38,14 @@ from radarsim.studies import registry
 
 # ---- reproduce -------------------------------------------------------------------------------------------------------
 PROCESSES = 2
-LOOK_S = 0.1  # how often a signal is looked for
+LOOK_S = 0.1  # interval at which signals are checked
 
 
 @dataclass(frozen=True)
 class Done:
-    """One config: its seconds, a summary of what it made; its faults and their exit code, if it has any.
+    """A finished config: seconds, summary; its faults and their exit code, if any.
 
-    stages: the seconds that simulation, drawing and writing took; what is left of all is statistics.
+    stages: the seconds of simulation, drawing and writing; the rest is statistics.
     """
 
     stem: str
@@ -60,7 +58,7 @@ class Done:
 
 @dataclass(frozen=True)
 class Task:
-    """What a process is asked for: a config by its name, where to, and how."""
+    """A task for a process: a config by name, the output directory, and options."""
 
     stem: str
     out: str
@@ -76,9 +74,9 @@ def reproduce(
     overrides: Sequence[str] = (),
     figures: bool = True,
 ) -> list[Done]:
-    """Run every config, reporting a line as each is done; a fault of one does not keep the others from running.
+    """Run every config and report a line as each finishes; a fault of one does not stop the others.
 
-    Raises Interrupted, with all that was done stored, if `stop` saw a signal.
+    Raises Interrupted, with all finished work stored, on a signal seen by `stop`.
     """
     done: list[Done] = []
     tasks = [Task(stem, str(out), tuple(overrides), figures) for stem in stems]
@@ -89,7 +87,7 @@ def reproduce(
 
 
 def _finished(tasks: Sequence[Task], stop: Signals | None) -> Iterator[Done]:
-    """What is done, as it is done, by processes that are gone at the end."""
+    """Finished configs as they come, from processes that have ended afterwards."""
     count = min(PROCESSES, len(tasks))
     idle: SimpleQueue[_Process] = SimpleQueue()
     processes = [_Process() for _ in range(count)]
@@ -123,7 +121,7 @@ def _finished(tasks: Sequence[Task], stop: Signals | None) -> Iterator[Done]:
 
 
 class _Process:
-    """A process that runs one config after another; in a session of its own, so that Ctrl-C is for this one alone."""
+    """A process that runs one config after another; in its own session, so that Ctrl-C reaches only the parent."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -141,7 +139,7 @@ class _Process:
         self._requests, self._answers = self._popen.stdin, self._popen.stdout
 
     def done(self, task: Task) -> Done:
-        """Have it run a config. If the process dies, that is reported as the config's fault, and another is started."""
+        """Run a config in it. If the process dies, that is reported as the config's fault, and a new one is started."""
         began = time.perf_counter()
         with suppress(OSError):
             self._requests.write(json.dumps(asdict(task)) + "\n")
@@ -159,7 +157,7 @@ class _Process:
         return Done(task.stem, time.perf_counter() - began, f"FAILED: {fault}", (fault,), 1)
 
     def stop(self, at_once: bool) -> None:
-        """Ask it to end: at once, storing what is done of a config, or else after the config."""
+        """End it: at once, storing finished blocks, or else after the current config."""
         with self._lock:
             self._ended = True
             if at_once:
@@ -177,7 +175,7 @@ class _Process:
 
 
 def answer() -> None:
-    """The program of a process: a Task on each line of stdin, a Done on each of stdout."""
+    """The program of a process: reads a Task from each line of stdin, writes a Done to stdout for each."""
     threading.Thread(target=_follow, args=(os.getppid(),), daemon=True).start()
     with Signals() as stop:
         try:
@@ -187,13 +185,13 @@ def answer() -> None:
                 sys.stdout.write(json.dumps(asdict(done)) + "\n")
                 sys.stdout.flush()
         except Interrupted as ended:
-            os._exit(ended.exit_code)  # as the command does: whoever sent the signal need not wait for an orderly end
-        except BrokenPipeError:  # whoever asked is gone
+            os._exit(ended.exit_code)  # as the command does: the sender of the signal need not wait for an orderly end
+        except BrokenPipeError:  # the parent is gone
             os._exit(1)
 
 
 def _follow(parent: int) -> None:
-    """End this process, which stores what it has, once the one that asked is gone."""
+    """End this process, which stores its finished blocks, once its parent is gone."""
     while os.getppid() == parent:
         time.sleep(1.0)
     os.kill(os.getpid(), signal.SIGTERM)
@@ -244,7 +242,7 @@ def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
 
 
 def _stages(done: Sequence[Done]) -> list[str]:
-    """The line that says where the time went, added up over both processes; none where nothing was run."""
+    """A line on the time spent, added up over both processes; none where nothing was run."""
     of = {name: sum(one.stages.get(name, 0.0) for one in done) for name in ("simulation", "drawing", "writing")}
     whole = sum(one.seconds for one in done if one.stages)
     if not whole:
@@ -256,17 +254,17 @@ def _stages(done: Sequence[Done]) -> list[str]:
 
 # ---- new study -------------------------------------------------------------------------------------------------------
 ONE_FILE, ONE_STEP, TEMPLATE = (Path(__file__).parent / name for name in ("one_file", "one_step", "template"))
-FORMS = {"linear": (ONE_FILE,), "step": (ONE_FILE, ONE_STEP), "folder": (TEMPLATE,)}  # a later folder's files stand
+FORMS = {"linear": (ONE_FILE,), "step": (ONE_FILE, ONE_STEP), "folder": (TEMPLATE,)}  # files of a later folder win
 MODULE = "random_walk"  # the name that the templates have
 SUFFIXES = (".md", ".py", ".toml", ".yaml")
 PLAIN = re.compile(r"[a-z][a-z0-9_]{0,39}")
 
 
 def new_study(name: str, folder: str | os.PathLike = ".", form: str = "linear") -> Path:
-    """Write the package folder/NAME with a study called NAME, of one of `FORMS`; its path.
+    """Write the package folder/NAME with a study called NAME, in one of `FORMS`; its path.
 
-    Raises ConfigError for a name that cannot be a new module's, and where there is anything of that name already;
-    StoreError where it cannot be written.
+    Raises ConfigError for a name that cannot be a new module's, and where something of that name exists; StoreError
+    where it cannot be written.
     """
     if fault := unfit(name):
         raise ConfigError(f"{one_line(name)}: {fault}")
@@ -283,7 +281,7 @@ def new_study(name: str, folder: str | os.PathLike = ".", form: str = "linear") 
 
 
 def unfit(name: str) -> str | None:
-    """Why a name cannot be that of a new study, its package and its first config; None where it can."""
+    """Why a name is unusable for a new study, its package and its first config; None where it is usable."""
     if not PLAIN.fullmatch(name) or iskeyword(name) or issoftkeyword(name) or name in ("true", "false", "null"):
         of = "a small letter, then at most 39 small letters, digits and _; no word of Python or YAML"
         return f"must be a module's name: {of}"
@@ -297,7 +295,7 @@ def unfit(name: str) -> str | None:
 
 
 def files(form: str) -> dict[str, Path]:
-    """The files of a form by their places in the package, in order."""
+    """The files of a form by their paths in the package, in order."""
     found = {
         file.relative_to(folder).as_posix(): file
         for folder in FORMS[form]
@@ -308,7 +306,7 @@ def files(form: str) -> dict[str, Path]:
 
 
 def renamed(text: str, name: str) -> str:
-    """A text of the template for a study of another name."""
+    """A text of the template with another study's name."""
     return text.replace(MODULE, name)
 
 

@@ -1,8 +1,6 @@
-"""What an earlier run.json says of the cases that it reports, as today's program reads it; what other sources made.
+"""The cases of an earlier run.json as today's program reads them; results of other sources.
 
-What a finished experiment gives: tables, figures, files.
-
-From finished cases to files: tables, figures, claims, run.json and report.html of one experiment.
+The result of a finished experiment: tables, figures, claims, run.json and report.html, in memory and as files.
 """
 
 import os
@@ -38,7 +36,7 @@ if TYPE_CHECKING:
 
 
 # ---- records ---------------------------------------------------------------------------------------------------------
-LABELS = ("case", "swept")  # of a resolved case, beside its keys
+LABELS = ("case", "swept")  # in a resolved case, beside its keys
 NAMED = 3  # cases in a line, or one more
 SURE = 3  # a change that shows in one of m / 3 realisations is missed by m of them with a probability of e⁻³ = 5 %
 
@@ -56,11 +54,11 @@ def recorded_case(record: Mapping, name: str) -> Case | None:
 
 
 def of_other_sources(names: Mapping[str, str]) -> list[str]:
-    """A line on the blocks that other sources made and that are kept, one on those that are not; once in a process.
+    """A line on blocks of other sources that are kept, one on those that are not; once for each process.
 
-    names are those of cases, by identity.
+    names: of cases, by identity.
     """
-    # The last of an identity counts: those before are of folders that gave other bytes, or of another directory.
+    # The last of an identity counts: earlier ones are of folders that gave other bytes, or of another directory.
     found = {one.identity: one for one in store.settled if one.identity in names}.values()
     store.settled[:] = [one for one in store.settled if one.identity not in names]
     lines = []
@@ -92,7 +90,7 @@ def _listed(found: list[store.Settled], names: Mapping[str, str]) -> str:
 
 
 # ---- result ----------------------------------------------------------------------------------------------------------
-MOST_ROWS = 40  # that a notebook shows
+MOST_ROWS = 40  # shown in a notebook
 
 
 class Result(Shown):
@@ -108,7 +106,7 @@ class Result(Shown):
         self.written: Written | None = None
 
     def _said(self) -> Sequence[str]:
-        """What was run, then the answer."""
+        """The experiment, then the answer."""
         count, cases = files.span(sorted({case.count for case in self.cases})), len(self.cases)
         told = {"config": self._label, "cases": plural("{count} case", "{count} cases", cases), "count": count}
         return (tr("{config}: {cases}, {count} realisations", **told), *self.answer)
@@ -200,10 +198,10 @@ class Result(Shown):
     def write(
         self, out: str | os.PathLike[str], figures: bool | str | Sequence[str] = True, width_mm: float | None = None
     ) -> "Written":
-        """Write tables, figures, claims, run.json and report.html into out/<stem>/, and out/index.html again.
+        """Write tables, figures, claims, run.json and report.html into out/<stem>/, and update out/index.html.
 
-        figures may name the formats of their files: svg, png, pdf; width_mm is their width in place of their own. What
-        was written comes back. Raises DisagreementError, with all written, where there are `faults`.
+        figures may name the formats of their files: svg, png, pdf; width_mm overrides their width. Returns the files
+        written. Raises DisagreementError, after writing, if there are `faults`.
         """
         from radarsim.report import html
 
@@ -222,7 +220,7 @@ class Result(Shown):
 
     @cached_property
     def faults(self) -> tuple[str, ...]:
-        """Differences of exact and measured values that chance does not explain, a line each."""
+        """Differences between exact and measured values that chance does not explain, a line for each."""
         own, made = study(self.experiment.study), self._tables
         nearly = [case.name for case in self.experiment.cases if own.exact_but_for(case)]
         bounds = ("claims",) if own.exact_errors else ("claims", "curves", "gains")
@@ -255,7 +253,7 @@ class Result(Shown):
         return found
 
     def unjudged(self) -> dict[str, list[str]]:
-        """The claims of this config that it cannot judge any more, or not in every part, by the reason."""
+        """Claims of this config that it no longer judges, or not in every part, by reason."""
         table = self._tables["claims"]
         found: dict[str, list[str]] = {}
         for row in table[table["verdict"] == claims.NOT_JUDGED].to_dict("records"):
@@ -265,13 +263,13 @@ class Result(Shown):
         return found
 
     def as_shipped(self) -> list[str]:
-        """The claims judged only under the shipped reading although they depend on what their paper leaves open."""
+        """Claims judged only under the shipped reading although they depend on an open choice of their paper."""
         rows = claims.first_rows(self._tables["claims"].to_dict("records"))
         return [row["claim"] for row in rows if page.alone(row)]
 
     @property
     def unmet(self) -> list[str]:
-        """The targets of precision or time that the run did not reach, a text each; empty if all were reached."""
+        """The targets of precision or time that the run did not reach, a text for each."""
         return list(self.facts.get("unmet", ()))
 
     @property
@@ -290,8 +288,8 @@ class Result(Shown):
 def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
     """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims.
 
-    A study whose errors are not of all realisations at common scans makes its own curves and gains. stem is the
-    shipped config's: all claims of it are in the table of claims, also those that it cannot judge any more.
+    A study whose errors are not of all realisations at common scans makes its own curves and gains. stem is the shipped
+    config's: all its claims are in the table, also those that it can no longer judge.
     """
     of = study(results[0].study)
     made = measured(results)
@@ -301,7 +299,7 @@ def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
 
 
 def over_readings(verdicts: "pd.DataFrame", name: str, out: Path | None = None) -> "pd.DataFrame":
-    """claims.csv of a study with the classes over all readings: those under `out`, else those that are shipped."""
+    """claims.csv of a study with the classes over all readings: those under `out`, else the shipped ones."""
     of = study(name)
     readings, papers = of.readings(), of.claims()
     if readings is None or papers is None or not len(verdicts):
@@ -312,7 +310,7 @@ def over_readings(verdicts: "pd.DataFrame", name: str, out: Path | None = None) 
 
 
 def measured(results: Sequence[CaseResult]) -> dict:
-    """The tables of what was measured alone: curves, gains, and the study's own."""
+    """The measured tables alone: curves, gains, and the study's own."""
     own = study(results[0].study).tables(results)
     shared = {"curves": common.curves, "gains": common.gains}
     made = {name: own[name] if name in own else table(results) for name, table in shared.items()} | own
@@ -322,7 +320,7 @@ def measured(results: Sequence[CaseResult]) -> dict:
 
 
 def gains_of(own: Study) -> "Callable[[Sequence[CaseResult]], pd.DataFrame]":
-    """The gains of a study's results alone, against all their baselines."""
+    """The gains alone of a study's results, against all their baselines."""
 
     def made(results: Sequence[CaseResult]) -> "pd.DataFrame":
         several = any(result.against for result in results)
@@ -338,7 +336,7 @@ def _against_all(results: Sequence[CaseResult], gains: "Callable[[CaseResult], p
 
 
 def against_first(made: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]) -> Mapping[str, "pd.DataFrame"]:
-    """The tables with gains against the first baseline of each case alone."""
+    """The tables with gains against the first baseline of each case only."""
     if not any(result.against for result in results):
         return made
     return {**made, "gains": common.against_own(made["gains"], results)}
@@ -355,25 +353,25 @@ def answered(results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"]) 
 
 
 def asked(experiment: Experiment) -> str:
-    """What an experiment asks, in one sentence."""
+    """The question of an experiment, in one sentence."""
     return called(study(experiment.study).question(experiment), names_in(experiment.cases))
 
 
 def answers(results: Sequence[CaseResult]) -> "list[notes.Answer]":
-    """What makes the answer from the tables, in parts: the study's own, and of each further baseline."""
+    """Functions that make the answer from the tables: the study's own, and for each further baseline."""
     own = study(results[0].study)
     further = [partial(_gained, one) for result in results for one in result.against]
     return [lambda made: own.answer(results, against_first(made, results)), *further[:MOST_FURTHER]]
 
 
 def of_intervals(results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"]) -> list[str]:
-    """What a reader of the answer must know of its intervals."""
+    """Warnings on the intervals in the answer."""
     names = names_in(results)
     return [called(line, names) for line in notes.of_intervals(results, made, answers(results))]
 
 
 def names_in(cases: Iterable[Case | CaseResult]) -> frozenset[str]:
-    """What configs call things, and their values in words; none where all is said as it stands."""
+    """Words for names and values of the configs; none where names are used as they stand."""
     if current() == ENGLISH:
         return frozenset()
     found: set[str] = set()
@@ -384,7 +382,7 @@ def names_in(cases: Iterable[Case | CaseResult]) -> frozenset[str]:
 
 
 def _gained(result: CaseResult, made: Mapping[str, "pd.DataFrame"]) -> list[str]:
-    """What each filter gains in the first component against the baseline of a result, at the last scan of both."""
+    """The gain of each filter in the first component against the baseline of a result, at the last scan of both."""
     gains = common.against_own(made["gains"], [result])
     last = gains[gains["component"].eq(gains["component"].iloc[0])] if len(gains) else gains
     last = last.groupby("filter", sort=False).tail(1)
@@ -397,7 +395,7 @@ def _gained(result: CaseResult, made: Mapping[str, "pd.DataFrame"]) -> list[str]
     return [tr("{case}, gain in {component} against {base} at {t} s: {filters}.", **told)]
 
 
-FEW_CLAIMS = 3  # which the verdicts tell better than a figure
+FEW_CLAIMS = 3  # whose verdicts are clearer than a figure
 
 
 def case_figures(
@@ -405,7 +403,7 @@ def case_figures(
 ) -> dict[str, Figure]:
     """All figures of an experiment, described, by the stem of their file: the study's own, and of sweeps.
 
-    The config may have fewer of them drawn: `Experiment.drawn`.
+    The config may select fewer: `Experiment.drawn`.
     """
     own = study(results[0].study)
     banded = _banded(made)
@@ -429,7 +427,7 @@ def case_figures(
 
 
 def _said(figure: Figure) -> Figure:
-    """The figure whose caption says why a band is missing."""
+    """The figure with a caption that says why a band is missing."""
     said = tr("No band is drawn where a few large errors dominate.")
     return replace(figure, caption=f"{figure.caption} {said}")
 
@@ -446,10 +444,10 @@ def _banded(made: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:
 
 @dataclass(frozen=True)
 class Written:
-    """What was written: the folder, its files by their path in it, the tables, and the sentences of the answer.
+    """Output of `write_files`: the folder, its files by their path in it, the tables, and the sentences of the answer.
 
-    removed are files of an earlier run that this one did not write. seconds: what drawing took, and writing with the
-    report. of_intervals: what a reader of the answer must know of its intervals.
+    removed: files of an earlier run that this one did not write. seconds: of drawing, and of writing with the report.
+    of_intervals: warnings on the intervals in the answer.
     """
 
     folder: Path
@@ -461,7 +459,7 @@ class Written:
     of_intervals: tuple[str, ...]
 
 
-ALWAYS = ("curves", "gains")  # tables written without a row too; others only where they have one
+ALWAYS = ("curves", "gains")  # tables written even without a row; others only if they have rows
 
 
 def write_files(
@@ -475,12 +473,12 @@ def write_files(
     formats: Sequence[str] = ("svg", "png"),
     width_mm: float | None = None,
 ) -> Written:
-    """Write all of an experiment's outputs into folder; every file at once, none half.
+    """Write all outputs of an experiment into folder; each file completely or not at all.
 
-    run holds the facts of the run for run.json: see provenance.record; made the tables, where they are at hand; formats
-    those of the figures' files, width_mm their width in place of their own. Outputs of an earlier run that this one
-    does not write (figures without `draw`) are removed, so that nothing stale stands beside new numbers. Where a
-    package's figures or words fail the tables alone are written.
+    run: the facts of the run for run.json, see provenance.record; made: the tables, if at hand; formats: those of the
+    figures' files; width_mm overrides their width. Outputs of an earlier run that this one does not write (figures
+    without `draw`) are removed, so that nothing stale remains. Where figures or words of a package's study fail, only
+    the tables are written.
     """
     from radarsim.report import html
 
@@ -496,7 +494,7 @@ def write_files(
         question = asked(experiment)
     except RadarsimError:
         raise
-    except OF_AUTHORS:  # of a package's figures or words: the tables do not depend on them
+    except OF_AUTHORS:  # in a package's figures or words, on which the tables do not depend
         files.replace_all(folder, contents, stale=files.outputs)
         raise
     if draw:
@@ -532,9 +530,9 @@ def write_files(
 
 
 def unnamed(own: Study, described: Iterable[str]) -> list[str]:
-    """A line on the figures that are drawn but are not among those that the study's keys name, if any.
+    """A line on figures that are not among those that the study's keys name, if any.
 
-    What is drawn several times has something behind that name: `gain_r_2`.
+    A figure drawn several times has a suffix: `gain_r_2`.
     """
     known = own.keys().figure_names
     if known is None:
@@ -546,7 +544,7 @@ def unnamed(own: Study, described: Iterable[str]) -> list[str]:
 
 
 def captions(described: Mapping[str, Figure]) -> str:
-    """The captions of figures as Markdown: what each shows, then how it is drawn."""
+    """The captions of figures as Markdown: their content, then how they are drawn."""
     parts = []
     for name, one in described.items():
         own = f"**{spoken(one.title)}.** {spoken(one.caption)}\n"

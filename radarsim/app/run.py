@@ -1,8 +1,7 @@
-"""The cases of an experiment collected one after the other, to a number of realisations or to a precision.
+"""One experiment from config to written results, for the command and Python: its cases are collected one after the
+other, to a number of realisations or to a precision.
 
-How long tables, figures and report of an experiment take, measured on a few of its realisations.
-
-One experiment from config to written results: the wiring that the command and Python share.
+The time that tables, figures and report of an experiment take, measured on a few of its realisations.
 """
 
 import json
@@ -47,10 +46,9 @@ Progress = Callable[[int, int, int], None]
 
 @dataclass
 class SimulatedCases:
-    """Of each case that has a realisation done, in the experiment's order, its work and sums.
+    """For each case with a finished realisation, in the experiment's order, its work and sums.
 
-    stopped is why not all is done; precision is what was asked for, cells hold the widest interval of each case that
-    was looked at.
+    stopped: why not all is done; precision: the target, if any; cells: the widest interval of each case looked at.
     """
 
     cases: list[tuple[Case, CaseWork, Collected]] = field(default_factory=list)
@@ -60,12 +58,12 @@ class SimulatedCases:
 
     @property
     def done(self) -> dict[str, int]:
-        """Realisations done, by the name of the case."""
+        """Finished realisations, by case name."""
         return {case.name: collected.count for case, _, collected in self.cases}
 
     @property
     def unmet(self) -> list[str]:
-        """The targets of time and precision that were not reached, a text each, with the widest interval of all."""
+        """The targets of time and precision that were not reached, a text for each, with the widest interval of all."""
         reasons = [] if self.stopped is None else [self.stopped]
         if self.precision is None:
             return reasons
@@ -81,7 +79,7 @@ class SimulatedCases:
 
 @dataclass(frozen=True)
 class Shares:
-    """What computing share `number` of `of` came to, by the name of the case; cases of one identity stand once."""
+    """Result of computing share `number` of `of`, by case name; cases of one identity appear once."""
 
     config: str
     number: int
@@ -90,12 +88,12 @@ class Shares:
 
     @property
     def unmet(self) -> list[str]:
-        """Why not all of it is done."""
+        """Why the share is incomplete."""
         return list(dict.fromkeys(one.stopped for one in self.cases.values() if one.stopped))
 
     @property
     def warnings(self) -> list[str]:
-        """Damage and mixtures that were met."""
+        """Damaged and mixed blocks."""
         return list(dict.fromkeys(warning for one in self.cases.values() for warning in one.warnings))
 
 
@@ -103,8 +101,7 @@ class Shares:
 class RunOptions:
     """How an experiment is computed: no option changes a number.
 
-    out is the results directory, None for none; executor, where given, replaces the threads; stop is called between
-    tasks.
+    out is the results directory, None for none; executor replaces the threads; stop is called between tasks.
     """
 
     out: str | os.PathLike[str] | None = None
@@ -123,8 +120,8 @@ def simulate(
 ) -> SimulatedCases:
     """Collect every case in turn, cases of one identity once; progress(done, total, from_store) is over all of them.
 
-    precision is in per cent: a case ends at the first look at which every quantity `of` that kind is known so well, and
-    large errors would have been seen (all report.precision). Raises ConfigError where a case has none of that kind.
+    precision is in per cent: a case ends at the first look at which every quantity `of` that kind is known to that
+    precision, and large errors would have been seen (all report.precision). Raises ConfigError where a case has none.
     """
     total = sum(case.realisations for case in experiment.cases)
     made: dict[tuple[str, int], tuple[CaseWork, Collected, Cell | None]] = {}
@@ -161,7 +158,7 @@ def simulate(
 
 
 def _collector(work: CaseWork, options: RunOptions, progress: Progress, of: Callable[..., Any]) -> Callable[..., Any]:
-    """The engine's `collect` or `share`, by `of`, for a work, as a function of the number of realisations."""
+    """The engine's `collect`, or `share` if `of` is given, for a work, as a function of the number of realisations."""
     means = {"threads": options.threads, "stop": options.stop, "executor": options.executor}
     return partial(of, work, store=options.out, progress=progress, **means)
 
@@ -195,7 +192,7 @@ def table_of(case: Case, of: Quantity) -> "Table":
 def _collected(
     case: Case, work: CaseWork, wanted: Wanted | None, collector: Callable[[int], Collected]
 ) -> "tuple[Collected, Cell | None]":
-    """The sums of a case, and the cell of its widest interval where a precision is asked for."""
+    """The sums of a case, and the cell of its widest interval where a precision is set."""
     if wanted is None:
         return collector(case.realisations), None
     from radarsim.report.precision import FIRST, FLOOR, least, looks, worst
@@ -204,7 +201,7 @@ def _collected(
     best, cell = None, None
     for n in looks(case.realisations, FLOOR if wanted.curves else FIRST):
         looked.append(collector(n))
-        # Stopped on the way to a look, a run may hold less without a gap than at the look before.
+        # A run stopped before a look may hold fewer without a gap than at the look before.
         if best is None or looked[-1].count > best.count:
             best = looked[-1]
             cell = worst(case_result(case, work, best), wanted.table, wanted.of) if best.count else None
@@ -214,7 +211,7 @@ def _collected(
             break
         if cell.percent < wanted.percent and n >= least(case_result(case, work, best), wanted.curves):
             break
-    assert best is not None  # there is a look at every number of realisations that check_precision lets pass
+    assert best is not None  # there is a look at every number of realisations that check_precision accepts
     computed = sum(one.computed for one in looked)
     whole = replace(
         best,
@@ -235,7 +232,7 @@ def unknown(case: Case, of: Quantity) -> str:
 
 
 def check_precision(experiments: Sequence[Experiment], percent: float, of: str = "sigma") -> None:
-    """ConfigError for an invalid precision, of what a case does not measure, or of too few realisations for a look."""
+    """ConfigError for an invalid precision, an unmeasured quantity, or too few realisations for a look."""
     from radarsim.report.precision import FIRST
 
     for case in (case for experiment in experiments for case in experiment.cases):
@@ -256,11 +253,11 @@ def check_precision(experiments: Sequence[Experiment], percent: float, of: str =
 def shared(
     experiment: Experiment, part: tuple[int, int], options: RunOptions, *, progress: Progress | None = None
 ) -> Shares:
-    """Put a part of every case, as (2, 3) the second of three, into the store under options.out.
+    """Put a share of every case, as (2, 3) the second of three, into the store under options.out.
 
-    It ends early where it is stopped.
+    Stops early on `stop`.
     """
-    assert options.out is not None  # a share is nothing but what it stores
+    assert options.out is not None  # a share is only what it stores
     total = sum(case.realisations for case in experiment.cases) // part[1]
     made: set[tuple[str, int]] = set()
     shares: dict[str, Shared] = {}
@@ -285,9 +282,9 @@ def shared(
 
 
 def case_result(case: Case, work: CaseWork, collected: Collected) -> CaseResult:
-    """A case with its sums and the labels that say what these are; display names are the case's own."""
+    """A case with its sums and their labels; display names are the case's own."""
     values = collected.values.view()
-    values.flags.writeable = False  # tables and figures are made of them when they are asked for
+    values.flags.writeable = False  # tables and figures are made of them on demand
     count, seconds, found = collected.count, collected.kernel_seconds, []
     for plan, of, sums in zip(work.plans, (case, *case.companions), work.unpacked(values), strict=True):
         # Cases that differ in display names alone share their work.
@@ -297,19 +294,20 @@ def case_result(case: Case, work: CaseWork, collected: Collected) -> CaseResult:
 
 
 # ---- writing ---------------------------------------------------------------------------------------------------------
-REALISATIONS = 2  # what tables and figures take does not depend on their number
-SPARE = 1.25  # for the report, for files and for what a picture of one case does not show
+REALISATIONS = 2  # the time of tables and figures does not depend on their number
+SPARE = 1.25  # for the report, for files and for what one case's figure does not show
 
 
 def seconds(experiment: Experiment, figures: bool | str | Sequence[str], width_mm: float | None) -> float:
-    """An estimate of the seconds that writing takes: the tables of the first case, times the cases, and one figure of
-    each kind, times their number, measured here."""
+    """Estimated seconds for writing: the tables of the first case, times the cases, and one figure of each kind, times
+    their number, measured here.
+    """
     from radarsim.app import result as output
 
     case = experiment.cases[0]
     work = CaseWork(case)
     result = case_result(case, work, collect(work, REALISATIONS))
-    output.case_tables([result])  # what it loads is not to be counted for every case
+    output.case_tables([result])  # its imports are not to be counted for every case
     started = time.perf_counter()
     made = output.case_tables([result], configs.shipped_stem(experiment))
     tables = (time.perf_counter() - started) * len(experiment.cases)
@@ -328,7 +326,7 @@ def seconds(experiment: Experiment, figures: bool | str | Sequence[str], width_m
 
 
 # ---- run -------------------------------------------------------------------------------------------------------------
-WORTH_MEASURING_S = 20.0  # of a time limit: within less, measuring what tables and figures take would be most of it
+WORTH_MEASURING_S = 20.0  # of a time limit: below it, measuring the time of tables and figures would take most of it
 
 
 def load_all(sources: Sequence[str | os.PathLike[str]], overrides: Sequence[str] = ()) -> list[Experiment]:
@@ -347,9 +345,9 @@ def load_all(sources: Sequence[str | os.PathLike[str]], overrides: Sequence[str]
 
 
 def namesakes(experiments: Sequence[Experiment]) -> list[str]:
-    """A line for each config whose results would overwrite those of another one: their folder has the config's name.
+    """A line for each config whose results would overwrite those of another: folders have the config's name.
 
-    Names that differ in case or in how their letters are composed are one name to some file systems.
+    Names that differ in case or in Unicode composition are one name to some file systems.
     """
     seen: dict[str, str] = {}
     faults = []
@@ -474,20 +472,20 @@ def cluster(workers: int | None, scheduler: str | None) -> AbstractContextManage
 
 
 def trust(scheduler: str) -> str | None:
-    """The trust that computing with a scheduler of another machine requires, in one line."""
+    """A warning on the trust that a scheduler on another machine requires, in one line."""
     from radarsim.engine.cluster import trust as line
 
     return line(scheduler)
 
 
 def merged(overrides: Overrides, realisations: float | None = None, seed: int | None = None) -> tuple[str, ...]:
-    """Overrides as texts, with realisations and seed, where given, as two more."""
+    """Overrides as texts, with realisations and seed, if given, as two more."""
     given = {"realisations": realisations, "seed": seed}
     return (*configs.reading.texts(overrides), *(f"{key}={value}" for key, value in given.items() if value is not None))
 
 
 def from_store(experiment: Experiment, out: str | os.PathLike[str], overrides: Sequence[str]) -> "Result":
-    """The result from stored blocks alone; as many realisations as the last run, where overrides do not say."""
+    """The result from stored blocks; with as many realisations as the last run, unless overrides say otherwise."""
     configs.directory(out)
     asked = experiment
     if not any(override.split("=")[0].strip() == "realisations" for override in overrides):
@@ -511,7 +509,7 @@ def from_store(experiment: Experiment, out: str | os.PathLike[str], overrides: S
 
 
 def lack(name: str, held: Stock, out: str | os.PathLike[str]) -> str:
-    """The line of a case that is not stored whole: how much of it is, and what is missing."""
+    """The line of a case that is not completely stored: how much of it is, and what is missing."""
     if not held.stored:
         return f"{name}: {held.asked} realisations are not stored in {out}"
     from radarsim.app.outlook import missing
@@ -520,7 +518,7 @@ def lack(name: str, held: Stock, out: str | os.PathLike[str]) -> str:
 
 
 def result_of(experiment: Experiment, simulated: SimulatedCases, facts: dict[str, Any], again: str) -> "Result":
-    """The result, `again` the command that repeats it; with what is to be warned of in the config."""
+    """The result, with `again`, the command that repeats it, and the warnings on the config."""
     from radarsim.app.result import Result
 
     facts["warnings"] += [*configs.shadows(experiment), *registry.study(experiment.study).warnings(experiment)]
@@ -528,7 +526,7 @@ def result_of(experiment: Experiment, simulated: SimulatedCases, facts: dict[str
 
 
 def as_last_run(experiment: Experiment, out: Path) -> Experiment:
-    """The experiment with each case's realisations as the run.json under `out` reports them, where there is one."""
+    """The experiment with each case's realisations as in the run.json under `out`, if there is one."""
     try:
         done = json.loads(files.read(out / experiment.stem / "run.json"))["cases"]
         numbers = {name: int(case["done"]) for name, case in done.items()}
@@ -545,12 +543,12 @@ def as_last_run(experiment: Experiment, out: Path) -> Experiment:
 
 
 def finished(simulated: SimulatedCases) -> list[CaseResult]:
-    """Cases with their sums and the labels that say what these are."""
+    """Cases with their sums and the labels of these."""
     return [case_result(*one) for one in simulated.cases]
 
 
 def facts_of(simulated: SimulatedCases, threads: int, seconds: float) -> dict[str, Any]:
-    """The facts of a run for run.json: stop reason, threads, times, warnings, identities, the precision reached."""
+    """The facts of a run for run.json: stop reason, threads, times, warnings, identities, precision reached."""
     from radarsim.app.result import of_other_sources
 
     collected = [c for _, _, c in simulated.cases]
@@ -581,7 +579,7 @@ def facts_of(simulated: SimulatedCases, threads: int, seconds: float) -> dict[st
 
 
 def cache_troubles() -> list[str]:
-    """What went wrong with the cache of compiled kernels in this process, a line for each kind; nothing depends on it.
+    """Faults of the cache of compiled kernels in this process, a line for each kind; no result depends on it.
 
     A kernel that could not be read or kept was compiled, as on a new machine.
     """
@@ -590,7 +588,7 @@ def cache_troubles() -> list[str]:
 
 
 def seconds_per_update(works: Iterable[CaseWork]) -> dict[str, dict[str, float]]:
-    """CPU seconds of one update of one realisation, by case and filter, of studies that measure it; never in a CSV."""
+    """CPU seconds of one update of one realisation, by case and filter, in studies that measure it; never in a CSV."""
     every = {work.case.name: dict(registry.study(work.case.study).seconds_per_update(work.plan)) for work in works}
     return {name: seconds for name, seconds in every.items() if seconds}
 
@@ -605,12 +603,12 @@ def papers(keys: Collection[str] = ()) -> "list[PaperClaims]":
     return [of for of in registry.papers(lambda study: study.claims(), keys).values() if of is not None]
 
 
-# P1.3 and P4, known or not; a small letter and names joined by commas are taken for what they are meant to be.
+# P1.3 and P4, known or not; lower case and names joined by commas are understood.
 LIKE_A_CLAIM = re.compile(r"P\d+(\.\w+)?|[Pp]\d+(\.[Ee]?\d+\w?)?(,.+)?")
 
 
 def _meant_as_a_claim(name: str) -> bool:
-    """Whether a name is written like a claim or a paper; a claim of a package begins with the key of its paper."""
+    """Whether a name has the form of a claim or a paper; a package's claim begins with the key of its paper."""
     if Path(name).is_file():
         return False
     paper, _, number = name.partition(".")
@@ -619,7 +617,7 @@ def _meant_as_a_claim(name: str) -> bool:
 
 
 def _unknown_claims(names: Sequence[str], known: Collection[str]) -> list[str]:
-    """A line for each name that is written like a claim or a paper, and is none."""
+    """A line for each name that has the form of a claim or a paper, but is unknown."""
     found, every = [], _keys(known)
     for name in names:
         paper = name.partition(".")[0]
@@ -639,11 +637,11 @@ def _keys(ids: Iterable[str]) -> list[str]:
 
 
 def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, Any]]:
-    """Rows of the claims, as stored under `out` or as not run; if any names are given, of these configs, papers (P1)
-    and claims (P1.4) alone.
+    """Rows of the claims, as stored under `out` or as not run; with names: of these configs, papers (P1) and claims
+    (P1.4).
 
-    Of a config that judges none: those of its study's paper, with the reason why each of them is not judged by it.
-    Each row has the columns of claims.csv and `config`. Raises ConfigError for what does not exist.
+    For a config that judges none: those of its study's paper, with the reason why it does not judge each. Each row has
+    the columns of claims.csv and `config`. Raises ConfigError for unknown names.
     """
     from radarsim.app import readings
     from radarsim.app import stored as kept
@@ -652,7 +650,7 @@ def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, 
 
     wanted = [name for name in names if _meant_as_a_claim(name)]
     known = [claim.id for paper in papers(_keys(wanted)) for claim in paper.claims] if wanted else []
-    if _unknown_claims(wanted, known):  # told beside all that there are
+    if _unknown_claims(wanted, known):  # with the list of all claims
         raise ConfigError(*_unknown_claims(wanted, [claim.id for paper in papers() for claim in paper.claims]))
     asked = load_all([name for name in names if name not in wanted])
     keys = _keys(wanted) + [registry.study(one.study).paper_key() for one in asked]

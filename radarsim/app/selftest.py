@@ -1,10 +1,10 @@
 """The self-test of `radarsim doctor`: a small case of every study, its tables compared with known ones.
 
-radarsim/app/known holds for each study (the sonar is three) a config, and the tables that it gave on the platform of
-platform.json. Elsewhere (instruction set, compiler, BLAS, mathematical library) the last bits differ: an ulp here and
-there, which the arithmetic after it magnifies by its condition number κ. So a number may differ by what κ allows, see
-`Tolerance`. `make known` makes the tables again, after a change that is meant to change numbers.
-A study of an installed package has its known answers in tests of its own; here it is only loaded.
+radarsim/app/known holds for each study (the sonar is three) a config and its tables on the platform of platform.json.
+Elsewhere (instruction set, compiler, BLAS, mathematical library) the last bits differ: an ulp here and there, which
+later arithmetic magnifies by its condition number κ. So a number may differ by what κ allows, see `Tolerance`. `make
+known` makes the tables again, after an intended change of numbers. A study of an installed package has its known
+answers in its own tests; here it is only loaded.
 """
 
 import csv
@@ -24,11 +24,11 @@ TABLES = ("curves", "gains")
 
 @dataclass(frozen=True)
 class Tolerance:
-    """By how much a study's numbers may differ between platforms, in σ: those of samples, and exact ones.
+    """By how much a study's numbers may differ between platforms, in σ: sampled and exact ones.
 
     Spreads, standard errors and half-widths of intervals are compared by their squares, as each is the root of a
     difference of sums: where all realisations err alike, a rounding ε of σ² makes √(2ε) |bias| of the spread. Notes are
-    not compared: each turns at a threshold, that on filters alike at a difference of none.
+    not compared: each turns at a threshold, that on equal filters at a difference of zero.
     """
 
     sampled: float = 1e-12
@@ -57,7 +57,7 @@ TOLERANCES = {
     # more or less, where two numbers nearly tie, shows by what it leaves: as in the discriminator.
     "pulses_to_tracks": Tolerance(sampled=1e-9, exact=1e-11),
 }
-UNKNOWN = Tolerance(sampled=1e-9, exact=1e-9)  # of a study that another package offers
+UNKNOWN = Tolerance(sampled=1e-9, exact=1e-9)  # of a study from another package
 
 
 def tolerance(study: str) -> Tolerance:
@@ -72,7 +72,7 @@ FIRST_NUMBER = {"curves": "sigma", "gains": "gain_percent"}  # columns before it
 
 @dataclass(frozen=True)
 class Verdict:
-    """The outcome of a study's case, and whether it is as it should be."""
+    """The outcome of a study's case, and whether it is as expected."""
 
     study: str
     good: bool
@@ -88,7 +88,7 @@ def tables(study: str) -> dict[str, bytes]:
 
 
 def verdicts() -> list[Verdict]:
-    """One for each study. A package that cannot be used is reported; it is no damage."""
+    """One for each study. An unusable package is reported, but is not damage."""
     same_platform = platform() == json.loads((KNOWN / "platform.json").read_text())
     broken = registry.unusable()
     return [
@@ -140,14 +140,14 @@ def distances(table: str, one: bytes, other: bytes) -> tuple[float, float]:
 
 
 def _compared(name: str, value: float, centre: float) -> float:
-    """What of a column is compared; see `Tolerance`."""
+    """The compared number of a column; see `Tolerance`."""
     if name in ("spread", "bias_se"):
         return value**2
     return (value - centre) ** 2 if name.endswith(("_lo", "_hi")) else value
 
 
 def write() -> None:
-    """Make the known tables again, of this platform."""
+    """Make the known tables again, on this platform."""
     made = {study: tables(study) for study in TOLERANCES}
     contents = {f"{study}.{name}.csv": content for study, own in made.items() for name, content in own.items()}
     files.replace_all(KNOWN, contents | {"platform.json": (json.dumps(platform(), indent=2) + "\n").encode()})

@@ -1,7 +1,7 @@
-"""`radarsim sensitivity`: by how much σ and gains change for a tenth more of each key, or less where more is refused.
+"""`radarsim sensitivity`: changes of σ and gains for +10 % of each key, or −10 % where more is refused.
 
-Exact where the case's σ are. Else both cases are simulated with the same noise, batch by batch, and the interval of a
-change is by how much it differs without one of the batches.
+Exact where the case's σ are. Else both cases are simulated with the same noise, in batches, and the interval of a
+change comes from the changes without one batch each.
 """
 
 import contextlib
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 MORE = 0.1
 BATCHES = 20  # of one case: their spread has 19 degrees of freedom
 MOST_BARS = 16
-NOTHING = 1e-9  # per cent: what rounding may make of no change
+NOTHING = 1e-9  # per cent: changes below it may be rounding
 ROUNDED = NOTHING / 100  # the same of a ratio; of gains, in points, still less
 FOLDER = "sensitivity"
 LESS = ", −10 %"  # after a key that is lowered
@@ -49,24 +49,23 @@ LABELS = ("case", "filter", "component", "unit", "key", "value", "changed_value"
 
 
 def columns(of: Sequence[Quantity]) -> tuple[str, ...]:
-    """Those of sensitivity.csv, of some quantities."""
+    """The columns of sensitivity.csv, for some quantities."""
     return *LABELS, *(name for one in of for name in (_value(one), *one.changes)), "exact"
 
 
 def _value(of: Quantity) -> str:
-    """The column of a quantity's value."""
     return f"{of.name}_percent" if of.shown_unit() == "%" else of.name
 
 
 @dataclass(frozen=True, repr=False)
 class Sensitivity(Shown):
-    """What was found: one row a key, filter and component, by falling effect of the key on the component that leads.
+    """The result: one row for each key, filter and component, by falling effect of the key on the leading component.
 
-    of are the quantities, the first of which decides; leading is empty where that has no components. at says when,
-    empty where it has no scans; without_effect are keys that change nothing, left_out those that can be neither raised
-    nor lowered, with the reason. without_estimate are filters that no row is about, as they have no estimate there.
-    not_paired are sampled keys that change when the scans are. labels: what people call each key of the rows, with its
-    symbol and unit. files: what was written, if anything.
+    of: the quantities, the first of which sets the order; leading: empty where that has no components. at: the time in
+    words, empty without scans; without_effect: keys that change nothing; left_out: keys that can be neither raised nor
+    lowered, with the reason. without_estimate: filters without rows, as they have no estimate there. not_paired:
+    sampled keys that change the scan times. labels: the name of each key, with its symbol and unit. files: those
+    written, if any.
     """
 
     stem: str
@@ -88,7 +87,7 @@ class Sensitivity(Shown):
 
     @property
     def lowered(self) -> tuple[str, ...]:
-        """The keys of the rows whose value is a tenth less, as the config refuses more."""
+        """The keys whose value is a tenth less, as the config refuses more."""
         return tuple(dict.fromkeys(row["key"] for row in self.rows if abs(row["changed_value"]) < abs(row["value"])))
 
     @property
@@ -97,7 +96,7 @@ class Sensitivity(Shown):
 
     @property
     def title(self) -> str:
-        """What changes, and when."""
+        """The quantity and the time."""
         what = self.of[0].place(self.leading, tr) or tr(self.of[0].words)
         what = " ".join(filter(None, (what, self.at)))
         return tr("{stem}: change of {component} for +10 %", stem=self.stem, component=what)
@@ -128,7 +127,7 @@ def sensitivity(
     """The changes of a quantity, or of σ and gain, at a time, at a scan, or at the time of the last scan, for +10 % of
     each numeric key, for −10 % where the config refuses more.
 
-    Whole numbers change by at least one. component leads the order: by default the first. Raises ConfigError.
+    Whole numbers change by at least one. component: sorts the rows; by default the first. Raises ConfigError.
     """
     cases = Cases(config, configs.reading.texts(overrides), case)
     study = registry.study(cases.base.study)
@@ -182,8 +181,9 @@ def sensitivity(
 
 
 def _parts(of: Quantity, case: Case) -> tuple[bool, tuple[tuple[str, str], ...]]:
-    """Whether a quantity's table has scans; the components, or what else there are several values of a filter by, with
-    their units."""
+    """Whether a quantity's table has scans; the components, or the other column that tells values of a filter apart,
+    with their units.
+    """
     work = CaseWork(case)
     table = quantities.table_of(of, case_result(case, work, collect(work, 1)))
     if not of.per:
@@ -192,11 +192,11 @@ def _parts(of: Quantity, case: Case) -> tuple[bool, tuple[tuple[str, str], ...]]
     return "k" in table, tuple(dict(zip(table[of.per].astype(str), units, strict=True)).items())
 
 
-TARGET = "target"  # the key whose own keys are called like others: a duration, a range
+TARGET = "target"  # the key whose own keys have names that others have too: a duration, a range
 
 
 def named(spec: Study, path: str) -> Label:
-    """What people call a key: of a filter with its name, of the target as its own, of a list's item with its number."""
+    """The name of a key: a filter's with the filter, the target's as its own, a list item's with its number."""
     found = label(spec, path)
     text, steps = tr(found.text), path.split(".")
     if steps[-1].isdecimal():
@@ -211,7 +211,7 @@ def named(spec: Study, path: str) -> Label:
 def other(cases: Cases, key: fields.NumericKey) -> tuple[float, Case]:
     """A tenth more of a key's value, in size, or less where the config refuses more; and the case with it.
 
-    Whole numbers change by at least one. Raises ConfigError, which says why there is no more.
+    Whole numbers change by at least one. Raises ConfigError with the reason where there is no more.
     """
     assert key.value is not None
     step = max(1, round(MORE * key.value)) if key.whole else MORE * key.value
@@ -224,7 +224,7 @@ def other(cases: Cases, key: fields.NumericKey) -> tuple[float, Case]:
 
 
 def when(asked: Asked) -> str:
-    """At which time or scan, in words."""
+    """The time or scan, in words."""
     if asked.at_k is not None:
         return tr("at k = {k}", k=str(asked.at_k))
     return tr("at the last scan") if asked.at_s is None else tr("at {t_s:g} s", t_s=asked.at_s)
@@ -240,8 +240,9 @@ def size(rows: Sequence[dict[Hashable, Any]], path: str, leading: str, change: s
 
 class Seen(NamedTuple):
     """Q quantities of F filters and C components at one time: of the whole case (Q, F, C), and of all its realisations
-    but one of n batches (Q, n, F, C), n = 1 where exact. Not-a-number where there is no estimate. t_s (K,) are the
-    times of the scans, s."""
+    but one of n batches (Q, n, F, C), n = 1 where exact. NaN where there is no estimate. t_s (K,): times of the scans,
+    s.
+    """
 
     whole: np.ndarray
     but_one: np.ndarray
@@ -254,7 +255,7 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True)
 class Look:
-    """How a case is looked at: every filter and component at one time, exactly or in batches of realisations."""
+    """Values of a case for every filter and component at one time, exact or in batches of realisations."""
 
     asked: Asked
     kinds: tuple[Quantity, ...]
@@ -264,14 +265,14 @@ class Look:
 
     @property
     def cells(self) -> list[tuple[int, int]]:
-        """Filters and components, by their places."""
+        """Filters and components, by index."""
         return [(f, c) for f in range(len(self.axes.filters)) for c in range(len(self.parts))]
 
     def pair(self, case: Case, base: Seen, changed: Case) -> tuple[Seen, Seen]:
-        """What a case, `base` with the usual realisations, and a changed one show. Raises ConfigError.
+        """Values of a case, `base` with the usual realisations, and of a changed one. Raises ConfigError.
 
-        With more of them where both are sampled at a time and the scan times differ: that time then has noise of other
-        scans in each, so that the interval of the change is that of two runs of their own.
+        More realisations where both are sampled at a time and the scan times differ: the noise at that time is then of
+        different scans, so that the interval of the change is that of two independent runs.
         """
         seen = self.of(changed)
         if base.exact or self.asked.at_s is None or np.array_equal(base.t_s, seen.t_s):
@@ -280,7 +281,7 @@ class Look:
         return longer.of(case), longer.of(changed)
 
     def of(self, case: Case) -> Seen:
-        """What a case shows. Raises ConfigError."""
+        """Values of a case. Raises ConfigError."""
         axes = quantities.labels(self.asked, case)
         known, without_ends = self._each(lambda asked: quantities.exact(asked, case, axes)), False
         if not quantities.planned(self.asked.of):
@@ -288,12 +289,12 @@ class Look:
             result = case_result(case, work, collect(work, 1))
             known = self._of_result(result, exactly=True)
             without_ends = self.asked.of.ends[0] not in quantities.table_of(self.asked.of, result)
-        # Of some filters alone, the others would seem to change nothing.
+        # With only some filters' values, the others would seem to change nothing.
         exact = without_ends or np.isfinite(known[0]).any(axis=1).all()
         return Seen(known, known[:, None], np.asarray(axes.t_s)) if exact else self._sampled(case)
 
     def _each(self, of: Callable[[Asked], float]) -> np.ndarray:
-        """(Q, F, C) of a function of what is asked."""
+        """(Q, F, C) of a function of the request."""
         names = [(self.axes.filters[f], self.parts[c][0] or None) for f, c in self.cells]
         values = [
             of(replace(self.asked, of=kind, filter=filter_name, component=part))
@@ -346,13 +347,13 @@ class Look:
 
 
 def _change(of: Quantity, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """The change of values of a quantity, of a size that of its logarithm."""
+    """The change of a quantity's values; for a size, the change of its logarithm."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.log(after / before) if of.kind == "size" else after - before
 
 
 def interval(but_one: np.ndarray, value: float) -> tuple[float, float, float]:
-    """A value with its 95 % interval from the same number without one batch each (n,); of n = 1 it is exact.
+    """A value with its 95 % interval from the n values without one batch each (n,); n = 1: it is exact.
 
     The jackknife over groups (Shao & Tu, The Jackknife and Bootstrap, 1995, sec. 2.3): a batch alone may have no
     estimate, as where few realisations lock.
@@ -412,7 +413,7 @@ def tornado(found: Sensitivity) -> Figure:
 
 
 def tick(name: Label) -> str:
-    """A key beside its bars: its name, letter and unit."""
+    """Label of a key beside its bars: name, symbol and unit."""
     words = panels.literal(name.text)
     return panels.with_unit(" ".join(filter(None, (words, panels.mathematical(name.symbol)))), name.unit)
 
@@ -420,9 +421,9 @@ def tick(name: Label) -> str:
 def write(
     found: Sensitivity, out: str | os.PathLike[str], formats: Sequence[str], width_mm: float | None = None
 ) -> Sensitivity:
-    """The same with its files: sensitivity.csv and the tornado figure, in `out`/sensitivity/CONFIG.
+    """Add the files: sensitivity.csv and the tornado figure, in `out`/sensitivity/CONFIG.
 
-    width_mm is the figure's width in place of its own.
+    width_mm overrides the figure's width.
     """
     configs.directory(out)
     contents = {"sensitivity.csv": common.to_csv(found.table)}

@@ -1,4 +1,4 @@
-"""What Python and a notebook show of an answer: its first sentences, its first figure, its figures by name."""
+"""How Python and notebooks show an answer: its first sentences, its first figure, its figures by name."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -11,25 +11,23 @@ MOST_LINES, MOST_LETTERS = 3, 200  # of a text that stands for the whole
 
 
 class Shown:
-    """An answer with sentences, maybe with a table and with figures, which are drawn when they are asked for."""
+    """An answer with sentences, and perhaps a table and figures, drawn on demand."""
 
     def _said(self) -> Sequence[str]:
-        """The answer in words."""
         raise NotImplementedError
 
     @property
     def _label(self) -> str:
-        """What the answer is called beside others."""
+        """Name of the answer among others."""
         return ""
 
     @property
     def _described(self) -> "Mapping[str, Figure]":
-        """Its figures, as data, by name."""
         return {}
 
     @property
     def _html(self) -> Sequence[str]:
-        """What a notebook shows: HTML above the first figure, and below it."""
+        """HTML in a notebook, above the first figure and below it."""
         from html import escape
 
         return "".join(f"<p>{escape(line)}</p>" for line in self._said()), ""
@@ -43,15 +41,14 @@ class Shown:
 
     @property
     def figures(self) -> tuple[str, ...]:
-        """The names that `figure` takes."""
+        """Names of the figures, for `figure`."""
         return tuple(self._described)
 
     def figure(self, name: str = "", *, ax: Any = None, label: str | None = None) -> "Canvas":
         """A Matplotlib figure by its name, by default the first; KeyError names those there are.
 
-        ax: axes that are there, in place of a figure of its own; of a figure of several panels as many of them. Curves
-        that were drawn there before keep their colours, and the new ones take the next: so two results are drawn on one
-        pair of axes. label is put before the names of the new curves there; by default it is the config's name.
+        ax: existing axes to draw on, as many as the figure has panels. Curves already there keep their colours, so that
+        two results can share axes. label is put before the names of the new curves; by default the config's name.
 
         >>> import matplotlib.pyplot as plt, radarsim
         >>> result = radarsim.run("rls2", realisations=2000)
@@ -78,7 +75,7 @@ class Shown:
 
 
 class Several(tuple[Any, ...]):
-    """A tuple that shows the first of its items, and how many there are."""
+    """A tuple shown by its first item and its length."""
 
     __slots__ = ()
 
@@ -96,7 +93,7 @@ def brief(lines: Sequence[str]) -> str:
 
 
 def _image(figure: "Figure | None") -> str:
-    """A figure as HTML that needs no other file; nothing for none."""
+    """A figure as self-contained HTML; empty for none."""
     if figure is None:
         return ""
     from base64 import b64encode

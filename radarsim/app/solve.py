@@ -1,11 +1,8 @@
-"""`radarsim solve` where the quantity is simulated, with the same noise at every value.
+"""`radarsim solve`: the value of a numeric key at which a quantity reaches a target.
 
-The interval is the set of values at which the quantity's own 95 % interval holds the target: it covers the true value
-as often as that interval covers.
-
-`radarsim solve`: the value of a numeric key at which a quantity reaches a target.
-
-Where the quantity is known exactly the root is that of the exact function, found here; else `by_sampling` looks for it.
+If the quantity is known exactly, the root of the exact function. Otherwise it is simulated, with the same noise at
+every value; the interval is then the set of values at which the quantity's own 95 % interval holds the target, and
+covers the true value as often as that interval does.
 """
 
 import math
@@ -27,8 +24,8 @@ from radarsim.studies import registry
 PILOT_SHARE, PILOT_LEAST = 16, 200  # realisations of the scan: a share of all, but not fewer
 PILOT_POINTS = 13
 WITH_ALL = 13  # values with all realisations: a bracket, the value, both ends of its interval
-MOST_STEPS = 3  # of the scan, by which the pilot's noise may have moved a crossing
-RESIDUE = 0.02  # of its interval: how near a sampled quantity is brought to the target, so that the noise decides
+MOST_STEPS = 3  # of the scan: the pilot's noise may have moved a crossing that far
+RESIDUE = 0.02  # part of its interval to which a sampled quantity is brought to the target: below, noise dominates
 
 
 def by_sampling(asked: Question, curve: Curve, notify: Callable[[str], None]) -> Answer:
@@ -90,7 +87,7 @@ def by_sampling(asked: Question, curve: Curve, notify: Callable[[str], None]) ->
 
 
 def unpaired(asked: Question, curve: Curve) -> tuple[str, ...]:
-    """Where the key moves the scans, that values are not compared with the same noise, in words.
+    """A note where the key moves the scans, so that values are not compared with the same noise.
 
     The quantity at a time is then read at another scan, whose noise is another.
     """
@@ -107,7 +104,7 @@ def unpaired(asked: Question, curve: Curve) -> tuple[str, ...]:
 
 
 def _changes(scanned: Sequence[tuple[float, float]]) -> list[int]:
-    """Places i of a scan of (x, y) at which y changes its sign to the next place."""
+    """Places i of a scan of (x, y) between which and the next y changes its sign."""
     return [i for i, ((_, a), (_, b)) in enumerate(pairwise(scanned)) if a * b < 0 or (a == 0 and b != 0)]
 
 
@@ -116,7 +113,7 @@ def _bracket(
 ) -> tuple[tuple[float, float], tuple[float, float]] | None:
     """Neighbouring places of the grid between which the quantity crosses the target with all realisations.
 
-    About the place i where the pilot saw it cross or come nearest, from which the noise may have moved it by steps.
+    Starts at place i, where the pilot crossed or came nearest; its noise may have moved that by some steps.
     """
     for j in sorted(range(i - MOST_STEPS, i + MOST_STEPS + 1), key=lambda j: abs(j - i)):
         if not 0 <= j < len(grid) - 1:
@@ -128,7 +125,7 @@ def _bracket(
 
 
 def _interval(asked: Question, curve: Curve, one: tuple[float, float], other: tuple[float, float]) -> Estimate:
-    """A value and the 95 % set about it: all values at which the quantity's own interval holds the target."""
+    """A value and its 95 % set: all values at which the quantity's own interval holds the target."""
     over, count, end = asked.over, curve.realisations, asked.equals
 
     def part(of: str, x: float) -> float:
@@ -146,7 +143,7 @@ def _interval(asked: Question, curve: Curve, one: tuple[float, float], other: tu
     for side, of in ((-1, "hi" if rising else "lo"), (1, "lo" if rising else "hi")):
         inside, outside = (value, part(of, value)), _outside(over, partial(part, of), value, one, other, side)
         if inside[1] * outside[1] >= 0 or math.isnan(outside[1]):
-            ends.append(outside[0])  # as far as is searched, the interval holds the target
+            ends.append(outside[0])  # the interval holds the target up to the end of the search
         else:
             ends.append(quantities.closed(partial(part, of), over, inside, outside, partial(close, of)))
     return Estimate(value, *ends)
@@ -160,7 +157,7 @@ def _outside(
     other: tuple[float, float],
     side: int,
 ) -> tuple[float, float]:
-    """A place on one side of a value at which the function has another sign than there, or the end of the range.
+    """A place on one side of a value where the function has the other sign, or the end of the range.
 
     The first step is a twentieth of the bracket's width on the scale of the search, each further one twice as long.
     """
@@ -177,21 +174,21 @@ def _outside(
 
 
 def _sampled_slope(curve: Curve, found: Estimate) -> float | None:
-    """The change of the quantity for one unit of the key, over the interval, of the same noise at both ends."""
+    """The change of the quantity for one unit of the key, over the interval, with the same noise at both ends."""
     low, high = (curve.simulated(x, curve.realisations).value for x in (found.lo, found.hi))
     return None if found.lo == found.hi or math.isnan(high - low) else (high - low) / (found.hi - found.lo)
 
 
 # ---- solve -----------------------------------------------------------------------------------------------------------
 NEAR = 1e-4  # of a value: the step of a derivative
-JUMP = 1e-4  # of a quantity: more than means over patterns of plots may jump where others are merged
+JUMP = 1e-4  # of a quantity: larger changes may be jumps of means over detection patterns, where others are merged
 STEP = 1e-3  # on the scale of the search, the step of a rough derivative
-AROUND = 2  # rough values a place of the scan, with those about roots and turns
-TINY = 1e-300  # in place of nothing
-TO_CLOSE = 12  # values, beside those of the scan, that bring a root from its bracket to rounding, and its slope
-NEAR_ENOUGH = 1e-10  # of the quantity: how near to its target it ends where it jumps about at a ten-thousandth anyway
-ROUGHLY = 1e-4  # part of a root, to which a rough one is closed
-DOUBT = 0.01  # of the quantity: how near to the target the rough one may come without a root before it is not trusted
+AROUND = 2  # rough values for each place of the scan, including those around roots and turns
+TINY = 1e-300  # instead of zero
+TO_CLOSE = 12  # values, besides those of the scan, to close a bracket to rounding and take the slope
+NEAR_ENOUGH = 1e-10  # of the quantity: distance from the target at which a search ends that jumps by 1e-4 anyway
+ROUGHLY = 1e-4  # relative width to which a rough root is closed
+DOUBT = 0.01  # of the quantity: a rough one that comes this near the target without a root is not trusted
 
 
 def solve(
@@ -211,9 +208,9 @@ def solve(
 ) -> Answer:
     """The value of a key at which a quantity equals `equals`, in the quantity's unit (gains and rates in per cent).
 
-    between: what is searched; by default what the key allows, and of one that has no two bounds a thousandth to a
-    thousand times its value. realisations: behind each sampled value, by default the config's. sampled: simulate also
-    what is known exactly. notify is called with a line on what the search will do, before one of some seconds.
+    between: the search range; by default the bounds of the key, or a thousandth to a thousand times its value if it has
+    no two bounds. realisations: for each sampled value, by default the config's. sampled: simulate even if the exact
+    value is known. notify is called with a line on a search that will take some seconds.
 
     Raises ConfigError for a wrong config, key, filter or component, and for a key without effect.
     """
@@ -241,11 +238,11 @@ def _exactly(asked: Question, curve: Curve, notify: Callable[[str], None]) -> An
     curve.expected = len(grid) + TO_CLOSE
     study, base = registry.study(asked.cases.base.study), quantities.shortened(asked.quantity, asked.cases.base)
     curve.rough = study.costly(base) and not asked.over.whole
-    elsewhere = grid[len(grid) // 3]  # not the config's own, which a study may still know
+    elsewhere = grid[len(grid) // 3]  # not the config's own value, which a study may have cached
     near = study.exact_but_for(base)
     roughly = timed(partial(curve.roughly, elsewhere))
-    # One exact value beside the search's own where it may take seconds: where each pattern of plots is followed it
-    # takes a twentieth of one.
+    # One exact value beyond the search's own, where it may take seconds: with each pattern of plots followed it takes
+    # a twentieth of one.
     each = timed(partial(curve.exactly, elsewhere)) if near or not curve.rough else 0.0
     said = question.said_of(asked)
     what = tr("computes the {quantity} at about {count} values of {key}", **said, count=curve.expected)
@@ -279,9 +276,9 @@ def _exactly(asked: Question, curve: Curve, notify: Callable[[str], None]) -> An
 
 
 def roots(asked: Question, curve: Curve) -> quantities.Found:
-    """Where the exact quantity reaches the target; first looked for roughly where that is much less work.
+    """Where the exact quantity reaches the target; searched roughly first where that is much cheaper.
 
-    Raises quantities.Undefined where it is defined nowhere.
+    Raises quantities.Undefined where it has no value.
     """
 
     def missing(x: float) -> float:
@@ -301,7 +298,7 @@ def roots(asked: Question, curve: Curve) -> quantities.Found:
 def exact_near(
     missing: Callable[[float], float], curve: Curve, over: quantities.Range, x: float, near_enough: float
 ) -> float | None:
-    """The root near a rough one: by secants, the first that of the rough quantity; where they fail, bracketed."""
+    """The root near a rough one: by secants, the first from the rough quantity; if they fail, bracketed."""
     u = over.inner(x)
     ends = over.outer(u - STEP), over.outer(u + STEP)
     low, high = (curve.roughly(end) for end in ends)
@@ -311,7 +308,7 @@ def exact_near(
 
 
 def timed(work: Callable[[], float]) -> float:
-    """Seconds that a piece of work takes."""
+    """Seconds that a function takes."""
     begun = time.monotonic()
     work()
     return time.monotonic() - begun

@@ -1,13 +1,10 @@
-"""A result as it was stored: run.json and the tables beside it, read only where they are the ones that it records.
+"""Stored results: run.json and its tables, read only if they are the ones that it records.
 
-Dropping stored blocks: what `radarsim clean` removes, and nothing beyond DIR/.blocks.
+What `radarsim clean` removes: stored blocks, and nothing outside DIR/.blocks.
 
-Claims as a run has stored them: the table is read only if it is the one that run.json records.
-
-What `radarsim readings` came to: rows of its tables under a directory, and the classes that radarsim ships.
-
-classes.csv beside this module is that of the shipped configs, copied by `make readings-pages`; where a directory of
-results has its own, of a claim that was judged there, that one counts.
+Stored results of `radarsim readings`: rows of its tables under a directory, and the shipped classes. classes.csv beside
+this module is that of the shipped configs, copied by `make readings-pages`; a claim judged in a directory of results
+takes its class from there.
 """
 
 import csv
@@ -56,7 +53,9 @@ def content(path: Path) -> bytes | None:
 def rows(
     path: Path, text: bytes, needed: Collection[str], made: Callable[[dict[str, Any]], Row], kind: str
 ) -> list[Row]:
-    """What `made` makes of each row of a CSV file with the columns needed; StoreError, with kind, for any other."""
+    """The result of `made` for each row of a CSV file with the required columns; StoreError, with kind, for any other
+    file.
+    """
     try:
         table = csv.DictReader(io.StringIO(text.decode("utf-8"), newline=""), strict=True)
         read, names = list(table), set(table.fieldnames or ())
@@ -77,7 +76,7 @@ def record(folder: Path) -> dict[str, Any] | None:
         return None
     try:
         found = json.loads(text)
-        files.to_json(found)  # ValueError for what no run writes, such as NaN or half a character
+        files.to_json(found)  # ValueError for content that no run writes, such as NaN or half a character
         if all(isinstance(found[key], dict) for key in ("cases", "outputs", "resolved")):
             return dict(found)
     except (ValueError, LookupError, TypeError, RecursionError):
@@ -86,9 +85,9 @@ def record(folder: Path) -> dict[str, Any] | None:
 
 
 def table(folder: Path, name: str, outputs: "dict[str, str]") -> "pd.DataFrame | None":
-    """A table of a folder whose run.json names these outputs; None where the run wrote none of this name.
+    """A table of a folder whose run.json records these outputs; None where the run wrote none of this name.
 
-    Raises StoreError where it cannot be read or is another one than recorded.
+    Raises StoreError where it cannot be read or differs from the record.
     """
     path = folder / f"{name}.csv"
     if path.name not in outputs:
@@ -108,7 +107,7 @@ def table(folder: Path, name: str, outputs: "dict[str, str]") -> "pd.DataFrame |
 # ---- clean -----------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Cleaned:
-    """How much was dropped, or would be: files and bytes of so many identities."""
+    """The amount dropped, or to be dropped: files and bytes of so many identities."""
 
     path: Path
     identities: int
@@ -119,12 +118,11 @@ class Cleaned:
 def clean(
     out: str | os.PathLike[str], experiments: Iterable[Experiment] | None = None, dry_run: bool = False
 ) -> Cleaned:
-    """Drop the stored blocks of all experiments, or of some, below out/.blocks; with dry_run only say how much.
+    """Drop the stored blocks of all experiments, or of some, below out/.blocks; with dry_run only count them.
 
-    Of a case those that other sources made go too.
-
-    Links are not followed and files that no store makes are left, and with them their folder. Raises ConfigError if
-    `out` does not exist or its .blocks is a link, StoreError if a file cannot be removed.
+    This includes a case's blocks from other sources. Links are not followed; files that no store makes remain, and so
+    do their folders. Raises ConfigError if `out` does not exist or its .blocks is a link, StoreError if a file cannot
+    be removed.
     """
     blocks = Path(out) / ".blocks"
     if not is_directory(Path(out)):
@@ -154,13 +152,13 @@ def _is_identity(path: Path) -> bool:
 
 
 # ---- stored claims ---------------------------------------------------------------------------------------------------
-LOOKS, PAUSE_S = 5, 0.1  # at a table that fits no record: a run beside us may be writing both just now
+LOOKS, PAUSE_S = 5, 0.1  # of a table that fits no record: another run may be writing both just now
 
 
 def stored(path: Path) -> list[dict[str, Any]] | None:
     """The rows of a stored claims.csv, numbers as such; None if there is none.
 
-    Raises StoreError where it cannot be read, is no such table, or is another one than run.json beside it records.
+    Raises StoreError where it cannot be read, is no such table, or differs from the record in run.json.
     """
     from radarsim.report.claims import CLAIMED, NUMBERS
 
@@ -181,7 +179,7 @@ def stored(path: Path) -> list[dict[str, Any]] | None:
 
 
 def _recorded(path: Path) -> str | None:
-    """The SHA-256 of the file that run.json beside it records; None where there is no run.json or it names no such."""
+    """The SHA-256 of the file in run.json beside it; None where there is no run.json or it does not name the file."""
     record = path.with_name("run.json")
     text = content(record)
     try:
@@ -202,7 +200,7 @@ def stored_readings(out: Path) -> list[dict[str, Any]]:
 
 
 def stored_classes(out: Path | None) -> list[Class]:
-    """The classes that were worked out under `out`. Raises StoreError for a damaged file."""
+    """The classes of claims judged under `out`. Raises StoreError for a damaged file."""
     return _rows(out / CLASSES, set(COLUMNS), Class.of_row) if out else []
 
 
@@ -213,9 +211,10 @@ def shipped_classes() -> tuple[Class, ...]:
 
 
 def classes_of(papers: Iterable[tuple[PaperReadings, PaperClaims]], out: Path | None) -> Known:
-    """The class over all readings of each claim of which its paper leaves something open; None where it is not known.
+    """The class over all readings of each claim that depends on an open choice of its paper; None where it is not
+    known.
 
-    One that was worked out of other words, numbers or choices than the claim has now is none.
+    A class from other words, numbers or choices than the claim has now does not count.
     """
     found = {(one.claim, one.declared): one for one in (*shipped_classes(), *stored_classes(out))}
     return {
