@@ -9,14 +9,14 @@
 
 In a notebook a result shows its answer and first figure; `radarsim.load("rls2")` gives one that was run before.
 `check`, `solve`, `sensitivity`, `compare`, `chart`, `claims` and `readings` answer what the commands of these names do;
-`simulate`, `read_plots`, `track` and `fit` are for recorded plots.
+`plots` gives those of many realisations as arrays; `simulate`, `read_plots`, `track` and `fit` are for recorded plots.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from radarsim.app.own_data import fit, read_plots, simulate, track
+    from radarsim.app.own_data import fit, plots, read_plots, simulate, track
     from radarsim.app.python import chart, check, claims, compare, load, readings, sensitivity, solve
     from radarsim.app.result import Result
     from radarsim.app.run import run
@@ -34,6 +34,7 @@ __all__ = [
     "compare",
     "fit",
     "load",
+    "plots",
     "read_plots",
     "readings",
     "run",
@@ -45,7 +46,7 @@ __all__ = [
 
 _HOMES = {
     **{"run": "app.run:run", "Result": "app.result:Result"},
-    **{name: f"app.own_data:{name}" for name in ("fit", "read_plots", "simulate", "track")},
+    **{name: f"app.own_data:{name}" for name in ("fit", "plots", "read_plots", "simulate", "track")},
     **{name: f"app.python:{name}" for name in ("chart", "check", "claims", "compare")},
     **{name: f"app.python:{name}" for name in ("load", "readings", "sensitivity", "solve")},
     **{"ConfigError": "errors:ConfigError", "RadarsimError": "errors:RadarsimError"},

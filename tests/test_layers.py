@@ -37,7 +37,7 @@ ROOMS = {
     "report": ("errors", "failures", "config", "language", *DATA),
     "studies.noise": (*CASE, "kernels.random"),
     "studies.radial": ("errors", "constants", "physics"),
-    "studies.interface": (*CASE, *DATA, "report"),
+    "studies.interface": ("errors", *CASE, *DATA, "report"),
     "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "report.quantities", "studies.interface"),
     "studies.onefile": (
         "errors",

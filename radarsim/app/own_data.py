@@ -2,16 +2,19 @@
 
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from radarsim.app.configs import Config, Overrides, load
 from radarsim.recorded import fit as fitting
-from radarsim.recorded import follow, plots
+from radarsim.recorded import follow
+from radarsim.recorded import plots as files
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from radarsim.studies.interface import Drawn
 
 Found = TypeVar("Found")
 
@@ -30,6 +33,31 @@ def simulate(config: Config, realisation: int = 0, overrides: Overrides = ()) ->
     return pd.DataFrame(follow.simulated(load(config, overrides), realisation))
 
 
+def plots(
+    config: Config, n: int = 1000, first: int = 0, overrides: Overrides = (), chunk: int | None = None
+) -> "Drawn | Iterator[Drawn]":
+    """Return the plots of realisations first … first + n - 1, exactly those of a run, with the truth, as arrays.
+
+    t_s (K,) are the times of the scans, columns[name] (n, K) what is measured, with NaN where a plot is missed, and
+    truth (n, K, C) the true state, whose components are named with their units. Where a scan may have several plots,
+    columns are (n, K, M), filled up with NaN. With chunk, an iterator of as many realisations at a time, in flat
+    memory; a filter over all of them may take 10 million.
+
+    Raises ConfigError for an invalid config, a config of several cases, or a study without plots.
+
+    >>> import radarsim
+    >>> made = radarsim.plots("rls2", n=500)
+    >>> made
+    <plots of realisations 0 … 499, 15 scans: range_m, velocity_mps; truth r (m), Vr (m/s), ar (m/s2)>
+    >>> made.columns["range_m"].shape, made.truth.shape
+    ((500, 15), (500, 15, 3))
+    >>> [part.n for part in radarsim.plots("rls2", n=500, chunk=200)]
+    [200, 200, 100]
+    """
+    parts = follow.batches(load(config, overrides), n, first, chunk)
+    return next(parts) if chunk is None else parts
+
+
 def read_plots(path: str | os.PathLike[str]) -> "pd.DataFrame":
     """Read a file of plots as written by `radarsim import` or `radarsim simulate`: numbers, and the column `track` as
     text.
@@ -43,7 +71,7 @@ def read_plots(path: str | os.PathLike[str]) -> "pd.DataFrame":
     try:
         texts = pd.read_csv(path, comment="#", dtype=str, keep_default_na=False)
         # Python's own parsing of numbers loses no digit.
-        measured = [str(name) for name in texts if name != plots.TRACK]
+        measured = [str(name) for name in texts if name != files.TRACK]
         numbers = {name: texts[name].replace("", "nan").astype(float) for name in measured}
     except (OSError, ValueError) as error:
         raise ConfigError(f"{os.fspath(path)}: cannot be read: {error}") from error
@@ -68,8 +96,8 @@ def track(
     header: list[str] = []
 
     def sink(piece: Any, name: str | None) -> None:
-        header[:] = plots.header_of(piece, name is not None)
-        rows.extend(plots.rows_of(piece, name))
+        header[:] = files.header_of(piece, name is not None)
+        rows.extend(files.rows_of(piece, name))
 
     experiment = load(config, overrides)
     _with_file(recorded, lambda path: follow.follow(experiment, path, sink))

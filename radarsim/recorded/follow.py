@@ -12,7 +12,7 @@ import itertools
 import json
 import os
 import shlex
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -28,7 +28,7 @@ from radarsim.engine.results import Track
 from radarsim.errors import ConfigError, PlotFault, argument
 from radarsim.recorded import plots
 from radarsim.recorded.plots import Path as Places
-from radarsim.studies.interface import RecordedPlots, Tracker, true_column
+from radarsim.studies.interface import Drawn, RecordedPlots, Tracker, true_column
 from radarsim.studies.registry import module as home_of
 from radarsim.studies.registry import study
 from radarsim.threads import mapping
@@ -133,7 +133,7 @@ def recorded_of(case: Case) -> RecordedPlots:
     return found
 
 
-Part = Literal["tracker", "simulated", "likelihood"]
+Part = Literal["tracker", "simulated", "drawing", "likelihood"]
 
 
 def borrowed(case: Case, part: Part) -> list[str]:
@@ -213,9 +213,38 @@ def simulated(experiment: Experiment, realisation: int = 0) -> dict[str, np.ndar
     """
     if not 0 <= realisation < LARGEST_REALISATIONS:
         raise ConfigError(f"realisation: must be from 0 to {LARGEST_REALISATIONS - 1}, got {realisation}")
+    case = case_with_plots(experiment)
+    return dict(recorded_of(case).simulated(case, realisation))
+
+
+def case_with_plots(experiment: Experiment) -> Case:
+    """An experiment's one case, of a study that draws plots; raises ConfigError."""
     case = one_case(experiment, "simulate", "radarsim simulate {} -o PLOTS.csv")
     refuse_borrowed(case, "simulated")
-    return dict(recorded_of(case).simulated(case, realisation))
+    refuse_borrowed(case, "drawing")
+    return case
+
+
+def batches(experiment: Experiment, n: int, first: int = 0, chunk: int | None = None) -> Iterator[Drawn]:
+    """The plots of n realisations of an experiment's one case from number `first` on, chunk by chunk, in flat memory.
+
+    Raises ConfigError, at once, for realisations that no run has.
+    """
+    given = {"n": (n, 1), "first": (first, 0), "chunk": (n if chunk is None else chunk, 1)}
+    n, first, size = (_whole(name, *one) for name, one in given.items())
+    if first + n > LARGEST_REALISATIONS:
+        raise ConfigError(f"first + n: must be at most {LARGEST_REALISATIONS}, got {first + n}")
+    case = case_with_plots(experiment)
+    plots, last = recorded_of(case), first + n
+    return (plots.drawn(case, i, min(size, last - i)) for i in range(first, last, size))
+
+
+def _whole(name: str, value: Any, least: int) -> int:
+    """A whole number, which may be a float; raises ConfigError."""
+    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    if not number or not float(value).is_integer() or value < least:
+        raise ConfigError(f"{name}: must be a whole number >= {least}, got {value!r}")
+    return int(value)
 
 
 @dataclass

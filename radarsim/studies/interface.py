@@ -12,11 +12,14 @@ A study whose files have the usual names need not write the class: see `radarsim
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from threading import RLock
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
+
+from radarsim.errors import ConfigError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -78,6 +81,65 @@ def true_column(component: str, unit: str) -> str:
     return f"{TRUE}{component}_{IN_NAMES.get(plain, plain.replace('/', 'p'))}"
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Drawn:
+    """The plots of n realisations from number `first` on, as a run draws them, and the truth at the times t_s (K,), s.
+
+    columns (n, K)  what is measured, by name and unit, not-a-number where missing; (n, K, M) where a scan may have
+                    several plots: these come first, the rest is not-a-number, and M is as large as needed
+    truth (n, K, C) the true state, its components by name and unit; beside: further columns, true_…, of either shape
+
+    Arrays may be views that cannot be written.
+    """
+
+    t_s: "np.ndarray"
+    columns: "Mapping[str, np.ndarray]"
+    components: tuple[tuple[str, str], ...]
+    truth: "np.ndarray"
+    beside: "Mapping[str, np.ndarray]" = field(default_factory=dict)
+    first: int = 0
+
+    @property
+    def n(self) -> int:
+        """How many realisations there are."""
+        return len(self.truth)
+
+    @property
+    def several(self) -> bool:
+        """Whether a scan may have several plots."""
+        return any(column.ndim == 3 for column in self.columns.values())
+
+    def __repr__(self) -> str:
+        names = ", ".join(f"{name} ({unit})" for name, unit in self.components)
+        numbers = f"{self.first} … {self.first + self.n - 1}, {len(self.t_s)} scans"
+        return f"<plots of realisations {numbers}: {', '.join(self.columns)}; truth {names}>"
+
+    def truth_of(self, components: Sequence[tuple[str, str]]) -> "np.ndarray":
+        """The truth (n, K, C) of these components, as those of axes, which may be fewer or in another order."""
+        names = [true_column(*one) for one in self.components]
+        chosen = [names.index(true_column(*one)) for one in components]
+        return self.truth if chosen == list(range(len(names))) else self.truth[..., chosen]
+
+    def rows(self, i: int) -> "dict[str, np.ndarray]":
+        """One of the realisations, counted from 0, as columns (rows,) of a file: `t_s`, what is measured, the truth.
+
+        A row a scan; where a scan may have several plots a row a plot, and one without values where it has none; of the
+        truth these have what stands beside it alone.
+        """
+        import numpy as np
+
+        made = {"t_s": self.t_s} | {name: values[i] for name, values in (*self.columns.items(), *self.beside.items())}
+        if not self.several:
+            return made | dict(zip((true_column(*one) for one in self.components), self.truth[i].T, strict=True))
+        wide = next(values for values in made.values() if values.ndim == 2)
+        there = np.any([np.isfinite(made[name]) for name in self.columns], axis=0) | (np.arange(wide.shape[1]) == 0)
+        full = (values if values.ndim == 2 else values[:, None] for values in made.values())
+        return {name: np.broadcast_to(v, wide.shape)[there] for name, v in zip(made, full, strict=True)}
+
+
+Draw = Callable[[int, int], Drawn]
+KEPT = 4  # cases whose plots were drawn last, which are prepared once
+
 OUTLIERS, BIAS, CORRELATION = EXPLANATIONS = ("outliers", "bias", "correlation")
 
 
@@ -123,6 +185,8 @@ class Turning(NamedTuple):
 class RecordedPlots(ABC):
     """What a study does with recorded plots: `radarsim track` and `radarsim simulate`.
 
+    A study has `drawing`, or the slower `simulated`, of which the other follows.
+
     rows_asked: of how many rows `radarsim track` asks the likelihood for its advice, so that it takes some seconds.
     from_any_origin: whether ranges count from any point, so that they may be negative. of_any_keys: whether all that it
     does it asks of the study, so that there are no keys that it could pass over.
@@ -148,9 +212,36 @@ class RecordedPlots(ABC):
     def scan_period_s(self, spec: Any) -> float:
         """The config's time between two plots."""
 
-    @abstractmethod
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        for own, other in (("simulated", "drawing"), ("drawing", "simulated")):
+            if own in vars(cls) and other not in vars(cls):  # what a base class has of the other one is of its plots
+                setattr(cls, other, vars(RecordedPlots)[other])
+        if cls.drawing is RecordedPlots.drawing and cls.simulated is RecordedPlots.simulated:
+            raise TypeError(f"{cls.__name__} must have `drawing` or `simulated`")
+
+    def drawing(self, case: "Case") -> Draw:
+        """The case prepared once: plots of realisations first … first + count - 1, by these two numbers.
+
+        Default: one after the other by `simulated`.
+        """
+        return lambda first, count: _one_by_one(self, case, first, count)
+
     def simulated(self, case: "Case", realisation: int) -> Mapping[str, "np.ndarray"]:
-        """The plots of one realisation, as a run draws them, and the truth in columns true_…; columns (n,)."""
+        """The plots of one realisation, as a run draws them, and the truth in columns true_…; columns (n,).
+
+        Default: by `drawing`.
+        """
+        return self.drawn(case, realisation, 1).rows(0)
+
+    def drawn(self, case: "Case", first: int, count: int) -> Drawn:
+        """The plots of realisations first … first + count - 1 of a case that is prepared once."""
+        with _LOCK:
+            draw = next((draw for kind, one, draw in _LAST if one is case and kind is type(self)), None)
+            if draw is None:
+                draw = self.drawing(case)
+                _LAST[:] = [*_LAST[1 - KEPT :], (type(self), case, draw)]
+        return draw(first, count)
 
     @abstractmethod
     def tracker(self, case: "Case") -> Tracker:
@@ -177,6 +268,26 @@ class RecordedPlots(ABC):
     def in_a_turn(self, case: "Case", filter_name: str, values: Mapping[str, float]) -> "Turning | None":
         """The largest error of a filter in a turn, as stated and with other values of its keys. Default: not known."""
         return None
+
+
+_LOCK, _LAST = RLock(), list[tuple[type[RecordedPlots], "Case", Draw]]()
+
+
+def _one_by_one(plots: RecordedPlots, case: "Case", first: int, count: int) -> Drawn:
+    """Of a study that has `simulated` alone."""
+    import numpy as np
+
+    every = [plots.simulated(case, i) for i in range(first, first + count)]
+    t_s = every[0]["t_s"]
+    if not all(np.array_equal(one["t_s"], t_s) for one in every) or not (np.diff(t_s) > 0).all():
+        raise ConfigError(f"study {case.study}: has plots of several realisations only if its `drawing` gives them")
+    columns = {name: np.stack([one[name] for one in every]) for name in every[0] if name != "t_s"}
+    true = {name: column for name, column in columns.items() if name.startswith(TRUE)}
+    units = {short: unit for unit, short in IN_NAMES.items()}
+    named = [name.removeprefix(TRUE).rpartition("_") for name in true]
+    components = tuple((name, units.get(unit, unit)) for name, _, unit in named)
+    measured = {name: column for name, column in columns.items() if name not in true}
+    return Drawn(t_s, measured, components, np.stack([*true.values()], axis=-1), first=first)
 
 
 class Paper(NamedTuple):
