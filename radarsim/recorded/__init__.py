@@ -1,1 +1,1 @@
-"""Recorded plots: reading, following, judging."""
+"""Recorded plots: reading them, filters over them, checks of the stated accuracies."""

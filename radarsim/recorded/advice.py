@@ -1,12 +1,12 @@
-"""What is wrong with the config's numbers, if anything is, from the likelihood along each of them.
+"""Errors in the config's numbers, if any, by the likelihood along each of them.
 
-Each explanation alone (a σ, the manoeuvre variance, a bias of the velocity, outliers, errors that last from plot to
-plot) is fitted to the plots. The one that raises the likelihood most is named, if it raises it more than chance does in
-one recording of twenty, all explanations together; then the search goes on beside it. What a recording with sound
-numbers says is: nothing wrong.
+Each explanation alone (a σ, the manoeuvre variance, a bias of the velocity, outliers, errors correlated from plot to
+plot) is fitted to the plots. The one that raises the likelihood most is named, if it raises it by more than chance does
+in one recording of twenty, over all explanations; then the search continues with it included. A recording with correct
+numbers yields: nothing wrong.
 
-Asked is the filter that takes most of a plot. One that takes less of it has nothing to say of the rest, and may predict
-the ranges best for the very reason that the velocities are bad.
+The filter used is the one that takes most columns of a plot. One that takes fewer says nothing about the rest, and may
+predict the ranges best just because the velocities are bad.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,16 +32,16 @@ from radarsim.recorded.fit import (
 from radarsim.recorded.follow import Followed, borrowed, recorded_of
 from radarsim.studies.interface import Likelihood, Turning
 
-LEVEL = 0.05  # of finding something where nothing is wrong
+LEVEL = 0.05  # of a false finding
 MOST_FOUND = 3
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One explanation: the key (or one of EXPLANATIONS), its value (a share; a bias in σ; a correlation), and the gain
-    of the logarithm of the likelihood over what was found before.
+    """One explanation: the key (or one of EXPLANATIONS), its value (a share; a bias in σ; a correlation), and the
+    increase of the log-likelihood over the findings before.
 
-    from_zero: whether the plots tell a key's value from zero. turning: what a smaller manoeuvre variance would cost.
+    from_zero: whether the plots distinguish a key's value from zero. turning: the cost of a smaller manoeuvre variance.
     """
 
     what: str
@@ -53,8 +53,8 @@ class Finding:
 
 @dataclass(frozen=True)
 class Compared:
-    """How much better than each filter the best one predicts the plots: differences of the logarithm of the likelihood
-    of the numbers that all of them take. fullest: the one that predicts best among those that take most of a plot."""
+    """By how much the best filter predicts the plots better than each other: differences of the log-likelihood of the
+    numbers that all of them take. fullest: the best predictor among those that take most columns of a plot."""
 
     best: str
     behind: dict[str, float]
@@ -63,7 +63,7 @@ class Compared:
 
 @dataclass(frozen=True)
 class Asked:
-    """Which rows were asked: so many altogether, the first `each` of so many tracks (None where the file has one)."""
+    """The rows used: so many altogether, the first `each` of so many tracks (None where the file has one)."""
 
     rows: int
     each: int
@@ -72,9 +72,9 @@ class Asked:
 
 @dataclass(frozen=True)
 class Advice:
-    """What the likelihood says of a config's filters over recorded plots: which is best; what is wrong with the numbers
-    of the one that takes most of a plot; of which rows. folding: where the velocities are folded, and nothing else is
-    looked for."""
+    """Advice from the likelihood of a config's filters over recorded plots: the best filter; the errors in the numbers
+    of the one that takes most columns; the rows used. folding: where the velocities are folded, and nothing else is
+    examined."""
 
     compared: Compared
     findings: list[Finding]
@@ -84,7 +84,7 @@ class Advice:
 
 def advised(followed: Followed, progress: Progress = silent) -> Advice | None:
     """Advice from the first rows of each track; none where the study has no likelihood of recorded plots. progress is
-    called with the number of likelihoods found."""
+    called with the number of likelihoods computed."""
     case, of = followed.case, recorded_of(followed.case)
     heads = [one.head for one in followed.tracks.values()] or [followed.head]
     long = [head for head in heads if len(head["t_s"]) >= LEAST_ROWS]
@@ -104,7 +104,7 @@ def advised(followed: Followed, progress: Progress = silent) -> Advice | None:
 
 
 def _judged(case: Case, likelihood: Likelihood, found: Finding) -> Finding:
-    """A finding with what a smaller manoeuvre variance would cost."""
+    """A finding with the cost of a smaller manoeuvre variance."""
     stated = dict(zip(likelihood.keys, likelihood.stated.tolist(), strict=True))
     if found.value >= stated.get(found.what, -np.inf):
         return found
@@ -120,7 +120,7 @@ def some(heads: Sequence[Mapping[str, np.ndarray]], most: int) -> list[Mapping[s
 
 
 def findings(likelihood: Likelihood, progress: Progress = silent) -> list[Finding]:
-    """What is wrong with the stated numbers, the weightiest first; empty where nothing is."""
+    """Errors in the stated numbers, the weightiest first; empty where nothing is wrong."""
     from scipy.stats import chi2
 
     of, whats = Counted(likelihood, progress), [*likelihood.keys, *likelihood.explains]
@@ -141,7 +141,8 @@ def findings(likelihood: Likelihood, progress: Progress = silent) -> list[Findin
 
 
 def _from_zero(likelihood: Counted, what: str, found: dict[str, float], top: float) -> bool:
-    """Whether the plots tell a key from zero, whatever the other keys are: asked of one that is smaller than stated."""
+    """Whether the plots distinguish a key from zero, whatever the other keys are: tested where it is smaller than
+    stated."""
     stated = dict(zip(likelihood.keys, likelihood.stated.tolist(), strict=True))
     if what not in stated or found[what] >= stated[what]:
         return True
@@ -151,7 +152,7 @@ def _from_zero(likelihood: Counted, what: str, found: dict[str, float], top: flo
 
 
 def compared(likelihoods: Sequence[Likelihood]) -> Compared:
-    """Which filter predicts the plots best, as stated."""
+    """Which filter predicts the plots best, with the stated numbers."""
     sums = {one.filter: one.by_number(np.asarray(one.stated)) for one in likelihoods}
     common = set.intersection(*(set(parts) for parts in sums.values()))
     totals = {name: sum(parts[number] for number in common) for name, parts in sums.items()}
@@ -164,7 +165,7 @@ def compared(likelihoods: Sequence[Likelihood]) -> Compared:
 
 
 def _exactly(likelihood: Counted, near: dict[str, float]) -> tuple[dict[str, float], float]:
-    """The top near values that were found roughly: what is printed must not hang on a processor's last digits."""
+    """The maximum near roughly found values: printed numbers must not depend on a processor's last digits."""
     along = Along(likelihood, list(near))
     at = polished(along, along.searched(near))
     return along.natural(at), along(at)

@@ -1,10 +1,9 @@
 """Figures of tracks over recorded plots: plan view and range, estimates, residuals, innovations, probabilities.
 
-Whether the accuracies that a config states fit recorded plots, judged by the filters' own innovations.
-
-A filter that is right about its errors has innovations whose squares, over the variance that it believes, are 1 on
-average per degree of freedom (NIS). More: the plots are worse than stated, or the target manoeuvres harder than the
-filter takes it to; less: they are better.
+Whether the accuracies that a config states fit recorded plots, judged by the filters' own innovations. For a consistent
+filter the squares of the innovations, divided by their predicted variance, average 1 for each degree of freedom (NIS).
+Larger: the plots are worse than stated, or the target manoeuvres more than the filter assumes; smaller: they are
+better.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,16 +30,16 @@ MOST_FILTERS = 8
 MOST_TRACKS = 8  # with a colour of their own; more are grey
 MOST_RESIDUALS = 9  # panels of residuals
 MOST_DOTS = 300  # of a filter in a panel of residuals
-WINDOW = 15  # innovations that a mean over time takes
+WINDOW = 15  # innovations in a mean over time
 TALL_MM, USUAL_MM = 74.0, 52.0  # of a panel: of a plan view, of others
 TICKS = (0.01, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0, 1000.0)  # of a mean NIS
-FAR_M = 2e4  # from which a plan view counts in km
+FAR_M = 2e4  # distance from which a plan view uses km
 
 
 def figures(track: Track, paths: Mapping[str, Path]) -> dict[str, Figure]:
-    """`plan`, `track`, `residuals`, `nis` and `probabilities`, as far as there are such, described; by name.
+    """`plan`, `track`, `residuals`, `nis` and `probabilities`, as far as available, described; by name.
 
-    track: the one that is drawn; paths: where the plots of every track are, that one first.
+    track: the one to draw; paths: the places of every track's plots, that one first.
     """
     drawn = {
         "plan": plan(track, paths),
@@ -61,14 +60,14 @@ def _time() -> Axis:
 
 
 def _several(name: str, title: str, caption: str, made: list[Panel], keys: Sequence[tuple[str, Style]] = ()) -> Figure:
-    """A figure of panels and, where there are keys, their legend in a cell of its own."""
+    """A figure of panels with their legend, if there are keys, in a cell of its own."""
     made = [*made, *([Panel(_time(), _time(), (), keys=tuple(keys))] if keys else [])]
     columns = min(2 if len(made) == 4 else 3, len(made))
     return Figure(name, title, caption, tuple(made), columns, PAGE_MM if columns > 1 else COLUMN_MM, USUAL_MM)
 
 
 def _usual(values: np.ndarray) -> tuple[float | None, float | None]:
-    """Limits that show the usual values whole: the ends of 99 % of them and 30 % more, so that no start rules all."""
+    """Limits for the usual values: the range of 99 % of them and 30 % more, so that the start does not dominate."""
     known = values[np.isfinite(values)]
     if known.size < 50:
         return None, None
@@ -130,7 +129,7 @@ def plan(track: Track, paths: Mapping[str, Path]) -> Figure | None:
 
 
 def _drawn_paths(track: Track, paths: Mapping[str, Path]) -> list[Path]:
-    """Where the plots are; of a single track whose file has angles of an antenna, by its own coordinates."""
+    """The places of the plots; for a single track whose file has angles of an antenna, its own coordinates."""
     names = [name for name, _ in track.components]
     if len(paths) == 1 and {"x", "y", "z"} <= set(names) and track.residual is not None:
         (path,) = paths.values()
@@ -144,11 +143,11 @@ def _drawn_paths(track: Track, paths: Mapping[str, Path]) -> list[Path]:
 
 
 def _ends(path: Path, size: float) -> list:
-    """Words at the first and the last place of a track, on the side where the track does not go."""
+    """Labels at the first and the last place of a track, on the side away from the track."""
     known = np.flatnonzero(np.isfinite(path.places[:, :2]).all(axis=1))
     if not known.size:
         return []
-    made, third = [], max(len(known) // 3, 1)  # its direction at an end is that of a third of it
+    made, third = [], max(len(known) // 3, 1)  # its direction at an end is that of the nearest third
     ends = ((known[0], known[min(third, len(known) - 1)], tr("start")), (known[-1], known[-third], tr("end")))
     for i, inner, what in ends:
         north, east = path.places[i, :2] - path.places[inner, :2]
@@ -158,15 +157,15 @@ def _ends(path: Path, size: float) -> list:
     return made
 
 
-# ---- estimates and what they miss -----------------------------------------------------------------------------------
+# ---- estimates and their errors --------------------------------------------------------------------------------------
 def estimates(track: Track) -> Figure:
-    """A panel for each component: the filters' estimates with what they believe of themselves, and the plots."""
+    """A panel for each component: the filters' estimates with their standard deviations, and the plots."""
     made, every = [], max(1, len(track.components) // max(1, len(track.measured)))
     for c, (component, unit) in enumerate(track.components):
         marks: list = []
         d, is_value = divmod(c, every)
         if track.residual is not None and is_value == 0 and d < len(track.measured):
-            plots = track.residual[..., d] + track.estimate[..., c]  # the same of every filter that has an estimate
+            plots = track.residual[..., d] + track.estimate[..., c]  # the same for every filter that has an estimate
             first, known = np.isfinite(plots).argmax(axis=0), np.isfinite(plots).any(axis=0)
             plots = plots[first, np.arange(plots.shape[1])]
             marks.append(Line(track.t_s[known], plots[known], "", PLOT, name=tr("plots")))
@@ -187,7 +186,7 @@ def estimates(track: Track) -> Figure:
 
 
 def residuals(track: Track) -> Figure | None:
-    """Plot less estimate, a panel for each filter and each number that is measured, between its ± 2 σ bounds."""
+    """Plot minus estimate, a panel for each filter and each measured number, between its ± 2 σ bounds."""
     if track.residual is None:
         return None
     made: list[Panel] = []
@@ -255,7 +254,7 @@ def innovations(track: Track) -> Figure | None:
 
 
 def probabilities(track: Track) -> Figure | None:
-    """Probabilities of the models, a panel for each filter of several."""
+    """Probabilities of the models, a panel for each multiple-model filter."""
     if track.probability is None:
         return None
     made = []
@@ -274,17 +273,17 @@ def probabilities(track: Track) -> Figure | None:
 
 # ---- accuracy --------------------------------------------------------------------------------------------------------
 LEAST_TESTS = 10  # below which there is no verdict
-CLOSE = 0.005  # of one, to which the mean is brought
+CLOSE = 0.005  # relative accuracy to which the mean is brought to 1
 ROUNDS = 60
 FITS, SMALL, LARGE, UNKNOWN = "fits", "too small", "too large", "too few plots"
 
 
 @dataclass(frozen=True)
 class Judged:
-    """One test: filter, what was measured, mean NIS with the bounds of a right filter, verdict, and the σ that would.
+    """One test: filter, measured number, mean NIS with its bounds for a consistent filter, verdict, and the fitting σ.
 
-    better holds, by key of the config, the standard deviations with which the mean is one; empty where the stated ones
-    fit, or where there are none such.
+    better: by config key, the standard deviations for which the mean is one; empty where the stated ones fit, or where
+    there are none such.
     """
 
     filter: str
@@ -316,7 +315,7 @@ def _judge(tally: Tally) -> Judged:
 
 
 def _own(case: Case, one: Judged, improved: Mapping[str, float]) -> dict[str, float]:
-    """Of the better values those of this test's keys."""
+    """The better values of this test's keys."""
     if one.verdict not in (SMALL, LARGE):
         return {}
     keys = recorded_of(case).sigmas(case.spec)[one.name]
@@ -324,10 +323,10 @@ def _own(case: Case, one: Judged, improved: Mapping[str, float]) -> dict[str, fl
 
 
 def better(case: Case, filter_name: str, columns: Mapping[str, np.ndarray]) -> dict[str, float]:
-    """The standard deviations, by their keys, with which one filter's mean NIS is 1 in each thing it tests.
+    """The standard deviations, by config key, for which one filter's mean NIS is 1 in each number it tests.
 
-    By running the filter again and again over the first rows, each σ multiplied by the root of its NIS; empty where
-    that does not come to an end (a filter whose manoeuvre variance alone explains more than the plots' scatter).
+    The filter runs repeatedly over the first rows, each σ multiplied by the root of its NIS; empty where that does not
+    converge (a filter whose manoeuvre variance alone explains more than the plots' scatter).
     """
     of = recorded_of(case)
     (options,) = (f for f in case.spec.filters if f.name == filter_name)
@@ -343,7 +342,7 @@ def better(case: Case, filter_name: str, columns: Mapping[str, np.ndarray]) -> d
         off: list[float] = []
         change: dict[str, list[float]] = {key: [] for key in factors}
         for q, (name, freedom) in enumerate(track.tested):
-            assert track.nis is not None  # what is tested has its NIS
+            assert track.nis is not None  # a tested number has its NIS
             values = track.nis[0, :, q]
             values = values[np.isfinite(values)]
             if values.size >= LEAST_TESTS:

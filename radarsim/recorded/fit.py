@@ -1,18 +1,15 @@
-"""A likelihood of recorded plots along some of what can explain them: keys of the config, and beside them outliers, a
-bias, errors that last from plot to plot.
+"""The config's numbers from recorded plots, by the likelihood of a filter's innovations.
 
-Whether recorded velocities are folded: by the ranges of the same plots, whatever a config says of their errors.
+The filter's predictions give each plot a density; their product is the likelihood of the filter's parameters (Schweppe
+1965). Estimates maximise it; an interval holds the values of a key at which the largest likelihood over all other keys
+is within half the 95 % point of chi-square of the maximum (profile likelihood). Beside the keys the plots may have
+outliers, a bias, or errors correlated from plot to plot.
 
-A velocity that is ambiguous by a span D lies within half of it, and differs from the change of the range by a whole
-number of spans. So where no velocity is beyond A / 2 the span is A at least, and a range that changes faster than A / 2
-has folded them. Which span it is follows from the differences, as far as they tell it. An error of all velocities
-alike does not look so: it shows in the velocities themselves.
-
-What recorded plots say of the config's numbers: by the likelihood of the innovations of a filter.
-
-The filter's predictions give each plot a density; their product is the likelihood of the numbers that it was built
-with (Schweppe 1965). Estimates are where it is largest; an interval holds the values of a key at which the largest
-likelihood over all other keys is within half the 95 % point of chi-square of it (profile likelihood).
+Whether recorded velocities are folded: from the ranges of the same plots, whatever a config states of their errors. A
+velocity ambiguous by a span D lies within half of it, and differs from the rate of the range by a whole number of
+spans. So if no velocity exceeds A / 2 in size, the span is A at least, and a range that changes faster than A / 2
+proves folding. The span follows from the differences, as far as they determine it. A common error of all velocities
+does not look like that: it shows in the velocities themselves.
 """
 
 import itertools
@@ -37,30 +34,30 @@ from radarsim.studies import registry
 from radarsim.studies.interface import BIAS, CORRELATION, EXPLANATIONS, OUTLIERS, Likelihood
 
 # ---- along -----------------------------------------------------------------------------------------------------------
-ROUGHLY = 0.01  # to which explanations are compared, in the logarithm of a key and of the likelihood
+ROUGHLY = 0.01  # relative accuracy, of a key and of the likelihood, to which explanations are compared
 LOWEST, HIGHEST = np.log(1e-4), np.log(1e4)  # of a key's factor
 MOST_BIAS = 50.0  # in σ of the velocity
-SHARES = {OUTLIERS: (1e-3, 0.4, 3.0), CORRELATION: (1e-3, 0.99, 0.0)}  # least, most, logit from which it is searched
-FAR_FROM_ZERO = 1e4  # times what counts as zero of a key
-IMPOSSIBLE = -1e300  # what counts as the logarithm of no likelihood: a search needs a number
-TOP, END, BESIDE = 130, 15, 60  # likelihoods that a key costs on the way to the top and to an end; an explanation
+SHARES = {OUTLIERS: (1e-3, 0.4, 3.0), CORRELATION: (1e-3, 0.99, 0.0)}  # least, most, logit at the start of the search
+FAR_FROM_ZERO = 1e4  # times the value of a key that counts as zero
+IMPOSSIBLE = -1e300  # stands for the logarithm of zero likelihood: a search needs a number
+TOP, END, BESIDE = 130, 15, 60  # likelihood evaluations of a key to the maximum and to an end; of an explanation
 NOTHING: Mapping[str, float] = MappingProxyType({})
 STARTS = (-2.0, 0.0, 2.0)  # of a search
-Progress = Callable[[int, int | None], None]  # likelihoods found, and how many it will be where that is known
+Progress = Callable[[int, int | None], None]  # likelihoods computed, and their expected number where known
 
 
 def silent(evaluations: int, expected: int | None = None) -> None:
-    """Progress that nobody sees."""
+    """Progress that is not shown."""
 
 
 def units(likelihood: Likelihood) -> np.ndarray:
-    """From where each key is searched: as the config states it; one that it states as zero, far from what counts so."""
+    """Starting values of the keys: as stated; one stated as zero starts far above what counts as zero."""
     near_zero = np.asarray(likelihood.stated) <= likelihood.least
     return np.where(near_zero, FAR_FROM_ZERO * np.asarray(likelihood.least), likelihood.stated)
 
 
 class Counted:
-    """A likelihood that counts how often it is found."""
+    """A likelihood that counts its evaluations."""
 
     def __init__(self, of: Likelihood, progress: Progress, count: int = 0, expected: int | None = None):
         self.of, self.progress, self.count, self.expected = of, progress, count, expected
@@ -73,7 +70,7 @@ class Counted:
 
 
 def value(likelihood: Counted, changed: Mapping[str, float]) -> float:
-    """The likelihood with some of the explanations at work."""
+    """The likelihood with some of the explanations applied."""
     stated = zip(likelihood.keys, likelihood.stated, strict=True)
     values = np.array([changed.get(key, value) for key, value in stated])
     found = likelihood(values, {what: changed[what] for what in EXPLANATIONS if what in changed})
@@ -81,7 +78,7 @@ def value(likelihood: Counted, changed: Mapping[str, float]) -> float:
 
 
 class Along:
-    """A likelihood along some explanations, each on the scale on which it is searched; others held at a value."""
+    """A likelihood along some explanations, each on its search scale; others held at a value."""
 
     def __init__(self, likelihood: Counted, whats: Sequence[str], held: Mapping[str, float] = NOTHING):
         unit = dict(zip(likelihood.keys, units(likelihood.of).tolist(), strict=True))
@@ -101,15 +98,15 @@ class Along:
 def best(
     likelihood: Counted, whats: Sequence[str], start: Mapping[str, float], held: Mapping[str, float] = NOTHING
 ) -> tuple[dict[str, float], float]:
-    """Where the likelihood is largest along some explanations, others held, and its logarithm there: roughly, from
-    three starts of the last one."""
+    """The maximum of the likelihood along some explanations, others held, and its logarithm there: roughly, from three
+    starts of the last one."""
     along, last = Along(likelihood, whats, held), whats[-1]
     tops = [climbed(along, {**start, last: along.scales[last][0](first)}) for first in STARTS]
     return max(tops, key=lambda top: top[1])
 
 
 def climbed(along: Along, start: Mapping[str, float]) -> tuple[dict[str, float], float]:
-    """The top that is reached from a start, and the logarithm of the likelihood there, roughly."""
+    """The maximum reached from a start, and the log-likelihood there, roughly."""
     from scipy.optimize import minimize
 
     def cost(at: np.ndarray) -> float:
@@ -123,7 +120,7 @@ def climbed(along: Along, start: Mapping[str, float]) -> tuple[dict[str, float],
 
 
 def _scale(what: str, unit: dict[str, float]) -> tuple[Callable[[float], float], Callable[[float], float]]:
-    """From what is searched to the value of an explanation, and back; unit: of each key."""
+    """From the search scale to the value of an explanation, and back; unit: of each key."""
     if what == BIAS:
         return lambda x: float(np.clip(x, -MOST_BIAS, MOST_BIAS)), lambda value: value
     if what in SHARES:
@@ -139,21 +136,21 @@ def _scale(what: str, unit: dict[str, float]) -> tuple[Callable[[float], float],
 
 
 # ---- doppler ---------------------------------------------------------------------------------------------------------
-FINE = 1 / 8  # of the least span: the standard deviation to which the change of the range is to be known
-MOST = 0.6  # of the plots at which it is
-MOST_PLOTS = 1000  # over which is looked
+FINE = 1 / 8  # of the least span: the standard deviation required of the rate of the range
+MOST = 0.6  # of the plots must have it
+MOST_PLOTS = 1000  # examined at most
 WIDEST = 2.0  # times its usual length that a window of plots may last
 CLEAR = 4.0  # standard deviations by which a range changes faster than a velocity can be
-LEAST_PLOTS, LEAST_SHARE_OF_PLOTS = 3, 0.1  # of those looked at, at which it does
-CHANCE, FOUND = 1.0, 3.0  # standard deviations by which whole spans are told from chance: of one that is known, of any
+LEAST_PLOTS, LEAST_SHARE_OF_PLOTS = 3, 0.1  # of the plots examined that must do so
+CHANCE, FOUND = 1.0, 3.0  # standard deviations that distinguish whole spans from chance: for a known span, for any
 VELOCITY, MEASURED = "velocity_mps", ("range_m", "velocity_mps")
-STEPS = 200  # of a search for the span, in which the phase of the farthest velocity turns once
+STEPS = 200  # of a search for the span, in which the phase of the largest velocity turns once
 
 
 @dataclass(frozen=True)
 class Folding:
-    """Velocities that are folded: the greatest of them and the fastest change of the ranges, m/s; the span, m/s, that
-    was known or that the plots fit best, None where they do not tell."""
+    """Folded velocities: the largest of them and the fastest rate of the ranges, m/s; the span, m/s, known or fitted to
+    the plots, None where they do not determine it."""
 
     velocity_mps: float
     rate_mps: float
@@ -163,7 +160,7 @@ class Folding:
 
 def folding(tracks: Sequence[Mapping[str, np.ndarray]], span_mps: float | None = None) -> Folding | None:
     """Whether the velocities of tracks, columns t_s, range_m and velocity_mps (n,), are folded; None where they are
-    not, or the plots are too few to tell. span_mps: by what, where it is known."""
+    not, or where too few plots decide it. span_mps: the span, where known."""
     whole = [np.stack([one["t_s"], one["range_m"], one["velocity_mps"]]) for one in tracks]
     whole = [one[:, np.isfinite(one).all(axis=0)] for one in whole]
     fastest = max((float(np.abs(one[2]).max()) for one in whole if one.size), default=0.0)
@@ -173,7 +170,7 @@ def folding(tracks: Sequence[Mapping[str, np.ndarray]], span_mps: float | None =
     rates, velocities, sigma = seen
     off = rates - velocities
     beyond = int((np.abs(off) > fastest + CLEAR * sigma).sum())
-    turned = np.median(np.abs(rates + velocities))  # of the other sign they are off by twice their size
+    turned = np.median(np.abs(rates + velocities))  # with the other sign they are off by twice their size
     if beyond < max(LEAST_PLOTS, LEAST_SHARE_OF_PLOTS * off.size) or turned < 0.5 * np.median(np.abs(off)):
         return None
     span = _span(off, 2 * fastest)
@@ -184,7 +181,7 @@ def folding(tracks: Sequence[Mapping[str, np.ndarray]], span_mps: float | None =
 
 
 def folded(case: Case, tracks: Sequence[Mapping[str, np.ndarray]]) -> Folding | None:
-    """Whether the velocities of tracks, columns (n,) each, are folded where a case's study takes them as measured."""
+    """Whether velocities of tracks, columns (n,) each, are folded although a case's study takes them as measured."""
     of = recorded_of(case)
     if VELOCITY not in tracks[0] or of.unfolding(1.0) is not None:
         return None
@@ -192,8 +189,8 @@ def folded(case: Case, tracks: Sequence[Mapping[str, np.ndarray]]) -> Folding | 
 
 
 def said(found: Folding, source: str | os.PathLike, case: Case | None = None) -> str:
-    """That velocities are folded, by what, and the command that unfolds them; source: the file of plots; case: of whose
-    radar, where there is one."""
+    """A message that velocities are folded, by which span, and the command that unfolds them; source: the file of
+    plots; case: its radar, where there is one."""
     told = {
         "velocity": significant_digits(found.velocity_mps, "#.3g"),
         "rate": significant_digits(found.rate_mps, "#.3g"),
@@ -214,7 +211,7 @@ def said(found: Folding, source: str | os.PathLike, case: Case | None = None) ->
 
 
 def _unfolded(found: Folding, source: str | os.PathLike, case: Case | None) -> list[str]:
-    """The command whose filters take the velocities as they are, with what the config says of their errors."""
+    """The command whose filters take the velocities as they are, with the config's statements on their errors."""
     span = found.span_mps or 2 * found.velocity_mps
     parts = [one for one in registry.parts(lambda study: study.recorded()).values() if one is not None]
     ways = [way for part in parts if (way := part.unfolding(float(f"{span:.4g}"))) is not None]
@@ -231,9 +228,9 @@ def _unfolded(found: Folding, source: str | os.PathLike, case: Case | None) -> l
 
 
 def _rates(tracks: Sequence[np.ndarray], least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """The change of the range at plots, the velocities there, and the standard deviations of the changes, (m,) each:
-    from parabolas through as few ranges about each as let it be known to FINE for most of them; None where no number of
-    them does."""
+    """The rate of the range at plots, the velocities there, and the standard deviations of the rates, (m,) each: from
+    parabolas through the smallest number of ranges around each that gives an accuracy of FINE for most of them; None
+    where no number does."""
     half, total = 2, sum(one.shape[1] for one in tracks)
     every = max(total // MOST_PLOTS, 1)
     while least > 0:
@@ -241,7 +238,7 @@ def _rates(tracks: Sequence[np.ndarray], least: float) -> tuple[np.ndarray, np.n
         rates, velocities, left, spread = np.concatenate([np.empty((4, 0)), *fits], axis=1)
         if not left.size:
             return None
-        # Of the squares left of normal errors the median is about that of chi-square (Wilson and Hilferty).
+        # The median of the residual squares of normal errors is about that of chi-square (Wilson and Hilferty).
         freedom = 2 * half - 2
         sigma = np.sqrt(np.median(left) / (freedom * (1 - 2 / (9 * freedom)) ** 3))
         fine = sigma * spread <= FINE * least
@@ -252,9 +249,8 @@ def _rates(tracks: Sequence[np.ndarray], least: float) -> tuple[np.ndarray, np.n
 
 
 def _parabolas(track: np.ndarray, half: int, every: int) -> np.ndarray:
-    """Of parabolas through the ranges of 2 half + 1 plots about one, at the ends of a track of those nearest: (4, m)
-    slope there, velocity there, the sum of squares that is left, the standard deviation of the slope for errors of 1 m.
-    """
+    """Parabolas through the ranges of 2 half + 1 plots around each, at the ends of a track of the nearest ones: (4, m)
+    slope there, velocity there, residual sum of squares, standard deviation of the slope for errors of 1 m."""
     size, (t, r, v) = 2 * half + 1, track
     usual = np.median(np.diff(t)) * (size - 1)
     rows = []
@@ -272,8 +268,8 @@ def _parabolas(track: np.ndarray, half: int, every: int) -> np.ndarray:
 
 
 def _whole(off: np.ndarray, spans: np.ndarray) -> np.ndarray:
-    """How clearly those velocities that are off (m,) by more than half a span are off by whole ones, for each span: the
-    mean of the cosine of their phase, in its standard deviations for phases by chance; zero where there are none."""
+    """How clearly the velocities that are off (m,) by more than half a span are off by whole ones, for each span: the
+    mean cosine of their phase, in its standard deviations for random phases; zero where there are none."""
     phase = np.abs(off)[None] / spans[:, None]
     folded = phase > 0.5
     count = folded.sum(axis=1)
@@ -291,32 +287,32 @@ def _span(off: np.ndarray, least: float) -> float | None:
 
 # ---- fit -------------------------------------------------------------------------------------------------------------
 HALF_CHI2_95 = 1.9207294103470  # half the 95 % point of chi-square with one degree of freedom
-LEAST_ROWS = 10  # of a track; shorter ones say next to nothing
-FIRST_STEP, ROUGH = 0.3, 1e-4  # of a search, and where it stands still before it is carried on, in the same logarithms
-REACH = 1e4  # how many times larger or smaller than the estimate an end of an interval is looked for
+LEAST_ROWS = 10  # of a track; shorter ones carry almost no information
+FIRST_STEP, ROUGH = 0.3, 1e-4  # step of a search at its start, and its end before a restart, in the same logarithms
+REACH = 1e4  # ratio to the estimate up to which an end of an interval is searched
 EVALUATIONS = 2000
-# To which a top and an end of an interval are found, in the logarithm of a key; the likelihood's own to a tenth. That
-# is far finer than what is printed: which way a search goes hangs on last digits, and these differ between processors.
+# Accuracy of a maximum and of an interval's end, in the logarithm of a key; of the likelihood a tenth of that. Far
+# finer than printed digits, since the path of a search depends on last digits, and these differ between processors.
 CLOSE = 1e-6
-STEP = 1e-3  # over which a slope is taken, in the logarithm of a key
-WIDE_STEP = 1e-2  # the same on the way there, where curvature is taken too
-FLAT, LONGEST_STEP = 1e-3, 1.5  # curvature that counts as none, and the longest Newton step, of that logarithm
+STEP = 1e-3  # difference for a slope, in the logarithm of a key
+WIDE_STEP = 1e-2  # the same during the search, where curvature is needed too
+FLAT, LONGEST_STEP = 1e-3, 1.5  # curvature that counts as none, and the longest Newton step, in that logarithm
 MOST_TOGETHER = 0.999  # of the correlation of two keys
 MOST_STEPS = 40
-SHORT_SIMPLEX = (50, 100, 200)  # likelihoods that a simplex takes before Newton steps are tried again
-RISES = np.array([2.0, 4.0, 6.0])  # below where a key that may be zero is clearly not, in that logarithm
-NEAR_ZERO = 7.0  # above what counts as zero, in that logarithm: tried at zero
-ALMOST = 300.0  # times what is close enough: a Newton step that promises no more comes close enough
-LEAST_SHARE, MOST_SHARE = 1e-6, 0.5  # of outliers; less is none
-MOST_OUTLIERS = 0.3  # of plots that may have ten times their σ; where it takes more, their errors are of another law
-FINER, LEAP = 1e-3, 0.01  # what counts as zero is this part of before where the likelihood leaps by more there
+SHORT_SIMPLEX = (50, 100, 200)  # evaluations of a simplex before Newton steps are tried again
+RISES = np.array([2.0, 4.0, 6.0])  # below these a key that may be zero is clearly not zero, in that logarithm
+NEAR_ZERO = 7.0  # above the value that counts as zero, in that logarithm: zero is tried
+ALMOST = 300.0  # times the accuracy: a Newton step that gains no more ends the search
+LEAST_SHARE, MOST_SHARE = 1e-6, 0.5  # of outliers; fewer are none
+MOST_OUTLIERS = 0.3  # of plots that may have ten times their σ; beyond, their errors follow another law
+FINER, LEAP = 1e-3, 0.01  # factor on the value that counts as zero where the likelihood jumps by more there
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """One key: the value that fits best, its 95 % interval, and whether the plots tell it from all other values.
+    """One key: the best value, its 95 % interval, and whether the plots distinguish it from all other values.
 
-    lo is 0 where the key may as well be zero, hi infinite where it has no upper end.
+    lo is 0 where the key may be zero, hi infinite where it has no upper end.
     """
 
     key: str
@@ -329,9 +325,9 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Fit:
-    """What was fitted: filter, tracks and plots used, the keys, the share of outliers where they were allowed for, and
-    by how much the logarithm of the likelihood is above that of the stated values; and what else the plots have, of
-    EXPLANATIONS, with its value: then the intervals do not hold."""
+    """The fit: filter, tracks and plots used, the keys, the share of outliers where allowed for, and the increase of
+    the log-likelihood over the stated values; and another explanation that the plots have, of EXPLANATIONS, with its
+    value: then the intervals do not hold."""
 
     filter: str
     tracks: int
@@ -343,8 +339,8 @@ class Fit:
 
 
 def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name: str | None = None) -> Likelihood:
-    """The likelihood of a filter of an experiment's one case over all tracks of a file; of the one that takes the most
-    of a plot where none is named. Raises ConfigError."""
+    """The likelihood of a filter of an experiment's one case over all tracks of a file; without a name, of the filter
+    that takes most columns of a plot. Raises ConfigError."""
     case = one_case(experiment, "fit", f"radarsim fit {{}} {os.fspath(source)}")
     refuse_borrowed(case, "likelihood")
     of = recorded_of(case)
@@ -367,7 +363,7 @@ def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name
 
 
 def unlikely(case: Case, filter_name: str | None, others: Sequence[str]) -> str:
-    """That there is nothing to fit by; others: the filters of which the study says how likely recorded plots are."""
+    """The fault that no likelihood exists; others: the filters for which the study has one."""
     if filter_name is not None and others:
         known = ", ".join(others)
         return f"filter: {filter_name} does not say how likely plots are, which fit needs; must be one of {known}"
@@ -396,14 +392,14 @@ def fit(
     robust: bool = False,
     progress: Progress = silent,
 ) -> Fit:
-    """The config's numbers as the plots of a file have them; robust: allowing for outliers. progress is called with the
-    number of likelihoods found. Raises ConfigError."""
+    """Fit the config's numbers to the plots of a file; robust: allowing for outliers. progress is called with the
+    number of likelihoods computed. Raises ConfigError."""
     return fitted(likelihood_of(experiment, source, filter_name), robust, progress)
 
 
 def fitted(likelihood: Likelihood, robust: bool = False, progress: Progress = silent) -> Fit:
-    """The keys of a likelihood where it is largest, with profile intervals. Raises ConfigError where it is asked to
-    allow for outliers and cannot, or the plots have no likelihood whatever the keys."""
+    """The keys at the maximum of a likelihood, with profile intervals. Raises ConfigError where outliers cannot be
+    allowed for, or the plots are impossible whatever the keys."""
     if robust and OUTLIERS not in likelihood.explains:
         raise ConfigError(f"robust: the likelihood of filter {likelihood.filter} cannot allow for outliers")
     search = _Search(likelihood, robust, progress)
@@ -423,8 +419,8 @@ def fitted(likelihood: Likelihood, robust: bool = False, progress: Progress = si
 
 
 def _beside(search: "_Search", likelihood: Likelihood) -> tuple[str, float] | None:
-    """What explains the plots beside the keys that fit them best, with its value: that which raises the top most, if by
-    more than chance does in one recording of twenty."""
+    """The explanation, with its value, that raises the maximum most beside the fitted keys, if by more than chance does
+    in one recording of twenty."""
     from scipy.stats import chi2
 
     fitted = search.natural(search.best).tolist()
@@ -441,8 +437,8 @@ def _beside(search: "_Search", likelihood: Likelihood) -> tuple[str, float] | No
 
 
 def polished(value: Callable[[np.ndarray], float], at: np.ndarray) -> np.ndarray:
-    """The top of a likelihood near one that a search has found, by two Newton steps. A search that compares stands
-    still where last digits decide: at their root. A difference over STEP is 10⁻⁷ wrong by them, and so is the top."""
+    """The maximum of a likelihood near one from a search, by two Newton steps. A search by comparison stalls at the
+    root of the last digits. A difference over STEP is 10⁻⁷ wrong by them, and so is the maximum."""
     shape, start = _Shape(value), at
     here = value(at)
     if not math.isfinite(shape.step(at, here, np.arange(at.size))[1]):
@@ -454,15 +450,15 @@ def polished(value: Callable[[np.ndarray], float], at: np.ndarray) -> np.ndarray
 
 
 class _Shape:
-    """How a likelihood is curved near a point, as Newton steps need it: that along each coordinate is found anew at
-    each step, from the differences that give the slope; how coordinates hang together, (n, n), is kept from before."""
+    """Curvature of a likelihood near a point, for Newton steps: along each coordinate it is computed anew at each step,
+    from the differences that give the slope; cross terms between coordinates, (n, n), are kept from before."""
 
     def __init__(self, value: Callable[[np.ndarray], float], together: np.ndarray | None = None):
         self.value, self.together = value, together
-        self.H = np.zeros((0, 0))  # the curvature at the last step, of the coordinates that were free
+        self.H = np.zeros((0, 0))  # the curvature at the last step, of the coordinates free then
 
     def step(self, at: np.ndarray, here: float, free: np.ndarray) -> tuple[np.ndarray, float]:
-        """A step up from `at`, of the free coordinates alone, and the gain that it promises."""
+        """An ascending step from `at`, of the free coordinates alone, and its predicted gain."""
         moves = WIDE_STEP * np.eye(at.size)[free]
         above, below = (np.array([self.value(at + sign * move) for move in moves]) for sign in (1, -1))
         if not (np.isfinite(here) and min(above.min(), below.min(), here) > IMPOSSIBLE):
@@ -482,14 +478,14 @@ class _Shape:
         return step, float(step[free] @ slope)
 
     def solved(self, slope: np.ndarray) -> np.ndarray:
-        """The Newton step up a slope (n,), none longer than LONGEST_STEP along any axis of the curvature."""
+        """The Newton step up a slope (n,), at most LONGEST_STEP along any axis of the curvature."""
         sizes, axes = np.linalg.eigh(self.H)
         along = axes.T @ slope / np.maximum(np.abs(sizes), FLAT)
         return axes @ np.clip(along, -LONGEST_STEP, LONGEST_STEP)
 
 
 class _Point(NamedTuple):
-    """A point of a profile: the logarithm of the key held, the largest likelihood there, and where that is."""
+    """A point of a profile: the logarithm of the key held, the largest likelihood there, and its coordinates."""
 
     at: float
     top: float
@@ -497,8 +493,8 @@ class _Point(NamedTuple):
 
 
 class _Search:
-    """The maximum of a likelihood, and its profile along each key. Searched are logarithms of the keys, and the logit
-    of the share of outliers."""
+    """The maximum of a likelihood, and its profile along each key. Coordinates are logarithms of the keys, and the
+    logit of the share of outliers."""
 
     def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress, evaluations: int = 0):
         self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, evaluations
@@ -513,7 +509,7 @@ class _Search:
         self.top_at = evaluations + TOP * start.size * (1 + robust)
         self.shape = _Shape(self._value)
         self.best, self.top = self._climbed(start, None, ROUGH)
-        # A second start far away: the likelihood of manoeuvre and plot errors may have two hills.
+        # A second start far away: the likelihood of manoeuvre and plot errors may have two maxima.
         for climbs, factor in enumerate((0.1, 10.0), 1):
             self.top_at = max(self.top_at, evaluations + (self.evaluations - evaluations) * 3 // climbs)
             moved = np.where(self.best > self.lowest, self.best, start)
@@ -532,8 +528,8 @@ class _Search:
         self.ends_begun_at = self.evaluations
 
     def natural(self, searched: np.ndarray) -> np.ndarray:
-        """The keys, and the share of outliers at the end where they are allowed for: at most MOST_SHARE, for all plots
-        as outliers of a tenth of the σ are as likely as none."""
+        """The keys, with the share of outliers at the end where allowed for: at most MOST_SHARE, since all plots as
+        outliers of a tenth of the σ are as likely as none."""
         count = len(self.likelihood.stated)
         keys = np.exp(np.clip(searched[:count], -200, 200))
         keys = np.where(keys <= self.likelihood.least, 0.0, keys)
@@ -550,7 +546,8 @@ class _Search:
         return found if math.isfinite(found) else IMPOSSIBLE
 
     def _expected(self) -> int:
-        """How many likelihoods it will be: the top and each end as they usually take, or as those found so far took."""
+        """Expected number of evaluations: the maximum and each end at their usual cost, or at that of those found so
+        far."""
         ends, size = 2 * len(self.likelihood.keys), len(self.likelihood.keys) + self.robust
         beside = BESIDE * (len(self.likelihood.explains) - self.robust)
         top = self.ends_begun_at or max(self.top_at, self.evaluations)
@@ -558,8 +555,8 @@ class _Search:
         return max(round(top + each * ends), self.evaluations) + beside
 
     def _climbed(self, start: np.ndarray, held: int | None, close: float) -> tuple[np.ndarray, float]:
-        """The top reached from a start, one coordinate held or none, and the logarithm of the likelihood there: by
-        Newton steps, until one promises less than `close` of it; where they lead nowhere, by a simplex for a while."""
+        """The maximum reached from a start, one coordinate held or none, and the log-likelihood there: by Newton steps,
+        until one gains less than `close`; where they fail, by a simplex for a while."""
         free = np.array([i for i in range(len(start)) if i != held])
         at, here = start, self._value(start)
         shape = self.shape if held is not None else _Shape(self._value)
@@ -574,7 +571,7 @@ class _Search:
     def _newton(
         self, at: np.ndarray, here: float, free: np.ndarray, close: float, shape: _Shape
     ) -> tuple[np.ndarray, float, bool]:
-        """As `_climbed`, by Newton steps alone: how far they lead, and whether that is the top."""
+        """As `_climbed`, by Newton steps alone: where they end, and whether that is the maximum."""
         for _ in range(MOST_STEPS):
             at, here = self._zeroed(at, here, free)
             moved = free[at[free] > self.lowest[free]]
@@ -601,8 +598,8 @@ class _Search:
         return at, here, False
 
     def _zeroed(self, at: np.ndarray, here: float, free: np.ndarray) -> tuple[np.ndarray, float]:
-        """A point and its likelihood, with those free coordinates that have come near zero at zero, where that is no
-        worse: there a logarithm is a plain, over which steps lead on and on."""
+        """A point and its likelihood, with free coordinates near zero set to zero, where that is no worse: the
+        likelihood is flat in their logarithm there, and steps would never end."""
         for j in free:
             if self.lowest[j] < at[j] < self.lowest[j] + NEAR_ZERO:
                 zero = at.copy()
@@ -612,8 +609,8 @@ class _Search:
         return at, here
 
     def _by_simplex(self, start: np.ndarray, free: np.ndarray, close: float, most: int) -> tuple[np.ndarray, float]:
-        """As `_climbed`, by a simplex: until it stands still within `close`, and does so again when it begins anew from
-        there: on a plain a simplex may shrink before it has found the way up; or after `most` likelihoods."""
+        """As `_climbed`, by a simplex: until it stalls within `close`, twice, since in a flat region a simplex may
+        shrink before it has found the ascent; or after `most` evaluations."""
         from scipy.optimize import minimize
 
         whole = start.copy()
@@ -634,7 +631,7 @@ class _Search:
         return whole, top
 
     def _profile(self, i: int, at: float, near: np.ndarray) -> tuple[float, np.ndarray]:
-        """The largest likelihood with key i held at the logarithm `at`, and where that is; others that are zero rise
+        """The largest likelihood with key i held at the logarithm `at`, and its coordinates; others that are zero rise
         from there if that makes the plots likelier."""
         start = near.copy()
         start[i] = at
@@ -650,25 +647,25 @@ class _Search:
         return top, where
 
     def steps_at_zero(self, i: int) -> bool:
-        """Whether the likelihood leaps where a key is small enough to count as zero: it is not small enough then."""
+        """Whether the likelihood jumps where a key is small enough to count as zero: it is not small enough then."""
         above, zero = (self._sliced(i, self.lowest[i] + sign * CLOSE) for sign in (1, -1))
         return zero > IMPOSSIBLE and above > IMPOSSIBLE and abs(above - zero) > LEAP
 
     def _maybe_zero(self, i: int) -> bool:
-        """Whether the plots hardly tell a key, or the share of outliers, from zero: near zero its logarithm is a plain
-        without slope, on which a search stands still, though it has to rise where another one is held too low. Asked a
-        little above zero: a σ of nothing is no filter's."""
+        """Whether the plots hardly distinguish a key, or the share of outliers, from zero: near zero its logarithm has
+        no slope, on which a search stalls, though it must rise where another one is held too low. Tested a little above
+        zero, since no filter has σ = 0."""
         return self._sliced(i, self.lowest[i] + CLOSE) > self.top - HALF_CHI2_95
 
     def _raised(self, i: int) -> float:
-        """The logarithm of such a key from which a search sees the slope: where the likelihood falls above the top."""
+        """The logarithm of such a key from which a search has a slope: where the likelihood falls above the maximum."""
         log = max(float(self.best[i]), float(self.lowest[i]))
         while self._sliced(i, log) > self.top - HALF_CHI2_95 and log < self.highest[i]:
             log += 1.0
         return log
 
     def _sliced(self, i: int, log: float) -> float:
-        """The likelihood with one key changed and all others at the top."""
+        """The likelihood with one key changed and all others at the maximum."""
         at = self.best.copy()
         at[i] = log
         return self._value(at)
@@ -701,8 +698,8 @@ class _Search:
         return None
 
     def _crossing(self, i: int, inside: "_Point", outside: "_Point", limit: float) -> float:
-        """The logarithm of key i at which the profile crosses a limit between two points: by secants of the root of its
-        fall from the top, which is nearly a straight line (Illinois method)."""
+        """The logarithm of key i at which the profile crosses a limit between two points: by secants of the square root
+        of its fall from the maximum, which is nearly a straight line (Illinois method)."""
 
         def above(point: _Point) -> float:
             fall = self.top - point.top
@@ -723,7 +720,7 @@ class _Search:
             replaced = side
 
     def _far_as(self, i: int) -> float:
-        """A little more than how far from the top an end is, were the likelihood a parabola there."""
+        """A little more than the distance of an end from the maximum if the likelihood were a parabola."""
         H = -self.curvature
         try:
             spread = float(np.linalg.inv(H)[i, i])
@@ -737,12 +734,12 @@ def _logit(share: float) -> float:
 
 
 def settings(found: Fit) -> dict[str, float]:
-    """What to write into the config, by key, to four digits; keys that the plots do not tell stay as they are."""
+    """Settings for the config, by key, to four digits; keys that the plots do not determine stay as they are."""
     return {one.key: float(f"{one.value:.4g}") for one in found.keys if one.identifiable}
 
 
 def as_json(found: Fit) -> list[dict[str, object]]:
-    """The keys as `fit --json` prints them; an interval without an upper end has none there."""
+    """The keys as `fit --json` prints them; an interval without an upper end has null there."""
     return [
         {
             "key": one.key,

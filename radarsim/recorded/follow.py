@@ -1,11 +1,10 @@
-"""Whether estimates after a long gap are more than rounding: the same plots followed again, times stretched by 10⁻¹⁰.
+"""The filters of an experiment over recorded plots, and a simulated realisation's plots to try them on.
 
-A covariance extrapolated over a gap can be so much larger than a plot's that the difference of the two, which is the
-estimate's, has no digit left: σ comes out wrong, zero or not at all. Stretched times change what is right in the tenth
-digit, and what is rounding altogether. Only the rows after a gap are compared: a filter of several models that has lost
-its target magnifies any difference by itself.
-
-The filters of an experiment over recorded plots, and a realisation's plots to try them on.
+Whether estimates after a long gap are more than rounding: the same plots are filtered again with times stretched by
+10⁻¹⁰. A covariance extrapolated over a gap can be so much larger than a plot's that the estimate's, their difference,
+has no digit left: σ comes out wrong, zero or not at all. Stretched times change correct values in the tenth digit, and
+rounding altogether. Only the rows after a gap are compared: a multiple-model filter that has lost its target magnifies
+any difference by itself.
 """
 
 import itertools
@@ -39,14 +38,14 @@ if TYPE_CHECKING:
 
 # ---- rounding --------------------------------------------------------------------------------------------------------
 STRETCH = 1 + 2.0**-33
-SIGMA, ESTIMATE, CHANCE = 1e-5, 1e-3, 1e-3  # that stretched times may change: of σ, in σ, in probability
+SIGMA, ESTIMATE, CHANCE = 1e-5, 1e-3, 1e-3  # permitted changes by stretched times: of σ, in σ, in probability
 WIDE, PERIODS = 30.0, 1000.0  # a gap in median intervals so far, or in the config's scan periods
 AFTER = 100  # rows compared after a gap
-LENGTHS = ("m", "rad")  # units of what is measured, and so never known exactly
+LENGTHS = ("m", "rad")  # units of measured numbers, which are never known exactly
 
 
 class Twin:
-    """A second tracker beside the first, and where the longest interval before the first loss was."""
+    """A second tracker beside the first, and the longest interval before the first loss."""
 
     def __init__(self, tracker: Tracker, period_s: float):
         self.tracker, self.period_s, self.whole = tracker, period_s, tracker.most_rows is not None
@@ -58,7 +57,7 @@ class Twin:
     def lost(self, columns: dict[str, np.ndarray], track: Track) -> bool:
         """Whether the track (of the first tracker) over the next rows has lost its digits.
 
-        Then `gap_s` is the longest interval up to there and `gap_row` the row, from 0, that ends it.
+        Then `gap_s` is the longest interval so far and `gap_row` the row, from 0, that ends it.
         """
         t, *measured = columns.values()
         if self.origin is None:
@@ -71,7 +70,7 @@ class Twin:
         if compared.any() or not self.whole:
             with np.errstate(all="ignore"):
                 other = self.tracker.feed(columns | {"t_s": (t - self.origin) * STRETCH})
-            # Of several plots of a time the track has one row.
+            # Several plots of one time make one row of the track.
             bad = unlike(track, other) & np.isin(track.t_s, t[compared])
         first = np.searchsorted(t, track.t_s[bad.argmax()], side="right") if bad.any() else len(t)
         longest = int(steps[:first].argmax())
@@ -81,7 +80,7 @@ class Twin:
         return bool(bad.any())
 
     def _steps(self, t: np.ndarray, measured: list[np.ndarray]) -> np.ndarray:
-        """The time (n,) since the row that last had what a row has: the longest of its numbers, zero where none."""
+        """The time (n,) since the last row with the numbers that a row has: the longest over these, zero where none."""
         longest = np.zeros(len(t))
         for j, column in enumerate(measured):
             present = np.isfinite(column)
@@ -99,7 +98,7 @@ class Twin:
 
 
 def unlike(track: Track, other: Track) -> np.ndarray:
-    """Which rows (n,) of two tracks differ by more than they may, or hold a σ that cannot be."""
+    """Which rows (n,) of two tracks differ by more than permitted, or hold an impossible σ."""
     if track.estimate.shape != other.estimate.shape:
         return np.ones(len(track.t_s), dtype=bool)
     known, sigma = np.isfinite(track.estimate), track.sigma
@@ -107,7 +106,7 @@ def unlike(track: Track, other: Track) -> np.ndarray:
     with np.errstate(all="ignore"):
         bad = known & (~np.isfinite(sigma) | (length & (sigma <= 0)))
         bad |= known != np.isfinite(other.estimate)
-        # What is no number differs from every number: "not within" in place of "beyond".
+        # NaN differs from every number: hence "not within" in place of "beyond".
         bad |= known & ~(np.abs(sigma - other.sigma) <= SIGMA * sigma)
         bad |= known & (sigma > 0) & ~(np.abs(track.estimate - other.estimate) <= ESTIMATE * sigma)
         rows = bad.any(axis=(0, 2))
@@ -118,16 +117,16 @@ def unlike(track: Track, other: Track) -> np.ndarray:
 
 
 # ---- follow ----------------------------------------------------------------------------------------------------------
-MOST_DRAWN = 2000  # rows kept for figures; of more, every second is dropped again and again
-GAP = 3.0  # intervals' median lengths that make a gap
+MOST_DRAWN = 2000  # rows kept for figures; when there are more, every second is dropped
+GAP = 3.0  # in median intervals
 MOST_NAMED = 12  # configs or values listed where one must be chosen
-BEFORE = 10  # estimates of a filter's start that do not count against the truth
-HEAD = 5000  # rows that a better σ is looked for on
+BEFORE = 10  # first estimates of a filter, which are not compared with the truth
+HEAD = 5000  # rows on which a better σ is searched
 BY_ROW = ("estimate", "sigma", "probability", "residual", "nis", "score", "residual_sigma")  # arrays (F, n, …)
 
 
 def recorded_of(case: Case) -> RecordedPlots:
-    """What a case's study does with recorded plots, which `one_case` has made sure of."""
+    """The recorded-plots interface of a case's study, which `one_case` has checked for."""
     found = study(case.study).recorded()
     assert found is not None
     return found
@@ -137,10 +136,10 @@ Part = Literal["tracker", "simulated", "drawing", "likelihood"]
 
 
 def borrowed(case: Case, part: Part) -> list[str]:
-    """The keys of a case, dotted, that a part of its study does not know: of another study, whose keys it extends."""
+    """The keys of a case, dotted, that an inherited part of its study does not know: its keys extend another's."""
     of = recorded_of(case)
     module = getattr(of, part).__module__
-    if module == RecordedPlots.__module__ or of.of_any_keys:  # nobody's: it does nothing
+    if module == RecordedPlots.__module__ or of.of_any_keys:  # of no study: it does nothing
         return []
     if f"{module}.".startswith(f"{home_of(case.study)}."):  # of the study itself
         return []
@@ -149,7 +148,7 @@ def borrowed(case: Case, part: Part) -> list[str]:
 
 
 def refuse_borrowed(case: Case, part: Part) -> None:
-    """Raise ConfigError where a part of a study would pass over keys that it does not know."""
+    """Raise ConfigError where an inherited part of a study would ignore keys that it does not know."""
     if keys := borrowed(case, part):
         of = getattr(recorded_of(case), part).__module__
         raise ConfigError(
@@ -161,7 +160,7 @@ def refuse_borrowed(case: Case, part: Part) -> None:
 def one_case(experiment: Experiment, what: str, command: str) -> Case:
     """The one case of an experiment, of a study with plots; raises ConfigError.
 
-    what is to be done with it, and by which command, its config as {}: a fault names what there is to choose from.
+    what (the purpose) and command are for the fault, which lists the choices; {} in the command is the config.
     """
     place = experiment.path or experiment.stem
     if len(experiment.cases) > 1:
@@ -174,7 +173,7 @@ def one_case(experiment: Experiment, what: str, command: str) -> Case:
 
 
 def choice(experiment: Experiment, command: str) -> str:
-    """What cases there are to choose from, and the command for the first: configs put together, or swept values."""
+    """The cases to choose from, and the command for the first: configs put together, or swept values."""
     stems = list(dict.fromkeys(case.stem for case in experiment.cases))
     if len(stems) > 1 and experiment.changes_included:
         return f"choose one of {listed(stems)}: {_call(command, experiment.path or '', f'include=[{stems[0]}]')}"
@@ -192,7 +191,7 @@ def choice(experiment: Experiment, command: str) -> str:
 
 
 def _call(command: str, path: str, *settings: str) -> str:
-    """A command of a config with settings, or its arguments in Python; the config by its stem where that finds it."""
+    """A command on a config with settings, or the Python arguments; the config by its stem where that finds it."""
     file = Path(path)
     found = document.config_file(file.stem)
     name = path if file.is_file() and not (found and found.samefile(file)) else file.stem
@@ -202,14 +201,14 @@ def _call(command: str, path: str, *settings: str) -> str:
 
 
 def listed(names: list[str]) -> str:
-    """Names one after the other; of very many the first."""
+    """A list of names; if it is very long, its beginning."""
     return ", ".join([*names[:MOST_NAMED], *(["…"] if len(names) > MOST_NAMED else [])])
 
 
 def simulated(experiment: Experiment, realisation: int = 0) -> dict[str, np.ndarray]:
-    """The plots of one realisation of an experiment's one case, the very numbers of a run, and the truth as true_….
+    """The plots of one realisation of an experiment's one case, exactly those of a run, and the truth as true_….
 
-    Columns of equal length, not-a-number where a plot is missed. Raises ConfigError for a realisation that no run has.
+    Columns of equal length, NaN where a plot is missed. Raises ConfigError for a realisation outside every run.
     """
     if not 0 <= realisation < LARGEST_REALISATIONS:
         raise ConfigError(f"realisation: must be from 0 to {LARGEST_REALISATIONS - 1}, got {realisation}")
@@ -249,7 +248,7 @@ def _whole(name: str, value: Any, least: int) -> int:
 
 @dataclass
 class Tally:
-    """How many tests of a filter's innovations there were, and the sum of their squares over their variances."""
+    """Number of tests of a filter's innovations, and the sum of their normalised squares."""
 
     filter: str
     name: str
@@ -259,14 +258,14 @@ class Tally:
 
     @property
     def mean(self) -> float:
-        """Per degree of freedom: 1 for a filter that is right about its errors."""
+        """For each degree of freedom: 1 for a consistent filter."""
         return self.total / (self.count * self.freedom) if self.count else np.nan
 
 
 @dataclass
 class Errors:
-    """A filter's errors against the truth in one component: how many, the sum of their squares, plain and over the
-    variances that it believes. The first BEFORE estimates, those of its start, are left out."""
+    """A filter's errors against the truth in one component: number, sum of squares, and sum of squares over the
+    filter's variances. The first BEFORE estimates, those of its start, are left out."""
 
     filter: str
     component: str
@@ -277,7 +276,7 @@ class Errors:
     normed: float = 0.0
 
     def add(self, error: np.ndarray, sigma: np.ndarray) -> None:
-        """Count errors (n,) with the standard deviations (n,) that the filter believes."""
+        """Count errors (n,) with the filter's standard deviations (n,)."""
         skip = max(0, BEFORE - self.seen)
         self.seen += len(error)
         error, sigma = error[skip:], sigma[skip:]
@@ -292,13 +291,13 @@ class Errors:
 
     @property
     def ratio(self) -> float:
-        """Root of the mean square of the error in believed standard deviations: 1 for a filter that is right."""
+        """Root of the mean square error in the filter's standard deviations: 1 for a consistent filter."""
         return (self.normed / self.count) ** 0.5 if self.count else np.nan
 
 
 @dataclass
 class Followed:
-    """The filters over a file of plots: rows, time, gaps, missing values, tests; and what figures and checks need."""
+    """The filters over a file of plots: rows, time, gaps, missing values, tests; data for figures and checks."""
 
     case: Case
     source: str | os.PathLike = "PLOTS.csv"
@@ -315,10 +314,10 @@ class Followed:
     stride: int = 1
     head: dict[str, np.ndarray] = field(default_factory=dict)
     median_s: float = np.nan
-    tracks: dict[str, "Followed"] = field(default_factory=dict)  # of a file that tells several apart, by name
-    passed_over: int = 0  # rows that belong to no track
-    errors: dict[tuple[str, str], Errors] = field(default_factory=dict)  # by filter and component, where there is truth
-    places: Places = field(default_factory=Places)  # where the plots are, for the plan view
+    tracks: dict[str, "Followed"] = field(default_factory=dict)  # by name, where the file has several
+    passed_over: int = 0  # rows of no track
+    errors: dict[tuple[str, str], Errors] = field(default_factory=dict)  # by filter and component, with truth
+    places: Places = field(default_factory=Places)  # places of the plots, for the plan view
 
     def take(self, columns: Mapping[str, np.ndarray], track: Track) -> None:
         """Count one more piece of the file."""
@@ -343,7 +342,7 @@ class Followed:
 
     def compare(self, track: Track, t_s: np.ndarray, truth: Mapping[str, np.ndarray]) -> None:
         """Count the errors of a piece of the track; truth: columns (n,) `true_COMPONENT_UNIT` at times t_s (n,)."""
-        rows = np.searchsorted(t_s, track.t_s)  # of several plots of a time the track has one row
+        rows = np.searchsorted(t_s, track.t_s)  # several plots of one time make one row of the track
         for c, (component, unit) in enumerate(track.components):
             column = truth.get(true_column(component, unit))
             if column is None:
@@ -421,7 +420,7 @@ class Follower:
         """The estimates over the next rows of the track; raises ConfigError where they are only rounding errors, or a
         filter cannot take a row.
 
-        The truth is counted against the estimates where its names fit the components.
+        The estimates are compared with the truth where its names match the components.
         """
         columns = own.columns
         try:
@@ -458,11 +457,10 @@ def follow(
 ) -> Followed:
     """The filters of an experiment's one case over the recorded plots in a CSV file, piece by piece to `sink`.
 
-    A file with a column `track` holds several tracks: the filters follow each by itself, and the sink is given its
-    name; rows without a name belong to none and are passed over. Tracks are followed in several threads (all cores
-    where None, none where 0), and come to the sink in the order of the file. Memory does not grow with a track's rows
-    where the study's filters go from row to row; others take so many rows at most. progress is called with the rows
-    done.
+    A file with a column `track` holds several tracks: each is filtered by itself, and the sink gets its name; rows
+    without a name are skipped. Tracks run in several threads (all cores where None, none where 0), and reach the sink
+    in the order of the file. Memory does not grow with a track's rows where the study's filters are recursive; others
+    take a limited number of rows. progress is called with the rows done.
 
     Raises ConfigError for an experiment of several cases, a study without recorded plots, and faults in the file.
     """
@@ -510,7 +508,7 @@ class Own(NamedTuple):
 
 
 def by_track(piece: plots.Piece) -> list[Own]:
-    """The rows of each track, in the order in which the tracks come first."""
+    """The rows of each track, in the order in which the tracks first appear."""
     tables = (piece.columns, piece.truth, piece.places)
     if piece.tracks is None:
         return [Own(None, *tables)]
@@ -521,7 +519,7 @@ def by_track(piece: plots.Piece) -> list[Own]:
 
 
 def together(case: Case, found: Mapping[str | None, Followed], passed_over: int) -> Followed:
-    """What was found over several tracks: sums, and what is drawn and tried again of the longest of them."""
+    """Sums over several tracks, and the drawings and checks of the longest of them."""
     longest = max(found.values(), key=lambda one: one.rows)
     whole = replace(longest, tallies={}, missing={}, estimating=set(), rows=0, gaps=0, errors={})
     whole.passed_over = passed_over
@@ -565,8 +563,8 @@ def draw(followed: Followed, folder: str | os.PathLike, sources: Iterable[str | 
 
 
 def put(folder: str | os.PathLike, contents: Mapping[str, bytes], sources: Iterable[str | os.PathLike] = ()) -> None:
-    """Write files into a folder. Raises StoreError, and ConfigError, with nothing written, where one of them would take
-    the place of one of the sources."""
+    """Write files into a folder. Raises StoreError, and ConfigError, with nothing written, where a file would overwrite
+    one of the sources."""
     from radarsim.report import files
 
     for name, source in itertools.product(contents, sources):

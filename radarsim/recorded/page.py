@@ -1,6 +1,6 @@
-"""What is said of tracks over recorded plots: rows, gaps, errors, how well the stated accuracies fit, advice.
+"""The report of tracks over recorded plots: one self-contained page, and its figures as files.
 
-The report of tracks over recorded plots: one self-contained page, and its figures as files.
+Its sentences: rows, gaps, errors, how well the stated accuracies fit, advice.
 """
 
 import math
@@ -18,22 +18,22 @@ from radarsim.report.wording import labelled, number, significant_digits, unit
 from radarsim.studies.interface import BIAS, CORRELATION, OUTLIERS
 
 # ---- words -----------------------------------------------------------------------------------------------------------
-CLEAR = 3.0  # of the logarithm of a likelihood, twenty times: from there on one filter is clearly the best
+CLEAR = 3.0  # of the log-likelihood, twenty times: from there on one filter is clearly the best
 
 
 def sentences(followed: Followed, judged: Sequence[accuracy.Judged], advised: Advice | None) -> list[str]:
-    """All that is said, a line each; advised: where a likelihood is known."""
+    """All lines of the report; advised: where a likelihood is known."""
     lines = [tested(one, advised is None) for one in judged if one.tests]
     return [*rows(followed), *errors(followed), *lines, *verdict(followed, judged, advised)]
 
 
 def verdict(followed: Followed, judged: Sequence[accuracy.Judged], advised: Advice | None) -> list[str]:
-    """Which filter is best, and what is to be changed: by the likelihood where it is known."""
+    """The best filter, and the changes advised: by the likelihood where it is known."""
     return nearest(judged) if advised is None else likely(followed, advised)
 
 
 def rows(followed: Followed) -> list[str]:
-    """How many rows and tracks there are, over what time, what is missing, and the gaps."""
+    """Numbers of rows and tracks, time covered, missing values, and the gaps."""
     span = followed.last_s - followed.first_s
     told = {"rows": counted(followed.rows), "span": span, "first": followed.first_s}
     lines = [labelled("plots", tr("{rows} over {span:g} s, from {first:g} s", **told))]
@@ -72,7 +72,7 @@ def counted(rows: int) -> str:
 
 
 def errors(followed: Followed) -> list[str]:
-    """What the filters missed the truth by, where the file has it."""
+    """The filters' errors, where the file has the truth."""
     return [
         plural(
             "{filter}, {component}: error against the truth {rms} {unit} RMS, {ratio} of the filter's own σ "
@@ -104,7 +104,7 @@ FINDINGS = {
 
 
 def tested(one: accuracy.Judged, cured: bool) -> str:
-    """One test; cured: with the σ under which it would be passed, where it is not."""
+    """One test; cured: with the σ under which it would be passed, where it fails."""
     bounds = tr(
         "NIS {nis:.3g} over {plots}; 95 % of consistent filters: [{lo:.3g}, {hi:.3g}]",
         nis=one.nis,
@@ -118,7 +118,7 @@ def tested(one: accuracy.Judged, cured: bool) -> str:
 
 
 def nearest(judged: Sequence[accuracy.Judged]) -> list[str]:
-    """What to write into the config: of the filter whose tests are most nearly right."""
+    """Advice for the config: from the filter whose tests are most nearly consistent."""
     verdicts: dict[str, set[str]] = {}
     for one in judged:
         verdicts.setdefault(one.filter, set()).add(one.verdict)
@@ -136,7 +136,7 @@ def nearest(judged: Sequence[accuracy.Judged]) -> list[str]:
 
 
 def likely(followed: Followed, advised: Advice) -> list[str]:
-    """Which filter predicts the plots best, and what is wrong with the numbers of the one that takes most of a plot."""
+    """The filter that predicts the plots best, and errors in the numbers of the one that takes most columns."""
     compared, lines = advised.compared, []
     if len(compared.behind) > 1 and advised.folding is None:
         behind = sorted((name, gap) for name, gap in compared.behind.items() if name != compared.best)
@@ -164,7 +164,7 @@ def likely(followed: Followed, advised: Advice) -> list[str]:
 
 
 def _partly(followed: Followed, asked: Asked) -> list[str]:
-    """Of which rows best filter and advice are, where not of all."""
+    """The rows behind best filter and advice, where not all."""
     if asked.rows >= followed.rows:
         return []
     if asked.tracks is None:
@@ -182,7 +182,7 @@ def _partly(followed: Followed, asked: Asked) -> list[str]:
 
 
 def times(gain: float) -> str:
-    """How many times as likely something is, from the difference of the logarithms: 12, 10¹⁶."""
+    """A likelihood ratio from the difference of the logarithms: 12, 10¹⁶."""
     power = round(gain / math.log(10))
     return (
         significant_digits(math.exp(gain), "#.2g" if gain < math.log(99) else ".0f")
@@ -192,7 +192,7 @@ def times(gain: float) -> str:
 
 
 def explained(one: Finding, filter_name: str) -> str:
-    """What is wrong, in words, and what it is worth."""
+    """An error in the numbers, in words, and its weight."""
     told = {"what": what(one.what, one.value), "times": times(one.gain)}
     if not one.from_zero:
         told["key"] = one.what
@@ -218,7 +218,7 @@ def explained(one: Finding, filter_name: str) -> str:
 
 
 def what(name: str, value: float) -> str:
-    """What is wrong, in words: a key, or one of EXPLANATIONS, and its value."""
+    """An error in words: a key, or one of EXPLANATIONS, and its value."""
     if name == OUTLIERS:
         share = significant_digits(100 * value, "#.2g")
         return tr("outliers: {share} % of the plots have errors of ten times their σ", share=share)
@@ -244,7 +244,7 @@ def write(
     folder: str | os.PathLike,
     sources: Iterable[str | os.PathLike] = (),
 ) -> list[str]:
-    """Write the page and `figures/` into a folder; the names of the figures. Errors of `follow.put`."""
+    """Write the page and `figures/` into a folder; the names of the figures. Errors as of `follow.put`."""
     from radarsim.report import html
     from radarsim.report.figures import save
 
@@ -267,7 +267,7 @@ def write(
 
 
 def _said(lines: Sequence[str]) -> list[str]:
-    """Lines of the terminal as sentences: the word that stands before each with a colon."""
+    """Lines of the terminal as sentences: the word before each with a colon."""
     parted = (line.split(maxsplit=1) for line in lines)
     return [f"{head.capitalize()}: {rest}." for head, rest in parted]
 

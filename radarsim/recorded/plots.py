@@ -1,11 +1,10 @@
-"""Where recorded plots are in the plane, as far as their file says it: for the plan view.
+"""Recorded plots: one track from a CSV file, and the estimates over it back to one.
 
-North and east are counted from the radar, or whatever stands at the origin.
-
-Recorded plots: one track from a CSV file, and the estimates over it back to one.
-
-A plots file has a header, before which lines may stand that begin with `#`; `t_s` must rise from row to row (or, for
+A plots file has a header, before which lines beginning with `#` may stand; `t_s` must rise from row to row (or, for
 studies that take several plots at a time, not fall), an empty cell means missing, other columns are ignored.
+
+Places of plots in the plane, for the plan view, as far as the file has them: north and east from the radar, or whatever
+stands at the origin.
 """
 
 import csv
@@ -30,14 +29,14 @@ if TYPE_CHECKING:
 
 
 # ---- places ----------------------------------------------------------------------------------------------------------
-MOST = 2000  # places of a track that are kept; of more, every second is dropped again and again
+MOST = 2000  # places of a track that are kept; when there are more, every second is dropped
 
 
 def in_plane(places: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """North, east and range (n, 3), m, of columns (n,) that say where plots are; None where they do not.
+    """North, east and range (n, 3), m, from columns (n,) of a file; None where it has none that say where plots are.
 
-    By x_m (north) and z_m (east) as `radarsim import` writes them; else by range and bearing, where the slant range
-    stands for that over ground; else with the range alone.
+    From x_m (north) and z_m (east) as `radarsim import` writes them; else from range and bearing, with the slant range
+    in place of the ground range; else the range alone.
     """
     if {"x_m", "y_m", "z_m"} <= set(places):
         x, y, z = (places[name] for name in ("x_m", "y_m", "z_m"))
@@ -60,7 +59,7 @@ class Path:
     stride: int = 1
 
     def add(self, t_s: np.ndarray, places: Mapping[str, np.ndarray]) -> None:
-        """The next plots; those without any place are left out."""
+        """Add plots; those without any place are left out."""
         found = in_plane(places)
         if found is None:
             return
@@ -75,17 +74,17 @@ class Path:
 
 
 # ---- plots -----------------------------------------------------------------------------------------------------------
-NAMED = 3  # rows named of those that have the same fault
+NAMED = 3  # rows listed of those with the same fault
 LARGEST = 1e18  # of any number, as in configs
 DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?")
-TRACK = "track"  # the column that tells several tracks of a file apart
-PLACES = ("range_m", "bearing_rad", "x_m", "y_m", "z_m")  # columns that say where a plot is: for figures alone
+TRACK = "track"  # the column that distinguishes several tracks of a file
+PLACES = ("range_m", "bearing_rad", "x_m", "y_m", "z_m")  # columns of a plot's place: for figures alone
 CHUNK = 20_000  # rows read, filtered and written at a time
 
 
 class Faults:
-    """What is wrong in the rows of a file: one line a kind of fault, with its first place, further rows that have it,
-    and what cures them all."""
+    """Faults in the rows of a file: one line for each kind of fault, with its first place, further rows that have it,
+    and a remedy for all."""
 
     def __init__(self, path: str):
         self.path = path
@@ -95,7 +94,7 @@ class Faults:
         return bool(self.kinds)
 
     def add(self, line: int, where: str, must: str, got: object, cure: str = "") -> None:
-        """where: the column's number and name, or nothing, ending in what parts it from the rest."""
+        """where: the column's number and name with their separator, or nothing."""
         first = f"{self.path}:{line}:{where} {must}, got {got}"
         self.kinds.setdefault(where + must, (first, cure and f"; {cure}", []))[2].append(line)
 
@@ -109,9 +108,8 @@ class Faults:
 
 
 class Piece(NamedTuple):
-    """Some rows of a file of plots: the columns (n,) that are measured; the track of each row, none where the file does
-    not tell tracks apart; the columns (n,) of the truth, `true_…`; and those that say where the plots are, of PLACES.
-    """
+    """Some rows of a file of plots: the measured columns (n,); the track of each row, none where the file has no
+    tracks; the columns (n,) of the truth, `true_…`; and those of the plots' places, of PLACES."""
 
     columns: dict[str, np.ndarray]
     tracks: list[str] | None
@@ -127,13 +125,13 @@ def pieces(
     any_origin: bool = False,
 ) -> Iterator[Piece]:
     """The columns of a file, of the first of `choices` that it has, `size` rows at a time, so that memory does not grow
-    with the file: `t_s` first; not-a-number where a cell is empty.
+    with the file: `t_s` first; NaN where a cell is empty.
 
-    Times rise, where there are tracks within each; several: rows may have the time of the row before. any_origin:
-    ranges may be negative.
+    Times rise, within each track; several: rows may have the time of the row before. any_origin: ranges may be
+    negative.
 
-    After the first fault no more rows come: the rest is read for its faults, and ConfigError raised at the end, with
-    all of them, each `file:row's line:column: name: what is wrong`.
+    After the first fault no more rows come: the rest is checked for faults, and ConfigError raised at the end with all
+    of them, each `file:row's line:column: name: what is wrong`.
     """
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
@@ -171,7 +169,7 @@ class _Reader:
         self.wanted = _chosen(path, header, choices)
         self.width, self.places = len(header), [header.index(name) for name in self.wanted]
         self.track = header.index(TRACK) if TRACK in header else None
-        # Not measured, in so far as the filters do not take them: what is no number there is missing.
+        # Columns that the filters do not take: anything but a number is missing.
         self.beside = {name: place for place, name in enumerate(header) if name.startswith(TRUE) or name in PLACES}
         self.last: dict[str, float] = {}
 
@@ -223,7 +221,7 @@ class _Reader:
         return lines, values, tracks
 
     def _judge(self, array: np.ndarray, lines: list[int]) -> None:
-        """Note values that no sensor can have given."""
+        """Note values that no sensor can have measured."""
         self.measured |= bool(np.isfinite(array[:, 1:]).any())
         for i, j in np.argwhere(impossible(array, self.wanted, self.any_origin)):
             name = self.wanted[j]
@@ -245,7 +243,7 @@ class _Reader:
             self.last[name] = own[-1]
 
     def _numbers(self, row: list[str], line: int) -> list[float]:
-        """The wanted numbers of a row; faults are noted and stand as not-a-number."""
+        """The wanted numbers of a row; faults are noted and become NaN."""
         if len(row) != self.width:
             self.faults.add(line, "", f"must have {self.width} cells as the header", len(row))
             return [math.nan] * (len(self.wanted) + len(self.beside))
@@ -267,17 +265,17 @@ class _Reader:
         return value
 
     def _where(self, j: int) -> str:
-        """The column that is wrong, as `Faults` names it."""
+        """The faulty column, as `Faults` names it."""
         return f"{self.places[j] + 1}: {self.wanted[j]}:"
 
 
 def _imported(path: str) -> str:
-    """The command that makes columns of ours of what other programs write."""
+    """The command that converts other programs' files to our columns."""
     return f"radarsim import {shlex.quote(path)} -o imported.csv"
 
 
 def _number_or_missing(text: str) -> float:
-    """A number of a column that is only compared with, not-a-number where it is none."""
+    """A number of a column that is only compared with; NaN where it is none."""
     try:
         value = float(text)
     except ValueError:
@@ -286,7 +284,7 @@ def _number_or_missing(text: str) -> float:
 
 
 def grouped(names: Sequence[str]) -> dict[str, np.ndarray]:
-    """The rows of each name, in the order in which the names come first."""
+    """The rows of each name, in the order in which the names first appear."""
     if len(set(names)) == 1:
         return {names[0]: np.arange(len(names))}
     rows: dict[str, list[int]] = {}
@@ -296,13 +294,13 @@ def grouped(names: Sequence[str]) -> dict[str, np.ndarray]:
 
 
 def _comment(row: list[str]) -> bool:
-    """Whether a row before the header says something of the file."""
+    """Whether a row before the header is a comment on the file."""
     return bool(row) and row[0].startswith("#")
 
 
 def impossible(array: np.ndarray, names: list[str], any_origin: bool = False) -> np.ndarray:
-    """Which values (n, columns) no sensor can have given: ranges not positive, unless they count from any origin, spans
-    not positive, and angles beyond a turn (degrees?)."""
+    """Which values (n, columns) no sensor can have measured: ranges not positive, unless they count from any origin,
+    spans not positive, and angles beyond a turn (degrees?)."""
     wrong = np.zeros(array.shape, dtype=bool)
     for j, name in enumerate(names):
         if name == "span_mps" or (name == "range_m" and not any_origin):
@@ -327,7 +325,7 @@ def _chosen(path: str, header: list[str], choices: Sequence[Sequence[str]]) -> l
 
 
 def header_of(track: Track, named: bool = False) -> tuple[str, ...]:
-    """The columns of a track; named: with the name of the recorded track before them."""
+    """The columns of a track; named: preceded by the name of the recorded track."""
     models = 0 if track.probability is None else track.probability.shape[2]
     names = ("t_s", "filter", "component", "unit", "estimate", "sigma")
     more = () if track.numbers is None else ("track", "score")
@@ -338,7 +336,7 @@ def header_of(track: Track, named: bool = False) -> tuple[str, ...]:
 def rows_of(track: Track, name: str | None = None) -> Iterator[tuple[str, ...]]:
     """Rows of a track: t_s, filter, component, unit, estimate, sigma, the models' probabilities, number and score.
 
-    name: of the recorded track, put before them.
+    name: of the recorded track, put first.
     """
     recorded = () if name is None else (name,)
     for i, t in enumerate(track.t_s.tolist()):
@@ -361,7 +359,7 @@ def _cell(value: float) -> str:
 def write_columns(
     columns: Mapping[str, np.ndarray], path: str | os.PathLike, config: str | os.PathLike | None = None
 ) -> None:
-    """Write columns (n,) of numbers as CSV, an empty cell for not-a-number, not over the config; errors of `Writer`."""
+    """Write columns (n,) of numbers as CSV, an empty cell for NaN, never over the config; errors as of `Writer`."""
     with Writer(path, {"the config": config}) as file:
         file.write([tuple(columns)])
         file.write(zip(*([_cell(v) for v in column.tolist()] for column in columns.values()), strict=True))
