@@ -1,1 +1,1 @@
-"""Recordings of radars, transponders and ships, read into our columns: `radarsim import`."""
+"""Recordings of radars, transponders and ships, converted to our columns: `radarsim import`."""

@@ -1,8 +1,8 @@
 """ASTERIX: plots of a radar (category 048, 001) and tracks of a surveillance centre (062), from raw data blocks.
 
-The specification is that of the library libasterix: which items a category has, how long each is, where its fields lie
-and in which unit. Decoding a record into its objects takes 0.3 ms, so here only the lengths of items are followed, and
-the few fields that are wanted cut out, which takes a hundredth of it.
+The specification is that of the library libasterix: the items of a category, their lengths, the places and units of
+their fields. Decoding a record into its objects takes 0.3 ms, so only the lengths of items are followed here, and the
+few fields needed cut out, which takes a hundredth of it.
 
 A data block is its category (1 byte), its length (2 bytes, these three included) and records; a record is a field
 specification (7 bits a byte, the eighth says that another byte follows) and the items that it names.
@@ -23,7 +23,7 @@ FLIGHT_LEVEL_M = 100 * FOOT_M
 WRAP_001_S = 512.0  # of the truncated time of day of category 001
 READ = (1, 2, 48, 62)
 
-Skip = Callable[[bytes, int], int]  # data and where an item begins: where it ends
+Skip = Callable[[bytes, int], int]  # data and start of an item: its end
 
 
 class Damaged(ValueError):
@@ -35,7 +35,7 @@ class Damaged(ValueError):
 
 
 class Field(NamedTuple):
-    """A number in an item: its first byte, the bits after its last one, bytes it lies in, bits, sign, least step."""
+    """A number in an item: its first byte, the bits after it, bytes it spans, bits, sign, resolution."""
 
     first: int
     shift: int
@@ -77,12 +77,12 @@ def record(category: int, variant: str | None = None) -> Any:
 
 
 def field(spec: Any, item: str, *path: str) -> Field:
-    """Where a field lies in an item of a record; path leads through groups, by the names of libasterix."""
+    """The place of a field in an item of a record; path leads through groups, by the names of libasterix."""
     return field_in(spec.cv_items_dict[item].cv_rule.cv_variation, *path)
 
 
 def field_in(variation: Any, *path: str) -> Field:
-    """The same in an element or a group that is given."""
+    """The same in a given element or group."""
     base, _ = _library()
     offset = 0
     for name in path:
@@ -119,7 +119,7 @@ def size_in_bits(base: ModuleType, variation: Any) -> int:
 
 @cache
 def skip(variation: Any) -> Skip:
-    """How to find the end of an item of a variation of libasterix."""
+    """A function that finds the end of an item of a libasterix variation."""
     base, _ = _library()
     if issubclass(variation, base.Element | base.Group):
         size = size_in_bits(base, variation) // 8
@@ -187,7 +187,7 @@ def _compound(variation: Any) -> Skip:
 
 
 def _named(data: bytes, at: int) -> tuple[list[int], int]:
-    """The numbers, from 0, that a field specification names, and where it ends."""
+    """The numbers, from 0, in a field specification, and its end."""
     begin, numbers = at, []
     while True:
         if at >= len(data):
@@ -206,14 +206,14 @@ def _source(data: bytes, at: int) -> str:
 
 
 def _after_specification(data: bytes, at: int) -> int:
-    """Where a field specification ends, whatever it names; beyond the data if it does not end."""
+    """The end of a field specification, whatever it names; beyond the data if it does not end."""
     while at < len(data) and data[at] & 1:
         at += 1
     return at + 1
 
 
 class _Profile:
-    """Where the wanted items of a category's records begin; the plan of each field specification is made once."""
+    """Places of the wanted items of a category's records; the plan of each field specification is made once."""
 
     def __init__(self, category: int, wanted: tuple[str, ...], variant: str | None = None):
         base, _ = _library()
@@ -228,7 +228,7 @@ class _Profile:
         self.plans: dict[bytes, list[tuple[int, str, Skip]]] = {}
 
     def places(self, data: bytes, at: int) -> tuple[list[int], int]:
-        """Where each wanted item begins, -1 where it is not there, and where the record ends."""
+        """The start of each wanted item, -1 where it is absent, and the end of the record."""
         begin, at = at, _after_specification(data, at)
         plan = self.plans.get(data[begin:at])
         if plan is None:
@@ -276,7 +276,7 @@ class _Plots048:
         self.span = field_in(raw, "AMB")
 
     def row(self, data: bytes, at: int) -> tuple[str, str, tuple[float, ...] | None, int]:
-        """Track, address and PLOT_COLUMNS of the record at `at`, none where it has no position; where it ends."""
+        """Track, address and PLOT_COLUMNS of the record at `at`, none where it has no position; its end."""
         (time, place, level, address, number, doppler), end = self.profile.places(data, at)
         if time < 0 or place < 0:
             return "", "", None, end
@@ -307,7 +307,7 @@ class _Plots048:
 
 
 class _Plots001:
-    """The same of the older category 001, whose records are plots or tracks, and whose time is truncated."""
+    """The same of the older category 001, whose records are plots or tracks, with truncated times."""
 
     def __init__(self) -> None:
         self.plot = _Profile(1, ("141", "040", "090", "120"), "plot")
@@ -321,7 +321,7 @@ class _Plots001:
         self.unrolled = sites.Unrolled(WRAP_001_S)
 
     def row(self, data: bytes, at: int) -> tuple[str, str, tuple[float, ...] | None, int]:
-        """As of category 048; the profile depends on the first bit of item 020, the second item of both."""
+        """As for category 048; the profile depends on the first bit of item 020, the second item of both."""
         kind = _after_specification(data, at) + 2  # item 010 has two bytes
         tracked = kind < len(data) and bool(data[kind] & 0x80)
         places, end = (self.tracked if tracked else self.plot).places(data, at)
@@ -341,7 +341,7 @@ class _Plots001:
         return track, "", row, end
 
     def _time(self, truncated: float) -> float:
-        """The time of day next to the last sector's; without sectors the truncated one, made to run on."""
+        """The time of day next to the last sector's; without sectors the truncated one, unwrapped."""
         if self.full is None:
             return self.unrolled(truncated)
         return truncated + WRAP_001_S * round((self.full - truncated) / WRAP_001_S)
@@ -359,7 +359,7 @@ class _Tracks062:
         self.east, self.north = field(spec, "185", "VX"), field(spec, "185", "VY")
 
     def row(self, data: bytes, at: int) -> tuple[str, str, tuple[float, ...] | None, int]:
-        """Track, address and POSITION_COLUMNS of the record at `at`; where it ends."""
+        """Track, address and POSITION_COLUMNS of the record at `at`; its end."""
         (time, place, height, level, speed, number, derived), end = self.profile.places(data, at)
         if time < 0 or place < 0:
             return "", "", None, end
@@ -388,7 +388,7 @@ class Asterix:
     of_day = True
 
     def __init__(self, path: str, file: BinaryIO, truth: bool = False):
-        """truth: positions alone are decoded, of other categories only the blocks are followed."""
+        """truth: only positions are decoded, of other categories only the blocks are followed."""
         self.path, self.file, self.truth = path, file, truth
         self.records = 0
         self.skipped: Counter[str] = Counter()
@@ -400,7 +400,7 @@ class Asterix:
         self.plots = False  # whether there are plots beside the truth
 
     def batches(self) -> Iterator[sites.Batch]:
-        """The records, some at a time; raises ConfigError where a block or record is not as the specification says."""
+        """The records in batches; raises ConfigError where a block or record violates the specification."""
         plots, positions = (
             sites.Gathered(sites.PLOTS, sites.PLOT_COLUMNS),
             sites.Gathered(sites.POSITIONS, sites.POSITION_COLUMNS),
@@ -457,7 +457,7 @@ class Asterix:
             else:
                 radar = _source(data, begin)
                 if track and radar != self.sources.setdefault(gathered.kind, radar):
-                    track = f"{radar}:{track}"  # two sensors count their tracks each for itself
+                    track = f"{radar}:{track}"  # two sensors number their tracks independently
                 gathered.add(track, address, (self.clock(row[0]), *row[1:]), radar)
 
     def _sectors(self, data: bytes) -> None:
@@ -470,5 +470,5 @@ class Asterix:
 
 
 def looks_like(head: bytes) -> bool:
-    """Whether a file that begins so may be ASTERIX: a data block at least, of a category that radars send."""
+    """Whether a file with this beginning may be ASTERIX: at least one data block, of a category that radars send."""
     return len(head) >= 4 and head[0] in (*READ, 8, 20, 21, 34) and int.from_bytes(head[1:3], "big") >= 4

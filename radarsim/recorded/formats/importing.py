@@ -1,7 +1,7 @@
 """`radarsim import`: a recording into a CSV of plots in our columns, with several tracks in one file.
 
-Records are read, placed and written some at a time, so that memory does not grow with the file; only what is truth is
-held, as it must be looked up by time. The file is there whole or not at all.
+Records are read, placed and written in batches, so that memory does not grow with the file; only the truth is held, for
+lookup by time. The file is written completely or not at all.
 """
 
 import codecs
@@ -42,14 +42,14 @@ from radarsim.report.files import Writer
 
 Format = Literal["asterix", "opensky", "ais", "csv"]
 FORMATS: tuple[Format, ...] = ("asterix", "opensky", "ais", "csv")
-HEAD = 4096  # bytes that the format is found from
+HEAD = 4096  # bytes used to detect the format
 LONGEST_GAP_S = 60.0  # over which truth is not interpolated
 MOST_LISTED = 12
 FARTHEST_TRUTH_M = 5000.0  # of plots from their truth in range, by median: 20 s of an airliner
 NOT_LATER = "rows not later than the one before of their track"
-SIGN_TESTS = 2000  # pairs of plots over which the sign of the Doppler speed is looked at
+SIGN_TESTS = 2000  # pairs of plots on which the sign of the Doppler speed is tested
 LEAST_TESTS = 20
-FOLD_TESTS = 3000  # rows over which folds of the Doppler speed are looked for
+FOLD_TESTS = 3000  # rows on which folding of the Doppler speed is tested
 FOLD_COLUMNS = ("t_s", "range_m", "velocity_mps")
 PLACED = ("range_m", "bearing_rad", "velocity_mps")
 LOCAL = ("x_m", "y_m", "z_m")
@@ -60,12 +60,12 @@ SPEEDS = ("vx_mps", "vy_mps", "vz_mps")
 class Options:
     """How to read a recording.
 
-    format: found from the content where None. site: where the radar stands; sites: where each radar of a recording of
-    several stands, by SAC/SIC, others being left out. antenna: its normal, for the angles that `multimodel` takes.
-    tracks: those to be written, all where empty. zero: what t_s counts from, "first" (record),
-    "midnight" (of the first record's day, UTC) or s from 1970. truth: a second recording, of positions. towards:
-    Doppler speeds count as positive where the range falls. columns: of a CSV, theirs by ours. encoding: of text that is
-    neither UTF-8 nor UTF-16, Windows-1252 where none is named.
+    format: detected from the content where None. site: place of the radar; sites: place of each radar of a recording of
+    several, by SAC/SIC, others are left out. antenna: its normal, for the angles that `multimodel` takes. tracks: those
+    to write, all where empty. zero: origin of t_s, "first" (record), "midnight" (of the first record's day, UTC) or s
+    from 1970. truth: a second recording, of positions. towards: Doppler speeds are positive where the range falls.
+    columns: of a CSV, theirs by ours. encoding: of text that is neither UTF-8 nor UTF-16, Windows-1252 where none is
+    named.
     """
 
     format: Format | None = None
@@ -82,7 +82,7 @@ class Options:
 
 @dataclass
 class Imported:
-    """What was read and written: format, records read, rows written, rows by track, what was passed over."""
+    """Result of an import: format, records read, rows written, rows by track, counts of skipped records."""
 
     format: Format
     records: int = 0
@@ -101,7 +101,7 @@ NAMED = {  # as spreadsheets write them
 
 
 def encoding_of(path: str | os.PathLike, named: str) -> str:
-    """The encoding of a text file: UTF-16 by its mark or zeros, else UTF-8, or the one named where it is no UTF-8."""
+    """The encoding of a text file: UTF-16 by its mark or zeros, else UTF-8, or the one named where it is not UTF-8."""
     if not os.path.isfile(path):  # a stream is read once
         return named or "utf-8-sig"
     with open(path, "rb") as file:
@@ -109,7 +109,7 @@ def encoding_of(path: str | os.PathLike, named: str) -> str:
         if head[:2] in MARKS:
             return "utf-16"
         even, odd = head[::2].count(0), head[1::2].count(0)
-        if max(even, odd) > max(10 * min(even, odd), len(head) / 10):  # of digits and commas one byte is zero
+        if max(even, odd) > max(10 * min(even, odd), len(head) / 10):  # for digits and commas one byte of two is zero
             return "utf-16-le" if odd > even else "utf-16-be"
         file.seek(0)
         decoder = codecs.getincrementaldecoder("utf-8")()
@@ -124,9 +124,10 @@ def encoding_of(path: str | os.PathLike, named: str) -> str:
 
 @contextmanager
 def opened(path: str, options: Options, truth: bool = False) -> Iterator[tuple[Format, Reader]]:
-    """The reader of a recording, by the format that is asked for or that its first bytes show; raises ConfigError.
+    """The reader of a recording, by the given format or the one that its first bytes show; raises ConfigError.
 
-    truth: only the positions of an ASTERIX file are wanted."""
+    truth: only the positions of an ASTERIX file are needed.
+    """
     encoding = "utf-8-sig"
     try:
         with open(path, "rb") as file:
@@ -174,9 +175,9 @@ def import_recording(
     options: Options,
     progress: Callable[[int], None] = lambda records: None,
 ) -> Imported:
-    """Read a recording and write it as plots; raises ConfigError, StoreError, and then leaves nothing written.
+    """Read a recording and write it as plots; raises ConfigError, StoreError, and then leaves no file.
 
-    progress is called now and then with the number of records read.
+    progress is called from time to time with the number of records read.
     """
     path = os.fspath(source)
     if options.truth and not options.site:
@@ -201,7 +202,7 @@ def import_recording(
 
 
 class _Import:
-    """The recording on its way: batches in, rows out."""
+    """An import in progress: batches in, rows out."""
 
     def __init__(
         self, kind: Format, reader: Reader, options: Options, truth: "_Truth | None", output: str | os.PathLike
@@ -217,7 +218,7 @@ class _Import:
         self.seen: set[str] = set()
 
     def rows(self) -> Iterator[Iterable[tuple[str, ...]]]:
-        """The rows of the output, some at a time."""
+        """The rows of the output, in batches."""
         for batch in self.reader.batches():
             if batch.kind == POSITIONS and self.truth is not None and self.truth.own:
                 continue  # it is the truth of the plots in the same file
@@ -226,7 +227,7 @@ class _Import:
                 yield self._written(kept)
 
     def _kept(self, batch: Batch) -> Batch | None:
-        """Those records of a batch that are asked for and later than their track's last."""
+        """The records of a batch that are wanted and later than their track's last."""
         wanted, keep = set(self.options.tracks), []
         times = batch.columns["t_s"].tolist()
         for i, (track, radar, t) in enumerate(zip(batch.track, batch.radar, times, strict=True)):
@@ -269,7 +270,7 @@ class _Import:
         return zip(cells[0], *names.values(), *cells[1:], strict=True)
 
     def _zero(self, first: float) -> float:
-        """What t_s counts from, in the times of the recording."""
+        """The origin of t_s, in the times of the recording."""
         zero = self.options.zero
         if zero == "first":
             return first
@@ -279,7 +280,7 @@ class _Import:
         return zero % DAY_S if self.reader.of_day else zero
 
     def _placed(self, batch: Batch) -> dict[str, np.ndarray]:
-        """Range, bearing, velocity and what follows from the place of the radar."""
+        """Range, bearing, velocity and other columns that need the radar's place."""
         site, given = self.options.site, batch.columns
         if batch.kind == POSITIONS:
             if site is None:
@@ -309,7 +310,7 @@ class _Import:
         return angles
 
     def comment(self) -> list[str]:
-        """The lines before the header: what the columns are."""
+        """The lines before the header: the meaning of the columns."""
         sites, antenna = dict(self.options.sites), self.options.antenna
         if self.options.site:
             sites[""] = self.options.site
@@ -339,7 +340,7 @@ class _Import:
         return "midnight (UTC) before the first record" if zero == "midnight" else "the first record"
 
     def nothing(self) -> str:
-        """The fault of a recording that leaves no row."""
+        """The fault of a recording without any row."""
         path = getattr(self.reader, "path", "the recording")
         if self.options.tracks and self.seen:
             there = sorted(self.seen)
@@ -350,7 +351,7 @@ class _Import:
         return f"{path}: has no plots; {self.reader.records} records were read{why}"
 
     def faults(self) -> list[str]:
-        """What makes the rows wrong that were written, seen when all were read."""
+        """Faults in the rows written, known when all are read."""
         path, found = getattr(self.reader, "path", "the recording"), []
         if len(self.radars) > 1 and self.options.site:
             names = ", ".join(self.radars)
@@ -363,7 +364,7 @@ class _Import:
         return found
 
     def finished(self) -> Imported:
-        """What was done, with what the user should know of it."""
+        """The result, with notes for the user."""
         done = self.done
         done.records = self.reader.records
         done.skipped = [*counted(self.reader.skipped), *counted(self.left)]
@@ -393,9 +394,9 @@ class _Import:
 
 
 class _Truth:
-    """Where each aircraft was: positions of the second recording, or of the same one (category 062 beside 048).
+    """Truth of each aircraft: positions of the second recording, or of the same one (category 062 beside 048).
 
-    An aircraft is known by its address alone (in a CSV: by its track's name). What has none is no truth of anything.
+    An aircraft is identified by its address (in a CSV: by its track's name). Records without one are ignored.
     """
 
     def __init__(self, path: str, options: Options):
@@ -428,12 +429,11 @@ class _Truth:
                     self._read(reader, options.site)
                 self.own = isinstance(reader, Asterix) and reader.plots and bool(self.tables)
         except ConfigError:
-            self.own = False  # told when the records are read, with how many there were before
+            self.own = False  # counted when the records are read, with how many there were before
         if not self.own:
             self.tables = {}
 
     def _read(self, reader: Reader, site: Site) -> None:
-        """Take the positions in."""
         self.of_day = reader.of_day
         for batch in reader.batches():
             if batch.kind == PLOTS:
@@ -447,7 +447,7 @@ class _Truth:
                     self.unnamed += len(rows)
 
     def columns(self, batch: Batch, range_m: np.ndarray, of_day: bool) -> dict[str, np.ndarray]:
-        """The truth at the times of a batch of plots of these ranges: range, bearing, velocity, place, speeds (n,)."""
+        """The truth at the times of plots (n,) with these ranges: range, bearing, velocity, place, speeds (n,)."""
         if not self.tables:
             return {}
         t, states = batch.columns["t_s"], np.full((len(batch.track), 6), np.nan)
@@ -465,13 +465,13 @@ class _Truth:
             if len(known := miss[rows][np.isfinite(miss[rows])]):
                 self.misses.setdefault(name, []).append(known)
         radial = np.einsum("ni,ni->n", states[:, :3], states[:, 3:]) / seen["range_m"]
-        # Named as the components of the studies' filters are.
+        # Named like the components of the studies' filters.
         columns = {"r_m": seen["range_m"], "Vr_mps": radial, "b_rad": seen["bearing_rad"]}
         columns |= dict(zip((*LOCAL, *SPEEDS), states.T, strict=True))
         return {f"true_{name}": column for name, column in columns.items()}
 
     def _path(self, name: str, of_day: bool) -> Callable[[np.ndarray], np.ndarray] | None:
-        """Position and speed (n, 6) of one aircraft by time; none where the truth does not name it."""
+        """Position and speed (n, 6) of one aircraft by time; none where the truth does not have it."""
         if name not in self.tables:
             return None
         if name not in self.ready:
@@ -482,7 +482,7 @@ class _Truth:
         return self.ready[name]
 
     def faults(self, tracks: Sequence[str]) -> list[str]:
-        """What shows that the truth is not that of the plots; tracks: some of theirs."""
+        """Signs that the truth is not that of the plots; tracks: some of theirs."""
         found = []
         if self.tables and not self.misses and not self.own:
             names = list(self.tables)
@@ -500,7 +500,7 @@ class _Truth:
         return found
 
     def notes(self) -> list[str]:
-        """How much of the plots has a truth, and how far from it they lie."""
+        """How many of the plots have a truth, and how far they are from it."""
         if not self.misses:
             return ["truth: of no plot"] if self.tables else []
         misses = np.concatenate([one for own in self.misses.values() for one in own])
@@ -509,8 +509,8 @@ class _Truth:
 
 
 def interpolated(table: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """Positions and speeds (m, 6) at times (m,), from fixes (n, 4) of time and position: piecewise cubic with the
-    slopes of the neighbouring fixes; not-a-number outside, and in gaps over LONGEST_GAP_S."""
+    """Positions and speeds (m, 6) at times (m,), from fixes (n, 4) of time and position: piecewise cubic with slopes
+    from the neighbouring fixes; NaN outside, and in gaps over LONGEST_GAP_S."""
     from scipy.interpolate import CubicHermiteSpline
 
     times, places = np.unique(table[:, 0], return_index=True)
@@ -529,7 +529,7 @@ def interpolated(table: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
 
 
 class _Sign:
-    """Whether Doppler speeds fit the change of the range as they stand, or with the other sign; folded ones too."""
+    """Whether Doppler speeds fit the rate of the range as they are, or with the other sign; folded ones too."""
 
     def __init__(self) -> None:
         self.last: dict[str, tuple[float, float]] = {}
@@ -537,7 +537,7 @@ class _Sign:
         self.turned: list[float] = []
 
     def take(self, batch: Batch) -> None:
-        """Look at pairs of plots of one track."""
+        """Test pairs of plots of one track."""
         names = ("t_s", "range_m", "velocity_mps", "span_mps")
         values = zip(batch.track, *(batch.columns[name].tolist() for name in names), strict=True)
         for track, t, r, v, span in values:
@@ -553,7 +553,7 @@ class _Sign:
                 misses.append(abs(miss if math.isnan(span) else miss - span * round(miss / span)))
 
     def note(self, towards: bool) -> str | None:
-        """What the user should know, if the other sign fits clearly better."""
+        """A note for the user if the other sign fits clearly better."""
         if len(self.as_is) < LEAST_TESTS:
             return None
         as_is, turned = float(np.median(self.as_is)), float(np.median(self.turned))
@@ -567,7 +567,7 @@ class _Sign:
 
 
 class _Folds:
-    """Plots by which to see whether Doppler speeds are folded: of rows that do not say by what."""
+    """Plots on which folding of Doppler speeds is tested: of rows that do not give their span."""
 
     def __init__(self) -> None:
         self.rows: dict[str, list[np.ndarray]] = {}
@@ -591,7 +591,7 @@ class _Folds:
 
 
 def zero_of(text: str) -> str | float:
-    """What t_s counts from: "first", "midnight", or a date and time of ISO 8601 (UTC) as s from 1970."""
+    """The origin of t_s: "first", "midnight", or a date and time of ISO 8601 (UTC) as s from 1970."""
     if text in ("first", "midnight"):
         return text
     try:
@@ -612,7 +612,7 @@ def encoding_named(name: str) -> str:
 
 
 def columns_of(texts: Sequence[str]) -> dict[str, str]:
-    """Columns named by hand, `OURS=THEIRS` each."""
+    """Columns assigned by the user, `OURS=THEIRS` each."""
     faults = [text for text in texts if "=" not in text]
     if faults:
         raise ConfigError(*(f"column: must be OURS=THEIRS, got {text!r}" for text in faults))

@@ -1,15 +1,12 @@
-r"""What every reader of a recording gives: some records at a time, as columns.
+r"""Common to all readers of recordings: batches of records, as columns.
 
-A radar on the earth (WGS 84): what it sees of positions, and where its plots are. By pymap3d.
+A radar on the earth (WGS 84): its measurements of positions, and the places of its plots. By pymap3d. Local axes: x
+north, y up, z east, with the origin at the radar. Bearings are counted from north to east. Elevations are above the
+plane that is level at the radar; an aircraft far away and low lies below it.
 
-Local axes: x north, y up, z east, with the origin at the radar. Bearings are counted from north to east. Elevations are
-those above the plane that is level at the radar; an aircraft far away and low lies below it.
-
-Ships by AIS: NMEA sentences `!AIVDM…`, by pyais.
-
-A message gives only the second of its minute. The time is that of the tag block (`\c:1577836800*..\!AIVDM…`) or of
-a number or ISO time before the sentence, or of a number after it; where there is neither, the seconds are made to run
-on from minute to minute.
+Ships by AIS: NMEA sentences `!AIVDM…`, by pyais. A message gives only the second of its minute. The time is that of the
+tag block (`\c:1577836800*..\!AIVDM…`) or of a number or ISO time before the sentence, or of a number after it; without
+these, the seconds are unwrapped from minute to minute.
 """
 
 import datetime
@@ -27,11 +24,11 @@ from radarsim import physics
 from radarsim.errors import ConfigError
 
 # ---- records ---------------------------------------------------------------------------------------------------------
-BATCH = 20_000  # records that are held at a time
+BATCH = 20_000  # records held at a time
 DAY_S = 86400.0
 PLOTS, POSITIONS = "plots", "positions"
 
-# What a record can hold beside its track and address. Angles are counted from north to east.
+# What a record can hold besides its track and address. Angles are counted from north to east.
 PLOT_COLUMNS = ("t_s", "range_m", "bearing_rad", "velocity_mps", "span_mps", "altitude_m")
 POSITION_COLUMNS = ("t_s", "latitude_deg", "longitude_deg", "altitude_m", "east_mps", "north_mps", "up_mps")
 
@@ -40,9 +37,9 @@ class Batch(NamedTuple):
     """Some records, in the order of the file.
 
     kind is PLOTS (measured by a radar: PLOT_COLUMNS) or POSITIONS (on the earth: POSITION_COLUMNS). track holds the
-    track of each record, '' where it has none; address what names the aircraft or ship everywhere (24 bits in
-    hexadecimal, MMSI), '' where it is not known; radar what names the sensor (SAC/SIC), '' where the format does not;
-    columns, arrays (n,), not-a-number where a record is silent.
+    track of each record, '' where it has none; address identifies the aircraft or ship everywhere (24 bits in
+    hexadecimal, MMSI), '' where unknown; radar identifies the sensor (SAC/SIC), '' where the format does not; columns,
+    arrays (n,), NaN where a record has no value.
     """
 
     kind: str
@@ -52,15 +49,15 @@ class Batch(NamedTuple):
     columns: dict[str, np.ndarray]
 
     def rows(self, keep: list[int]) -> "Batch":
-        """Those of its records."""
+        """The rows with these indices."""
         track, address, radar = ([column[i] for i in keep] for column in (self.track, self.address, self.radar))
         return Batch(self.kind, track, address, radar, {name: column[keep] for name, column in self.columns.items()})
 
 
 class Reader(Protocol):
-    """A reader of one format. Times count from midnight where `of_day`, else from 1970 (UTC), as the format has them.
+    """A reader of one format. Times count from midnight where `of_day`, else from 1970 (UTC), as in the format.
 
-    records: how many were read until now; skipped: how many of them were passed over, by what they were.
+    records: number read so far; skipped: number of them skipped, by reason.
     """
 
     of_day: bool
@@ -68,12 +65,12 @@ class Reader(Protocol):
     skipped: Counter[str]
 
     def batches(self) -> Iterator[Batch]:
-        """The records, some at a time; raises ConfigError with file, place, what was expected and read."""
+        """The records in batches; raises ConfigError with file, place, expected and actual content."""
 
 
 @dataclass
 class Gathered:
-    """Records of one kind, one after the other, until there are enough for a batch."""
+    """Records of one kind, collected until there are enough for a batch."""
 
     kind: str
     names: tuple[str, ...]
@@ -91,14 +88,14 @@ class Gathered:
         return len(self.rows)
 
     def add(self, track: str, address: str, row: tuple[float, ...], radar: str = "") -> None:
-        """One more record; row in the order of `names`."""
+        """Add a record; row in the order of `names`."""
         self.track.append(track)
         self.address.append(address)
         self.radar.append(radar)
         self.rows.append(row)
 
     def taken(self) -> Batch:
-        """The records until now as a batch; it starts again."""
+        """The records so far as a batch; the collection is emptied."""
         table = np.array(self.rows, dtype=float).reshape(-1, len(self.names))
         columns = dict(zip(self.names, table.T.copy(), strict=True))
         batch = Batch(self.kind, self.track, self.address, self.radar, columns)
@@ -107,15 +104,15 @@ class Gathered:
 
 
 class Unrolled:
-    """Times of a clock that starts again after `period_s`, made to run on. Records out of order by half of it are seen
-    as they are; so are times that fall from, or to, further than near_s from the clock's turn."""
+    """Times of a clock with period `period_s`, unwrapped. Records out of order by half of it are taken as they are; so
+    are times that fall from, or to, more than near_s from the clock's turn."""
 
     def __init__(self, period_s: float, near_s: float = math.inf):
         self.period_s, self.near_s, self.turns = period_s, near_s, 0
         self.last: float | None = None
 
     def __call__(self, t: float) -> float:
-        """t (s) of the clock, with the turns that it has made added."""
+        """Unwrapped time of a clock time t (s)."""
         if self.last is not None:
             near = max(t, self.last) >= self.period_s - self.near_s and min(t, self.last) <= self.near_s
             if near and t < self.last - self.period_s / 2:
@@ -133,12 +130,12 @@ def utc_s(text: str) -> float:
 
 
 def needs(module: str, extra: str) -> ConfigError:
-    """The fault of a library that an extra of ours brings."""
+    """The fault of a library that one of our extras installs."""
     return ConfigError(f"{module} is not installed, which this needs: pip install 'radarsim[{extra}]'")
 
 
 def counted(skipped: Mapping[str, int]) -> list[str]:
-    """What was passed over, in words."""
+    """Numbers of skipped records, in words."""
     return [f"{count} {what}" for what, count in skipped.items() if count]
 
 
@@ -148,7 +145,7 @@ try:
 except ImportError:
     pymap3d = None
 
-CLOSE_M = 0.01  # to which a height is met when the elevation of a plot is looked for
+CLOSE_M = 0.01  # accuracy of the height when the elevation of a plot is computed
 ROUNDS = 20
 
 
@@ -160,7 +157,7 @@ class Antenna(NamedTuple):
 
 
 class Site:
-    """Where the radar stands: latitude and longitude in degrees, height above the ellipsoid in m."""
+    """Place of a radar: latitude and longitude in degrees, height above the ellipsoid in m."""
 
     def __init__(self, latitude_deg: float, longitude_deg: float, height_m: float):
         if pymap3d is None:
@@ -170,7 +167,7 @@ class Site:
     def seen(self, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Range, bearing, elevation, local position and, where speeds are known, radial velocity of positions (n,).
 
-        A height that is not known is taken as 0, that of the sea.
+        An unknown height is taken as 0, sea level.
         """
         lat, lon = columns["latitude_deg"], columns["longitude_deg"]
         height = np.nan_to_num(columns["altitude_m"], nan=0.0)
@@ -189,7 +186,7 @@ class Site:
     def local(self, range_m: np.ndarray, bearing_rad: np.ndarray, altitude_m: np.ndarray) -> np.ndarray:
         """Local positions (n, 3) of plots of slant range and bearing at a height (n,), all in m and rad.
 
-        Not-a-number where the height is not known, or where no point of that range has it.
+        NaN where the height is unknown, or where no point of that range has it.
         """
         sine = np.zeros_like(range_m)
         bearing = np.degrees(bearing_rad)
@@ -290,12 +287,12 @@ TAG_TIME = re.compile(rb"[\\,]c:(\d{9,13})")
 AFTER = re.compile(rb"\*[0-9A-Fa-f]{2}[,; \t]+(\d{9,13}(?:\.\d+)?)\s*$")
 PARTS = re.compile(rb"![A-Z]{2}VD[MO],(\d),(\d),(\d?),")
 NO_SPEED, NO_COURSE, NO_SECOND = 102.2, 360.0, 60
-MOST_OPEN = 100  # messages of several sentences that wait for their end
-LEAST_GOOD = 0.5  # of the sentences; a file with fewer is no AIS
+MOST_OPEN = 100  # incomplete messages kept
+LEAST_GOOD = 0.5  # of the sentences; a file with fewer is not AIS
 
 
 def sound(sentence: bytes) -> bool:
-    """Whether a sentence has the sum that it states after its asterisk: the exclusive or of all its characters."""
+    """Whether a sentence has the checksum stated after its asterisk: the exclusive or of all its characters."""
     body, star, stated = sentence[1:].partition(b"*")
     total = 0
     for byte in body:
@@ -304,7 +301,7 @@ def sound(sentence: bytes) -> bool:
 
 
 class Ais:
-    """A file of AIS sentences; class A and B reports of position are read, all others passed over."""
+    """A file of AIS sentences; position reports of class A and B are read, all others skipped."""
 
     of_day = False
 
@@ -318,7 +315,7 @@ class Ais:
         self.minute = Unrolled(60.0)
 
     def batches(self) -> Iterator[Batch]:
-        """The reports of position, some at a time; raises ConfigError where most sentences are damaged."""
+        """The position reports in batches; raises ConfigError where most sentences are damaged."""
         gathered, damaged, first = Gathered(POSITIONS, POSITION_COLUMNS), 0, ""
         for number, line in enumerate(self.file, start=1):
             sentence = SENTENCE.search(line)
@@ -344,8 +341,8 @@ class Ais:
             yield gathered.taken()
 
     def _decoded(self, sentence: bytes) -> Any:
-        """The message that a sentence ends; none while further sentences of it are to come."""
-        assert pyais is not None  # `__init__` has made sure
+        """The message that a sentence completes; none while further sentences of it are to come."""
+        assert pyais is not None  # `__init__` has checked it
         parts = PARTS.match(sentence)
         if parts and parts[1] != b"1":
             held = self.open.setdefault(parts[3], [])
@@ -363,7 +360,7 @@ class Ais:
         return pyais.decode(sentence)
 
     def _stated(self, line: bytes, before: int, number: int) -> float:
-        """The time before a sentence, s from 1970; not-a-number where none is stated."""
+        """The time before a sentence, s from 1970; NaN where there is none."""
         head = line[:before]
         if found := TAG_TIME.search(head) or AFTER.search(line):
             stamp = float(found[1])

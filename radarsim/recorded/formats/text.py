@@ -1,14 +1,13 @@
-"""Positions of aircraft and plots in CSV: transponder data (OpenSky and its like) and spreadsheets of one's own.
+"""Positions of aircraft and plots in CSV: transponder data (OpenSky and the like) and users' spreadsheets.
 
 Columns are found by their names, whatever the case and the spaces; a unit may stand at the end of a name (`range_km`,
-`Altitude [ft]`). Times are seconds from 1970, times of day (which run on after midnight), dates as
-`20.11.2026 10:00:00,01` or ISO 8601, with or without a zone (UTC is taken where there is none).
-Cells are parted by commas, semicolons or tabulators, whatever the header has most of; parted by other than commas,
-numbers may have a decimal comma.
+`Altitude [ft]`). Times are seconds from 1970, times of day (unwrapped after midnight), dates as `20.11.2026
+10:00:00,01` or ISO 8601, with or without a zone (default UTC). Cells are separated by commas, semicolons or tabs,
+whichever is most frequent in the header; with a separator other than a comma, numbers may have a decimal comma.
 
-Where a name has no unit, SI is taken; but positions whose names are those of aviation (`gs`, `groundspeed`, `alt`, …)
-count in feet, knots and feet a minute, and speeds of ships (`sog`) in knots, as the exports do that use them. What was
-taken is in `notes`. The time is that of the measurement, where the file has it beside another one.
+A name without unit means SI; but positions with names from aviation (`gs`, `groundspeed`, `alt`, …) are in feet, knots
+and feet a minute, and speeds of ships (`sog`) in knots, like the exports that use them. Assumptions are in `notes`. The
+time is that of the measurement, if the file has several.
 """
 
 import csv
@@ -31,10 +30,10 @@ UNITS = {
     "kts": 1852 / 3600, "knots": 1852 / 3600, "kmh": 1 / 3.6, "km/h": 1 / 3.6, "ms": 1e-3, "fpm": 0.3048 / 60,
     "ft/min": 0.3048 / 60,
 }  # fmt: skip
-# Our name of what is read: the names it goes by, in lower case without spaces and units.
+# Our name of a quantity: the names it has in files, in lower case without spaces and units.
 NAMES = {
     "t_s": (
-        *("lastposupdate", "last_position", "time_position"),  # of the position; what follows may be of a query
+        *("lastposupdate", "last_position", "time_position"),  # of the position; the following may be of a query
         *("t", "time", "timestamp", "t_s", "datetime", "date_time", "basedatetime", "base_date_time", "utc"),
     ),
     "track": ("icao24", "icao", "hex", "mmsi", "track_id", "address", "callsign", "flight", "id", "track", "name"),
@@ -57,12 +56,12 @@ ON_EARTH = ("latitude_deg", "longitude_deg")
 POSITION = "position"  # latitude and longitude in one cell, parted by a comma
 AVIATION = ("gs", "groundspeed", "ground_speed", "alt", "alt_baro", "alt_geom", "direction")  # names without a unit
 AVIATION_UNITS = {"altitude_m": "ft", "speed_mps": "kn", "up_mps": "fpm"}
-MARITIME = ("sog", "cog", "mmsi")  # names of AIS: speeds without a unit are in knots, and these are no numbers:
+MARITIME = ("sog", "cog", "mmsi")  # names of AIS: speeds without a unit are in knots, and these values mean missing:
 NO_SPEED_KN, NO_COURSE_DEG = 102.2, 360.0
-THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")  # a number that may be a thousand, or a decimal
-MIDNIGHT_S = 3600.0  # a time of day that falls has passed midnight if both are as near; else a file is sorted by track
-STILL_MPS = 1.0  # below it a position may be the same again
-NAMES_AT_MOST = 10_000  # different cells by which a column may name aircraft
+THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")  # a number that may be a thousand or a decimal
+MIDNIGHT_S = 3600.0  # a falling time of day has passed midnight if both are as near it; else a file is sorted by track
+STILL_MPS = 1.0  # below it a position may stay the same
+NAMES_AT_MOST = 10_000  # different cells in a column that may name aircraft
 HIGHEST_M = 20_000.0  # of an aircraft; higher altitudes are feet
 DELIMITERS = ",;\t"
 OF_DAY = re.compile(r"(\d{1,2}):(\d\d)(?::(\d\d)(?:[.,:](\d+))?)?")
@@ -72,15 +71,15 @@ UNIT = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]$")
 
 
 class Column:
-    """A column of the file: its place, and what makes its numbers into our units."""
+    """A column of the file: its index and the conversion to our units."""
 
     def __init__(self, place: int, name: str, factor: float, unit: str):
-        """unit: that which was taken though the name has none."""
+        """unit: the assumed one, where the name has none."""
         self.place, self.name, self.factor, self.unit = place, name, factor, unit
 
 
 def _second_of_day(found: re.Match) -> float:
-    """The time that OF_DAY has found, s after midnight; raises ValueError where a day has none such."""
+    """A time matched by OF_DAY, s after midnight; raises ValueError for an impossible one."""
     hours, minutes, seconds, fraction = found.groups(default="0")
     if int(hours) > 23 or int(minutes) > 59 or int(seconds) > 60:
         raise ValueError(found[0])
@@ -113,7 +112,7 @@ class Table:
     of_day = False
 
     def __init__(self, path: str, file: TextIO, given: Mapping[str, str] | None = None, encoding: str = "UTF-8"):
-        """encoding: what the file was decoded by."""
+        """encoding: of the file."""
         self.path, self.records, self.highest, self.encoding = path, 0, 0.0, encoding
         self.commas: set[str] = set()  # numbers with a comma, until one cannot be of thousands
         self.skipped: Counter[str] = Counter()
@@ -134,7 +133,7 @@ class Table:
         self.header = [name.strip() for name in header]
 
     def _opened(self, file: TextIO) -> list[str]:
-        """The header; from there on the rows are read with what parts its cells."""
+        """Read the header; the rows are then split by its separator."""
         before, text = 0, ""
         for text in file:
             if text.strip() and not text.startswith("#"):
@@ -155,7 +154,7 @@ class Table:
         return self.before + self.rows.line_num
 
     def notes(self) -> list[str]:
-        """What was taken for granted of units, and what speaks against it."""
+        """Assumptions on units, and signs against them."""
         plain = {ours: c.name for ours, c in self.columns.items() if not split(c.name)[1]}
         units = {"range_m": "m", "bearing_rad": "degrees", "velocity_mps": "m/s", "span_mps": "m/s", "altitude_m": "m"}
         units |= {"speed_mps": "m/s", "up_mps": "m/s"} | {ours: c.unit for ours, c in self.columns.items() if c.unit}
@@ -175,7 +174,7 @@ class Table:
         return found
 
     def whose(self, late: int) -> str | None:
-        """The question which column names the aircraft, where none does and so many rows are out of order of time."""
+        """The question which column names the aircraft, where none does and so many rows are out of time order."""
         if not late or "track" in self.columns:
             return None
         likely = [(i, len(cells)) for i, cells in self.cells.items() if 1 < len(cells) <= self.records / 2]
@@ -190,7 +189,7 @@ class Table:
         )
 
     def _found(self, header: list[str], given: Mapping[str, str]) -> dict[str, Column]:
-        """Which of our columns the header has; those that were given by name first."""
+        """Our columns in the header; those assigned by the user first."""
         found: dict[str, Column] = {}
         names = [name.strip() for name in header]
         for ours, theirs in given.items() if header else ():
@@ -235,7 +234,7 @@ class Table:
             raise ConfigError(f"{self.path}:1: must have {what}; missing ({hints}); got {got}")
 
     def batches(self) -> Iterator[sites.Batch]:
-        """The rows, some at a time; raises ConfigError with all faults, each with its line and column."""
+        """The rows in batches; raises ConfigError with all faults, each with its line and column."""
         names = sites.POSITION_COLUMNS if self.kind == sites.POSITIONS else sites.PLOT_COLUMNS
         row_of: RowOf = self._position if self.kind == sites.POSITIONS else self._plot
         gathered = sites.Gathered(self.kind, names)
@@ -284,7 +283,7 @@ class Table:
             if abs(value) > most:
                 self._fault(name, f"must be from -{most} to {most} degrees", f"{value:g}")
         altitude = self._number(cells, "altitude_m")
-        self.highest = max(self.highest, altitude)  # not-a-number is not larger
+        self.highest = max(self.highest, altitude)  # NaN is not larger
         return t, lat, lon, altitude, speed * math.sin(course), speed * math.cos(course), up
 
     def _plot(self, cells: list[str]) -> tuple[float, ...]:
