@@ -1,1 +1,1 @@
-"""A folder a paper; what a study is, which there are, and what their numbers depend on."""
+"""Studies, one folder for each paper; their interface, their registry, and the identity of their results."""

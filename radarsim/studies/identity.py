@@ -1,12 +1,12 @@
 """What a case's numbers depend on, as one hash: the name of its stored blocks.
 
-Its first half is the question: the resolved case with every default written out, the seed, the layout of random numbers
+Its first half is the request: the resolved case with every default written out, the seed, the layout of random numbers
 and the study's `model`. Realisations, limits, threads, output, file and display names are not in it.
 
-Its second half is a hash of files, which an edit of any kind changes, of words too: of radarsim's own studies those of
-the study, of the rooms that it stands on and of what runs it, but for what shows numbers; of a study from another
-package all files of that, and the versions of what is installed; so of filters from another package. It is a quick
-answer alone. Where it differs, stored blocks are computed again in part and taken over if their bytes are the same; see
+Its second half is a hash of files, which any edit changes, also of comments: for radarsim's own studies those of the
+study, of the packages that it uses and of the engine, except files that only show numbers; for a study from another
+package all its files, and the versions of installed packages; likewise for filters from another package. It is only a
+quick answer: where it differs, stored blocks are recomputed in part and kept if their bytes are equal; see
 radarsim.engine.store.
 """
 
@@ -25,7 +25,7 @@ from radarsim.studies.registry import SHIPPED, module, study
 
 PACKAGE = Path(__file__).parents[1]
 ROOMS = ("app/configs.py", "bursts", "config", "engine", "constants.py", "kernels", "physics.py")
-SHOW = {"claims", "figures", "map", "measures", "readings", "tables", "words"}  # files of a study, by their stem
+SHOW = {"claims", "figures", "map", "measures", "readings", "tables", "words"}  # a study's files, by stem
 
 
 def identity(case: Case) -> str:
@@ -47,7 +47,7 @@ def identity(case: Case) -> str:
 
 
 def packages(case: Case) -> tuple[str, ...]:
-    """The packages but radarsim that compute a case's numbers: of its study, and of its filters' keys and gains."""
+    """The packages other than radarsim that compute a case's numbers: of its study, of its filters' keys and gains."""
     of_study = () if case.study in SHIPPED else (module(case.study),)
     kinds = [
         one
@@ -61,7 +61,7 @@ def packages(case: Case) -> tuple[str, ...]:
 
 @cache
 def sources(name: str, outside: tuple[str, ...] = ()) -> str:
-    """SHA-256 of the files that may compute numbers of a study, and those of packages from outside."""
+    """SHA-256 of the files that may compute a study's numbers, including those of outside packages."""
     found = hashlib.sha256()
     places = [(PACKAGE / room, files(PACKAGE / room)) for room in ROOMS]
     places.append((PACKAGE / "studies", (PACKAGE / "studies").glob("*.py")))
@@ -81,7 +81,7 @@ def sources(name: str, outside: tuple[str, ...] = ()) -> str:
 
 
 def files(place: Path) -> Iterator[Path]:
-    """All files of a package or room but bytecode beside sources; the archive where it lies in one."""
+    """All files of a package except bytecode beside sources; the archive if it is in one."""
     if place.is_dir():
         yield from (path for path in place.rglob("*") if path.is_file() and path.parent.name != "__pycache__")
     else:

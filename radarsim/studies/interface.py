@@ -1,11 +1,11 @@
-"""What a study is: one paper's question, as the rest of radarsim sees it.
+"""The interface of a study: one paper's experiment.
 
-A study is an object of a class derived from `Study`. Its abstract methods are required; the others are optional and do
-what their docstrings say where a study does not define them. Methods import what they need when they are called, so
-that `radarsim list` loads no kernels.
+A study is an object of a class derived from `Study`. Its abstract methods are required; the others are optional, with
+the defaults in their docstrings. Methods import what they need when they are called, so that `radarsim list` loads no
+kernels.
 
 The numbers come from two of them: `prepare` makes a plan of a case, once; `simulate` makes the sums of one block of
-realisations. Everything else is made of these sums.
+realisations. Everything else derives from these sums.
 
 A study whose files have the usual names need not write the class: see `radarsim.studies.folder`.
 """
@@ -37,11 +37,11 @@ if TYPE_CHECKING:
 
 
 class Plan(Protocol):
-    """What `prepare` makes of a case; beside this it holds the arrays that the study's kernels take.
+    """The result of `prepare`; a study's own plan adds the arrays that its kernels take.
 
-    block is how many realisations a block holds: from the study alone, never from N, threads or the machine. layout
-    names the arrays of the sums and their shapes. axes say what the sums are of. gaussian: whether all errors are
-    Gaussian, with the exact bias and σ of the axes.
+    block: realisations in a block, from the study alone, never from N, threads or the machine. layout: names and shapes
+    of the arrays of sums. axes: the quantities that the sums are of. gaussian: whether all errors are Gaussian, with
+    the exact bias and σ of the axes.
     """
 
     @property
@@ -57,15 +57,15 @@ class Plan(Protocol):
 class Tracker(Protocol):
     """The filters of a case over recorded plots, chunk by chunk.
 
-    most_rows is how many rows it takes, all at once; None: any number, chunk by chunk in flat memory. several: whether
-    rows may have the time of the row before, as plots of one scan do.
+    most_rows: how many rows it takes, all at once; None: any number, chunk by chunk in constant memory. several:
+    whether rows may have the time of the row before, as plots of one scan do.
     """
 
     most_rows: int | None
     several: bool
 
     def feed(self, columns: Mapping[str, "np.ndarray"]) -> "Track":
-        """The estimates over the next rows: columns (n,), not-a-number where a value is missing.
+        """The estimates over the next rows: columns (n,), NaN where a value is missing.
 
         Raises PlotFault for a row that a filter cannot take.
         """
@@ -76,7 +76,7 @@ IN_NAMES = {"m/s": "mps", "m/s2": "mps2", "rad/s": "radps", "rad/s2": "radps2"} 
 
 
 def true_column(component: str, unit: str) -> str:
-    """The column of plots that holds the truth of a component of the state: `true_Vr_mps`."""
+    """The column with the true values of a component of the state: `true_Vr_mps`."""
     plain = unit.translate(str.maketrans("²³⁴⁵", "2345"))
     return f"{TRUE}{component}_{IN_NAMES.get(plain, plain.replace('/', 'p'))}"
 
@@ -144,10 +144,11 @@ OUTLIERS, BIAS, CORRELATION = EXPLANATIONS = ("outliers", "bias", "correlation")
 
 
 class Likelihood(Protocol):
-    """How likely recorded plots are under a filter, by the keys of the config that it was designed with.
+    """The likelihood of recorded plots under a filter, as a function of the config keys that it was designed with.
 
-    filter: its name; tracks and rows: how many there are; keys: dotted names; stated (n,): their values in the config;
-    least (n,): what counts as zero of them; explains: by what else it can explain plots, of EXPLANATIONS.
+    filter: its name; tracks and rows: numbers of them; keys: dotted names; stated (n,): their values in the config;
+    least (n,): values of them that count as zero; explains: other explanations of plots that it can include, of
+    EXPLANATIONS.
     """
 
     filter: str
@@ -161,15 +162,14 @@ class Likelihood(Protocol):
     def __call__(
         self, values: "np.ndarray", outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0
     ) -> float:
-        """The logarithm of the likelihood of values (n,) of the keys. It is asked with what it explains plots by alone.
+        """The log-likelihood of values (n,) of the keys. Only explanations in `explains` may be given.
 
-        outliers: the share of plots with ten times their σ; bias: a constant error of what can show one, in its σ;
-        correlation: of the errors of neighbouring plots, at the recording's usual interval.
+        outliers: the share of plots with ten times their σ; bias: a constant error of a number that can show one, in
+        its σ; correlation: of the errors of neighbouring plots, at the recording's usual interval.
         """
 
     def by_number(self, values: "np.ndarray") -> Mapping[str, float]:
-        """The same with the keys alone, summed for each number that a plot holds, by its column; not-a-number where it
-        cannot be told."""
+        """The same for the keys alone, summed for each number of a plot, by its column; NaN where it is unknown."""
 
 
 class Turning(NamedTuple):
@@ -183,13 +183,13 @@ class Turning(NamedTuple):
 
 
 class RecordedPlots(ABC):
-    """What a study does with recorded plots: `radarsim track` and `radarsim simulate`.
+    """A study's part for recorded plots: `radarsim track` and `radarsim simulate`.
 
     A study has `drawing`, or the slower `simulated`, of which the other follows.
 
-    rows_asked: of how many rows `radarsim track` asks the likelihood for its advice, so that it takes some seconds.
-    from_any_origin: whether ranges count from any point, so that they may be negative. of_any_keys: whether all that it
-    does it asks of the study, so that there are no keys that it could pass over.
+    rows_asked: number of rows for the likelihood behind the advice of `radarsim track`, so that it takes some seconds.
+    from_any_origin: whether ranges count from any point, so that they may be negative. of_any_keys: whether it uses
+    only methods of the study, so that it cannot ignore keys.
     """
 
     rows_asked: int = 3000
@@ -198,7 +198,7 @@ class RecordedPlots(ABC):
 
     @abstractmethod
     def columns(self, spec: Any) -> Sequence[Sequence[str]]:
-        """The columns that are read, `t_s` first; the first of these choices that a file has is taken."""
+        """The columns to read, `t_s` first; the first of these choices that a file has is taken."""
 
     def columns_of(self, spec: Any, one: Any) -> Sequence[str]:
         """The columns without which a filter takes no plot. Default: none, each takes what is read."""
@@ -206,7 +206,7 @@ class RecordedPlots(ABC):
 
     @abstractmethod
     def sigmas(self, spec: Any) -> Mapping[str, Sequence[str]]:
-        """The keys of the standard deviations that stand behind each number that is measured."""
+        """The keys of the standard deviations of each measured number."""
 
     @abstractmethod
     def scan_period_s(self, spec: Any) -> float:
@@ -250,19 +250,20 @@ class RecordedPlots(ABC):
     def likelihood(
         self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"
     ) -> "Likelihood | None":
-        """How likely tracks, columns (n,) each, are under a filter; of the one that takes most of a plot where None.
+        """The likelihood of tracks, columns (n,) each, under a filter; where None, the one that takes most columns of a
+        plot.
 
         Default: not known; `radarsim fit` refuses its configs.
         """
         return None
 
     def span_mps(self, spec: Any) -> float | None:
-        """What velocities of a config's radar are ambiguous by, m/s; None, the default, where it does not say."""
+        """The span by which velocities of a config's radar are ambiguous, m/s; None, the default, if not stated."""
         return None
 
     def unfolding(self, span_mps: float) -> tuple[str, str] | None:
-        """A shipped config whose filters take velocities that are folded by so much (m/s), and the `KEY=VALUE` that
-        says so; None, the default, where velocities are taken as they are measured."""
+        """A shipped config whose filters take velocities folded by this span (m/s), and its setting `KEY=VALUE`; None,
+        the default, where velocities are taken as measured."""
         return None
 
     def in_a_turn(self, case: "Case", filter_name: str, values: Mapping[str, float]) -> "Turning | None":
@@ -301,7 +302,7 @@ class Paper(NamedTuple):
 
 
 def paper_in(claims: str) -> str:
-    """The key `paper` of a text as claims.yaml, where it stands on a line of its own; else nothing."""
+    """The key `paper` in the text of a claims.yaml, on a line of its own; else nothing."""
     found = re.search(r"^paper: *([\w-]+) *$", claims, re.MULTILINE)
     return found[1] if found else ""
 
@@ -327,16 +328,16 @@ class Study(ABC):
         """The YAML keys: a subclass of `radarsim.config.fields.Study`."""
 
     def own_filters(self) -> "type[Model] | None":
-        """What keys of filters from other packages are derived from, see `radarsim.studies.registry.filters`.
+        """The base class for keys of filters from other packages, see `radarsim.studies.registry.filters`.
 
-        Default: nothing, the study takes no such filters.
+        Default: none, the study takes no such filters.
         """
         return None
 
     # ---- numbers -------------------------------------------------------------------------------------------------
     @abstractmethod
     def prepare(self, case: "Case") -> Plan:
-        """The plan of a case: truth, matrices, gains, exact values. Raises ConfigError where there is none."""
+        """The plan of a case: truth, matrices, gains, exact values. Raises ConfigError for an impossible case."""
 
     @abstractmethod
     def simulate(self, plan: Any, first: int, count: int) -> "np.ndarray":
@@ -348,29 +349,30 @@ class Study(ABC):
     def shortened(self, case: "Case", at_s: float | None, at_k: int | None) -> "Case":
         """A case with the same exact errors at a time (s) or scan, cheaper to prepare. Default: the case itself.
 
-        Raises ConfigError where the whole case cannot be.
+        Raises ConfigError where the whole case is impossible.
         """
         return case
 
     def exact_but_for(self, case: "Case") -> str:
-        """What the values called exact of a case are, in words, where they are exact but for less than one prints.
+        """A qualification of the exact values of a case, in words, where they are approximate to less than the digits
+        printed.
 
         Default: nothing, they are exact.
         """
         return ""
 
     def costly(self, case: "Case") -> bool:
-        """Whether the exact errors of a case take long, and with `Case.roughly` much less. Default: no."""
+        """Whether the exact errors of a case are slow to compute, and much faster with `Case.roughly`. Default: no."""
         return False
 
     def quantities(self, spec: Any = None) -> "tuple[Quantity, ...]":
-        """What a case measures, without spec any case. Default: σ and gain, of the common tables."""
+        """The quantities that a case measures; without spec, any case. Default: σ and gain, of the common tables."""
         from radarsim.report.quantities import COMMON
 
         return COMMON
 
     def relabelled(self, axes: "Axes", case: "Case") -> "Axes":
-        """The axes of a plan with the display names of a case that has the same identity. Default: names of filters."""
+        """The axes of a plan with the display names of a case of the same identity. Default: names of filters."""
         return replace(axes, filters=tuple(member.name for member in case.spec.members))
 
     def seconds_per_update(self, plan: Any) -> Mapping[str, float]:
@@ -378,9 +380,10 @@ class Study(ABC):
         return {}
 
     def seconds_at_most(self, plan: Any) -> float | None:
-        """CPU seconds that no processor exceeds for one realisation, from what is counted: nothing is simulated.
+        """An upper bound on CPU seconds for one realisation on any processor, from operation counts: nothing is
+        simulated.
 
-        `radarsim check` times a few realisations, unless all of them are surely short by this. Default: not known.
+        `radarsim check` times a few realisations, unless this shows that all of them are short. Default: not known.
         """
         return None
 
@@ -402,7 +405,7 @@ class Study(ABC):
         return tables.gains(results)
 
     def table(self, name: str, results: "Sequence[CaseResult]", column: str = "") -> "pd.DataFrame | None":
-        """The table of a name, with this column; None where it makes none. `curves` and `gains` alone where they do."""
+        """The table of a name, with this column; None if there is none. `curves` and `gains` without other tables."""
         common = {"curves": self.curves, "gains": self.gains}.get(name)
         made = None if common is None else common(results)
         return self.tables(results).get(name) if made is None or (column and column not in made) else made
@@ -411,41 +414,41 @@ class Study(ABC):
     def figures(
         self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
-        """The figures, described, by the stem of their file, from results and from all tables made of them."""
+        """The figures, described, by the stem of their file, from results and all their tables."""
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
-        """The tables that figures are drawn from, by how the figure's name begins. Default: none named.
+        """The tables behind figures, by the beginning of the figure's name. Default: none named.
 
-        Not needed of a figure with the name of its table, nor where the name begins with sigma, gain or sweep.
+        Not needed for a figure with the name of its table, nor where the name begins with sigma, gain or sweep.
         """
         return {}
 
     @abstractmethod
     def question(self, experiment: "Experiment") -> str:
-        """What an experiment asks, in one sentence."""
+        """The question of an experiment, in one sentence."""
 
     @abstractmethod
     def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
         """The answer: sentences with numbers and 95 % intervals."""
 
     def warnings(self, experiment: "Experiment") -> Sequence[str]:
-        """What a config allows but hardly means, a line each; the run goes on. Default: nothing."""
+        """Settings that are allowed but hardly intended, a line each; the run goes on. Default: nothing."""
         return ()
 
     def inputs(self, results: "Sequence[CaseResult]") -> "pd.DataFrame | None":
-        """A table of what was put in, for the report. Default: none."""
+        """A table of the inputs, for the report. Default: none."""
         return None
 
     def cost(self, made: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":
-        """A table of what the filters cost, for the report; run is as in run.json. Default: none."""
+        """A table of the filters' cost, for the report; run is as in run.json. Default: none."""
         return None
 
     def claim_faults(self, shipped: "Shipped") -> Sequence[str]:
-        """What its claims and readings name and no shipped config has, a line each. `shipped` as of `claims.judged`."""
+        """Names in its claims and readings that no shipped config has, a line each. `shipped` as of `claims.judged`."""
         return ()
 
     def paper_key(self) -> str:
-        """What the names of its claims begin with (P1), before they are read. Default: not known, so they are read."""
+        """The prefix of its claims' names (P1), before they are read. Default: not known, so they are read."""
         return ""
 
     def claims(self) -> "PaperClaims | None":
@@ -453,16 +456,16 @@ class Study(ABC):
         return None
 
     def readings(self) -> "PaperReadings | None":
-        """What the paper leaves open, and its claims under each reading. Default: nothing."""
+        """The paper's open choices, and its claims under each reading. Default: nothing."""
         return None
 
     # ---- beside --------------------------------------------------------------------------------------------------
     def recorded(self) -> RecordedPlots | None:
-        """What it does with recorded plots. Default: nothing; `track` and `simulate` refuse its configs."""
+        """Its part for recorded plots. Default: nothing; `track` and `simulate` refuse its configs."""
         return None
 
     def chart(self, cases: "Sequence[Case]", references: "Sequence[Case]") -> "Chart | None":
-        """One chart for every device, with these cases on it, and others to compare with. Default: none."""
+        """One chart for all radars, with these cases on it, and others to compare with. Default: none."""
         return None
 
     def shipped(self) -> Path | None:

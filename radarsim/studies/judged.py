@@ -1,8 +1,8 @@
-"""What claims of a study in one file are measured by, and its readings: a case is found by its keys.
+"""Measures of claims, and readings, of a study in one file: a case is found by its keys.
 
-A claim says `of: [{radar.scan_period_s: 2}]`: the case of these keys, or properties, by their dotted names; `of: [{}]`
-is the first one. The functions here, whose first argument is `seen`, may be its `measure`; `at` is a scan, by default
-the last one.
+A claim says `of: [{radar.scan_period_s: 2}]`: the case with these keys, or properties, by their dotted names; `of:
+[{}]` is the first one. The functions here whose first argument is `seen` may be its `measure`; `at` is a scan, by
+default the last one.
 """
 
 import math
@@ -26,11 +26,11 @@ from radarsim.report.statistics import Estimate, difference, mean
 from radarsim.report.tables import realisations
 
 NOWHERE = object()
-CLOSE = 1e-9  # relative: one number written in two ways
+CLOSE = 1e-9  # relative difference of one number written in two ways
 
 
 class Evidence(claims.Evidence):
-    """What the paper's experiment measured; a case is known by a mapping of its keys, or by its name."""
+    """Results of the paper's experiment; a case is identified by a mapping of its keys, or by its name."""
 
     def case(self, key: Any) -> CaseResult:
         if not isinstance(key, Mapping):
@@ -44,7 +44,7 @@ class Evidence(claims.Evidence):
 
 
 def _value(spec: Any, path: str) -> Any:
-    """A key of a case, by its dotted name; NOWHERE where it has none such."""
+    """A key of a case, by its dotted name; NOWHERE where it has none of that name."""
     try:
         return attrgetter(path)(spec)
     except AttributeError:
@@ -57,7 +57,7 @@ def _unknown(key: Mapping[str, Any], specs: Sequence[Any]) -> str:
 
 
 def _is(spec: Any, key: Mapping[str, Any]) -> bool:
-    """Whether it is the case of these keys."""
+    """Whether it is the case with these keys."""
     return all(_equal(_value(spec, path), value) for path, value in key.items())
 
 
@@ -99,7 +99,7 @@ def bias(seen: Evidence, case: Any, filter: str, component: str, at: int | None 
 
 
 def over_believed(seen: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
-    """σ of a filter over the one that it believes; where the study has the table `believed`."""
+    """σ of a filter over the σ that it predicts; where the study has the table `believed`."""
     found = seen.case(case)
     k = int(found.axes.k[_place(found, filter, component, at)[1]])
     row = seen.row("believed", case=found.name, filter=filter, component=component, k=k)
@@ -107,14 +107,14 @@ def over_believed(seen: Evidence, case: Any, filter: str, component: str, at: in
 
 
 def _place(found: CaseResult, filter: str, component: str, at: int | None) -> tuple[int, int, int]:
-    """Where the sums of an error stand."""
+    """The index of an error in the sums."""
     axes = found.axes
     k = list(axes.k).index(at) if at is not None else -1
     return axes.filters.index(filter), k, [name for name, _ in axes.components].index(component)
 
 
 def limit(seen: Evidence, case: Any, filter: str, component: str) -> float:
-    """The σ that a filter tends to, by the study's own limits."""
+    """The limit of a filter's σ, by the study's own limits."""
     return float(seen.row("last", case=seen.case(case).name, filter=filter, component=component)["steady_sigma"])
 
 
@@ -124,7 +124,7 @@ def _at(series: Series, at: int | None) -> Estimate:
 
 # ---- readings --------------------------------------------------------------------------------------------------------
 class Readings(PaperReadings):
-    """Readings whose alternatives set keys of a case, dotted names; a bare one is of every filter."""
+    """Readings whose alternatives set keys of a case, by dotted names; a bare name is of every filter."""
 
     def __init__(self, paper: str, choices: tuple[Choice, ...]):
         self.paper, self.choices = paper, choices
@@ -141,7 +141,7 @@ def faults(
     shipped: Shipped,
     configs: Sequence[str],
 ) -> Iterator[str]:
-    """What claims and choices name and nothing has, a line each with its place: known without a run.
+    """Names in claims and choices that do not exist, a line each with its place: known without a run.
 
     components: of the study; configs: the stems that its package ships.
     """
@@ -162,7 +162,7 @@ def faults(
 
 
 def _names(measure: Call, specs: Sequence[Model], components: Sequence[str]) -> Iterator[str]:
-    """Which case, filter, component, gain or scan of a measure is not there: of arguments of functions here alone."""
+    """The unknown case, filter, component, gain or scan of a measure: in arguments of the functions here only."""
     of: list[Any] = []
     for key in (key for key in measure.cases if isinstance(key, Mapping)):
         if unknown := _unknown(key, specs):
@@ -183,7 +183,7 @@ def _names(measure: Call, specs: Sequence[Model], components: Sequence[str]) -> 
 
 
 def _no_number(measure: Call, spec: Any) -> Iterator[str]:
-    """Why a case has no number for a measure of functions here: no gain of its baseline, no scan after its last."""
+    """Why a case has no number for a measure of the functions here: no gain of its baseline, no scan after its last."""
     name, at = measure.arguments.get("filter"), measure.arguments.get("at")
     if measure.function in (gain, gain_change) and name == (spec.baseline or spec.filters[0].name):
         yield f"filter {name!r} is the baseline: it has no gain"
@@ -201,7 +201,7 @@ def _kept_from(spec: Model, values: Mapping[str, Any]) -> str:
 
 
 def _with(spec: Any, values: Mapping[str, Any]) -> Any:
-    """A config's keys with other values of some; raises Unreadable where they do not go together."""
+    """A config's keys with some values changed; raises Unreadable where they are incompatible."""
     origin, faults = Origin("reading"), Faults()
     data: Any = from_python(spec.model_dump(exclude_none=True), (), origin, faults)
     for path, value in values.items():

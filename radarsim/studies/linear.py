@@ -1,14 +1,14 @@
 """A study of linear filters from its matrices: a base for studies in one file (`radarsim.studies.onefile`).
 
-Beside what that says a class gives `motion` and `plot`: how the truth moves, and what a filter sees. A filter that
-believes other matrices than the true ones has them by `assumed_motion` and `assumed_plot`, one with gains of its own
-by `own_gains`. `detection` is the key of the probability that there is a plot, `fitted` are those that `radarsim fit`
-looks for, real numbers.
+Besides the items listed there a class gives `motion` and `plot`: how the truth moves, and how a filter's plots depend
+on it. A filter with a wrong model states its matrices by `assumed_motion` and `assumed_plot`, one with gains of its own
+by `own_gains`. `detection` is the key of the probability of a plot, `fitted` are the keys that `radarsim fit`
+estimates, real numbers.
 
-Derived are the Kalman gains, exact σ and bias of every filter, of one with a wrong model too, the σ that it tends to,
-the compiled kernel, plots of one realisation, filters over recorded plots, and their likelihood. A plot's numbers have
+Derived are the Kalman gains, exact σ and bias of every filter, also one with a wrong model, the limit of its σ, the
+compiled kernel, plots of one realisation, filters over recorded plots, and their likelihood. A plot's numbers have
 independent errors. Where plots may be missed, the gains of a Kalman filter depend on which were: its exact values and
-limits are not known then; those of a filter with gains of its own are.
+limits are then unknown; those of a filter with gains of its own are known.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -31,14 +31,14 @@ if TYPE_CHECKING:
     from radarsim.kernels import states
 
 BLOCK = 4096
-CLOSE = 1e-14  # change of a limit that has settled, of its components' own sizes
+CLOSE = 1e-14  # relative change of a limit's components that counts as settled
 DOUBLINGS = 60
-LONGEST_PERIOD = 64  # scans after which plots repeat themselves, looked for up to here
-LEAST = 1e-6  # of a stated key that is fitted, which counts as zero
+LONGEST_PERIOD = 64  # longest period of plots, in scans, that is looked for
+LEAST = 1e-6  # of a fitted key's stated value, which counts as zero
 
 
 class Motion(NamedTuple):
-    """How a state of n components moves: F(dt) and Q(dt), each (n, n), and its mean (n,) and covariance (n, n) at the
+    """Motion of a state of n components: F(dt) and Q(dt), each (n, n), and its mean (n,) and covariance (n, n) at the
     first plot."""
 
     F: Callable[[float], Any]
@@ -51,8 +51,8 @@ class Motion(NamedTuple):
 class Matrices:
     """A filter of n states and D numbers over K scans, as the kernels take it.
 
-    F, Q, P (n, n), x (n,), H (K, D, n), R (K, D): what it believes, R variances; see (K, D, n), sigma (K, D): of its
-    plots; gains (K, D, n), the Kalman gains where it has none of its own. own: whether it has.
+    F, Q, P (n, n), x (n,), H (K, D, n), R (K, D): its model, R variances; see (K, D, n), sigma (K, D): of its plots;
+    gains (K, D, n): its own, or the Kalman gains. own: whether it has its own.
     """
 
     F: np.ndarray
@@ -69,7 +69,7 @@ class Matrices:
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a block needs; see `kernels.states.Problem`."""
+    """Data of a block; see `kernels.states.Problem`."""
 
     layout: Layout
     axes: Axes
@@ -79,10 +79,10 @@ class Plan:
 
 
 class LinearStudy(OneFile):
-    """A study of linear filters; the module's docstring says what a subclass gives.
+    """A study of linear filters; the module's docstring lists what a subclass gives.
 
-    motion(spec): how the truth moves; its first components are those of the study. plot(spec, one, k): what filter
-    `one` sees at scan k, from 0: the rows H (D, n), and the standard deviations (D,) of its numbers; a single number
+    motion(spec): how the truth moves; its first components are those of the study. plot(spec, one, k): the plot of
+    filter `one` at scan k, from 0: the rows H (D, n), and the standard deviations (D,) of its numbers; a single number
     may be given as (n,) and a float.
     """
 
@@ -124,24 +124,24 @@ class LinearStudy(OneFile):
         return self.motion(spec)
 
     def assumed_plot(self, spec: Any, one: Any, k: int) -> tuple[Any, Any]:
-        """What a filter assumes of its plots. Default: the truth."""
+        """A filter's model of its plots. Default: the truth."""
         return self.plot(spec, one, k)
 
     def own_gains(self, spec: Any, one: Any) -> Any:
         """The gains (K, D, n) of a filter that has its own, such as `steady_gains`; None: a Kalman filter.
 
-        A plot's numbers are taken in one after the other, each with its gains.
+        A plot's numbers are processed one after the other, each with its gains.
         """
         return None
 
     def steady_gains(self, spec: Any, one: Any) -> np.ndarray:
-        """The gains (K, D, n) that a Kalman filter of what this one believes tends to, from the first scan on."""
+        """The limit of the Kalman gains (K, D, n) of this filter's model, used from the first scan on."""
         of = self._believed(spec, one)
         phases = np.arange(spec.scans) % period(of.H, of.R)
         return np.asarray(steady(of)[0][phases])
 
     def probability(self, spec: Any) -> float:
-        """The probability that there is a plot."""
+        """The probability of a plot."""
         given = self.call(attrgetter(self.detection), spec) if self.detection else 1.0
         if not isinstance(given, int | float) or not 0 <= given <= 1:
             raise self._fault("detection", f"{self.detection} must be a probability, from 0 to 1, got {given!r}")
@@ -149,7 +149,7 @@ class LinearStudy(OneFile):
 
     # ---- from matrices to arrays ---------------------------------------------------------------------------------
     def _fault(self, what: str, words: str) -> ConfigError:
-        """An error with the line of the method that `what` begins with."""
+        """An error with the line of the method whose name begins `what`."""
         name = what.partition(":")[0]
         code = getattr(getattr(self, name, None), "__code__", None)
         place = self.place
@@ -158,7 +158,7 @@ class LinearStudy(OneFile):
         return ConfigError(f"{place}: study {self.name}: {what}: {words}"[:400])
 
     def _array(self, what: str, given: Any, *shape: int) -> np.ndarray:
-        """A matrix that the study gives, of this shape; raises ConfigError."""
+        """A matrix of the study, checked for this shape; raises ConfigError."""
         try:
             found = np.asarray(given, dtype=float)
         except (TypeError, ValueError):
@@ -170,7 +170,7 @@ class LinearStudy(OneFile):
         return found
 
     def _covariance(self, what: str, given: Any, n: int) -> np.ndarray:
-        """A covariance (n, n) that the study gives; raises ConfigError."""
+        """A covariance (n, n) of the study, checked; raises ConfigError."""
         found = self._array(what, given, n, n)
         if not is_covariance(found):
             raise self._fault(what, f"must be symmetric and not negative, got {found.tolist()}")
@@ -195,11 +195,11 @@ class LinearStudy(OneFile):
         return F, Q, self._array(f"{what}: mean", of.mean, n), P
 
     def _truth(self, spec: Any) -> tuple[tuple[np.ndarray, ...], float]:
-        """How the truth moves (`_moved`), and the probability of a plot."""
+        """The motion of the truth (`_moved`), and the probability of a plot."""
         return self._moved("motion", self.call(self.motion, spec), self.scan_period_s(spec)), self.probability(spec)
 
     def _rows(self, what: str, given: Callable[[int], tuple[Any, Any]], scans: int, n: int) -> tuple[np.ndarray, ...]:
-        """Rows H (K, D, n) and standard deviations (K, D) of what is given for each scan."""
+        """Rows H (K, D, n) and standard deviations (K, D) from those of each scan."""
         every = [given(k) for k in range(scans)]
         for one in every:
             if not isinstance(one, tuple | list) or len(one) != 2:
@@ -215,7 +215,7 @@ class LinearStudy(OneFile):
         return H, sigma
 
     def _believed(self, spec: Any, one: Any) -> Matrices:
-        """The Kalman filter of what a filter believes."""
+        """The Kalman filter of a filter's model."""
         F, Q, x, P = self._moved("assumed_motion", self.call(self.assumed_motion, spec, one), self.scan_period_s(spec))
         see, sigma = self._rows("plot", lambda k: self.call(self.plot, spec, one, k), spec.scans, x.size)
         H, R = self._rows("assumed_plot", lambda k: self.call(self.assumed_plot, spec, one, k), spec.scans, x.size)
@@ -290,7 +290,7 @@ class LinearStudy(OneFile):
 
 # ---- design ----------------------------------------------------------------------------------------------------------
 def kalman(F: np.ndarray, Q: np.ndarray, P: np.ndarray, H: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """The gains (K, D, n) of a Kalman filter (Bar-Shalom et al. 2001, section 5.2), P being that at the first scan."""
+    """The gains (K, D, n) of a Kalman filter (Bar-Shalom et al. 2001, section 5.2), with P at the first scan."""
     gains = np.empty_like(H)
     for k in range(len(H)):
         P = F @ P @ F.T + Q if k else P
@@ -299,7 +299,7 @@ def kalman(F: np.ndarray, Q: np.ndarray, P: np.ndarray, H: np.ndarray, R: np.nda
 
 
 def updated(P: np.ndarray, H: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The gains (D, n) of numbers taken in one after the other, and P after them, by Joseph's form."""
+    """The gains (D, n) of numbers processed one after the other, and P after them, by Joseph's form."""
     gains = np.empty_like(H)
     for d, (h, r) in enumerate(zip(H, R, strict=True)):
         gains[d] = P @ h / (h @ P @ h + r)
@@ -309,7 +309,7 @@ def updated(P: np.ndarray, H: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np
 
 
 def period(*arrays: np.ndarray) -> int:
-    """After how many scans arrays (K, …) repeat themselves; K where they do not."""
+    """The period, in scans, of arrays (K, …); K where they have none."""
     scans = len(arrays[0])
     for p in range(1, min(LONGEST_PERIOD, scans // 2) + 1):
         if all(np.array_equal(one[p:], one[:-p]) for one in arrays):
@@ -317,9 +317,9 @@ def period(*arrays: np.ndarray) -> int:
     return scans
 
 
-@np.errstate(all="ignore")  # what grows without end has no limit
+@np.errstate(all="ignore")  # growth without end has no limit
 def steady(of: Matrices) -> tuple[np.ndarray, np.ndarray]:
-    """The gains (p, D, n) over a period of p scans that a Kalman filter tends to, and its P before the first of them.
+    """The limit over a period of p scans of a Kalman filter's gains (p, D, n), and its P before the first of them.
 
     P goes from scan to scan as A (P⁻¹ + J)⁻¹ A' + C with A = F, C = Q, J = H'R⁻¹H. Two such steps are one of the same
     form, so 2^m periods take m of them (structured doubling: Chu, Fan & Lin 2005).
@@ -359,7 +359,7 @@ def _after(first: Step, second: Step) -> Step:
 
 # ---- exact values ----------------------------------------------------------------------------------------------------
 def exact(truth: tuple[np.ndarray, ...], of: Matrices, probability: float) -> tuple[np.ndarray, np.ndarray]:
-    """σ and bias (K, n) of a filter's errors e, by the mean and covariance of (e, truth), whatever it believes.
+    """σ and bias (K, n) of a filter's errors e, from the mean and covariance of (e, truth), whatever its model.
 
     A missed plot makes a mixture of two; then σ is exact still, though the error is not Gaussian.
     """
@@ -387,11 +387,11 @@ def exact(truth: tuple[np.ndarray, ...], of: Matrices, probability: float) -> tu
 
 @np.errstate(all="ignore")
 def limit(truth: tuple[np.ndarray, ...], of: Matrices, probability: float) -> np.ndarray:
-    """The σ (n,) that a filter's errors tend to, at scans of the phase of its last one; not-a-number where there is
-    none, or where it depends on the truth: by a wrong F or H.
+    """The limit of σ (n,) of a filter's errors, at scans of the phase of its last one; NaN where there is none, or
+    where it depends on the truth: by a wrong F or H.
 
-    Of its own gains the last ones are kept. The covariance of the errors goes over a period as S → T S + W, with S as a
-    vector, and stays at (1 - T)⁻¹ W.
+    Of a filter's own gains the last ones are kept. The covariance of the errors goes over a period as S → T S + W, with
+    S as a vector, and stays at (1 - T)⁻¹ W.
     """
     F, Q, mean, _ = truth
     n = mean.size
@@ -416,7 +416,7 @@ def limit(truth: tuple[np.ndarray, ...], of: Matrices, probability: float) -> np
 
 # ---- for the kernel --------------------------------------------------------------------------------------------------
 def root(S: np.ndarray) -> np.ndarray:
-    """L (n, n) with L L' = S ≥ 0, lower; columns that S has no need of are zero (Cholesky)."""
+    """L (n, n) with L L' = S ≥ 0, lower; columns not needed for S are zero (Cholesky)."""
     L, left = np.zeros_like(S), S.copy()
     for j in range(len(S)):
         if left[j, j] > 1e-12 * S[j, j]:
@@ -428,7 +428,7 @@ def root(S: np.ndarray) -> np.ndarray:
 def problem_of(
     case: "Case", truth: tuple[np.ndarray, ...], every: Sequence[Matrices], probability: float, baseline: int
 ) -> "states.Problem":
-    """What the kernel simulates."""
+    """The problem that the kernel simulates."""
     from radarsim.kernels import states
     from radarsim.studies.noise import noise_key
 
@@ -461,7 +461,7 @@ def problem_of(
 
 # ---- recorded plots --------------------------------------------------------------------------------------------------
 class _Rows:
-    """What a filter believes over rows of recorded plots, whatever the times between them."""
+    """A filter's model over rows of recorded plots, whatever the times between them."""
 
     def __init__(self, study: LinearStudy, spec: Any, one: Any):
         self.study, self.spec, self.one = study, spec, one
@@ -470,12 +470,12 @@ class _Rows:
         self.period = period(self.of.H, self.of.R)
 
     def numbers(self, columns: Mapping[str, np.ndarray], n: int) -> np.ndarray:
-        """The numbers z (n, D), not-a-number where a column is not there."""
+        """The numbers z (n, D), NaN where a column is absent."""
         none = np.full(n, np.nan)
         return np.stack([columns.get(name, none) for name in self.columns], axis=1)
 
     def moves(self, dt: np.ndarray, spec: Any = None) -> tuple[np.ndarray, np.ndarray]:
-        """F and Q (n, n, n) over times; over none at all the state stays."""
+        """F and Q (n, n, n) over times; over a time of zero the state stays."""
         motion, n = self.study.assumed_motion(spec or self.spec, self.one), self.of.x.size
         times, at = np.unique(dt, return_inverse=True)
         F, Q = np.tile(np.eye(n), (times.size, 1, 1)), np.zeros((times.size, n, n))
@@ -496,17 +496,17 @@ class _Rows:
         return H, np.stack([np.atleast_1d(sigma) for _, sigma in every]).astype(float) ** 2
 
     def gains(self, first: int, n: int) -> np.ndarray:
-        """A filter's own gains of rows; after its last scan those of the last period go on."""
+        """A filter's own gains at rows; after its last scan those of the last period repeat."""
         k, scans = first + np.arange(n), len(self.of.gains)
         last = scans - min(self.period, scans)
         return self.of.gains[np.where(k < scans, k, last + (k - last) % (scans - last))]
 
 
 class Following:
-    """The filters of a case over recorded plots, chunk by chunk in flat memory.
+    """The filters of a case over recorded plots, chunk by chunk in constant memory.
 
-    The first row is the first scan: there the state is as the config says. A filter none of whose columns are in the
-    file has no estimates.
+    The first row is the first scan: there the state is as in the config. A filter none of whose columns are in the file
+    has no estimates.
     """
 
     most_rows: int | None = None
@@ -519,7 +519,7 @@ class Following:
         self.count, self.last = 0, np.nan
 
     def feed(self, columns: Mapping[str, np.ndarray]) -> Track:
-        """The estimates over the next rows: columns (n,), not-a-number where a value is missing."""
+        """The estimates over the next rows: columns (n,), NaN where a value is missing."""
         t = columns["t_s"]
         dt = np.diff(t, prepend=self.last if self.count else t[0])
         made = [self._one(one, *state, dt, columns) for one, state in zip(self.filters, self.states, strict=True)]
@@ -542,7 +542,7 @@ class Following:
     def _one(
         self, one: _Rows, x: np.ndarray, P: np.ndarray, dt: np.ndarray, columns: Mapping[str, np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What `states.follow` gives of a filter, and its residuals (n, D)."""
+        """The result of `states.follow` for a filter, and its residuals (n, D)."""
         from radarsim.kernels import states
 
         rows, z = len(dt), one.numbers(columns, len(dt))
@@ -556,9 +556,9 @@ class Following:
 
 
 class PlotLikelihood:
-    """How likely tracks are under a filter's model, by the keys that the study names as `fitted`.
+    """The likelihood of tracks under a filter's model, by the keys that the study names as `fitted`.
 
-    The state at the first plot is as the config says.
+    The state at the first plot is as in the config.
     """
 
     explains: tuple[str, ...] = (OUTLIERS, CORRELATION)
@@ -582,7 +582,7 @@ class PlotLikelihood:
         self.usual_s = float(np.median(usual)) if usual else study.scan_period_s(spec)
 
     def _scores(self, values: np.ndarray, outliers: float, correlation: float) -> np.ndarray:
-        """Sums over all tracks for each number."""
+        """Sums over all tracks for each number of a plot."""
         from radarsim.kernels.hypotheses import lasting, log_likelihood
 
         spec = self.spec

@@ -1,4 +1,4 @@
-"""A study in one file: a class says what its keys, filters and claims are, and all else of a study follows from it.
+"""A study in one file: a class declares keys, filters and claims; the rest of a study follows from it.
 
     class Walk(LinearStudy):  # or another base that computes
         name, about = "walk", "Random walk (textbook)."  # as of every study
@@ -75,7 +75,7 @@ class Measured(NamedTuple):
 
 
 RESERVED = "filters", "baseline", "scans"
-MOST_SETS = 6  # sets of columns of which a file may have any; of more, all or one
+MOST_SETS = 6  # sets of columns of which a file may have any; if more, all or one
 NEEDED: Mapping[str, tuple[type, str]] = {
     "name": (str, "the value of `study:` in YAML"),
     "about": (str, "one line for `radarsim list`"),
@@ -89,12 +89,12 @@ NEEDED: Mapping[str, tuple[type, str]] = {
 
 
 class OneFile(Study):
-    """A study that one class of one file declares; the module's docstring says what a subclass gives.
+    """A study declared by one class of one file; the module's docstring lists what a subclass gives.
 
     realisation(case, i): the plots of realisation i as a run draws them, columns (K,), and the true components (K, C).
     tracker(case): the filters of a case before their first plot. Without either, or without `measured`, the numbers of
-    a recorded plot, the study does nothing with recorded plots. most_scans: of `scans`. extra_figures: names of figures
-    that a subclass draws beside those of each component, with * for what varies.
+    a recorded plot, the study does nothing with recorded plots. most_scans: bound of `scans`. extra_figures: names of
+    figures that a subclass draws beside those of each component, with * for the varying part.
     """
 
     asks: str
@@ -114,7 +114,7 @@ class OneFile(Study):
     key_class: "type[Keys]"
 
     def __init_subclass__(cls) -> None:
-        """Makes the class of the keys, where nothing is missing. Other processes find it by its name in the module."""
+        """Makes the class of the keys, if nothing is missing. Other processes find it by its name in the module."""
         super().__init_subclass__()
         if not any(True for _ in cls.missing()):
             name = f"{cls.__name__}Keys"
@@ -127,7 +127,7 @@ class OneFile(Study):
         if faults := [f"{self.place}: {fault}" for fault in self.missing()]:
             raise ConfigError(*faults)
         if self.claims_yaml:
-            _ = self._written  # a claim that names what is not there is known before anything runs
+            _ = self._written  # unknown names in a claim are reported before anything runs
         return self.key_class
 
     @property
@@ -135,12 +135,12 @@ class OneFile(Study):
         """The file, and line, of the class, for messages."""
         try:
             return f"{inspect.getsourcefile(type(self))}:{inspect.getsourcelines(type(self))[1]}"
-        except (OSError, TypeError):  # made by a call
+        except (OSError, TypeError):  # class made by a call
             return str(sys.modules[type(self).__module__].__file__)
 
     @classmethod
     def missing(cls) -> Iterator[str]:
-        """What the class lacks, or has of the wrong kind: a line each."""
+        """Attributes that the class lacks, or has of the wrong kind: a line each."""
         given = {name: getattr(cls, name, None) for name in NEEDED}
         if wrong := {name: one for name, one in given.items() if not isinstance(one, NEEDED[name][0]) or not one}:
             for name, one in wrong.items():
@@ -200,7 +200,7 @@ class OneFile(Study):
 
     # ---- numbers -------------------------------------------------------------------------------------------------
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """What a function of the study gives; ConfigError with its place and the study's name where it fails."""
+        """The value of one of the study's functions; ConfigError with its place and the study's name if it fails."""
         return call(function, *arguments, of=f"study {self.name}: ")
 
     def scan_period_s(self, spec: Any) -> float:
@@ -238,7 +238,7 @@ class OneFile(Study):
         return Layout(error=(*shape, 4), paired=shape)
 
     def limits(self, spec: Any) -> "np.ndarray | None":
-        """The σ (F, C) that the errors of a config tend to, not-a-number where there is none; None: not known."""
+        """The limit of σ (F, C) of a config's errors, NaN where there is none; None: not known."""
         return None
 
     def quantities(self, spec: Any = None) -> tuple[Quantity, ...]:
@@ -252,7 +252,7 @@ class OneFile(Study):
         return {"last": tables.joined(map(self._last, results))}
 
     def _last(self, result: "CaseResult") -> Mapping[str, Any]:
-        """σ at the last scan, exact where that is known, and the one that it tends to."""
+        """σ at the last scan, exact where known, and its limit."""
         import numpy as np
 
         from radarsim.report import statistics, tables
@@ -282,7 +282,7 @@ class OneFile(Study):
         return f"{tr(self._term(self.asks))} {tr('Filters: {names}.', names=few(list(names)))}"
 
     def _term(self, words: str) -> Term:
-        """Words of the study, said in the language spoken by the catalogue of its package."""
+        """A text of the study, translated by the catalogue of its package."""
         return term(words, type(self).__module__.partition(".")[0])
 
     def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
@@ -294,7 +294,7 @@ class OneFile(Study):
         return [*(f"{name}{sentence}" for name, one in each for sentence in self._sentences(one, made)), *others]
 
     def _sentences(self, result: "CaseResult", made: "Mapping[str, pd.DataFrame]") -> Iterator[str]:
-        """σ of the leading component at the last scan, and what each filter gains."""
+        """σ of the leading component at the last scan, and the gain of each filter."""
         from radarsim.report import panels, tables, wording
 
         leading = self.components[0]
@@ -317,7 +317,7 @@ class OneFile(Study):
     # ---- the paper -----------------------------------------------------------------------------------------------
     @cached_property
     def _written(self) -> "tuple[tuple[Claim, ...], tuple[Choice, ...]]":
-        """What `claims_yaml` holds."""
+        """The content of `claims_yaml`."""
         from radarsim.report.claims.over import written_in
         from radarsim.studies import judged
 
@@ -380,7 +380,7 @@ class OneFile(Study):
 
 
 class Recorded(RecordedPlots):
-    """What a study of one file does with recorded plots: a file may have all columns, or those of some filters."""
+    """The part of a study of one file for recorded plots: a file may have all columns, or those of some filters."""
 
     from_any_origin = True
     of_any_keys = True

@@ -12,7 +12,7 @@ from radarsim.errors import ConfigError
 def truth(target: Any, t: np.ndarray) -> np.ndarray:
     """Range, radial velocity and acceleration (K, 3) of a configured target at times t (K,), in m, m/s, m/s².
 
-    Of a target whose coefficients are drawn, with those of the middle. Raises ValueError for a target that is none.
+    For a target with random coefficients: with the means. Raises ValueError for an impossible target.
     """
     match target.kind:
         case "polynomial":
@@ -46,7 +46,7 @@ def recorded_flight(file: str, t: np.ndarray) -> np.ndarray:
 
 
 def checked_truth(target: Any, t: np.ndarray, case: str) -> np.ndarray:
-    """As `truth`, (K, 3) at times t (K,); raises ConfigError, naming the case, for a target that cannot be."""
+    """As `truth`, (K, 3) at times t (K,); raises ConfigError, naming the case, for an impossible target."""
     try:
         x = truth(target, t)
     except physics.Unreadable as error:

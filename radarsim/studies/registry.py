@@ -1,11 +1,11 @@
-"""The studies there are: those shipped here, and those that installed packages offer; and filters that packages add.
+"""The available studies: those shipped here, and those of installed packages; also filters that packages add.
 
 A package offers a study by an entry point of the group `radarsim.studies`: its name is the value of `study:` in YAML,
-its target the declared object, see `radarsim.studies.interface.Study`. A package that cannot be used is an error only
-where its study is asked for: lists of all studies leave it out, and `unusable` says why.
+its target the declared object, see `radarsim.studies.interface.Study`. An unusable package is an error only where its
+study is requested: lists of all studies leave it out, and `unusable` gives the reason.
 
-A package adds a filter to a study that takes such by an entry point of the group `radarsim.filters`: its name is the
-value of `kind:` of a filter in YAML, its target a class of keys, derived from what `Study.own_filters` gives.
+A package adds a filter to a study that allows this by an entry point of the group `radarsim.filters`: its name is the
+value of `kind:` of a filter in YAML, its target a class of keys, derived from that of `Study.own_filters`.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -30,7 +30,7 @@ from radarsim.studies.interface import Study
 Part = TypeVar("Part")
 
 GROUP, FILTERS = "radarsim.studies", "radarsim.filters"
-SHIPPED = {  # in the order of the papers, then what goes beyond them
+SHIPPED = {  # in the order of the papers, then extensions
     "range_doppler": "radarsim.studies.range_doppler",
     "multimodel": "radarsim.studies.multimodel",
     "sonar": "radarsim.studies.sonar",
@@ -42,7 +42,7 @@ SHIPPED = {  # in the order of the papers, then what goes beyond them
 
 @cache
 def entries(group: str = GROUP) -> Mapping[str, Mapping[str, EntryPoint]]:
-    """What installed packages offer in a group: by the entry's name, and of each name by the package's."""
+    """Entry points of installed packages in a group: by the entry's name, then by the package's."""
     found: dict[str, dict[str, EntryPoint]] = {}
     for entry in sorted(entry_points(group=group)):
         found.setdefault(entry.name, {}).setdefault(entry.dist.name if entry.dist else entry.value, entry)
@@ -50,17 +50,17 @@ def entries(group: str = GROUP) -> Mapping[str, Mapping[str, EntryPoint]]:
 
 
 def offered() -> tuple[str, ...]:
-    """The names of the studies of installed packages; a name that is shipped here is not taken over."""
+    """The names of the studies of installed packages; a name that is shipped here is ignored."""
     return tuple(name for name in entries() if name not in SHIPPED)
 
 
 def names() -> tuple[str, ...]:
-    """The values that `study:` may have."""
+    """The permitted values of `study:`."""
     return (*SHIPPED, *offered())
 
 
 def has(name: str) -> bool:
-    """Whether there is a study of that name; looks at installed packages only where it is not shipped here."""
+    """Whether a study of that name exists; looks at installed packages only where it is not shipped here."""
     return name in SHIPPED or name in offered()
 
 
@@ -100,9 +100,9 @@ def module(name: str) -> str:
 
 
 def part(name: str, take: Callable[[Study], Part]) -> Part:
-    """What `take` gets from the study of a name.
+    """The result of `take` for the study of a name.
 
-    Raises ConfigError with the package's name where the study comes from a package that cannot give it.
+    Raises ConfigError with the package's name where the study of a package fails.
     """
     one = study(name)
     if name in SHIPPED:
@@ -116,18 +116,18 @@ def part(name: str, take: Callable[[Study], Part]) -> Part:
 
 
 def parts(take: Callable[[Study], Part]) -> dict[str, Part]:
-    """What `take` gets from every study that can give it, by the study's name."""
+    """The result of `take` for every study that gives one, by the study's name."""
     found = {}
     for name in names():
         try:
             found[name] = part(name, take)
         except ConfigError:
-            continue  # reported by `unusable`, and where this study is asked for
+            continue  # reported by `unusable`, and where this study is requested
     return found
 
 
 def papers(take: Callable[[Study], Part], keys: Collection[str] = ()) -> dict[str, Part | None]:
-    """The same of the studies whose paper has one of these keys (P1), or is not known before its claims are read."""
+    """The same for studies whose paper has one of these keys (P1), or a key unknown until its claims are read."""
 
     def may_be(one: Study) -> bool:
         return not keys or one.paper_key() in ("", *keys)
@@ -136,7 +136,7 @@ def papers(take: Callable[[Study], Part], keys: Collection[str] = ()) -> dict[st
 
 
 def unusable() -> dict[str, str]:
-    """The studies of installed packages that cannot be used, by name, and why."""
+    """The unusable studies of installed packages, by name, with the reason."""
     found = {
         name: f"study {name}: shipped with radarsim; that of the package {' and '.join(sorted(packages))} is not used"
         for name, packages in entries().items()
@@ -151,7 +151,7 @@ def unusable() -> dict[str, str]:
 
 
 def lacking(stem: str) -> tuple[str, ...]:
-    """Why there is no config of a stem: faults of the studies of this name, or whose packages ship such a config."""
+    """Why no config of a stem was found: faults of the studies of this name, or whose packages ship such a config."""
     return tuple(fault for name, fault in unusable().items() if stem == name or _ships(name, stem))
 
 
@@ -175,7 +175,7 @@ def keys(name: str) -> type[Keys]:
 
 
 def own_keys(name: str) -> type[Keys]:
-    """The schema of the YAML keys that a study itself has. Raises as `study`."""
+    """The schema of a study's own YAML keys. Raises as `study`."""
     found = part(name, lambda one: one.keys())
     if not (isinstance(found, type) and issubclass(found, Keys)):
         raise _fault(name, "must give keys that are a subclass of radarsim.config.fields.Study")
@@ -192,7 +192,7 @@ def usable() -> tuple[str, ...]:
 def quantity(name: str, case: Case) -> Quantity:
     """The quantity of a name that a case measures, also in the spelling of its option (`above-oracle`).
 
-    Raises ConfigError where there is none such.
+    Raises ConfigError for an unknown one.
     """
     measured = {one.name: one for one in quantities(case.study, case.spec)}
     spelt = name if name in measured else name.removeprefix("--").replace("-", "_")
@@ -203,12 +203,12 @@ def quantity(name: str, case: Case) -> Quantity:
 
 
 def quantities(name: str, spec: Keys | None) -> tuple[Quantity, ...]:
-    """What the study of a name measures of a case with these keys, None: of any. Raises as `part`."""
+    """The quantities that the study of a name measures in a case with these keys; None: in any. Raises as `part`."""
     return part(name, lambda one: declared(one, spec))
 
 
 def declared(study: Study, spec: Keys | None) -> tuple[Quantity, ...]:
-    """The same of a study. ConfigError for what is no Quantity."""
+    """The same of a study. ConfigError for anything but a Quantity."""
     given: Any = study.quantities(spec)
     if not isinstance(given, tuple | list) or not all(isinstance(one, Quantity) for one in given):
         raise _fault(study.name, f"quantities: must give a tuple of Quantity, got {given!r}"[:200])
@@ -216,19 +216,19 @@ def declared(study: Study, spec: Keys | None) -> tuple[Quantity, ...]:
 
 
 def folders() -> tuple[Path, ...]:
-    """Folders with `configs/` and `scenarios/` that packages ship, whose configs are found by stem."""
+    """Folders with `configs/` and `scenarios/` of packages, whose configs are found by stem."""
     found = parts(lambda one: one.shipped()) if offered() else {}
     return tuple(Path(folder) for folder in found.values() if folder is not None)
 
 
 def packages() -> tuple[str, ...]:
-    """The outermost modules of the packages that offer studies or filters, none of which this imports."""
+    """The top-level modules of the packages that offer studies or filters, without importing them."""
     added = (entry.module for of in entries(FILTERS).values() for entry in of.values())
     return tuple(dict.fromkeys(one.partition(".")[0] for one in (*map(module, offered()), *added)))
 
 
 def package(name: str) -> str | None:
-    """The installed package that offers a study, with its version; None for one that is shipped here."""
+    """The installed package that offers a study, with its version; None for a study shipped here."""
     if name in SHIPPED:
         return None
     return _package(next(iter(entries()[name].values())))
@@ -254,7 +254,7 @@ def _package(entry: EntryPoint) -> str:
 
 
 def fault_of(error: BaseException) -> StudyError | None:
-    """What an error that nobody has caught says, where the code of an installed package is to blame; else None."""
+    """The message of an uncaught error if the code of an installed package raised it; else None."""
     if failures.place(error, installed=True) is None:
         return None
     return StudyError(f"the code of an installed package fails: {failures.summary(error)}")
@@ -266,7 +266,7 @@ def _fault(name: str, words: str) -> ConfigError:
 
 # ---- filters of packages ---------------------------------------------------------------------------------------------
 class Filters(NamedTuple):
-    """Filters of installed packages: the keys of each by study and kind, and by kind why others cannot be used."""
+    """Filters of installed packages: the keys of each by study and kind, and by kind why others are unusable."""
 
     usable: Mapping[str, Mapping[str, Any]]
     unusable: Mapping[str, str]
@@ -274,7 +274,7 @@ class Filters(NamedTuple):
 
 @cache
 def filters() -> Filters:
-    """The filters of all installed packages, which are imported for it."""
+    """The filters of all installed packages, which are imported for this."""
     usable: dict[str, dict[str, Any]] = {}
     unusable: dict[str, str] = {}
     for kind, packages in entries(FILTERS).items():
@@ -298,7 +298,7 @@ def filters() -> Filters:
 
 
 def _filter(kind: str, entry: EntryPoint) -> tuple[Any, str]:
-    """The keys of a filter that a package offers, and what is wrong with it; nothing, if it can be used."""
+    """The keys of a filter that a package offers, and its fault; empty if it is usable."""
     try:
         found = entry.load()
     except OF_AUTHORS as error:

@@ -53,14 +53,14 @@ if TYPE_CHECKING:
     from radarsim.report.drawing import Figure
 
 ANOTHER = "gives another formula each time"
-ROUNDED = 1e-9  # of the largest truth: what plain Python and the kernel may differ by
-NO_COVARIANCE = -1e100  # in place of the variances and the NEES of a matrix that is not positive
+ROUNDED = 1e-9  # of the largest truth: permitted difference between plain Python and the kernel
+NO_COVARIANCE = -1e100  # stands for the variances and the NEES of a matrix that is not positive
 BLOCK = 512  # realisations in a block
-ROOM = 20_000  # rows of plots and errors at once, 1.3 MB: what a processor keeps near
+ROOM = 20_000  # rows of plots and errors at once, 1.3 MB: fits a processor's cache
 
 
 class Steps:
-    """A filter of one realisation; see the head of the module. Its functions have no self."""
+    """A filter of one realisation; see the module's docstring. Its functions have no self."""
 
     design: Callable[[Any, Any], Any]
     start: Callable[[Any, Any, Any], Any]
@@ -82,7 +82,7 @@ class Followed:
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a block needs; see `radarsim.kernels.stepped` for the arrays."""
+    """Data of a block; see `radarsim.kernels.stepped` for the arrays."""
 
     layout: Layout
     axes: Axes
@@ -101,7 +101,7 @@ class Plan:
 
 
 class StepStudy(OneFile):
-    """A study by the steps of one realisation; the module's docstring says what a subclass gives."""
+    """A study by the steps of one realisation; the module's docstring lists what a subclass gives."""
 
     kinds: Mapping[str, type[Steps]]
     normals: tuple[int, int, int]
@@ -114,7 +114,7 @@ class StepStudy(OneFile):
     plot: Callable[..., Any]
 
     def known(self, spec: Any, t_s: np.ndarray) -> Sequence[np.ndarray]:
-        """What is known at times t_s (K,) s: columns (K,), in the order of `known_columns`. Default: nothing."""
+        """Quantities known at times t_s (K,) s: columns (K,), in the order of `known_columns`. Default: nothing."""
         return ()
 
     def truth(self, x: Any, u: Any, c: Any) -> tuple[Any, ...]:
@@ -126,7 +126,7 @@ class StepStudy(OneFile):
         return 1.0
 
     def exact_sigma(self, spec: Any) -> np.ndarray | None:
-        """The exact σ (F, K, C) of a case about the truth, not-a-number where it is not known. Default: not known."""
+        """The exact σ (F, K, C) of a case about the truth, NaN where unknown. Default: not known."""
         return None
 
     @classmethod
@@ -191,7 +191,7 @@ class StepStudy(OneFile):
         return float(given)
 
     def _exact(self, spec: Any) -> np.ndarray | None:
-        """What `exact_sigma` gives."""
+        """The value of `exact_sigma`, checked."""
         if (given := self.call(self.exact_sigma, spec)) is None:
             return None
         shape = len(spec.filters), spec.scans, len(self.components)
@@ -201,7 +201,7 @@ class StepStudy(OneFile):
         return found
 
     def _known(self, spec: Any, t_s: np.ndarray) -> np.ndarray:
-        """The time since the scan before, and what is known at each, (K, whole eights)."""
+        """The time since the scan before, and the known quantities at each, (K, whole eights)."""
         what = f"must give {len(self.known_columns)} columns of {t_s.size} finite numbers, as known_columns says; "
         one, other = (self.call(self.known, spec, t_s) for _ in range(2))
         if not isinstance(one, Sequence | np.ndarray) or isinstance(one, str) or len(one) != len(self.known_columns):
@@ -245,7 +245,7 @@ class StepStudy(OneFile):
         return Scene(programs[0], programs[1], shape)
 
     def _at_a_scan(self, trace: traced.Trace) -> tuple[Any, tuple[Any, ...]]:
-        """The time since the scan before, and what is known at a scan."""
+        """The time since the scan before, and the known quantities at a scan."""
         from radarsim.kernels import stepped
 
         dt, *u = trace.plain(stepped.KNOWN, (0.0,) * (1 + len(self.known_columns)))
@@ -263,7 +263,7 @@ class StepStudy(OneFile):
         return Followed(made, plain(numbers), rows, tested)
 
     def _filter_programs(self, steps: type[Steps], numbers: Any, scene: "Scene", missed: bool) -> tuple[Any, Any, int]:
-        """The programs of a filter's first scan and of those that follow, and the rows of its state."""
+        """The programs of a filter's first scan and of later ones, and the rows of its state."""
         from radarsim.kernels import stepped
 
         made, state = [], None
@@ -326,9 +326,9 @@ class StepStudy(OneFile):
         return values
 
     def _free_of_error(self, plan: Plan) -> np.ndarray:
-        """Where (F, K, C) estimates are the truth in plain Python too, in realisation 0.
+        """Where (F, K, C) estimates equal the truth in plain Python too, in realisation 0.
 
-        What is compiled takes all numbers as finite: an error that is none may be stored as zero.
+        Compiled code assumes finite numbers: a NaN error may be stored as zero.
         """
         if "free" not in plan.checked:
             plots, truth = self.realisation(plan.case, 0)
@@ -352,7 +352,7 @@ class StepStudy(OneFile):
         return made
 
     def _believed(self, result: CaseResult) -> Mapping[str, Any]:
-        """The σ that filters with a covariance believe, the root of its mean variance, beside the true one."""
+        """The σ that filters with a covariance predict, the root of its mean variance, beside the true one."""
         from radarsim.report import notes
 
         sigma = np.sqrt(np.asarray(result.sums["believed"]) / result.count)
@@ -418,7 +418,7 @@ class Scene:
 
 @cache
 def kernel(make: Callable[..., Any], *of: Any) -> Callable[..., None]:
-    """What a function of `radarsim.kernels.stepped` makes of programs, once."""
+    """The kernel that a function of `radarsim.kernels.stepped` makes of programs, cached."""
     return make(*of)
 
 
@@ -445,18 +445,18 @@ def noise(trace: traced.Trace, n: int) -> traced.Lane:
 
 
 def plain(numbers: Any) -> np.ndarray:
-    """The numbers (n,) of a record and a zero, so that there is one."""
+    """The numbers (n,) of a record and a zero, so that there is at least one."""
     return np.array([*traced.leaves(numbers), 0.0], dtype=float)
 
 
 # ---- faults of an author's formulas ----------------------------------------------------------------------------------
 def numbers_of(function: Callable[..., Any], *arguments: Any) -> Any:
-    """What a step gives; whole numbers in it are numbers of a realisation like others."""
+    """The result of a step, with whole numbers as numbers of a realisation."""
     return traced.numbered(call(function, *arguments))
 
 
 def recorded(function: Callable[..., Any], *arguments: Any) -> Any:
-    """What a step does with numbers of a realisation, which is the same whenever it is asked."""
+    """The result of a step on numbers of a realisation, checked to be the same on each call."""
     made, again = (numbers_of(function, *arguments) for _ in range(2))
     if made is None or isinstance(made, list):
         raise fault(function, f"must give a tuple of numbers, got {'nothing' if made is None else 'a list'}")
@@ -487,7 +487,7 @@ def record(function: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def array_of(function: Callable[..., Any], given: Any, what: str) -> np.ndarray:
-    """An array (…,) of the numbers that an author's function gives; ConfigError where they are no such."""
+    """An array (…,) of the numbers that an author's function gives; ConfigError where they are no such numbers."""
     try:
         return np.asarray(given, dtype=float)
     except (TypeError, ValueError):
@@ -506,7 +506,7 @@ def variances(P: Sequence[Any], n: int) -> tuple[Any, ...]:
 
 
 def same_shape(function: Callable[..., Any], given: Any, wanted: Any) -> None:
-    """Raises ConfigError where a state is of another shape than the one before."""
+    """Raises ConfigError where a state's shape differs from the one before."""
     if shape(given) != shape(wanted):
         raise fault(function, f"gives a state of the shape {shape(given)}, the one before has {shape(wanted)}")
 
@@ -567,7 +567,7 @@ class Tracker:
         return Track(self.names, components, t, found[:, :, 0], found[:, :, 1])
 
     def _next(self, row: int, step: Callable[..., Any], before: Any, *given: Any) -> Any:
-        """The state that a step gives at a row, of the shape of the one before, where there is one."""
+        """The state after a step at a row, of the shape of the one before, if any."""
         with np.errstate(all="ignore"):
             state = numbers_of(step, *given)
         if before is not None:
@@ -575,7 +575,7 @@ class Tracker:
         return finite(row, step, state)
 
     def _numbers(self, row: int, step: Callable[..., Any], count: int, what: str, *given: Any) -> Any:
-        """So many numbers that a step gives at a row."""
+        """A given number of numbers from a step at a row."""
         with np.errstate(all="ignore"):
             found = numbers_of(step, *given)
         of_length(step, found, count, what)
@@ -583,14 +583,14 @@ class Tracker:
 
 
 def finite(row: int, step: Callable[..., Any], found: Any) -> Any:
-    """What a step gives; raises PlotFault with the row where a number of it is not finite."""
+    """The result of a step; raises PlotFault with the row where a number of it is not finite."""
     if wrong := [one for one in traced.leaves(found) if not math.isfinite(one)]:
         raise refusal(row, step, f"gives {wrong[0]:g}")
     return found
 
 
 def refusal(row: int, step: Callable[..., Any], words: str) -> PlotFault:
-    """Why a filter cannot go on from a row."""
+    """Why a filter cannot continue after a row."""
     error = PlotFault(*fault(step, words).lines)
     error.row = row
     return error
