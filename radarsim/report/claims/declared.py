@@ -1,13 +1,11 @@
-"""What an experiment measured, as claims ask for it: curves as series, points of them with their intervals.
+"""The papers' claims as data: what a study declares.
 
-Whether a case is the paper's own experiment, of which alone its claims may be judged.
+Measured values for claims: curves as series, points of them with their intervals.
 
-A claim names the shipped config that holds its experiment. A case is the paper's when its checked keys equal those of
-a case of that config. What may differ: the number of realisations, the seed and the options of a run, which are no
-keys of a study; names that are only displayed (`config.fields.Display`); and members that are added to a list which
-the study declares in `PaperClaims.may_grow`.
-
-The papers' claims as data: what a study declares.
+Whether a case is the paper's own experiment; only such cases may judge its claims. A claim names the shipped config
+that holds its experiment. A case is the paper's when its checked keys equal those of a case of that config. These may
+differ: the number of realisations, the seed and the options of a run, which are not keys of a study; display names
+(`config.fields.Display`); and members added to a list that the study declares in `PaperClaims.may_grow`.
 """
 
 import copy
@@ -29,19 +27,19 @@ from radarsim.report.statistics import Estimate, difference
 
 # ---- evidence --------------------------------------------------------------------------------------------------------
 class Missing(KeyError):
-    """The experiment does not hold what a part of a claim needs; that part is then not judged by it.
+    """The experiment does not hold what a part of a claim needs; it then does not judge that part.
 
-    A text says why; anything else is the key of a case that is not there.
+    A text gives the reason; anything else is the key of an absent case.
     """
 
     @property
     def why(self) -> str:
-        """The reason, where one was given."""
+        """The reason, if given."""
         return next((arg for arg in self.args if isinstance(arg, str)), "")
 
 
 class NoSuchName(Missing):
-    """A case that is there has no filter, or component, of that name, or no gain of it: it is the baseline."""
+    """An existing case has no filter, or component, of that name, or no gain of it: it is the baseline."""
 
     for_the_author = True
 
@@ -50,7 +48,7 @@ class NoSuchName(Missing):
 
 
 class Hidden(dict):
-    """In place of sums and tables where none may be looked at: everything is missing."""
+    """Stands for sums and tables that must not be read: everything is missing."""
 
     def __missing__(self, key: str) -> Any:
         raise Missing(key)
@@ -66,7 +64,7 @@ class Certain(Estimate):
 class Series:
     """A measured curve: scans k, times t, values and the ends of their intervals, arrays of one length.
 
-    short says why it ends before the paper's does; what depends on its end is then missing.
+    short: why it ends before the paper's; values that depend on its end are then missing.
     """
 
     k: np.ndarray
@@ -81,14 +79,14 @@ class Series:
         return Estimate(float(self.value[i]), float(self.lo[i]), float(self.hi[i]))
 
     def where(self, mask: np.ndarray | slice) -> "Series":
-        """The points that a mask or indices pick; raises Missing where there is none."""
+        """The points selected by a mask or indices; raises Missing where there is none."""
         if not np.asarray(self.k)[mask].size:
             raise Missing("no such scans")
         k, t, value, lo, hi = (np.asarray(part)[mask] for part in (self.k, self.t, self.value, self.lo, self.hi))
         return Series(k, t, value, lo, hi, self.short)
 
     def upto(self, k: int) -> "Series":
-        """To scan k; whole if it goes so far."""
+        """Points up to scan k; all if the curve reaches k."""
         part = self.where(self.k <= k)
         return replace(part, short="") if self.k[-1] >= k else part
 
@@ -124,7 +122,7 @@ class Series:
         return self.point(int(np.nanargmin(self.value)))
 
     def when_largest(self, of: str = "t") -> Estimate:
-        """Time (or scan, of="k") of the largest value; the interval spans all that cannot be told from it."""
+        """Time (or scan, of="k") of the largest value; the interval spans all points not significantly below it."""
         self._whole()
         axis = getattr(self, of)
         top = int(np.nanargmax(self.value))
@@ -133,7 +131,7 @@ class Series:
 
 
 def common_times(a: Series, b: Series) -> tuple[Series, Series]:
-    """The points of both at the times that both have."""
+    """The points of both at their common times."""
     _, i, j = np.intersect1d(np.round(a.t, 6), np.round(b.t, 6), return_indices=True)
     return a.where(i), b.where(j)
 
@@ -147,7 +145,7 @@ def minus(a: Series, b: Series) -> Series:
 def ratio(a: Estimate, b: Estimate, scale: float = 1.0) -> Estimate:
     """scale · a / b of independent positive estimates: relative half-widths add in squares.
 
-    Its ends are no numbers where one of them is zero, as errors of what is exactly known are.
+    Its ends are NaN where an estimate is zero, as errors of exactly known values are.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         value = np.divide(scale * a.value, b.value)
@@ -162,7 +160,7 @@ def certain(value: float) -> Certain:
 
 
 class _Watched(dict):
-    """Tables that note which of them is looked at."""
+    """Tables that record which of them are read."""
 
     def __init__(self, made: Mapping, looked: set[tuple[str, str]]):
         super().__init__(made)
@@ -174,24 +172,24 @@ class _Watched(dict):
 
 
 class Evidence:
-    """What an experiment measured, as the claims of its study ask for it. Studies say in `case` what a key means.
+    """Measured values of an experiment for the claims of its study. Studies define in `case` the meaning of a key.
 
-    results are the cases that are the paper's, no others; of their lists that may grow, `members` gives the paper's.
+    results: only the paper's cases; `members` gives the paper's members of their lists that may grow.
     """
 
     def __init__(self, results: Sequence[CaseResult], made: Mapping, places: Mapping[str, Mapping[str, set[int]]]):
-        """places: by the name of a case and the key of a list, which of its members are the paper's."""
+        """places: by case name and list key, the indices of the paper's members."""
         self.results: list[CaseResult] = list(results)
-        self.looked: set[tuple[str, str]] = set()  # tables, with or without a component, since it was last emptied
+        self.looked: set[tuple[str, str]] = set()  # tables read, with or without a component, since it was last emptied
         self.tables: Mapping = _Watched(made, self.looked)
         self._places = places
         self._exact = False
         self._groups: dict[str, Mapping] = {}
 
     def exactly(self) -> "Evidence":
-        """The same with exact values in place of measured ones; what is not known exactly is missing.
+        """The same with exact values in place of measured ones; values that are not known exactly are missing.
 
-        Curves and gains are those of their exact columns; no other table, and no sums, can be seen.
+        Curves and gains are those of their exact columns; other tables, and sums, cannot be read.
         """
         for name in ("curves", "gains"):
             self._grouped(name)
@@ -201,25 +199,25 @@ class Evidence:
         return other
 
     def _grouped(self, table: str) -> Mapping:
-        """The rows of curves by case, filter and component; of gains by their baseline too."""
+        """The rows of curves by case, filter and component; of gains also by baseline."""
         if table not in self._groups:
             columns = ("case", "filter", "component", *(("baseline",) if table == "gains" else ()))
             self._groups[table] = tables.groups(self.tables[table], *columns)
         return self._groups[table]
 
     def members(self, result: CaseResult, key: str = "filters") -> list[tuple[int, Any]]:
-        """The members of a list of a case that are the paper's, each with its number; not those that were added."""
+        """The paper's members of a list of a case, each with its number; not the added ones."""
         return [(i, one) for i, one in enumerate(getattr(result.spec, key)) if i in self._places[result.name][key]]
 
     def case(self, key: Any) -> CaseResult:
-        """The case that a key means; raises Missing where the experiment does not hold it. Here: by name."""
+        """The case for a key; raises Missing where the experiment does not hold it. Here: by name."""
         for result in self.results:
             if result.name == key:
                 return result
         raise Missing(key)
 
     def _lacking(self, result: CaseResult, filter_name: str, component: str, *base: str) -> Missing:
-        """Which name a case does not have, of one that is there; of names that it has, that there is no such curve."""
+        """Which name an existing case lacks; if it has all names, that it has no such curve."""
         filters, components = result.axes.filters, tuple(name for name, _ in result.axes.components)
         for kind, name, known in (("filter", filter_name, filters), ("component", component, components)):
             if name not in known:
@@ -258,7 +256,7 @@ class Evidence:
     def ratio(self, key: Any, filter_name: str, over: str, component: str) -> Series:
         """σ of a filter over that of another one of the case: paired where one of the two is a baseline of it.
 
-        Otherwise it is that of independent estimates, whose interval is wider than common noise would make it.
+        Otherwise as of independent estimates, with an interval wider than under common noise.
         """
         case = self.case(key)
         baselines = {one.baseline for one in (case, *case.against)}
@@ -298,9 +296,9 @@ Shipped = Callable[[str], Sequence[Model] | None]  # config → the checked keys
 
 @dataclass(frozen=True)
 class Described:
-    """A case's keys, as plain data: those of its lists that may grow apart from the rest.
+    """A case's keys, as plain data: those of its lists that may grow separate from the rest.
 
-    named holds, for each key that names a member of such a list, that member.
+    named: for each key that names a member of such a list, that member.
     """
 
     fixed: dict
@@ -309,7 +307,7 @@ class Described:
 
 
 def described(spec: Model, may_grow: Sequence[str], may_shorten: Sequence[str] = ()) -> Described:
-    """The keys of a case that are compared: all but may_shorten."""
+    """The keys of a case for comparison: all but may_shorten."""
     plain = {key: value for key, value in canonical(spec).items() if key not in may_shorten}
     members = {key: plain.pop(key) for key in may_grow}
     named = {}
@@ -321,9 +319,9 @@ def described(spec: Model, may_grow: Sequence[str], may_shorten: Sequence[str] =
 
 
 def own_members(mine: Described, shipped: Iterable[Described], may_grow: Sequence[str]) -> dict[str, set[int]] | None:
-    """Of a case that is the paper's: which members of its lists, by number, are the paper's; None for any other case.
+    """For a paper's case, the indices of the paper's members of its lists; None for any other case.
 
-    shipped are the cases of the claim's config.
+    shipped: the cases of the claim's config.
     """
     found: dict[str, set[int]] | None = None
     for papers in shipped:
@@ -336,7 +334,7 @@ def own_members(mine: Described, shipped: Iterable[Described], may_grow: Sequenc
 
 
 def differences(mine: Described, shipped: Iterable[Described], may_grow: Sequence[str]) -> list[str]:
-    """The keys in which a case differs from the nearest of these, "key is x, the paper's y"; empty where in none."""
+    """The keys in which a case differs from the nearest of these, "key is x, the paper's y"; empty if none."""
     shipped = list(shipped)
     if own_members(mine, shipped, may_grow) is not None:
         return []
@@ -360,7 +358,7 @@ def _differing(mine: object, papers: object, path: str = "") -> list[str]:
     if equal(mine, papers):
         return []
     if isinstance(mine, dict) and isinstance(papers, dict):
-        if mine.get("kind") != papers.get("kind"):  # the keys of one kind say nothing to those of another
+        if mine.get("kind") != papers.get("kind"):  # keys of one kind are meaningless for another
             return _differing(mine.get("kind"), papers.get("kind"), f"{path}.kind".strip("."))
         keys = dict.fromkeys((*mine, *papers))
         return [line for key in keys for line in _differing(mine.get(key), papers.get(key), f"{path}.{key}".strip("."))]
@@ -377,11 +375,11 @@ def _short(value: object) -> str:
     return text if len(text) <= LONGEST else text[:LONGEST] + "…"
 
 
-LONGEST = 40  # characters of a value that a reason quotes
+LONGEST = 40  # characters of a value quoted in a reason
 
 
 def _places(wanted: Sequence, given: Sequence) -> set[int]:
-    """Where the wanted members stand among the given ones, each at a place of its own."""
+    """The indices of the wanted members among the given ones, all different."""
     places: set[int] = set()
     for one in wanted:
         place = next((i for i, other in enumerate(given) if i not in places and equal(one, other)), None)
@@ -391,7 +389,7 @@ def _places(wanted: Sequence, given: Sequence) -> set[int]:
 
 
 def equal(one: object, other: object) -> bool:
-    """Whether plain data are equal, numbers to 10⁻¹² of their size."""
+    """Whether plain data are equal, numbers to a relative 10⁻¹²."""
     if isinstance(one, dict) and isinstance(other, dict):
         return one.keys() == other.keys() and all(equal(value, other[key]) for key, value in one.items())
     if isinstance(one, list) and isinstance(other, list):
@@ -404,16 +402,16 @@ def equal(one: object, other: object) -> bool:
 
 
 # ---- declared --------------------------------------------------------------------------------------------------------
-Measured = Callable[[Any], Estimate]  # of the evidence of the study, a subclass of Evidence
+Measured = Callable[[Any], Estimate]  # takes the evidence of the study, a subclass of Evidence
 Number = Callable[[Any], float]
 
 
 @dataclass(frozen=True)
 class Part:
-    """One measurement of a claim: its cases (the study's keys), what is measured, the unit, how, and the range.
+    """One measurement of a claim: its cases (the study's keys), the quantity, its unit, the function, and the range.
 
-    scale gives what the range's margin is a share of, as σ; default: the margin is in the part's own unit. exact
-    gives the exact value where `measure` of the exact curves does not; ceiling what a perfect estimator would score.
+    scale gives the quantity that the margin is relative to, such as σ; default: the margin is in the part's own unit.
+    exact gives the exact value where `measure` of the exact curves does not; ceiling the score of a perfect estimator.
     statement, number, variant, against_print and asserted are as in `rule.Judged`.
     """
 
@@ -434,12 +432,12 @@ class Part:
 
 @dataclass(frozen=True)
 class Claim:
-    """A statement of a paper: where it stands, how it was read, the parts that judge it, the config that holds them.
+    """A statement of a paper: its place, its interpretation, the parts that judge it, the config that holds them.
 
-    original is the sentence in the paper's language. An extension is ours, and not counted. reported: the paper says
-    that others assert it, and does not itself: judged under every reading, and not counted. unstated says what the
-    paper leaves out without which the statement cannot be judged; joint: one variant has to give every number;
-    internal: both sides are printed, so that what does not agree is the print with itself.
+    original is the sentence in the paper's language. An extension is ours, and not counted. reported: the paper reports
+    an assertion of others: judged under every reading, and not counted. unstated: what the paper leaves out and the
+    statement cannot be judged without; joint: one variant has to give every number; internal: both sides are printed,
+    so that a disagreement is within the print.
     """
 
     id: str
@@ -468,7 +466,7 @@ class Claim:
 
     @property
     def how(self) -> dict[str, bool]:
-        """How the rule takes it, as `rule.claim` wants it."""
+        """Its judging options, as arguments of `rule.claim`."""
         return {"unstated": bool(self.unstated), "joint": self.joint, "internal": self.internal}
 
 
@@ -476,12 +474,11 @@ class Claim:
 class PaperClaims:
     """The claims of a paper that a study judges, and how its results are read for them.
 
-    paper is how tables cite it: authors and year. page is the stem of the study's page in docs/, where there is one.
-    may_shorten names keys that only cut a run short, or let it go on: what does not depend on its end is judged still.
-    may_grow names the study's lists to which members may be added without its being another experiment than the
-    paper's; every other key must be as in the claim's config, see `radarsim.report.claims.declared`.
-    held_too names, by the stem of a shipped config, the claims of other configs of which it holds every part: when it
-    is changed so that it no longer judges them, it says so.
+    paper: how tables cite it, authors and year. page: the stem of the study's page in docs/, if any. may_shorten: keys
+    that only shorten or extend a run: quantities that do not depend on its end are still judged. may_grow: the study's
+    lists to which members may be added while it stays the paper's experiment; every other key must be as in the claim's
+    config, see `radarsim.report.claims.declared`. held_too: by the stem of a shipped config, the claims of other
+    configs of which it holds every part: if it is changed so that it no longer judges them, it says so.
     """
 
     claims: Sequence[Claim]
@@ -493,5 +490,5 @@ class PaperClaims:
     held_too: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def holds(self, claim: Claim, stem: str) -> bool:
-        """Whether the shipped config of that stem holds a claim whole."""
+        """Whether the shipped config of that stem holds all of a claim."""
         return claim.config == stem or claim.id in self.held_too.get(stem, ())

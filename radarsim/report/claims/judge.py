@@ -1,4 +1,4 @@
-"""claims.csv: verdicts on the claims of an experiment, and why those that it cannot judge are not judged."""
+"""claims.csv: verdicts on the claims of an experiment, and the reasons where there is none."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case
 
 UNCLEAR, NOT_RUN, NOT_JUDGED = "not distinguishable", "not run", "not judged here"
-MOST_SAID, MOST_OF_ONE = 3, 8  # keys and cases that a reason names; keys where it names one case
+MOST_SAID, MOST_OF_ONE = 3, 8  # keys and cases in a reason; keys in a reason on one case
 NOT_THE_PAPERS = "not the paper's experiment: {changed}"
 
 
@@ -70,9 +70,9 @@ def judged(
 ) -> "pd.DataFrame":
     """claims.csv: a row for each part of each claim that these results can judge.
 
-    A claim sees only the cases that are the paper's: those of its config, which `shipped` gives by its stem. Claims
-    that the config `stem` holds, which is the one that was run, are all there: what cannot be judged says why. Of
-    others those of which every part can be judged.
+    A claim uses only the paper's cases: those of its config, which `shipped` gives by its stem. Claims of the config
+    `stem`, the one that was run, are all listed, with a reason where they cannot be judged; other claims if every part
+    can be judged.
     """
     rows: list[dict[str, Any]] = []
     if of is not None:
@@ -84,18 +84,18 @@ def judged(
     return table
 
 
-LOOKED = "looked"  # beside the rows of claims.csv, not in them: the tables, with their components, that a part is from
+LOOKED = "looked"  # beside the rows of claims.csv, not in them: the tables, with components, behind a part
 
 
 class _Papers:
-    """What of the results is the paper's, by the config of a claim."""
+    """The paper's part of the results, by the config of a claim."""
 
     def __init__(self, of: PaperClaims, results: Sequence[CaseResult], made: Mapping, shipped: Shipped):
         self._of, self._results, self._made, self._shipped = of, results, made, shipped
         self._seen: dict[str, tuple[Evidence | None, str]] = {}
 
     def evidence(self, config: str) -> tuple[Evidence | None, str]:
-        """The evidence that claims of a config may see, None where no case is the paper's; what differs in others."""
+        """The evidence for claims of a config, None where no case is the paper's; differences of the other cases."""
         if config not in self._seen:
             of = self._of
             specs = _papers(of, config, self._shipped)
@@ -126,7 +126,7 @@ def _described(of: PaperClaims, one: "CaseResult | Case") -> Described:
 def _differences(
     of: PaperClaims, held: "Sequence[CaseResult | Case]", papers: Sequence[Described], most: int = MOST_SAID
 ) -> str:
-    """In which keys cases that are not the paper's differ from the nearest of these: at most so many a case."""
+    """The keys in which other cases differ from the nearest of the paper's: at most so many for each case."""
     said = []
     for one in held:
         found = differences(_described(of, one), papers, of.may_grow)
@@ -136,13 +136,13 @@ def _differences(
 
 
 def _of_cases(table: "pd.DataFrame", names: set[str]) -> "pd.DataFrame":
-    """The rows of a table that belong to cases of these names, or to none."""
+    """The rows of a table for these cases, or without a case."""
     return table[table["case"].isin(names)] if "case" in table else table
 
 
 @dataclass(frozen=True)
 class _Tried:
-    """A part with what became of it: the judged numbers, or why there are none."""
+    """A part with its result: the numbers, or why there are none."""
 
     part: Part
     cases: str = ""
@@ -162,13 +162,13 @@ def _rows(claim: Claim, paper: str, papers: _Papers, own: bool) -> list[dict[str
     here = [(one, one.judged) for one in tried if one.judged is not None]
     outcome = rule.claim([of for _, of in here], **claim.how) if here else None
     many = sum(of.sampled and not of.void and of.asserted for _, of in here)
-    asked = [one for one in tried if one.part.asserted] or tried  # what else is shown beside them decides nothing
+    asked = [one for one in tried if one.part.asserted] or tried  # other parts decide nothing
     whole = all(one.judged is not None for one in asked) or (outcome is not None and outcome.kind == REFUTED)
     return [_row(claim, paper, one, outcome if whole else None, many) for one in tried]
 
 
 def _tried(part: Part, seen: Evidence | None, changed: str) -> _Tried:
-    """Measure a part; say why where it cannot be."""
+    """Measure a part, or give the reason why not."""
     if seen is None:
         return _Tried(part, why=NOT_THE_PAPERS.format(changed=changed))
     seen.looked.clear()
@@ -191,7 +191,7 @@ def _tried(part: Part, seen: Evidence | None, changed: str) -> _Tried:
 
 
 def weighed(part: Part, seen: Evidence, measured: Estimate, n: int) -> Judged:
-    """A part with its numbers, its exact value not yet known; n: realisations."""
+    """A part with its numbers, before its exact value is known; n: realisations."""
     value, lo, hi = (float(one) for one in measured)
     return Judged(
         *(value, lo, hi, part.expected.lo, part.expected.hi),
@@ -204,7 +204,7 @@ def weighed(part: Part, seen: Evidence, measured: Estimate, n: int) -> Judged:
 
 
 def exact(part: Part, seen: Evidence, measured: Estimate) -> float:
-    """The exact value of a part, not-a-number where it is not known."""
+    """The exact value of a part, NaN where unknown."""
     try:
         if part.exact:
             return float(part.exact(seen))
@@ -214,9 +214,9 @@ def exact(part: Part, seen: Evidence, measured: Estimate) -> float:
 
 
 def disagreement(part: Part, of: Judged) -> str:
-    """What to say where a part has an exact value of its own, further off than chance puts it; else nothing.
+    """A message where a part has an exact value of its own, further off than chance explains; else nothing.
 
-    All others follow from tables, which `agreement` holds against their exact columns.
+    All other values follow from tables, which `agreement` compares with their exact columns.
     """
     if part.exact is None or not of.known or of.n < FEW:
         return ""
@@ -227,7 +227,7 @@ def disagreement(part: Part, of: Judged) -> str:
     return f"{ERROR}: exact {of.exact:.6g}, simulated {of.measured:.6g} [{of.lo:.6g}, {of.hi:.6g}]"
 
 
-ROUNDING = 1e-3  # of a margin, in values that have no width: identities hold to the last bits
+ROUNDING = 1e-3  # of a margin, for values without width: identities hold to the last bits
 FAILED = "its measure fails"
 ERROR = f"exact value and simulation differ by more than {ERROR_OF_PROGRAM} standard errors"
 
@@ -239,7 +239,7 @@ def errors(rows: "pd.DataFrame") -> list[str]:
 
 
 def failed(rows: "pd.DataFrame") -> list[str]:
-    """A line for each measure that failed, with its place: errors of who wrote the claims."""
+    """A line for each measure that failed, with its place: errors of the claims' author."""
     every = dict.fromkeys(rows["why"].astype(str))
     return [why.removeprefix(f"{FAILED}: ") for why in every if why.startswith(FAILED)]
 
@@ -281,12 +281,12 @@ def blank(claim: Claim, paper: str) -> dict[str, Any]:
 
 
 def _end(value: float) -> float:
-    """A number as a table holds it: at twelve digits, not-a-number where it is infinite."""
+    """A number for a table: twelve digits, NaN for infinity."""
     return float(f"{value:.12g}") if math.isfinite(value) else math.nan
 
 
 def listed(papers: Sequence[PaperClaims], stored: Mapping[str, Sequence[Mapping]]) -> list[dict]:
-    """Rows of claims with the columns of claims.csv and `config`: as stored, or once as not run.
+    """Rows of claims with the columns of claims.csv and `config`: as stored, or one row each as not run.
 
     stored: config stem → the rows of its claims.csv.
     """
@@ -301,11 +301,11 @@ def listed(papers: Sequence[PaperClaims], stored: Mapping[str, Sequence[Mapping]
 
 
 def unstored(of: PaperClaims, cases: "Sequence[Case]", shipped: Shipped, stem: str) -> list[dict]:
-    """A row for each claim of which an experiment without stored verdicts is known to judge it, or known not to.
+    """A row for each claim that an experiment without stored verdicts certainly judges, or certainly does not.
 
-    With the columns of claims.csv. cases are all of the experiment's. Where none is the paper's the claim is not
-    judged, and the row says why; where the shipped config `stem` holds it, it is not run. What a run might judge has no
-    row.
+    With the columns of claims.csv. cases: all of the experiment's. Where none is the paper's, the claim is not judged,
+    and the row gives the reason; where the shipped config `stem` holds it, it is not run. A claim that a run might
+    judge has no row.
     """
     rows: list[dict] = []
     for claim in of.claims:
@@ -322,5 +322,5 @@ def unstored(of: PaperClaims, cases: "Sequence[Case]", shipped: Shipped, stem: s
 
 
 def first_rows(rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """One row of each claim, the first."""
+    """The first row of each claim."""
     return list({(row["paper"], row["claim"]): row for row in reversed(list(rows))}.values())[::-1]

@@ -74,12 +74,12 @@ DEFAULT = "as shipped"
 
 
 class Unreadable(Exception):
-    """A reading that cannot be flown or designed, and why."""
+    """A reading that is impossible to fly or design, and why."""
 
 
 @dataclass(frozen=True)
 class Alternative:
-    """One way to take a choice: its name in tables, its kind (E, U or N), why it is one, and what it sets."""
+    """One way to take a choice: its name in tables, its kind (E, U or N), the reason for it, and the settings."""
 
     name: str
     kind: str
@@ -90,11 +90,11 @@ class Alternative:
 
 @dataclass(frozen=True)
 class Choice:
-    """Something that a paper leaves open: the column of the table, what is open, and the paper's sentence on it.
+    """An open point of a paper: the column of the table, the question, and the paper's sentence on it.
 
     original is the sentence in the paper's language, english in English; both say "nothing" where it is silent. The
-    first alternative is the default. claims: the ids of those on which it bears; empty: all of the paper. contradicts:
-    the print has more than one of the alternatives.
+    first alternative is the default. claims: the ids of the claims affected; empty: all of the paper. contradicts: the
+    print has more than one of the alternatives.
     """
 
     key: str
@@ -107,14 +107,14 @@ class Choice:
 
     @property
     def default(self) -> str:
-        """The name of what the shipped configs take."""
+        """The name of the alternative in the shipped configs."""
         return self.alternatives[0].name
 
     def __getitem__(self, name: str) -> Alternative:
         return next(one for one in self.alternatives if one.name == name)
 
     def bears_on(self, claim: str) -> bool:
-        """Whether a claim may come out otherwise by this choice."""
+        """Whether this choice may change the verdict on a claim."""
         return not self.claims or claim in self.claims
 
 
@@ -131,22 +131,22 @@ class Reading:
 class PaperReadings(ABC):
     """The readings of a paper, and how its claims are measured under one.
 
-    A study whose numbers are known exactly gives evidence without a run; any other changes the cases of a claim's
-    config, which are then run, and reads their sums as it reads those of the paper's own.
+    A study with exact numbers gives evidence without a run; any other changes the cases of a claim's config, which are
+    then run, and reads their sums like those of the paper's own.
     """
 
     paper: str  # P1
     choices: tuple[Choice, ...]
-    realisations: int = 1000  # of each run, where none are asked for
-    most: int = 16_000  # of a run that is to decide a claim, where none are asked for
+    realisations: int = 1000  # of each run, by default
+    most: int = 16_000  # of a run that is to decide a claim, by default
 
     def open(self, claim: Claim) -> bool:
-        """Whether the paper leaves anything open on which a claim of its own may hang."""
+        """Whether the paper leaves anything open that affects a claim of its own."""
         return not claim.extension and any(choice.bears_on(claim.id) for choice in self.choices)
 
     # ---- the readings --------------------------------------------------------------------------------------------
     def declared(self) -> Sequence[Reading]:
-        """The readings that are judged, the default first: all combinations of E and U, and each N alone."""
+        """The readings to judge, the default first: all combinations of E and U, and each N alone."""
         return list(dict.fromkeys([*self.combined(self.choices), *self.against_print()]))
 
     def combined(self, choices: Iterable[Choice]) -> Iterator[Reading]:
@@ -168,7 +168,7 @@ class PaperReadings(ABC):
         return Reading(tuple((choice.key, taken.get(choice.key, choice.default)) for choice in self.choices))
 
     def of_claim(self, claim: str) -> list[Reading]:
-        """The declared readings that differ for a claim: what does not bear on it is left at its default."""
+        """The declared readings that differ for a claim: choices that do not affect it stay at their default."""
         return list(dict.fromkeys(self.bearing(one, claim) for one in self._declared))
 
     @cached_property
@@ -176,22 +176,22 @@ class PaperReadings(ABC):
         return self.declared()
 
     def bearing(self, reading: Reading, claim: str) -> Reading:
-        """A reading with what does not bear on a claim left at its default."""
+        """A reading with the choices that do not affect a claim at their default."""
         pairs = zip(reading.taken, self.choices, strict=True)
         return Reading(tuple((key, name if one.bears_on(claim) else one.default) for (key, name), one in pairs))
 
     def kind(self, reading: Reading) -> str:
-        """E, U or N: the last of the kinds of its alternatives that are not the default; E of the default itself."""
+        """E, U or N: the last of the kinds of its alternatives that are not the default; E for the default itself."""
         kinds = [choice[reading[choice.key]].kind for choice in self._other(reading)]
         return max(kinds, key=KINDS.index, default=EQUIVALENT)
 
     def name(self, reading: Reading) -> str:
-        """What a reading takes otherwise than the shipped configs."""
+        """How a reading differs from the shipped configs."""
         words = [f"{choice.key}: {reading[choice.key]}" for choice in self._other(reading)]
         return "; ".join(words) or DEFAULT
 
     def sets(self, reading: Reading) -> dict[str, Any]:
-        """The values that the alternatives of a reading set."""
+        """The settings of a reading's alternatives."""
         return {key: value for one in self.choices for key, value in one[reading[one.key]].sets.items()}
 
     def _other(self, reading: Reading) -> list[Choice]:
@@ -199,26 +199,26 @@ class PaperReadings(ABC):
 
     # ---- a claim under a reading -----------------------------------------------------------------------------------
     def parts(self, claim: Claim, reading: Reading) -> Sequence[Part]:
-        """The parts of a claim that a reading is asked for. Default: all."""
+        """The parts of a claim to judge under a reading. Default: all."""
         return claim.parts
 
     def changed(self, claim: Claim, case: "Case", reading: Reading) -> "Case | None":
-        """A case of a claim's config as a reading takes it; None where the claim needs no such case.
+        """A case of a claim's config changed for a reading; None where the claim does not need it.
 
-        Raises Unreadable where it cannot be flown or designed.
+        Raises Unreadable where it is impossible to fly or design.
         """
         return None
 
     def evidence(self, claim: Claim, reading: Reading, seen: "Seen | None", of: PaperClaims) -> "Evidence":
-        """What a claim is measured by under a reading; seen: what its cases gave, None where all is exact.
+        """The evidence for a claim under a reading; seen: the results of its cases, None where all is exact.
 
-        of: the paper's claims. Default: the evidence of these, over what was seen.
+        of: the paper's claims. Default: their evidence, over `seen`.
         """
-        assert seen is not None  # a paper whose values are exact gives evidence of its own
+        assert seen is not None  # a paper with exact values gives its own evidence
         return of.evidence(seen.results, seen.tables, seen.places)
 
     def exact(self, claim: Claim, reading: Reading) -> bool:
-        """Whether the evidence of a claim is exact under a reading, so that nothing is run. Default: no."""
+        """Whether the evidence for a claim is exact under a reading, so that nothing is run. Default: no."""
         return False
 
     def search(self) -> "Search | None":
@@ -228,11 +228,10 @@ class PaperReadings(ABC):
 
 @dataclass(frozen=True)
 class Seen:
-    """What the changed cases of a config gave, under the names and keys that the config gives them.
+    """Results of the changed cases of a config, under the names and keys of that config.
 
-    results (in the order of the config) have the sums and axes of what was run and the keys of the paper's own case,
-    by which claims find it; ran has them with the keys that were run. tables and places are as `claims.Evidence` takes
-    them.
+    results (in the order of the config) have the sums and axes of the run and the keys of the paper's own case, by
+    which claims find it; ran has them with the keys of the run. tables and places are as in `claims.Evidence`.
     """
 
     results: Sequence[CaseResult]
@@ -248,7 +247,7 @@ TO_THE_STEPS = term("as shipped {count} of {of} match to the steps of the print"
 
 @dataclass(frozen=True)
 class Printed:
-    """A number that a paper prints: the claim that it belongs to, what it is, and the values that count as it."""
+    """A number that a paper prints: its claim, its description, and the values that count as equal to it."""
 
     claim: str
     what: str
@@ -270,9 +269,9 @@ class Fine:
 class Search:
     """Printed numbers (n) under all combinations of the values of some choices.
 
-    axes: key of a choice → its values, the shipped one given by `shipped`. strict and granular (n, *lengths of axes)
-    say whether a number comes out, `values` what it is. fine: for choices whose values are numbers without steps.
-    read_as says in words what strict and granular are.
+    axes: key of a choice → its values, the shipped one given by `shipped`. strict and granular (n, *lengths of axes):
+    whether a number is reproduced; `values`: the numbers. fine: for choices whose values are numbers without steps.
+    read_as: strict and granular in words.
     """
 
     paper: str
@@ -287,20 +286,20 @@ class Search:
 
     @property
     def readings(self) -> int:
-        """How many combinations there are."""
+        """The number of combinations."""
         return int(self.strict[0].size)
 
     @cached_property
     def place(self) -> tuple[int, ...]:
-        """Where the shipped combination stands."""
+        """The index of the shipped combination."""
         return tuple(list(values).index(self.shipped[key]) for key, values in self.axes.items())
 
     def count(self, granular: bool) -> np.ndarray:
-        """How many printed numbers come out, at every combination."""
+        """How many printed numbers are reproduced, for every combination."""
         return (self.granular if granular else self.strict).sum(axis=0)
 
     def best(self, granular: bool) -> tuple[int, ...]:
-        """That with most of them; of several that with most under the other rule, then nearest the shipped."""
+        """The combination with most numbers; of several, most under the other rule, then nearest the shipped."""
         own, other = self.count(granular), self.count(not granular)
         score = own.astype(np.int64) * (len(self.printed) + 1) + other
         tied = np.argwhere(score == score.max())
@@ -308,15 +307,15 @@ class Search:
         return tuple(int(i) for i in tied[np.argmin(changed)])
 
     def taken(self, place: tuple[int, ...]) -> dict[str, str]:
-        """The values of the choices at a combination."""
+        """The values of the choices in a combination."""
         return {key: values[i] for (key, values), i in zip(self.axes.items(), place, strict=True)}
 
     def measured(self, place: tuple[int, ...]) -> np.ndarray:
-        """The numbers (n,) at a combination."""
+        """The numbers (n,) in a combination."""
         return np.moveaxis(self.values, 0, -1)[place]
 
     def sentence(self) -> str:
-        """What the search comes to."""
+        """The result of the search."""
         of, place = len(self.printed), self.place
         parts = []
         for granular, sentence in ((False, TO_THE_DIGIT), (True, TO_THE_STEPS)):
@@ -332,12 +331,12 @@ class Search:
         return tr("{count:,} readings: {said}.", count=self.readings, said="; ".join(parts))
 
     def words(self, place: tuple[int, ...]) -> str:
-        """What a combination takes otherwise than shipped."""
+        """How a combination differs from the shipped one."""
         other = [f"{key}: {value}" for key, value in self.taken(place).items() if value != self.shipped[key]]
         return "; ".join(other) or tr("as shipped")
 
     def windows(self, key: str) -> list[str]:
-        """The values of one choice, all others as shipped, at which each number comes out to the printed digit."""
+        """The values of one choice, all others as shipped, at which each number equals the printed digits."""
         if key in self.fine:
             fine = self.fine[key]
             return [_intervals(fine.values, row) for row in fine.strict]
@@ -350,7 +349,7 @@ class Search:
 
 
 def _intervals(values: Sequence[float], held: np.ndarray) -> str:
-    """Runs of a grid at which something holds: `0.00083 … 0.001`."""
+    """Runs of a grid in which something holds: `0.00083 … 0.001`."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], held.astype(int), [0]])))
     runs = [(values[a], values[b - 1]) for a, b in zip(edges[::2], edges[1::2], strict=True)]
     return ", ".join(f"{a:.3g}" if a == b else f"{a:.3g} … {b:.3g}" for a, b in runs) or "none"
@@ -421,7 +420,7 @@ class AlternativeKeys(Model):
 
 
 class ChoiceKeys(Model):
-    """What a paper leaves open; see `Choice`. claims: without the paper; english: where the paper speaks."""
+    """An open point of a paper; see `Choice`. claims: without the paper; english: where the paper is not silent."""
 
     key: Stem
     asks: str
@@ -433,7 +432,7 @@ class ChoiceKeys(Model):
 
 
 class ChoicesKeys(Model):
-    """What a paper leaves open, the file readings.yaml."""
+    """The open points of a paper, the file readings.yaml."""
 
     paper: Name
     names: dict[str, Anything] = {}  # noqa: RUF012
@@ -441,7 +440,7 @@ class ChoicesKeys(Model):
 
 
 class FileKeys(Model):
-    """The claims of a paper that one file holds; config: of those that name none. choices: as in readings.yaml."""
+    """The claims of a paper in one file; config: of those that name none. choices: as in readings.yaml."""
 
     paper: Name
     config: Stem
@@ -461,7 +460,7 @@ class Call:
     source: str = field(default="", compare=False)  # where it is written, for messages
 
     def __call__(self, seen: Any) -> Estimate:
-        """What it measures; a plain number is without noise. Raises MeasureError where the function fails."""
+        """The measured value; a plain number is without noise. Raises MeasureError where the function fails."""
         try:
             if self.function is None:
                 found = getattr(seen, self.name)(*self.cases, **self.arguments)
@@ -480,7 +479,7 @@ class Call:
         raise MeasureError(f"{self.source}: {self.name}: must give an Estimate or a number, got {shown(found)}")
 
     def _misspelt(self, error: Exception) -> bool:
-        """Whether a function of a package looks for a name that the paper's own case does not have."""
+        """Whether a function of a package asks for a name that the paper's own case does not have."""
         of_a_package = self.function is not None and not self.function.__module__.startswith("radarsim.")
         return of_a_package and isinstance(error, NoSuchName)
 
@@ -490,7 +489,7 @@ class Call:
 
 
 def claims_of(file: Callable[[str], ModuleType]) -> Sequence[Claim]:
-    """The claims of a study: of claims.yaml beside its measures, or `CLAIMS` of its module claims; file gives these."""
+    """The claims of a study: of claims.yaml beside its measures, or `CLAIMS` of its module claims; or of this file."""
     measures = file("measures")
     written = Path(str(measures.__file__)).with_name("claims.yaml")
     if written.is_file():
@@ -508,9 +507,9 @@ def claims_in(file: Path, *measures: ModuleType) -> tuple[Claim, ...]:
 
 @cache
 def written_in(text: str, source: str, *measures: ModuleType) -> tuple[tuple[Claim, ...], tuple[Choice, ...]]:
-    """The claims, and the choices if any, of a text as in claims.yaml; source: the file that holds it, for faults.
+    """The claims, and the choices if any, of a text like claims.yaml; source: its file, for faults.
 
-    Empty lines before the text make the lines of faults those of that file.
+    Empty lines before the text align the line numbers of faults with that file.
     """
     faults = Faults()
     document = parse(text, source, faults)
@@ -519,7 +518,7 @@ def written_in(text: str, source: str, *measures: ModuleType) -> tuple[tuple[Cla
 
 
 def choices_in(file: Path) -> tuple[Choice, ...]:
-    """What a paper leaves open, by a file readings.yaml; raises ConfigError, one line for each fault."""
+    """The open points of a paper, from a file readings.yaml; raises ConfigError, one line for each fault."""
     faults = Faults()
     return _made(read(file, faults), faults, ChoicesKeys, lambda keys, reader: reader.choices(keys))
 
@@ -531,7 +530,7 @@ def _made(
     make: "Callable[[Keyed, _Reader], Iterator[Written]]",
     measures: Sequence[ModuleType] = (),
 ) -> tuple[Written, ...]:
-    """What is made of a checked document."""
+    """The objects made of a checked document."""
     keys = None if document is None else check(model, document, faults)
     made = () if document is None or keys is None else tuple(make(keys, _Reader(document, faults, measures)))
     faults.raise_if_any()
@@ -539,23 +538,23 @@ def _made(
 
 
 def of_other_cases(part: Part, *cases: Any) -> Part:
-    """A part that is written in YAML, of other cases."""
+    """A part from YAML with other cases."""
     assert isinstance(part.measure, Call)
     return replace(part, cases=cases, measure=replace(part.measure, cases=cases))
 
 
 def with_arguments(part: Part, **arguments: Any) -> Part:
-    """A part that is written in YAML, measured with other arguments."""
+    """A part from YAML with other arguments."""
     assert isinstance(part.measure, Call)
     return replace(part, measure=replace(part.measure, arguments={**part.measure.arguments, **arguments}))
 
 
 class _Unknown(Exception):
-    """Something that the text names is not there; the fault is noted."""
+    """A name in the text is unknown; the fault is noted."""
 
 
 class _Reader:
-    """Makes claims of checked keys, and notes what is named and is not there."""
+    """Makes claims of checked keys, and notes unknown names."""
 
     def __init__(self, document: Document, faults: Faults, measures: Sequence[ModuleType]):
         self.document, self.faults = document, faults
@@ -658,7 +657,7 @@ class _Reader:
         return Part(cases, measure=measure, expected=found, exact=exact, **given)
 
     def _filled(self, value: Any, names: Mapping[str, Any], path: Keys) -> Any:
-        """A value with names in place of `$name`, and tuples in place of lists."""
+        """A value with `$name` replaced, and tuples in place of lists."""
         if isinstance(value, dict):
             return {key: self._filled(one, names, (*path, key)) for key, one in value.items()}
         if isinstance(value, list | tuple):
@@ -677,7 +676,7 @@ class _Reader:
         raise _Unknown
 
     def _call(self, value: Any, known: Mapping[str, Callable[..., Any]], cases: tuple, path: Keys) -> Call:
-        """What `name` or `{name: arguments}` calls: arguments by name, or, of a range, in their order."""
+        """The call of `name` or `{name: arguments}`: arguments by name, or, for a range, in their order."""
         name, given = next(iter(value.items())) if isinstance(value, dict) and len(value) == 1 else (value, {})
         if name not in known:
             self._add(path, f"must be one of them{_listed(str(name), known)}", value)
@@ -722,13 +721,13 @@ def _listed(name: str, known: Mapping[str, Any]) -> str:
 
 
 def _falls(ends: Mapping[str, Any]) -> bool:
-    """Whether the ends of a range are plain numbers and fall."""
+    """Whether the ends of a range are plain numbers in falling order."""
     low, high = ends.get("low"), ends.get("high")
     return isinstance(low, int | float) and isinstance(high, int | float) and low > high
 
 
 def _misfit(annotation: Any, value: Any) -> str:
-    """What an argument must be, where it is not: of plain types and literals; nothing is said of others."""
+    """The type that an argument must have, where it has not: plain types and literals only."""
     if get_origin(annotation) is Literal:
         allowed = get_args(annotation)
         return "" if value in allowed else f"one of {', '.join(map(str, allowed))}"
@@ -753,9 +752,9 @@ LAST = (
 
 @dataclass(frozen=True)
 class Under:
-    """A claim under one reading: its parts with their numbers, in the order of the claim, and what became of them.
+    """A claim under one reading: its parts with their numbers, in the order of the claim, and the verdict.
 
-    why says what kept it from being judged: it cannot be flown or designed, or there is nothing to measure.
+    why: the reason if it was not judged: impossible to fly or design, or nothing to measure.
     """
 
     claim: Claim
@@ -772,13 +771,13 @@ class Under:
         return self.kind != rule.AGAINST and self.outcome is not None
 
     def as_rule(self) -> rule.Reading:
-        """What the rule looks at."""
+        """The input of the rule."""
         outcome = self.outcome.kind if self.outcome else ""
         return rule.Reading(self.name, self.kind, dict(self.reading.taken), outcome)
 
 
 def under(of: PaperReadings, claim: Claim, reading: Reading, evidence: Evidence, n: int = 0) -> Under:
-    """Judge a claim by the evidence of a reading, which has n realisations; 0 where nothing was run."""
+    """Judge a claim by the evidence of a reading with n realisations; 0 where nothing was run."""
     name, kind = of.name(reading), of.kind(reading)
     try:
         parts = tuple(
@@ -792,9 +791,9 @@ def under(of: PaperReadings, claim: Claim, reading: Reading, evidence: Evidence,
 
 
 def _judged(part: Part, seen: Evidence, exact: bool, n: int, shipped: bool) -> Judged:
-    """A part with its numbers; which variant it is of, and whether that is against the print, the reading says.
+    """A part with its numbers; the reading gives its variant and whether that is against the print.
 
-    exact: whether all evidence is. Of other evidence the exact value is known where the run knows it; a part's own
+    exact: whether all evidence is exact. Otherwise the exact value is known where the run knows it; a part's own
     formula is of the shipped reading.
     """
     found, nothing = part.measure(seen), Estimate(*(math.nan,) * 3)
@@ -809,11 +808,11 @@ class Over:
 
     claim: Claim
     under: tuple[Under, ...]
-    contradicting: frozenset[str] = frozenset()  # the choices of which the print has several alternatives
+    contradicting: frozenset[str] = frozenset()  # choices with several alternatives in the print
 
     @cached_property
     def outcome(self) -> Outcome | None:
-        """What the rule says of it; None where the default reading was not judged."""
+        """The verdict of the rule; None where the default reading was not judged."""
         own = self.under[0].outcome
         if own is None:
             return None
@@ -826,11 +825,11 @@ class Over:
         return replace(found, needed=self._needed() if found.kind == rule.UNDECIDED else None)
 
     def _needed(self) -> int | None:
-        """Realisations that would decide every reading that is not; None where a value lies on a border."""
+        """Realisations that would decide every undecided reading; None where a value lies on a border."""
         return rule.most_needed(one.outcome.needed for one in self.undecided if one.outcome)
 
     def _each_somewhere(self) -> bool:
-        """Whether every number of a joint claim comes out under some reading, though no reading gives all."""
+        """Whether every number of a joint claim is reproduced under some reading, though no reading gives all."""
         counted = [one for one in self.under if one.counted]
         held = {part.number for one in counted for part, judged in one.parts if rule.verdict(judged) == rule.CONFIRMED}
         every = {part.number for one in counted for part, _ in one.parts}
@@ -838,24 +837,24 @@ class Over:
 
     @property
     def against_print(self) -> list[Under]:
-        """The readings against the print under which it comes out otherwise than in the default one."""
+        """The readings against the print with another verdict than the default one."""
         own = self.under[0].outcome
         judged = [one for one in self.under if one.kind == rule.AGAINST and one.outcome]
         return [one for one in judged if own and one.outcome and one.outcome.kind != own.kind]
 
     @property
     def undecided(self) -> list[Under]:
-        """The readings that the paper allows and under which it is not decided."""
+        """The readings that the paper allows and that are undecided."""
         return [one for one in self.under if one.counted and one.outcome and one.outcome.kind == rule.UNDECIDED]
 
     @property
     def looked(self) -> int:
-        """The fewest realisations of a reading that is not decided; 0 where all are."""
+        """The fewest realisations of an undecided reading; 0 where all are decided."""
         return min((judged.n for one in self.undecided for _, judged in one.parts), default=0)
 
     @property
     def impossible(self) -> list[Under]:
-        """The readings that were not judged, which say why."""
+        """The readings that were not judged, with their reasons."""
         return [one for one in self.under if one.outcome is None]
 
     def sentence(self) -> str:
@@ -877,7 +876,7 @@ class Over:
         return "; ".join(words)
 
     def still_open(self) -> str:
-        """Of a claim that is not decided, how many readings leave it so, and what they would take; else nothing."""
+        """For an undecided claim, how many readings are undecided, and the realisations they need; else nothing."""
         if self.outcome is None or self.outcome.kind != rule.UNDECIDED:
             return ""
         told, needed = {"count": len(self.undecided), "n": f"{self.looked:,}"}, self.outcome.needed
@@ -898,9 +897,9 @@ def columns(every: Iterable[PaperReadings]) -> tuple[str, ...]:
 
 
 def rows(one: Under, names: Sequence[str], over: Outcome | None = None) -> list[dict[str, Any]]:
-    """Rows of readings.csv: one a part; one alone with the reason where it was not judged.
+    """Rows of readings.csv: one for each part; a single one with the reason where it was not judged.
 
-    over: what the claim comes to over all its readings, the class of which stands in each row.
+    over: the result over all readings, whose class is in each row.
     """
     choices = dict(one.reading.taken)
     blank: dict[str, Any] = dict.fromkeys(names, "") | {"claim": one.claim.id, "reading": one.name, "kind": one.kind}
@@ -923,16 +922,16 @@ def rows(one: Under, names: Sequence[str], over: Outcome | None = None) -> list[
 
 
 def _cell(value: float, never: bool = False) -> float | str:
-    """A number as the table holds it: at twelve digits, empty where there is none; never: `inf` of what never comes."""
+    """A number for the table: twelve digits, empty for NaN; never: `inf` for a settling time that is never reached."""
     if never and math.isinf(value):
         return value
     return float(f"{value:.12g}") if math.isfinite(value) else ""
 
 
 def depth(one: Under) -> tuple[float, float, float]:
-    """How far the worst part lies from what the words say, in margins, with the ends of its interval.
+    """How far the worst part is from the words, in margins, with the ends of its interval.
 
-    Negative inside: by as much as it could move before it left.
+    Negative inside: the distance to the nearest end.
     """
     found = [_depth(judged) for _, judged in one.parts if judged.asserted and not judged.void]
     return max(found, default=(math.nan,) * 3, key=lambda ends: ends[0])
@@ -956,9 +955,9 @@ WITHIN = term("as shipped {count} of {of} numbers are within the margins of the 
 
 @dataclass(frozen=True)
 class JointOutcome:
-    """What came of a printed number under a reading: its value, and by which rule it comes out.
+    """A printed number under a reading: its value, and by which rule it is reproduced.
 
-    open: its interval is too wide to say whether it lies within the margin.
+    open: its interval is too wide to tell whether it lies within the margin.
     """
 
     value: float
@@ -969,7 +968,7 @@ class JointOutcome:
 
 @dataclass(frozen=True)
 class Asserted:
-    """A number that a paper prints: its claim, what it is, the words and the unit."""
+    """A number that a paper prints: claim, description, words and unit."""
 
     claim: str
     what: str
@@ -979,7 +978,7 @@ class Asserted:
 
 @dataclass(frozen=True)
 class Together:
-    """A reading with the claims that hold and were judged under it, and what came of every number."""
+    """A reading with the claims that hold and were judged under it, and the outcome of every number."""
 
     reading: Reading
     name: str
@@ -989,18 +988,18 @@ class Together:
     outcomes: Mapping[Key, JointOutcome]
 
     def count(self, granular: bool) -> int:
-        """How many numbers come out."""
+        """How many numbers are reproduced."""
         return sum(one.granular if granular else one.strict for one in self.outcomes.values())
 
     @property
     def open(self) -> int:
-        """Of how many it cannot be said whether they lie within their margin."""
+        """How many numbers are not known to lie within their margin."""
         return sum(one.open for one in self.outcomes.values())
 
 
 @dataclass(frozen=True)
 class Joint:
-    """What a paper prints, under all readings that are declared: the readings, and the numbers by their keys."""
+    """A paper's printed numbers under all declared readings: the readings, and the numbers by key."""
 
     of: PaperReadings
     every: tuple[Together, ...]
@@ -1008,11 +1007,11 @@ class Joint:
 
     @property
     def shipped(self) -> Together:
-        """The reading that the shipped configs take."""
+        """The reading of the shipped configs."""
         return self._of(self.of.reading())
 
     def best(self, granular: bool) -> Together:
-        """That with most numbers; of several that with most under the other rule, then nearest the shipped."""
+        """The reading with most numbers; of several, most under the other rule, then nearest the shipped."""
         allowed = [one for one in self.every if one.kind != rule.AGAINST]
         return max(
             allowed, key=lambda one: (one.count(granular), one.count(not granular), -changed(self.of, one.reading))
@@ -1022,7 +1021,7 @@ class Joint:
         return next(one for one in self.every if one.reading == reading)
 
     def sentence(self) -> str:
-        """What the search comes to."""
+        """The result of the search."""
         said = []
         for granular, words in ((False, TO_THE_PRINT), (True, WITHIN)):
             own, best = self.shipped, self.best(granular)
@@ -1037,7 +1036,7 @@ class Joint:
         return tr("{count:,} readings: {said}.", count=len(self.every), said="; ".join(said))
 
     def windows(self, key: str) -> dict[Key, str]:
-        """The alternatives of a choice, all others as shipped, under which each number comes out to the print."""
+        """The alternatives of a choice, all others as shipped, under which each number is reproduced as printed."""
         choice = next(one for one in self.of.choices if one.key == key)
         names = [one.name for one in choice.alternatives]
         alone = {name: self.of.reading(**{key: name}) for name in names}
@@ -1062,10 +1061,10 @@ def _listed_readings(held: Mapping[str, bool]) -> str:
 
 
 def joint(of: PaperReadings, over: Sequence[Over]) -> Joint:
-    """The joint search of a paper over its claims' readings, those that give most numbers first.
+    """The joint search of a paper over its claims' readings, those with most numbers first.
 
-    The readings are those that are declared for a claim, and all combinations of E and U under which every claim was
-    judged: as under the reading that takes what bears on it.
+    The readings are the declared ones of a claim, and all combinations of E and U under which every claim was judged:
+    with the verdict of the reading restricted to the choices that affect it.
     """
     over = [one for one in over if one.claim.counted]
     claims = [{one.reading: _Own(one) for one in claim.under if one.outcome is not None} for claim in over]
@@ -1084,17 +1083,17 @@ def joint(of: PaperReadings, over: Sequence[Over]) -> Joint:
     found.sort(key=lambda one: (-one.count(False), -one.count(True), -len(one.held), changed(of, one.reading)))
     numbers: dict[Key, Asserted] = {}
     for key, asserted in (item for own in claims for one in own.values() for item in one.numbers.items()):
-        numbers.setdefault(key, asserted)  # a number has the name that it has as shipped, of the first reading
+        numbers.setdefault(key, asserted)  # a number is named as in the first reading, the shipped one
     return Joint(of, tuple(found), numbers)
 
 
 def changed(of: PaperReadings, reading: Reading) -> int:
-    """How many choices a reading takes otherwise than the shipped configs."""
+    """In how many choices a reading differs from the shipped configs."""
     return sum(reading[choice.key] != choice.default for choice in of.choices)
 
 
 class _Own:
-    """A claim under one reading: whether it holds, its numbers, and what came of them."""
+    """A claim under one reading: whether it holds, its numbers, and their outcome."""
 
     def __init__(self, under: Under):
         self.under = under
@@ -1108,7 +1107,7 @@ class _Own:
 
 
 def _numbers(one: Under) -> dict[Key, list[tuple[Part, Judged]]]:
-    """The parts that the paper asserts, by the number that they are of; a void one tests nothing."""
+    """The parts that the paper asserts, by their number; a void one tests nothing."""
     found: dict[Key, list[tuple[Part, Judged]]] = {}
     for place, (part, judged) in enumerate(one.parts):
         if part.asserted and not judged.void:

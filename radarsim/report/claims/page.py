@@ -1,13 +1,12 @@
-"""Specification curves: a claim under every reading, sorted by how it comes out, and below what each reading takes.
+"""The page of claims: all of a paper in a table, with every part below, from stored results.
 
-The class of a claim over all readings that its paper allows, beside the one that it has as shipped.
+The forest plot of claims: the worst part of each, its interval and exact value, in margins of the words.
 
-It is worked out in one place, `over.Over.outcome`, when `radarsim readings` judges a claim under each of them, and
-kept as a row of classes.csv. Everything else that shows a class looks it up.
+Specification curves: a claim under every reading, sorted by outcome, and below the alternatives of each reading.
 
-The page of claims: all of a paper in a table, and every part of them below, made from stored results.
-
-The forest plot of claims: of each the worst part, its interval and exact value, in margins of what the words say.
+The class of a claim over all readings that its paper allows, beside its class as shipped. It is computed in one place,
+`over.Over.outcome`, when `radarsim readings` judges a claim under each of them, and kept as a row of classes.csv.
+Everything else that shows a class looks it up.
 """
 
 import math
@@ -41,7 +40,7 @@ from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Re
 from radarsim.report.wording import interval
 
 # ---- curve -----------------------------------------------------------------------------------------------------------
-FURTHEST = 5.0  # margins: what lies further is drawn there
+FURTHEST = 5.0  # margins: larger distances are drawn there
 LETTERS = 44  # of an alternative beside the panel
 HEADING = 1.5  # lines that the name of a choice takes above its alternatives
 KINDS = {
@@ -129,9 +128,9 @@ ALONE = term("{own} as shipped; other readings not judged")
 
 @dataclass(frozen=True)
 class Class:
-    """A claim over all its readings: its class, in how many of how many it is true, what flips it.
+    """A claim over all its readings: its class, in how many readings it is true, the choices that flip it.
 
-    needed: realisations that would decide it where it is not, else not-a-number. declared: of what it was judged.
+    needed: realisations that would decide it if undecided, else NaN. declared: a mark of its declaration.
     """
 
     claim: str
@@ -150,7 +149,7 @@ class Class:
 
     @classmethod
     def of_row(cls, row: Mapping[str, Any]) -> "Class":
-        """From a row of classes.csv. Raises ValueError or LookupError for one that is none."""
+        """From a row of classes.csv. Raises ValueError or LookupError for an invalid one."""
         if row["class"] not in rule.CLASSES:
             raise ValueError(row["class"])
         needed = float(row["needed"]) if row["needed"] else math.nan
@@ -158,12 +157,12 @@ class Class:
         return cls(row["claim"], row["class"], holds, of, row["depends_on"], needed, row["declared"])
 
 
-# Of each claim of which its paper leaves something open: its class over all readings, None where it is not known.
+# For each claim that depends on an open choice: its class over all readings, None where unknown.
 Known = Mapping[str, Class | None]
 
 
 def declared(of: PaperReadings, claim: Claim) -> str:
-    """A mark of what a claim asserts and of what its paper leaves open of it: another one, another claim."""
+    """A mark of a claim's assertions and of the open choices that affect it: a changed mark means another claim."""
     parts = [
         [
             *(part.what, part.unit, part.statement, part.number, part.variant, part.against_print, part.asserted),
@@ -181,7 +180,7 @@ def declared(of: PaperReadings, claim: Claim) -> str:
 
 
 def of_over(of: PaperReadings, over: Over) -> Class | None:
-    """The class of a claim that was judged under its readings; None where it could not be."""
+    """The class of a claim over its readings; None where it could not be judged."""
     found = over.outcome
     if found is None or found.readings is None or found.holds_in is None:
         return None
@@ -190,9 +189,9 @@ def of_over(of: PaperReadings, over: Over) -> Class | None:
 
 
 def with_classes(rows: Sequence[Mapping[str, Any]], known: Known) -> list[dict[str, Any]]:
-    """Rows of claims.csv with the class over all readings in place of that as shipped, which stands in `as_shipped`.
+    """Rows of claims.csv with the class over all readings in place of that as shipped, which moves to `as_shipped`.
 
-    What was not judged stays as it is.
+    Rows that were not judged stay as they are.
     """
     return [dict(row) | _over(row, known) for row in rows]
 
@@ -212,19 +211,19 @@ def _over(row: Mapping[str, Any], known: Known) -> dict[str, Any]:
 
 
 def alone(row: Mapping[str, Any]) -> bool:
-    """Whether a claim was judged as shipped alone, though its paper leaves open what may turn it."""
+    """Whether a claim was judged only as shipped, though open choices may change its verdict."""
     return bool(row["overall"] == ALONE.format(own=row["as_shipped"]))
 
 
 def verdict_words(row: Mapping[str, Any]) -> str:
-    """How far a claim of claims.csv stands, in a phrase in the language spoken."""
+    """The verdict on a claim of claims.csv, as a phrase in the current language."""
     if alone(row):
         return tr(ALONE, own=term(row["as_shipped"]))
     return words(row["class"], row["as_shipped"], row["depends_on"], tr)
 
 
 def words(kind: str, own: str, depends_on: str = "", say: Callable[..., str] = str.format) -> str:
-    """How far a claim stands, in a phrase: its class, and the one as shipped where this is another.
+    """The verdict on a claim as a phrase: its class, and the one as shipped if it differs.
 
     say: puts values into a message, as `language.tr` does; default: in English.
     """
@@ -262,7 +261,7 @@ WORDS = {  # of each class, for the headline
 def page(rows: Sequence[Mapping], pages: Mapping[str, str], parts: bool = True) -> str:
     """The page, from the rows of `claims.listed`; pages holds the stem of a paper's page, by the paper.
 
-    parts: whether every part that was measured follows, in a table to be opened.
+    parts: whether a folded table of all measured parts follows.
     """
     text = [TITLE, "", HEAD, *headline(rows), ""]
     for paper in dict.fromkeys(row["paper"] for row in rows):
@@ -282,7 +281,7 @@ def page(rows: Sequence[Mapping], pages: Mapping[str, str], parts: bool = True) 
 
 
 def headline(rows: Sequence[Mapping]) -> list[str]:
-    """The classes with their counts, what they mean and which claims are of them, a line each."""
+    """The classes with their counts, meanings and claims, a line each."""
     found, extensions = counts(rows)
     own = [parts[0] for parts in grouped(rows) if not extension(parts)]
     lines = [f"In all {sum(found.values())} claims, and {extensions} extensions that are not counted:", ""]
@@ -294,7 +293,7 @@ def headline(rows: Sequence[Mapping]) -> list[str]:
 
 
 def in_a_row(claims: Sequence[str]) -> str:
-    """Names of claims, those with numbers in a row by the first and last: `P1.1–P1.34`."""
+    """Names of claims, consecutive numbers as a range: `P1.1–P1.34`."""
     runs: list[list[str]] = []
     for name in claims:
         paper, _, end = name.rpartition(".")
@@ -315,7 +314,7 @@ def of_class(kind: str, count: int) -> str:
 
 
 def counts(rows: Sequence[Mapping]) -> tuple[dict[str, int], int]:
-    """How many claims are of each class, in the order of the rule, and how many extensions there are besides."""
+    """How many claims are in each class, in the order of the rule, and how many extensions there are besides."""
     found: Counter[str] = Counter()
     extensions = 0
     for parts in grouped(rows):
@@ -335,12 +334,12 @@ def grouped(rows: Sequence[Mapping]) -> list[list[Mapping]]:
 
 
 def extension(parts: Sequence[Mapping]) -> bool:
-    """Whether nothing of a claim is the paper's own: ours, or reported of others."""
+    """Whether nothing of a claim is the paper's own: ours, or reported from others."""
     return all(str(part["extension"]).lower() == "true" for part in parts)
 
 
 def counted(rows: Sequence[Mapping]) -> str:
-    """How many claims are of which class, in words."""
+    """How many claims are in which class, in words."""
     classes, extensions = counts(rows)
     said = ", ".join(of_class(kind, count) for kind, count in classes.items())
     more = plural("{count} extension not counted", "{count} extensions not counted", extensions) if extensions else ""
@@ -348,7 +347,7 @@ def counted(rows: Sequence[Mapping]) -> str:
 
 
 def verdict_of(parts: Sequence[Mapping]) -> str:
-    """How far a claim stands, with the readings under which it is true, and what would decide one that is not."""
+    """The verdict on a claim, with the readings under which it is true, and what would decide an undecided one."""
     first, notes = parts[0], []
     text = verdict_words(first)
     if first["overall"] in MARKS:
@@ -378,7 +377,7 @@ def number(value: Any) -> float | None:
 
 
 def _line(parts: Sequence[Mapping]) -> str:
-    """A claim: its words; to be opened, the original, how it was read and the part furthest from it; its class."""
+    """A claim: its words; folded, the original, its interpretation and the part furthest from it; its class."""
     first, found = parts[0], worst(parts)
     original = f"«{first['original']}»" if first["original"] else ""
     inner = [" ".join(filter(None, (original, f"({first['place']})")))]
@@ -395,7 +394,7 @@ def _expected(row: Mapping) -> str:
 
 
 def worst(parts: Sequence[Mapping]) -> Mapping | None:
-    """The part that is furthest from its words, of variants of a number the nearest; None where none was measured."""
+    """The part furthest from its words, of variants of a number the nearest; None where none was measured."""
     counted = extension(parts)
     best: dict[str, Mapping] = {}
     for i, row in enumerate(parts):
@@ -409,7 +408,7 @@ def worst(parts: Sequence[Mapping]) -> Mapping | None:
 
 
 def depth_of_row(value: float, row: Mapping) -> float:
-    """Distance of a value from what the words say, in margins: 0 at an end of the range, negative inside."""
+    """Distance of a value from the words, in margins: 0 at an end of the range, negative inside."""
     lo, hi = number(row["expected_lo"]), number(row["expected_hi"])
     below = -math.inf if lo is None else lo - value
     above = -math.inf if hi is None else value - hi
@@ -443,13 +442,13 @@ def _parts(parts: Sequence[Mapping]) -> list[str]:
 
 
 def named(row: Mapping, parts: Sequence[Mapping]) -> str:
-    """What a part of a claim measures, with its case where the words alone are those of another part too."""
+    """Description of a part, with its case where another part has the same words."""
     alike = sum(other["what"] == row["what"] for other in parts)
     return row["what"] if alike == 1 else f"`{row['case']}`: {row['what']}"
 
 
 def shown(row: Mapping) -> str:
-    """What decides a part: the exact value where it is known, else the measured one with its interval."""
+    """The value that decides a part: the exact one where known, else the measured one with its interval."""
     exact = number(row["exact"])
     if number(row["measured"]) is None:
         return "–"
@@ -459,7 +458,7 @@ def shown(row: Mapping) -> str:
 
 
 def unit_after(value: float, unit: str) -> str:
-    """A unit as it stands after a number: what is counted is in the form of it, that of two after a fraction."""
+    """A unit after a number: a counted thing in its plural form, that of two after a fraction."""
     count = abs(int(value)) if value == value // 1 else 2
     if unit == "scans":
         return plural("scan", "scans", count)
@@ -469,7 +468,7 @@ def unit_after(value: float, unit: str) -> str:
 
 
 def expected(words: str, unit: str = "") -> str:
-    """What is expected of a part, in the language spoken: `about 20 to 30 ± 10`; with the unit where one is given."""
+    """The expected range, in the current language: `about 20 to 30 ± 10`; with the unit if given."""
     said = " ".join(tr(one) if one.isalpha() else numeral(one) for one in words.split())
     last = re.findall(r"\d[\d.]*", words)[-1:]
     return f"{said} {unit_after(float(last[0]), unit) if last else tr(unit)}".rstrip() if unit else said
@@ -498,20 +497,20 @@ def measured(row: Mapping) -> str:
 
 
 def bounds(row: Mapping) -> tuple[float, float]:
-    """The interval of a part that is shown: that which is judged, or of one known exactly its own 95 %."""
+    """The interval shown for a part: the judged one, or, if it is known exactly, its own 95 %."""
     names = ("judged_lo", "judged_hi") if number(row["exact"]) is None else ("lo", "hi")
     lo, hi = (math.nan if row[name] == "" else float(row[name]) for name in names)
     return lo, hi
 
 
 def _cell(text: str) -> str:
-    """Text that neither ends a cell nor is taken for markup."""
+    """Text that neither ends a cell nor is read as markup."""
     text = text.replace("|", "\\|")
     return text.replace("<", "&lt;").replace("&lt;br>", "<br>")
 
 
 # ---- forest ----------------------------------------------------------------------------------------------------------
-FURTHEST_IN_FOREST = 4.0  # margins: what lies further is drawn there
+FURTHEST_IN_FOREST = 4.0  # margins: larger distances are drawn there
 COLOURS = (5, 2, 4, GREY, 3, 1, 6)  # of the classes in their order: green, red, blue, grey, …
 STYLES = {
     kind: Style(colour=colour, dash=None, marker=i, size_pt=4.0)
@@ -520,12 +519,12 @@ STYLES = {
 
 
 def depth_in_forest(value: float, row: Mapping) -> float:
-    """Distance of a value from what the words say, in margins, cut at 4."""
+    """Distance of a value from the words, in margins, cut at 4."""
     return float(np.clip(depth_of_row(value, row), -FURTHEST_IN_FOREST, FURTHEST_IN_FOREST))
 
 
 def figure(rows: Sequence[Mapping]) -> Figure | None:
-    """All claims of these rows that were judged, a panel a paper; None where there are none."""
+    """All judged claims of these rows, a panel for each paper; None where there are none."""
     judged = [own for own in grouped(rows) if own[0]["class"] not in (NOT_RUN, NOT_JUDGED)]
     found = [(own, row) for own in judged if (row := worst(own)) is not None]
     papers = list(dict.fromkeys(own[0]["paper"] for own, _ in found))
@@ -574,7 +573,7 @@ def _panel(paper: str, found: Sequence[tuple[Sequence[Mapping], Mapping]]) -> Pa
 
 
 def _forest_line(kind: str, style: Style, of: Sequence[tuple[int, Mapping]]) -> Line:
-    """The marks of one class: where a value is known exactly, this is what the mark stands at."""
+    """The marks of one class: at the exact value where it is known."""
     rows = [row for _, row in of]
     ends = np.array([sorted(depth_in_forest(end, row) for end in bounds(row)) for row in rows])
     value = np.array([depth_in_forest(float(row["measured"]), row) for row in rows])

@@ -1,4 +1,4 @@
-"""The page of a paper's readings: what it leaves open, its claims over all readings, its printed numbers by reading."""
+"""The page of a paper's readings: open choices, claims over all readings, printed numbers by reading."""
 
 import math
 import re
@@ -11,7 +11,7 @@ from radarsim.report.claims.over import Choice, Joint, Key, Over, PaperReadings,
 from radarsim.report.claims.page import expected, plain, words
 from radarsim.report.claims.rule import said
 
-PAPERS = "ru"  # the language of the papers that are quoted
+PAPERS = "ru"  # the language of the quoted papers
 SHOWN = 12  # readings of the table of claims by reading
 EVERY, NOWHERE, BUT = term("all"), term("none"), "all but "
 RANGES = re.compile(r"[\d.,e… +-]+")
@@ -32,7 +32,7 @@ INTRODUCTION = term(
 
 
 def page(of: PaperReadings, cited: str, over: Sequence[Over], counted: Search | Joint) -> str:
-    """The page as Markdown; counted is what the joint search of the paper came to."""
+    """The page as Markdown; counted: the result of the paper's joint search."""
     parts = [tr("# {paper} by reading", paper=of.paper), f"{tr(cited)}. {tr(INTRODUCTION, paper=of.paper)}"]
     parts += [f"**{counted.sentence()}**"]
     parts += [tr("## Claims over all readings"), _claims(over)]
@@ -53,12 +53,12 @@ def page(of: PaperReadings, cited: str, over: Sequence[Over], counted: Search | 
 
 
 def left_open(of: PaperReadings) -> list[str]:
-    """The choices that the paper leaves open, each with its alternatives and their reasons: paragraphs of Markdown."""
+    """The open choices of the paper, each with its alternatives and their reasons: paragraphs of Markdown."""
     return [tr("## What the paper leaves open"), tr(KINDS), *map(_choice, of.choices)]
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A Markdown table; terms among the columns in the language spoken."""
+    """A Markdown table; terms among the columns are translated."""
     lines = [
         "| " + " | ".join(tr(one) if isinstance(one, Term) else one for one in columns) + " |",
         "|" + "---|" * len(columns),
@@ -101,7 +101,7 @@ def _impossible(over: Sequence[Over]) -> str:
 
 
 def _best(of: Joint) -> str:
-    """The readings that give most numbers, and the shipped one."""
+    """The readings with most numbers, and the shipped one."""
     best = of.every[:SHOWN]
     rows = [
         (
@@ -145,7 +145,7 @@ def _came(of: Together, key: Key) -> str:
 
 
 def _alternatives(of: Joint) -> str:
-    """Choices as columns, those that change anything; what comes out everywhere, or nowhere, is left out."""
+    """Choices as columns, those that change anything; numbers reproduced everywhere, or nowhere, are left out."""
     windows = {choice.key: of.windows(choice.key) for choice in of.of.choices}
     kept = {key: own for key, own in windows.items() if set(own.values()) - {"all", "none"}}
     rows = [
@@ -183,7 +183,7 @@ def _value(search: Search, number: int, place: tuple[int, ...]) -> str:
 
 
 def _windows(search: Search) -> str:
-    """Choices as columns, those that change anything; what comes out everywhere is left out."""
+    """Choices as columns, those that change anything; numbers reproduced everywhere are left out."""
     windows = {key: search.windows(key) for key in search.axes}
     kept = {key: own for key, own in windows.items() if len(set(own) - {"all", "none"}) or len(set(own)) > 1}
     rows = [
@@ -203,7 +203,7 @@ def _windows(search: Search) -> str:
 
 
 def _listed(window: str) -> str:
-    """Alternatives or ranges of numbers, in the language spoken; the names of alternatives are what is typed."""
+    """Alternatives or ranges of numbers, translated; the names of alternatives are those typed by the user."""
     if window in (EVERY, NOWHERE):
         return tr(window)
     if window.startswith(BUT):

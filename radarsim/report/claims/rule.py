@@ -1,14 +1,12 @@
 """The rule by which a claim is judged: numbers in, verdicts out. Written down before anything was measured.
 
-docs/verdicts.md gives it in words. A judged part holds what was measured, the exact value where one is known, the range
-that the paper's words leave and the margin that these words have. `verdict` judges one part, `claim` all parts of a
-claim, `over_readings` a claim under all readings that its paper allows.
+docs/verdicts.md gives it in words. A judged part holds the measured value, the exact value where known, the range that
+the paper's words allow and the margin of these words. `verdict` judges one part, `claim` all parts of a claim,
+`over_readings` a claim under all readings that its paper allows.
 
-Why a claim is not judged, in the language spoken: claims.csv and readings.csv say it in English.
+Ranges and margins from a paper's words; these functions see the words alone, never a measurement.
 
-What a paper's words leave of a number: the values, and how finely the words give them. See docs/verdicts.md.
-
-Every function takes the words alone; none knows what was measured.
+Reasons why a claim is not judged, in the current language: claims.csv and readings.csv have them in English.
 """
 
 import math
@@ -25,7 +23,7 @@ from radarsim.language import numeral, term, tr
 CONFIRMED, REFUTED, IMMATERIAL = "confirmed", "refuted", "no material difference"
 CONTRADICTORY, UNJUDGEABLE = "the print contradicts itself", "not judgeable as stated"
 UNDECIDED, DEPENDS = "not yet decided", "depends on"
-VOID = "void"  # of a part: the truth itself would not pass it
+VOID = "void"  # of a part: the truth itself would fail it
 CLASSES = (CONFIRMED, REFUTED, DEPENDS, IMMATERIAL, CONTRADICTORY, UNJUDGEABLE, UNDECIDED)
 NO_READING_MENDS = (CONTRADICTORY, UNJUDGEABLE)
 
@@ -39,7 +37,7 @@ EQUIVALENT, UNSTATED, AGAINST = "E", "U", "N"  # kinds of readings; the last con
 Z95 = NormalDist().inv_cdf(0.975)
 ROUNDING = 1e-12  # of a margin
 # A verdict is the same however its number of realisations came about: by one run, by `--decide`, or by a person who
-# runs on what is not yet decided. So each counts as one of all looks that may be taken, one a doubling: at fewer than
+# extends undecided runs. So each counts as one of all looks that may be taken, one for each doubling: at fewer than
 # 2000 realisations, at 2000·2^m, and at the most that a run may have, 10¹². report.precision.looks makes them.
 LOOKS = 31
 
@@ -48,13 +46,13 @@ LOOKS = 31
 class Judged:
     """One measured part of a claim; all numbers in the part's own unit.
 
-    lo and hi bound 95 %. exact is not-a-number where it is not known. expected_lo and expected_hi are what the words
-    say, an end that they leave open infinite; margin > 0 is how finely they say it, kind whence it comes. ceiling is
-    what a perfect estimator would score, not-a-number where that is no question.
+    lo and hi bound 95 %. exact is NaN where unknown. expected_lo and expected_hi are the range of the words, infinite
+    at an open end; margin > 0 is their resolution, kind its origin. ceiling is the score of a perfect estimator, NaN
+    where that does not apply.
 
-    statement names the part's sentence where a claim makes several, each of which has to be true. Parts of one
-    `number` are variants of it: one suffices. variant is the name of this one, against_print whether it takes a value
-    that the paper contradicts. A part that is not asserted by the paper is an extension: shown, not counted.
+    statement names the part's sentence where a claim has several, all of which must be true. Parts of one `number` are
+    variants of it: one suffices. variant is this one's name, against_print whether it takes a value that the paper
+    contradicts. A part that the paper does not assert is an extension: shown, not counted.
     """
 
     measured: float
@@ -80,7 +78,7 @@ class Judged:
 
     @property
     def value(self) -> float:
-        """What is judged: the exact value, or the measured one."""
+        """The judged value: the exact one, or the measured one."""
         return self.exact if self.known else self.measured
 
     @property
@@ -90,15 +88,15 @@ class Judged:
 
     @property
     def sampled(self) -> bool:
-        """Whether chance has a part in it."""
+        """Whether it has a sampling error."""
         return not self.known and self.lo != self.hi
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a claim: its class, the words, how many numbers held and failed, and the worst miss in margins.
+    """The outcome of a claim: its class, the words, how many numbers held and failed, and the worst miss in margins.
 
-    needed is how many realisations would decide what is not yet decided, where that is so; None: no number would.
+    needed: realisations that would decide it, if undecided; None: no number would.
     """
 
     kind: str
@@ -113,7 +111,7 @@ class Outcome:
 
     @property
     def words(self) -> str:
-        """The class, and what it depends on."""
+        """The class, and its dependence on choices."""
         return f"{self.kind} {', '.join(self.depends_on)}".rstrip() if self.kind == DEPENDS else self.kind
 
 
@@ -124,17 +122,17 @@ def widened(lo: float, value: float, hi: float, factor: float) -> tuple[float, f
 
 
 def level(parts: int) -> float:
-    """Half-widths at which that many intervals hold at once, at all LOOKS, in 95 % of runs, over those of one at one.
+    """Factor on half-widths so that as many intervals hold at once, at all LOOKS, in 95 % of runs.
 
     One factor at every look (Pocock, Biometrika 64, 1977, 191-199), by the union bound over looks and parts: whatever
     their correlation, at most 5 % of runs err. For one part the exact recursion over looks gives 4.0 %; a factor for
-    just 5 % would save 4 % of the realisations.
+    exactly 5 % would save 4 % of the realisations.
     """
     return NormalDist().inv_cdf(1 - 0.025 / LOOKS / max(parts, 1)) / Z95
 
 
 def ends(part: Judged, parts: int = 1) -> tuple[float, float]:
-    """The interval that is judged: the exact value twice, or the 95 % interval widened for so many parts."""
+    """The judged interval: the exact value twice, or the 95 % interval widened for so many parts."""
     if part.known:
         return part.exact, part.exact
     if part.lo == part.hi:
@@ -177,21 +175,21 @@ def verdict(part: Judged, parts: int = 1) -> str:
 
 
 def _near_equality(lo: float, hi: float, part: Judged) -> bool:
-    """Whether an interval lies within the margin of an end of the range, on whichever side."""
+    """Whether an interval lies within the margin of an end of the range, on either side."""
     equal = (end for end in (part.expected_lo, part.expected_hi) if math.isfinite(end))
     return any(end - part.margin <= lo and hi <= end + part.margin for end in equal)
 
 
 def harmless(part: Judged, parts: int = 1) -> bool:
-    """Whether an undecided part can at worst turn out to be no material difference."""
+    """Whether an undecided part can at worst become no material difference."""
     lo, hi = ends(part, parts)
     return part.expected_lo - part.margin <= lo and hi <= part.expected_hi + part.margin
 
 
 def needed(part: Judged, parts: int = 1) -> int | None:
-    """How many realisations would likely decide a part: the interval shrinks with 1/√n about the value measured.
+    """How many realisations would likely decide a part: the interval shrinks with 1/√n about the measured value.
 
-    0 where it is decided; None where the value lies on a border, or nothing is known of its interval.
+    0 where it is decided; None where the value lies on a border, or its interval is unknown.
     """
     if verdict(part, parts) != UNDECIDED:
         return 0
@@ -203,7 +201,7 @@ def needed(part: Judged, parts: int = 1) -> int | None:
 
 
 def _borders(part: Judged) -> list[float]:
-    """The values on which verdicts change."""
+    """The values at which verdicts change."""
     ways = (-part.margin, part.margin) if part.kind == MATERIAL else (0.0,)
     out = (part.expected_lo - part.margin, part.expected_hi + part.margin)
     inner = [end + way for end in (part.expected_lo, part.expected_hi) for way in ways]
@@ -224,18 +222,18 @@ def _shrunk(part: Judged, parts: int, border: float) -> int | None:
 
 
 # ---- a claim ------------------------------------------------------------------------------------------------------
-# Of variants of a number the first of these that one of them has; CONTRADICTORY where only one against the print holds.
+# For variants of a number the first of these that one has; CONTRADICTORY where only one against the print holds.
 BEST = (CONFIRMED, IMMATERIAL, UNDECIDED, CONTRADICTORY, REFUTED)
-# Of the sentences of a claim the first of these that one of them has.
+# For the sentences of a claim the first of these that one has.
 WORST = (REFUTED, CONTRADICTORY, UNDECIDED, UNJUDGEABLE, IMMATERIAL, CONFIRMED)
 
 
 def claim(parts: Sequence[Judged], *, unstated: bool = False, joint: bool = False, internal: bool = False) -> Outcome:
-    """The outcome of a claim of these parts; of an extension none of which is asserted, as if all were.
+    """The outcome of a claim with these parts; of an extension without asserted parts, as if all were.
 
     unstated: the paper leaves out what the statement is about, so that it cannot be judged. joint: one variant has to
-    give every number; where each comes out in some variant and no variant gives all, the print contradicts itself.
-    internal: what is compared is printed on both sides; where it differs, the print contradicts itself.
+    give every number; where each is reproduced in some variant and no variant gives all, the print contradicts itself.
+    internal: both sides are printed; where they differ, the print contradicts itself.
     """
     asserted = [part for part in parts if part.asserted] or list(parts)
     many = sum(part.sampled and not part.void for part in asserted)
@@ -259,7 +257,7 @@ def claim(parts: Sequence[Judged], *, unstated: bool = False, joint: bool = Fals
 
 
 def _numbers(parts: Sequence[Judged]) -> dict[tuple[str, str], list[Judged]]:
-    """Parts by statement and number; one of no number stands for itself."""
+    """Parts by statement and number; a part without number stands for itself."""
     numbers: dict[tuple[str, str], list[Judged]] = {}
     for i, part in enumerate(parts):
         numbers.setdefault((part.statement, part.number or f"#{i}"), []).append(part)
@@ -300,13 +298,13 @@ def _sentence(said: Sequence[str], safe: bool) -> str:
 
 
 def most_needed(every: Iterable[int | None]) -> int | None:
-    """Of numbers of realisations the largest; None where there is none, or one of them is no number."""
+    """The largest number of realisations; None where there is none, or one is None."""
     known = list(every)
     return None if not known or None in known else max(one for one in known if one is not None)
 
 
 def roughly(n: float) -> int:
-    """A number of realisations as it is said: up to two digits, never fewer."""
+    """A number of realisations rounded for people: up to two digits, never fewer."""
     step = 10 ** max(len(str(math.ceil(n))) - 2, 0)
     return math.ceil(n / step) * step
 
@@ -333,9 +331,9 @@ def _joint(parts: Sequence[Judged], many: int) -> Outcome:
 # ---- over readings ------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Reading:
-    """A claim under one reading: its kind (E, U or N), what it chooses, and the class that the claim has under it.
+    """A claim under one reading: its kind (E, U or N), its alternatives, and the class of the claim under it.
 
-    outcome is empty where the reading could not be flown or designed.
+    outcome is empty where the reading is impossible to fly or design.
     """
 
     name: str
@@ -347,8 +345,8 @@ class Reading:
 def over_readings(own: Outcome, readings: Sequence[Reading]) -> Outcome:
     """The outcome of a claim from that of the default reading and those of all: only E and U count.
 
-    Confirmed only if true in all of them, refuted only if false in all, else it depends on what these choose. What no
-    reading can mend stays: a print that contradicts itself, a statement that cannot be judged.
+    Confirmed only if true in all of them, refuted only if false in all, else it depends on the choices. Some outcomes
+    hold under every reading: a print that contradicts itself, a statement that cannot be judged.
     """
     counted = [one for one in readings if one.kind in (EQUIVALENT, UNSTATED) and one.outcome]
     if not counted:
@@ -370,11 +368,11 @@ def over_readings(own: Outcome, readings: Sequence[Reading]) -> Outcome:
 
 
 def flips(readings: Sequence[Reading]) -> tuple[str, ...]:
-    """The choices on which the outcome hangs, the strongest first, equal ones in their order.
+    """The choices that change the outcome, the strongest first, equal ones in their order.
 
-    A choice is one of them if two readings that differ in it alone come out differently. Where no two readings differ
-    in one choice alone, those by whose values the readings differ most in the share that holds; where none holds, in
-    the share that is refuted.
+    A choice is one of them if two readings that differ in it alone have different outcomes. Where no two readings
+    differ in one choice alone: those by whose values the readings differ most in the share that holds; where none
+    holds, in the share that is refuted.
     """
     asked = CONFIRMED if any(one.outcome == CONFIRMED for one in readings) else REFUTED
     choices = list(dict.fromkeys(key for one in readings for key in one.choices))
@@ -396,7 +394,7 @@ def flips(readings: Sequence[Reading]) -> tuple[str, ...]:
 def _alike_but(
     choice: str, choices: Sequence[str], readings: Sequence[Reading]
 ) -> dict[tuple[str | None, ...], dict[str | None, list[Reading]]]:
-    """Readings by all that they choose but this, and those by what they choose of this."""
+    """Readings grouped by all their other choices, then by their alternative of this one."""
     found: dict[tuple[str | None, ...], dict[str | None, list[Reading]]] = {}
     for one in readings:
         rest = tuple(one.choices.get(key) for key in choices if key != choice)
@@ -405,7 +403,7 @@ def _alike_but(
 
 
 def _spread(choice: str, readings: Sequence[Reading], asked: str) -> float:
-    """Largest less least share of readings that come out so, over the values of a choice."""
+    """Largest less least share of readings with this outcome, over the values of a choice."""
     shares: dict[str, list[bool]] = {}
     for one in readings:
         shares.setdefault(one.choices.get(choice, ""), []).append(one.outcome == asked)
@@ -445,7 +443,7 @@ SAID_WHOLE = (
 
 
 def said(why: object) -> str:
-    """A reason in the language spoken; one that is not known here as it stands."""
+    """A reason in the current language; an unknown one unchanged."""
     text = str(why)
     for message in WHOLE:
         found = _pattern(message).fullmatch(text)
@@ -456,7 +454,7 @@ def said(why: object) -> str:
 
 
 def _by_case(changed: str) -> Iterator[str]:
-    """What differs, by case: `rls2: radar.sigma_range_m is 30, the paper's 25; and 2 more`."""
+    """Differences by case: `rls2: radar.sigma_range_m is 30, the paper's 25; and 2 more`."""
     for part in changed.split("; "):
         case, _, differences = part.rpartition(": ")
         found = _pattern(AND_MORE).fullmatch(part)
@@ -467,7 +465,7 @@ def _by_case(changed: str) -> Iterator[str]:
 
 
 def _apart(differences: str) -> list[str]:
-    """Differences one by one; the second half of one begins with a comma as well."""
+    """A list of differences split; the second half of one begins with a comma as well."""
     return re.split(r", (?!the paper's )(?=\S+ is |\d+ of the paper's |\S+ differs from )", differences)
 
 
@@ -480,19 +478,19 @@ def _difference(text: str) -> str:
 
 
 def _said(found: re.Match[str]) -> dict[str, str]:
-    """What stands in the places, numbers as the language writes them."""
+    """The values in the placeholders, numbers as the language writes them."""
     return {name: numeral(text) if NUMBER.fullmatch(text) else text for name, text in found.groupdict().items()}
 
 
 def _pattern(message: str) -> re.Pattern[str]:
-    """What a message becomes when its places are filled."""
+    """The pattern of a message with its placeholders filled."""
     parts = PLACE.split(message)
     return re.compile("".join(f"(?P<{one}>.+?)" if i % 2 else re.escape(one) for i, one in enumerate(parts)))
 
 
 # ---- ranges ----------------------------------------------------------------------------------------------------------
 class Range(NamedTuple):
-    """The values that the words say, ends included, the words, their margin, and the kind of rule that gives it.
+    """The range of the words, ends included, the words, their margin, and the kind of rule that gives it.
 
     strict is the range of the rule of version 0.1, for `old_verdict`.
     """
@@ -511,7 +509,7 @@ def digit(text: str) -> float:
 
 
 def printed(text: str, step: float | None = None) -> Range:
-    """A printed number; step: that of which it is a multiple where numbers are read off a graph. Default: its digit."""
+    """A printed number; step: its resolution where numbers are read off a graph. Default: its last digit."""
     return _inclusive(text, text, text, step, PRINT)
 
 
@@ -541,7 +539,7 @@ def _half_digit(value: float) -> float:
 
 
 def above(value: float, margin: float | None = None) -> Range:
-    """More than a value. Over zero: better, a difference of at least the margin, 1 % where none is given."""
+    """More than a value. Over zero: better, a difference of at least the margin, by default 1 %."""
     kind, wide = _one_sided(value, margin)
     return Range(math.nextafter(value, math.inf), math.inf, f"> {value:g}", wide, kind, (value, math.inf))
 
@@ -587,7 +585,7 @@ def within(low: float, high: float, margin: float = 0.5) -> Range:
 
 
 def same(value: float = 0.0, margin: float = 1.0, strict: float | None = None) -> Range:
-    """What coincides: a value to within a margin, 1 % of σ."""
+    """Coincidence: a value to within a margin, by default 1 % of σ."""
     old = margin if strict is None else strict
     return Range(value, value, f"{value:g} ± {margin:g}", margin, SAME, (value - old, value + old))
 
