@@ -1,19 +1,14 @@
-"""Words of figures, with the little mathematical text that they use, marked up for a page.
+"""Draws report/drawing.py's figures for the page: small SVGs, one for each panel, and the numbers for the pointer's
+readout.
 
-Colours, dashes and markers of a page's charts, for a light and for a dark page.
+Its parts: words with their little mathematical text, marked up for a page; colours, dashes and markers for a light and
+a dark page; axes with limits and ticks; paths, samples of lines, text.
 
-Every colour stands out from its page by 3 : 1 at least (WCAG 2.2, 1.4.11); dash and marker tell curves apart in grey.
-
-Axes of a page's charts: from values to places, limits and ticks.
-
-Pieces of a page's charts: paths, samples of lines, text; how far a mark reaches, and what of it is drawn.
-
-Draws report/drawing.py's figures for the page: small SVGs, one a panel, and the numbers that a pointer reads off.
-
-Panels stand apart so that a narrow screen can set them one below the other. Colours come from the page's style sheet
-in a light and a dark form. Text is escaped here; nothing else from outside gets into the markup. A panel of lines is
-drawn again by the page's script where a reader looks closer: what that needs beside the numbers (limits, what ticks,
-references and notes stand at) is kept with them and in attributes.
+Every colour has a contrast of 3 : 1 at least with its page (WCAG 2.2, 1.4.11); dash and marker distinguish curves in
+grey. Panels are separate so that a narrow screen can stack them. Colours come from the page's style sheet in a light
+and a dark form. Text is escaped here; nothing else from outside gets into the markup. The page's script redraws a panel
+of lines when zoomed; the data for that beyond the numbers (limits, which ticks, places of references and notes) are
+kept with them and in attributes.
 """
 
 import math
@@ -63,7 +58,7 @@ LADDER = (
     *(("#109b4d", "#598783"), ("#fe5292", "#6c753e")),
 )
 COLOURS = tuple(LADDER[i] for i in (0, 6, 3, 9, 4, 8, 1, 7, 2, 5))  # in the order of use: few curves lie far apart
-NEUTRAL = ("#6b6b6b", "#a9a9a9")  # of what is no curve of its own
+NEUTRAL = ("#6b6b6b", "#a9a9a9")  # of anything but a curve of its own
 SHADES = (  # of an ordered scale, least to most
     ("#440154", "#3b528b", "#2a788e", "#1f9a6e", "#4f8a10"),
     ("#8c8cf0", "#4fa3e0", "#35b7a0", "#7ad151", "#fde725"),
@@ -122,7 +117,7 @@ def contrast(one: str, other: str) -> float:
 MARGIN = {"x": 0.02, "y": 0.06}  # of the span of the data, on either side
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 TICK_DIGITS = 6
-WIDE = 20.0  # largest over least value of maps from which their colours go by the logarithm
+WIDE = 20.0  # ratio of values from which the colours of maps are logarithmic
 FURTHER = 3  # ticks more than wanted that a logarithmic axis may have
 MOST_DECADES = 7  # labelled on a logarithmic axis
 
@@ -138,7 +133,7 @@ class Scale:
     end: float
 
     def place(self, values: ArrayLike) -> np.ndarray:
-        """Places of values; not-a-number where a value has none."""
+        """Places of values; NaN where a value has none."""
         v = np.asarray(values, dtype=float)
         low, high = self.low, self.high
         if self.log:
@@ -184,7 +179,7 @@ def steps(low: float, high: float, wanted: int) -> list[float]:
 
 
 def decades(low: float, high: float, wanted: int) -> list[tuple[float, str]]:
-    """Powers of ten, and 2 and 5 times as well where these are not many more than wanted."""
+    """Powers of ten, and 2 and 5 times these if that gives not many more than wanted."""
     first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
     stride = max(1, -(-(last - first + 1) // MOST_DECADES))
     ticks = list(
@@ -197,7 +192,7 @@ def decades(low: float, high: float, wanted: int) -> list[tuple[float, str]]:
 
 
 def powers(exponents: Sequence[int]) -> list[str]:
-    """Powers of ten, all in figures where each is short, else all raised but 1 and 10."""
+    """Powers of ten, all in figures where each is short, else all raised except 1 and 10."""
     short = all(-4 <= n <= 4 for n in exponents)
     return [tick_text(10.0**n) if short or n in (0, 1) else power_of_ten(n) for n in exponents]
 
@@ -208,7 +203,7 @@ def tick_text(value: float) -> str:
 
 
 def heat_scale(parts: Sequence[np.ndarray]) -> tuple[float, float, bool]:
-    """Least and largest of the values of maps side by side, and whether their colours go by the logarithm."""
+    """Least and largest of the values of maps side by side, and whether their colours are logarithmic."""
     values = np.concatenate([np.zeros(0), *map(np.ravel, parts)])
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
@@ -216,7 +211,7 @@ def heat_scale(parts: Sequence[np.ndarray]) -> tuple[float, float, bool]:
 
 
 def equal(x: Scale, y: Scale) -> tuple[Scale, Scale]:
-    """Two linear scales with as many units to a place each: the one with the smaller span sees more, to both sides."""
+    """Two linear scales with as many units to a place each: the one with the smaller span is extended to both sides."""
     per_place = max((one.high - one.low) / abs(one.end - one.start) for one in (x, y))
 
     def widened(one: Scale) -> Scale:
@@ -228,7 +223,7 @@ def equal(x: Scale, y: Scale) -> tuple[Scale, Scale]:
 
 # ---- chart pieces ----------------------------------------------------------------------------------------------------
 SIZE = 12.0  # of the letters, in units of the SVG
-DIGITS = ".5g"  # of the numbers that a pointer reads off
+DIGITS = ".5g"  # of the pointer's readout
 
 
 def sample(style: Style) -> Markup:
@@ -253,7 +248,7 @@ def dashed(style: Style) -> Markup:
 
 
 def markers(places: Sequence[tuple[float, float]], style: Style) -> Markup:
-    """A style's marker at each place, all as one path; nothing where it has none."""
+    """A style's marker at each place, all as one path; nothing without a marker."""
     if style.marker is None:
         return Markup("")
     shape = MARKERS[style.marker % len(MARKERS)]
@@ -263,7 +258,7 @@ def markers(places: Sequence[tuple[float, float]], style: Style) -> Markup:
 
 
 def extent_of(mark: Mark) -> tuple[np.ndarray, np.ndarray]:
-    """What a mark adds to the limits of x and of y."""
+    """The extent of a mark in x and y, for the limits."""
     none = np.zeros(0)
     match mark:
         case Line():
@@ -280,7 +275,7 @@ def extent_of(mark: Mark) -> tuple[np.ndarray, np.ndarray]:
 
 
 def by_number(panel: Panel) -> Panel:
-    """A panel of bars or of a map: its places are numbers of columns and rows, whatever their values."""
+    """Whether it is a panel of bars or of a map: its places are numbers of columns and rows, whatever their values."""
     mark = next(mark for mark in panel.marks if isinstance(mark, Heat | Bars))
     if isinstance(mark, Bars):
         return replace(panel, x=replace(panel.x, scale="linear", ticks=tuple(enumerate(mark.names))))
@@ -307,7 +302,7 @@ def places(x: np.ndarray, y: np.ndarray) -> list[tuple[float, float]]:
 
 
 def path(x: np.ndarray, y: np.ndarray) -> str:
-    """A polyline through the finite points, in tenths of a unit, started again after a gap."""
+    """A polyline through the finite points, in tenths of a unit, restarted after a gap."""
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     there = np.isfinite(x) & np.isfinite(y)
     tenths = np.stack([np.where(there, np.round(10 * v), 0) for v in (x, np.clip(y, -1e5, 1e5))]).astype(np.int64)
@@ -331,12 +326,12 @@ def unbroken(there: np.ndarray) -> list[np.ndarray]:
 
 
 def short(values: np.ndarray) -> list[float | None]:
-    """Numbers for the pointer: five digits, nothing where not finite."""
+    """Numbers for the pointer: five digits, empty where not finite."""
     return [float(format(v, DIGITS)) if np.isfinite(v) else None for v in np.asarray(values, dtype=float).tolist()]
 
 
 def text_at(x: float, y: float, text: str, anchor: str, css: str = "", data: tuple[str, float] | None = None) -> Markup:
-    """Text at a place, a line below the other; data: the axis and the value that it is the tick of."""
+    """Text at a place, a line below the other; data: the axis and value of a tick."""
     named = Markup(' class="{}"').format(css) if css else Markup("")
     named += Markup(' data-{}="{:.9g}"').format(Markup(data[0]), data[1]) if data else Markup("")
     return Markup("").join(
@@ -349,12 +344,12 @@ def text_at(x: float, y: float, text: str, anchor: str, css: str = "", data: tup
 
 # ---- chart -----------------------------------------------------------------------------------------------------------
 WIDTH, HEIGHT = 440.0, 280.0  # of a panel, in units of the SVG
-LETTER = 0.62 * SIZE  # mean width of one
+LETTER = 0.62 * SIZE  # mean width of a letter
 RIGHT, BOTTOM = 12.0, 44.0
-ENDS_SHARE = 0.3  # of a panel's width that the names at the ends of its lines may take
-ROW = 1.15 * SIZE  # of a panel's height that each of them takes
-MARKED = 16  # at most about so many markers or crosses a line
-FEWER = 6  # points of a line for each marker, at least: where lines are drawn of few points, for a small page
+ENDS_SHARE = 0.3  # maximum share of a panel's width for the names at the ends of its lines
+ROW = 1.15 * SIZE  # height of a name in a panel
+MARKED = 16  # about so many markers or crosses on a line at most
+FEWER = 6  # least points of a line for each marker, where lines have few points, for a small page
 POINTS = 400  # of a line; a panel is as many units wide
 Heats = dict[str, tuple[float, float, bool]]  # of maps with the same words: least, largest value, logarithmic or not
 SEEN = 0.7  # units from the line from which its band is drawn
@@ -404,18 +399,18 @@ def chart(figure: Figure, points: int = POINTS) -> Chart:
 
 
 def heats_of(panels: Sequence[Panel]) -> Heats:
-    """The scales of the colours of maps: one for all of a figure that have the same words."""
+    """The colour scales of maps: one for all maps of a figure that have the same words."""
     maps = [mark for panel in panels for mark in panel.marks if isinstance(mark, Heat)]
     return {one.label: heat_scale([m.values for m in maps if m.label == one.label]) for one in maps}
 
 
 def named(line: Line) -> str:
-    """What a line is called: its name, else its label."""
+    """The name of a line: its name, else its label."""
     return line.name or line.label
 
 
 def at_ends(panel: Panel) -> list[str]:
-    """The names that stand at the ends of a panel's lines, as in the files; none where not all of them fit."""
+    """The names at the ends of a panel's lines, as in the files; none where not all of them fit."""
     lines = [m for m in panel.marks if isinstance(m, Line) and m.label and np.isfinite(m.y).any()]
     names = [named(line) for line in lines]
     short = max((len(spoken(name)) for name in names), default=0) * LETTER <= ENDS_SHARE * WIDTH
@@ -469,7 +464,7 @@ class _Frame:
             self.data["draw"] = self._redrawn(panel)
 
     def _redrawn(self, panel: Panel) -> dict[str, Any]:
-        """What the page's script needs to draw the panel with other limits: those given, whether ticks are given and
+        """Data for the page's script to draw the panel with other limits: those given, whether ticks are given and
         whether both axes have one scale."""
         limits = [panel.x.limits, panel.y.limits]
         return {"lim": limits, "ticks": [bool(panel.x.ticks), bool(panel.y.ticks)], "equal": panel.equal}
@@ -536,7 +531,7 @@ class _Frame:
         return Markup('<g data-g="{}"{}>{}</g>').format(group, ink(line.style), made)
 
     def _interval(self, x: np.ndarray, y: np.ndarray, whole: dict[str, np.ndarray], style: Style) -> Markup:
-        """A band where it can be seen, whiskers of single points; nothing where neither end is known."""
+        """A band where visible, whiskers on single points; nothing where neither end is known."""
         known = np.isfinite(whole["lo"]) | np.isfinite(whole["hi"])
         edge = 10 * HEIGHT  # an end that is infinite is beyond the panel
         with np.errstate(invalid="ignore"):
@@ -555,7 +550,7 @@ class _Frame:
         return Markup('<path class="b" d="{}"/>').format(d)
 
     def _keep(self, name: str, whole: dict[str, np.ndarray], group: int, style: Style) -> None:
-        """Numbers for the pointer; times that curves share are kept once."""
+        """Numbers for the pointer; times shared by curves are kept once."""
         x = short(whole["x"])
         if x not in self.data["xs"]:
             self.data["xs"].append(x)

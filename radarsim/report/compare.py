@@ -1,16 +1,13 @@
-"""What is compared: cases of stored results, and which answers to which.
+"""A comparison: cases of stored results and their partners; table, sentences and figures.
 
-The table of a comparison: every measured value of two sides at common times, their difference with its interval.
+The table has every measured value of two sides at common times, and their difference with its interval. Where both
+sides use the same measurements their errors are correlated, and the interval of a difference needs the correlation ρ of
+their mean squares. Stored results hold that of each filter with the baseline of its run. Where both runs have the same
+baseline (its rows are equal to the last digit), ρ is at least ρ₁ρ₂ − √((1 − ρ₁²)(1 − ρ₂²)), since a correlation matrix
+has no negative eigenvalue: with it the interval covers 95 % or more. Where no filter links them, ρ is taken as −1, the
+worst case: the half-widths add. Sides of different noise are independent.
 
-Where both sides are of the same measurements their errors go together, and the interval of a difference needs the
-correlation ρ of their mean squares. Stored results hold that of each filter with the baseline of its run. Where both
-runs have the same baseline (its rows are equal to the last digit), ρ is at least ρ₁ρ₂ − √((1 − ρ₁²)(1 − ρ₂²)), since a
-matrix of correlations has no negative eigenvalue: with it the interval covers 95 % or more. Where no filter links them,
-ρ is taken as −1, the worst there is: the half-widths add. Sides of different noise are independent.
-
-What a comparison says in sentences.
-
-Figures of a comparison: each quantity of all sides on common axes, and beside it the differences.
+The figures show each quantity of all sides on common axes, and the differences beside it.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -33,15 +30,15 @@ if TYPE_CHECKING:
 
 
 # ---- sides -----------------------------------------------------------------------------------------------------------
-LABELS = ("filter", "component", "model")  # that say which line a row is of; the time says where on it
+LABELS = ("filter", "component", "model")  # that identify the line of a row; the time identifies its point
 
 
 @dataclass(frozen=True)
 class Side:
     """One case of one stored result.
 
-    label is what it is called here; noise what its random numbers and its world depend on, None where that is not
-    known; count its realisations; tables its rows of the stored tables, by name; measured what its study measures.
+    label: its name here; noise: a hash of all that its measurements depend on, None where unknown; count: its
+    realisations; tables: its rows of the stored tables, by name; measured: the quantities of its study.
     """
 
     run: str
@@ -58,22 +55,22 @@ class Side:
 
 
 class Pair(NamedTuple):
-    """A side, and the one that it is compared with."""
+    """A side, and the one it is compared with."""
 
     side: Side
     against: Side
 
     @property
     def common_noise(self) -> bool:
-        """Whether both are of the same measurements: study, seed, target and sensor, and as many realisations."""
+        """Whether both use the same measurements: study, seed, target and sensor, and as many realisations."""
         return self.side.noise is not None and self.side.noise == self.against.noise
 
 
 def pairs(runs: Sequence[Sequence[Side]]) -> tuple[list[Pair], list[str]]:
-    """Each further run's cases against those of the first, and a line for each case that none answers to.
+    """Each further run's cases against those of the first, and a line for each case without a partner.
 
-    A run of a single case is set beside every case of the other one; else cases of the same swept values, or the same
-    name, answer to one another.
+    A run of a single case is compared with every case of the other; else cases with the same swept values, or the same
+    name, are partners.
     """
     first, found, alone = runs[0], [], []
     for run in runs[1:]:
@@ -101,7 +98,7 @@ MEANING = {
     UNLINKED: term("common noise but no common baseline filter; the interval is valid for any correlation"),
     SAME: term("the same numbers"),
 }
-DIGITS = 9  # of a time, by which rows find one another
+DIGITS = 9  # of a time, when rows are matched
 
 
 def compared(pairs: Sequence[Pair]) -> "pd.DataFrame":
@@ -111,7 +108,7 @@ def compared(pairs: Sequence[Pair]) -> "pd.DataFrame":
 
 
 def shared(sides: Iterable[Side]) -> list[Quantity]:
-    """The quantities that are measured by two sides or more; what a share leaves of 1 differs as that does."""
+    """The quantities measured by two sides or more; the complement of a share differs by the same amount."""
     found = [one for side in sides for one in side.measured if not one.rest]
     return [one for one in dict.fromkeys(found) if found.count(one) > 1]
 
@@ -128,7 +125,7 @@ def _part(pair: Pair, of: Quantity) -> dict[str, Any] | None:
     if a is None or b is None:
         return None
     own, other = filters_of(pair.side), filters_of(pair.against)
-    alone = len(own) == len(other) == 1 and own != other  # two lone filters answer to one another by any name
+    alone = len(own) == len(other) == 1 and own != other  # two single filters are partners whatever their names
     b = b.assign(against_filter=b["filter"])
     if alone:
         b = b.assign(filter=own[0])
@@ -211,7 +208,7 @@ def _estimate(rows: "pd.DataFrame", end: str) -> Estimate:
 
 
 def correlation(pair: Pair, of: Quantity, rows: "pd.DataFrame") -> tuple[np.ndarray, np.ndarray]:
-    """Of each row the correlation of both estimates, as bad as it can be, and in a word what is known of it."""
+    """For each row the correlation of both estimates, in the worst case, and a word on what is known of it."""
     n = len(rows)
     if not pair.common_noise:
         return np.zeros(n), np.full(n, INDEPENDENT, dtype=object)
@@ -259,7 +256,7 @@ def baseline(side: Side) -> str:
 
 
 def _same_baseline(pair: Pair, rows: "pd.DataFrame") -> np.ndarray:
-    """Whether both sides' baselines have the very same numbers at the row's component and time: the same filter."""
+    """Whether both sides' baselines have equal numbers at the row's component and time: the same filter."""
     known = []
     for side in pair:
         curves = side.tables["curves"]
@@ -275,7 +272,7 @@ MOST_SENTENCES = 12  # sentences; the table has all
 
 
 def sentences(made: "pd.DataFrame", measured: Iterable[Quantity] = COMMON) -> list[str]:
-    """At the last common time, of the first component of what is told: both values, and by how much they differ."""
+    """At the last common time, for the first component of the quantities `told`: both values and their difference."""
     last = at_the_end(made)
     lines: list[str] = []
     for of in told(made, measured):
@@ -299,13 +296,13 @@ def sentences(made: "pd.DataFrame", measured: Iterable[Quantity] = COMMON) -> li
 
 
 def told(made: "pd.DataFrame", measured: Iterable[Quantity]) -> list[Quantity]:
-    """What is spoken of: the first one, and what follows neither from it, as gains do, nor is one of many shares."""
+    """The quantities in sentences: the first, and those that neither follow from it (gains) nor are of many shares."""
     found = [of for of in measured if (made["quantity"] == of.value).any()]
     return [of for n, of in enumerate(found) if not n or (not of.paired and of.per in ("", "component"))]
 
 
 def at_the_end(made: "pd.DataFrame") -> "pd.DataFrame":
-    """The rows of the last common time of each line, of those that both sides have a value of there."""
+    """The rows of the last common time of each line, of those with a value on both sides."""
     keys = ["quantity", "label", "against_label", "filter", "component", "model"]
     last = made.groupby(keys, sort=False).tail(1)
     return last[last["value"].notna() & last["against"].notna()]
@@ -332,7 +329,7 @@ def _sentence(words: str, row: dict[Any, Any]) -> str:
 
 
 def changes(row: dict[Any, Any]) -> tuple[str, str]:
-    """By how much a value differs, with its interval; and the exact change where it is known beside a sample."""
+    """The difference of a value, with its interval; and the exact difference where known beside a sample."""
     if row["percent"] != row["percent"]:
         text = f"{signed(row['difference'])} {tr(unit_of(row['unit']))}".rstrip()
         return f"{text} {interval(signed(row['difference_lo']), signed(row['difference_hi']))}", ""
@@ -344,7 +341,7 @@ def changes(row: dict[Any, Any]) -> tuple[str, str]:
     return f"{percent(row['percent'])} {interval(*said)}", percent(exact) if exact == exact else ""
 
 
-MULTIPLE = 300  # per cent, from which on a change is a multiple
+MULTIPLE = 300  # per cent, from which on a change is written as a multiple
 
 
 def percent(value: float) -> str:
@@ -366,7 +363,7 @@ def value(number: float) -> str:
 
 
 def pairings(made: "pd.DataFrame") -> list[str]:
-    """How the differences are paired, a line each kind."""
+    """How the differences are paired, a line for each kind."""
     kinds = made.loc[made["quantity"] == "sigma", "pairing"].tolist()
     counts = {words: kinds.count(kind) for kind, words in MEANING.items()}
     return [
@@ -383,7 +380,7 @@ HEIGHT_MM = 70.0
 def figures(sides: Sequence[Side], made: "pd.DataFrame") -> dict[str, Figure]:
     """A figure for each quantity and component that two sides share: values on the left, differences on the right.
 
-    made is table.compared's. Of more than eight sides the first eight are drawn, and the caption says so.
+    made is from table.compared. Of more than eight sides the first eight are drawn, and the caption says so.
     """
     drawn, measured = {}, {one.value: one for one in shared(sides)}
     for (quantity, component, model), rows in made.groupby(["quantity", "component", "model"], sort=False):

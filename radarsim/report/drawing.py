@@ -1,7 +1,4 @@
-"""What a figure shows, as data: figures of panels of marks.
-
-Nothing here knows how it is drawn (report/figures.py does).
-"""
+"""Figures as data: panels of marks. Independent of how they are drawn (report/figures.py)."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -14,7 +11,7 @@ if TYPE_CHECKING:
 
 COLUMN_MM = 85.0  # one column of a journal page
 PAGE_MM = 175.0  # two columns
-GREY = -1  # the colour of what is no curve of its own: guides, crowds of points
+GREY = -1  # the colour of marks that are not curves: guides, crowds of points
 
 
 @dataclass(frozen=True)
@@ -32,7 +29,7 @@ class Style:
     """How a mark is distinguished, in grey too: each number picks from a list of its own.
 
     colour: an int picks a distinct colour, GREY none of these, a float from 0 to 1 a shade of an ordered scale. dash
-    and marker: ints, None for no line or no marker. flat: a line ends where its data end, as a bar does, however wide.
+    and marker: ints, None for no line or no marker. flat: a line ends where its data end, like a bar, however wide.
     """
 
     colour: int | float = 0
@@ -47,9 +44,8 @@ class Style:
 class Line:
     """A series y (n,) over x (n,), with its 95 % band lo … hi and its exact values (small crosses) where known.
 
-    The label is written at the line's end where labels fit, else into a legend. dash None leaves markers alone
-    (scatter), with whiskers for lo … hi. name says which line it is where the label leaves that to keys or to another
-    panel.
+    The label is written at the line's end where labels fit, else in a legend. dash None leaves markers alone (scatter),
+    with whiskers for lo … hi. name identifies the line where the label leaves that to keys or to another panel.
     """
 
     x: np.ndarray
@@ -113,10 +109,10 @@ MARKED = ("label", "name", "text")  # words of marks
 class Panel:
     """One pair of axes. keys explain styles (not single lines) in a small legend: (words, style).
 
-    direct: lines are named at their ends where the names fit; else always in the figure's legend, which stands below
-    the panels; "right": beside a single panel; "none": they are named in another panel. A remark stands above the
-    panel, at its right. Without marks a panel adds its keys to the legend. crosses is what the crosses of exact values
-    are called; empty: exact. equal: x and y are drawn at one scale, as a map.
+    direct: lines are named at their ends where the names fit; else always in the figure's legend, below the panels;
+    "right": beside a single panel; "none": they are named in another panel. A remark is above the panel, at its right.
+    A panel without marks adds its keys to the legend. crosses: the name of the exact values' crosses; empty: exact.
+    equal: x and y have one scale, as on a map.
     """
 
     x: Axis
@@ -134,9 +130,9 @@ class Panel:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of one or more panels in rows of `columns`; the caption says what is drawn and what the marks mean.
+    """A figure of one or more panels in rows of `columns`; the caption describes content and marks.
 
-    headline is the run's answer in a sentence of plain text, over its first figure.
+    headline is the run's answer in a sentence of plain text, above its first figure.
     """
 
     name: str
@@ -151,7 +147,7 @@ class Figure:
 
 
 def reworded(figure: Figure, said: Callable[[str], str]) -> Figure:
-    """The figure with every text of it put into other words."""
+    """The figure with every text replaced by a function."""
 
     def with_words(one: Any, *names: str) -> Any:
         return replace(one, **{name: said(getattr(one, name)) for name in names if hasattr(one, name)})
@@ -175,7 +171,7 @@ def reworded(figure: Figure, said: Callable[[str], str]) -> Figure:
 
 @dataclass(frozen=True)
 class Chart:
-    """One chart for every device of a study: figures by their name, a table, a sentence for each case, a live page.
+    """One chart for all radars of a study: figures by their name, a table, a sentence for each case, a live page.
 
     page is the text of one self-contained HTML file.
     """

@@ -1,11 +1,9 @@
-"""Where the lines of a figure are named: at their ends where names fit, else once a figure, below the panels.
+"""Draws report/drawing.py's figures in this project's style. The only file that uses Matplotlib.
 
-A legend never lies on curves. Panels that name different things alike keep legends of their own.
-
-Draws report/drawing.py's figures in the one style of this project. The only file that knows Matplotlib.
-
-Legible in grey: the colours are steps of lightness, and dash and marker tell the same apart. The bytes of an SVG depend
-on the data and on the versions of Matplotlib and its fonts alone.
+Lines are named at their ends where names fit, else once for each figure, below the panels; a legend never covers
+curves. Panels with different lines of the same style keep their own legends. Legible in grey: colours are steps of
+lightness, and dash and marker carry the same distinction. The bytes of an SVG depend only on the data and on the
+versions of Matplotlib and its fonts.
 """
 
 import gc
@@ -41,11 +39,11 @@ from radarsim.report.drawing import Bars, Figure, Heat, Line, Note, Panel, Refer
 from radarsim.report.wording import number, spoken
 
 # ---- legends ---------------------------------------------------------------------------------------------------------
-LONGEST_AT_END = 28  # letters of a name that may stand at a line's end
-NAMES_SHARE = 0.3  # of a panel's cell that names at the ends of its lines may take
+LONGEST_AT_END = 28  # letters of a name at a line's end
+NAMES_SHARE = 0.3  # maximum share of a panel's cell for names at the ends of its lines
 AT_ENDS_MM = 4.4  # of a panel's height for each name at a line's end
 ROW_MM, LETTER_MM, SAMPLE_MM = 3.5, 1.45, 12.0  # of a legend: a row, a letter, the sample of a line with its gaps
-LEAST_PANEL_MM = 55.0  # wide, of a figure whose width is chosen
+LEAST_PANEL_MM = 55.0  # width, in a figure of a chosen width
 WIDTHS_MM = (85, 120, 175)  # of a journal's page: one column, one and a half, two
 MOST_BESIDE = 16  # names in one column beside a panel
 
@@ -54,7 +52,7 @@ Keys = Mapping[str, Style | None]  # words and the look that they explain; None 
 
 @dataclass(frozen=True)
 class Legend:
-    """Names and the looks that they explain, with a title."""
+    """Names and styles of a legend, with a title."""
 
     keys: Keys
     title: str = ""
@@ -65,7 +63,7 @@ class Legend:
         return max(1, min(len(self.keys), int(width_mm / (LETTER_MM * longest + SAMPLE_MM))))
 
     def height_mm(self, width_mm: float) -> float:
-        """How tall it is at a width."""
+        """Its height at a width."""
         rows = -(-len(self.keys) // self.columns(width_mm)) + bool(self.title)
         return ROW_MM * rows + 2.0
 
@@ -82,7 +80,7 @@ class Named:
 
 
 def named(figure: Figure) -> Named:
-    """How the lines of a figure are named."""
+    """Plan how the lines of a figure are named."""
     panels = tuple(panel for panel in figure.panels if panel.marks)
     cell = figure.width_mm / min(figure.columns, max(1, len(panels)))
     narrow = any(LETTER_MM * _longest(panel) > NAMES_SHARE * cell for panel in panels if panel.direct)
@@ -130,7 +128,7 @@ def _fits(panel: Panel, height_mm: float) -> bool:
 
 
 def _keys(panel: Panel, at_ends: bool, crossed: set[str]) -> Keys:
-    """What of a panel a legend explains; exact crosses of each kind once a figure."""
+    """The styles of a panel that a legend explains; exact crosses of each kind once for each figure."""
     found: dict[str, Style | None] = {}
     if panel.legend != "none":
         found |= {m.label: m.style for m in lines(panel) if not at_ends}
@@ -144,7 +142,7 @@ def _keys(panel: Panel, at_ends: bool, crossed: set[str]) -> Keys:
 
 
 def at_width(figure: Figure, width_mm: float | None) -> Figure:
-    """The figure at a width: as many columns as leave a panel its room. Without a width as it is."""
+    """The figure at a width: as many columns as leave enough width for a panel. Unchanged without a width."""
     if width_mm is None or width_mm == figure.width_mm:
         return figure
     return replace(figure, width_mm=width_mm, columns=max(1, min(figure.columns, int(width_mm // LEAST_PANEL_MM))))
@@ -215,7 +213,7 @@ def render(figure: Figure) -> Canvas:
 
 
 def draw_on(figure: Figure, axes: Any, label: str = "") -> Canvas:
-    """Draw the panels of a figure on axes that are there, one each, beside what these hold; the figure they belong to.
+    """Draw the panels of a figure on existing axes, one each, besides what these hold; the figure they belong to.
 
     label is put before the names of its curves, whose colours and markers follow those of curves already there.
     """
@@ -228,7 +226,7 @@ def draw_on(figure: Figure, axes: Any, label: str = "") -> Canvas:
         for one, panel in zip(given, panels, strict=True):
             crosses = panel.crosses or tr("exact")
             there = set(one.get_legend_handles_labels()[1]) - {crosses}
-            one.autoscale(True)  # limits of what stood there hold for that alone
+            one.autoscale(True)  # earlier limits hold for earlier curves alone
             _draw(one, _beside(panel, len(there), label), maps)
             if keys := dict(zip(*reversed(one.get_legend_handles_labels()), strict=True)):
                 ordered = sorted(keys, key=lambda name: name == crosses)  # what explains all curves stands last
@@ -238,7 +236,7 @@ def draw_on(figure: Figure, axes: Any, label: str = "") -> Canvas:
 
 
 def _beside(panel: Panel, after: int, label: str) -> Panel:
-    """A panel beside so many curves: its curves with the next colours and with the label before their names."""
+    """A panel drawn over so many curves: its curves with the next colours and with the label before their names."""
     marks: list[Any] = []
     for mark in panel.marks:
         if isinstance(mark, Line) and (mark.label or mark.name):
@@ -254,7 +252,7 @@ def _beside(panel: Panel, after: int, label: str) -> Panel:
 
 @contextmanager
 def _unknown_letters_pass() -> Iterator[None]:
-    """Letters that the font lacks are drawn as boxes, without a warning for each."""
+    """Without a warning for letters that the font lacks: they are drawn as boxes."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing")
         yield
@@ -310,9 +308,8 @@ def _laid_out(figure: Figure) -> Canvas:
 def _measured_once(canvas: Canvas) -> Iterator[None]:
     """Ticks are placed, and their numbers measured, once for each place, size and resolution of a panel.
 
-    Matplotlib places them four times for every axis that it lays out and three times for every one that it draws. The
-    methods that remember lie over its own for as long as this lasts; a version of it that has no such methods draws
-    the same, only more slowly.
+    Matplotlib places them four times for every axis that it lays out and three times for every one that it draws.
+    Caching methods replace its own meanwhile; a version of it without these methods draws the same, only more slowly.
     """
     sides = [side for axes in canvas.axes for side in (axes.xaxis, axes.yaxis)]
     for side in sides:
@@ -326,7 +323,7 @@ def _measured_once(canvas: Canvas) -> Iterator[None]:
 
 
 def _remembering(side: Any) -> dict[str, Callable]:
-    """Methods of an axis that remember their last answer for as long as what it depends on is as it was."""
+    """Methods of an axis that cache their last result while its inputs stay the same."""
 
     def remembering(method: Callable) -> Callable:
         asked: tuple[Any, ...] = ()
@@ -348,7 +345,7 @@ def _remembering(side: Any) -> dict[str, Callable]:
 
 @contextmanager
 def _without_collection() -> Iterator[None]:
-    """Without Python's search for cyclic garbage: a figure is full of cycles, and all of it is needed to its end."""
+    """Without Python's search for cyclic garbage: a figure is full of cycles, and all of it is needed until the end."""
     collecting = gc.isenabled()
     gc.disable()
     try:
@@ -384,8 +381,8 @@ def save(
 ) -> dict[str, bytes]:
     """The bytes of the figure in each format ("svg", "png" at 200 dpi, "pdf"), the same for the same data.
 
-    At a width in place of its own its letters keep their size. Title, caption and made_by (what it was made of, and
-    with what) stand in each file's metadata.
+    At another width its letters keep their size. Title, caption and made_by (sources and versions) are in each file's
+    metadata.
     """
     with _without_collection():
         canvas = render(at_width(figure, width_mm))
@@ -414,7 +411,7 @@ class Scans(NamedTuple):
 
 
 def _scans(panel: Panel) -> Scans | None:
-    """The step and the last of even values from zero on (scans) that all lines of a panel stand at; None where not."""
+    """Step and last of even values from zero on (scans) on which all lines of a panel lie; None where not."""
     every = [np.asarray(mark.x, float) for mark in panel.marks if isinstance(mark, Line)]
     x = np.unique(np.concatenate(every or [np.zeros(0)]))
     if panel.x.scale == "log" or len(x) < FEWEST_SCANS or x[0] < 0:
@@ -462,7 +459,7 @@ def _draw(axes: Axes, panel: Panel, maps: Colours) -> None:
 
 
 def _ticks(side: XAxis | YAxis, axis: Ends, placed: bool, scans: Scans | None = None) -> None:
-    """The ticks of an axis: those given; those that its bars or its map have set; scans, the last too; else round."""
+    """The ticks of an axis: given ones; those set by its bars or its map; scans, with the last; else round values."""
     if axis.ticks:
         where, labels = zip(*axis.ticks, strict=True)
         side.set_ticks(where, labels)
@@ -476,7 +473,7 @@ def _ticks(side: XAxis | YAxis, axis: Ends, placed: bool, scans: Scans | None = 
 def at_scans(scans: Scans, intervals: int) -> list[tuple[float, str]]:
     """Ticks at every few scans from zero, about so many intervals, and at the last scan.
 
-    One interval more, or fewer down to half, where so all are as long.
+    One interval more, or down to half as many, if all intervals are then equally long.
     """
     count = round(scans.last / scans.step)
     every = [m * 10**p for p in range(9) for m in (1, 2, 3, 4, 5)]
@@ -489,9 +486,9 @@ def at_scans(scans: Scans, intervals: int) -> list[tuple[float, str]]:
 
 
 class Round(Locator):
-    """Ticks at the round values that the page's charts have too (report/chart.py).
+    """Ticks at round values, as in the page's charts (report/chart.py).
 
-    Of an axis of x so many, at most, that their numbers stand apart; where its values are scans, at these. words are
+    On an axis of x at most as many as leave gaps between their numbers; where its values are scans, at these. words:
     the numbers of the last ones.
     """
 
@@ -527,7 +524,7 @@ class Round(Locator):
         return ticks
 
     def _length_pt(self) -> float:
-        """How long an axis of x is, points; of another as long as need be."""
+        """The length of an axis of x, points; of another axis, unlimited."""
         if not isinstance(self.axis, XAxis):
             return math.inf
         axes = self.axis.axes
@@ -621,7 +618,7 @@ def _bars(axes: Axes, bars: Bars) -> None:
 
 
 def common_colours(panels: Sequence[Panel]) -> Colours:
-    """The colours of maps: one scale for all of a figure whose bars have the same words."""
+    """The colours of maps: one scale for all maps of a figure whose bars have the same words."""
     scales = chart.heats_of(panels).items()
     return {label: LogNorm(low, high) if log else Normalize(low, high) for label, (low, high, log) in scales}
 
@@ -650,7 +647,7 @@ def _note(axes: Axes, note: Note) -> None:
 
 
 def _at_ends(axes: Axes, panel: Panel) -> list[Annotation]:
-    """The names of a panel's lines, written at their ends; to be moved apart once the layout stands."""
+    """The names of a panel's lines, written at their ends; to be moved apart when the layout is final."""
     texts = []
     for m in lines(panel):
         last = np.flatnonzero(np.isfinite(m.y))[-1]
@@ -671,7 +668,7 @@ def _at_ends(axes: Axes, panel: Panel) -> list[Annotation]:
 
 
 def _legend(where: Axes | Canvas, legend: Legend | None, columns: int, **place: Any) -> None:
-    """Names and styles, the exact crosses among them, in so many columns."""
+    """Names and styles, including the exact crosses, in so many columns."""
     if legend is None:
         return
     handles = [Line2D([], [], **(EXACT if look is None else _look(look))) for look in legend.keys.values()]

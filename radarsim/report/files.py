@@ -1,11 +1,10 @@
-"""Files that are there whole or not at all.
+"""Files are written completely or not at all.
 
 A regular file is written under a temporary name beside it and renamed, so that a reader, a full disk or a kill never
-meets half of it. It keeps the mode it had; a new one has what the umask leaves. A link stays, and what it leads to is
-replaced. A stream (a terminal, a pipe, /dev/null) has nothing to replace and is written through. Directories and disks
-are refused.
+leaves half of it. It keeps its mode; a new one gets that of the umask. A link stays, and its target is replaced. A
+stream (a terminal, a pipe, /dev/null) is written directly. Directories and disks are refused.
 
-run.json: what was run, with what, and the outcome. Times stand here and in the report, never in a CSV.
+run.json: the request, the software, and the outcome. Times are here and in the report, never in a CSV.
 """
 
 import csv
@@ -59,9 +58,9 @@ def replace_all(
 ) -> None:
     """Write contents (relative path: bytes) below folder: all under temporary names first, then renamed in their order.
 
-    So a full disk leaves the outputs of an earlier run as they were. The renaming is done under a lock, so that two
-    writers of one folder leave the files of the last of them alone. Of the paths that `stale` gives of the folder,
-    those below it and not among the contents are removed. Raises StoreError.
+    So a full disk leaves the outputs of an earlier run unchanged. Renaming is done under a lock, so that of two writers
+    of one folder only the last one's files remain. Paths returned by `stale` below the folder, and not among the
+    contents, are removed. Raises StoreError.
     """
     folder = Path(folder)
     _refuse_twins(folder, contents)
@@ -90,7 +89,7 @@ def replace_all(
 
 
 def create(path: Path, data: bytes) -> None:
-    """Write a new file, whole or not at all. Raises FileExistsError where there is anything, StoreError."""
+    """Write a new file, completely or not at all. Raises FileExistsError where the name is taken, StoreError."""
     temporary = beside(path)
     try:
         try:
@@ -108,10 +107,10 @@ def create(path: Path, data: bytes) -> None:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold a folder for this thread: another that asks for it, of any process of this machine, waits until it is free.
+    """Lock a folder for this thread: others, of any process of this machine, wait until it is free.
 
-    The lock leaves no file and ends with its process. Where the file system has none, nobody waits. A thread may hold
-    a folder twice. Raises StoreError where it is not free within WAIT_S.
+    The lock leaves no file and ends with its process. Where the file system has none, nobody waits. A thread may lock a
+    folder twice. Raises StoreError where it is not free within WAIT_S.
     """
     key = _key(folder)
     held = _held.__dict__.setdefault("keys", set())
@@ -155,7 +154,7 @@ def _wait_for(descriptor: int, folder: Path) -> None:
 
 
 def _refuse_twins(folder: Path, names: Iterable[str]) -> None:
-    """StoreError for names that are one file where letters of either case are the same."""
+    """StoreError for names that are one file on a case-insensitive file system."""
     seen: dict[str, str] = {}
     for name in names:
         first = seen.setdefault(unicodedata.normalize("NFC", name).casefold(), name)
@@ -164,7 +163,7 @@ def _refuse_twins(folder: Path, names: Iterable[str]) -> None:
 
 
 def _refuse_special(path: Path) -> None:
-    """OSError where a pipe, a device or a socket stands in an output's place; a link is replaced, never followed."""
+    """OSError where an output's path is a pipe, a device or a socket; a link is replaced, never followed."""
     try:
         kind = os.lstat(path).st_mode
     except OSError:
@@ -174,12 +173,12 @@ def _refuse_special(path: Path) -> None:
 
 
 def beside(path: Path) -> Path:
-    """A name for a temporary file, of no other process or thread, in the folder of the file that it will become."""
+    """A unique name for a temporary file, in the folder of its destination."""
     return path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
 
 
 def rename(temporary: Path, path: Path) -> None:
-    """Put a finished temporary file in the place of a file, whose mode it takes where there is one."""
+    """Rename a finished temporary file to its destination, keeping the mode of an existing file."""
     try:
         mode = stat.S_IMODE(os.stat(path).st_mode)
     except OSError:
@@ -190,7 +189,7 @@ def rename(temporary: Path, path: Path) -> None:
 
 
 def same_file(one: str | os.PathLike, other: str | os.PathLike) -> bool:
-    """Whether two paths lead to one file, by links or by another case of their letters too."""
+    """Whether two paths are one file, also by links or by another case of their letters."""
     try:
         return os.path.samefile(one, other)
     except OSError:
@@ -198,10 +197,10 @@ def same_file(one: str | os.PathLike, other: str | os.PathLike) -> bool:
 
 
 class Writer:
-    """A CSV file at a path that the user gave: whole or not at all, or a stream that is written through.
+    """A CSV file at a path given by the user: written completely or not at all, or a stream, written directly.
 
-    sources are files that are read, by what they are called; the path must lead to none of them: ConfigError. So is a
-    path to no file or stream. Faults of the disk become StoreError.
+    sources: files that are read, by their names in messages; a path to one of them raises ConfigError, and so does a
+    path to neither a file nor a stream. Disk faults become StoreError.
     """
 
     def __init__(self, path: str | os.PathLike, sources: Mapping[str, str | os.PathLike | None] = MappingProxyType({})):
@@ -263,11 +262,10 @@ def record(
     answer: Sequence[str],
     machine: Mapping[str, object],
 ) -> dict[str, Any]:
-    """All of run.json but the report's own hash.
+    """All of run.json except the report's own hash.
 
-    run gives the facts of the run (stop reason, threads, times, warnings, identities …), kept as they are; contents
-    are the outputs, by path; machine describes the one they were made on.
-    Realisations asked and done are sums over the cases, which may differ in both.
+    run: the facts of the run (stop reason, threads, times, warnings, identities …), copied; contents: the outputs, by
+    path; machine: its description. Realisations requested and done are sums over the cases, which may differ in both.
     """
     facts = dict(run)
     stop = facts.pop("stop", "done")
@@ -305,7 +303,7 @@ def with_output(made: dict, path: str, data: bytes) -> dict:
 
 
 def earlier(folder: Path, name: str = "run.json") -> dict:
-    """The record of an earlier run in a folder; an empty one where there is none that can be read."""
+    """The record of an earlier run in a folder; empty where none can be read."""
     try:
         record = json.loads(read(folder / name))
     except (OSError, ValueError, RecursionError):
@@ -320,7 +318,7 @@ def outputs(folder: Path, name: str = "run.json") -> list[str]:
 
 
 def replaced(folder: Path, experiment: Experiment) -> list[str]:
-    """A warning where a folder holds the results of another config, which has the same name."""
+    """A warning where a folder holds the results of another config of the same name."""
     record = earlier(folder)
     before, now = record.get("config_path"), path_of(experiment)
     if not isinstance(before, str) or before == now or is_of(folder, experiment):
@@ -329,19 +327,19 @@ def replaced(folder: Path, experiment: Experiment) -> list[str]:
 
 
 def is_of(folder: Path, experiment: Experiment) -> bool:
-    """Whether a folder holds the results of an experiment, with whatever seed and however many realisations."""
+    """Whether a folder holds the results of an experiment, with any seed and number of realisations."""
     return _asked(earlier(folder).get("resolved")) == _asked(experiment.resolved)
 
 
 def path_of(experiment: Experiment) -> str:
-    """The file of a config, as text that can be written."""
+    """The file of a config, as printable text."""
     if experiment.path is None:
         return "a mapping in Python"
     return os.fsencode(os.path.abspath(experiment.path)).decode("utf-8", "backslashreplace")
 
 
 def _asked(resolved: Any) -> object:
-    """A resolved config without how often and with which seed it is run."""
+    """A resolved config without its number of realisations and seed."""
     try:
         cases = [{key: case[key] for key in case if key not in ("realisations", "seed")} for case in resolved["cases"]]
     except (LookupError, TypeError):
@@ -350,7 +348,7 @@ def _asked(resolved: Any) -> object:
 
 
 def extent(record: Mapping) -> str:
-    """Realisations of a case and the seeds in words; how many were asked for only where a case is short of them."""
+    """Realisations of a case and the seeds in words; the requested number only where a case is short of it."""
     cases = record["cases"].values()
     done, asked, seeds = (sorted({case[key] for case in cases}) for key in ("done", "asked", "seed"))
     most, said = max(done, default=0), {"done": span(done), "asked": span(asked)}
@@ -375,18 +373,18 @@ def extent(record: Mapping) -> str:
 
 
 def span(counts: Sequence[int]) -> str:
-    """Counts in words: the one there is, or the least to the largest."""
+    """Counts in words: a single one, or the least to the largest."""
     low, high = min(counts, default=0), max(counts, default=0)
     return numeral(f"{low:,}") if low == high else tr("{low:,} to {high:,}", low=low, high=high)
 
 
 def to_json(value: object) -> bytes:
-    """JSON as it is written: readable, keys in their order, no not-a-number."""
+    """JSON as written to files: readable, keys in their order, without NaN."""
     return (json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python and of the packages that shape a number or a figure."""
+    """Versions of Python and of the packages that affect numbers or figures."""
     found = {"python": platform.python_version()}
     for name in PACKAGES:
         try:

@@ -1,8 +1,7 @@
-"""What belongs to what in a report: the tables that a figure is drawn from, and of a claim its figures and tables.
+"""report.html: one self-contained page of an experiment; the template escapes all text from configs and tables.
 
-What was asked: every key of the cases with its value and the schema's description.
-
-report.html: one self-contained page of an experiment; the template escapes all text from configs and tables.
+Its links: the tables behind a figure, and for a claim its figures and tables. Its request: every key of the cases with
+its value and the schema's description.
 
 results/index.html: all runs of a folder by paper, newest first, each with its answer in one line.
 """
@@ -46,13 +45,13 @@ if TYPE_CHECKING:
 
 # ---- links -----------------------------------------------------------------------------------------------------------
 COMMON = {"sigma": ("curves",), "sweep": ("curves",), "dynamic": ("curves",), "gain": ("gains",)}
-MOST = 3  # figures that one claim leads to
+MOST = 3  # figures linked from one claim
 
 Looked = Sequence[tuple[str, str]]  # tables, with the component that was looked at or nothing
 
 
 def tables_of(figure: str, declared: Mapping[str, Sequence[str]], made: Collection[str]) -> tuple[str, ...]:
-    """The tables, of those made, that a figure is drawn from: as its study declares, by its own name, by its kind."""
+    """The tables behind a figure, of those made: as its study declares, by its own name, by its kind."""
     begins = sorted((name for name in declared if figure.startswith(name)), key=len)
     if begins and figure not in made:
         found: Sequence[str] = declared[begins[-1]]
@@ -64,7 +63,7 @@ def tables_of(figure: str, declared: Mapping[str, Sequence[str]], made: Collecti
 
 
 def figures_of(looked: Looked, drawn_from: Mapping[str, Sequence[str]]) -> list[str]:
-    """The figures that show what was looked at: of the table, and of these its component's own where there is one."""
+    """The figures that show the tables read by a claim, and of these its component's own if there is one."""
     found: list[str] = []
     for table, component in looked:
         own = [name for name, tables in drawn_from.items() if table in tables]
@@ -80,7 +79,7 @@ MOST_ROWS = 40  # shown row by row
 
 
 def asked(cases: Sequence[Case]) -> "dict[str, pd.DataFrame]":
-    """Tables of text by their title: what all cases share, and where there are several, in what they differ."""
+    """Tables of text by their title: keys that all cases share and, if there are several, those that differ."""
     keys_of = {case.name: {key: (value, about) for key, value, about in described(case.spec)} for case in cases}
     first = keys_of[cases[0].name]
     shared = [
@@ -191,7 +190,7 @@ def report_page(
     cost: "pd.DataFrame | None" = None,
     drawn_from: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> str:
-    """The page of an experiment: question, answer, what was asked, figures, claims, exact values, tables, provenance.
+    """The page of an experiment: question, answer, request, figures, claims, exact values, tables, provenance.
 
     figures are described ones (none with --no-figures); record is run.json's; inputs, agreement and cost (against
     accuracy) are tables, or None. drawn_from: of the study, see `Study.drawn_from`.
@@ -228,7 +227,7 @@ def report_page(
 
 
 def _first(figures: Sequence[Figure]) -> int:
-    """How many figures are seen without unfolding: the first one, others while their panels are few together."""
+    """How many figures are not folded: the first one, others while their panels are few together."""
     panels = [sum(bool(panel.marks) for panel in one.panels) for one in figures[:FIRST] if one.name != "claims"]
     return max(1, sum(sum(panels[: n + 1]) <= FIRST_PANELS for n in range(len(panels))))
 
@@ -260,10 +259,10 @@ def comparison(
     differing: "Mapping[str, pd.DataFrame]",
     outputs: Collection[str],
 ) -> str:
-    """The page of a comparison: sentences, figures, in what the configs differ, the table.
+    """The page of a comparison: sentences, figures, differing keys, the table.
 
-    differing are tables of keys by their title, empty where the configs are of several studies; outputs the files
-    beside the page.
+    differing: tables of keys by their title, empty where the configs are of several studies; outputs: the files beside
+    the page.
     """
     return whole(
         "compare.html.j2",
@@ -284,7 +283,7 @@ MOST_KEYS = 4  # that a line names
 
 
 def _differences(differing: "Mapping[str, pd.DataFrame]") -> str:
-    """The first keys in which what is compared differs, with the values of each; empty where no key does."""
+    """The first keys in which the compared cases differ, with the values of each; empty where none does."""
     *_, table = (None, *differing.values()) if len(differing) > 1 else (None,)
     if table is None:
         return ""
@@ -305,7 +304,7 @@ def followed(
     yaml: str,
     command: str,
 ) -> str:
-    """The page of tracks over recorded plots: answer, what the plots are, figures, tables of rows by column, config."""
+    """The page of tracks over recorded plots: answer, plots, figures, tables of rows by column, config."""
     return whole(
         "track.html.j2",
         config=config,
@@ -321,7 +320,7 @@ def followed(
 
 
 def _grid(name: str, rows: Sequence[Mapping[str, object]]) -> dict[str, Any]:
-    """A table of rows by column, as far as it is shown."""
+    """The shown part of a table of rows by column."""
     shown = rows[:ROWS]
     columns = [{"name": key, "numeric": isinstance(value, int | float)} for key, value in rows[0].items()]
     cells = [[cell(value) for value in row.values()] for row in shown]
@@ -329,7 +328,7 @@ def _grid(name: str, rows: Sequence[Mapping[str, object]]) -> dict[str, Any]:
 
 
 def yaml_of(resolved: Mapping[str, Any]) -> str:
-    """The resolved experiment as YAML; of very many cases the first."""
+    """The resolved experiment as YAML; with very many cases the first."""
     cases = resolved["cases"]
     written = as_yaml({**resolved, "cases": cases[:MOST_CASES]})
     left = len(cases) - MOST_CASES
@@ -337,7 +336,7 @@ def yaml_of(resolved: Mapping[str, Any]) -> str:
 
 
 def command(experiment: Experiment, record: Mapping[str, Any]) -> str:
-    """The command that repeats the run: as the run's facts give it, else by the config."""
+    """The command that repeats the run: from the run's facts, else from the config."""
     if "command" in record:
         return str(record["command"])
     parts = ["radarsim", "run", shlex.quote(str(experiment.path or experiment.stem))]
@@ -348,7 +347,7 @@ def command(experiment: Experiment, record: Mapping[str, Any]) -> str:
 
 
 def cell(value: object) -> str:
-    """A number for people, whole ones in full, others at four digits; text as it is, nothing for not-a-number."""
+    """A number for people, whole ones in full, others at four digits; text unchanged, empty for NaN."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return str(value)
     return numeral(str(value)) if isinstance(value, int) else wording.number(value)
@@ -376,14 +375,14 @@ def _template(name: str) -> "Template":
 
 
 def _measured(part: Mapping[str, Any]) -> str:
-    """What a part of a claim measured; an infinite settling time as text."""
+    """The measured value of a part of a claim; an infinite settling time as text."""
     if math.isinf(part["measured"]) and "settling" in part["what"]:
         return tr(NOT_SETTLED)
     return cell(part["measured"])
 
 
 def _bounds(part: Mapping[str, Any]) -> str:
-    """The interval of a part of a claim; a dash where chance has no part in it."""
+    """The interval of a part of a claim; a dash without a sampling error."""
     lo, hi = claims_page.bounds(part)
     return "–" if lo == hi else f"{cell(lo)} … {cell(hi)}"
 
@@ -396,7 +395,7 @@ def _css(verdict: str) -> str:
 def _claims(
     table: "pd.DataFrame", sources: Mapping[str, Sequence[str]], written: Collection[str]
 ) -> list[dict[str, Any]]:
-    """Claims with their parts, from claims.csv's rows, with the figures and tables that each is judged from.
+    """Claims with their parts, from claims.csv's rows, with the figures and tables behind each.
 
     sources: the tables of each figure; written: the tables that are files.
     """
@@ -421,7 +420,7 @@ def _cell(column: str, value: object) -> str:
 
 
 def _tables(made: "Mapping[str, pd.DataFrame]") -> list[dict[str, Any]]:
-    """The tables as far as they are shown: the long ones share what room the short ones leave."""
+    """The shown parts of the tables: long ones share the rows that short ones leave."""
     rows, most = [len(table) for table in made.values()], ROWS
     while most > 10 and sum(min(count, most) for count in rows) > ALL_ROWS:
         most -= 10
@@ -429,7 +428,7 @@ def _tables(made: "Mapping[str, pd.DataFrame]") -> list[dict[str, Any]]:
 
 
 def table_in_words(name: str, table: "pd.DataFrame") -> dict[str, Any]:
-    """A table that stands in the page alone, in words; one that is a file of its own is shown as it is there."""
+    """A table of the page alone, in words; a table with a file of its own is shown as in the file."""
     made = _table(name, table)
     for column in made["columns"]:
         column["name"] = head(column["name"])
@@ -441,7 +440,7 @@ def table_in_words(name: str, table: "pd.DataFrame") -> dict[str, Any]:
 
 
 def head(column: str) -> str:
-    """What a column of a table that stands in the page alone is called; a unit stands behind the last comma."""
+    """The head of a column of a table of the page alone; a unit is behind the last comma."""
     if column in CALLED or column in HEADS:
         return tr(CALLED.get(column, column))
     by_stage = re.fullmatch(r"σ of y, (.+), m", column)
@@ -480,7 +479,7 @@ def _table(name: str, table: "pd.DataFrame", most: int = ROWS) -> dict[str, Any]
 
 
 def _figures(figures: Sequence[Figure]) -> list[dict[str, Any]]:
-    """The figures as charts; where there are many curves, each is drawn of fewer points."""
+    """The figures as charts; where there are many curves, each is drawn with fewer points."""
     lines = sum(isinstance(mark, Line) for figure in figures for panel in figure.panels for mark in panel.marks)
     points = max(LEAST_POINTS, min(chart.POINTS, MOST_POINTS // max(1, lines)))
     made = []
@@ -505,7 +504,7 @@ def _files(figures: Sequence[Figure], outputs: Collection[str]) -> dict[str, lis
 
 
 def words_of_script(own: Sequence[str] = ()) -> "Markup":
-    """What the page's script says, and a script of the page's own, in the language spoken, as JSON by the English."""
+    """Texts of the page's script, and of a page's own script, in the current language, as JSON by the English."""
     return _json({text: tr(text) for text in (*SCRIPT, *own)})
 
 
@@ -536,8 +535,8 @@ def _file(name: str) -> str:
 def live(title: str, parts: Sequence[str], data: str, words: Sequence[str] = ()) -> str:
     """A self-contained page that computes: a study's own body, style and script, and its data as JSON.
 
-    The parts are files of the package: the body is a template in which `tr` says a message, style and script stand as
-    they are. words: what the script says. The data cannot end its element.
+    The parts are files of the package: the body is a template in which `tr` marks messages, style and script are
+    copied. words: texts of the script. The data cannot end its element.
     """
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
@@ -567,7 +566,7 @@ NAME = "index.html"
 def write(out: Path) -> None:
     """Write the index of the runs under out; raises StoreError. Runs whose run.json cannot be read are left out.
 
-    Under a lock from the first look to the writing: of two runs that end at once, the last one sees both.
+    Under a lock from reading to writing: of two runs that end at once, the last one sees both.
     """
     out = Path(out)
     with files.locked(out):
@@ -596,7 +595,7 @@ def _run(path: Path) -> dict | None:
 
 
 def _by_paper(runs: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:
-    """The runs by the paper whose claims they judge; one that judges none beside others of its study, or under that."""
+    """The runs by the paper whose claims they judge; one that judges none with others of its study, or under that."""
     papers = {run["study"]: run["paper"] for run in reversed(runs) if run["paper"]}
     found: dict[str, list[Mapping[str, Any]]] = {}
     for run in runs:
@@ -605,14 +604,14 @@ def _by_paper(runs: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, 
 
 
 def _finished(record: Mapping, path: Path) -> str:
-    """When the run ended, UTC, to the second: as run.json says, else when that was written."""
+    """When the run ended, UTC, to the second: from run.json, else the time of that file."""
     finished = record.get("finished")
     when = datetime.fromisoformat(finished) if finished else datetime.fromtimestamp(path.stat().st_mtime, UTC)
     return when.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
 def _claims_of(path: Path) -> dict[str, Any]:
-    """Of a table of claims the paper of the first, how many are of which class in words, and as marks by their look."""
+    """From a table of claims the paper of the first, how many are of which class in words, and as styled marks."""
     try:
         rows = list(csv.DictReader(io.StringIO(files.read(path).decode("utf-8"), newline="")))
         looks = [_css(parts[0]["class"]) for parts in claims_page.grouped(rows)]

@@ -1,34 +1,35 @@
 """Exact values against measured ones, in every table and every run.
 
 A column `exact_NAME` of a table holds the exact value of its column NAME, or gain_NAME; `exact` alone that of the
-column whose ends are `lo` and `hi`. The two columns after the measured one are the ends of its 95 %
-interval; of a mean the one after it, `…_se`, is its standard error. So a study that names its columns like this is held
-against its own exact values without a word more. Each of them is to lie within `statistics.ERROR_OF_PROGRAM` standard
-errors, within more where there are so many that chance would take one further.
+column whose ends are `lo` and `hi`. The two columns after the measured one are the ends of its 95 % interval; of a mean
+the one after it, `…_se`, is its standard error. So a study with these column names is checked against its own exact
+values without further declarations. Each measured value must lie within `statistics.ERROR_OF_PROGRAM` standard errors,
+within more where there are so many that chance would take one further.
 
 Whose standard errors: the sample's own, where a filter's errors are Gaussian at every scan, by their κ. Where they are
 not, as where plots are missed, something rare may make much of a mean of squares and be missing in a sample, and in its
-standard error with it. Such a σ is held against being too large alone, which no sample is for what it lacks; of a bias
-so much may be missing as `UNSEEN` of n realisations can make, σ √(UNSEEN/n) (Cauchy and Schwarz); a gain is not held.
+standard error with it. Such a σ is only checked for being too large, which no sample becomes by missing events; of a
+bias so much may be missing as `UNSEEN` of n realisations can make, σ √(UNSEEN/n) (Cauchy and Schwarz); a gain is not
+checked.
 
-What a filter believes of its errors against what they are, with the same columns and words in every study.
+A filter's predicted errors against its true ones, with the same columns and words in every study.
 
 `believed.csv` compares standard deviations, component by component: `ratio` is the true σ over the believed one.
 `consistency.csv` compares whole states and residuals by normalised squares, per degree of freedom: NEES eᵀP⁻¹e of the
-error e, NIS νᵀS⁻¹ν of the innovation ν, P and S the covariances that the filter believes. Both are 1 for a filter that
-is right about itself. Over 1 the filter is optimistic, its errors are larger than it believes; under 1 it is
-pessimistic. (Bar-Shalom, Li & Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, 5.4.)
+error e, NIS νᵀS⁻¹ν of the innovation ν, P and S the covariances that the filter predicts. Both are 1 for a consistent
+filter. Over 1 the filter is optimistic, its errors are larger than predicted; under 1 it is pessimistic. (Bar-Shalom,
+Li & Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, 5.4.)
 
 Where a table's interval covers less than its 95 %: a last column `note`, there only where a row has one.
 
 There is one rule. An interval of σ takes the spread of e² from the sample; where few of the realisations make that
 spread, it is too narrow, and more so in the sample that happens to lack them. How many make it is n/(κ − 1), the
 effective realisations. They are counted at the row's own scan and at the scans near it, as the few that are missing in
-one are seen in another. A gain has a rule more, as both filters may err alike but for a few realisations. Of what a
-study knows better of its rare errors (wrong folds, lost bursts) it brings notes of its own.
+one are seen in another. A gain has a rule more, as both filters may err alike but for a few realisations. A study that
+knows more about its rare errors (wrong folds, lost bursts) brings notes of its own.
 
-A row beside which the exact value stands has none: that value is the better one, whatever the interval. What was
-measured of marked and of unmarked rows stands in docs/trust.md.
+A row with an exact value has none: that value is the better one, whatever the interval. Measured coverage of marked and
+unmarked rows is in docs/trust.md.
 """
 
 import math
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
 
 # ---- agreement -------------------------------------------------------------------------------------------------------
 COLUMNS = ("case", "filter", "component", "unit", "scans", "inside_percent", "largest_difference_percent", "at_k")
-ALMOST = 2e-4  # of a value that `Study.exact_but_for` says something of
+ALMOST = 2e-4  # of a value for which `Study.exact_but_for` gives a qualification
 ROUNDING = 1e-9  # of a value
 UNSEEN = 18.0  # realisations of n that are all missing in one sample of 6·10⁷
 STRAYS = 5.0  # standard errors by which κ of Gaussian errors may lie off theirs
@@ -97,8 +98,8 @@ def distances(
 ) -> np.ndarray:
     """Standard errors (rows,) by which the measured values of a column lie off the exact ones.
 
-    made: all tables; nearly: the cases of which exact values are right to `ALMOST`. 0 where the sample may lack as
-    much, see above. Not-a-number where no exact value is known, or under `FEW` realisations measured it.
+    made: all tables; nearly: the cases whose exact values are accurate to `ALMOST`. 0 where missing rare events may
+    explain the distance, see above. NaN where no exact value is known, or fewer than `FEW` realisations measured it.
     """
     table = made[name]
     (value, lo, hi), exact = measured(table, of), table[of.exact].to_numpy(dtype=float)
@@ -125,7 +126,7 @@ def distances(
 
 
 def _gaussian(made: "Mapping[str, pd.DataFrame]", table: "pd.DataFrame") -> np.ndarray:
-    """Whether errors are Gaussian, (rows,), of the filter of each row, and of that which it is compared with."""
+    """Whether errors are Gaussian, (rows,), of the filter of each row, and of the one it is compared with."""
     curves = made.get("curves")
     if curves is None or not len(curves):
         return np.zeros(len(table), dtype=bool)
@@ -151,10 +152,10 @@ def faults(
     bounds: Collection[str] = ("claims",),
     declared: Sequence[Quantity] = (),
 ) -> list[str]:
-    """A line for each column that lies further off its exact values than chance takes any: the furthest row of it.
+    """A line for each column that is further off its exact values than chance explains: its furthest row.
 
-    made, nearly: as for `distances`; bounds: tables that hold no exact values of what was measured, whatever they say;
-    declared: what the study measures.
+    made, nearly: as for `distances`; bounds: tables without exact values of the measured quantities, whatever their
+    columns; declared: the quantities of the study.
     """
     found = {
         (name, of): distances(made, name, of, nearly, declared)
@@ -259,15 +260,15 @@ def normalised(
 
 
 def verdict(mean: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> np.ndarray:
-    """What a mean NEES or NIS says of a filter's covariance, by the bounds of a filter that is right about itself."""
+    """The meaning of a mean NEES or NIS for a filter's covariance, by the bounds of a consistent filter."""
     return np.select([mean < lo, mean > hi], [PESSIMISTIC, OPTIMISTIC], CONSISTENT).astype(object)
 
 
 def bounds_from_spread(total: Values, square: Values, n: Values, looks: int) -> tuple[np.ndarray, np.ndarray]:
     """Bounds of a mean NEES or NIS of unknown law, from Σq and Σq² over n realisations.
 
-    They stand about 1 as the interval of the mean, widened so that `looks` of them hold at once in 95 % of runs, stands
-    about the mean: 1 leaves that interval where the mean leaves these bounds.
+    They are the interval of the mean, widened so that `looks` of them hold at once in 95 % of runs, moved to 1: 1
+    leaves that interval where the mean leaves these bounds.
     """
     mean = statistics.mean_square(total, square, n, looks)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -342,7 +343,7 @@ def _noted(
 
 
 def known(table: "pd.DataFrame") -> np.ndarray:
-    """The rows (rows,) beside which exact values stand."""
+    """The rows (rows,) with exact values."""
     columns = [column for column in table if str(column).startswith("exact_") and column != "exact_bias"]
     return table[columns].notna().all(axis=1).to_numpy() & bool(columns)
 
@@ -356,9 +357,9 @@ Answer = Callable[[Mapping[str, "pd.DataFrame"]], Sequence[str]]  # sentences fr
 
 
 def concerned(made: Mapping[str, "pd.DataFrame"], answers: Sequence[Answer]) -> "dict[str, pd.DataFrame]":
-    """By table the marked rows whose intervals the answer gives, or is decided by: with wider ones it reads otherwise.
+    """By table, the marked rows whose intervals the answer gives, or depends on: with wider ones it reads otherwise.
 
-    answers: the parts of the answer, each looked at by itself, as most rows concern one of many.
+    answers: the parts of the answer, each examined by itself, as most rows concern one of many.
     """
     found: dict[str, set[int]] = {}
     for answer in answers:
@@ -380,7 +381,7 @@ def concerned(made: Mapping[str, "pd.DataFrame"], answers: Sequence[Answer]) -> 
 
 
 def _least(rows: np.ndarray, matter: Callable[[np.ndarray], bool]) -> list[int]:
-    """Of these rows those that matter, found by halves; all of them where they do together alone."""
+    """Of these rows those that matter, found by bisection; all of them where they matter only together."""
     if not len(rows) or not matter(rows):
         return []
     half = len(rows) // 2
@@ -389,7 +390,7 @@ def _least(rows: np.ndarray, matter: Callable[[np.ndarray], bool]) -> list[int]:
 
 
 def _wider(table: "pd.DataFrame", rows: np.ndarray) -> "pd.DataFrame":
-    """The table with intervals twice as wide in these rows, of the columns that their notes are of."""
+    """The table with intervals twice as wide in these rows, in the columns that their notes concern."""
     wider, said = table.copy(), table["note"].to_numpy(dtype=object)[rows]
     lows = [str(column) for column in table if str(column).endswith(("_lo", "_lo_s"))]
     for note in set(said):
@@ -402,7 +403,7 @@ def _wider(table: "pd.DataFrame", rows: np.ndarray) -> "pd.DataFrame":
 
 
 def is_of(note: str, column: str, columns: Sequence[str]) -> bool:
-    """Whether a note is of a column among those with intervals: of those that it begins with the name of, else of all.
+    """Whether a note concerns a column among those with intervals: those named at its beginning, else all.
 
     >>> [is_of("gain: heavy tails", one, ["sigma", "gain_percent"]) for one in ("sigma", "gain_percent")]
     [False, True]
@@ -412,7 +413,7 @@ def is_of(note: str, column: str, columns: Sequence[str]) -> bool:
 
 
 def needed(rows: "pd.DataFrame", made: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]) -> np.ndarray:
-    """How many realisations (rows,) marked intervals take, from those that count; not-a-number where not known."""
+    """How many realisations (rows,) marked intervals take, from the effective ones; NaN where unknown."""
     n, fewest = behind(rows.drop(columns="n_eff", errors="ignore"), made, results)
     with np.errstate(divide="ignore"):
         return np.where(rows["note"].str.endswith(HEAVY) & (fewest < EFFECTIVE), n * EFFECTIVE / fewest, np.nan)
@@ -421,8 +422,8 @@ def needed(rows: "pd.DataFrame", made: Mapping[str, "pd.DataFrame"], results: Se
 def notes_on(n: np.ndarray, fewest: np.ndarray) -> np.ndarray:
     """The notes (rows,) on intervals of n realisations (rows,).
 
-    fewest: how many of them count where a few large errors decide, at the scan where they are fewest; not-a-number
-    where errors have no tails, or nothing is known of them.
+    fewest: how many of them count where a few large errors decide, at the scan where they are fewest; NaN where errors
+    have no tails, or nothing is known of them.
     """
     return np.where(fewest < np.minimum(EFFECTIVE, n / TAIL), HEAVY, "").astype(object)
 
@@ -458,10 +459,10 @@ def _alike(gains: "pd.DataFrame", curves: "pd.DataFrame", paired: Sequence[Quant
 def behind(
     table: "pd.DataFrame", made: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How many realisations stand behind each row (rows,), and the fewest effective ones there and nearby.
+    """How many realisations are behind each row (rows,), and the fewest effective ones there and nearby.
 
-    A row's own, those of σ in the same row of curves, or the case's; not-a-number where effective ones are not known. A
-    gain rests on the fewer of both filters.
+    A row's own, those of σ in the same row of curves, or the case's; NaN where effective ones are unknown. A gain rests
+    on the fewer of both filters.
     """
     if "n_eff" in table:
         return table["n"].to_numpy(dtype=float), nearby(table)
@@ -492,9 +493,9 @@ MOST_NAMES = 3  # named in a line
 def of_intervals(
     results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", answers: Sequence[Answer]
 ) -> list[str]:
-    """What a reader of the answer must know of its intervals, a line at most; and whether weights are wrong.
+    """Warnings on the intervals of the answer, at most a line each; and whether weights are wrong.
 
-    answers: the parts of the answer. How many rows of which table are marked is said where these are shown.
+    answers: the parts of the answer. The number of marked rows in a table is given where it is shown.
     """
     return [*(few(results) or rests(results, made, answers)), *rare.warnings(made.get("rare"))]
 
@@ -514,7 +515,7 @@ def few(results: Sequence[CaseResult]) -> list[str]:
 
 
 def rests(results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", answers: Sequence[Answer]) -> list[str]:
-    """A line on the answer's intervals that are too narrow, with the realisations that it takes, if any are."""
+    """A line on the answer's intervals that are too narrow, with the realisations that they need, if any are."""
     found = concerned(made, answers).values()
     if not found:
         return []

@@ -1,4 +1,4 @@
-"""Figures that every study needs, made from the tables alone: σ against time, gain against time."""
+"""Figures common to all studies, made from the tables alone: σ against time, gain against time."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -22,24 +22,24 @@ if TYPE_CHECKING:
     import pandas as pd
 
 WIDE_MM = 120.0  # one panel of many lines
-MOST_AT_ENDS = 6  # lines of one panel named at their ends; more by colour and dash
-MOST = 8  # cases of a panel; more are named in its caption
+MOST_AT_ENDS = 6  # lines of one panel named at their ends; if more, by colour and dash
+MOST = 8  # cases of a panel; the others are named in its caption
 MOST_PANELS = 12
-NEAR_ONE = 0.999  # probabilities from here on differ in their further digits
-RARE = 0.1  # of a share: what is lost of it, below which it is drawn by its logarithm
+NEAR_ONE = 0.999  # probabilities above it differ only in further digits
+RARE = 0.1  # of a share's loss: below it the loss is drawn logarithmically
 MOST_GONE = 8  # names of what a figure leaves out
-WIDE = 20  # largest over least value from which an axis is logarithmic
+WIDE = 20  # ratio of values from which an axis is logarithmic
 MOST_LINES = 12  # of a panel that several cases of more than FEW_FILTERS share
-FEW_FILTERS = 3  # told apart by dash, while shades tell the cases apart
+FEW_FILTERS = 3  # distinguished by dash, while shades distinguish the cases
 LONG = 5  # powers of ten from this one on are written raised
 NEAR_ZERO = 1e-5  # of the largest σ: below it a logarithmic axis would show rounding
 WIDEST_BAND, LOG_MARGIN, MARGIN = 2.0, 1.12, 0.05  # of a shared axis: how far bands count, and room at its ends
-LOSS = 100.0  # per cent at which gains far below are cut
-LONGEST_INSIDE = 28  # letters of a name that may stand in a legend inside a panel of many lines
+LOSS = 100.0  # per cent at which much lower gains are cut
+LONGEST_INSIDE = 28  # letters of a name in a legend inside a panel of many lines
 GREEK = {"b": "\\beta", "e": "\\varepsilon"}  # bearing and elevation, as the components' names begin or end
 DEGREES = 180 / np.pi
 FEW_DIGITS = 3  # of an angle that was given in radians
-POWERS = ("manoeuvre_variance",)  # swept keys that are read as powers of ten
+POWERS = ("manoeuvre_variance",)  # swept keys written as powers of ten
 
 
 SIGMA = ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")  # columns of a line of σ against time
@@ -47,7 +47,7 @@ GAIN = ("t_s", "gain_percent", "gain_lo", "gain_hi", "exact_percent")
 
 
 def number(value: object, powers: bool = False) -> str:
-    """A number for people: 0.001 as 10⁻³ (with powers, 0.1 as 10⁻¹), others at four digits; text as it is.
+    """A number for people: 0.001 as 10⁻³ (with powers, 0.1 as 10⁻¹), others at four digits; text unchanged.
 
     A mapping of keys as "key value, key value", numbers of a list one after the other.
     """
@@ -68,7 +68,7 @@ def number(value: object, powers: bool = False) -> str:
 
 
 def in_short(value: object, among: Sequence[object]) -> object:
-    """A mapping by its kind and what sets it apart from others of the kind, as words; any other value as it is."""
+    """A mapping by its kind and its differences from others of the kind, as words; any other value unchanged."""
     if not isinstance(value, Mapping) or "kind" not in value:
         return value
     alike = [one for one in among if isinstance(one, Mapping) and one.get("kind") == value["kind"]]
@@ -77,17 +77,17 @@ def in_short(value: object, among: Sequence[object]) -> object:
 
 
 def literal(name: str) -> str:
-    """Text of a user's for a figure: a dollar is a dollar."""
+    """A user's text for a figure: a dollar is a dollar."""
     return name.replace("$", r"\$")
 
 
 def stem(result: CaseResult) -> str:
-    """The config that a case is of: its name without the swept keys."""
+    """The config of a case: its name without the swept keys."""
     return result.name.split(" ", 1)[0]
 
 
 def device(result: CaseResult) -> str:
-    """What a case's sensor is called: the display name, else the config's stem."""
+    """The name of a case's sensor: the display name, else the config's stem."""
     return literal(result.spec.device) if result.spec.device else stem(result)
 
 
@@ -97,7 +97,7 @@ def swept(result: CaseResult) -> str:
 
 
 def with_its_unit(result: CaseResult, key: str, value: object) -> str:
-    """A value of a key with the key's unit, but for one that would have to stand in brackets."""
+    """A value of a key with the key's unit, except a unit that would need brackets."""
     if isinstance(value, list | tuple):
         return " ".join(filter(None, (number(value), key_label(result, key).unit)))
     if not isinstance(value, int | float) or isinstance(value, bool):
@@ -108,40 +108,40 @@ def with_its_unit(result: CaseResult, key: str, value: object) -> str:
 
 
 def key_label(result: CaseResult, key: str) -> Label:
-    """What people call a key of a case, in the language spoken."""
+    """The name of a key of a case, in the current language."""
     found = label_of(result.spec, key)
     return found._replace(text=tr(found.text), unit=unit_of(found.unit))
 
 
 def unit_of(name: str) -> str:
-    """A unit as people write it, in the language spoken."""
+    """A unit as people write it, in the current language."""
     return tr(wording.unit(name))
 
 
 def is_power(key: str) -> bool:
-    """Whether values of a key are read as powers of ten."""
+    """Whether values of a key are written as powers of ten."""
     return key.rpartition(".")[2] in POWERS
 
 
 def symbol_of(result: CaseResult, key: str) -> str:
-    """A key of a case as a figure names it in short: its letter where it has one (mathematical text), else its name."""
+    """The short name of a key of a case in figures: its letter if it has one (mathematical text), else its name."""
     found = key_label(result, key)
     return mathematical(found.symbol) if found.symbol else found.text
 
 
 def axis_of(result: CaseResult, key: str) -> str:
-    """A key of a case as an axis names it: name, letter, unit; values stand there times `axis_factor`."""
+    """The label of a key's axis: name, letter, unit; values on it are times `axis_factor`."""
     found = key_label(result, key)
     return with_unit(" ".join(filter(None, (found.text, mathematical(found.symbol)))), in_degrees(found.unit)[1])
 
 
 def axis_factor(result: CaseResult, key: str) -> float:
-    """By what the values of a key are multiplied on its axis: angles are given in radians and shown in degrees."""
+    """The factor for a key's values on an axis: angles are given in radians and shown in degrees."""
     return in_degrees(key_label(result, key).unit)[0]
 
 
 def sigma_of(symbol: str, unit: str) -> str:
-    """What an axis of σ of a component is called."""
+    """The label of an axis of σ of a component."""
     return with_unit(tr("$\\sigma$ of {symbol}", symbol=symbol), unit)
 
 
@@ -152,7 +152,7 @@ def mathematical(symbol: str) -> str:
 
 
 def letter(component: str) -> str:
-    """A component of the tables as a figure's axis names it: "vb" as $v_\\beta$; a longer name as it is."""
+    """A component of the tables on a figure's axis: "vb" as $v_\beta$; a longer name unchanged."""
     found = re.fullmatch(r"([vVa]?)([a-z])", component)
     if not found:
         return literal(component)
@@ -161,7 +161,7 @@ def letter(component: str) -> str:
 
 
 def in_degrees(unit: str) -> tuple[float, str]:
-    """The factor by which an angle, or its rate, is shown, and its unit: degrees for radians; others as they are."""
+    """The factor by which an angle, or its rate, is shown, and its unit: degrees for radians; others unchanged."""
     return (DEGREES, unit.replace("rad", "°", 1)) if unit == "rad" or unit.startswith("rad/") else (1.0, unit)
 
 
@@ -186,7 +186,7 @@ def label(result: CaseResult) -> str:
 def line(rows: "pd.DataFrame", columns: Sequence[str], label: str, style: Style | int, name: str = "") -> Line:
     """A line of x and y from two columns of rows; further columns give the ends of its band, and exact values.
 
-    A style that is a number is that of the filter of this number.
+    A numeric style is that of the filter with this number.
     """
     x, y, *more = (rows[column].to_numpy(dtype=float) for column in columns)
     lo, hi = more[:2] or (None, None)
@@ -203,7 +203,7 @@ def line_of(x: np.ndarray, rows: Sequence["pd.Series"], columns: Sequence[str], 
 
 
 def in_legend(drawn: Sequence[Panel]) -> list[Panel]:
-    """Panels of many lines with one legend in a cell of its own, the names taken from the lines."""
+    """Panels of many lines with one legend in a cell of its own, with names from the lines."""
     keys = {mark.label: mark.style for panel in drawn for mark in panel.marks if isinstance(mark, Line) and mark.label}
     blank = [
         replace(
@@ -234,13 +234,13 @@ def plain_label(result: CaseResult) -> str:
 
 
 def at_its_place(result: CaseResult, sentence: str) -> str:
-    """A sentence on a case, after the values that it was swept to where there are several."""
+    """A sentence on a case, preceded by its swept values where there are several."""
     where = plain(swept(result))
     return f"{where}: {sentence}" if where else sentence
 
 
 def reported(results: Sequence[CaseResult], most: int = 3) -> tuple[list[CaseResult], list[str]]:
-    """The cases that an answer tells: all, or of more than so many the first and the last; and words on the others."""
+    """The cases that an answer reports: all, or the first and last of more than so many; and words on the others."""
     if len(results) <= most:
         return list(results), []
     left = plural(
@@ -252,7 +252,7 @@ def reported(results: Sequence[CaseResult], most: int = 3) -> tuple[list[CaseRes
 
 
 def plain(words: str) -> str:
-    """A figure's text without the marks of mathematical text."""
+    """A figure's text without mathematical markup."""
     bare = re.sub(r"_\{([^}]*)\}", r"_\1", words.replace(r"\$", "\0"))
     return bare.replace("$", "").replace("\0", "$")
 
@@ -266,7 +266,8 @@ def families(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
 
 
 def by_panel(results: Sequence[CaseResult], most: float = MOST_LINES) -> dict[str, list[CaseResult]]:
-    """Cases that share a panel, by its title: those of a config, and of several swept keys all but the last alike.
+    """Cases that share a panel, by its title: those of a config; with several swept keys, those alike in all but the
+    last.
 
     Cases of many filters have a panel each where they would make more than so many lines together.
     """
@@ -300,7 +301,7 @@ def spread_out(items: Sequence[Any], most: int) -> list[Any]:
 
 
 def realisations(results: Sequence[CaseResult]) -> str:
-    """How many realisations stand behind a figure: "100,000 to 200,000 realisations" where its cases differ."""
+    """The number of realisations of a figure: "100,000 to 200,000 realisations" where its cases differ."""
     return _of_realisations([result.count for result in results])
 
 
@@ -312,7 +313,7 @@ def _of_realisations(counts: Sequence[int]) -> str:
 
 
 def left_out(every: Sequence[str], some: Sequence[str]) -> str:
-    """Words on what a figure does not show, to follow its caption: how many of how many it does, and which not."""
+    """Words on the omissions of a figure, after its caption: how many of how many it shows, and which are missing."""
     gone = [name for name in every if name not in some]
     if not gone:
         return ""
@@ -321,7 +322,7 @@ def left_out(every: Sequence[str], some: Sequence[str]) -> str:
 
 
 def names_of(results: Sequence[CaseResult]) -> list[str]:
-    """Cases as people call them apart: by swept values, with the device where there are several."""
+    """Distinct names of cases: by swept values, with the device where there are several."""
     several = len(families(results)) > 1
     found = [plain_label(one) if several or not one.swept else plain(swept(one)) for one in results]
     return found if len(set(found)) == len(found) else [one.name for one in results]
@@ -334,7 +335,7 @@ def cases_left_out(every: Sequence[CaseResult], some: Sequence[CaseResult]) -> s
 
 
 def unswept(results: Sequence[CaseResult]) -> list[CaseResult]:
-    """The cases that nothing is swept in, where there are such; else all."""
+    """The cases without swept keys, if any; else all."""
     return [result for result in results if not result.swept] or list(results)
 
 
@@ -344,7 +345,7 @@ def named(experiment: Experiment, figure: str) -> list[str]:
 
 
 def shown(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
-    """The results that a figure shows, of the cases named, at most eight evenly spaced; and words on those left out."""
+    """The results in a figure, of the cases named, at most eight evenly spaced; and words on the others."""
     wanted = [result for result in results if result.name in set(names)]
     some = spread_out(wanted, MOST)
     return some, cases_left_out(wanted, some)
@@ -353,7 +354,7 @@ def shown(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[Cas
 def shown_families(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
     """The results of a figure with a panel for each of `by_panel`: at most twelve panels of at most eight cases.
 
-    Of more, those evenly spaced from the first to the last.
+    If more, evenly spaced ones from the first to the last.
     """
     wanted = [result for result in results if result.name in set(names)]
     groups = spread_out(list(by_panel(wanted).values()), MOST_PANELS)
@@ -362,7 +363,7 @@ def shown_families(results: Sequence[CaseResult], names: Sequence[str]) -> tuple
 
 
 def fitting_axis(label: str, marks: Sequence[Mark]) -> Axis:
-    """An axis of values above zero: logarithmic where the least would else lie on zero."""
+    """An axis of positive values: logarithmic where the least would otherwise lie on zero."""
     values = np.concatenate([np.asarray(mark.y, float) for mark in marks if isinstance(mark, Line)] or [np.ones(1)])
     values = values[np.isfinite(values) & (values > 0)]
     if not values.size or values.max() <= WIDE * values.min():
@@ -372,30 +373,30 @@ def fitting_axis(label: str, marks: Sequence[Mark]) -> Axis:
 
 
 def lost(line: Line) -> Line:
-    """A line of what a share lacks to one."""
+    """A line of the complement of a share."""
     lo, hi, exact = (None if part is None else 1 - part for part in (line.hi, line.lo, line.exact))
     return replace(line, y=1 - line.y, lo=lo, hi=hi, exact=exact)
 
 
 def is_rare(lines: Sequence[Line]) -> bool:
-    """Whether any of some shares is mostly so near to one that its losses are the question, and has losses to show."""
+    """Whether any of some shares is mostly so near one that its losses matter, and has losses to show."""
     return any(float(np.median(line.y)) > 1 - RARE and np.count_nonzero(line.y < 1) > 1 for line in lines)
 
 
 def loss_axis(label: str, lines: Sequence[Line]) -> Axis:
-    """A logarithmic axis of losses, from half the least that was seen: where none was there is no point."""
+    """A logarithmic axis of losses, from half the least non-zero one: zero has no point."""
     values = np.concatenate([line.y for line in lines] or [np.ones(1)])
     return Axis(label, "log", (float(values[values > 0].min(initial=1.0)) / 2, None))
 
 
 def never_lost(lines: Sequence[Line]) -> str:
-    """Words on the lines of losses that have none anywhere, to follow a caption."""
+    """Words on the lines without any losses, after a caption."""
     names = [plain(line.name or line.label) for line in lines if not (line.y > 0).any()]
     return " " + tr("Never lost: {names}.", names=seen.named(names, MOST_GONE)) if names else ""
 
 
 def shared(drawn: Sequence[Panel]) -> list[Panel]:
-    """Panels of lines side by side: of one quantity all have one axis of y, that of them which holds all the others."""
+    """Panels of lines side by side: those of one quantity share the axis of y that holds all."""
     shown = [panel for panel in drawn if panel.marks]
     lines = [mark for panel in shown for mark in panel.marks if isinstance(mark, Line)]
     if len(shown) < 2 or len({panel.y.label for panel in shown}) > 1 or not lines or any(p.y.ticks for p in shown):
@@ -410,7 +411,7 @@ def shared(drawn: Sequence[Panel]) -> list[Panel]:
 
 
 def _holding(lines: Sequence[Line], y: Axis) -> tuple[float, float]:
-    """Limits that hold all lines, and their bands but for what is far beyond them."""
+    """Limits that hold all lines, and their bands except ends far beyond them."""
     values = np.concatenate(
         [np.asarray(part, float) for one in lines for part in (one.y, one.exact) if part is not None]
     )
@@ -449,7 +450,7 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: 
 
 
 def in_columns(figure: Figure) -> Figure:
-    """A figure of as many columns as its panels fill, at one of the widths of a page."""
+    """A figure with as many columns as its panels fill, at one of the widths of a page."""
     count = len([panel for panel in figure.panels if panel.marks])
     alike = tuple(shared(figure.panels))
     one = {(panel.y.label, panel.y.scale, panel.y.limits, panel.y.ticks) for panel in alike if panel.marks}
@@ -467,9 +468,10 @@ def _sigma_panel(title: str, members: Sequence[CaseResult], curves: Mapping, of:
 
 
 def lines_of(members: Sequence[CaseResult], rows: Mapping, component: str, columns: Sequence[str]) -> list[Mark]:
-    """A line for each filter of each case of a panel: named by the filter of a lone case, by the value of a swept one.
+    """A line for each filter of each case of a panel: named by the filter if there is one case, else by the swept
+    value.
 
-    rows by case, filter and component; columns as for `line`. A filter looks the same in every figure of its cases.
+    rows by case, filter and component; columns as for `line`. A filter has the same style in every figure of its cases.
     """
     filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
     marks: list[Mark] = []
@@ -490,7 +492,7 @@ def lines_of(members: Sequence[CaseResult], rows: Mapping, component: str, colum
 
 
 def _shown_value(result: CaseResult, key: str, value: object) -> str:
-    """A value of a key without its unit, as its axis has it."""
+    """A value of a key without its unit, as on its axis."""
     factor = axis_factor(result, key)
     turned = factor != 1.0 and isinstance(value, int | float) and not isinstance(value, bool)
     return wording.number(factor * float(str(value)), FEW_DIGITS) if turned else number(value, is_power(key))
@@ -513,7 +515,7 @@ def nees_panels(results: Sequence[CaseResult], rows: Mapping) -> list[Panel]:
 
 
 def nees_figure(drawn: Sequence[Panel], left_out: str) -> Figure:
-    """The figure `consistency` of such panels; what is left out of them goes into its caption."""
+    """The figure `consistency` of such panels; its caption names the panels left out."""
     caption = tr(
         "Mean of the normalised squared error eᵀP⁻¹e per estimated component, with the filter's own "
         "covariance P: one (dotted) for a consistent filter, more for an optimistic one, less for a "
@@ -526,7 +528,7 @@ def nees_figure(drawn: Sequence[Panel], left_out: str) -> Figure:
 def keyed(panel: Panel, members: Sequence[CaseResult], baseline: bool = True) -> Panel:
     """A panel whose legend explains dashes by filter and colours by swept value; few lines are named at their ends.
 
-    baseline: whether the filter that others are compared with is drawn.
+    baseline: whether to draw the baseline filter.
     """
     if len(members) == 1:
         return panel
@@ -543,13 +545,13 @@ def keyed(panel: Panel, members: Sequence[CaseResult], baseline: bool = True) ->
 
 
 def key_title(result: CaseResult) -> str:
-    """What a legend of values of a case's last swept key is headed: its letter or name, and its unit."""
+    """The title of a legend of the last swept key's values: its letter or name, and its unit."""
     key = result.swept[-1][0]
     return with_unit(symbol_of(result, key), in_degrees(key_label(result, key).unit)[1])
 
 
 def _by_colour(panel: Panel, dashes: tuple, title: str) -> Panel:
-    """A panel of many lines: names not at the lines but in a legend beside it, one of each colour and each dash."""
+    """A panel of many lines: names in a legend beside it, one for each colour and each dash."""
     lines = [mark for mark in panel.marks if isinstance(mark, Line)]
     shades = {line.label: Style(line.style.colour, 0) for line in lines}
     marks = tuple(replace(mark, label="") if isinstance(mark, Line) else mark for mark in panel.marks)
@@ -557,7 +559,7 @@ def _by_colour(panel: Panel, dashes: tuple, title: str) -> Panel:
 
 
 def look(nth_filter: int, nth_case: int, cases: int) -> Style:
-    """Filters differ by dash and marker; cases by shade, and where there is but one, filters by colour too."""
+    """Filters differ by dash and marker; cases by shade; filters of a single case by colour too."""
     colour = nth_filter if cases == 1 else nth_case / (cases - 1)
     return Style(colour, nth_filter, nth_filter)
 
@@ -597,7 +599,7 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, of: Co
                 words = ", ".join(filter(None, (case, literal(f) if several or len(results) == 1 else "")))
                 mark = n if several else i
                 marks.append(line(rows, GAIN, words, Style(i if len(results) > 1 else n, mark, mark), words))
-    # Many long names would cover the lines: they stand beside the panel.
+    # Many long names would cover the lines: the legend is beside the panel.
     long = len(marks) > 3 and any(isinstance(mark, Line) and len(mark.label) > LONGEST_INSIDE for mark in marks)
     panel = Panel(time_axis(), *_cut(y, marks), direct=not long, legend="right" if long else "best")
     width = PAGE_MM if long else COLUMN_MM if len(results) < 3 else WIDE_MM
@@ -606,7 +608,7 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, of: Co
 
 
 def _gains_said(figure: Figure) -> Figure:
-    """A figure of gains with what is to be seen, and that losses are cut, where they are."""
+    """A figure of gains with its first sentence, and a note where losses are cut."""
     if any(panel.y.limits[0] == -LOSS for panel in figure.panels):
         words = tr("Losses of over {loss:g} % lie below the axis: {names}.", loss=LOSS, names=seen.below(figure, -LOSS))
         figure = replace(figure, caption=f"{figure.caption} {words}")
@@ -614,7 +616,7 @@ def _gains_said(figure: Figure) -> Figure:
 
 
 def _cut(y: Axis, lines: Sequence[Mark]) -> tuple[Axis, tuple[Mark, ...]]:
-    """The axis of gains and its marks: losses far beyond all of σ would hide everything else, and are cut."""
+    """The axis of gains and its marks: losses far beyond 100 % would hide everything else, and are cut."""
     values = [mark.y[np.isfinite(mark.y)] for mark in lines if isinstance(mark, Line)]
     least = min((float(found.min()) for found in values if found.size), default=0.0)
     return replace(y, limits=(-LOSS, 100.0)) if least < -2 * LOSS else y, (Reference(0), *lines)
@@ -626,7 +628,7 @@ def per_component(
     components: Iterable[Component],
     experiment: Experiment,
 ) -> dict[str, Figure]:
-    """gain_<component> and sigma_<component> of every component; each of the cases that the config names for it."""
+    """gain_<component> and sigma_<component> of every component; each with the cases that the config names for it."""
     curves, gains = (common.groups(tables[name], "case", "filter", "component") for name in ("curves", "gains"))
     made = {}
     for of in components:
@@ -644,9 +646,9 @@ def per_component(
 
 
 def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: Component) -> Figure | None:
-    """Dynamic error (bias) and fluctuation error (spread) of one component apart, a panel for each case that has both.
+    """Dynamic error (bias) and fluctuation error (spread) of one component, a panel for each case that has both.
 
-    None where no case's bias exceeds its spread anywhere: then σ says it all.
+    None where no case's bias exceeds its spread anywhere: then σ suffices.
     """
     drawn: list[Panel] = []
     for result in results:

@@ -1,12 +1,11 @@
 """How wide the intervals of a quantity are, and how many realisations make them narrow enough.
 
-`--precision` looks at declared numbers of realisations only, 2000·2^m below N and N itself. Were it to look after every
-block, it would stop at the first one at which chance made the intervals narrow, and where that is would depend on the
-machine.
+`--precision` looks at declared numbers of realisations only, 2000·2^m below N and N itself. With a look after every
+block, it would stop where chance made the intervals narrow, and the place would depend on the machine.
 
-An interval of σ is narrow, too, where rare large errors have not come yet. A sample cannot tell what it lacks: to ask
-for narrower intervals, or for one more doubling, mends little. So where errors are not known to be Gaussian there is a
-number of realisations below which no run ends: FLOOR, and FLOOR_OF_TAILS where large errors have come.
+An interval of σ is also narrow where rare large errors have not occurred yet. A sample cannot show what it lacks: a
+narrower target, or one more doubling, helps little. So where errors are not known to be Gaussian, no run ends below a
+minimum of realisations: FLOOR, or FLOOR_OF_TAILS after large errors.
 """
 
 import math
@@ -22,21 +21,21 @@ from radarsim.report.quantities import SIGMA, Quantity
 if TYPE_CHECKING:
     import pandas
 
-Table = Callable[[Sequence[CaseResult]], "pandas.DataFrame"]  # of a study: that which holds the quantity
+Table = Callable[[Sequence[CaseResult]], "pandas.DataFrame"]  # of a study: the table of the quantity
 FIRST = 2000
-FLOOR = 64_000  # of errors of one in 10⁴, all but two samples in 1000 have one
+FLOOR = 64_000  # with errors of probability 10⁻⁴, all but two samples in 1000 have one
 FLOOR_OF_TAILS = 512_000  # of these 51 are expected: the interval then covers 92 %
-TAILED = 3  # realisations an effective one, from which on large errors are seen: κ = 4; of Gaussian errors two
+TAILED = 3  # realisations for each effective one, from which on errors are large: κ = 4; Gaussian ones have two
 EQUAL = 1e-9  # relative difference of widths that is rounding
 MOST = 10**12  # realisations, as in a config
 
 
 @dataclass(frozen=True)
 class Cell:
-    """The 95 % half-width of a quantity, in its `half_width_unit` (infinite where not known), and which one that is.
+    """The 95 % half-width of a quantity, in its `half_width_unit` (infinite where unknown), and the quantity's place.
 
-    component is empty and k zero where the quantity has none. below bounds a rate of events that were never seen.
-    against is the filter that a gain is against, where the case has several such.
+    component is empty and k zero where the quantity has none. below bounds a rate of events that never occurred.
+    against is the filter that a gain refers to, where the case has several baselines.
     """
 
     percent: float
@@ -68,7 +67,7 @@ class Cell:
 
 
 def looks(most: int, first: int = FIRST) -> Iterator[int]:
-    """The numbers of realisations, from `first` on, at which a precision is looked at: of 2000 and more `most` is last.
+    """The numbers of realisations, from `first` on, at which a precision is checked: from 2000 on, ending with `most`.
 
     >>> list(looks(10_000))
     [2000, 4000, 8000, 10000]
@@ -83,9 +82,10 @@ def looks(most: int, first: int = FIRST) -> Iterator[int]:
 
 
 def least(result: CaseResult, curves: Table | None) -> int:
-    """Realisations below which a precision ends no run, unless its N is less; curves None: no tails are to be feared.
+    """Realisations below which a precision ends no run, unless its N is less; curves None: there are no tails to
+    expect.
 
-    Large errors are seen where the effective realisations of any σ are under a third of all.
+    Large errors have occurred where the effective realisations of any σ are under a third of all.
     """
     if curves is None:
         return FIRST
@@ -96,7 +96,7 @@ def least(result: CaseResult, curves: Table | None) -> int:
 def worst(result: CaseResult, table: Table, of: Quantity = SIGMA) -> Cell | None:
     """The quantity of a case with the widest interval; None where the case has none.
 
-    Where the case draws rare events of one filter, only its rate of them counts: others are left as rare as they are.
+    Where the case samples rare events of one filter, only its rate of them counts: other events stay rare.
     """
     made = table([result])
     aimed_at = getattr(getattr(result.spec, "rare", None), "aimed_at", None)
@@ -128,9 +128,10 @@ def needed(
     most: int = MOST,
     curves: Table | None = None,
 ) -> int | None:
-    """At which look a run of at most `most` likely ends, or of how many more it would; None if beyond all bounds.
+    """The look at which a run of at most `most` likely ends, or the larger number that it would need; None if
+    unattainable.
 
-    From the sums of a pilot, taken as those of more realisations, in proportion. curves as of `least`.
+    From the sums of a pilot, scaled to more realisations. curves as of `least`.
     """
     cell = worst(result, table, of)
     if cell is None:
@@ -138,7 +139,7 @@ def needed(
     if not math.isfinite(cell.percent):
         return None
     for n in sorted({*looks(MOST), most}):
-        # Half-widths go with 1/√n: what is far from enough need not be looked at.
+        # Half-widths go with 1/√n: looks far from enough are skipped.
         if cell.percent * math.sqrt(result.count / n) >= 2 * percent:
             continue
         whole = grown(result, n)
@@ -149,13 +150,13 @@ def needed(
 
 
 def grown(result: CaseResult, n: int) -> CaseResult:
-    """A case with its sums in proportion to n realisations."""
+    """A case with its sums scaled to n realisations."""
     sums = {name: sums * (n / result.count) for name, sums in result.sums.items()}
     return replace(result, count=n, sums=sums, against=tuple(grown(one, n) for one in result.against))
 
 
 def gaussian(result: CaseResult) -> CaseResult:
-    """A case with the expected sums of its errors in place of the drawn ones: Gaussian, of the exact bias and σ.
+    """A case with the expected sums of Gaussian errors, of the exact bias and σ, in place of the sampled ones.
 
     For linear filters under Gaussian noise, where the exact values are σ and bias themselves.
     """

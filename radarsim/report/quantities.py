@@ -1,8 +1,8 @@
-"""What a study measures: the components of its errors, and each quantity of them, declared once.
+"""The quantities of a study: the components of its errors, and each quantity of them, declared once.
 
-From a declaration follow the options of `radarsim solve`, what `--of` takes in `run --precision` and in `sensitivity`,
-what `compare` puts side by side, their words, units and axes. `Study.quantities` gives those of a study. Declared here
-are those that several studies measure.
+The options of `radarsim solve`, the values of `--of` in `run --precision` and in `sensitivity`, the quantities in
+`compare`, their words, units and axes all follow from a declaration. `Study.quantities` gives those of a study.
+Declared here are those of several studies.
 """
 
 import re
@@ -25,7 +25,7 @@ TAKEN = frozenset(f"--{name}" for name in (*OTHERS, "realisations", "seed", "set
 
 
 class Component(NamedTuple):
-    """A component of the errors: its name in tables, its unit, its letter (mathematical text), what it is called."""
+    """A component of the errors: its name in tables, its unit, its letter (mathematical text), its name in words."""
 
     name: str
     unit: str
@@ -44,20 +44,20 @@ RADIAL = (
 class Quantity:
     """A number that a table of a study holds for each filter, with its 95 % interval or exactly.
 
-    name: what options call it, `false_tracks` is `--false-tracks`. words: what sentences call it, a `term`. table: the
+    name: that of its option, `false_tracks` is `--false-tracks`. words: its name in sentences, a `term`. table: the
     stem of its file. column: that of its value, `x|y` where the ends of the interval are `y_lo` and `y_hi`, else they
     are `x_lo` and `x_hi`; in a table without these it is known exactly. exact: the column of exact values, by default
-    `exact_x`; a table need not have it. per: the column that tells several values of one filter apart (`component`,
+    `exact_x`; a table need not have it. per: the column that distinguishes several values of one filter (`component`,
     `model`), empty where each filter has one.
 
     kind: a `size` is positive, its changes and its precision are in per cent of it; a `share` lies from 0 to 1, is
-    shown in per cent and changes by points, its precision is in per cent of it; a `signed` one changes, and is known,
-    by its own unit. unit: the column's; by default that of the component. axis: what an axis calls it, with `{symbol}`
-    for the component's letter; by default its words and that.
+    shown in per cent and changes by points, its precision is in per cent of it; a `signed` one has changes and
+    precision in its own unit. unit: the column's; by default that of the component. axis: its axis label, with
+    `{symbol}` for the component's letter; by default its words and that.
 
     last: its precision is that at the last scan or window of each filter. squares: it is made of squared errors, which
-    rare large ones decide. paired: it is a change of σ in per cent of that of another filter, which has none itself.
-    rest: it is what the column leaves of 1.
+    rare large ones dominate. paired: it is a change of σ in per cent of that of another filter, which has none itself.
+    rest: it is 1 minus the column.
     """
 
     name: str
@@ -76,7 +76,7 @@ class Quantity:
     rest: bool = False
 
     def __post_init__(self) -> None:
-        """Raises ConfigError for a name that no option can have."""
+        """Raises ConfigError for a name that is impossible as an option."""
         if not re.fullmatch("[a-z][a-z0-9_]*", self.name):
             raise ConfigError(f"quantity {self.name!r}: its name must be of small letters, digits and _")
         if self.option in TAKEN:
@@ -105,17 +105,17 @@ class Quantity:
 
     @property
     def scale(self) -> float:
-        """By what the column's numbers are multiplied for people."""
+        """The factor of the column's numbers in text for people."""
         return 100.0 if self.kind == "share" else 1.0
 
     @property
     def half_width_unit(self) -> str:
-        """What half the width of its interval is counted in for a precision."""
+        """The unit of half the width of its interval in a precision."""
         return "%" if self.kind != "signed" else "points" if self.unit == "%" else self.unit
 
     @property
     def changed_unit(self) -> str:
-        """What its changes are counted in."""
+        """The unit of its changes."""
         return "%" if self.kind == "size" else "points" if self.shown_unit() == "%" else self.unit
 
     @property
@@ -125,19 +125,19 @@ class Quantity:
         return f"{self.name}_change{word}", f"{self.name}_change_lo", f"{self.name}_change_hi"
 
     def shown_unit(self, of_component: str = "") -> str:
-        """The unit in which people read it, of a component with a unit."""
+        """The unit in text for people, for a component with a unit."""
         return "%" if self.kind == "share" else self.unit or of_component
 
     def place(self, part: str, say: Callable[[str], str] = str) -> str:
-        """One of several values of a filter as sentences have it: `r`, `model 2`."""
+        """One of several values of a filter in sentences: `r`, `model 2`."""
         return part if self.per == "component" or not part else f"{say(self.per)} {part}"
 
     def complement(self, name: str, words: str) -> "Quantity":
-        """What a share leaves of 1."""
+        """1 minus a share."""
         return replace(self, name=name, words=words, more_is_better=not self.more_is_better, rest=not self.rest)
 
     def read(self, rows: "pd.DataFrame") -> "tuple[Estimate, np.ndarray]":
-        """Values with their intervals, and exact values (rows,) or not-a-number, of rows of its table.
+        """Values with their intervals, and exact values (rows,) or NaN, from rows of its table.
 
         Raises ConfigError where that lacks a column.
         """

@@ -1,8 +1,8 @@
-"""Rare events by importance sampling: the table `rare`, with notes where the weights do not bear what it says.
+"""Rare events by importance sampling: the table `rare`, with notes where the weights do not support its numbers.
 
 Realisations are drawn from a law under which the event is frequent, and each counts with its weight w, the ratio of the
 laws: the mean of w over those with the event is its probability, whatever the law (docs/rare.md). A share of them is
-drawn from the law itself, so that no weight is over one divided by it.
+drawn from the original law, so that no weight exceeds one divided by that share.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,7 +30,7 @@ ERRORS = 4.0  # standard errors of the mean weight beyond which it is not one; o
 
 
 class Drawn(NamedTuple):
-    """How realisations were drawn: all of them, how many from the law itself, Σw and Σw²; numbers, or one a row."""
+    """How realisations were drawn: all, how many from the original law, Σw and Σw²; numbers, or one for each row."""
 
     n: int
     plain: float | np.ndarray
@@ -39,7 +39,7 @@ class Drawn(NamedTuple):
 
 
 class Counted(NamedTuple):
-    """Of an event the realisations that have it: Σw, Σw², their number and Σw⁴, arrays of one shape."""
+    """The realisations with an event: Σw, Σw², their number and Σw⁴, arrays of one shape."""
 
     weight: np.ndarray
     squared: np.ndarray
@@ -53,25 +53,13 @@ def rate(of: Counted, drawn: Drawn) -> statistics.Estimate:
 
 
 def complement(of: statistics.Estimate) -> statistics.Estimate:
-    """One less a probability."""
+    """One minus a probability."""
     return statistics.Estimate(1 - of.value, 1 - of.hi, 1 - of.lo)
 
 
 def rows(labels: Mapping[str, Any], event: str, sought: np.ndarray, of: Counted, drawn: Drawn) -> dict[str, Any]:
-    """How probable rare events are, with the key `rare`: by the weights of realisations that are drawn for them.
-
-    From labels (case, filter, k, t_s) of n rows and sought (n,). The interval is known from Σw², and that by
-    (Σw²)²/Σw⁴ realisations: where few weigh most, larger weights may be missing, and the rate and its interval are too
-    small together, and a `note` stands there. docs/rare.md has more.
-
-    event: in words
-    sought: whether realisations are drawn for it
-    rate ±: its probability
-    events: number of realisations that have it; `n_eff` effective ones
-    variance_factor: how many times more plain realisations would know the probability as well
-    plain: number of the n that are drawn as they are
-    mean_weight, mean_weight_se: mean of all weights, which must be one, and its standard error
-    """
+    """How probable rare events are, with the key `rare`: by the weights of realisations that are drawn for them. =>
+    Probabilities of rare events, with the key `rare`: from the weights of realisations drawn for them."""
     estimate, size = rate(of, drawn), len(sought)
     variance = of.squared / drawn.n - estimate.value**2
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -96,10 +84,11 @@ def rows(labels: Mapping[str, Any], event: str, sought: np.ndarray, of: Counted,
 
 
 def note(drawn: Drawn, *events: Counted) -> np.ndarray:
-    """What is to be said (rows,) of rows with the rates of these events: of the first of which there is something.
+    """The notes (rows,) on rows with the rates of these events: for the first event that has one.
 
-    Any row of any table with weighted rates has one: shifts lead to the last scan alone, so that few weights, of any
-    size, stand behind others. Where an event is common, those that do not have it are counted too.
+    Every row of every table with weighted rates may have one: shifts lead to the last scan alone, so that at other
+    scans few weights, of any size, are behind a rate. Where an event is common, realisations without it are counted
+    too.
     """
     said = np.full(events[0].weight.shape, "", dtype=object)
     for of in events:
@@ -112,10 +101,10 @@ def note(drawn: Drawn, *events: Counted) -> np.ndarray:
 
 
 def _weighing(of: Counted) -> np.ndarray:
-    """How many of the events have weights of the size that Σw² is made of, by the spread of them all: n_eff²/number.
+    """How many of the events have weights of the size that dominates Σw², by the spread of all weights: n_eff²/number.
 
-    Of logarithms of spread τ, Gaussian, w² has its mass 2τ above the middle: where e^{−2τ²} of the events are, and
-    n_eff/number is e^{−τ²}. A sample that lacks the heavy ones shows the spread of the others still.
+    For Gaussian logarithms of spread τ, w² has its mass 2τ above the middle: there are e^{−2τ²} of the events, and
+    n_eff/number is e^{−τ²}. A sample that lacks the heavy ones still shows the spread of the others.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         found = statistics.effective_events(of.weight, of.squared) ** 2 / of.number
@@ -131,7 +120,7 @@ def table(parts: "Sequence[dict[str, Any]]") -> "pd.DataFrame | None":
 
 
 def told(row: "pd.Series") -> dict[str, Any]:
-    """What a sentence tells of a row of rare.csv: rate with interval, number of events, and effective ones."""
+    """A row of rare.csv in words: rate with interval, number of events, and effective ones."""
     return {
         "rate": row["rate"],
         "low": row["rate_lo"],
@@ -142,12 +131,12 @@ def told(row: "pd.Series") -> dict[str, Any]:
 
 
 def unaimed(event: str, how: str) -> str:
-    """The name of an event that no shift leads to, part of one that is sought: `how` it comes about."""
+    """The name of an event without a shift of its own, part of a sampled one: `how` it comes about."""
     return f"{event} {how}"
 
 
 def warnings(made: "pd.DataFrame | None") -> list[str]:
-    """Where weights have not the mean that they must have, which makes every rate wrong: a line of the worst case."""
+    """A line on the worst case whose weights have a wrong mean, which makes every rate wrong."""
     if made is None or not len(rows := made[made["n"] >= statistics.FEW]):
         return []
     off = (rows["mean_weight"] - 1).abs() - ERRORS * rows["mean_weight_se"]
@@ -166,7 +155,7 @@ def warnings(made: "pd.DataFrame | None") -> list[str]:
 
 
 def _unaimed(made: "pd.DataFrame") -> np.ndarray:
-    """The rows (rows,) sought of which a part that no shift leads to has much of what is known, Σw² = (Σw)²/n_eff."""
+    """The sampled rows (rows,) where events without a shift of their own dominate Σw² = (Σw)²/n_eff."""
     sought, squared = made["sought"].astype(bool), made["rate"] ** 2 / made["n_eff"].clip(lower=1.0)
     parts = ~sought & made["event"].str.startswith(tuple(unaimed(one, "") for one in made["event"][sought].unique()))
     of_parts = squared.where(parts, 0.0).groupby([made[name] for name in ("case", "filter", "k")]).transform("max")

@@ -1,7 +1,7 @@
-"""What is to be seen in a figure, in a sentence with which its caption begins; and what its crosses are.
+"""The first sentence of a figure's caption, from its content; and the meaning of its crosses.
 
-Read off the marks that are drawn, of every named line and every panel. Lines whose intervals overlap are told together;
-of a line whose interval rests on too little "about" is said.
+Read from the drawn marks, of every named line and every panel. Lines with overlapping intervals share a sentence; a
+line whose interval has too little behind it is "about".
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -16,12 +16,12 @@ from radarsim.report.drawing import Figure, Heat, Line, Panel
 from radarsim.report.wording import spoken
 
 DIGITS = 3
-MOST_PANELS = 4  # told by their titles; of more it is counted
-MOST_NAMES = 3  # told of those that share a place
+MOST_PANELS = 4  # named by their titles; of more, the number is given
+MOST_NAMES = 3  # named of those that share a place
 
 
 class Seen(NamedTuple):
-    """A line as it is told: its name and its panel's title, its points (n,), and the interval of the last."""
+    """A line for a sentence: its name and its panel's title, its points (n,), and the interval of the last."""
 
     name: str
     panel: str
@@ -36,7 +36,7 @@ class Seen(NamedTuple):
 
     @property
     def rough(self) -> bool:
-        """Whether its interval at the end is not known."""
+        """Whether its last interval is unknown."""
         return bool(np.isnan(self.lo) or np.isnan(self.hi))
 
     @property
@@ -46,24 +46,24 @@ class Seen(NamedTuple):
 
 
 def begun(figure: Figure, sentence: str) -> Figure:
-    """The figure whose caption begins with a sentence, where there is one."""
+    """The figure with a sentence at the beginning of its caption, if there is one."""
     return replace(figure, caption=f"{sentence} {figure.caption}") if sentence else figure
 
 
 def all_begun(
     drawn: Mapping[str, Figure | None], by: Mapping[str, Callable[[Figure], str]]
 ) -> dict[str, Figure | None]:
-    """Figures by name, each that `by` names with the sentence of its function; the others as they are."""
+    """Figures by name, those in `by` with the sentence of their function; the others unchanged."""
     return {name: begun(one, by[name](one)) if one and name in by else one for name, one in drawn.items()}
 
 
 def numbered(figure: Figure, number: str) -> Figure:
-    """The figure whose caption says which of the paper's it is."""
+    """The figure with the paper's number of it in its caption."""
     return replace(figure, caption=f"{figure.caption} {tr('Figure {number} of the paper.', number=number)}")
 
 
 def crossed(figure: Figure) -> Figure:
-    """The figure whose caption says what its crosses are, where it has any."""
+    """The figure with the meaning of its crosses, if any, in its caption."""
     called = [panel.crosses or tr("exact values") for panel in figure.panels if _has_crosses(panel)]
     if not called:
         return figure
@@ -72,7 +72,7 @@ def crossed(figure: Figure) -> Figure:
 
 
 class Way(NamedTuple):
-    """The sentences on which lines end lowest, or highest; sign is 1 or −1."""
+    """The sentences on lines that end lowest, or highest; sign is 1 or −1."""
 
     sign: int
     one: str
@@ -95,9 +95,10 @@ HIGHEST = Way(
 
 
 def at_the_end(figure: Figure, way: Way = LOWEST) -> str:
-    """Which lines end lowest and highest of all that are drawn; of several panels the lowest of each, or the highest.
+    """Which lines end lowest and highest of all; for several panels the lowest of each, or the highest.
 
-    A panel of a single line says nothing by itself: of those alone, and of several quantities, the extremes are told.
+    A panel of a single line has nothing to compare: for such panels, and for several quantities, the extremes are
+    given.
     """
     drawn = [lines for panel in _drawn(figure) if (lines := _lines(panel))]
     if len({panel.y.label for panel in _drawn(figure)}) > 1 or not any(len(lines) > 1 for lines in drawn):
@@ -122,7 +123,7 @@ def at_the_end(figure: Figure, way: Way = LOWEST) -> str:
 
 
 def highest_at_the_end(figure: Figure) -> str:
-    """`at_the_end` where more is better, or what adds up to one: the highest first."""
+    """`at_the_end` where more is better, or for shares that add up to one: the highest first."""
     return at_the_end(figure, HIGHEST)
 
 
@@ -130,7 +131,7 @@ OF_ALL = term("Of all panels lowest {low} ({lowest}), highest {high} ({highest})
 
 
 def _by_panel(found: Sequence[str], titles: Sequence[str]) -> str:
-    """The names that come first in each panel: by the panels' titles, of more panels how often."""
+    """The first names in each panel: by the panels' titles, or, with many panels, how often."""
     by_names = {names: [title for own, title in zip(found, titles, strict=True) if own == names] for names in found}
     if len(found) <= MOST_PANELS and all(titles):
         return "; ".join(f"{named(of)}: {names}" for names, of in by_names.items())
@@ -142,7 +143,7 @@ def _by_panel(found: Sequence[str], titles: Sequence[str]) -> str:
 
 
 def most(figure: Figure) -> str:
-    """The highest point of all lines, %, which line's and when, and where that line ends."""
+    """The highest point of all lines, %, its line and time, and where that line ends."""
     lines = [line for panel in _drawn(figure) for line in _lines(panel)]
     if not lines:
         return ""
@@ -160,13 +161,13 @@ def most(figure: Figure) -> str:
 
 
 def below(figure: Figure, least: float) -> str:
-    """The lines that go below a value somewhere, by their names."""
+    """The lines that go below a value anywhere, by their names."""
     lines = [line for panel in _drawn(figure) for line in _lines(panel) if line.y.min() < least]
     return _names(lines, len(_drawn(figure)) > 1)
 
 
 def extremes(figure: Figure) -> str:
-    """The highest and the lowest point of all named lines and maps, whose they are, of every quantity that is drawn."""
+    """The highest and the lowest point of all named lines and maps, with their names, for every quantity drawn."""
     found: dict[str, list[Seen]] = {}
     for panel in _drawn(figure):
         for label, line in _shown(panel):
@@ -188,19 +189,19 @@ def _extremes(quantity: str, unit: str, lines: Sequence[Seen], several: bool) ->
 
 
 def _unit(label: str) -> str:
-    """The unit at the end of an axis' label, or nothing: what follows a comma in brackets is none."""
+    """The unit at the end of an axis' label, or nothing: after a comma in brackets there is none."""
     _, comma, tail = label.rpartition(", ")
     return tail if comma and tail.count("(") == tail.count(")") else ""
 
 
 def _quantity(figure: Figure, label: str) -> str:
-    """What an axis shows, without its unit, as a sentence begins; of an axis without a label the figure's title."""
+    """The quantity on an axis, without unit, as a sentence begins; for an axis without label the figure's title."""
     words = spoken(label.removesuffix(f", {_unit(label)}") or figure.title)
     return words if "α" <= words[:1] <= "ω" else words[:1].upper() + words[1:]
 
 
 def reading_at(x: float) -> Callable[[Figure], str]:
-    """A function that tells which line is highest and which lowest at a place of the axis, of those that reach it."""
+    """A function that gives the highest and the lowest line at a place of the axis, of those that reach it."""
 
     def told(figure: Figure) -> str:
         every = [line for panel in _drawn(figure) for line in _lines(panel)]
@@ -227,12 +228,12 @@ def _has_crosses(panel: Panel) -> bool:
 
 
 def _drawn(figure: Figure) -> list[Panel]:
-    """The panels that show something with a name."""
+    """The panels with named marks."""
     return [panel for panel in figure.panels if _shown(panel)]
 
 
 def _shown(panel: Panel) -> list[tuple[str, Seen]]:
-    """The lines and the maps of a panel, each with the label of what it shows."""
+    """The lines and the maps of a panel, each with the label of its quantity."""
     maps = [mark for mark in panel.marks if isinstance(mark, Heat) and np.isfinite(mark.values).any()]
     title = _title(panel)
     heats = [(m.label, Seen("", title, np.zeros(0), m.values[np.isfinite(m.values)], np.nan, np.nan)) for m in maps]
@@ -240,7 +241,7 @@ def _shown(panel: Panel) -> list[tuple[str, Seen]]:
 
 
 def _lines(panel: Panel) -> list[Seen]:
-    """The lines of a panel that have a name and a point, by the points that are known."""
+    """The lines of a panel that have a name and a point, by their known points."""
     lines = [mark for mark in panel.marks if isinstance(mark, Line) and _name(mark)]
     return [_line(line, _title(panel)) for line in lines if np.isfinite(line.y).any()]
 
@@ -264,7 +265,7 @@ def _level(lines: Sequence[Seen]) -> bool:
 def _foremost(lines: Sequence[Seen], sign: int, ranked: bool = False) -> list[Seen]:
     """The line that ends lowest (sign 1) or highest (−1), and those whose intervals overlap its own.
 
-    As they are drawn, so that a set has one order; by their ends where asked for, and where not all will be named.
+    In drawing order, for a stable sentence; by their ends if requested, and where not all will be named.
     """
     low, high = min(lines, key=lambda line: sign * line.last).ends
     found = [line for line in lines if line.ends[0] <= high and low <= line.ends[1]]
@@ -278,7 +279,7 @@ def _names(lines: Sequence[Seen], several: bool = False) -> str:
 
 
 def named(names: Iterable[str], most: int = MOST_NAMES) -> str:
-    """Names in a sentence, each once, of many the first."""
+    """Names in a sentence, each once; of many the first."""
     return few(list(dict.fromkeys(names)), most)
 
 
@@ -287,7 +288,7 @@ def _name(line: Line) -> str:
 
 
 def _ending(lines: Sequence[Seen], sign: int, unit: str) -> str:
-    """The lowest (sign 1) or highest (−1) last value of lines, "about" it where its interval is not known."""
+    """The lowest (sign 1) or highest (−1) last value of lines, "about" it where its interval is unknown."""
     line = min(lines, key=lambda one: sign * one.last)
     return tr("about {value}", value=_valued(line.last, unit)) if line.rough else _valued(line.last, unit)
 

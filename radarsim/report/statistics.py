@@ -1,7 +1,7 @@
 """Numbers with their 95 % intervals, from sums alone. NumPy only; every function takes arrays of any shape.
 
-The intervals treat what is estimated as a mean of independent realisations and nothing as Gaussian: the spread of
-e² comes from the fourth moment. tests/report and tests/trust simulate the coverage; docs/trust.md gives it.
+The intervals are those of a mean of independent realisations and assume nothing Gaussian: the spread of e² comes from
+the fourth moment. tests/report and tests/trust simulate the coverage; docs/trust.md gives it.
 """
 
 from statistics import NormalDist
@@ -54,7 +54,7 @@ def student(freedom: Values) -> Values:
 
 
 def _per_one(sums: Values, n: Values) -> Values:
-    """sums / n, not-a-number where n is 0."""
+    """sums / n, NaN where n is 0."""
     n = np.asarray(n, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(n > 0, sums / n, np.nan)
@@ -92,8 +92,8 @@ def _root(m2: Values, relative: Values, n: Values, looks: Values = 1) -> Estimat
 def effective(square: Values, fourth: Values, n: Values) -> Values:
     """How many realisations of n stand behind a σ: n/(κ − 1), κ = m₄/m₂² from Σe² and Σe⁴; half of n for Gaussian e.
 
-    Twice the degrees of freedom of the chi-square variable that `root_mean_square` takes the mean of e² for; infinite
-    where all e² are equal within rounding, not-a-number where there is none.
+    Twice the degrees of freedom of the chi-square variable of `root_mean_square`; infinite where all e² are equal
+    within rounding, NaN where there is none.
     """
     m2, m4 = _per_one(square, n), _per_one(fourth, n)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -105,9 +105,10 @@ TOGETHER = 0.0027  # chance of a number beyond three standard errors
 
 
 def furthest(looks: Values) -> float:
-    """By how many standard errors the furthest of so many differences lies in 0.27 % of right programs at most.
+    """A bound on the largest of so many differences, in standard errors, that correct programs exceed in 0.27 % of
+    runs.
 
-    Of one difference by 3; of several by Bonferroni, however dependent they are.
+    For one difference 3; for several by Bonferroni, however dependent they are.
     """
     return NormalDist().inv_cdf(1 - TOGETHER / 2 / max(int(looks), 1))
 
@@ -116,13 +117,12 @@ ERROR_OF_PROGRAM = 5.85  # standard errors between a measured and an exact value
 
 
 def standard_errors(of: Estimate, exact: Values) -> Values:
-    """By how many of its standard errors a measured value lies off the exact one, from its 95 % interval; 0 or more.
+    """Distance of a measured value from the exact one in its standard errors, from its 95 % interval; 0 or more.
 
     Towards the wider side of the interval the variance is taken to grow in proportion to the distance, as it does where
-    the interval is Wilson's or that of a rate: what is left is then the score of the exact value. Towards the narrower
-    side it stays what it is at the value. A statistic so made strays no further than a Gaussian number: of rates
-    however rare, and of σ from 200 realisations on. Infinite where a value without width is off, not-a-number where
-    either is not known.
+    the interval is Wilson's or that of a rate: the result is then the score of the exact value. Towards the narrower
+    side it stays what it is at the value. This statistic has no heavier tails than a Gaussian number: of rates however
+    rare, and of σ from 200 realisations on. Infinite where a value without width is off, NaN where either is unknown.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         off = np.subtract(exact, of.value)
@@ -168,7 +168,7 @@ def mean_square(total: Values, square: Values, n: Values, looks: Values = 1) -> 
 
 
 def quantile(looks: Values) -> Values:
-    """The normal quantile with which all of so many intervals or bounds hold in 95 % of runs, however dependent.
+    """The normal quantile at which all of so many intervals or bounds hold in 95 % of runs, however dependent.
 
     Bonferroni: the 5 % are shared among them.
     """
@@ -176,7 +176,7 @@ def quantile(looks: Values) -> Values:
 
 
 def normalised_bounds(freedom: Values, looks: Values = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of the mean normalised error squared (NEES, NIS per component) of a filter that is right about itself.
+    """Bounds of the mean normalised error squared (NEES, NIS per component) of a consistent filter.
 
     freedom is realisations × components, of which the sum is chi-square; its quantiles are Wilson and Hilferty's. In
     95 % of runs all of the `looks` at such means lie within.
@@ -203,7 +203,7 @@ def gain(
         # (n + 2)/(n − 1)/n makes m₄/m₂² − 1 of a Gaussian sample the variance of its mean square over m₂².
         variance = np.maximum(variance, 0) * ((n + 2) / np.maximum(n - 1, 0) / n)
         ratio = np.sqrt(a / b)
-        # One realisation tells nothing of its spread: the interval is all there can be.
+        # One realisation shows no spread: the interval is unbounded.
         step = np.where(n > 1, 0.5 * student(n - 1) * np.sqrt(variance), np.inf)
     with np.errstate(over="ignore"):  # of two realisations
         factor = np.exp(step)
@@ -238,8 +238,8 @@ def weighted_rate(total: Values, square: Values, n: Values, plain: Values) -> Es
     """Share of realisations in which something happens, from some that another law drew, with weights w.
 
     total and square are Σw and Σw² over those of n in which it happened. Wilson's interval at the number of yes-or-no
-    trials that would tell as much, p(1 − p) over the variance of the mean. `plain` of the n were drawn from the law
-    itself: where nothing happened, they alone say how rare it is.
+    trials with as much information, p(1 − p) over the variance of the mean. `plain` of the n were drawn from the law
+    itself: where nothing happened, only they bound the rate.
     """
     n, plain = np.asarray(n, dtype=float), np.asarray(plain, dtype=float)
     p = np.clip(_per_one(total, n), 0, 1)
@@ -250,7 +250,7 @@ def weighted_rate(total: Values, square: Values, n: Values, plain: Values) -> Es
 
 
 def effective_events(total: Values, square: Values) -> Values:
-    """How many events of equal weight stand behind a weighted share: (Σw)²/Σw² over the events, 0 of none (Kish)."""
+    """How many events of equal weight a weighted share corresponds to: (Σw)²/Σw² over the events, 0 of none (Kish)."""
     total, square = np.asarray(total, dtype=float), np.asarray(square, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(square > 0, total**2 / square, 0.0)
@@ -264,8 +264,8 @@ def rate(count: Values, n: Values) -> Estimate:
 def difference(a: Estimate, b: Estimate, correlation: Values = 0.0) -> Estimate:
     """a − b of estimates: the half-widths add in squares, each end with the ends that make it.
 
-    Less twice their product times the correlation of the two, which is 0 of independent ones. Not-a-number where
-    infinite ones (a filter that never settles) leave nothing to be said. (Zou, Psychological Methods 12, 2007, 399.)
+    Less twice their product times the correlation of the two, which is 0 of independent ones. NaN where infinite ones
+    (a filter that never settles) leave it undefined. (Zou, Psychological Methods 12, 2007, 399.)
     """
 
     def joined(one: Values, other: Values) -> Values:

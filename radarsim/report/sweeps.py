@@ -1,4 +1,4 @@
-"""What a sweep shows by itself: σ at the last scan against one swept key, or over two as a map, whatever the study."""
+"""Figures of a sweep, for every study: σ at the last scan against one swept key, or over two as a map."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from radarsim.language import tr
 from radarsim.report import panels, seen, wording
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Style
 
-WIDE = 20  # largest over least swept value from which the axis is logarithmic
+WIDE = 20  # ratio of swept values from which the axis is logarithmic
 VALUES = ("m", "rad")  # units of what is measured itself, not of its rates
 MOST_PANELS = 6
 BROAD = 12  # letters of a name at an axis, from which it is broken between words
@@ -53,13 +53,13 @@ def families(results: Sequence[CaseResult]) -> dict[tuple[str, tuple[str, ...]],
 
 
 def components(result: CaseResult) -> list[tuple[str, str]]:
-    """The components shown: what is measured; of a single one, its rates too."""
+    """The components shown: the measured ones; for a single one, its rates too."""
     values = [(name, unit) for name, unit in result.axes.components if unit in VALUES]
     return (values if len(values) > 1 else list(result.axes.components))[:MOST_PANELS]
 
 
 def places(result: CaseResult, key: str, values: Sequence) -> tuple[np.ndarray, Axis]:
-    """Where values of a key that is swept stand on an axis: numbers where they are, anything else one after the other.
+    """Places of a swept key's values on an axis: numbers themselves, anything else one after the other.
 
     result is one of the swept cases.
     """
@@ -74,7 +74,7 @@ def places(result: CaseResult, key: str, values: Sequence) -> tuple[np.ndarray, 
 
 
 def last(result: CaseResult, filter_name: str, component: str, curves: Mapping) -> tuple[float, ...]:
-    """σ at the last scan with its interval and exact value; not-a-number where the filter has none."""
+    """σ at the last scan with its interval and exact value; NaN where the filter has none."""
     rows = curves.get((result.name, filter_name, component))
     if rows is None or not len(rows):
         return (np.nan,) * 4
@@ -113,7 +113,7 @@ APART = 0.12  # between the points of filters beside each other, values being on
 def _line_panel(
     key: str, members: Sequence[CaseResult], component: tuple[str, str], curves: Mapping, title: str = ""
 ) -> Panel:
-    """Lines over numbers; over anything else points, from the least leading σ of the first filter to its largest."""
+    """Lines over numbers; over anything else points, ordered by the leading σ of the first filter."""
     filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
     factor, unit = panels.in_degrees(component[1])
     x, axis = places(members[0], key, [dict(result.swept)[key] for result in members])

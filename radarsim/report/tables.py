@@ -63,7 +63,7 @@ def spread(columns: Columns) -> dict[str, Any]:
 
 
 def stacked(parts: Sequence[Columns]) -> dict[str, Any]:
-    """Columns of several parts of one case, set one below the other."""
+    """Columns of several parts of one case, concatenated."""
     every = [spread(part) for part in parts]
     return {name: np.concatenate([part[name] for part in every]) for name in every[0]} if every else {}
 
@@ -77,22 +77,22 @@ def of_rows(rows: Sequence[Columns]) -> dict[str, np.ndarray]:
 class Tables:
     """The tables of a study, declared by functions that make the columns of one case, or the whole table of all cases.
 
-    Their docstrings are the reference page: what a row is, then a paragraph of columns, a line each, of those that the
-    functions below and those of `notes` and `rare` do not declare already. `name: meaning`; `name ± stem: meaning` of
-    an estimate, whose ends are `stem_lo` and `stem_hi`, without stem those of the name; several names before one
-    meaning are parted by commas, a unit that the name does not end in stands in brackets before the colon, `[unit]` is
-    that of the column `unit`; further lines are indented. Of `exact_NAME` nothing need be said.
+    Their docstrings are the reference page: what a row is, then a paragraph of columns, a line each, except those
+    declared by the functions below and those of `notes` and `rare`. `name: meaning`; `name ± stem: meaning` of an
+    estimate, whose ends are `stem_lo` and `stem_hi`, without stem those of the name; several names before one meaning
+    are parted by commas, a unit that the name does not end in stands in brackets before the colon, `[unit]` is that of
+    the column `unit`; further lines are indented. `exact_NAME` needs no line.
     """
 
     def __init__(self) -> None:
         self.declared: dict[str, tuple[Callable[[Any], Any], Callable[[Any], bool] | None]] = {}
 
     def __call__(self, name: str, of: Callable[[Any], bool] = lambda result: True) -> Callable[[Maker], Maker]:
-        """Declares the table of a name, made of the cases that `of` holds for, each by itself."""
+        """Declares the table of a name, made separately for each of the cases that `of` holds for."""
         return self._declare(name, of)
 
     def whole(self, name: str) -> Callable[[Maker], Maker]:
-        """Declares the table of a name, made of all cases at once; not there where the function returns None."""
+        """Declares the table of a name, made of all cases at once; absent where the function returns None."""
         return self._declare(name, None)
 
     def _declare(self, name: str, of: Callable[[Any], bool] | None) -> Callable[[Maker], Maker]:
@@ -112,7 +112,7 @@ class Tables:
 
 
 def names(values: Sequence[str], index: np.ndarray) -> np.ndarray:
-    """The names that an index array (n,) points to."""
+    """The names for an index array (n,)."""
     return np.array(list(values), dtype=object)[index]
 
 
@@ -238,23 +238,25 @@ def _gains(result: CaseResult) -> Columns:
 
 
 def against_own(gains: "pd.DataFrame", results: Sequence[CaseResult]) -> "pd.DataFrame":
-    """The rows of gains that are against the baselines of these results, not against further ones of their cases."""
+    """The rows of gains against the baselines of these results, not against further ones of their cases."""
     own = {(result.name, result.baseline) for result in results}
     pairs = zip(gains["case"].tolist(), gains["baseline"].tolist(), strict=True)
     return gains[np.array([pair in own for pair in pairs], dtype=bool)]
 
 
 def below(parts: "Sequence[pd.DataFrame]") -> "pd.DataFrame":
-    """Tables of the same columns set one below the other; a note is empty where one has none."""
+    """Tables of the same columns concatenated; a note is empty where one has none."""
     if any("note" in part for part in parts):
         parts = [part if "note" in part else part.assign(note="") for part in parts]
     return joined({str(name): part[name].to_numpy() for name in part} for part in parts)
 
 
 def to_csv(table: "pd.DataFrame") -> bytes:
-    """A table as UTF-8 CSV: shortest numbers that read back the same, '\\n' ends, an empty cell for not-a-number.
+    """A table as UTF-8 CSV: shortest numbers that read back equal, '
 
-    Several times faster than DataFrame.to_csv at the same text, and independent of pandas' version.
+    ' ends, an empty cell for NaN.
+
+    Several times faster than DataFrame.to_csv with the same text, and independent of pandas' version.
     """
     columns = [_cells(table[name]) for name in table.columns]
     lines = [",".join(map(_quoted, table.columns)), *map(",".join, zip(*columns, strict=True))]
@@ -262,9 +264,9 @@ def to_csv(table: "pd.DataFrame") -> bytes:
 
 
 def from_csv(content: bytes) -> "pd.DataFrame":
-    """A table from `to_csv`'s bytes: labels as text, all else as the very numbers that were written.
+    """A table from `to_csv`'s bytes: labels as text, all else as exactly the numbers written.
 
-    Raises ValueError where a row is of another length.
+    Raises ValueError where a row has another length.
     """
     names, *rows = csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)
     columns = zip(*rows, strict=True) if rows else ([] for _ in names)
@@ -272,7 +274,7 @@ def from_csv(content: bytes) -> "pd.DataFrame":
 
 
 def read_rows(rows: Sequence[Mapping[Any, Any]], names: Iterable[str]) -> "pd.DataFrame":
-    """Columns of rows that a CSV file has, or will have: numbers as numbers, not-a-number where a cell is empty."""
+    """Columns of rows of a CSV file: numbers as numbers, NaN where a cell is empty."""
     columns = {name: [row[name] for row in rows] for name in names}
     return frame({name: _typed(name, column) for name, column in columns.items()})
 
@@ -282,7 +284,7 @@ def _typed(name: str, column: Sequence[Any]) -> Sequence[Any] | np.ndarray:
 
 
 def _read(name: str, column: Sequence[str]) -> Sequence[str] | np.ndarray:
-    """A column of text as what it was: numbers, but for labels and for words."""
+    """A column of text converted back: to numbers, except labels and words."""
     if name in LABEL_COLUMNS:
         return list(column)
     try:

@@ -1,6 +1,6 @@
-"""Numbers, units and counts as they stand in sentences, and text that is safe to print. Loads no NumPy.
+r"""Numbers, units and counts in sentences, and text that is safe to print. Loads no NumPy.
 
-Words of figures have a little mathematical text, `$\\sigma$ of $D_M$`; here it is read, and written plain.
+Words of figures have a little mathematical text, `$\sigma$ of $D_M$`; here it is parsed, and written plain.
 """
 
 import math
@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from radarsim.language import numeral, power_of_ten, term, tr
 
 POWERS = str.maketrans("234", "²³⁴")  # of units in tables, as people write them
-SAID = (  # units that a language may write otherwise
+SAID = (  # units that a language may write differently
     *(term("m"), term("m²"), term("s"), term("m/s"), term("m/s²"), term("rad"), term("rad/s"), term("rad/s²")),
     *(term("Hz"), term("Hz/s"), term("Hz/s²"), term("Hz/s³"), term("Hz/s⁴"), term("km"), term("°/s"), term("°/s²")),
 )
@@ -21,7 +21,7 @@ KEPT = re.compile(  # the space between a number and its unit, in any language s
 )
 SPACES = "\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}"  # which a language may put into numbers
 PLAIN = 6  # digits before the point that are still written out
-MOST_NINES = 12  # digits of what is nearly one, or nearly all
+MOST_NINES = 12  # digits of a share near one
 
 
 LABELS = (  # of lines
@@ -54,7 +54,7 @@ def plural(count: int, noun: str) -> str:
 def number(value: float, digits: int = 4) -> str:
     """A number for people at so many digits: 25600, 0.00012, 1.2·10⁻⁷, ∞; nothing for not-a-number.
 
-    What is under one is never said to be one.
+    A number under one is never rounded to one.
 
     >>> [number(one) for one in (25600.0, 1e10, 2.56e7, -0.00005, 0.25, 0.99999)]
     ['25600', '10¹⁰', '2.56·10⁷', '−5·10⁻⁵', '0.25', '0.99999']
@@ -74,7 +74,7 @@ def number(value: float, digits: int = 4) -> str:
 
 
 def interval(low: str, high: str) -> str:
-    """The ends of an interval in brackets, parted by what the language puts between decimal numbers."""
+    """The ends of an interval in brackets, with the language's separator of decimal numbers."""
     return tr("[{low}, {high}]", low=low, high=high)
 
 
@@ -85,7 +85,8 @@ def estimate(values: Iterable[float], unit: str = "", form: str = ".4g") -> str:
 
 
 def share(value: float, low: float, high: float) -> str:
-    """A share in per cent with its 95 % interval, at as many digits as tell the ends apart, and from none and all.
+    """A share in per cent with its 95 % interval, with digits enough to distinguish the ends from each other, 0 and 100
+    %.
 
     >>> share(100, 99.9962, 100), share(94.123, 93.9, 94.3), share(99.99, 99.9885, 99.9915)
     ('100 % [99.996, 100]', '94.12 % [93.90, 94.30]', '99.990 % [99.989, 99.992]')
@@ -115,17 +116,17 @@ def unbroken(words: str) -> str:
 
 
 def printable(text: str) -> str:
-    """Text without control characters: what a config names must not steer the terminal."""
+    """Text without control characters: names in a config must not control the terminal."""
     return "".join(c if c.isprintable() or c in SPACES else "�" for c in text)
 
 
 def in_a_row(numbers: Iterable[str]) -> str:
-    """Numbers one after the other, parted by semicolons where the language writes a decimal comma."""
+    """Numbers one after the other, separated by semicolons where the language writes a decimal comma."""
     return (", " if numeral("0.5") == "0.5" else f";{NBSP}").join(numbers)
 
 
 def clauses(sentence: str) -> list[str]:
-    """A sentence's parts between semicolons; one within brackets or between numbers (`in_a_row`) parts nothing.
+    """A sentence's parts between semicolons; one within brackets or between numbers (`in_a_row`) does not separate.
 
     >>> clauses("locked in 12 % [11; 13] (of 5; 6 lost); lost in 88 %")
     ['locked in 12 % [11; 13] (of 5; 6 lost)', 'lost in 88 %']
@@ -140,13 +141,13 @@ def clauses(sentence: str) -> list[str]:
 
 
 def significant_digits(value: float, form: str = "#.4g") -> str:
-    """A number in a form, of four figures, as sentences have it: no point at its end, no zero below zero, a minus."""
+    """A number in a format, of four digits, for sentences: no trailing point, no minus zero, a true minus."""
     text = format(value, form).removesuffix(".")
     return numeral(text if float(text) else text.removeprefix("-"))
 
 
 def known(value: float, form: str = "#.4g", after: str = "") -> str:
-    """`figures` of a number and what follows it, or nothing for not-a-number."""
+    """`figures` of a number and its suffix, or nothing for NaN."""
     return significant_digits(value, form) + after if value == value else ""
 
 

@@ -86,7 +86,7 @@ class Series:
         return Series(k, t, value, lo, hi, self.short)
 
     def upto(self, k: int) -> "Series":
-        """Points up to scan k; all if the curve reaches k."""
+        """Points up to scan k; complete (not `short`) if the curve reaches k."""
         part = self.where(self.k <= k)
         return replace(part, short="") if self.k[-1] >= k else part
 
