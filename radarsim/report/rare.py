@@ -58,8 +58,20 @@ def complement(of: statistics.Estimate) -> statistics.Estimate:
 
 
 def rows(labels: Mapping[str, Any], event: str, sought: np.ndarray, of: Counted, drawn: Drawn) -> dict[str, Any]:
-    """How probable rare events are, with the key `rare`: by the weights of realisations that are drawn for them. =>
-    Probabilities of rare events, with the key `rare`: from the weights of realisations drawn for them."""
+    """Probabilities of rare events, with the key `rare`: from the weights of realisations drawn for them.
+
+    From labels (case, filter, k, t_s) of n rows and sought (n,). The interval is known from Σw², and that by
+    (Σw²)²/Σw⁴ realisations: where few have most of the weight, larger weights may be missing, and the rate and its
+    interval are too small together, and a `note` marks the row. docs/rare.md has more.
+
+    event: in words
+    sought: whether realisations are drawn for it
+    rate ±: its probability
+    events: number of realisations that have it; `n_eff` effective ones
+    variance_factor: how many times as many plain realisations give the same precision
+    plain: number of the n drawn from the original law
+    mean_weight, mean_weight_se: mean of all weights, which must be one, and its standard error
+    """
     estimate, size = rate(of, drawn), len(sought)
     variance = of.squared / drawn.n - estimate.value**2
     with np.errstate(divide="ignore", invalid="ignore"):
