@@ -447,7 +447,7 @@ class _Frame:
         self.y_ticks = list(panel.y.ticks) or ys.ticks(5)
         self.y = ys
         widest = max((len(line) for _, text in self.y_ticks for line in text.split("\n")), default=1)
-        self.left = max(30.0, 12.0 + LETTER * min(widest, 22))
+        self.left = max(30.0, 16.0 + LETTER * min(widest, 22))
         self.names, self.ends = at_ends(panel), Markup("")
         self.right = WIDTH - RIGHT - max((1.1 * LETTER * len(spoken(name)) for name in self.names), default=0.0)
         self.x: Scale = scale(panel.x, [x for x, _ in extent], "x", self.left, self.right)

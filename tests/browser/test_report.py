@@ -250,6 +250,7 @@ STUDIES = (  # a config of each study, and of each part of the sonar's
     *("rls2", "range_doppler", "multimodel_1hz", "sonar_asynchronous", "sonar_manoeuvre", "sonar_clutter"),
     *("discriminator", "pulses", "ambiguous", "multimodel", "rls2_manoeuvres"),
 )
+LONGEST = ("multimodel_rules", "manoeuvre_variance", "sonar_clutter_ends")  # in print; the last has a warning
 
 
 @pytest.fixture(scope="session")
@@ -258,7 +259,7 @@ def every(tmp_path_factory):
     out = tmp_path_factory.mktemp("every")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figures, "save", lambda *_, **__: {})
-        for name in STUDIES:
+        for name in (*STUDIES, *LONGEST):
             run.run(name, realisations=200, out=out)
     return out
 
@@ -295,13 +296,19 @@ Math.min(...[...document.querySelectorAll("main *")].filter((e) => e.checkVisibi
     return chart ? size * chart.getBoundingClientRect().width / chart.viewBox.baseVal.width : size;
   }))
 """
+FOLDED = """
+[...document.querySelectorAll(".answer p, .warning p")].filter((e) => !e.checkVisibility()).map((e) => e.textContent)
+"""
 PAPER_MM, MARGIN_MM, PX_MM = (210, 297), 10.0, 96 / 25.4  # A4
 
 
-@pytest.mark.parametrize("name", STUDIES)
+@pytest.mark.parametrize("name", [*STUDIES, *LONGEST])
 def test_every_study_prints_on_two_pages_in_letters_that_are_read(page, every, name):
+    """With the whole answer and every warning."""
     wide = PAPER_MM[0] - 2 * MARGIN_MM
     page.open(every / name / "report.html", width=int(wide * PX_MM), media="print")
+    assert page.evaluate(FOLDED) == []
+    assert name != LONGEST[-1] or page.evaluate("document.querySelectorAll('.warning p').length") > 0
     assert page.evaluate(SMALLEST) * 0.75 >= 5  # points
     paper = dict(zip(("paperWidth", "paperHeight"), (mm / 25.4 for mm in PAPER_MM), strict=True))
     printed = base64.b64decode(page.call("Page.printToPDF", **paper)["data"])

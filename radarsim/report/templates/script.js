@@ -412,7 +412,7 @@ class Panel {
     if (this.draw.equal) this.evened();
     const own = this.ticks("x", 6), up = this.ticks("y", 5);
     const widest = Math.max(1, ...up.map(([, text]) => text.length));
-    const left = up.given ? this.home.x[3] : Math.max(30, 12 + LETTER * widest);
+    const left = up.given ? this.home.x[3] : Math.max(30, 16 + LETTER * widest);
     this.x[3] = left;
     const [right, bottom, top] = [this.x[4], this.y[3], this.y[4]];
     const xs = own.map(([v]) => place(this.x, v)), ys = up.map(([v]) => place(this.y, v));

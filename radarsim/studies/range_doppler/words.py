@@ -213,7 +213,7 @@ def _best_sentences(results: Sequence[Result], made: Made) -> list[str]:
         "scan periods).",
         PERIODS,
     )
-    return [" ".join([rule, *sentences])]
+    return [f"{rule} {sentences[0]}", *sentences[1:]]
 
 
 def _best(rows: "pd.DataFrame", name: str) -> str:
@@ -273,7 +273,7 @@ def _best_of_broken(results: Sequence[Result], made: Made) -> list[str]:
         "from scan {k} on).",
         k=FIRST,
     )
-    return [" ".join([rule, *sentences])]
+    return [f"{rule} {sentences[0]}", *sentences[1:]]
 
 
 def _least_worst(rows: "pd.DataFrame", members: Sequence[Result], name: str) -> str:

@@ -1,8 +1,10 @@
 """P2's tables, figures and claims, on a small run of the shipped config."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import radarsim
@@ -83,12 +85,37 @@ def test_figures_are_described(result):
     assert result.figure("trajectory") is not None
 
 
-def test_answer_names_the_best_filter_of_each_stage(result):
-    height, climb = words.answer(result.cases, result.tables)
+def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):
+    first, height, climb = words.answer(result.cases, result.tables)
     for stage in ("start", "ballistic", "manoeuvre", "after"):
         assert stage in height
         assert stage in climb
     assert "m/s [" in climb
+    stages = result.tables["stages"]
+    wide = stages[stages["component"] == "y"].pivot_table(index="stage", columns="filter", values="sigma")
+    above = 100 * (wide.div(wide.min(axis=1), axis=0) - 1)
+    (best, least), (second, more) = above.max().sort_values().iloc[:2].items()
+    stage = above[best].idxmax()
+    assert f"stage: {best}, σ of the height at most {least:.2g} % above the least ({stage}: " in first
+    assert f"; {wide.loc[stage].idxmin()}: {wide.loc[stage].min():.3g} m [" in first
+    assert first.endswith(f"; next {second}, {more:.2g} %.")
+
+
+def test_the_answer_on_several_cases_is_one_sentence():
+    """Of the filters that all cases have; one that is best everywhere is never above the least."""
+    rows = [  # a is 10 % above the least, b up to 100 %
+        *(("one", "start", "a", 11.0), ("one", "start", "b", 10.0), ("one", "start", "only here", 1.0)),
+        *(("two", "start", "a", 10.0), ("two", "start", "b", 20.0)),
+    ]
+    columns = {"sigma_lo": 1.0, "sigma_hi": 99.0, "component": "y", "unit": "m"}
+    stages = pd.DataFrame(rows, columns=["case", "stage", "filter", "sigma"]).assign(**columns)
+    cases = [SimpleNamespace(name=name, swept=(), spec=SimpleNamespace(device="")) for name in ("one", "two")]
+    (told,) = words.answer(cases, {"stages": stages})
+    assert "every case: a, σ of the height at most 10 % above the least (one, start: 11 m [1, 99]; b: 10 m" in told
+    alone = words.answer(cases, {"stages": stages[stages["filter"] == "b"]})
+    assert [line.rpartition("start: ")[2] for line in alone] == ["b, 10 m [1, 99].", "b, 20 m [1, 99]."]
+    told, *_ = words.answer(cases[1:], {"stages": pd.concat([stages[3:], stages[3:].assign(component="vy")])})
+    assert told == "Least σ of the height in every stage: a; next b, at most 100 % above it."
 
 
 def test_time_per_update_stands_in_the_record_and_the_report_alone(tmp_path):

@@ -6,6 +6,7 @@ from scipy import stats
 
 import radarsim
 from radarsim.studies.sonar.clutter import tables as report
+from radarsim.studies.sonar.clutter import words
 from radarsim.studies.sonar.clutter.kernels import tracker
 
 
@@ -32,6 +33,29 @@ def config(**more):
 @pytest.fixture(scope="module")
 def result():
     return radarsim.run(config())
+
+
+def test_the_answer_is_of_the_hardest_case_and_its_tracker_of_longest_life(result):
+    first, others = result.answer
+    rows = result.tables["tracking"]
+    worst = rows.groupby("case")["ends_per_hour"].min().idxmax()
+    best, other = rows[rows["case"] == worst].sort_values("ends_per_hour").to_dict("records")
+    assert first.startswith(f"Longest track life in the hardest case, λ = 2 km⁻²: {best['filter']} confirms ")
+    assert f", life {float(format(best['life_s'], '.3g')):,g} s [" in first
+    assert f" {float(format(best['false_tracks_per_hour'], '.3g')):,.10g} [" in first
+    assert others.startswith(f"The others there: {other['filter']} confirms ")
+
+
+def test_a_tracker_that_confirms_nothing_keeps_no_track(result):
+    """Which is not that it loses none."""
+    table = result.tables["tracking"].copy()
+    lost = table["filter"] == "PDA"
+    table.loc[lost, ["confirmed", "ends_per_hour", "life_s", "time_to_confirm_s"]] = [0.0, np.nan, np.nan, np.nan]
+    first, others = words.answer(result.cases, {"tracking": table})
+    assert ": nearest confirms " in first
+    assert others == "The others there: PDA confirms no track."
+    table.loc[:, ["confirmed", "ends_per_hour"]] = [0.0, np.nan]
+    assert "confirms no track" in words.answer(result.cases, {"tracking": table})[0]
 
 
 def test_tables_say_what_the_sums_hold(result):
