@@ -54,9 +54,9 @@ def load(config: Config, *, out: Out = RESULTS, overrides: Overrides = ()) -> "R
 def check(
     config: Config,
     *,
+    overrides: Overrides = (),
     realisations: float | None = None,
     seed: int | None = None,
-    overrides: Overrides = (),
     precision: float | None = None,
     of: str = "sigma",
     share: tuple[int, int] | None = None,

@@ -1,5 +1,6 @@
 """How Python and notebooks show an answer: its first sentences, its first figure, its figures by name."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +11,12 @@ if TYPE_CHECKING:
 MOST_LINES, MOST_LETTERS = 3, 200  # of a text that stands for the whole
 
 
-class Shown:
+class Shown(ABC):
     """An answer with sentences, and perhaps a table and figures, drawn on demand."""
 
+    @abstractmethod
     def _said(self) -> Sequence[str]:
-        raise NotImplementedError
+        """The answer in words."""
 
     @property
     def _label(self) -> str:

@@ -16,7 +16,6 @@ from radarsim.threads import forbidden
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.live import Live
     from rich.progress import Progress as Bar
     from rich.progress import TaskID
 
@@ -60,10 +59,13 @@ class Progress:
     compiler's time counts nor what came from the store.
     """
 
-    def __init__(self, title: str, quiet: bool, what: str = "realisations"):
+    shares = True  # the share of a whole is known, and shown by a bar
+
+    def __init__(self, title: str, what: str = "realisations", quiet: bool = False):
         self.title, self.quiet, self.what = title, quiet, tr(what)
-        self.started = time.monotonic()
-        self.first = self.last = (0.0, 0, 0)  # reports: when, computed, of how many
+        self.started = self.due = time.monotonic()
+        self.first: tuple[float, int, int | None] = (0.0, 0, None)  # reports: when, computed, of how many
+        self.last: tuple[float, int, int | None] = self.first
         self.bar: Bar | None = None
         self.task: TaskID
         self.lock = threading.Lock()
@@ -87,24 +89,18 @@ class Progress:
             if self.bar is None and not self.quiet:
                 self.bar = self._begun()
 
-    def update(self, done: int, total: int, from_store: int) -> None:
+    def update(self, done: int, total: int | None = None, from_store: int = 0) -> None:
         """How many are done, of how many, and how many of them were read from the store."""
-        rate = self.rate(done - from_store, total)
-        if self.quiet or time.monotonic() - self.started < SILENT_S or not sys.stderr.isatty():
+        rate, now = self.rate(done - from_store, total), time.monotonic()
+        if self.quiet or now < max(self.started + SILENT_S, self.due) or not sys.stderr.isatty():
             return
+        self.due = now + REFRESH_S
         self._begin()
         assert self.bar is not None  # it has just begun
-        share = numeral(f"{100 * done / max(total, 1):5.1f}")
-        told = tr("{share} %", share=share)
-        if done >= total:
-            told += tr("  the results follow")
-        elif rate > 0:
-            speed = numeral(f"{rate:,.0f}" if rate >= 10 else f"{rate:.2g}")
-            left = clock((total - done) / rate)
-            told += tr("  {rate} {what}/s  {left} left", rate=speed, what=self.what, left=left)
+        told = self._told(done, total, rate)
         self.bar.update(self.task, total=total, completed=done, told=told, refresh=forbidden())
 
-    def rate(self, computed: int, total: int) -> float:
+    def rate(self, computed: int, total: int | None) -> float:
         """How many are computed in a second, on average since the first report of so many in all; 0 if not known."""
         now = time.monotonic()
         if total != self.last[2] or computed < self.last[1]:
@@ -112,49 +108,44 @@ class Progress:
         self.last = now, computed, total
         return (computed - self.first[1]) / (now - self.first[0]) if now > self.first[0] else 0.0
 
+    def _told(self, done: int, total: int | None, rate: float) -> str:
+        """The share that is done, the rate and the time left."""
+        assert total is not None
+        told = tr("{share} %", share=numeral(f"{100 * done / max(total, 1):5.1f}"))
+        if done >= total:
+            told += tr("  the results follow")
+        elif rate > 0:
+            speed = numeral(f"{rate:,.0f}" if rate >= 10 else f"{rate:.2g}")
+            left = clock((total - done) / rate)
+            told += tr("  {rate} {what}/s  {left} left", rate=speed, what=self.what, left=left)
+        return told
+
     def _begun(self) -> "Bar":
         from rich.progress import BarColumn, TextColumn
         from rich.progress import Progress as Bar
 
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[told]}"))
+        told = TextColumn("{task.fields[told]}")
+        columns = (TextColumn("{task.description}"), BarColumn(), told) if self.shares else (told,)
         bar = Bar(*columns, console=console(stderr=True), transient=True, auto_refresh=not forbidden())
         self.task = bar.add_task(self.title, total=None, told=tr("begins"))
         bar.start()
         return bar
 
 
-class Counter:
-    """How much is done of what has no known end, on stderr if that is a terminal, once it has lasted two seconds."""
+class Counter(Progress):
+    """How much is done of what has no known end, or one that is only expected: in words, without a bar."""
 
-    def __init__(self, title: str, what: str):
-        self.title, self.what, self.started = tr(title), tr(what), time.monotonic()
-        self.due = self.started + SILENT_S
-        self.line: Live | None = None
+    shares = False
 
-    def __enter__(self) -> Self:
-        return self
+    def rate(self, computed: int, total: int | None) -> float:
+        """How many are done in a second, on average from the beginning."""
+        return computed / max(time.monotonic() - self.started, 1e-9)
 
-    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
-        if self.line is not None:
-            self.line.stop()
-
-    def update(self, done: int, expected: int | None = None) -> None:
-        """How many are done, of how many where that is known: then with the time that is left."""
-        now = time.monotonic()
-        if now < self.due or not sys.stderr.isatty():
-            return
-        self.due = now + REFRESH_S
-        if self.line is None:
-            from rich.live import Live
-
-            self.line = Live(console=console(stderr=True), transient=True, auto_refresh=False)
-            self.line.start()
-        rate = done / (now - self.started)
-        told = {"title": self.title, "done": done, "what": self.what, "rate": rate}
-        words = tr("{title}: {done:,} {what}, {rate:,.0f}/s", **told)
-        if expected is not None:
-            words += "  " + tr("about {left} left", left=clock((expected - done) / rate))
-        self.line.update(words, refresh=True)
+    def _told(self, done: int, total: int | None, rate: float) -> str:
+        words = tr(
+            "{title}: {done:,} {what}, {rate:,.0f}/s", title=tr(self.title), done=done, what=self.what, rate=rate
+        )
+        return words if total is None else words + "  " + tr("about {left} left", left=clock((total - done) / rate))
 
 
 def show(

@@ -153,7 +153,7 @@ def test_without_threads_a_bar_begins_with_the_first_report(monkeypatch):
         progress.update(50, 200, 0)
         assert (progress.bar.tasks[0].total, progress.bar.tasks[0].completed) == (200, 50)
         assert "25.0 %" in screen.getvalue()
-    with console.Counter("tracking", "rows") as counter:
+    with limited(0), console.Counter("tracking", "rows") as counter:
         counter.update(50)
         assert "tracking: 50 rows" in screen.getvalue()
 
