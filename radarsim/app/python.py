@@ -148,6 +148,8 @@ def _place(at_s: float | None, at_k: int | None) -> dict[str, object]:
     if at_s is not None and at_k is not None:
         both = f"{argument('at_s', '--at')} and {argument('at_k', '--at-k')}"
         raise ConfigError(f"{both} do not go together: a time or a scan")
+    if isinstance(at_k, SupportsFloat) and not float(at_k).is_integer():
+        raise ConfigError(f"{argument('at_k', '--at-k')}: must be a whole number, that of a scan, got {at_k:g}")
     return {name: value for name, value in (("at_s", at_s), ("at_k", at_k)) if value is not None}
 
 
@@ -342,7 +344,11 @@ def readings(
     from radarsim.engine import run
 
     configs.check(threads=threads, time_limit=time_limit, out=out, figures=figures)
-    alternatives = [f"{key}={value}" for key, value in only.items()] if isinstance(only, Mapping) else only
+    if isinstance(only, str) or not isinstance(only, Iterable):
+        raise ConfigError(
+            f'only: must be a mapping such as {{"start": "unweighted"}}, or texts KEY=VALUE, got {only!r}'
+        )
+    alternatives = [f"{key}={value}" for key, value in only.items()] if isinstance(only, Mapping) else list(only)
     configs.texts(names)
     wanted = reading.asked(names, alternatives)
     limit = time_limit if time_limit is None or callable(time_limit) else run.TimeLimit(time_limit)

@@ -431,17 +431,18 @@ def answered(asked: Question, attained_now: float, **given: Any) -> Answer:
 
 def nowhere(asked: Question, curve: Curve) -> ConfigError:
     """Why the quantity has no value anywhere on the range: the config's own reason if it gives one."""
-    reasons = [error for _, error in sorted(curve.refused.items())]
-    if reasons:
-        return ConfigError(*dict.fromkeys(line for error in reasons[:1] for line in error.lines))
+    if curve.refused:
+        x, error = min(curve.refused.items(), key=lambda one: one[0])
+        own = (line if line.startswith(asked.key) else f"with {asked.key}={number(x)}: {line}" for line in error.lines)
+        return ConfigError(*dict.fromkeys(own))
     return ConfigError(f"{asked.quantity.words}: there is no estimate there, whatever {asked.key} is")
 
 
-def refuse_without_effect(asked: Question, values: Iterable[float]) -> None:
-    """ConfigError where the quantity is the same at every value tried."""
-    known = [value for value in values if not math.isnan(value)]
-    if known and max(known) - min(known) <= SAME * max(abs(max(known)), abs(min(known)), 1e-300):
-        everywhere = f"{known[0]:.6g} {asked.unit} at every value from {asked.over.low:g} to {asked.over.high:g}"
+def refuse_without_effect(asked: Question, tried: Iterable[tuple[float, float]]) -> None:
+    """ConfigError where the quantity is the same at every value of the key that was tried and has an estimate."""
+    places, known = zip(*((x, y) for x, y in tried if not math.isnan(y)), strict=True)
+    if max(known) - min(known) <= SAME * max(abs(max(known)), abs(min(known)), 1e-300):
+        everywhere = f"{known[0]:.6g} {asked.unit} at every value from {min(places):g} to {max(places):g}"
         raise ConfigError(f"{asked.key}: has no effect on the {asked.quantity.words}: {everywhere}")
 
 

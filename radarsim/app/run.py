@@ -604,7 +604,7 @@ def papers(keys: Collection[str] = ()) -> "list[PaperClaims]":
 
 
 # P1.3 and P4, known or not; lower case and names joined by commas are understood.
-LIKE_A_CLAIM = re.compile(r"P\d+(\.\w+)?|[Pp]\d+(\.[Ee]?\d+\w?)?(,.+)?")
+LIKE_A_CLAIM = re.compile(r"P\d+(\.\w*)?|[Pp]\d+(\.[Ee]?\d+\w?)?(,.+)?")
 
 
 def _meant_as_a_claim(name: str) -> bool:
@@ -623,7 +623,9 @@ def _unknown_claims(names: Sequence[str], known: Collection[str]) -> list[str]:
         paper = name.partition(".")[0]
         if name in known or name in every:
             continue
-        if paper in every:
+        if (meant := name.rstrip(".").upper()) in (*known, *every):
+            found.append(f"claims: {name} is no claim and no paper; did you mean {meant}?")
+        elif paper in every:
             own = [claim for claim in known if claim.startswith(f"{paper}.")]
             found.append(f"claims: {name} is no claim of {paper}; its claims: {', '.join(own)}")
         else:

@@ -69,7 +69,7 @@ class Shown(ABC):
         if not described:
             raise KeyError("there are no figures")
         name = name or next(iter(described))
-        if name not in described:
+        if not isinstance(name, str) or name not in described:
             raise KeyError(f"no figure {name!r}; there are: {', '.join(described)}")
         if ax is None:
             return render(described[name])

@@ -47,7 +47,7 @@ def by_sampling(asked: Question, curve: Curve, notify: Callable[[str], None]) ->
     known = [one for one in scanned if not math.isnan(one[1])]
     if not known:
         raise question.nowhere(asked, curve)
-    question.refuse_without_effect(asked, [y + asked.equals for _, y in known])
+    question.refuse_without_effect(asked, [(x, y + asked.equals) for x, y in known])
     apart = unpaired(asked, curve)
     if apart:
         notify("; ".join(apart))
@@ -253,7 +253,7 @@ def _exactly(asked: Question, curve: Curve, notify: Callable[[str], None]) -> An
     except quantities.Undefined:
         raise question.nowhere(asked, curve) from None
     counted = question.ROUGH if curve.rough else 0  # both kinds differ a little where the key has no effect
-    question.refuse_without_effect(asked, [one.value for (_, count), one in curve.known.items() if count == counted])
+    question.refuse_without_effect(asked, [(x, one.value) for (x, n), one in curve.known.items() if n == counted])
     values = found.roots
     if asked.over.whole:
         values = tuple(dict.fromkeys(question.fulfilling(asked, x, curve.exactly) for x in values))

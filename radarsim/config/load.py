@@ -121,6 +121,10 @@ def texts(overrides: Overrides) -> tuple[str, ...]:
     if isinstance(overrides, Mapping):
         faults = Faults()
         found = tuple(_texts(overrides, "", faults))
+        keys = [text.partition("=")[0] for text in found]
+        for i, key in enumerate(keys):
+            if other := next((one for one in keys[:i] if f"{one}.".startswith(f"{key}.")), None):
+                faults.add(given(key), (), "is given twice" if other == key else f"overwrites {other}, given before it")
         faults.raise_if_any()
         return found
     if isinstance(overrides, str | bytes) or not isinstance(overrides, Iterable):
@@ -132,6 +136,9 @@ def texts(overrides: Overrides) -> tuple[str, ...]:
 def _texts(values: Mapping[Any, Any], above: str, faults: Faults) -> Iterator[str]:
     for name, value in values.items():
         key = f"{above}{name}"
+        if key.count(".") > DEEPEST:
+            faults.add(given(".".join(key.split(".")[:3])), (), f"nested more than {DEEPEST} deep")
+            return
         if isinstance(value, Mapping) and value and not WHOLE & value.keys():
             yield from _texts(value, f"{key}.", faults)
             continue

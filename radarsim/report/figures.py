@@ -221,6 +221,8 @@ def draw_on(figure: Figure, axes: Any, label: str = "") -> Canvas:
     given = [one for one in np.atleast_1d(np.asarray(axes, dtype=object)).ravel() if isinstance(one, Axes)]
     if len(given) != len(panels):
         raise ConfigError(f"ax: figure {figure.name!r} takes {len(panels)} Matplotlib axes, got {len(given)}")
+    if other := [one.name for one in given if one.name != "rectilinear"]:
+        raise ConfigError(f"ax: figure {figure.name!r} takes plane rectangular Matplotlib axes, got {other[0]}")
     maps = common_colours(panels)
     with matplotlib.rc_context(STYLE), _unknown_letters_pass():
         for one, panel in zip(given, panels, strict=True):

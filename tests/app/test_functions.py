@@ -169,6 +169,13 @@ def test_check(config):
 KEY = "rls2", "radar.sigma_range_m"
 
 
+def endless():
+    """A mapping that contains itself."""
+    made: dict[str, object] = {}
+    made["radar"] = made
+    return made
+
+
 @pytest.mark.parametrize(
     ("ask", "words"),
     [
@@ -178,6 +185,16 @@ KEY = "rls2", "radar.sigma_range_m"
         (lambda: radarsim.solve(*KEY, equals=3, sigma="r"), "filter: name one of r, r+Vr"),
         (lambda: radarsim.solve(*KEY, equals=3, sigma="r", filter="r", at_s=1e4), "at_s: must be from 0 to 140 s"),
         (lambda: radarsim.solve(*KEY, equals=3, sigma="r", filter="r", at_k=99), "at_k: must be from 1 to 15"),
+        (lambda: radarsim.solve(*KEY, equals=3, sigma="r", filter="r", at_k=7.5), "at_k: must be a whole number"),
+        (lambda: radarsim.sensitivity("rls2", at_k=7.5), "at_k: must be a whole number, that of a scan, got 7.5"),
+        (
+            lambda: radarsim.solve("rls2", "scans", equals=30, sigma="r", filter="r", at_s=60, between=(3, 5)),
+            "with scans=3: at_s: must be from 0 to 20 s, the last scan's time, got 60",
+        ),
+        (
+            lambda: radarsim.solve("rls2", "scans", equals=30, sigma="r", filter="r", at_s=60, between=(3, 12)),
+            "m at every value from 7 to 12",
+        ),
         (lambda: radarsim.solve(*KEY, equals=3, gain="r", between=(5, 3)), "between: must be two rising numbers"),
         (lambda: radarsim.solve("rls2", "duration_s", equals=3, gain="r"), "give between=(low, high)"),
         (lambda: radarsim.solve("range_doppler", KEY[1], equals=3, gain="r"), "choose one with case: 'rls1'"),
@@ -190,6 +207,20 @@ KEY = "rls2", "radar.sigma_range_m"
         (lambda: radarsim.compare("rls2", "rls4", out="nowhere"), "`radarsim run rls4 --out nowhere` computes it"),
         (lambda: radarsim.chart("sonar_missed"), "study sonar has no chart"),
         (lambda: radarsim.readings("P1.4", only={"strt": "x"}), "only: strt=x: no choice 'strt'"),
+        (lambda: radarsim.readings("P1.4", only="start=x"), "only: must be a mapping such as"),
+        (lambda: radarsim.readings("P1.4", only=None), "or texts KEY=VALUE, got None"),
+        (lambda: radarsim.claims("P1."), "claims: P1. is no claim and no paper; did you mean P1?"),
+        (lambda: radarsim.claims("p1.3"), "claims: p1.3 is no claim and no paper; did you mean P1.3?"),
+        (lambda: radarsim.run("rls2", overrides=endless()), "overrides['radar.radar.radar']: nested more than 50 deep"),
+        (lambda: radarsim.run(endless()), "config: radar.radar.radar: nested more than 50 deep"),
+        (
+            lambda: radarsim.run("rls2", overrides={"radar": {"sigma_range_m": 3}, "radar.sigma_range_m": 4}),
+            "overrides['radar.sigma_range_m']: is given twice",
+        ),
+        (
+            lambda: radarsim.run("rls2", overrides={"radar.sigma_range_m": 3, "radar": 4}),
+            "overrides['radar']: overwrites radar.sigma_range_m, given before it",
+        ),
         (lambda: radarsim.readings("P1.4", realisations=0), "realisations: must be >= 1, got 0"),
         (lambda: radarsim.check("rls2", precision=0), "precision: must be > 0 and ≤ 100 %, got 0"),
     ],

@@ -79,6 +79,10 @@ def test_a_figure_on_too_few_axes_is_refused(results):
         results["rls2"].figure("gain_r", ax=Canvas().subplots(1, 2))
     with pytest.raises(radarsim.ConfigError, match="got 0"):
         results["rls2"].figure("gain_r", ax="here")
+    with pytest.raises(radarsim.ConfigError, match="takes plane rectangular Matplotlib axes, got 3d"):
+        results["rls2"].figure("gain_r", ax=Canvas().add_subplot(projection="3d"))
+    with pytest.raises(KeyError, match="there are: gain_r, sigma_r"):
+        results["rls2"].figure(["gain_r"])
 
 
 def test_a_figure_without_axes_is_drawn_as_before(results):

@@ -160,7 +160,7 @@ def test_linear_algebra_takes_one_thread_unless_told_otherwise(given, threads):
     [
         ("P4.99", "claims: P4.99 is no claim of P4; its claims: {all}"),
         ("P99", "claims: P99 is no claim and no paper; papers: P1, P2, P3, P4"),
-        ("p4.5", "claims: p4.5 is no claim and no paper; papers: P1, P2, P3, P4"),
+        ("p4.5", "claims: p4.5 is no claim and no paper; did you mean P4.5?"),
         ("P4.5,P4.6", "claims: P4.5,P4.6 is no claim of P4; its claims: {all}"),
     ],
 )
