@@ -28,6 +28,8 @@ COLUMNS = (  # of tables
     *(term("95 % of gain"), term("of"), term("change"), term("filters"), term("scans")),
     *(term("realisations"), term("one thread"), term("known from"), term("last to get there"), term("claim")),
     *(term("statement"), term("place"), term("measured and expected"), term("class"), term("config"), term("key")),
+    *(term("RMS error"), term("unit"), term("of own σ"), term("estimates"), term("number"), term("plots"), term("NIS")),
+    *(term("95 % from"), term("95 % to"), term("stated σ")),
     *(term("value"), term("name"), term("what it is"), term("paper and question"), term("study"), term("keys")),
 )
 TITLES = (term("reading"), term("tracking"), term("judging"), term("fitting"))  # of what has no known end
@@ -42,11 +44,10 @@ WHAT = (
 )
 
 
-def console(stderr: bool = False) -> "Console":
+def console(stream: TextIO) -> "Console":
     """A rich console; plain text of a fixed width where the stream is no terminal."""
     from rich.console import Console
 
-    stream = sys.stderr if stderr else sys.stdout
     width = None if stream.isatty() else PIPED_WIDTH
     return Console(file=stream, width=width, highlight=False, markup=False, emoji=False, soft_wrap=not stream.isatty())
 
@@ -126,7 +127,7 @@ class Progress:
 
         told = TextColumn("{task.fields[told]}")
         columns = (TextColumn("{task.description}"), BarColumn(), told) if self.shares else (told,)
-        bar = Bar(*columns, console=console(stderr=True), transient=True, auto_refresh=not forbidden())
+        bar = Bar(*columns, console=console(sys.stderr), transient=True, auto_refresh=not forbidden())
         self.task = bar.add_task(self.title, total=None, told=tr("begins"))
         bar.start()
         return bar
@@ -154,16 +155,19 @@ def show(
     rows: Sequence[Sequence[object]],
     right: Sequence[str] = (),
     spare: Sequence[str] = (),
+    stream: TextIO | None = None,
 ) -> None:
-    """Print one table; columns in `right` are aligned right, those in `spare` left out on a narrow terminal."""
+    """Print one table, by default to stdout; columns in `right` are aligned right, those in `spare` left out on a
+    narrow terminal."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
 
-    screen = console()
+    stream = stream or sys.stdout
+    screen = console(stream)
     cells = [["\n".join(map(printable, str(cell).split("\n"))) for cell in row] for row in rows]
     shown = fitting(columns, cells, spare, screen.width, [tr(name) for name in columns])
-    terminal = sys.stdout.isatty()
+    terminal = stream.isatty()
     style: dict[str, Any] = {"box": box.SIMPLE_HEAD, "padding": (0, 1, 0, 0)} if terminal else {"box": None}
     table = Table(title=title or None, title_justify="left", pad_edge=False, **style)
     for i in shown:
@@ -173,7 +177,7 @@ def show(
     with screen.capture() as captured:
         screen.print(table)
     for line in captured.get().rstrip("\n").split("\n"):
-        sys.stdout.write(line.rstrip() + "\n")
+        stream.write(line.rstrip() + "\n")
     if missing := [columns[i] for i in range(len(columns)) if i not in shown]:
         said = ", ".join(map(tr, missing))
         field("", tr("left out at {width} columns: {columns}", width=screen.width, columns=said))

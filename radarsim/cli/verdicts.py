@@ -8,7 +8,7 @@ from textwrap import shorten
 from typing import TYPE_CHECKING, Any, TextIO
 
 from radarsim.app import configs
-from radarsim.cli.console import PIPED_WIDTH, field, say
+from radarsim.cli.console import PIPED_WIDTH, broken, field, say, show
 from radarsim.language import listed, plural, term, tr
 from radarsim.report.wording import interval, known, labelled, printable, significant_digits
 
@@ -34,14 +34,22 @@ def report(followed: "Followed", judged: "Sequence[Judged]", advised: "Advice | 
     from radarsim.recorded import page
 
     stream = sys.stderr if stderr else sys.stdout
-    for line in page.sentences(followed, judged, advised):
+    for line in page.rows(followed):
+        write(stream, line)
+    for title, rows in ((page.ERRORS, page.errors(followed)), (page.TESTS, page.tests(judged))):
+        if rows:
+            forms = [page.NUMBERS.get(name) for name in rows[0]]
+            texts = [
+                [known(cell, form) if form else cell for cell, form in zip(row.values(), forms, strict=True)]
+                for row in rows
+            ]
+            show(tr(title), list(rows[0]), texts, list(page.NUMBERS), stream=stream)
+    for line in (*page.findings(judged), *page.verdict(followed, judged, advised)):
         write(stream, line)
 
 
 def write(stream: TextIO, line: str) -> None:
     """A line, to a terminal broken between words."""
-    from radarsim.cli.console import broken
-
     for part in broken(printable(line), stream):
         stream.write(part + "\n")
 

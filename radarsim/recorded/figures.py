@@ -15,7 +15,7 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.config.fields import Model
 from radarsim.engine.results import Track
-from radarsim.language import tr
+from radarsim.language import term, tr
 from radarsim.recorded.follow import Followed, Tally, recorded_of
 from radarsim.recorded.plots import Path
 from radarsim.report import panels
@@ -275,7 +275,8 @@ def probabilities(track: Track) -> Figure | None:
 LEAST_TESTS = 10  # below which there is no verdict
 CLOSE = 0.005  # relative accuracy to which the mean is brought to 1
 ROUNDS = 60
-FITS, SMALL, LARGE, UNKNOWN = "fits", "too small", "too large", "too few plots"
+FITS, SMALL, LARGE, UNKNOWN = term("fits"), term("too small"), term("too large"), term("too few plots")
+LOST, DOUBT = term("fold lost"), term("too small?")
 
 
 @dataclass(frozen=True)
@@ -299,6 +300,7 @@ class Judged:
 def judged(followed: Followed) -> list[Judged]:
     """Every filter's tests, with the better standard deviations where the stated ones do not fit."""
     found = [_judge(tally) for tally in followed.tallies.values()]
+    found = [replace(one, verdict=_of_folds(followed.case, one, found)) for one in found]
     improved = {}
     for name in {one.filter for one in found if one.verdict in (SMALL, LARGE)}:
         improved[name] = better(followed.case, name, followed.head)
@@ -312,6 +314,15 @@ def _judge(tally: Tally) -> Judged:
     if tally.count < LEAST_TESTS:
         verdict = UNKNOWN
     return Judged(tally.filter, tally.name, tally.count, tally.mean, lo, hi, verdict, {})
+
+
+def _of_folds(case: Case, one: Judged, every: Sequence[Judged]) -> str:
+    """The verdict of a test, that of a filter that decides the folds by itself in the light of what others say."""
+    of = recorded_of(case)
+    folds = {member.name for member in case.spec.members if of.unfolds(member)}
+    if one.verdict != SMALL or one.filter not in folds:
+        return one.verdict
+    return LOST if any(other.name == one.name and other.verdict in (FITS, LARGE) for other in every) else DOUBT
 
 
 def _own(case: Case, one: Judged, improved: Mapping[str, float]) -> dict[str, float]:

@@ -276,7 +276,7 @@ class Errors:
     normed: float = 0.0
 
     def add(self, error: np.ndarray, sigma: np.ndarray) -> None:
-        """Count errors (n,) with the filter's standard deviations (n,)."""
+        """Count errors (n,) with the filter's standard deviations (n,); not-a-number where it gives none."""
         skip = max(0, BEFORE - self.seen)
         self.seen += len(error)
         error, sigma = error[skip:], sigma[skip:]
@@ -349,7 +349,7 @@ class Followed:
                 continue
             error = track.estimate[:, :, c] - column[rows]
             for f, name in enumerate(track.filters):
-                known = np.isfinite(error[f]) & (track.sigma[f, :, c] > 0)
+                known = np.isfinite(error[f]) & ~(track.sigma[f, :, c] <= 0)
                 one = self.errors.setdefault((name, component), Errors(name, component, unit))
                 one.add(error[f, known], track.sigma[f, known, c])
 
@@ -357,6 +357,12 @@ class Followed:
     def silent(self) -> list[str]:
         """The filters of the config that never had an estimate."""
         return [one.name for one in self.case.spec.members if one.name not in self.estimating]
+
+    @property
+    def untested(self) -> list[str]:
+        """The filters with estimates that have no innovation to test: they give no covariance of it."""
+        tested = {name for (name, _), tally in self.tallies.items() if tally.count}
+        return [one.name for one in self.case.spec.members if one.name in self.estimating - tested]
 
     @property
     def without_plots(self) -> dict[str, list[str]]:
@@ -543,6 +549,7 @@ def together(case: Case, found: Mapping[str | None, Followed], passed_over: int)
     return whole
 
 
+@np.errstate(all="ignore")  # of a filter that diverged
 def drawn(followed: Followed) -> "dict[str, Figure]":
     """The figures of a track, or of the longest of several, described; by name."""
     from radarsim.recorded import figures

@@ -7,9 +7,12 @@ import math
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from radarsim.config.experiment import Experiment
-from radarsim.language import listed, numeral, plural, power_of_ten, term, tr
+from radarsim.language import listed, plural, power_of_ten, term, tr
 from radarsim.recorded import figures as accuracy
 from radarsim.recorded import fit
 from radarsim.recorded.advice import Advice, Asked, Finding
@@ -19,12 +22,6 @@ from radarsim.studies.interface import BIAS, CORRELATION, OUTLIERS
 
 # ---- words -----------------------------------------------------------------------------------------------------------
 CLEAR = 3.0  # of the log-likelihood, twenty times: from there on one filter is clearly the best
-
-
-def sentences(followed: Followed, judged: Sequence[accuracy.Judged], advised: Advice | None) -> list[str]:
-    """All lines of the report; advised: where a likelihood is known."""
-    lines = [tested(one, advised is None) for one in judged if one.tests]
-    return [*rows(followed), *errors(followed), *lines, *verdict(followed, judged, advised)]
 
 
 def verdict(followed: Followed, judged: Sequence[accuracy.Judged], advised: Advice | None) -> list[str]:
@@ -53,6 +50,9 @@ def rows(followed: Followed) -> list[str]:
     if followed.silent:
         names = ", ".join(followed.silent)
         lines.append(labelled("no rows", tr("{names}: no estimate from these plots", names=names)))
+    if followed.untested:
+        names = ", ".join(followed.untested)
+        lines.append(labelled("untested", tr("{names}: no innovation with a covariance, so no test", names=names)))
     if followed.gaps:
         words = tr(
             "{count} longer than three times the usual interval of {usual:g} s; the longest {longest:g} s, "
@@ -71,50 +71,62 @@ def counted(rows: int) -> str:
     return plural("{count} row", "{count} rows", rows)
 
 
-def errors(followed: Followed) -> list[str]:
-    """The filters' errors, where the file has the truth."""
+def errors(followed: Followed) -> list[dict[str, Any]]:
+    """The filters' errors, where the file has the truth: a row each, by column."""
     return [
-        plural(
-            "{filter}, {component}: error against the truth {rms} {unit} RMS, {ratio} of the filter's own σ "
-            "({count} estimate)",
-            "{filter}, {component}: error against the truth {rms} {unit} RMS, {ratio} of the filter's own σ "
-            "({count} estimates)",
-            one.count,
-            filter=one.filter,
-            component=one.component,
-            rms=significant_digits(one.rms),
-            unit=tr(unit(one.unit)),
-            ratio=significant_digits(one.ratio, "#.3g"),
-        )
+        {
+            "filter": one.filter,
+            "component": one.component,
+            "RMS error": one.rms,
+            "unit": tr(unit(one.unit)),
+            "of own σ": one.ratio,
+            "estimates": one.count,
+        }
         for one in followed.errors.values()
         if one.count
     ]
 
 
+ERRORS, TESTS = (term("Errors against the truth"), term("Innovations (NIS of a consistent filter: 1)"))
 FINDINGS = {
-    accuracy.FITS: term("the stated σ fits"),
     accuracy.SMALL: term(
         "the plots are less accurate than stated, or the target manoeuvres harder than the filter allows for"
     ),
     accuracy.LARGE: term(
         "the plots are more accurate than stated, or the filter allows for harder manoeuvres than occur"
     ),
-    accuracy.UNKNOWN: term("too few plots to decide"),
+    accuracy.LOST: term("the velocity is unfolded by a wrong number of spans; other filters fit the same plots"),
+    accuracy.DOUBT: term("a wrong fold, plots less accurate than stated, or harder manoeuvres than allowed for"),
 }
 
 
-def tested(one: accuracy.Judged, cured: bool) -> str:
-    """One test; cured: with the σ under which it would be passed, where it fails."""
-    bounds = tr(
-        "NIS {nis:.3g} over {plots}; 95 % of consistent filters: [{lo:.3g}, {hi:.3g}]",
-        nis=one.nis,
-        plots=plural("{count} plot", "{count} plots", one.tests),
-        lo=one.lo,
-        hi=one.hi,
-    )
-    better = ", ".join(f"{key} {numeral(f'{value:.4g}')}" for key, value in one.better.items())
-    cure = tr("; {better} would", better=better) if better and cured else ""
-    return f"{one.filter}, {one.name}: {bounds}: {tr(FINDINGS[one.verdict])}{cure}"
+def tests(judged: Sequence[accuracy.Judged]) -> list[dict[str, Any]]:
+    """The tests of the innovations: a row each, by column."""
+    return [
+        {
+            "filter": one.filter,
+            "number": one.name,
+            "plots": one.tests,
+            "NIS": one.nis,
+            "95 % from": one.lo,
+            "95 % to": one.hi,
+            "stated σ": tr(one.verdict),
+        }
+        for one in judged
+        if one.tests
+    ]
+
+
+NUMBERS = {  # columns of these, and how they are printed
+    **{"RMS error": "#.4g", "of own σ": "#.3g", "estimates": ".0f"},
+    **{"plots": ".0f", "NIS": ".3g", "95 % from": ".3g", "95 % to": ".3g"},
+}
+
+
+def findings(judged: Sequence[accuracy.Judged]) -> list[str]:
+    """The meaning of the verdicts that occur."""
+    there = {one.verdict for one in judged if one.tests}
+    return [f"{tr(verdict)}: {tr(words)}" for verdict, words in FINDINGS.items() if verdict in there]
 
 
 def nearest(judged: Sequence[accuracy.Judged]) -> list[str]:
@@ -126,7 +138,7 @@ def nearest(judged: Sequence[accuracy.Judged]) -> list[str]:
         words = tr("{names}: consistent in all tests", names=", ".join(fitting))
         return [labelled("", words)] if len(fitting) < len(verdicts) else []
     wrong = [one for one in judged if one.better]
-    if not wrong or len({one.filter for one in wrong}) < 2:
+    if not wrong:
         return []
     best = min((one for one in wrong), key=lambda one: abs(one.nis - 1))
     own = {key: value for one in wrong if one.filter == best.filter for key, value in one.better.items()}
@@ -235,6 +247,7 @@ def what(name: str, value: float) -> str:
 NAME = "report.html"
 
 
+@np.errstate(all="ignore")  # of a filter that diverged
 def write(
     followed: Followed,
     experiment: Experiment,
@@ -255,7 +268,7 @@ def write(
         _said(verdict(followed, judged, advised)) or ["Too few plots to judge the filters by."],
         _said(rows(followed)),
         list(made.values()),
-        {"Errors against the truth": _errors(followed), "Innovations": _tests(judged), "Tracks": _tracks(followed)},
+        {tr(ERRORS): errors(followed), tr(TESTS): tests(judged), "Tracks": _tracks(followed)},
         html.yaml_of(experiment.resolved),
         f"radarsim track {experiment.path or experiment.stem} {os.fspath(source)}",
     )
@@ -270,37 +283,6 @@ def _said(lines: Sequence[str]) -> list[str]:
     """Lines of the terminal as sentences: the word before each with a colon."""
     parted = (line.split(maxsplit=1) for line in lines)
     return [f"{head.capitalize()}: {rest}." for head, rest in parted]
-
-
-def _errors(followed: Followed) -> list[dict[str, object]]:
-    return [
-        {
-            "filter": one.filter,
-            "component": one.component,
-            "unit": one.unit,
-            "estimates": one.count,
-            "RMS error": one.rms,
-            "in believed σ": one.ratio,
-        }
-        for one in followed.errors.values()
-        if one.count
-    ]
-
-
-def _tests(judged: Sequence[accuracy.Judged]) -> list[dict[str, object]]:
-    return [
-        {
-            "filter": one.filter,
-            "number": one.name,
-            "plots": one.tests,
-            "mean NIS": one.nis,
-            "95 % from": one.lo,
-            "to": one.hi,
-            "stated σ": one.verdict,
-        }
-        for one in judged
-        if one.tests
-    ]
 
 
 def _tracks(followed: Followed) -> list[dict[str, object]]:

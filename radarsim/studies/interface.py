@@ -266,6 +266,10 @@ class RecordedPlots(ABC):
         the default, where velocities are taken as measured."""
         return None
 
+    def unfolds(self, one: Any) -> bool:
+        """Whether a filter of a config decides by how many spans a velocity is folded; not, by default."""
+        return False
+
     def in_a_turn(self, case: "Case", filter_name: str, values: Mapping[str, float]) -> "Turning | None":
         """The largest error of a filter in a turn, as stated and with other values of its keys. Default: not known."""
         return None

@@ -285,7 +285,15 @@ class LinearStudy(OneFile):
     def likelihood(
         self, case: "Case", filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]
     ) -> "PlotLikelihood | None":
-        return PlotLikelihood(self, case.spec, filter_name, tracks) if self.fitted else None
+        if not self.fitted:
+            return None
+        # One with gains of its own does not say how likely plots are; its motion and its plots do, where all have such.
+        members = case.spec.filters
+        known = [one for one in members if self.call(self.own_gains, case.spec, one) is None] or members
+        every = [PlotLikelihood(self, case.spec, one, tracks) for one in known if filter_name in (None, one.name)]
+        if len(every) < 2:
+            return every[0] if every else None
+        return max(every, key=lambda one: (len(one.of.columns), one(one.stated)))
 
 
 # ---- design ----------------------------------------------------------------------------------------------------------
@@ -358,6 +366,7 @@ def _after(first: Step, second: Step) -> Step:
 
 
 # ---- exact values ----------------------------------------------------------------------------------------------------
+@np.errstate(all="ignore")  # of a filter that diverges
 def exact(truth: tuple[np.ndarray, ...], of: Matrices, probability: float) -> tuple[np.ndarray, np.ndarray]:
     """σ and bias (K, n) of a filter's errors e, from the mean and covariance of (e, truth), whatever its model.
 
@@ -563,10 +572,7 @@ class PlotLikelihood:
 
     explains: tuple[str, ...] = (OUTLIERS, CORRELATION)
 
-    def __init__(
-        self, study: LinearStudy, spec: Any, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]
-    ):
-        one = next((one for one in spec.filters if one.name == filter_name), spec.filters[0])
+    def __init__(self, study: LinearStudy, spec: Any, one: Any, tracks: Sequence[Mapping[str, np.ndarray]]):
         self.spec, self.filter, self.of = spec, one.name, _Rows(study, spec, one)
         self.tracks, self.rows = len(tracks), sum(len(track["t_s"]) for track in tracks)
         self.keys = study.fitted

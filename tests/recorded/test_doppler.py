@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from radarsim.app.run import load_all
+from radarsim.cli.verdicts import report
 from radarsim.recorded import follow, plots
+from radarsim.recorded.figures import DOUBT, FITS, LOST, judged
 from radarsim.recorded.fit import folding
-from tests.program import command
+from tests.program import Terminal, command
 
 SPAN = 60.0  # m/s: 0.1 m at 1.2 kHz
 RADAR = {"sigma_range_m": 60, "sigma_velocity_mps": 3, "scan_period_s": 4, "detection_probability": 0.9}
@@ -83,6 +85,31 @@ def test_the_command_that_is_named_unfolds_them(flown, tmp_path, monkeypatch):
     rows = [line.split(",") for line in (tmp_path / "unfolded.csv").read_text().splitlines()]
     *_, last = (float(row[4]) for row in rows if row[1:3] == ["memory", "Vr"])
     assert last == pytest.approx(-250, abs=15)  # and not 10
+
+
+def test_a_filter_that_lost_its_fold_is_not_taken_for_inaccurate_plots(tmp_path, monkeypatch):
+    """The nearest fold of realisation 0 is wrong; beside filters that fit it is known, alone it is one of three."""
+    monkeypatch.setenv("COLUMNS", "80")
+    (config,) = load_all(["ambiguous_rls2"])
+    plots.write_columns(follow.simulated(config), tmp_path / "plots.csv")
+    found = follow.follow(config, tmp_path / "plots.csv")
+    verdicts = {one.filter: one.verdict for one in judged(found) if one.tests}
+    assert verdicts.pop("nearest fold") == LOST
+    assert set(verdicts.values()) == {FITS}
+    for stderr in (False, True):
+        screens = {name: Terminal() for name in ("stdout", "stderr")}
+        for name, screen in screens.items():
+            monkeypatch.setattr(f"sys.{name}", screen)
+        report(found, judged(found), None, stderr)
+        own, other = (screens[name].getvalue() for name in (("stderr", "stdout") if stderr else ("stdout", "stderr")))
+        assert other == ""
+        lines = [re.sub(r"\x1b\[\d*m", "", line) for line in own.splitlines()]
+        assert max(map(len, lines)) <= 80
+        assert any(re.fullmatch(r" nearest fold +range_m +14 +93 +0\.401 +1\.87 +fold lost", line) for line in lines)
+    lone = "filters=[{name: nearest, doppler: folded, manoeuvre_variance: 1e-3, hypotheses: 1}]"
+    (config,) = load_all(["ambiguous_rls2"], (lone,))
+    (one, *_) = judged(follow.follow(config, tmp_path / "plots.csv"))
+    assert one.verdict == DOUBT
 
 
 def test_import_notices_them_where_the_recording_does_not_say_by_what(flown, tmp_path):

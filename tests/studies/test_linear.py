@@ -304,6 +304,28 @@ def test_the_likelihood_is_that_of_all_plots_together():
         assert sum(found.by_number(np.array([sigma, noise])).values()) == pytest.approx(wanted, rel=1e-10)
 
 
+def test_what_is_fitted_is_the_likeliest_of_the_filters_that_say_how_likely_plots_are():
+    """One with gains of its own does not; where all have such, by the model that they share with a Kalman filter."""
+    study = study_of(2, 1)
+    case = case_of(study, [{"gain": "half"}, {"wrong": "R"}, {}, {"wrong": "F"}])
+    columns = study.recorded().simulated(case, 0)
+    each = {one.name: study.likelihood(case, one.name, [columns]) for one in case.spec.filters}
+    half, *others = each.values()
+    assert half is None
+    best = max(others, key=lambda one: one(one.stated))
+    assert study.likelihood(case, None, [columns]).filter == best.filter
+    alone = study.likelihood(case_of(study, [{"gain": "half"}]), None, [columns])
+    right = each[case.spec.filters[2].name]
+    assert alone(alone.stated) == pytest.approx(right(right.stated), rel=1e-12)
+
+
+def test_a_filter_that_diverges_has_no_exact_error_and_no_warning():
+    study = study_of(2, 1)
+    study.own_gains = lambda spec, one: np.full((spec.scans, 1, 2), 9.0)
+    plan = study.prepare(case_of(study, [{}], scans=400))
+    assert not np.isfinite(plan.axes.exact_sigma[0, -1]).any()
+
+
 def test_at_the_first_plot_and_over_no_time_the_state_stays_whatever_the_motion_says():
     """Of a motion that is the same over any time; F(0) of an author's formula may fail."""
     study = study_of(2, 1)

@@ -283,7 +283,7 @@ def failing(what):
     def measure(seen):
         if isinstance(what, BaseException):
             raise what
-        return what
+        return what(seen) if callable(what) else what
 
     return over.Call("own", measure, (), {}, "file.py:7:1")
 
@@ -296,6 +296,8 @@ def failing(what):
         (ValueError("boom"), "ValueError: boom \\("),
         (SystemExit(0), "SystemExit: 0 \\("),
         (NoSuchName("no filter 'quikc'; there are slow"), "no filter 'quikc'; there are slow \\("),
+        (lambda seen: seen.curve({}, "quick", "x").at(41), "no such scans; there are 1 to 40 \\("),
+        (lambda seen: seen.gain({}, "quick", "x").since(50), "no such scans; there are 1 to 40 \\("),
     ],
 )
 def test_a_measure_that_fails_is_one_line_and_the_other_claims_are_judged(made, what, said):

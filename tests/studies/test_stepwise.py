@@ -13,6 +13,8 @@ from radarsim.config.fields import Member, Model, Positive, Probability, key
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.kernels.traced import elimination, sqrt, updated, where
+from radarsim.recorded import page
+from radarsim.recorded.follow import BEFORE, Followed
 from radarsim.studies import judged, stepwise
 from radarsim.studies.onefile import Component, Measured
 from radarsim.studies.stepwise import Steps, StepStudy
@@ -199,6 +201,22 @@ def test_the_plots_of_a_realisation_followed_in_plain_python_are_what_the_run_ma
     np.testing.assert_allclose(track.estimate[..., 0] - plots["true_x_m"], sums["error"][..., 0, 0], atol=1e-12)
     np.testing.assert_allclose(track.sigma[0, :, 0] ** 2, sums["believed"][0, :, 0], rtol=1e-12)
     assert np.isnan(track.sigma[1]).all()
+
+
+def test_a_filter_without_a_covariance_is_told_of_beside_recorded_plots():
+    """Its errors, and that it is not tested."""
+    study = Walk()
+    case = case_of(study)
+    columns = dict(study.recorded().simulated(case, 1))
+    track, found = study.tracker(case).feed(columns), Followed(case)
+    truth = {name: columns.pop(name) for name in list(columns) if name.startswith("true_")}
+    found.take(columns, track)
+    found.compare(track, columns["t_s"], truth)
+    for f, own in enumerate(page.errors(found)):
+        error = (track.estimate[f, :, 0] - truth["true_x_m"])[BEFORE:]
+        assert own["RMS error"] == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
+        assert np.isnan(own["of own σ"]) == (f == 1)
+    assert found.untested == ["kalman", "halves"]
 
 
 def test_missed_plots_are_missed_as_often_as_stated():

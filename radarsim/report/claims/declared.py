@@ -44,7 +44,11 @@ class NoSuchName(Missing):
     for_the_author = True
 
     def __str__(self) -> str:
-        return self.why
+        return "; ".join(self.args)
+
+
+class NoSuchScans(NoSuchName):
+    """A curve that is there has no such scans. A second text says which it has."""
 
 
 class Hidden(dict):
@@ -81,7 +85,8 @@ class Series:
     def where(self, mask: np.ndarray | slice) -> "Series":
         """The points selected by a mask or indices; raises Missing where there is none."""
         if not np.asarray(self.k)[mask].size:
-            raise Missing("no such scans")
+            there = f"there are {self.k[0]} to {self.k[-1]}" if len(self.k) else "there are none"
+            raise NoSuchScans("no such scans", there)
         k, t, value, lo, hi = (np.asarray(part)[mask] for part in (self.k, self.t, self.value, self.lo, self.hi))
         return Series(k, t, value, lo, hi, self.short)
 

@@ -58,7 +58,16 @@ from radarsim.engine.results import CaseResult
 from radarsim.errors import OF_AUTHORS, ConfigError, MeasureError, RadarsimError
 from radarsim.language import term, tr
 from radarsim.report.claims import rule
-from radarsim.report.claims.declared import Claim, Evidence, Missing, NoSuchName, PaperClaims, Part, certain
+from radarsim.report.claims.declared import (
+    Claim,
+    Evidence,
+    Missing,
+    NoSuchName,
+    NoSuchScans,
+    PaperClaims,
+    Part,
+    certain,
+)
 from radarsim.report.claims.judge import exact as known
 from radarsim.report.claims.judge import weighed
 from radarsim.report.claims.rule import AGAINST, EQUIVALENT, UNSTATED, Judged, Outcome
@@ -786,6 +795,10 @@ def under(of: PaperReadings, claim: Claim, reading: Reading, evidence: Evidence,
         )
     except Missing as missing:
         return Under(claim, reading, name, kind, why=missing.why or NOTHING)
+    except MeasureError as error:
+        if name == DEFAULT or not isinstance(error.__cause__, NoSuchScans):  # a reading may have fewer scans
+            raise
+        return Under(claim, reading, name, kind, why=error.__cause__.why)
     outcome = rule.claim([judged for _, judged in parts], **claim.how)
     return Under(claim, reading, name, kind, parts, outcome)
 

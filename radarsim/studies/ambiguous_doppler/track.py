@@ -610,6 +610,9 @@ class Recorded(RecordedPlots):
     def unfolding(self, span_mps: float) -> tuple[str, str]:
         return UNFOLDS, f"radar.repetition_rate_hz={2 * span_mps / UNFOLDS_WAVELENGTH_M:.6g}"
 
+    def unfolds(self, one: Any) -> bool:
+        return bool(getattr(one, "doppler", "") == "folded")
+
     def likelihood(
         self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]
     ) -> PlotLikelihood | None:
