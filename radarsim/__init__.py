@@ -16,6 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from radarsim.app.judge import judge
     from radarsim.app.own_data import fit, plots, read_plots, simulate, track
     from radarsim.app.python import chart, check, claims, compare, load, readings, sensitivity, solve
     from radarsim.app.result import Result
@@ -33,6 +34,7 @@ __all__ = [
     "claims",
     "compare",
     "fit",
+    "judge",
     "load",
     "plots",
     "read_plots",
@@ -45,7 +47,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    **{"run": "app.run:run", "Result": "app.result:Result"},
+    **{"judge": "app.judge:judge", "run": "app.run:run", "Result": "app.result:Result"},
     **{name: f"app.own_data:{name}" for name in ("fit", "plots", "read_plots", "simulate", "track")},
     **{name: f"app.python:{name}" for name in ("chart", "check", "claims", "compare")},
     **{name: f"app.python:{name}" for name in ("load", "readings", "sensitivity", "solve")},

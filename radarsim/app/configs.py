@@ -339,8 +339,14 @@ class CaseWork:
 
     @cached_property
     def plans(self) -> tuple[Plan, ...]:
-        """The plan, and that of each further baseline; their sums are concatenated."""
-        return (self.plan, *(study(self.case.study).prepare(one) for one in self.case.companions))
+        """The plan, that of each further baseline, and of filters from outside; their sums are concatenated."""
+        of = study(self.case.study)
+        plans = (self.plan, *(of.prepare(one) for one in self.case.companions))
+        if not self.case.outside:
+            return plans
+        from radarsim.studies import outside
+
+        return (*plans, outside.prepare(of, self.case, self.plan))
 
     @cached_property
     def identity(self) -> str:
@@ -363,7 +369,12 @@ class CaseWork:
         """Sums (size,) over realisations first … first + count - 1."""
         import numpy as np
 
-        made = [study(self.case.study).simulate(plan, first, count) for plan in self.plans]
+        own = self.plans[:-1] if self.case.outside else self.plans
+        made = [study(self.case.study).simulate(plan, first, count) for plan in own]
+        if self.case.outside:
+            from radarsim.studies import outside
+
+            made.append(outside.simulate(self.plans[-1], first, count))
         return made[0] if len(made) == 1 else np.concatenate(made)
 
     def unpacked(self, values: "np.ndarray") -> "Iterator[dict[str, np.ndarray]]":

@@ -22,7 +22,7 @@ from radarsim.engine import store
 from radarsim.engine.results import CaseResult
 from radarsim.errors import OF_AUTHORS, DisagreementError, MeasureError, RadarsimError
 from radarsim.language import ENGLISH, called, current, few, plural, tr
-from radarsim.report import claims, files, notes, seen
+from radarsim.report import claims, files, notes, outside, seen
 from radarsim.report import tables as common
 from radarsim.report.claims import page
 from radarsim.report.claims.page import OVER, with_classes
@@ -295,7 +295,8 @@ def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
     made = measured(results)
     verdicts = claims.judged(of.claims(), results, made, configs.shipped, stem)
     made["claims"] = over_readings(verdicts, results[0].study)
-    return notes.noted(made, results, of.exact_errors, quantities(results[0].study, results[0].spec))
+    made = notes.noted(made, results, of.exact_errors, quantities(results[0].study, results[0].spec))
+    return outside.added(made, results)
 
 
 def over_readings(verdicts: "pd.DataFrame", name: str, out: Path | None = None) -> "pd.DataFrame":
@@ -337,7 +338,7 @@ def _against_all(results: Sequence[CaseResult], gains: "Callable[[CaseResult], p
 
 def against_first(made: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]) -> Mapping[str, "pd.DataFrame"]:
     """The tables with gains against the first baseline of each case only."""
-    if not any(result.against for result in results):
+    if not any(result.against or result.outside for result in results):
         return made
     return {**made, "gains": common.against_own(made["gains"], results)}
 
@@ -361,7 +362,11 @@ def answers(results: Sequence[CaseResult]) -> "list[notes.Answer]":
     """Functions that make the answer from the tables: the study's own, and for each further baseline."""
     own = study(results[0].study)
     further = [partial(_gained, one) for result in results for one in result.against]
-    return [lambda made: own.answer(results, against_first(made, results)), *further[:MOST_FURTHER]]
+    return [
+        *outside.answers(results),
+        lambda made: own.answer(results, against_first(outside.without(made, results), results)),
+        *further[:MOST_FURTHER],
+    ]
 
 
 def of_intervals(results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"]) -> list[str]:
@@ -407,11 +412,13 @@ def case_figures(
     """
     own = study(results[0].study)
     banded = _banded(made)
-    drawn = dict(own.figures(results, against_first(banded, results), experiment))
+    alone = outside.without(banded, results)
+    drawn = dict(own.figures(results, against_first(alone, results), experiment))
     for n in range(max(len(result.against) for result in results)):
         others = [result.against[n] for result in results if len(result.against) > n]
-        found = own.figures(others, {**banded, "gains": common.against_own(banded["gains"], others)}, experiment)
+        found = own.figures(others, {**alone, "gains": common.against_own(alone["gains"], others)}, experiment)
         drawn |= {f"{name}_{n + 2}": figure for name, figure in found.items() if name.startswith("gain_")}
+    drawn |= outside.figures(results, banded, experiment, drawn)
     if made["claims"]["claim"].nunique() > FEW_CLAIMS and (judged := page.figure(made["claims"].to_dict("records"))):
         drawn["claims"] = judged
     if any(notes.heavy(made[name]).any() for name in ("curves", "gains")):
@@ -517,7 +524,7 @@ def write_files(
         answer,
         question,
         inputs=own.inputs(results),
-        cost=own.cost(made, run),
+        cost=own.cost(outside.without(made, results), run),
         agreement=notes.agreement(made["curves"]) if own.exact_errors else None,
         drawn_from=own.drawn_from(),
     )

@@ -286,11 +286,17 @@ def case_result(case: Case, work: CaseWork, collected: Collected) -> CaseResult:
     values = collected.values.view()
     values.flags.writeable = False  # tables and figures are made of them on demand
     count, seconds, found = collected.count, collected.kernel_seconds, []
-    for plan, of, sums in zip(work.plans, (case, *case.companions), work.unpacked(values), strict=True):
+    unpacked = list(work.unpacked(values))
+    for plan, of, sums in zip(work.plans, (case, *case.companions), unpacked, strict=False):
         # Cases that differ in display names alone share their work.
         axes = plan.axes if work.case == case else study(case.study).relabelled(plan.axes, of)
         found.append(CaseResult(of.name, of.study, of.spec, of.swept, count, sums, axes, seconds))
-    return replace(found[0], against=tuple(found[1:]))
+    whole = replace(found[0], against=tuple(found[1:]))
+    if not case.outside:
+        return whole
+    from radarsim.studies import outside
+
+    return replace(whole, outside=outside.result(work.plans[-1], whole, unpacked[-1]))
 
 
 # ---- writing ---------------------------------------------------------------------------------------------------------

@@ -87,6 +87,7 @@ class Case:
     companion, the same case but for that key, computed on the same noise.
     asked_from_k: exact σ and gains are asked for from this scan on, counted from 1; 0: every exact value. roughly: what
     is long to compute may be off by a thousandth, as where a search only looks about.
+    outside: filters of somebody else beside the study's own, see `radarsim.studies.outside`.
     """
 
     name: str
@@ -100,16 +101,18 @@ class Case:
     asked_from_k: int = 0
     roughly: bool = False
     against: tuple[str, ...] = ()
+    outside: tuple[Any, ...] = ()
 
     def __repr__(self) -> str:
-        filters = ", ".join(member.name for member in self.spec.members)
+        filters = ", ".join(member.name for member in (*self.spec.members, *self.outside))
         return f"<case {self.name}: {self.realisations:,} realisations, seed {self.seed}; filters {filters}>"
 
     @property
     def companions(self) -> "tuple[Case, ...]":
         """The case with each further baseline in place of its own."""
         return tuple(
-            replace(self, spec=self.spec.model_copy(update={"baseline": name}), against=()) for name in self.against
+            replace(self, spec=self.spec.model_copy(update={"baseline": name}), against=(), outside=())
+            for name in self.against
         )
 
     @property

@@ -100,7 +100,8 @@ class CaseResult(Generic[A_co]):
 
     A study's own tables take results with its own axes, `CaseResult[RangeDopplerAxes]`; a plain `CaseResult` is any.
 
-    against holds the same case with the sums and axes of each further baseline.
+    against holds the same case with the sums and axes of each further baseline; outside, where it has filters of
+    somebody else, with theirs.
 
     `error` (F, K, C, 4) holds the sums of e, e², e³, e⁴; `paired` (F, K, C) those of e²·e² with the baseline's error; a
     study adds its own.
@@ -115,6 +116,7 @@ class CaseResult(Generic[A_co]):
     axes: A_co
     seconds: float = 0.0
     against: "tuple[CaseResult[A_co], ...]" = ()
+    outside: "CaseResult[Axes] | None" = None
 
     def __repr__(self) -> str:
         filters = ", ".join(self.axes.filters)

@@ -43,6 +43,8 @@ def identity(case: Case) -> str:
     if case.against:
         names = [member.name for member in case.spec.members]
         question["against"] = [names.index(name) for name in case.against]
+    if case.outside:
+        question["outside"] = [one.identity for one in case.outside]
     return digest(question)[:QUESTION] + sources(case.study, packages(case))[:QUESTION]
 
 

@@ -1,0 +1,322 @@
+"""A filter of somebody else judged on the noise of a run, from a function, from arrays, or from a file of estimates."""
+
+import hashlib
+import itertools
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from radarsim.app import configs, run
+from radarsim.app.configs import CaseWork, Config, Overrides
+from radarsim.config.experiment import Case, Experiment
+from radarsim.errors import ConfigError
+from radarsim.language import tr
+from radarsim.report import statistics
+from radarsim.studies import outside
+from radarsim.studies.interface import TRUE, true_column
+from radarsim.studies.outside import Called, Chunks, Given, Outside, Plan, Plots
+
+if TYPE_CHECKING:
+    from radarsim.app.result import Result
+
+TRIED = 256  # realisations on which a filter is checked before it is judged
+MATERIAL = 1e-3  # of a component's rms error: changes below it are rounding, which also float32 makes
+FOLLOWS = 50  # realisations from which on it is tested whether errors follow the plots
+REARRANGED = 10.0  # times: by so much smaller are errors in another order only where that is the right one
+AXES = "realisation", "k", "t_s"  # columns of a table of estimates beside the components
+ARRAYS = "estimates", "covariances", "realisations", "components", "seed", "config"
+
+
+def judge(
+    config: Config,
+    estimates: Any,
+    *,
+    name: str = "mine",
+    components: Sequence[str] = (),
+    one_by_one: bool = False,
+    overrides: Overrides = (),
+    realisations: float | None = None,
+    seed: int | None = None,
+    precision: float | None = None,
+    of: str = "sigma",
+    threads: int | None = None,
+    out: str | os.PathLike[str] | None = None,
+    figures: bool | str | Sequence[str] = True,
+    width_mm: float | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
+) -> "Result":
+    """Judge a filter of your own on the plots of a run; returns a result like that of `run`, its filter beside the
+    config's.
+
+    estimates is an array (n, K, d) for realisations 0 … n - 1 of `plots`, or a pair with covariances (n, K, d, d); the
+    file of one (npz, csv, parquet); an iterator of such chunks; a function of plots that gives one; or an object, or
+    class, with `start(world)` and `step(plots)`, which is asked scan by scan: see `radarsim.studies.outside`. The d
+    components are the leading ones of the state, or those named. one_by_one: the function takes one realisation.
+
+    Gains are against every filter of the config, paired on the same realisations. Not-a-number before the first
+    estimate of a realisation is no estimate yet; after it, or an error over a hundred times those of the config's
+    filters, is a failure: `tables["failures"]`. σ and gains are of the other realisations. `warnings` say what is
+    unsound: a function that looks ahead, that gives other estimates when called again, single precision.
+
+    The other arguments are those of `run`; blocks are not stored, and results are in out/CONFIG_NAME. Raises
+    ConfigError for estimates of another shape, order or seed.
+
+    >>> import radarsim
+    >>> result = judge("rls2", lambda plots: plots["range_m"], name="raw plots", realisations=2000)
+    >>> result.gains.query("filter == 'raw plots' and component == 'r'")["baseline"].unique().tolist()
+    ['r', 'r+Vr']
+    """
+    asked: dict[str, Any] = {"precision": precision, "threads": threads, "figures": figures, "width_mm": width_mm}
+    texts = run.merged(configs.check(overrides, out=out, **asked), None, seed)
+    experiment, warnings = judged(configs.load(config, texts), estimates, name, components, one_by_one, realisations)
+    (member,) = experiment.cases[0].outside
+    asked |= {"of": of, "progress": progress, "threads": 0 if member.in_order else threads}
+    result = run.run(experiment, **asked)
+    return finished(result, warnings, out, figures, width_mm)
+
+
+def finished(
+    result: "Result",
+    warnings: Sequence[str],
+    out: str | os.PathLike[str] | None,
+    figures: bool | str | Sequence[str] = True,
+    width_mm: float | None = None,
+    command: str = "none: the filter was given in Python",
+) -> "Result":
+    """The result with what the checks found, written where asked."""
+    judged_by = {one.name: one.identity for case in result.experiment.cases for one in case.outside}
+    result.facts |= {"command": command, "judged": judged_by}
+    result.facts["warnings"] = [*warnings, *result.facts["warnings"]]
+    if out is not None:
+        result.write(out, figures, width_mm)
+    return result
+
+
+def judged(
+    experiment: Experiment,
+    estimates: Any,
+    name: str,
+    components: Sequence[str] = (),
+    one_by_one: bool = False,
+    realisations: float | None = None,
+) -> tuple[Experiment, list[str]]:
+    """The experiment with a filter beside its own, under a name with the filter's, and what the checks say of it."""
+    if not isinstance(name, str) or not name.strip() or "/" in name or name.startswith("."):
+        raise ConfigError(f"name: must be the name of a filter, got {name!r}")
+    n, cases = configs.whole(realisations), experiment.cases
+    member = source(estimates, name, tuple(components), one_by_one, cases)
+    there = len(member.arrays[0]) if isinstance(member, Given) else None
+    if there is not None and (n or 0) > there:
+        raise ConfigError(f"{name}: there are estimates of {there} realisations, fewer than {n}")
+    counts = {"realisations": n or there} if n or there else {}
+    cases = tuple(replace(case, outside=(member,), **counts) for case in cases)
+    stem = f"{experiment.stem}_{'_'.join(name.split())}"
+    made = replace(experiment, stem=stem, cases=cases, **counts)
+    return made, [line for case in made.cases for line in tried(case, member)]
+
+
+def source(
+    given: Any, name: str, components: tuple[str, ...], one_by_one: bool, cases: Sequence[Case]
+) -> Outside:
+    """Where the estimates come from. Raises ConfigError for what is none of the kinds."""
+    if isinstance(given, Outside):
+        return given
+    if callable(given) or hasattr(given, "step"):
+        if hasattr(given, "step") != hasattr(given, "start"):
+            raise ConfigError(f"{name}: a filter that is asked scan by scan must have start(world) and step(plots)")
+        components = components or tuple(getattr(given, "components", ()))
+        return Called(name, given, f"{id(given)}", components, one_by_one)
+    if len(cases) > 1:
+        every = ", ".join(case.name for case in cases)
+        raise ConfigError(f"{name}: estimates are of one case, and there are {every}: give one config, or a function")
+    if isinstance(given, Iterator):
+        return Chunks(name, given, f"{id(given)}", components)
+    if isinstance(given, str | os.PathLike):
+        given, components = read(Path(given), cases[0], components)
+    x, P = given if isinstance(given, tuple) and len(given) == 2 else (given, None)
+    x, P = np.asarray(x), None if P is None else np.asarray(P)
+    if x.ndim not in (2, 3) or x.dtype.kind not in "fiu":
+        raise ConfigError(f"{name}: estimates must be an array (n, K, d), a function, an iterator or a file, got {given!r:.60}")
+    found = hashlib.sha256(np.ascontiguousarray(x).tobytes())
+    found.update(b"" if P is None else np.ascontiguousarray(P).tobytes())
+    return Given(name, (x, P), found.hexdigest(), components)
+
+
+# ---- files -----------------------------------------------------------------------------------------------------------
+def read(path: Path, case: Case, components: tuple[str, ...]) -> tuple[Any, tuple[str, ...]]:
+    """Estimates of a file, with covariances where it has them, by realisation from 0 on; the components that it names.
+
+    Raises ConfigError for a file that is none of the kinds, or of other realisations or another seed than the case's.
+    """
+    try:
+        if path.suffix == ".npz":
+            with np.load(path, allow_pickle=False) as held:
+                return _of_arrays(path, dict(held), case, components)
+        import pandas as pd
+
+        if path.suffix not in (".csv", ".parquet"):
+            raise ConfigError(f"{path}: must end in .npz, .csv or .parquet")
+        table = pd.read_csv(path, comment="#") if path.suffix == ".csv" else pd.read_parquet(path)
+        return _of_table(path, {str(one): table[one].to_numpy() for one in table}, case)
+    except (OSError, ValueError, ImportError) as error:
+        raise ConfigError(f"{path}: cannot be read: {error}") from error
+
+
+def _of_arrays(
+    path: Path, held: Mapping[str, np.ndarray], case: Case, components: tuple[str, ...]
+) -> tuple[Any, tuple[str, ...]]:
+    if "estimates" not in held:
+        raise ConfigError(f"{path}: must hold an array `estimates` (n, K, d), got {', '.join(held) or 'nothing'}")
+    if "seed" in held and int(held["seed"]) != case.seed:
+        raise ConfigError(f"{path}: of plots with seed {int(held['seed'])}; the run has seed {case.seed}")
+    x, P = held["estimates"], held.get("covariances")
+    rows = np.asarray(held.get("realisations", np.arange(len(x)))).ravel()
+    if len(rows) != len(x):
+        raise ConfigError(f"{path}: realisations: must be {len(x)} numbers, as many as there are estimates, got {len(rows)}")
+    order = _in_order(path, rows)
+    own = tuple(map(str, held["components"])) if "components" in held else components
+    return (x[order], P[order]) if P is not None else x[order], own
+
+
+def _of_table(path: Path, held: Mapping[str, np.ndarray], case: Case) -> tuple[Any, tuple[str, ...]]:
+    """One row a realisation and scan: `realisation`, `k` or `t_s`, and a column for each component."""
+    state = CaseWork(case).plan.axes.components
+    columns = {name: one for name in held for one, unit in state if name in (one, true_column(one, unit).removeprefix(TRUE))}
+    scan = next((held[one] for one in AXES[1:] if one in held), None)
+    if "realisation" not in held or scan is None or not columns:
+        wanted = f"realisation, k or t_s, and of {', '.join(one for one, _ in state)} those it estimates"
+        raise ConfigError(f"{path}: must have the columns {wanted}; got {', '.join(held)}")
+    rows, K = np.lexsort((scan, held["realisation"])), len(np.unique(scan))
+    numbers = held["realisation"][rows]
+    if len(rows) % K or (numbers.reshape(-1, K) != numbers[::K, None]).any():
+        short = next(i for i, n in zip(*np.unique(numbers, return_counts=True), strict=True) if n != K)
+        raise ConfigError(f"{path}: realisation {short}: must have one row for each of the {K} scans, empty cells where "
+                          f"there is no estimate")  # fmt: skip
+    order = _in_order(path, numbers[::K])
+    x = np.stack([held[name][rows].astype(float).reshape(-1, K) for name in columns], axis=-1)
+    return x[order], tuple(columns.values())
+
+
+def _in_order(path: Path, rows: np.ndarray) -> np.ndarray:
+    """The order in which the realisations of a file are 0, 1, 2, …"""
+    order = np.argsort(rows, kind="stable")
+    if (wrong := np.flatnonzero(rows[order] != np.arange(len(rows)))).size:
+        at = int(wrong[0])
+        raise ConfigError(f"{path}: must hold every realisation from 0 on once: where {at} should be there is "
+                          f"{rows[order][at]}; `radarsim simulate CONFIG --realisations 0:{len(rows)} -o …` writes them")  # fmt: skip
+    return order
+
+
+# ---- checks ----------------------------------------------------------------------------------------------------------
+def tried(case: Case, member: Outside) -> list[str]:
+    """What is unsound about a filter, found on a few realisations; raises ConfigError where its estimates are not of
+    these plots."""
+    plan = CaseWork(case).plans[-1]
+    drawn = plan.draw(0, min(case.realisations, TRIED))
+    plots = outside.plots_of(plan, drawn)
+    given = member.estimates(plots)
+    raw = np.asarray(given[0] if isinstance(given, tuple) else given)
+    inner = outside.inner_errors(plan, 0, drawn.n)
+    found = outside.judged(plan, member, given, drawn, outside.largest(inner))
+    x, _ = outside.checked(member.name, given, drawn.n, len(plan.world.t_s), plan.names, member.components)
+    places = outside.columns_of(member.name, x.shape[2], plan.names, member.components)
+    _rearranged(plan, member, x, drawn.truth_of(plan.axes.components), places, inner)
+    _follows(case, member, found.error, inner)
+    with np.errstate(invalid="ignore"):
+        rms = np.sqrt(np.nanmean(np.square(np.where(np.isnan(found.error), 0, found.error)), axis=(0, 1)))[places]
+    lines = []
+    if raw.dtype.kind == "f" and raw.dtype.itemsize < np.dtype(float).itemsize:
+        step = float(np.nanmax(np.spacing(np.nanmax(np.abs(raw.reshape(-1, x.shape[2])), axis=0)) / rms))
+        lines.append(tr("{name}: estimates in {type}, which rounds them by up to {share:.1g} of their rms error",
+                        name=member.name, type=str(raw.dtype), share=step))  # fmt: skip
+    if isinstance(member, Called):
+        if any(not np.array_equal(plots[one], drawn.columns[one], equal_nan=True) for one in drawn.columns):
+            lines.append(tr("{name}: changes the plots that it is given; it gets copies", name=member.name))
+        lines += _repeatable(plan, member, x, MATERIAL * rms)
+    return lines
+
+
+def _again(plan: Plan, member: Outside, plots: Plots) -> np.ndarray:
+    return outside.checked(
+        member.name, member.estimates(plots), plots.n, len(plan.world.t_s), plan.names, member.components
+    )[0]
+
+
+def _differ(one: np.ndarray, other: np.ndarray, least: np.ndarray) -> bool:
+    with np.errstate(invalid="ignore"):
+        return bool((np.isfinite(one) != np.isfinite(other)).any() or (np.abs(one - other) > least).any())
+
+
+def _repeatable(plan: Plan, member: Called, x: np.ndarray, least: np.ndarray) -> Iterator[str]:
+    """Whether a filter gives the same again, without the rest of its batch, and with other plots after some scan."""
+    n, K = x.shape[:2]
+    name = member.name
+    if _differ(_again(plan, member, outside.plots_of(plan, plan.draw(0, n))), x, least):
+        yield tr("{name}: gives other estimates when it sees the same plots again: its numbers cannot be repeated", name=name)
+        return
+    half = max(n // 2, 1)
+    if half < n and _differ(_again(plan, member, outside.plots_of(plan, plan.draw(0, half))), x[:half], least):
+        yield tr("{name}: its estimates of a realisation depend on which others are in the batch", name=name)
+        return
+    if hasattr(member.target, "step") or K < 2 or n < 2:
+        return
+    cut = K // 2
+    plots = outside.plots_of(plan, plan.draw(0, n))
+    for column in plots.columns.values():
+        column[:, cut:] = np.roll(column[:, cut:], 1, axis=0)  # of another realisation
+    if _differ(_again(plan, member, plots)[:, :cut], x[:, :cut], least):
+        yield tr("{name}: looks ahead: with other plots after scan {k} its estimates up to there change; a filter that "
+                 "waits for later plots is no rival of those that do not", name=name, k=cut)  # fmt: skip
+
+
+def _rearranged(
+    plan: Plan, member: Outside, x: np.ndarray, truth: np.ndarray, places: Sequence[int], inner: np.ndarray
+) -> None:
+    """Raises ConfigError where estimates fit in another order of components or scans, and not as they stand."""
+    with np.errstate(all="ignore"):
+        scale = np.sqrt(np.nanmedian(np.square(inner), axis=(0, 1, 2)))[list(places)]
+
+        def misfit(order: Sequence[int], step: int) -> float:
+            off = np.abs(x[:, ::step][..., list(order)] - truth[..., list(places)])
+            median = np.nanmedian(np.where(np.isinf(off), np.nan, off), axis=(0, 1))
+            return float(np.nanmean(np.log(np.maximum(median / scale, 1e-3))))
+
+        d = len(places)
+        swaps = itertools.permutations(range(d)) if d <= 4 else (
+            [*range(i), j, *range(i + 1, j), i, *range(j + 1, d)] for i in range(d) for j in range(i + 1, d)
+        )  # fmt: skip
+        every = [(range(d), 1), (range(d), -1), *((order, 1) for order in swaps)]
+        fits = [misfit(*one) for one in every]
+    order, step = every[int(np.nanargmin(fits))] if np.isfinite(fits).any() else every[0]
+    if fits[0] - np.nanmin(fits) > np.log(REARRANGED):
+        stand = "the scans from the last to the first" if step < 0 else "the components in the order " + ", ".join(
+            plan.names[places[list(order).index(i)]] for i in range(d)
+        )
+        raise ConfigError(f"{member.name}: estimates hold {stand}: their errors are then {np.exp(fits[0] - np.nanmin(fits)):.2g} "
+                          f"times smaller; expected {', '.join(plan.names[i] for i in places)} by rising scans")  # fmt: skip
+
+
+def _follows(case: Case, member: Outside, error: np.ndarray, inner: np.ndarray) -> None:
+    """Raises ConfigError where the errors are no more alike those of any filter of the config than by chance.
+
+    Of all that see the same plots they are correlated. For each realisation the products of the normalised errors are
+    averaged over scans and components; over realisations their mean is tested against nought.
+    """
+    n = len(error)
+    if n < FOLLOWS:
+        return
+    with np.errstate(all="ignore"):
+        mine, *own = ((one - np.nanmean(one, axis=0)) / np.nanstd(one, axis=0) for one in (error, *inner))
+        scores = []
+        for one in own:
+            alike = np.nanmean(np.where(np.isfinite(mine * one), mine * one, np.nan).reshape(n, -1), axis=1)
+            alike = alike[np.isfinite(alike)]
+            scores.append(alike.mean() / alike.std() * np.sqrt(alike.size) if alike.size >= FOLLOWS else np.nan)
+    if np.isfinite(scores).any() and np.nanmax(scores) < statistics.furthest(len(scores)):
+        raise ConfigError(f"{member.name}: its errors have nothing in common with those of the config's filters, which see the "
+                          f"same plots: estimates of other realisations, in another order, or of another seed than "
+                          f"{case.seed}?")  # fmt: skip

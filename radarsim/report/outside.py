@@ -1,0 +1,227 @@
+"""Tables, answer and figures of filters from outside beside those of a config: `CaseResult.outside`.
+
+The study's own tables stay as they are; rows of these filters stand below. Their gains are against every filter of the
+config, each over the realisations in which both have an estimate.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from radarsim.config.experiment import Experiment
+from radarsim.engine.results import CaseResult
+from radarsim.language import listed, tr
+from radarsim.report import notes, panels, statistics, wording
+from radarsim.report import tables as common
+from radarsim.report.drawing import Figure
+from radarsim.report.quantities import RADIAL, Component
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Made = Mapping[str, "pd.DataFrame"]
+GAIN = ("gain_percent", "gain_lo", "gain_hi")
+
+
+# ---- tables ----------------------------------------------------------------------------------------------------------
+def others(result: CaseResult) -> list[CaseResult]:
+    """The filters from outside of a result as a case; none where it has none."""
+    return [] if result.outside is None else [result.outside]
+
+
+def names(result: CaseResult) -> tuple[str, ...]:
+    """What gains may be against: the config's filters, its baseline first, then those from outside."""
+    own, b = result.axes.filters, result.axes.baseline
+    return (own[b], *own[:b], *own[b + 1 :], *(name for one in others(result) for name in one.axes.filters))
+
+
+def gains(result: CaseResult) -> common.Columns:
+    """Gains of the filters from outside of one case against all that come before them."""
+    return common.stacked([_gains(result, name, one) for one in others(result) for name in names(result)])
+
+
+def _gains(result: CaseResult, base: str, of: CaseResult) -> common.Columns:
+    every = (*result.axes.filters, *of.axes.filters)
+    both = np.asarray(of.sums["both"])[:, every.index(base)]
+    at = f, k, c = common.shown(of, both[..., 0] > 0)
+    n, own, own_4, base_2, base_4, cross = np.moveaxis(both[at], -1, 0)
+    return {
+        **common.leading(of, f, k, baseline=np.full(f.size, base, dtype=object), **common.components(of, c)),
+        "gain_percent|gain": statistics.gain(own, own_4, base_2, base_4, cross, n),
+        "exact_percent": np.full(f.size, np.nan),
+    }
+
+
+def failures(result: CaseResult) -> common.Columns:
+    """How often a filter from outside fails, by the reason; σ and gains are of the other realisations.
+
+    reason: `any`; `not_a_number`: after an estimate; `no_estimate` although a filter of the config has one; `diverged`:
+        an error over a hundred times the largest of the config's filters in the realisation
+    share ±: of all realisations
+    """
+    rows = []
+    for one in others(result):
+        for name, counts in zip(one.axes.filters, np.asarray(one.sums["failures"]), strict=True):
+            for reason, count in (("any", counts[:3].sum()), *zip(REASONS, counts[:3], strict=True)):
+                share = statistics.rate(count, one.count)
+                row = {"case": one.name, "filter": name, "reason": reason, "n": one.count, "failed": int(count)}
+                rows.append(row | {"share": statistics.Estimate(*map(float, share))})
+    return common.of_rows(rows)
+
+
+REASONS = ("not_a_number", "no_estimate", "diverged")
+
+
+def consistency(result: CaseResult) -> common.Columns:
+    """NEES of the components that a filter from outside estimates, where it gives covariances."""
+    parts: list[common.Columns] = []
+    for one in others(result):
+        sums = np.asarray(one.sums["nees"])
+        f, k = np.nonzero(sums[..., 0] > 1)
+        n, total, square = np.moveaxis(sums[f, k], -1, 0)
+        looks = int((sums[..., 0] > 1).sum(1).max(initial=1))
+        mean, bounds = statistics.mean_square(total, square, n), notes.bounds_from_spread(total, square, n, looks)
+        parts.append({**common.leading(one, f, k), "n": n.astype(np.int64), **notes.normalised("nees", mean, bounds)})
+    return common.stacked(parts)
+
+
+def added(made: Made, results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
+    """The tables with the rows of filters from outside below their own."""
+    outside = [one for result in results for one in others(result)]
+    if not outside:
+        return dict(made)
+    with_own = [one for one in results if one.outside is not None]
+    curves = common.curves(outside)
+    rows = {"curves": _below(made["curves"], curves), "gains": common.joined(map(gains, with_own), common.GAINS)}
+    rows = notes.noted(rows, [*results, *outside], exact=False)
+    marked = rows["curves"].tail(len(curves))
+    rows["curves"] = marked if (marked.get("note", "") != "").any() else marked.drop(columns="note", errors="ignore")
+    rows["failures"] = common.joined(map(failures, with_own))
+    rows["nees"] = common.joined(map(consistency, with_own))
+    found = dict(made)
+    for name, table in rows.items():
+        if len(table):
+            found[name] = _below(made[name], table) if name in made else table
+    return found
+
+
+def without(made: Made, results: Sequence[CaseResult]) -> Made:
+    """The tables without these rows, as the study made them."""
+    own = {name for result in results for one in others(result) for name in one.axes.filters}
+    return {name: made[name][~made[name]["filter"].isin(own)] for name in ("curves", "gains")} | {
+        name: table for name, table in made.items() if name not in ("curves", "gains")
+    } if own else made  # fmt: skip
+
+
+def _below(above: "pd.DataFrame", below: "pd.DataFrame") -> "pd.DataFrame":
+    """Rows below those of a table, whose columns they get, and `note`; empty cells where they lack one."""
+    columns = [*above, *(["note"] if "note" in below and "note" not in above else [])]
+
+    def filled(table: "pd.DataFrame", other: "pd.DataFrame") -> "pd.DataFrame":
+        blank = {n: "" if n == "note" or other[n].dtype == object else np.nan for n in columns if n not in table}
+        return table.assign(**blank)[columns]
+
+    return common.below([filled(above, below), filled(below, above)]) if len(above) else below
+
+
+# ---- answer ----------------------------------------------------------------------------------------------------------
+def answers(results: Sequence[CaseResult]) -> "list[notes.Answer]":
+    """What says how the filters from outside do, a part for each."""
+    several = len(results) > 1
+    return [
+        partial(_said, result, name, f"{result.name}: " if several else "")
+        for result in results
+        for one in others(result)
+        for name in one.axes.filters
+    ]
+
+
+def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
+    """Whether the filter is better than the config's best, how often it fails, then all gains at the last scan."""
+    rows = common.where(made["gains"], case=result.name, filter=name)
+    fails = common.where(made["failures"], case=result.name, filter=name, reason="any").iloc[0]
+    share = wording.share(*(100 * fails[key] for key in ("share", "share_lo", "share_hi")))
+    failing = tr("{name} fails in {share} of the realisations; in the others ", name=name, share=share)
+    start = case + (failing if fails["failed"] else "")
+    if not len(rows):
+        return [start + tr("{name} has no estimate that could be compared.", name=name)]
+    component, unit = next(one for one in result.axes.components if one[0] in set(rows["component"]))
+    last = rows[rows["component"].eq(component) & rows["k"].eq(rows.loc[rows["component"].eq(component), "k"].max())]
+    curves = common.where(made["curves"], case=result.name, component=component, k=last["k"].iloc[0])
+    sigma = dict(zip(curves["filter"], common.exact_first(curves, "sigma", "exact_sigma"), strict=True))
+    own = [base for base in last["baseline"] if base in result.axes.filters]
+    best = min(own, key=lambda base: sigma[base])
+    row = last[last["baseline"] == best].iloc[0]
+    told: dict[str, Any] = {"name": name, "best": best, "component": component, "t": f"{row['t_s']:g}"}
+    told["gain"] = wording.estimate((row[key] for key in GAIN), "%", ".3g")
+    if row["gain_lo"] > 0:
+        first = tr("{name} is better than {best}, the config's best in {component} at {t} s: gain {gain}", **told)
+    elif row["gain_hi"] < 0:
+        first = tr("{name} is worse than {best}, the config's best in {component} at {t} s: gain {gain}", **told)
+    else:
+        first = tr("{name} cannot be told from {best}, the config's best in {component} at {t} s: gain {gain}", **told)
+    mine = curves[curves["filter"] == name].iloc[0]
+    sigmas = wording.estimate((mine[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(unit))
+    said = [start + first + "; " + tr("its σ is {sigma}, {floor}.", sigma=sigmas, floor=_floor(curves, best, unit))]
+    against = [f"{one['baseline']} {wording.estimate((one[key] for key in GAIN), '%', '.3g')}"
+               for one in last.to_dict("records") if one["baseline"] != best]  # fmt: skip
+    if against:
+        said.append(tr("Further gains of {name} there: against {gains}.", name=name, gains=listed(against)))
+    extremes = rows[rows["baseline"] == best].sort_values("gain_percent").iloc[[0, -1]].to_dict("records")
+    ends = [tr("{gain} ({component} at {t} s)", gain=wording.estimate((one[key] for key in GAIN), "%", ".3g"),
+               component=one["component"], t=f"{one['t_s']:g}") for one in extremes]  # fmt: skip
+    if len(rows) > len(last):
+        said.append(tr("Over all components and scans its gain against {best} is from {least} to {most}.",
+                       best=best, least=ends[0], most=ends[1]))  # fmt: skip
+    return [*said, *_nees(result, name, made)]
+
+
+def _floor(curves: "pd.DataFrame", best: str, unit: str) -> str:
+    """How far the least σ that is known exactly lies, in words."""
+    row = curves[curves["filter"] == best].iloc[0]
+    if np.isnan(row["exact_sigma"]):
+        return tr("that of {best} {sigma}", best=best, sigma=wording.estimate(
+            (row[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(unit)))  # fmt: skip
+    return tr("that of {best} {sigma} {unit} exactly", best=best, sigma=f"{row['exact_sigma']:.4g}",
+              unit=panels.unit_of(unit))  # fmt: skip
+
+
+def _nees(result: CaseResult, name: str, made: Made) -> Iterator[str]:
+    """What its covariances are worth at the last scan."""
+    rows = common.where(made["nees"], case=result.name, filter=name) if "nees" in made else ()
+    if len(rows):
+        row = rows.iloc[-1]
+        nees = wording.estimate((row[key] for key in ("nees", "nees_lo", "nees_hi")), "", ".3g")
+        told = {"name": name, "t": f"{row['t_s']:g}", "nees": nees, "verdict": tr(row["nees_verdict"])}
+        yield tr("NEES of {name} at {t} s, 1 if its covariance is right: {nees}, {verdict}.", **told)
+
+
+# ---- figures ---------------------------------------------------------------------------------------------------------
+def figures(
+    results: Sequence[CaseResult], made: Made, experiment: Experiment, drawn: Mapping[str, Figure]
+) -> dict[str, Figure]:
+    """σ and gain with the filters from outside: in place of the study's figures of these names, at least of the first
+    component."""
+    joint = [_joint(result) for result in results if result.outside is not None]
+    if not joint:
+        return {}
+    known = {one.name: one for one in RADIAL}
+    each = [known.get(name, Component(name, unit, panels.letter(name), name)) for name, unit in joint[0].axes.components]
+    rows = {**made, "gains": common.against_own(made["gains"], joint)}
+    found = panels.per_component(joint, rows, each, experiment)
+    first = {f"{kind}_{each[0].name}" for kind in ("gain", "sigma")}
+    return {name: figure for name, figure in found.items() if name in drawn or name in first}
+
+
+def _joint(result: CaseResult) -> CaseResult:
+    """All filters of a case, as figures that are drawn from tables alone need it."""
+    (of,) = others(result)
+    together = {
+        name: np.concatenate([getattr(result.axes, name), getattr(of.axes, name)])
+        for name in ("available", "exact_sigma", "exact_bias")
+    }
+    filters = (*result.axes.filters, *of.axes.filters)
+    return replace(result, axes=replace(of.axes, filters=filters, baseline=result.axes.baseline, **together))
