@@ -54,6 +54,7 @@ ROOMS = {
         *("studies.interface", "studies.noise", "studies.onefile"),
     ),
     "studies.stepwise": ("errors", "failures", *CASE, *DATA, "kernels", "report", "studies.noise", "studies.onefile"),
+    "studies.outside": ("errors", *CASE, *DATA, "studies.interface"),
     "studies.judged": ("errors", "config", *DATA, "report"),  # claims and readings of studies in one file
     "studies.registry": ("errors", "failures", "config", "report.quantities", "studies.interface"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry"),
@@ -119,7 +120,7 @@ LIBRARIES = {  # library: the files and rooms that may import it
     "llvmlite": {"kernels/compile.py", "kernels/lanes.py"},
     "pydantic": {"config", "studies/*/config.py"},
     "pydantic_core": {"config/check.py", "config/fields.py", "config/load.py"},
-    "pandas": {"report/tables.py", "report/precision.py", "app/own_data.py"},
+    "pandas": {"report/tables.py", "report/precision.py", "app/own_data.py", "app/judge.py"},
 }
 
 

@@ -374,7 +374,8 @@ class CaseWork:
         if self.case.outside:
             from radarsim.studies import outside
 
-            made.append(outside.simulate(self.plans[-1], first, count))
+            beside: Any = self.plans[-1]
+            made.append(outside.simulate(beside, first, count))
         return made[0] if len(made) == 1 else np.concatenate(made)
 
     def unpacked(self, values: "np.ndarray") -> "Iterator[dict[str, np.ndarray]]":

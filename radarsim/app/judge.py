@@ -3,17 +3,18 @@
 import hashlib
 import itertools
 import os
+import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from radarsim.app import configs, run
 from radarsim.app.configs import CaseWork, Config, Overrides
 from radarsim.config.experiment import Case, Experiment
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, DisagreementError, MeasureError
 from radarsim.language import tr
 from radarsim.report import statistics
 from radarsim.studies import outside
@@ -66,7 +67,7 @@ def judge(
     ConfigError for estimates of another shape, order or seed.
 
     >>> import radarsim
-    >>> result = judge("rls2", lambda plots: plots["range_m"], name="raw plots", realisations=2000)
+    >>> result = judge("rls2", lambda plots: plots["range_m"], name="raw plots", realisations=500)
     >>> result.gains.query("filter == 'raw plots' and component == 'r'")["baseline"].unique().tolist()
     ['r', 'r+Vr']
     """
@@ -74,24 +75,30 @@ def judge(
     texts = run.merged(configs.check(overrides, out=out, **asked), None, seed)
     experiment, warnings = judged(configs.load(config, texts), estimates, name, components, one_by_one, realisations)
     (member,) = experiment.cases[0].outside
-    asked |= {"of": of, "progress": progress, "threads": 0 if member.in_order else threads}
-    result = run.run(experiment, **asked)
-    return finished(result, warnings, out, figures, width_mm)
+    asked = {"precision": precision, "of": of, "progress": progress, "threads": 0 if member.in_order else threads}
+    return finished(experiment, warnings, out, figures, width_mm, **asked)
 
 
 def finished(
-    result: "Result",
+    experiment: Experiment,
     warnings: Sequence[str],
     out: str | os.PathLike[str] | None,
     figures: bool | str | Sequence[str] = True,
     width_mm: float | None = None,
     command: str = "none: the filter was given in Python",
+    **asked: Any,
 ) -> "Result":
-    """The result with what the checks found, written where asked."""
+    """The result of an experiment of `judged`, with what the checks found, written where asked."""
+    try:
+        result = run.run(experiment, **asked)
+    except (DisagreementError, MeasureError) as error:  # raised again below
+        result = cast("Result", error.result)
     judged_by = {one.name: one.identity for case in result.experiment.cases for one in case.outside}
     result.facts |= {"command": command, "judged": judged_by}
     result.facts["warnings"] = [*warnings, *result.facts["warnings"]]
-    if out is not None:
+    if out is None:
+        result.check()
+    else:
         result.write(out, figures, width_mm)
     return result
 
@@ -112,16 +119,14 @@ def judged(
     there = len(member.arrays[0]) if isinstance(member, Given) else None
     if there is not None and (n or 0) > there:
         raise ConfigError(f"{name}: there are estimates of {there} realisations, fewer than {n}")
-    counts = {"realisations": n or there} if n or there else {}
+    counts: dict[str, Any] = {"realisations": n or there} if n or there else {}
     cases = tuple(replace(case, outside=(member,), **counts) for case in cases)
     stem = f"{experiment.stem}_{'_'.join(name.split())}"
     made = replace(experiment, stem=stem, cases=cases, **counts)
     return made, [line for case in made.cases for line in tried(case, member)]
 
 
-def source(
-    given: Any, name: str, components: tuple[str, ...], one_by_one: bool, cases: Sequence[Case]
-) -> Outside:
+def source(given: Any, name: str, components: tuple[str, ...], one_by_one: bool, cases: Sequence[Case]) -> Outside:
     """Where the estimates come from. Raises ConfigError for what is none of the kinds."""
     if isinstance(given, Outside):
         return given
@@ -137,13 +142,21 @@ def source(
         return Chunks(name, given, f"{id(given)}", components)
     if isinstance(given, str | os.PathLike):
         given, components = read(Path(given), cases[0], components)
-    x, P = given if isinstance(given, tuple) and len(given) == 2 else (given, None)
-    x, P = np.asarray(x), None if P is None else np.asarray(P)
+    given, P = given if isinstance(given, tuple) and len(given) == 2 else (given, None)
+    x, P = np.asarray(given), None if P is None else np.asarray(P)
     if x.ndim not in (2, 3) or x.dtype.kind not in "fiu":
-        raise ConfigError(f"{name}: estimates must be an array (n, K, d), a function, an iterator or a file, got {given!r:.60}")
+        raise ConfigError(
+            f"{name}: estimates must be an array (n, K, d), a function, an iterator or a file, got {given!r:.60}"
+        )
     found = hashlib.sha256(np.ascontiguousarray(x).tobytes())
     found.update(b"" if P is None else np.ascontiguousarray(P).tobytes())
     return Given(name, (x, P), found.hexdigest(), components)
+
+
+def command(experiment: Experiment, estimates: str, name: str, overrides: Sequence[str]) -> str:
+    """The command that judges a file again."""
+    verb, own, *rest = shlex.split(configs.command(experiment, overrides, configs.RESULTS, verb="judge"))[1:]
+    return shlex.join(["radarsim", verb, own, estimates, "--name", name, *rest])
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
@@ -176,7 +189,9 @@ def _of_arrays(
     x, P = held["estimates"], held.get("covariances")
     rows = np.asarray(held.get("realisations", np.arange(len(x)))).ravel()
     if len(rows) != len(x):
-        raise ConfigError(f"{path}: realisations: must be {len(x)} numbers, as many as there are estimates, got {len(rows)}")
+        raise ConfigError(
+            f"{path}: realisations: must be {len(x)} numbers, as many as there are estimates, got {len(rows)}"
+        )
     order = _in_order(path, rows)
     own = tuple(map(str, held["components"])) if "components" in held else components
     return (x[order], P[order]) if P is not None else x[order], own
@@ -185,7 +200,9 @@ def _of_arrays(
 def _of_table(path: Path, held: Mapping[str, np.ndarray], case: Case) -> tuple[Any, tuple[str, ...]]:
     """One row a realisation and scan: `realisation`, `k` or `t_s`, and a column for each component."""
     state = CaseWork(case).plan.axes.components
-    columns = {name: one for name in held for one, unit in state if name in (one, true_column(one, unit).removeprefix(TRUE))}
+    columns = {
+        name: one for name in held for one, unit in state if name in (one, true_column(one, unit).removeprefix(TRUE))
+    }
     scan = next((held[one] for one in AXES[1:] if one in held), None)
     if "realisation" not in held or scan is None or not columns:
         wanted = f"realisation, k or t_s, and of {', '.join(one for one, _ in state)} those it estimates"
@@ -194,8 +211,8 @@ def _of_table(path: Path, held: Mapping[str, np.ndarray], case: Case) -> tuple[A
     numbers = held["realisation"][rows]
     if len(rows) % K or (numbers.reshape(-1, K) != numbers[::K, None]).any():
         short = next(i for i, n in zip(*np.unique(numbers, return_counts=True), strict=True) if n != K)
-        raise ConfigError(f"{path}: realisation {short}: must have one row for each of the {K} scans, empty cells where "
-                          f"there is no estimate")  # fmt: skip
+        raise ConfigError(f"{path}: realisation {short}: must have a row for each of the {K} scans, empty "
+                          f"cells where there is no estimate")  # fmt: skip
     order = _in_order(path, numbers[::K])
     x = np.stack([held[name][rows].astype(float).reshape(-1, K) for name in columns], axis=-1)
     return x[order], tuple(columns.values())
@@ -207,7 +224,8 @@ def _in_order(path: Path, rows: np.ndarray) -> np.ndarray:
     if (wrong := np.flatnonzero(rows[order] != np.arange(len(rows)))).size:
         at = int(wrong[0])
         raise ConfigError(f"{path}: must hold every realisation from 0 on once: where {at} should be there is "
-                          f"{rows[order][at]}; `radarsim simulate CONFIG --realisations 0:{len(rows)} -o …` writes them")  # fmt: skip
+                          f"{rows[order][at]}; `radarsim simulate CONFIG --realisations 0:{len(rows)} -o …` "
+                          f"writes them")  # fmt: skip
     return order
 
 
@@ -215,7 +233,7 @@ def _in_order(path: Path, rows: np.ndarray) -> np.ndarray:
 def tried(case: Case, member: Outside) -> list[str]:
     """What is unsound about a filter, found on a few realisations; raises ConfigError where its estimates are not of
     these plots."""
-    plan = CaseWork(case).plans[-1]
+    plan = cast("Plan", CaseWork(case).plans[-1])
     drawn = plan.draw(0, min(case.realisations, TRIED))
     plots = outside.plots_of(plan, drawn)
     given = member.estimates(plots)
@@ -226,18 +244,24 @@ def tried(case: Case, member: Outside) -> list[str]:
     places = outside.columns_of(member.name, x.shape[2], plan.names, member.components)
     _rearranged(plan, member, x, drawn.truth_of(plan.axes.components), places, inner)
     _follows(case, member, found.error, inner)
-    with np.errstate(invalid="ignore"):
-        rms = np.sqrt(np.nanmean(np.square(np.where(np.isnan(found.error), 0, found.error)), axis=(0, 1)))[places]
+    rms = np.sqrt(_mean(np.square(found.error), (0, 1)))[places]
     lines = []
     if raw.dtype.kind == "f" and raw.dtype.itemsize < np.dtype(float).itemsize:
         step = float(np.nanmax(np.spacing(np.nanmax(np.abs(raw.reshape(-1, x.shape[2])), axis=0)) / rms))
-        lines.append(tr("{name}: estimates in {type}, which rounds them by up to {share:.1g} of their rms error",
+        lines.append(tr("{name}: estimates are {type}, rounded by up to {share:.1g} of their rms error",
                         name=member.name, type=str(raw.dtype), share=step))  # fmt: skip
     if isinstance(member, Called):
         if any(not np.array_equal(plots[one], drawn.columns[one], equal_nan=True) for one in drawn.columns):
-            lines.append(tr("{name}: changes the plots that it is given; it gets copies", name=member.name))
+            lines.append(tr("{name}: changes the plots it is given; it gets copies", name=member.name))
         lines += _repeatable(plan, member, x, MATERIAL * rms)
     return lines
+
+
+def _mean(values: np.ndarray, axis: int | tuple[int, ...]) -> np.ndarray:
+    """The mean of what is finite, not-a-number where nothing is."""
+    there = np.isfinite(values)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(there, values, 0).sum(axis) / there.sum(axis))
 
 
 def _again(plan: Plan, member: Outside, plots: Plots) -> np.ndarray:
@@ -256,11 +280,14 @@ def _repeatable(plan: Plan, member: Called, x: np.ndarray, least: np.ndarray) ->
     n, K = x.shape[:2]
     name = member.name
     if _differ(_again(plan, member, outside.plots_of(plan, plan.draw(0, n))), x, least):
-        yield tr("{name}: gives other estimates when it sees the same plots again: its numbers cannot be repeated", name=name)
+        yield tr(
+            "{name}: gives other estimates for the same plots when called again, so its numbers cannot be repeated",
+            name=name,
+        )
         return
     half = max(n // 2, 1)
     if half < n and _differ(_again(plan, member, outside.plots_of(plan, plan.draw(0, half))), x[:half], least):
-        yield tr("{name}: its estimates of a realisation depend on which others are in the batch", name=name)
+        yield tr("{name}: its estimates of a realisation depend on the others in the batch", name=name)
         return
     if hasattr(member.target, "step") or K < 2 or n < 2:
         return
@@ -269,8 +296,8 @@ def _repeatable(plan: Plan, member: Called, x: np.ndarray, least: np.ndarray) ->
     for column in plots.columns.values():
         column[:, cut:] = np.roll(column[:, cut:], 1, axis=0)  # of another realisation
     if _differ(_again(plan, member, plots)[:, :cut], x[:, :cut], least):
-        yield tr("{name}: looks ahead: with other plots after scan {k} its estimates up to there change; a filter that "
-                 "waits for later plots is no rival of those that do not", name=name, k=cut)  # fmt: skip
+        yield tr("{name}: uses later plots: its estimates up to scan {k} change with the plots after it; compare it "
+                 "with smoothers, not with filters", name=name, k=cut)  # fmt: skip
 
 
 def _rearranged(
@@ -293,11 +320,14 @@ def _rearranged(
         fits = [misfit(*one) for one in every]
     order, step = every[int(np.nanargmin(fits))] if np.isfinite(fits).any() else every[0]
     if fits[0] - np.nanmin(fits) > np.log(REARRANGED):
-        stand = "the scans from the last to the first" if step < 0 else "the components in the order " + ", ".join(
-            plan.names[places[list(order).index(i)]] for i in range(d)
+        stand = (
+            "the scans from the last to the first"
+            if step < 0
+            else "the components in the order " + ", ".join(plan.names[places[list(order).index(i)]] for i in range(d))
         )
-        raise ConfigError(f"{member.name}: estimates hold {stand}: their errors are then {np.exp(fits[0] - np.nanmin(fits)):.2g} "
-                          f"times smaller; expected {', '.join(plan.names[i] for i in places)} by rising scans")  # fmt: skip
+        by, wanted = np.exp(fits[0] - np.nanmin(fits)), ", ".join(plan.names[i] for i in places)
+        raise ConfigError(f"{member.name}: estimates hold {stand}: their errors are then {by:.2g} times smaller; "
+                          f"expected {wanted} by rising scans")  # fmt: skip
 
 
 def _follows(case: Case, member: Outside, error: np.ndarray, inner: np.ndarray) -> None:
@@ -309,14 +339,15 @@ def _follows(case: Case, member: Outside, error: np.ndarray, inner: np.ndarray) 
     n = len(error)
     if n < FOLLOWS:
         return
+    scores = []
     with np.errstate(all="ignore"):
-        mine, *own = ((one - np.nanmean(one, axis=0)) / np.nanstd(one, axis=0) for one in (error, *inner))
-        scores = []
+        off = [one - _mean(one, 0) for one in (error, *inner)]
+        mine, *own = (one / np.sqrt(_mean(np.square(one), 0)) for one in off)
         for one in own:
-            alike = np.nanmean(np.where(np.isfinite(mine * one), mine * one, np.nan).reshape(n, -1), axis=1)
+            alike = _mean((mine * one).reshape(n, -1), 1)
             alike = alike[np.isfinite(alike)]
             scores.append(alike.mean() / alike.std() * np.sqrt(alike.size) if alike.size >= FOLLOWS else np.nan)
     if np.isfinite(scores).any() and np.nanmax(scores) < statistics.furthest(len(scores)):
-        raise ConfigError(f"{member.name}: its errors have nothing in common with those of the config's filters, which see the "
-                          f"same plots: estimates of other realisations, in another order, or of another seed than "
-                          f"{case.seed}?")  # fmt: skip
+        raise ConfigError(f"{member.name}: its errors have nothing in common with those of the config's filters, "
+                          f"which see the same plots: estimates of other realisations, in another order, or of another "
+                          f"seed than {case.seed}?")  # fmt: skip

@@ -296,7 +296,8 @@ def case_result(case: Case, work: CaseWork, collected: Collected) -> CaseResult:
         return whole
     from radarsim.studies import outside
 
-    return replace(whole, outside=outside.result(work.plans[-1], whole, unpacked[-1]))
+    beside: Any = work.plans[-1]
+    return replace(whole, outside=outside.result(beside, whole, unpacked[-1]))
 
 
 # ---- writing ---------------------------------------------------------------------------------------------------------

@@ -196,6 +196,75 @@ def _compute_each(
 
 
 @group.main.command()
+@group.config_argument
+@click.argument("estimates", metavar="ESTIMATES")
+@click.option("--name", default="mine", show_default=True, metavar="NAME", help="What the filter is called.")
+@group.realisations_option
+@group.seed_option
+@group.set_option
+@group.precision_option
+@group.of_option
+@group.threads_option
+@group.out_option
+@group.drawing_options
+@click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
+@group.json_option
+def judge(
+    config: str,
+    estimates: str,
+    name: str,
+    realisations: int | None,
+    seed: int | None,
+    overrides: tuple[str, ...],
+    precision: float | None,
+    of: str,
+    threads: int | None,
+    out: str,
+    drawing: group.Drawing,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Judge estimates of a filter of your own: is it better than the config's?
+
+    ESTIMATES holds what your filter made of the plots that `radarsim simulate CONFIG --realisations 0:N` wrote. The
+    config's filters are run on the same plots; gains of your filter against every one of them are paired, with 95 %
+    intervals. Results are in DIR/CONFIG_NAME. From Python, `radarsim.judge` also takes a function or an object.
+
+    \b
+    .npz            estimates (n, K, d): realisations 0 … n - 1, the scans, the leading d
+                    components of the state; if you have them covariances (n, K, d, d),
+                    components (names, if not the leading ones), realisations (numbers, if in
+                    another order) and seed
+    .csv, .parquet  a row for each realisation and scan: realisation, k or t_s, and a column
+                    for each component, such as r and Vr (or r_m and Vr_mps)
+
+    Where the filter has no estimate yet a value is NaN, or a cell empty. NaN after an estimate, and errors over a
+    hundred times the largest of the config's filters, are failures: their share is in the first sentence of the report.
+
+    \b
+    Example
+      radarsim simulate rls2 --realisations 0:10000 -o plots.npz
+      radarsim judge rls2 estimates.npz --name mine
+    """
+    _refuse_of_nothing(of, precision)
+    from radarsim.engine import run as stopping
+
+    with stopping.Signals() as stop:
+        from radarsim.app import judge as judging
+        from radarsim.app import run as simulation
+
+        (loaded,) = simulation.load_all([config], simulation.merged(overrides, None, seed))
+        made, warnings = judging.judged(loaded, estimates, name, realisations=realisations)
+        if precision is not None:
+            simulation.check_precision([made], precision, of)
+        again = judging.command(loaded, estimates, name, simulation.merged(overrides, realisations, seed))
+        asked: dict[str, Any] = {"precision": precision, "of": of, "threads": threads, "stop": stop}
+        asked |= {"command": again, **drawing.arguments}
+        compute = partial(judging.finished, warnings=warnings, out=out, **asked)
+        _compute_each([made], compute, out, quiet, as_json, None)
+
+
+@group.main.command()
 @group.configs_argument
 @group.realisations_option
 @group.seed_option

@@ -41,7 +41,8 @@ def print_result(result: "Result") -> None:
     for line in written.answer:
         say(line)
     show_last_scan(result)
-    print_verdicts(result)
+    if not any(case.outside for case in result.cases):  # the paper's claims are none of such a filter
+        print_verdicts(result)
     drawn = [Path(name) for name in written.files if name.startswith("figures/") and not name.endswith(".md")]
     others = sum(name.endswith(".csv") for name in written.files) - 1
     field("tables", tr("{file} and {count} more there", file=str(written.folder / "curves.csv"), count=others))

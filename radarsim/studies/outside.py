@@ -18,9 +18,10 @@ a filter of the config has one, and where an error is more than a hundred times 
 filters in it. Its errors enter no sum, so that σ and gains are of the other realisations; how many failed is counted.
 """
 
+import itertools
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
@@ -48,7 +49,7 @@ class World:
     """What a filter may know beforehand.
 
     t_s (K,) times of the scans, s; columns: what is measured, units in the names; sigma: its standard deviations, where
-    one key of the config says so; components: names and units of the state; keys: the config, as YAML has it.
+    the config states them; components: names and units of the state; keys: the config, as YAML has it.
     """
 
     t_s: np.ndarray
@@ -197,8 +198,8 @@ def checked(name: str, given: Any, n: int, K: int, components: Sequence[str], ow
     if x.dtype.kind not in "fiu":
         raise ConfigError(f"{name}: estimates must be real numbers, got {x.dtype}")
     if x.ndim != 3 or x.shape[:2] != (n, K) or not (x.shape[2] == most if own else 1 <= x.shape[2] <= most):
-        order = next((o for o in ((1, 0, 2), (0, 2, 1), (2, 0, 1), (2, 1, 0), (1, 2, 0))
-                      if x.ndim == 3 and np.transpose(x, o).shape[:2] == (n, K) and 1 <= x.shape[o[2]] <= most), None)  # fmt: skip
+        orders = itertools.permutations(range(3)) if x.ndim == 3 else ()
+        order = next((o for o in orders if x.transpose(o).shape[:2] == (n, K) and 1 <= x.shape[o[2]] <= most), None)
         hint = f"; its axes are in another order: transpose{order} mends it" if order else ""
         raise ConfigError(f"{name}: estimates must have shape {wanted}, got {x.shape}{hint}")
     d = x.shape[2]
@@ -228,6 +229,12 @@ class Plan:
     axes: Axes
     layout: Layout
 
+    gaussian = False
+
+    @property
+    def block(self) -> int:
+        return int(self.inner.block)
+
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(name for name, _ in self.axes.components)
@@ -252,11 +259,16 @@ def prepare(study: "Study", case: Case, inner: Any) -> Plan:
     if first.several or scans[-1] >= len(first.t_s) or not np.allclose(first.t_s[scans] - first.t_s[0], axes.t_s):
         raise ConfigError(f"{case.name}: its plots do not stand at the scans of its errors")
     keys = recorded.sigmas(case.spec)
-    sigma = {name: float(attrgetter(one)(case.spec)) for name, (one, *more) in keys.items() if not more}
+    stated = {one.rpartition("sigma_")[2]: one for of in keys.values() for one in of}
+    sigma = {name: attrgetter(stated[name])(case.spec) for name in first.columns if name in stated}
     world = World(first.t_s, tuple(first.columns), sigma, axes.components, case.keys)
     G, (F, K, C) = len(names), axes.available.shape
     layout = Layout(
-        error=(G, K, C, 4), estimates=(G, K, C), both=(G, F + G, K, C, PAIRED), nees=(G, K, 3), failures=(G, len(COUNTS))
+        error=(G, K, C, 4),
+        estimates=(G, K, C),
+        both=(G, F + G, K, C, PAIRED),
+        nees=(G, K, 3),
+        failures=(G, len(COUNTS)),
     )
     unknown = np.full((G, K, C), np.nan)
     own = Axes(tuple(names), axes.components, axes.k, axes.t_s, np.ones((G, K, C), dtype=bool), 0, unknown, unknown)
@@ -270,7 +282,7 @@ def plots_of(plan: Plan, drawn: "Drawn") -> Plots:
 
 
 def inner_errors(plan: Plan, first: int, count: int) -> np.ndarray:
-    """Errors (F, n, K, C) of the study's own filters, not-a-number where one has no estimate: each realisation alone."""
+    """Errors (F, n, K, C) of the study's own filters, not-a-number where one has no estimate, one by one."""
     layout, available = plan.inner.layout, np.asarray(plan.inner.axes.available)
     found = np.empty((count, *available.shape))
     simulate = plan.study.simulate
@@ -345,7 +357,14 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
         for power, values in enumerate((e, square, square * e, fourth)):
             sums["error"][g, ..., power] = values.sum(0)
         for b, (other, base, base_fourth) in enumerate(squares):
-            pairs = ((there, other), (square, other), (fourth, other), (there, base), (there, base_fourth), (square, base))
+            pairs = (
+                (there, other),
+                (square, other),
+                (fourth, other),
+                (there, base),
+                (there, base_fourth),
+                (square, base),
+            )
             for j, (one, two) in enumerate(pairs):
                 sums["both"][g, b, ..., j] = np.einsum("nkc,nkc->kc", one, two)
         known = np.isfinite(found.nees)
