@@ -344,7 +344,7 @@ def normalised(e: np.ndarray, P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
-    """Sums of one block, in the order of the plan's layout."""
+    """Sums (size,) of one block, in the order of the plan's layout."""
     drawn = plan.draw(first, count)
     errors = list(inner_errors(plan, first, count))
     scale = largest(errors)
@@ -383,7 +383,7 @@ def largest(errors: Iterable[np.ndarray]) -> np.ndarray:
 
 
 def squared(error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where there is an error (1 or 0), its square and fourth power, zero elsewhere."""
+    """Of errors (n, K, C) where there is one (1 or 0), its square and fourth power, zero elsewhere."""
     there = np.isfinite(error).astype(float)
     square = np.square(np.nan_to_num(error))
     return there, square, np.square(square)
