@@ -1,4 +1,4 @@
-"""The exceptions that a user meets, each with the exit code of the command that met it."""
+"""The exceptions that reach the user, each with the exit code of the command."""
 
 from contextvars import ContextVar
 
@@ -6,7 +6,7 @@ ON_COMMAND_LINE = ContextVar("ON_COMMAND_LINE", default=False)  # whether a comm
 
 
 def argument(name: str, option: str = "") -> str:
-    """An argument as its giver calls it: by its name in Python, on the command line by its option, else `--NAME`.
+    """The name of an argument for its giver: the name in Python; on the command line its option, else `--NAME`.
 
     >>> argument("at_s", "--at")
     'at_s'
@@ -84,7 +84,7 @@ class NonFiniteError(RadarsimError):
 
 
 class Interrupted(RadarsimError):
-    """A signal stopped the run; what was finished is stored, where it goes on."""
+    """A signal stopped the run; finished blocks are stored, and a further run continues."""
 
     def __init__(self, signal_number: int, goes_on: bool = True):
         name = {2: "Ctrl-C", 15: "SIGTERM"}.get(signal_number, f"signal {signal_number}")

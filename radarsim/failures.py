@@ -1,4 +1,4 @@
-"""Failures of code that is not radarsim's: what an author's function did wrong, in one line with its place.
+"""Failures of other people's code: the error of an author's function in one line with its place.
 
 The place is the deepest line of an installed package that offers studies or filters; where none of these led to the
 error, of any code that is neither radarsim's nor a library's, such as a notebook or a test.
@@ -21,7 +21,7 @@ from radarsim.errors import OF_AUTHORS, ConfigError, RadarsimError
 
 LIBRARIES = (*(sysconfig.get_path(name) for name in ("stdlib", "platstdlib")), str(Path(__file__).parent))
 COMPILING = re.compile(r"Failed in |-+$|\[\d\] |During: ")  # lines of a compiler's message that say where it was
-OF_NUMPY = "__array_ufunc__"  # what NumPy names where it is asked for the sine of eight realisations
+OF_NUMPY = "__array_ufunc__"  # in NumPy's error about the sine of eight realisations
 LONGEST = 300  # characters of a message
 
 _of: ContextVar[str] = ContextVar("_of", default="")
@@ -42,7 +42,7 @@ class Place(NamedTuple):
 def place(error: BaseException, installed: bool = False, function: Any = None) -> Place | None:
     """The line to blame for an error. installed: of an installed package that offers studies or filters, or None.
 
-    function: the author's function that was called; code in its folder is the author's too.
+    function: the author's function; other code in its folder is the author's too.
     """
     code = _code(function)
     within = (*homes(), *([Path(os.path.realpath(code.co_filename)).parent] if code else []))
@@ -54,7 +54,7 @@ def place(error: BaseException, installed: bool = False, function: Any = None) -
 
 
 def _places(error: BaseException) -> Iterator[Place]:
-    """The lines that led to an error, the deepest last: of what cannot be compiled, that which is named."""
+    """The lines that led to an error, the deepest last; for uncompilable code, the line named."""
     for frame, line in traceback.walk_tb(error.__traceback__):
         yield Place(frame.f_code.co_filename, line, frame.f_code.co_qualname.rpartition("<locals>.")[2])
     if isinstance(error, SyntaxError) and error.filename:
@@ -64,7 +64,7 @@ def _places(error: BaseException) -> Iterator[Place]:
 
 
 def _code(function: Any) -> CodeType | None:
-    """The code of a function; None of what is not written in Python."""
+    """The code of a function; None if it is not written in Python."""
     while isinstance(function, functools.partial):
         function = function.func
     return getattr(inspect.unwrap(function) if callable(function) else function, "__code__", None)
@@ -75,7 +75,7 @@ def _is_library(file: str) -> bool:
 
 
 def words(error: BaseException) -> str:
-    """What an error says, in one line: its kind, and the first line of its message that says something."""
+    """An error in one line: its kind, and the first non-empty line of its message."""
     message = str(error.msg) if isinstance(error, SyntaxError) else str(error)
     lines = [line.strip() for line in message.splitlines() if line.strip() and not COMPILING.match(line)]
     line = lines[0][:LONGEST] if lines else ""
@@ -87,14 +87,14 @@ def words(error: BaseException) -> str:
 
 
 def summary(error: BaseException) -> str:
-    """What an error says, and its place in brackets."""
+    """An error in one line, with its place in brackets."""
     at = place(error)
     return f"{words(error)} ({at})" if at else words(error)
 
 
 @contextmanager
 def of_study(name: str) -> Iterator[None]:
-    """What `call` and `fault` name within it belongs to this study."""
+    """Functions named by `call` and `fault` within it belong to this study."""
     before = _of.set(f"study {name}: ")
     try:
         yield
@@ -103,9 +103,9 @@ def of_study(name: str) -> Iterator[None]:
 
 
 def call(function: Callable[..., Any], *arguments: Any, of: str = "") -> Any:
-    """What an author's function gives; ConfigError with its file and line where it fails.
+    """The value of an author's function; ConfigError with its file and line where it fails.
 
-    of: what the function belongs to, where that is not clear from its name; by default what `of_study` names.
+    of: what the function belongs to, if its name does not show it; by default from `of_study`.
     """
     try:
         return function(*arguments)

@@ -1,4 +1,4 @@
-"""Whether threads may be started: `--threads 0` and `threads=0` forbid it, in all that a call does."""
+"""Whether threads may be started: `--threads 0` and `threads=0` forbid it, for a whole call."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ _forbidden: ContextVar[bool] = ContextVar("forbidden", default=False)
 
 
 def forbidden() -> bool:
-    """Whether everything is to be done in the calling thread."""
+    """Whether everything must be done in the calling thread."""
     return _forbidden.get()
 
 
@@ -25,7 +25,7 @@ def limited(count: int | None) -> Iterator[None]:
 
 @contextmanager
 def mapping(count: int | None = None) -> Iterator[Callable[..., Iterator[Any]]]:
-    """`map`, in so many threads (Python's own number where None), in this one where threads are forbidden."""
+    """`map`, in so many threads (default: Python's number), or in this one where threads are forbidden."""
     if forbidden() or count == 0:
         yield map
         return

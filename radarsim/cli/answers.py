@@ -1,4 +1,4 @@
-"""What the terminal shows of answers to questions about a design."""
+"""Terminal output of answers to questions about a design."""
 
 import math
 from collections.abc import Hashable
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def print_answer(answer: "Answer") -> None:
-    """A value with what it attains, then a line each: the slope, other values, the run that confirms."""
+    """A value with the quantity there, then a line each: the slope, other values, the run that confirms."""
     (_, value), *others = answer.lines
     say(value)
     for label, words in others:
@@ -25,7 +25,7 @@ def print_answer(answer: "Answer") -> None:
 
 
 def print_drawn(drawn: "DopplerChart") -> None:
-    """Where each case lies, a line each, and what was written."""
+    """A line on each case's place, and the files written."""
     folder = drawn.folder
     assert folder is not None  # the command writes what it prints
     for line in drawn.sentences:

@@ -1,4 +1,4 @@
-"""What the terminal shows while it waits, and how lines are said: progress, fields, warnings."""
+"""Terminal output in general: progress, labelled lines, warnings."""
 
 import re
 import shutil
@@ -53,11 +53,11 @@ def console(stream: TextIO) -> "Console":
 
 
 class Progress:
-    """What is done, its rate and the time left, on stderr if that is a terminal, once it has lasted most of a second.
+    """Finished work, its rate and the time left, on stderr if that is a terminal, once it has lasted most of a second.
 
-    Until the first report, while kernels are compiled, the bar moves without saying how much; by a thread, so where
-    threads are forbidden it begins with that report. The rate is that of what was computed since then: neither the
-    compiler's time counts nor what came from the store.
+    Until the first report, while kernels are compiled, the bar moves without a number; by a thread, so where threads
+    are forbidden it begins with that report. The rate is that of computations since then: neither compilation nor
+    stored results count.
     """
 
     shares = True  # the share of a whole is known, and shown by a bar
@@ -102,7 +102,7 @@ class Progress:
         self.bar.update(self.task, total=total, completed=done, told=told, refresh=forbidden())
 
     def rate(self, computed: int, total: int | None) -> float:
-        """How many are computed in a second, on average since the first report of so many in all; 0 if not known."""
+        """How many are computed in a second, on average since the first report of so many in all; 0 if unknown."""
         now = time.monotonic()
         if total != self.last[2] or computed < self.last[1]:
             self.first = now, computed, total
@@ -134,7 +134,7 @@ class Progress:
 
 
 class Counter(Progress):
-    """How much is done of what has no known end, or one that is only expected: in words, without a bar."""
+    """Progress of work without a known end, on stderr if that is a terminal, once it has lasted two seconds."""
 
     shares = False
 
@@ -190,7 +190,7 @@ def fitting(
     width: int,
     heads: Sequence[str] | None = None,
 ) -> list[int]:
-    """The places of the columns that fit into a width, the spare ones left out one by one; heads: as they are shown."""
+    """The indices of the columns that fit into a width, the spare ones left out one by one; heads: as shown."""
     wide = [
         max(len(line) for text in (name, *(row[i] for row in cells)) for line in text.split("\n"))
         for i, name in enumerate(heads or columns)
@@ -202,18 +202,18 @@ def fitting(
 
 
 def say(line: str) -> None:
-    """Print one line: to a terminal in as many as its width takes, broken between words; else never broken."""
+    """Print one line: to a terminal broken between words at its width; else never broken."""
     for part in broken(printable(line), sys.stdout):
         sys.stdout.write(part + "\n")
 
 
 def command(label: str, text: str) -> None:
-    """Print a command under a label, in one line, however long, so that it can be copied."""
+    """Print a command under a label, in one line, however long, for copying."""
     sys.stdout.write(printable(labelled(label, text)) + "\n")
 
 
 def broken(text: str, stream: TextIO) -> list[str]:
-    """A line as a stream takes it: of a terminal in as many lines as its width asks for; else whole."""
+    """A line for a stream: for a terminal broken at its width; else whole."""
     return wrapped(text, shutil.get_terminal_size().columns) if stream.isatty() else [text]
 
 
@@ -229,7 +229,7 @@ def field(label: str, text: str) -> None:
 
 
 def wrapped(line: str, width: int) -> list[str]:
-    """A line broken between words, a unit kept with its number; what follows stands under its first words."""
+    """A line broken between words, a unit kept with its number; further lines are indented to its first words."""
     label = re.match(r"(\S+( \S+)?)? {2,}|", line)
     indent = " " * len(label[0]) if label and len(label[0]) < width // 2 else ""
     kept = unbroken(line)

@@ -1,4 +1,4 @@
-"""The commands that ask about a design: solve, sensitivity, chart. Heavy imports wait inside the commands."""
+"""The commands on a design: solve, sensitivity, chart. Heavy imports are inside the commands."""
 
 import functools
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ OF = "of_"  # what the parameters of quantities begin with
 
 
 class Named(click.ParamType):
-    """A name after an option; not the next option, which click would take for it and then stumble over what is left."""
+    """A name after an option; never the next option, which click would accept and then fail on the rest."""
 
     def __init__(self, metavar: str):
         self.name = metavar

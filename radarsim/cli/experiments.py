@@ -1,4 +1,4 @@
-"""Commands that run experiments and read their results. Heavy imports wait inside the commands."""
+"""Commands that run experiments and read their results. Heavy imports are inside the commands."""
 
 from collections.abc import Callable
 from functools import partial
@@ -100,7 +100,7 @@ def run(
 
 
 def _say_what_lacks(out: str, threads: int | None, whole: bool, one: "Experiment") -> None:
-    """Of a store with gaps, as without one of its shares: a line on them, and on how long they take."""
+    """A line on gaps in a store, such as a missing share, and on the time they take."""
     from radarsim.app.outlook import lacking
     from radarsim.cli import outcomes
 
@@ -109,13 +109,13 @@ def _say_what_lacks(out: str, threads: int | None, whole: bool, one: "Experiment
 
 
 def _refuse_of_nothing(of: str, precision: float | None) -> None:
-    """Raises UsageError for what a precision is of where none is given."""
+    """Raises UsageError for a quantity of a precision without a precision."""
     if of != "sigma" and precision is None:
         raise click.UsageError("--of applies to --precision: give --precision too")
 
 
 def _refuse_together(shard: object, precision: object, cluster: object, threads: object) -> None:
-    """Raises UsageError for options that do not go together."""
+    """Raises UsageError for incompatible options."""
     if shard and precision:
         raise click.UsageError("--shard and --precision do not go together: a precision is judged on all blocks")
     if threads is not None and cluster:
@@ -125,7 +125,7 @@ def _refuse_together(shard: object, precision: object, cluster: object, threads:
 def _loaded(
     configs: tuple[str, ...], overrides: tuple[str, ...], precision: tuple[float, str] | None, decide: bool
 ) -> "list[Experiment]":
-    """The experiments, all checked, with what their claims and a precision ask for."""
+    """The experiments, all checked, with the quantities that their claims and a precision need."""
     from radarsim.app import readings
     from radarsim.app import run as simulation
 
@@ -145,10 +145,10 @@ def _compute_each(
     as_json: bool,
     look: "Callable[[Experiment], None] | None",
 ) -> None:
-    """Compute experiments one by one, each after a look at it, and print what came of it.
+    """Compute experiments one by one, each after a forecast, and print the results.
 
-    Raises DisagreementError at the end for what no chance makes, else MeasureError where the measure of a claim failed,
-    else TargetUnmet for what was not reached.
+    Raises DisagreementError at the end for differences beyond chance, else MeasureError where the measure of a claim
+    failed, else TargetUnmet for targets that were not reached.
     """
     from radarsim.app import documents
     from radarsim.app import run as simulation

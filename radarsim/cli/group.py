@@ -85,11 +85,11 @@ class Commands(click.Group):
 
 @contextlib.contextmanager
 def stoppable() -> Iterator[None]:
-    """While entered, SIGINT and SIGTERM end a command, with what it had begun to write taken away.
+    """While entered, SIGINT and SIGTERM end a command, and files being written are removed.
 
-    What a handler raises may be turned into another exception on its way, as by an import, or be swallowed, as by the
-    finalisers that Python calls at any time; then the process ends on the spot a little later. Runs, which store what
-    they have done, take both signals in a way of their own meanwhile. A signal that is ignored (nohup) stays so.
+    An exception from a handler may be turned into another one on its way, as by an import, or be swallowed, as by the
+    finalisers that Python calls at any time; then the process ends at once a little later. Runs, which store their
+    results, handle both signals themselves meanwhile. A signal that is ignored (nohup) stays so.
     """
     numbers = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) is not signal.SIG_IGN]
     if threading.current_thread() is not threading.main_thread():
@@ -108,7 +108,7 @@ def stoppable() -> Iterator[None]:
     told = sys.unraisablehook
 
     def silent_of_it(what: "sys.UnraisableHookArgs") -> None:
-        """Of a handler's exception that Python has to swallow nothing is printed: the process ends a little later."""
+        """Do not print a handler's exception that Python has to swallow: the process ends a little later."""
         if not isinstance(what.exc_value, Interrupted):
             told(what)
 
@@ -254,7 +254,7 @@ def main() -> None:
 
 
 def completed(ctx: click.Context, param: click.Parameter, incomplete: str) -> "list[CompletionItem]":
-    """What may stand for a config on the command line: the stems that are found, YAML files, and folders."""
+    """Completions for a config on the command line: available stems, YAML files, and folders."""
     from click.shell_completion import CompletionItem
 
     from radarsim.app.configs import document as lookup
@@ -301,7 +301,7 @@ time_limit_option = click.option(
 
 
 def _obeyed(context: click.Context, option: click.Parameter, count: int | None) -> int | None:
-    """The number of threads, which the whole command keeps to."""
+    """The number of threads, for the whole command."""
     context.with_resource(limited(count))
     return count
 
@@ -350,12 +350,12 @@ class Drawing(NamedTuple):
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """As functions that draw take it."""
+        """The arguments for functions that draw."""
         return {"figures": self.formats, "width_mm": self.width_mm}
 
 
 def drawing_options(command: Callable[..., None]) -> Callable[..., None]:
-    """--no-figures, --format and --width, which the command takes together as `drawing`."""
+    """--no-figures, --format and --width, passed to the command together as `drawing`."""
 
     @functools.wraps(command)
     def taking(no_figures: bool, formats: tuple[str, ...], width_mm: float | None, **others: Any) -> None:

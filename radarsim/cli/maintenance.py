@@ -1,4 +1,4 @@
-"""The commands that look after results and the program: list, doctor, clean and the like. Heavy imports wait inside."""
+"""Commands for upkeep: list, doctor, clean and the like. Heavy imports are inside the commands."""
 
 from typing import TYPE_CHECKING
 

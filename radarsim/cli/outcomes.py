@@ -1,4 +1,4 @@
-"""What the terminal shows of runs, forecasts, comparisons and upkeep: the answer, tables, where files were written."""
+"""Terminal output of runs, forecasts, comparisons and upkeep: the answer, tables, and files written."""
 
 import math
 import os
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from radarsim.app.stored import Cleaned
     from radarsim.config.experiment import Experiment
 
-MOST_BEGUN = 4  # cases of which is said what of them is stored
-MOST_ROWS = 36  # of the last scan's table; of a larger experiment the answer and the files are enough
+MOST_BEGUN = 4  # cases whose stored part is listed
+MOST_ROWS = 36  # of the last scan's table; for a larger experiment the answer and the files suffice
 MARKS = {  # behind intervals that are too narrow
     " *": term("heavy tails: the interval is too narrow"),
     " †": term("the interval is too narrow: the column note of curves.csv or gains.csv says why"),
@@ -58,9 +58,9 @@ def print_result(result: "Result") -> None:
 
 
 def show_last_scan(result: "Result") -> None:
-    """σ with interval, exact σ and gain of each case, filter and component at the last scan, unless too many.
+    """σ with interval, exact σ and gain of each case, filter and component at the last scan, unless there are too many.
 
-    A case is called by what it was swept to.
+    A case is named by its swept values.
     """
     from radarsim.report import panels
 
@@ -70,7 +70,7 @@ def show_last_scan(result: "Result") -> None:
 
 
 def show_rows(stem: str, last: "pd.DataFrame", names: Mapping[str, str]) -> None:
-    """The table of rows of `Result.last_scan`, by names for the cases; what all have alike stands above."""
+    """The table of rows of `Result.last_scan`, by names for the cases; common values are in its title."""
     found: Iterable[Any] = last.itertuples()  # named by column, which pandas' stubs do not know
     rows = [
         (
@@ -98,7 +98,7 @@ def show_but_alike(
     right: Sequence[str],
     spare: Sequence[str],
 ) -> None:
-    """Print a table without empty columns, and those of `alike` that have one value: that stands in the title."""
+    """Print a table without empty columns, and with columns of `alike` that have one value moved to the title."""
     values = [{row[i] for row in rows} for i in range(len(columns))]
     once = {i: rows[0][i] for i, own in enumerate(values) if own == {""} or (len(own) == 1 and columns[i] in alike)}
     kept = [i for i in range(len(columns)) if i not in once]
@@ -108,7 +108,7 @@ def show_but_alike(
 
 
 def print_comparison(compared: "Comparison") -> None:
-    """What stored results differ by at the last common time, and where the files are."""
+    """Differences of stored results at the last common time, and the files."""
     from radarsim.report import compare
 
     counted = [row for row in compared.last if row["quantity"] in dict(compared.told)]
@@ -145,7 +145,7 @@ def print_comparison(compared: "Comparison") -> None:
 
 
 def too_narrow(row: Any, column: str) -> str:
-    """A mark behind an interval, of a row of `last_scan`, by the column that says why it is too narrow."""
+    """A mark on an interval, for a row of `last_scan`, by the column that says why it is too narrow."""
     from radarsim.report import notes
 
     note = getattr(row, column, "")
@@ -156,7 +156,7 @@ def too_narrow(row: Any, column: str) -> str:
 
 
 def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
-    """What a run would do."""
+    """The cost of a run."""
     say(tr("{config}: valid", config=str(experiment.path or experiment.stem)))
     rows = [
         (case.name, case.filters, str(case.scans), numeral(f"{case.realisations:,}"), _seconds(case))
@@ -182,14 +182,14 @@ def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
 
 
 def _seconds(case: "CaseOutlook") -> str:
-    """What one thread takes for a case."""
+    """Seconds of one thread for a case."""
     if case.timed or not case.seconds:
         return tr("{t_s:.3g} s", t_s=case.seconds)
     return tr("under {t_s:.2g} s", t_s=case.seconds)
 
 
 def print_lacking(experiment: "Experiment", lacking: "Lacking", whole: bool) -> None:
-    """That the store of a run has gaps, and how long they take; whole: whether the run surely computes all of them."""
+    """Gaps in the store of a run, and the time to fill them; whole: whether the run surely computes all of them."""
     from radarsim.app.outlook import about, missing
 
     told = {
@@ -244,12 +244,12 @@ def print_needs(experiment: "Experiment", outlook: "Outlook") -> None:
 
 
 def _unreached(need: "Need") -> str:
-    """Why a pilot foretells no number of realisations."""
+    """Why a pilot predicts no number of realisations."""
     return tr("out of reach") if need.below is None else tr("none observed: below {rate:.2g}", rate=need.below)
 
 
 def print_share(share: "Shares", out: str | os.PathLike[str]) -> None:
-    """What was done of a share of an experiment, and what to do with it."""
+    """The result of a share of an experiment, and the next step."""
     done = sum(one.done for one in share.cases.values())
     held = sum(one.from_store for one in share.cases.values())
     told = {"number": share.number, "of": share.of, "config": share.config, "done": done, "held": held}
@@ -260,7 +260,7 @@ def print_share(share: "Shares", out: str | os.PathLike[str]) -> None:
 
 
 def print_inspection(found: "Inspection") -> None:
-    """What an inspection of a result found; its faults are reported as errors."""
+    """Findings about a result; faults are reported as errors."""
     outputs = plural("{count} output", "{count} outputs", found.outputs)
     pieces = plural("{count} stored piece", "{count} stored pieces", found.pieces)
     say(tr("{folder}: {outputs} and {pieces} checked", folder=str(found.folder), outputs=outputs, pieces=pieces))
@@ -277,7 +277,7 @@ def print_inspection(found: "Inspection") -> None:
 
 
 def print_cleaned(cleaned: "Cleaned", dry_run: bool) -> None:
-    """How much was dropped, or would be."""
+    """The amount dropped, or to be dropped."""
     told = {
         "files": plural("{count} file", "{count} files", cleaned.files),
         "cases": counted_cases(cleaned.identities),
@@ -289,7 +289,7 @@ def print_cleaned(cleaned: "Cleaned", dry_run: bool) -> None:
 
 
 def print_names(inventory: "Inventory") -> None:
-    """How many configs, scenarios, studies and filters there are, and their names, those of configs by paper."""
+    """The numbers of configs, scenarios, studies and filters, and their names, those of configs by paper."""
     (_, _, configs), (_, _, scenarios), (_, _, studies), (_, _, filters) = inventory
     say(plural("{count} config (radarsim run NAME)", "{count} configs (radarsim run NAME)", len(configs)))
     for paper in dict.fromkeys(paper for _, paper, _ in configs):
@@ -304,7 +304,7 @@ def print_names(inventory: "Inventory") -> None:
 
 
 def print_inventory(inventory: "Inventory") -> None:
-    """Filters, studies, scenarios and configs, with a line on each: what is asked for most stands last."""
+    """Filters, studies, scenarios and configs, with a line on each: the most useful last."""
     for n, (title, columns, rows) in enumerate(reversed(inventory)):
         if n:
             say("")

@@ -1,4 +1,4 @@
-"""Commands for one's own data and one's own radar. Heavy imports wait inside the commands."""
+"""Commands for users' own data and radars. Heavy imports are inside the commands."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

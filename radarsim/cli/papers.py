@@ -1,4 +1,4 @@
-"""The commands on stored results beside one another, and on the papers' claims under every reading."""
+"""The commands that compare stored results and judge the papers' claims under every reading."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What the terminal shows of tracks over recorded plots, and of claims: what was found, measured and expected."""
+"""Terminal output of tracks over recorded plots, and of claims."""
 
 import shlex
 import shutil
@@ -30,7 +30,7 @@ def echo(rows: Iterable[Sequence[str]]) -> None:
 
 
 def report(followed: "Followed", judged: "Sequence[Judged]", advised: "Advice | None", stderr: bool = False) -> None:
-    """Print what was found; to stderr where the track itself goes to stdout. advised: where a likelihood is known."""
+    """Print the results; to stderr where the track itself goes to stdout. advised: where a likelihood is known."""
     from radarsim.recorded import page
 
     stream = sys.stderr if stderr else sys.stdout
@@ -55,7 +55,7 @@ def write(stream: TextIO, line: str) -> None:
 
 
 def report_fit(found: "Fit") -> None:
-    """Print what was fitted, and the options that put it into the config."""
+    """Print a fit, and the options that put it into the config."""
     from radarsim.recorded import fit, page
 
     tracks = plural("{count} track", "{count} tracks", found.tracks)
@@ -111,7 +111,7 @@ NOTHING_OF_ALL = term(
 
 
 def print_verdicts(result: "Result") -> None:
-    """The claims that a run can judge by their class over all readings, and which of them came out otherwise here."""
+    """The claims of a run by their class over all readings, with those that differ here."""
     from radarsim.report.claims import page, rule
 
     verdicts, shipped = result.verdicts(), result.verdicts("as_shipped")
@@ -140,10 +140,10 @@ def print_claims(
     out: str = configs.RESULTS,
     names: Sequence[str] = (),
 ) -> None:
-    """A line a claim: number, class, first words; of those that are detailed all of it and what was measured.
-    The commands that it names are those for the directory `out`, and for the names that were asked for.
+    """A line for each claim: number, class, first words; for detailed ones all of it with measured values. The commands
+    it shows are for the directory `out`, and for the requested names.
 
-    Of experiments that are not the paper's a line for each reason, with the claims that cannot be judged for it.
+    For experiments other than the paper's a line for each reason, with the claims that cannot be judged.
     """
     from radarsim.report.claims import NOT_JUDGED, NOT_RUN, page, rule
 
@@ -189,12 +189,12 @@ def print_claims(
 
 
 def _named(row: Mapping[str, Any]) -> str:
-    """What a part of a claim measures, in which case."""
+    """A part of a claim and its case."""
     return ": ".join(filter(None, (str(row["case"]), tr(str(row["what"])))))
 
 
 def _standing(parts: Sequence[Mapping[str, Any]]) -> str:
-    """The class of a claim in a few words; in brackets of one that is not counted."""
+    """The class of a claim in a few words; in brackets if it is not counted."""
     from radarsim.report.claims import page, rule
 
     own = parts[0]["class"]
@@ -204,7 +204,7 @@ def _standing(parts: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
-    """A claim with its place, config, original sentence and a line a part."""
+    """A claim with its place, config, original sentence and a line for each part."""
     from radarsim.report.claims import NOT_JUDGED, NOT_RUN, page, rule
 
     first = parts[0]
@@ -228,7 +228,7 @@ def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
 
 
 def print_readings(done: "Readings", detailed: bool) -> None:
-    """A line a claim, of single claims a line a reading too, and what the joint search came to."""
+    """A line for each claim, for single claims one for each reading too, and the joint search."""
     from radarsim.report.claims import rule
 
     for read in done.read:

@@ -1,7 +1,4 @@
-"""Values put at the keys that overrides and sweeps name, and scenarios put in the place of their stems.
-
-From a config to its cases: includes, overrides, sweeps and scenarios put in place, then checked case by case.
-"""
+"""From a config to its cases: includes, overrides, sweeps and scenarios are applied, then each case is checked."""
 
 import itertools
 import math
@@ -36,7 +33,7 @@ Read = Callable[[FilePath, Faults], Document | None]
 
 @dataclass(frozen=True)
 class Setting:
-    """A value to be put at a key, from an override or a sweep."""
+    """A value for a key, from an override or a sweep."""
 
     key: str
     value: object
@@ -44,11 +41,11 @@ class Setting:
 
 
 class NoSuchKey(ValueError):
-    """A key that the config has no place for; its text is the message."""
+    """A key without a place in the config; its text is the message."""
 
 
 def place(document: Document, model: type[Study], setting: Setting, read: Read, faults: Faults) -> Document:
-    """The document with a setting's value at the places its key means. Raises NoSuchKey."""
+    """The document with a setting's value at each place of its key. Raises NoSuchKey."""
     first = setting.key.split(".")[0]
     if "." in setting.key and isinstance(document.data.get(first), str):
         document = scenarios_inlined(document, model, read, faults, only=first)
@@ -60,9 +57,9 @@ def place(document: Document, model: type[Study], setting: Setting, read: Read, 
 
 
 def key_paths(document: Document, model: type[Study], key: str, missing_ok: bool = False) -> list[KeyPath]:
-    """The places that a key of `sweep` or `--set` means: one, or for a bare filter key one in every filter that has it.
+    """The places of a key of `sweep` or `--set`: one, or for a bare filter key one in every filter that has it.
 
-    Raises NoSuchKey, or gives none at all with missing_ok.
+    Raises NoSuchKey, or returns none with missing_ok.
     """
     try:
         if "." in key or key in allowed_keys(model):
@@ -107,7 +104,7 @@ def _in_every_member(document: Document, model: type[Study], key: str) -> list[K
 
 
 def _without_twin(document: Document, path: KeyPath, model: type[Study]) -> Document:
-    """The document without what the new value replaces: the same quantity in the other unit, or said another way."""
+    """The document without the key that the new value replaces: the same quantity in other units or terms."""
     twin = _twin(path, model)
     if not twin or document.get((*path[:-1], twin)) is ABSENT:
         return document
@@ -122,7 +119,7 @@ def _twin(path: KeyPath, model: type[Study]) -> str:
 
 
 def _with_twins(paths: Iterable[KeyPath], model: type[Study]) -> Iterator[KeyPath]:
-    """The paths, and of each that has one its twin's: who changes the one takes the other away."""
+    """The paths, each with its twin's if it has one: a change of one removes the other."""
     for path in paths:
         yield path
         if path and (twin := _twin(path, model)):
@@ -130,10 +127,10 @@ def _with_twins(paths: Iterable[KeyPath], model: type[Study]) -> Iterator[KeyPat
 
 
 def overlaid(document: Document, model: type[Study], over: Document, read: Read, faults: Faults) -> Document:
-    """The document of an included config with the keys that stand beside `include` laid over it.
+    """The document of an included config with the keys beside `include` laid over it.
 
-    Mappings are changed key by key, scenarios by their content; whatever else takes the place of what was there: lists,
-    values, a scenario's stem, and a mapping of another kind.
+    Mappings are changed key by key, scenarios by their content; all else is replaced: lists, values, a scenario's stem,
+    and a mapping of another kind.
     """
     stems = [key for key, value in over.data.items() if isinstance(value, str)]
     over = scenarios_inlined(over, model, read, faults)
@@ -147,7 +144,7 @@ def overlaid(document: Document, model: type[Study], over: Document, read: Read,
 
 
 def _merged(document: Document, model: type[Study], over: Document, path: KeyPath) -> Document:
-    """The document with the keys that another has in the mapping at a path."""
+    """The document merged with another one's keys in the mapping at a path."""
     below, value = document.get(path), over.get(path)
     if not isinstance(below, dict) or not isinstance(value, dict):
         return _replaced(document, model, over, path)
@@ -167,7 +164,7 @@ def _replaced(document: Document, model: type[Study], over: Document, path: KeyP
 
 
 def leaves(data: object, path: KeyPath = ()) -> Iterator[KeyPath]:
-    """The paths of what is no mapping, or an empty one."""
+    """The paths of all values except non-empty mappings."""
     if not isinstance(data, dict) or not data:
         yield path
         return
@@ -202,7 +199,7 @@ def scenarios_inlined(
 
 
 def data_files_found(document: Document, model: type[Study], faults: Faults) -> Document:
-    """The document with a path that can be opened for each file of data, named from the folder of its own YAML file."""
+    """The document with a readable path for each file of data, relative to the folder of its own YAML file."""
     for path, value in list(_texts(document.data, ())) if _has_data_files(model) else ():
         holder = model_at(model, document.data, path[:-1])
         info = holder.model_fields.get(str(path[-1])) if holder else None
@@ -261,15 +258,15 @@ def changes_included(document: Document) -> bool:
 
 
 def _renamed(drafts: list[Draft], stem: str) -> list[Draft]:
-    """The drafts of a config that changes what it includes, called after it where it is included in its turn."""
+    """The drafts of a config that changes what it includes, renamed after it if it is included in turn."""
     several = len({draft.stem for draft in drafts}) > 1
     return [replace(draft, stem=f"{stem}:{draft.stem}" if several else stem) for draft in drafts]
 
 
 def no_such_config(name: str, studies: Studies, known: bool = False) -> str:
-    """That there is no config of a name: the fault of the package that would have it, or else the nearest name.
+    """The fault that no config has this name: from the package that would have it, or with the nearest name.
 
-    known: where none is near, the names there are.
+    known: the names to list where none is near.
     """
     if faults := studies.lacking(name):
         return f"no such config: {'; '.join(faults)}"
@@ -281,7 +278,7 @@ def no_such_config(name: str, studies: Studies, known: bool = False) -> str:
 class Expander:
     """Expands configs into drafts, each config once.
 
-    `read(file, faults)` gives the document in a file, or notes a fault and gives None.
+    `read(file, faults)` returns the document in a file, or notes a fault and returns None.
     """
 
     def __init__(self, read: Read, settings: Iterable[Setting], faults: Faults, studies: Studies):
@@ -324,7 +321,7 @@ class Expander:
         )
 
     def _expand(self, document: Document, chain: tuple[FilePath, ...], over: Over) -> tuple[Common, list[Draft]]:
-        """The common keys of a config, and the drafts it stands for; over is laid over them, the nearest first."""
+        """The common keys of a config, and its drafts; over is laid over them, the nearest first."""
         common = self._common(document.only(COMMON_KEYS))
         if "include" in document.data:
             inside = self._included(document, common, chain, over)
@@ -372,7 +369,7 @@ class Expander:
         self.faults.add(document.origin(("study",)), ("study",), message, name)
 
     def _carried(self, document: Document, study: str, over: Document) -> tuple[Document, str]:
-        """A config of one study carried over to that which stands beside `include`, if one does, and its study."""
+        """A config converted to the study beside `include`, if one is given, and its study."""
         wanted = over.data.get("study", study)
         if wanted == study or not isinstance(wanted, str):  # what is no text is a fault already noted
             return document, study
@@ -389,7 +386,7 @@ class Expander:
         return document.with_data((), data), wanted
 
     def _included(self, document: Document, common: Common, chain: tuple[FilePath, ...], over: Over) -> list[Draft]:
-        """The drafts of all included configs, with the keys that stand beside `include` laid over each."""
+        """The drafts of all included configs, with the keys beside `include` laid over each."""
         if changes_included(document) or common.study is not None:
             over = (document.without(set(COMMON_KEYS) - {"study"}), *over)
         chain = (*chain, document.file.resolve()) if document.file else chain
@@ -440,9 +437,9 @@ class Expander:
         return [self._with(draft, settings) for draft in drafts for settings in itertools.product(*axes)]
 
     def _may_be_swept(self, document: Document, before: list[str], key: str, drafts: list[Draft], over: Over) -> bool:
-        """Whether a swept key is one that this sweep, and no other, no override and no key laid over it, decides.
+        """Whether a swept key is set by this sweep alone: by no other sweep, override or key laid over it.
 
-        before: the keys that the same sweep names before it.
+        before: the earlier keys of the same sweep.
         """
         origin = document.key_origin(("sweep", key))
         if key.split(".")[0] in COMMON_KEYS:
@@ -508,7 +505,7 @@ class Expander:
         return Case(name, draft.stem, draft.study, spec, draft.swept, draft.realisations, seed, against=against)
 
     def _baselines(self, document: Document, model: type[Study]) -> tuple[Document, tuple[str, ...]]:
-        """The document with the first of several baselines alone, and the others, each checked as if it stood alone."""
+        """The document with only the first of several baselines, and the others, each checked as if alone."""
         path: KeyPath = ("baseline",)
         names = document.get(path)
         if "baseline" not in model.model_fields or names is ABSENT or isinstance(names, str | None):
@@ -542,7 +539,7 @@ class Expander:
             self.faults.add(document.origin(("include",)), ("include",), message)
 
     def _check_figure_names(self, common: Common, drafts: list[Draft], document: Document) -> None:
-        """A figure must be one that the study may draw, where its schema says which these are."""
+        """A figure must be one that the study may draw, if its schema lists these."""
         known = [self.studies.keys(study).figure_names for study in {draft.study for draft in drafts}]
         if len(known) != 1 or known[0] is None:
             return

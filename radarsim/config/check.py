@@ -1,9 +1,8 @@
-"""A document checked against a schema: pydantic's errors, reported in plain text where the value was written.
+"""A document checked against a schema: pydantic's errors, reported in plain text at the place of the value.
 
-What people call a key: one text, symbol and unit for each, from the schema of the study that has it.
-
-A key says it itself: `key("scan period", "time between two plots, s", symbol="Δt")`. The unit is the one that the end
-of the key names; a key that names none, or none that people write, gives it beside the symbol, as `unit`.
+Names of keys: one text, symbol and unit for each, from the schema of its study: `key("scan period", "time between two
+plots, s", symbol="Δt")`. The unit is the one at the end of the key's name; a key without such an ending, or with an
+unusual one, gives it beside the symbol, as `unit`.
 """
 
 import math
@@ -54,9 +53,9 @@ WITHOUT_VALUE = ("missing", "extra_forbidden", "unique", "union_tag_not_found")
 
 
 def check(model: type[M], document: Document, faults: Faults, also: Iterable[str] = ()) -> M | None:
-    """The document as a checked object; None, and faults noted, if it is not one.
+    """The document as a checked object; None, with faults noted, if it is invalid.
 
-    `also` are top-level keys that are checked elsewhere and are named among the allowed ones.
+    `also` are top-level keys that are checked elsewhere and are listed among the allowed ones.
     """
     refuse_both_units(document, faults)
     try:
@@ -74,7 +73,7 @@ def check(model: type[M], document: Document, faults: Faults, also: Iterable[str
 
 @dataclass(frozen=True)
 class _Found:
-    """One of pydantic's errors: its kind, the path of the value as the user wrote it, and what its message needs."""
+    """One of pydantic's errors: its kind, the path of the value as the user wrote it, and the data for its message."""
 
     kind: str
     path: KeyPath
@@ -83,7 +82,7 @@ class _Found:
 
     @classmethod
     def of(cls, error: ErrorDetails, document: Document) -> "list[_Found]":
-        """One, or one for each fault that the cross-checks of a mapping found."""
+        """One, or one for each fault of a mapping's cross-checks."""
         kind, context = error["type"], dict(error.get("ctx", {}))
         path = path_in(document.data, error["loc"], keep_last=kind in ("missing", "extra_forbidden"))
         if kind in ("union_tag_invalid", "union_tag_not_found", "no_such_kind"):
@@ -95,14 +94,14 @@ class _Found:
 
     @classmethod
     def misfit(cls, fault: At, path: KeyPath, document: Document) -> "_Found":
-        """A fault that a cross-check of the mapping at a path found."""
+        """A fault from a cross-check of the mapping at a path."""
         *above, key = fault.key.split(".")
         outer = [int(step) if step.isdecimal() else step for step in above]
         return cls("at", twin(document.data, (*path, *outer), key), {"message": fault.message}, fault.message)
 
 
 class _Partial:
-    """A document with faults, read as far as it has none, for the cross-checks that what was read is enough for.
+    """A document with faults: its valid part, for the cross-checks that need no more.
 
     Where a mapping has an unknown key, its optional keys that are not given count as unread: one may be misspelt.
     """
@@ -115,13 +114,13 @@ class _Partial:
         self.more: list[_Found] = []
 
     def misfits(self) -> list[_Found]:
-        """The further faults that the cross-checks find."""
+        """Further faults, from the cross-checks."""
         with suppress(NotRead):
             self._read(())
         return self.more
 
     def _read(self, path: KeyPath) -> Model:
-        """The mapping at a path, without the fields that have faults; raises NotRead if it is no mapping."""
+        """The mapping at a path, without the fields that have faults; raises NotRead if it is not a mapping."""
         model, data = model_at(self.model, self.document.data, path), self.document.get(path)
         if path in self.whole or model is None or not isinstance(data, dict):
             raise NotRead
@@ -143,7 +142,7 @@ class _Partial:
         misfits = list(part.misfits())
         self.more += [_Found.misfit(each, path, self.document) for each in misfits]
         for each in misfits:
-            part.__dict__.pop(each.key, None)  # what is around it must not rely on it
+            part.__dict__.pop(each.key, None)  # the mapping around it must not rely on it
         return part
 
     def _field(self, path: KeyPath, name: str, info: FieldInfo, model: type[Model]) -> Any:
@@ -161,7 +160,7 @@ class _Partial:
         return members
 
     def _validate(self, check: Callable[..., Any], members: tuple[Model, ...], path: KeyPath) -> None:
-        """Let a check of the whole list see what was read of its members."""
+        """Let a check of the whole list see the valid members."""
         try:
             check(members)
         except NotRead:
@@ -179,7 +178,7 @@ def _reader(model: type[Model], name: str) -> TypeAdapter[Any]:
 
 
 def _irrelevant(one: _Found, found: list[_Found], document: Document) -> bool:
-    """Whether an error is of a choice's member that the value, by its form, was not meant to be."""
+    """Whether an error concerns a member of a choice that the value, by its form, was not meant to be."""
     value = document.get(one.path)
     form = MAPPING if isinstance(value, dict) else LIST if isinstance(value, list) else SCALAR
     if one.kind not in (MAPPING | LIST | SCALAR) - form:
@@ -214,7 +213,7 @@ def _report(model: type[Model], document: Document, found: _Found, faults: Fault
 
 
 def _message(kind: str, context: dict[str, Any], original: str, key: str) -> str:
-    """What is required, as text; bounds of a `_deg` key in degrees."""
+    """The requirement, as text; bounds of a `_deg` key in degrees."""
     if kind == "at":
         return str(context["message"])
     if kind == "value_error":
@@ -242,7 +241,7 @@ def unknown_key(key: object, known: Iterable[str]) -> str:
 
 
 def path_in(data: object, location: tuple[int | str, ...], keep_last: bool) -> KeyPath:
-    """The keys of pydantic's location as they stand in the data: without names of union members, `_deg` as written."""
+    """The keys of pydantic's location as in the data: without names of union members, `_deg` as written."""
     path: KeyPath = ()
     for i, step in enumerate(location):
         written = step
@@ -271,7 +270,7 @@ def allowed_keys(model: type[Model]) -> list[str]:
 
 
 def model_at(model: type[Model], data: object, path: KeyPath) -> type[Model] | None:
-    """The schema of the mapping at a path; of a choice, the member that the data's kind names."""
+    """The schema of the mapping at a path; of a choice, the member with the data's kind."""
     current: type[Model] | None = model
     candidates = [model]
     for step in path:
@@ -285,7 +284,7 @@ def model_at(model: type[Model], data: object, path: KeyPath) -> type[Model] | N
 
 
 def models_in(annotation: object) -> list[type[Model]]:
-    """All schemas named in an annotation: of a choice, a list, an optional."""
+    """All schemas in an annotation: of a choice, a list, an optional."""
     if isinstance(annotation, type) and issubclass(annotation, Model):
         return [annotation]
     return [model for argument in get_args(annotation) for model in models_in(argument)]
@@ -326,7 +325,7 @@ UNITS = {
 
 
 class Words(str):
-    """What a key is called, and the outermost package of the schema that calls it so, in whose catalogues it stands."""
+    """The name of a key, and the top-level package of its schema, whose catalogues translate it."""
 
     package = ""
 
@@ -369,9 +368,9 @@ def label(keys: Study | type[Study] | None, key: str) -> Label:
 
 
 def _field(keys: Model | type[Model], steps: list[str]) -> tuple[type[Model], FieldInfo] | None:
-    """The field that dotted steps lead to, from the top or, for a bare key, from the members of the study's list.
+    """The field at dotted steps, from the top or, for a bare key, from the members of the study's list.
 
-    With it the schema that calls it so: a base class, where the field is inherited.
+    With it the schema that names it: a base class, where the field is inherited.
     """
     model = keys if isinstance(keys, type) else type(keys)
     if steps and _named(steps[0]).isdisjoint(model.model_fields) and issubclass(model, Study):
@@ -402,7 +401,7 @@ def _fields(model: Model | type[Model]) -> dict[str, FieldInfo]:
 
 
 def _models(value: object) -> Iterator[Model]:
-    """The mappings that a value is or holds: of a choice, the kind that was chosen."""
+    """The mappings that a value is or holds: of a choice, the given kind."""
     if isinstance(value, Model):
         yield value
     elif isinstance(value, tuple | list):

@@ -1,8 +1,8 @@
-"""Faults of a config: where, what, what is allowed; collected, so that the user sees all of them at once.
+"""A config as plain data in which every value keeps its place of origin.
 
-Where configs and scenarios are found by their stem, and what is suggested when they are not.
+Faults of a config: place, fault, allowed values; collected, so that the user sees all of them at once.
 
-A config as plain data in which every value still knows where it was written.
+Where configs and scenarios are found by their stem, and suggestions when they are not.
 """
 
 import difflib
@@ -26,8 +26,8 @@ LONGEST_SOURCE = 500  # characters of the place
 class Origin(NamedTuple):
     """Where a value was written: a file with line and column from 1, an argument, or `config`: a dictionary.
 
-    prefix counts the leading keys of a path that do not stand in that file: a scenario's own keys begin below `target`.
-    key: that which an argument such as `--set KEY` names itself, maybe a bare filter key.
+    prefix counts the leading keys of a path that are not in that file: a scenario's own keys begin below `target`. key:
+    the key that an argument such as `--set KEY` names itself, possibly a bare filter key.
     """
 
     source: str
@@ -66,16 +66,16 @@ class Faults:
         self._lines.setdefault(": ".join(parts), (rank, origin.line, origin.column, len(self._lines)))
 
     def spoil(self, origin: Origin, path: KeyPath, message: str, got: object = ABSENT) -> None:
-        """Note a fault that makes the value at this place unusable: no further fault of it is reported."""
+        """Note a fault that makes the value at this place unusable: further faults of it are not reported."""
         self.add(origin, path, message, got)
         self._spoiled.add((origin._replace(prefix=0), path[origin.prefix :]))
 
     def spoiled(self, origin: Origin, path: KeyPath) -> bool:
-        """Whether the value at this place has been reported as unusable."""
+        """Whether the value at this place is reported as unusable."""
         return (origin._replace(prefix=0), path[origin.prefix :]) in self._spoiled
 
     def beside(self, source: str) -> None:
-        """Name the file whose keys lie over those of others, where faults are named in the others alone."""
+        """Name the file whose keys are laid over others, where faults are attributed to the others alone."""
         if source not in self._sources and not self._of_arguments:
             self._lines = {f"{line} (with the keys of {source} over it)": rank for line, rank in self._lines.items()}
 
@@ -96,13 +96,13 @@ def dotted(path: KeyPath) -> str:
 
 
 def shown(value: object) -> str:
-    """A value as it is quoted in a message: one line of at most 60 characters, control characters escaped."""
+    """A value quoted in a message: one line of at most 60 characters, control characters escaped."""
     text = short(value) if isinstance(value, float | int) and not isinstance(value, bool) else _literal(value)
     return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
 
 
 def _literal(value: object, room: int = LONGEST) -> str:
-    """Like repr, with YAML's true and false, and without formatting more than is shown."""
+    """Like repr, with YAML's true and false, and without formatting more than shown."""
     match value:
         case None:
             return "nothing"
@@ -146,7 +146,7 @@ def one_line(text: str) -> str:
 
 
 def ascii_controls(text: str) -> str:
-    """Escapes what is not printable, the way repr does."""
+    """Escapes unprintable characters, as repr does."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
@@ -160,7 +160,7 @@ RESERVED = "a config must have another name: there is a file of that name among 
 
 
 def no_folders() -> tuple[Path, ...]:
-    """Folders with configs/ and scenarios/ beside the shipped one: none, but see radarsim.app.configs."""
+    """Folders with configs/ and scenarios/ besides the shipped one: none, but see radarsim.app.configs."""
     return ()
 
 
@@ -176,7 +176,7 @@ def config_file(name: str, beside: Path | None = None) -> Path | None:
 def scenario_file(name: str, config: Path | None) -> Path | None:
     """The file of a scenario: beside the config, in scenarios/ next to its folder or here, among the shipped.
 
-    A config of that name beside the config is no scenario.
+    A config of that name beside the config is not a scenario.
     """
     folders = [] if config is None else [config.parent, next_to(config.parent) / "scenarios"]
     found = _first(name, [*folders, Path("scenarios"), SHIPPED / "scenarios"], refused=_is_config)
@@ -188,7 +188,7 @@ def _further(kind: str) -> list[Path]:
 
 
 def next_to(folder: Path) -> Path:
-    """The folder around a folder, in the user's own notation where that has one."""
+    """The folder around a folder, in the user's own notation if it has one."""
     return folder.parent if folder.name not in ("", "..") else folder / ".."
 
 
@@ -201,7 +201,7 @@ def _first(name: str, folders: list[Path], refused: Callable[[Path], bool] = lam
 
 
 def _is_config(file: Path) -> bool:
-    """Whether a file has a key that only configs have; what cannot be read is judged by who reads it."""
+    """Whether a file has a key that only configs have; an unreadable file is left to its reader."""
     try:
         with file.open(encoding="utf-8", errors="replace") as text:
             return any(line.startswith(("study:", "include:")) for line in text)
@@ -210,7 +210,7 @@ def _is_config(file: Path) -> bool:
 
 
 def stems(kind: str) -> tuple[str, ...]:
-    """Stems of the configs or scenarios that can be named here: those of the working directory and the shipped ones."""
+    """Stems of available configs or scenarios: those of the working directory and the shipped ones."""
     folders = (Path(kind), SHIPPED / kind, *_further(kind))
     return tuple(sorted({file.stem for folder in folders for file in folder.glob("*.yaml")}))
 
@@ -221,17 +221,17 @@ def is_stem(name: str) -> bool:
 
 
 def composed(name: str) -> str:
-    """A name with each letter composed with its accents: the same for every way of writing it (Unicode's NFC)."""
+    """A name with its letters and accents composed: the same for every way of writing it (Unicode's NFC)."""
     return unicodedata.normalize("NFC", name)
 
 
 def is_reserved(stem: str) -> bool:
-    """Whether a config's results would have the name of a file that is written beside them, in letters of any case."""
+    """Whether a config's results would have the name of a file written beside them, in letters of any case."""
     return stem.casefold() in FILES_OF_RESULTS
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """`; did you mean X?` for the known name nearest to a mistaken one, or nothing."""
+    """`; did you mean X?` for the nearest known name, or nothing."""
     name, known = str(name)[:100], list(known)
     begun = [full for full in known if len(name) > 2 and full.lower().startswith(name.lower())]
     near = begun or difflib.get_close_matches(name, known, n=1, cutoff=0.6)
@@ -254,7 +254,7 @@ class Document:
     keys: Mapping[KeyPath, Origin] = field(default_factory=dict)
 
     def origin(self, path: KeyPath) -> Origin:
-        """Where the value at a path was written; of a value that is not there, the nearest one around it."""
+        """Where the value at a path was written; if there is no value, the nearest one around it."""
         while path and path not in self.values:
             path = path[:-1]
         return self.values.get(path, Origin(self.source))
@@ -279,7 +279,7 @@ class Document:
         return self.with_data((), {key: value for key, value in self.data.items() if key not in keys})
 
     def with_data(self, path: KeyPath, value: object) -> "Document":
-        """The document with other data at a path, where every value still has the origin it had."""
+        """The document with other data at a path, where every value keeps its origin."""
         return replace(self, data=_with(self.data, path, value))
 
     def graft(self, path: KeyPath, value: object, origin: Origin) -> "Document":
@@ -296,7 +296,7 @@ class Document:
         return self._replaced(path, other.data, whole | moved(other.values), moved(other.keys))
 
     def laid(self, path: KeyPath, over: "Document") -> "Document":
-        """The document with what another one has at a path, with its origins, in place of what it has there itself."""
+        """The document with another one's value and origins at a path, replacing its own."""
 
         def of(origins: Mapping[KeyPath, Origin]) -> dict[KeyPath, Origin]:
             return {below: origin for below, origin in origins.items() if below[: len(path)] == path}
@@ -316,7 +316,7 @@ class Document:
 
 
 def child(value: object, step: str | int) -> object:
-    """What stands under a key or an index, or ABSENT."""
+    """The value under a key or an index, or ABSENT."""
     if isinstance(value, dict):
         return value.get(step, ABSENT)
     if isinstance(value, list) and isinstance(step, int) and 0 <= step < len(value):

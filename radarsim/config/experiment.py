@@ -1,6 +1,6 @@
-"""What of a checked configuration changes its numbers, as plain JSON-able data.
+"""A checked config: an experiment of cases.
 
-What a checked config is: an experiment of cases.
+The part of a checked config that changes its numbers, as plain JSON-able data.
 """
 
 import hashlib
@@ -27,17 +27,17 @@ def digest(value: object) -> str:
 
 
 def canonical(spec: BaseModel) -> dict[str, Any]:
-    """All that changes a number, defaults filled, in SI units; display names are left out."""
+    """All that changes a number, defaults filled in, in SI units; display names are left out."""
     return _plain(spec, (Display,))
 
 
 def world(spec: BaseModel) -> dict[str, Any]:
-    """What is observed, without the filters and the number of scans: cases of one world share their noise."""
+    """The observed world, without the filters and the number of scans: cases of one world share their noise."""
     return _plain(spec, (Display, Design))
 
 
 def complete(spec: BaseModel) -> dict[str, Any]:
-    """Every key that has a value, names too: reads back as the same configuration."""
+    """Every key that has a value, including names: reads back as the same configuration."""
     return _plain(spec, ())
 
 
@@ -57,14 +57,14 @@ def _plain(value: object, leave_out: tuple[type, ...]) -> Any:
 
 
 def _at_its_default(model: BaseModel, name: str, info: FieldInfo) -> bool:
-    """Whether a field is one that earlier versions did not have, and does what they did."""
+    """Whether a field that earlier versions lacked has the value that keeps their behaviour."""
     return any(isinstance(mark, Added) for mark in info.metadata) and getattr(model, name) == info.default
 
 
 def _without_names(model: BaseModel, name: str, info: FieldInfo) -> object:
     """The value of a field, without the names in it.
 
-    For the name of a member of a list the member's place, 0 where none is named; for a file of data its content's hash.
+    A name of a list's member is replaced by its place, 0 where none is named; a file of data by its content's hash.
     """
     value = getattr(model, name)
     for mark in info.metadata:
@@ -78,7 +78,7 @@ def _without_names(model: BaseModel, name: str, info: FieldInfo) -> object:
 # ---- experiment ------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Case:
-    """One configuration to be run: a study's checked keys, how often, and with which seed.
+    """One configuration to run: a study's checked keys, the number of realisations, and the seed.
 
     name is the stem of its config with ` key=value` for each swept key. spec holds the study's own keys, an object of
     its subclass of `radarsim.config.fields.Study`. noise_of, where given, are the keys of another case, whose noise
@@ -117,7 +117,7 @@ class Case:
 
     @property
     def keys(self) -> dict[str, Any]:
-        """Its keys as plain data, names too: all baselines where there are several."""
+        """Its keys as plain data, including names: all baselines where there are several."""
         several = {"baseline": [self.spec.baseline, *self.against]} if self.against else {}
         return complete(self.spec) | several
 
@@ -129,9 +129,9 @@ class Case:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What a config asks for; figures holds, for each that is drawn, names or patterns of the cases that it shows.
+    """The experiment of a config; figures holds, for each figure to draw, names or patterns of its cases.
 
-    changes_included: keys of the study stand beside `include`, so that a case is not what the config of its stem says.
+    changes_included: keys of the study stand beside `include`, so that a case differs from the config of its stem.
     """
 
     stem: str
@@ -150,7 +150,7 @@ class Experiment:
 
     @cached_property
     def resolved(self) -> dict[str, Any]:
-        """The whole experiment as plain JSON-able data, defaults filled and in SI units, for the record."""
+        """The whole experiment as plain JSON-able data, defaults filled in and in SI units, for the record."""
         return {
             "config": self.stem,
             "study": self.study,
@@ -159,13 +159,13 @@ class Experiment:
         }
 
     def shown_in(self, figure: str) -> tuple[Case, ...]:
-        """The cases that a figure shows: all of them, where the config does not say."""
+        """The cases in a figure: all of them, unless the config selects some."""
         if figure not in self.figures:
             return self.cases
         return tuple(case for case in self.cases if any(matches(case.name, p) for p in self.figures[figure]))
 
     def drawn(self, figures: Iterable[str]) -> list[str]:
-        """Those of the figures that the config has drawn, in its order; all of them, where it names none."""
+        """Those of the figures that the config selects, in its order; all of them, where it selects none."""
         every = list(figures)
         wanted = [name for pattern in self.figures for name in every if matches(name, pattern)]
         return list(dict.fromkeys(wanted)) if self.figures else every
@@ -175,12 +175,12 @@ DRAWN_FOR_ALL = ("claims", "sweep_*")  # figures that no study names
 
 
 def matches(name: str, pattern: str) -> bool:
-    """Whether a pattern of `figures` means a case: its very name, or with * and ? for what may differ."""
+    """Whether a pattern of `figures` matches a case: its exact name, or with * and ?."""
     return name == pattern or fnmatchcase(name, pattern.replace("[", "[[]"))
 
 
 def in_name(value: object) -> str:
-    """A swept value as it stands in a case's name: numbers at their shortest, text plain, lists without blanks."""
+    """A swept value in a case's name: numbers at their shortest, text plain, lists without blanks."""
     match value:
         case bool():
             return str(value).lower()

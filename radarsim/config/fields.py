@@ -76,7 +76,7 @@ class NotFinite(ValueError):
 
 
 def from_text(text: str) -> object:
-    """The value of a plain (unquoted) word: number, true, false, nothing, or the text itself."""
+    """The value of a plain (unquoted) word: number, true, false, null, or the text itself."""
     if text in CONSTANTS:
         return CONSTANTS[text]
     if NOT_FINITE.fullmatch(text):
@@ -90,7 +90,7 @@ def from_text(text: str) -> object:
 
 
 def from_python(value: object, path: KeyPath, origin: Origin, faults: Faults) -> object:
-    """A dictionary given in Python as YAML would have given it; NumPy scalars and arrays become plain values."""
+    """A Python dictionary converted as if from YAML; NumPy scalars and arrays become plain values."""
     if len(path) > DEEPEST:
         faults.spoil(origin, path[:3], f"nested more than {DEEPEST} deep")
         return None
@@ -132,31 +132,31 @@ SMALLEST = 1e-18
 
 
 class Display:
-    """Mark of a field that changes no number (a display name): left out of a case's identity and of its noise."""
+    """Mark of a field that changes no number (a display name): excluded from a case's identity and from its noise."""
 
 
 class Design:
-    """Mark of a field that designs filters or says how long to look: no part of the world nor of its noise's key."""
+    """Mark of a field that designs filters or limits the observation: no part of the world nor of its noise's key."""
 
 
 class Added:
-    """Mark of a key that earlier versions did not have, and did as its default says.
+    """Mark of a key that earlier versions lacked, behaving as its default.
 
-    At its default it is left out of a case's identity and of its noise's key, so that the noise is what it was.
+    At its default it is excluded from a case's identity and from its noise's key, so that the noise stays the same.
     """
 
 
 @dataclass(frozen=True)
 class NameIn:
-    """Mark of a field that names a member of a list; in a case's identity its place in the list stands for it."""
+    """Mark of a field that names a member of a list; a case's identity has its place in the list instead."""
 
     field: str
 
 
 class DataFile:
-    """Mark of a text field that names a file of data, from the folder of the YAML file in which it stands.
+    """Mark of a text field that names a file of data, relative to the folder of its YAML file.
 
-    The checked object holds a path that can be opened; in a case's identity the file's content stands for it.
+    The checked object holds a readable path; a case's identity has the file's content instead.
     """
 
 
@@ -172,7 +172,7 @@ class Scenario:
 class Only:
     """Mark of a key that belongs to some values of keys beside it, such as a kind: {"kind": ("adaptive", "imm")}.
 
-    default: its value there, where it is not given; needed: it has to be given. Elsewhere it must be left out.
+    default: its value there, if it is not given; needed: it is required. Elsewhere it must be left out.
     """
 
     where: Mapping[str, tuple[str, ...]]
@@ -185,7 +185,7 @@ class NotRead(Exception):
 
 
 class At(NamedTuple):
-    """A fault that a cross-check finds: at which key, dotted if deeper, and what is required."""
+    """A fault from a cross-check: the key, dotted if deeper, and the requirement."""
 
     key: str
     message: str
@@ -200,24 +200,24 @@ _CROSS_CHECKS: set[Callable[[Any], Iterator[At]]] = set()
 
 
 def cross_check(method: Check) -> Check:
-    """Mark of a model's method that yields faults of fields that do not go together.
+    """Mark of a model's method that yields faults of incompatible fields.
 
-    All cross-checks of a model are run, in order. Where some fields have faults of their own they are run as well, on
-    what could be read: there one that touches an unread field ends at once, so what is independent stands apart.
+    All cross-checks of a model are run, in order. Where some fields have faults of their own they run as well, on the
+    valid fields: one that touches an invalid field ends at once, so that independent checks are separate methods.
     """
     _CROSS_CHECKS.add(method)
     return method
 
 
 def of_each(members: Iterable[T], check: Callable[[int, T], Iterator[At]]) -> Iterator[At]:
-    """The faults of every member of a list, `check(i, member)`; what is unread in one does not stop the others."""
+    """The faults of every member of a list, `check(i, member)`; an invalid field in one does not stop the others."""
     for i, member in enumerate(members):
         with suppress(NotRead):
             yield from check(i, member)
 
 
 def readable(members: Iterable[T], value: Callable[[T], V]) -> list[V]:
-    """The value of every member of which it could be read."""
+    """The value of every member for which it is valid."""
     values = []
     for member in members:
         with suppress(NotRead):
@@ -266,7 +266,7 @@ class Model(BaseModel):
         return self.model_copy(update=found) if found else self
 
     def _settled(self, name: str) -> Any:
-        """The value of a key, or the default that it has where it belongs."""
+        """The value of a key, or its default where it belongs."""
         value, only = getattr(self, name), conditions(type(self)).get(name)
         if value is not None or only is None:
             return value
@@ -274,7 +274,7 @@ class Model(BaseModel):
         return only.default if belongs else None
 
     def _of_kind(self, name: str, only: Only) -> Iterator[At]:
-        """The fault of a key that does not belong to the kind that there is, or is needed by it."""
+        """The fault of a key that does not belong to the given kind, or is required by it."""
         value, kinds = getattr(self, name), {key: self._settled(key) for key in only.where}
         other = next((key for key, values in only.where.items() if kinds[key] not in values), None)
         if value is not None and other is not None:
@@ -284,7 +284,7 @@ class Model(BaseModel):
             yield at(name, "is needed by " + ", ".join(f"{key}: {kind}" for key, kind in kinds.items()))
 
     def misfits(self) -> Iterator[At]:
-        """What all cross-checks find; those that need an unread field end there."""
+        """Faults from all cross-checks; those that need an invalid field end there."""
         for name, only in conditions(type(self)).items():
             with suppress(NotRead):
                 yield from self._of_kind(name, only)
@@ -318,20 +318,20 @@ class Model(BaseModel):
 
 @cache
 def conditions(model: type[Model]) -> dict[str, Only]:
-    """The keys of a model that belong to some kinds only, by name."""
+    """The keys of a model that belong only to some kinds, by name."""
     marks = {name: [m for m in info.metadata if isinstance(m, Only)] for name, info in model.model_fields.items()}
     return {name: own[0] for name, own in marks.items() if own}
 
 
 def _literals(annotation: Any) -> tuple[str, ...]:
-    """The texts that a key of a few may have, or none; nothing of other keys."""
+    """The permitted texts of a key with listed values; nothing for other keys."""
     every = [one for part in get_args(annotation) for one in (get_args(part) or (part,))]
     return tuple(one for one in every if isinstance(one, str))
 
 
 def unknown_to(spec: Model, home: str) -> list[str]:
-    """The keys of a config, dotted, that code of a package cannot know: those that a model derived elsewhere adds to
-    the package's, and values that it allows beyond."""
+    """The keys of a config, dotted, that a package's code cannot know: those that a model derived elsewhere adds to the
+    package's, and additional values."""
     return list(_unknown(spec, home, ""))
 
 
@@ -351,13 +351,13 @@ def _unknown(spec: Model, home: str, above: str) -> Iterator[str]:
 
 
 def _known(module: str, home: str) -> bool:
-    """Whether a module is one of a package, or one that it stands on: radarsim, of a study of radarsim its keys."""
+    """Whether a module belongs to a package or one that it builds on: radarsim, or for a radarsim study its keys."""
     ours = "radarsim.config." if home.startswith("radarsim.") else "radarsim."
     return f"{module}.".startswith((f"{home}.", ours))
 
 
 def _allowed(info: FieldInfo, value: Any) -> bool:
-    """Whether a field of a model takes a value that another model has taken."""
+    """Whether a field of a model accepts a value from another model."""
     allowed: Any = Annotated[info.annotation, *info.metadata] if info.metadata else info.annotation
     try:
         TypeAdapter(allowed).validate_python(value)
@@ -382,7 +382,7 @@ def _unit_changed(key: str, unit: str, other: str) -> str | None:
 
 
 def radians(value: Any) -> Any:
-    """Degrees to radians, also within lists; what is no number is left for the check to refuse."""
+    """Degrees to radians, also within lists; anything but numbers is left for the check to refuse."""
     if isinstance(value, list):
         return [radians(item) for item in value]
     return math.radians(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
@@ -397,7 +397,7 @@ def _moderate(value: float) -> float:
 
 
 def _whole(value: Any) -> Any:
-    """1e5 is a whole number too; what is not one is left for the check to refuse."""
+    """1e5 is a whole number too; anything else is left for the check to refuse."""
     if isinstance(value, float) and value.is_integer():
         return int(value)
     return value
@@ -410,7 +410,7 @@ def _printable(value: str) -> str:
 
 
 def _no_formula(value: str) -> str:
-    """A name that no spreadsheet takes for a formula when it opens a table of results."""
+    """A name that no spreadsheet reads as a formula when it opens a table of results."""
     if value.startswith(("=", "+", "-", "@")):
         raise PydanticCustomError("text", "must not begin with = + - or @: a spreadsheet takes that for a formula")
     return value
@@ -455,10 +455,10 @@ def key(
     only: Mapping[str, str | tuple[str, ...]] | None = None,
     **limits: Any,
 ) -> Any:
-    """A key: what people call it, what it means with its unit, its default (none: it must be given), and its letter.
+    """A key: its name, its description with unit, its default (none: it is required), and its letter.
 
-    unit: of the value, where the key does not end in it. only: values of keys beside it that it belongs to, and its
-    default is of; the key may be None then. limits: what `pydantic.Field` takes beside.
+    unit: of the value, where the key does not end in it. only: values of keys beside it that it belongs to, and for
+    which its default holds; the key may then be None. limits: further arguments of `pydantic.Field`.
     """
     extra: Any = {name: text for name, text in (("symbol", symbol), ("unit", unit)) if text is not None}
     given = default if only is None else None
@@ -497,7 +497,7 @@ class Study(Model):
 
     @property
     def members(self) -> tuple[Any, ...]:
-        """The list that `bare_keys` names: the filters of a case."""
+        """The list of `bare_keys`: the filters of a case."""
         return getattr(self, self.bare_keys)
 
     @cross_check
@@ -512,7 +512,7 @@ class Study(Model):
 
 
 def kinds_of(keys: type[Model]) -> tuple[str, ...]:
-    """The kinds that a model's key `kind` allows; of a study's keys those of its members."""
+    """The permitted values of a model's key `kind`; for a study's keys those of its members."""
     if issubclass(keys, Study):
         members = [one for one in _parts(keys.model_fields[keys.bare_keys].annotation) if _is_model(one)]
         return tuple(kind for one in members for kind in kinds_of(one))
@@ -529,10 +529,10 @@ def widened(
     why_not: Mapping[str, str],
     again: tuple[Callable[[str], type[Study]], str],
 ) -> type[Study]:
-    """The keys of a study whose members may be of further kinds too; a kind that is not given is the study's own.
+    """The keys of a study whose members may have further kinds; an absent kind means the study's own.
 
-    why_not: of kinds that cannot be used the reason. again: a function and what it takes to give these keys again, by
-    which a config travels between processes.
+    why_not: for unusable kinds the reason. again: a function and arguments that return these keys again, by which a
+    config travels between processes.
     """
     info = keys.model_fields[keys.bare_keys]
     (own, _) = get_args(info.annotation)
@@ -543,7 +543,7 @@ def widened(
         return data.get("kind", first) if isinstance(data, dict) else getattr(data, "kind", first)
 
     def known(data: Any) -> Any:
-        if (kind := kind_of(data)) not in list(kinds):  # which compares what may be no text
+        if (kind := kind_of(data)) not in list(kinds):  # which may compare something other than text
             reason = f"; {why_not[kind]}" if isinstance(kind, str) and kind in why_not else ""
             told = {"kinds": ", ".join(kinds), "reason": reason, "discriminator": "kind"}
             raise PydanticCustomError("no_such_kind", "must be one of {kinds}{reason}", told)
@@ -577,7 +577,7 @@ def unique_names(members: tuple[N, ...]) -> tuple[N, ...]:
     """Check that no two members of a list have the same name; for AfterValidator."""
     seen: set[str] = set()
     for member in members:
-        name = unicodedata.normalize("NFC", member.name)  # what looks the same is the same
+        name = unicodedata.normalize("NFC", member.name)  # equal looks are equal names
         if name in seen:
             raise PydanticCustomError("unique", "names must differ: {name} is there twice", {"name": member.name})
         seen.add(name)
@@ -598,9 +598,9 @@ class Member(Model):
 def keys_of(
     name: str, module: str, parts: Mapping[str, type[Model]], filters: type[Member], most_scans: int
 ) -> type[Study]:
-    """The keys of a study of these parts, by name, and of `filters`, `baseline` and `scans` with their marks.
+    """The keys of a study with these parts, by name, and `filters`, `baseline` and `scans` with their marks.
 
-    The class is called so, and is to be found in this module.
+    The class has this name, and is found in this module.
     """
     about = {name: (one.__doc__ or name).strip().partition("\n")[0].rstrip(".") for name, one in parts.items()}
     own: Any = {name: (one, key(name.replace("_", " "), about[name])) for name, one in parts.items()}
@@ -621,7 +621,7 @@ def keys_of(
 
 
 # ---- numeric ---------------------------------------------------------------------------------------------------------
-MOST_NAMED = 5  # keys that begin as a mistaken name does and are all suggested
+MOST_NAMED = 5  # keys with the beginning of a mistaken name that are all suggested
 
 
 @dataclass(frozen=True)
@@ -640,7 +640,7 @@ class NumericKey:
 
 
 def keys(spec: Study) -> list[NumericKey]:
-    """Every key of a case that holds a number, in the order of its schema, items of lists by their place."""
+    """Every numeric key of a case, in the order of its schema, items of lists by index."""
     return list(_within(spec, ()))
 
 
@@ -650,7 +650,7 @@ def _within(model: Model, path: tuple[str | int, ...]) -> Iterator[NumericKey]:
 
 
 def _at(value: Any, path: tuple[str | int, ...], allowed: Any) -> Iterator[NumericKey]:
-    """The keys at and below a value, of which `allowed` is the annotation and its marks."""
+    """The keys at and below a value; `allowed` is its annotation with marks."""
     if isinstance(value, Model):
         yield from _within(value, path)
     elif isinstance(value, tuple | list):
@@ -666,7 +666,7 @@ def _is_number(value: object) -> bool:
 
 
 def _parts(annotation: Any) -> Iterator[Any]:
-    """An annotation and all that it is made of: members of a choice, items of a list, marks."""
+    """An annotation and all its parts: members of a choice, items of a list, marks."""
     yield annotation
     for inner in annotation if isinstance(annotation, list) else get_args(annotation):
         yield from _parts(inner)
@@ -674,7 +674,7 @@ def _parts(annotation: Any) -> Iterator[Any]:
 
 
 def _is_choice(allowed: Any) -> bool:
-    """Whether only listed values are allowed, numbers though they are."""
+    """Whether only listed values are allowed, even though they are numbers."""
     return any(get_origin(part) is Literal for part in _parts(allowed))
 
 
@@ -683,7 +683,7 @@ def _takes_numbers(allowed: Any) -> bool:
 
 
 def _bounds(allowed: Any) -> tuple[float, float, bool]:
-    """Least and greatest value, and whether only whole ones, that the marks of an annotation allow."""
+    """Lower and upper bound, and whether only whole numbers, from the marks of an annotation."""
     low, high, whole = -math.inf, math.inf, False
     for part in _parts(allowed):
         if isinstance(part, Whole):
@@ -694,7 +694,7 @@ def _bounds(allowed: Any) -> tuple[float, float, bool]:
 
 
 def _limits(part: Any, *names: str) -> list[float]:
-    """The limits of these names that a mark holds."""
+    """The limits of these names in a mark."""
     held = [getattr(part, name, None) for name in names]
     return [float(one) for one in held if isinstance(one, int | float)]
 
@@ -735,7 +735,7 @@ def _degrees(key: NumericKey, name: str) -> NumericKey:
 
 
 def _no_such(name: str, spec: Study, known: list[str]) -> str:
-    """Why a name means no numeric key."""
+    """Why a name is not a numeric key."""
     value: Any = spec
     for step in name.split("."):
         if isinstance(value, Model) and step in type(value).model_fields:
@@ -749,13 +749,13 @@ def _no_such(name: str, spec: Study, known: list[str]) -> str:
 
 
 def _several(name: str, known: list[str]) -> str:
-    """A suggestion of all the keys that begin as a name does, where they are a few."""
+    """A suggestion of all the keys with the beginning of a name, if they are few."""
     begun = [path for path in known if len(name) > 2 and path.startswith(name)]
     return f"; did you mean {' or '.join(begun)}?" if 1 < len(begun) <= MOST_NAMED else ""
 
 
 def _in_group(name: str, known: list[str]) -> str:
-    """What there is in the group of a name, or which groups and single keys there are."""
+    """The members of a name's group, or the available groups and single keys."""
     group = name.rpartition(".")[0]
     while group and not any(path.startswith(f"{group}.") for path in known):
         group = group.rpartition(".")[0]

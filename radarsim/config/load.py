@@ -1,8 +1,6 @@
 """YAML to checked experiments. The only file that imports yaml: it reads text, with line and column of every value.
 
-A config of one's own to begin with: a known one written again, each key with its meaning beside it.
-
-`radarsim new`: a config of one's own, after another.
+`radarsim new`: a user's own config, from a known one, each key with its description beside it.
 """
 
 import copy
@@ -46,10 +44,10 @@ LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same events and ma
 
 
 def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Overrides, studies: Studies) -> Experiment:
-    """The experiment that a config describes, all of it checked.
+    """The experiment that a config describes, fully checked.
 
-    source is a path, the stem of a config (here, in ./configs, or shipped), or a mapping as YAML would give it;
-    overrides see `texts`. Raises ConfigError, one line for each fault of the whole.
+    source is a path, the stem of a config (here, in ./configs, or shipped), or a mapping like the YAML; for overrides
+    see `texts`. Raises ConfigError, one line for each fault.
     """
     faults = Faults()
     settings = [setting for text in texts(overrides) if (setting := _setting(text, faults))]
@@ -87,9 +85,9 @@ def _from_mapping(source: Mapping[str, Any], faults: Faults) -> Document:
 
 
 def _from_user(source: str | bytes | os.PathLike[str], studies: Studies, faults: Faults) -> Document | None:
-    """The config that the user named by path or stem."""
+    """The config that the user gave by path or stem."""
     name = os.fsdecode(source)
-    # A file without suffix that is called as a config does not hide it.
+    # A file without suffix and with a config's name does not hide it.
     found = config_file(name) if is_stem(name) else None
     by_path = os.path.isfile(name) and (bool(Path(name).suffix) or found is None)
     file = None if by_path else found
@@ -112,8 +110,8 @@ def _from_user(source: str | bytes | os.PathLike[str], studies: Studies, faults:
 def texts(overrides: Overrides) -> tuple[str, ...]:
     """Overrides as texts `dotted.key=value`, the value in YAML, as `--set` takes them.
 
-    They are such texts, or a mapping from keys, dotted or nested, to Python's values: a mapping inside changes the keys
-    that it names, unless it is a value as a whole: a target with its `kind`. Raises ConfigError.
+    Or a mapping from keys, dotted or nested, to Python values: an inner mapping changes the keys in it, unless it is a
+    complete value: a target with its `kind`. Raises ConfigError.
 
     >>> texts({"scans": 20, "radar": {"sigma_range_m": 300.0, "name": "mine"}})
     ('scans=20', 'radar.sigma_range_m=300.0', 'radar.name=mine')
@@ -155,7 +153,7 @@ def _literal(value: object) -> str:
 
 
 def given(key: str) -> Origin:
-    """Where an override of a key is given: an argument of its own, or one of several."""
+    """The argument that gives an override: one of its own, or one of several."""
     return Origin(argument(key) if key in OPTIONS else argument(f"overrides[{key!r}]", f"--set {key}"), key=key)
 
 
@@ -172,10 +170,10 @@ def _setting(text: str, faults: Faults) -> Setting | None:
 
 
 def read(file: Path, faults: Faults) -> Document | None:
-    """The document in a file; None, and a fault noted, if there is none."""
+    """The document in a file; None, with a fault noted, if there is none."""
     shown = str(file)
     try:
-        kind = file.stat().st_mode  # Path.is_file says no, from Python 3.14 on, of what may not be looked at
+        kind = file.stat().st_mode  # from Python 3.14 on, Path.is_file returns False without access
         if not stat.S_ISREG(kind):
             faults.add(Origin(shown), (), "is a directory" if stat.S_ISDIR(kind) else "is not a regular file")
             return None
@@ -208,7 +206,7 @@ def read(file: Path, faults: Faults) -> Document | None:
 
 
 def parse(text: str, source: str, faults: Faults, plain_origin: Origin | None = None) -> Document | None:
-    """YAML text as a document; None, and a fault noted, if it is not YAML of the plain kind that is read here."""
+    """YAML text as a document; None, with a fault noted, if it is not YAML of the plain kind accepted here."""
     reader = _Reader(source, faults, plain_origin)
     try:
         data = reader.document(yaml.parse(text, Loader=LOADER))
@@ -224,14 +222,14 @@ def parse(text: str, source: str, faults: Faults, plain_origin: Origin | None = 
     except UnicodeEncodeError:
         faults.add(plain_origin or Origin(source), (), "is not UTF-8 text")
     except _Refused:
-        pass  # what was refused is noted; nothing after it can be understood
+        pass  # the fault is noted; nothing after it can be understood
     else:
         return Document(data, source, None, reader.values, reader.keys)
     return None
 
 
 class _Refused(Exception):
-    """The rest of the text cannot be read."""
+    """The rest of the text is unreadable."""
 
 
 class _Reader:
@@ -243,13 +241,13 @@ class _Reader:
         self.keys: dict[KeyPath, Origin] = {}
 
     def origin(self, mark: "yaml.Mark | yaml._yaml.Mark | None") -> Origin:
-        """Where a mark is; in an override, the override."""
+        """The origin of a mark; in an override, the override."""
         if self.plain_origin or mark is None:
             return self.plain_origin or Origin(self.source)
         return Origin(self.source, mark.line + 1, mark.column + 1)
 
     def document(self, events: Iterable[yaml.Event]) -> object:
-        """The data of the one document that there must be."""
+        """The data of the one document that must be there."""
         self.events: Iterator[Any]  # of yaml.Event; which kind follows is known from the one before
         self.events = (e for e in events if not isinstance(e, yaml.StreamStartEvent | yaml.DocumentEndEvent))
         if isinstance(next(self.events), yaml.StreamEndEvent):
@@ -271,7 +269,7 @@ class _Reader:
             return None
         if event.anchor is not None:
             self.faults.add(origin, path, f"anchors (&{event.anchor}) are not read")
-        assert isinstance(event, yaml.CollectionStartEvent | yaml.ScalarEvent)  # beside aliases there is nothing else
+        assert isinstance(event, yaml.CollectionStartEvent | yaml.ScalarEvent)  # besides aliases there is nothing else
         if event.tag is not None:
             self.faults.spoil(origin, path, f"tags ({event.tag}) are not read")
         if isinstance(event, yaml.SequenceStartEvent):
@@ -306,7 +304,7 @@ class _Reader:
         return mapping
 
     def _skip(self, path: KeyPath, key: str) -> None:
-        """Read a value that is not wanted, without touching the origins of the one that is."""
+        """Skip an unwanted value, without touching the origins of the wanted one."""
         values, keys = self.values, self.keys
         self.values, self.keys = {}, {}
         self._node(next(self.events), (*path, key))
@@ -336,7 +334,7 @@ DEGREES = {"rad": "degrees", "rad/s": "degrees per second"}
 def starter(data: Mapping[str, Any], study_keys: type[Model], name: str, like: str) -> str:
     """YAML of a config's data (as read, keys as written) under a new name, each key with the schema's description.
 
-    Optional keys that are not given follow, commented out, with their defaults.
+    Missing optional keys follow, commented out, with their defaults.
     """
     lines = [
         f"# {name}.yaml — like {like}: change the numbers, then `radarsim run {name}.yaml`",
@@ -344,7 +342,7 @@ def starter(data: Mapping[str, Any], study_keys: type[Model], name: str, like: s
     ]
     common = {key: value for key, value in data.items() if key in COMMON_KEYS}
     own = {key: value for key, value in data.items() if key not in COMMON_KEYS}
-    # What has a display name (a radar, a sensor) is called as the config is.
+    # A display name (of a radar, a sensor) becomes the config's name.
     named = {key: value for key, value in own.items() if isinstance(value, Mapping) and "name" in value}
     own |= {key: {**value, "name": name} for key, value in named.items()}
     for key in ("study", "include"):
@@ -401,7 +399,7 @@ def _line(text: str, about: str) -> str:
 
 
 def _about(model: type[Model] | None, key: str) -> str:
-    """The schema's description of a key; of one in degrees with that unit."""
+    """The schema's description of a key; in degrees with that unit."""
     if model is None:
         return ""
     name = key if key in model.model_fields else in_radians(key)
@@ -415,7 +413,7 @@ def _about(model: type[Model] | None, key: str) -> str:
 
 
 def _inner(model: type[Model] | None, key: str, value: object) -> type[Model] | None:
-    """The model of a key's mapping, or of the members of its list: of several the one whose keys and kind fit."""
+    """The model of a key's mapping, or of the members of its list: of several the one with matching keys and kind."""
     if model is None or key not in model.model_fields:
         return None
     members = value if isinstance(value, list) else [value]
@@ -457,10 +455,10 @@ def flow(value: object) -> str:
 def new(
     name: str, like: str | os.PathLike[str], studies: Studies, values: Mapping[str, float] = MappingProxyType({})
 ) -> tuple[str, str]:
-    """The name of the file of a new config, NAME with the suffix given or not, and its text, after a known config.
+    """The name of the file of a new config, NAME with or without suffix given, and its text, from a known config.
 
-    values by dotted key take the place of those of the known config; a bare key stands for that key in every filter.
-    Raises ConfigError for a name that a config cannot have.
+    values by dotted key replace those of the known config; a bare key means that key in every filter. Raises
+    ConfigError for an impossible name.
     """
     name = name.removesuffix(".yaml")
     if is_reserved(name):
@@ -487,14 +485,13 @@ def new(
 
 
 def _place(name: str, beside: Path | None = None) -> Path | None:
-    """The file of a config that is included by a file, or from here."""
+    """The file of a config included by a file, or from here."""
     found = config_file(name, beside)
     return found and found.resolve()
 
 
 def _put(data: dict[str, Any], key: str, value: float) -> None:
-    """Put a number in the place of a dotted key, or of a bare one in every filter; of an angle, in rad, also in the
-    place of its twin in degrees."""
+    """Put a number at a dotted key, or at a bare one in every filter; an angle, rad, also replaces its twin."""
     *path, last = key.split(".")
     places: list[Any] = data.get("filters", []) if not path else [data]
     for place in places:

@@ -1,4 +1,4 @@
-"""The YAML keys that every config may have, and what config knows of the studies: their names and their keys.
+"""The YAML keys common to all configs, and the interface to the studies: their names and their keys.
 
 The schema of the YAML as JSON Schema, for editors and for `radarsim schema`.
 """
@@ -48,10 +48,10 @@ class Studies(Protocol):
     """The available studies; see radarsim.studies.registry, which config does not know."""
 
     def names(self) -> tuple[str, ...]:
-        """The values that `study:` may have."""
+        """The permitted values of `study:`."""
 
     def usable(self) -> tuple[str, ...]:
-        """Those of them whose keys can be read; a package from outside may be broken."""
+        """Those with readable keys; an outside package may be broken."""
 
     def has(self, name: str) -> bool:
         """Whether there is a study of that name."""
@@ -60,7 +60,7 @@ class Studies(Protocol):
         """Why there is no config of a stem: faults of packages that would have it."""
 
     def keys(self, name: str) -> type[Study]:
-        """The schema of a study's keys, imported when first asked for."""
+        """The schema of a study's keys, imported on first use."""
 
 
 # ---- json schema -----------------------------------------------------------------------------------------------------
@@ -115,7 +115,7 @@ def _experiment(name: str, study: dict[str, Any], common: dict[str, Any]) -> dic
 
 
 def _comparison(common: dict[str, Any], kinds: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """A config that includes others; of the keys of their studies that lie over them a mapping need not be whole."""
+    """A config that includes others; mappings laid over keys of their studies need not be complete."""
     keys = {key: part for kind in reversed(kinds.values()) for key, part in kind["properties"].items()}
     return {
         "title": "include",
@@ -132,7 +132,7 @@ def _comparison(common: dict[str, Any], kinds: dict[str, dict[str, Any]]) -> dic
 
 
 def _scenario(models: dict[str, type[Study]], kinds: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """A file in scenarios/: whatever may stand inline where a config names one."""
+    """A file in scenarios/: the inline content that it replaces in a config."""
     inline: list[dict[str, Any]] = []
     for name, model in models.items():
         for field, info in model.model_fields.items():
@@ -142,7 +142,7 @@ def _scenario(models: dict[str, type[Study]], kinds: dict[str, dict[str, Any]]) 
 
 
 def tidy(part: Any) -> Any:
-    """A schema without what carries no information: names of classes, and null, which stands for an absent key."""
+    """A schema without keywords that carry no information: names of classes, and null, which means an absent key."""
     if isinstance(part, list):
         return [tidy(item) for item in part]
     if not isinstance(part, dict):

@@ -1,1 +1,1 @@
-"""Monte Carlo without a word of radar: blocks of realisations, sums that add, threads, a store, stopping."""
+"""Monte Carlo without any radar: blocks of realisations, additive sums, threads, a store, stopping."""

@@ -16,14 +16,14 @@ import numpy as np
 from radarsim.engine.results import Sums
 from radarsim.errors import NonFiniteError
 
-QUESTION = 32  # digits of an identity that tell what is asked; those after them tell which sources answer it
+QUESTION = 32  # digits of an identity for the request; the further ones are for the sources
 
 
 class Work(Protocol):
-    """What is simulated. `identity` (hex digits) names all that changes a number, `block` is how many realisations make
-    a block, `size` the length of the vector of sums.
+    """A work to simulate. `identity` (hex digits) names all that changes a number, `block` is the number of
+    realisations in a block, `size` the length of the vector of sums.
 
-    A work may also have `explain(first, count)`, which gives lines saying where numbers that are not finite came from.
+    A work may also have `explain(first, count)`, which gives lines on the origin of numbers that are not finite.
     """
 
     @property
@@ -63,14 +63,14 @@ class Node:
         return self.first * block, block << self.level
 
     def above(self, highest: int) -> Iterator["Node"]:
-        """The nodes that contain it, itself left out, up to the given level."""
+        """The nodes that contain it, excluding itself, up to the given level."""
         for level in range(self.level + 1, highest + 1):
             yield Node(level, self.index >> (level - self.level))
 
 
 @dataclass(frozen=True, slots=True)
 class Partial:
-    """The first `count` realisations of a block: the end of a run whose N is no multiple of the block."""
+    """The first `count` realisations of a block: the end of a run whose N is not a multiple of the block."""
 
     index: int
     count: int
@@ -125,7 +125,7 @@ def widest(first: int, stop: int, highest: int) -> Node:
 
 
 def maximal(nodes: Collection[Node], stop: int) -> list[Node]:
-    """Those of the nodes that end by block `stop` and lie inside no other such node, from left to right."""
+    """Those of the nodes that end by block `stop` and are not contained in another such node, from left to right."""
     inside = {node for node in nodes if node.stop <= stop}
     highest = max((node.level for node in inside), default=0)
     top = (node for node in inside if not any(other in inside for other in node.above(highest)))
@@ -133,7 +133,7 @@ def maximal(nodes: Collection[Node], stop: int) -> list[Node]:
 
 
 def gaps(nodes: Collection[Node], stop: int, start: int = 0) -> list[tuple[int, int]]:
-    """Runs (first, stop) of the blocks start … stop − 1 that none of the nodes holds, which do not overlap."""
+    """Runs (first, stop) of the blocks start … stop − 1 outside all of the nodes, which do not overlap."""
     found, first = [], start
     for node in sorted(nodes, key=lambda node: node.first):
         if first < min(node.first, stop):
@@ -143,7 +143,7 @@ def gaps(nodes: Collection[Node], stop: int, start: int = 0) -> list[tuple[int, 
 
 
 def share_of(realisations: int, block: int, part: tuple[int, int]) -> tuple[int, int, int]:
-    """A share, as (2, 3) the second of three: its full blocks first … stop − 1, the realisations of its cut one."""
+    """A share, as (2, 3) the second of three: its full blocks first … stop − 1, the realisations of its partial one."""
     full, rest = divmod(realisations, block)
     first, stop = (min(share_bound(full + (rest > 0), bound, part[1]), full) for bound in (part[0] - 1, part[0]))
     return first, stop, rest if part[0] == part[1] else 0
@@ -164,12 +164,12 @@ def added(left: Sums, right: Sums, first: int) -> Sums:
 
 
 def simulated(work: Work, piece: Node | Partial) -> Sums:
-    """The sums of a node or of a cut block. ValueError if the work gives a vector of another shape or type,
+    """The sums of a node or of a partial block. ValueError if the work gives a vector of another shape or type,
     NonFiniteError naming the realisations if it gives numbers that are not finite."""
     first, count = piece.realisations(work.block)
     with np.errstate(over="ignore", invalid="ignore"):
         values = _merged(work, first, count)
-        # NaN and infinity survive addition, so that one look at the end sees them all.
+        # NaN and infinity survive addition, so one check at the end finds them all.
         if np.isfinite(values).all():
             return Sums(count, values)
         for start in range(first, first + count, work.block):
@@ -180,7 +180,7 @@ def simulated(work: Work, piece: Node | Partial) -> Sums:
 
 
 def _merged(work: Work, first: int, count: int) -> np.ndarray:
-    """Sums of one block or less, or of 2^q blocks, of which the odd one of each level meets the even one that waits."""
+    """Sums of one block or less, or of 2^q blocks, merging the odd one of each level with the pending even one."""
     block, shape = work.block, (work.size,)
     waiting: list[np.ndarray] = []
     for number, start in enumerate(range(first, first + count, block)):
@@ -205,21 +205,21 @@ def _span(first: int, count: int) -> str:
 
 
 class Forest:
-    """Nodes that are done, merged with their siblings as soon as both are there; so it holds few, however many came."""
+    """Finished nodes, merged with their siblings as soon as both exist; so it holds few, however many were added."""
 
     def __init__(self, block: int, size: int):
         self.nodes: dict[Node, Sums] = {}
         self._block, self._size = block, size
 
     def add(self, node: Node, sums: Sums) -> None:
-        """Take a node that overlaps no other, and merge upwards as far as siblings reach."""
+        """Add a node that overlaps no other, and merge upwards as long as siblings exist."""
         while (sibling := self.nodes.pop(Node(node.level, node.index ^ 1), None)) is not None:
             node = Node(node.level + 1, node.index >> 1)
             sums = added(sibling, sums, node.first * self._block)
         self.nodes[node] = sums
 
     def prefix(self) -> list[Node]:
-        """The nodes that follow one another from block 0 without a gap; they are the largest that fill them."""
+        """The nodes from block 0 on without a gap; they are the largest that fill it."""
         nodes, stop = [], 0
         for node in sorted(self.nodes, key=lambda node: node.first):
             if node.first != stop:

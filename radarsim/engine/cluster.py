@@ -1,10 +1,10 @@
-"""A key and its certificate for the processes of one run, by the package `cryptography`.
-
-Tasks on a Dask cluster: processes of this machine, or the workers of a scheduler. The only file that knows Dask.
+"""Tasks on a Dask cluster: processes of this machine, or the workers of a scheduler. The only file that uses Dask.
 
 A task travels as the pickled work (a case: a few kilobytes) and the piece; the worker prepares a work once and keeps
 it. Workers may come and go: Dask hands the tasks of a dead one to another. They must have the same sources, which the
-identity of the work tells.
+identity of the work shows.
+
+A key and its certificate for the processes of one run, by the package `cryptography`.
 """
 
 import contextlib
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 
 # ---- certificate -----------------------------------------------------------------------------------------------------
-# The certificate dies with the run, which holds the only key; no date ends it. So a clock that is set under the run, or
-# that is wrong from the start (1970 where a battery is flat), locks nobody out.
+# The certificate ends with the run, which holds the only key; it has no end date. So a clock that is set during the
+# run, or is wrong from the start (1970 with a flat battery), locks nobody out.
 FIRST = datetime(1970, 1, 1, tzinfo=UTC)
 LAST = datetime(9999, 12, 31, 23, 59, 59, tzinfo=UTC)  # RFC 5280, 4.1.2.5: of no well-defined end
 NAME = "radarsim"
@@ -70,14 +70,14 @@ def self_signed() -> tuple[str, str]:
 
 # ---- cluster ---------------------------------------------------------------------------------------------------------
 CONNECT_S = 10
-WORKERS_S = 30  # how long a scheduler may be without a worker
-DEATHS = 20  # of workers under one task, after which it is taken for their cause
+WORKERS_S = 30  # how long a scheduler may have no worker
+DEATHS = 20  # of workers running one task, after which it is taken as their cause
 RESULT_S = 60  # how long the sums of a block may take from a worker
-HOLDER_S = 5  # the same on this machine before one looks whether the worker lives
+HOLDER_S = 5  # the same on this machine before checking whether the worker lives
 LOOK_S = 1.0
 SCHEMES = ("tcp", "tls")
 ROLES = ("client", "scheduler", "worker")
-LOOPBACK = "127.0.0.1"  # what this machine starts for itself listens to nobody else
+LOOPBACK = "127.0.0.1"  # servers started on this machine listen only here
 HINT = "--workers and --scheduler need Dask: pip install 'radarsim[cluster]'"
 QUIET = ("distributed", "distributed.nanny", "distributed.worker", "distributed.scheduler", "distributed.comm")
 # A worker process of this machine, whose options follow.
@@ -105,8 +105,8 @@ def _dask() -> ModuleType:
 def steady_clock() -> None:
     """Let messages of this process wait by a clock that nobody sets; to be called before any loop begins.
 
-    Dask holds what it sends back until a deadline by the time of day, as Tornado's loops count it: a clock set back by
-    an hour between two messages held the second for that hour, and the run waited for it. Neither has a setting.
+    Dask delays outgoing messages until a deadline by the time of day, as Tornado's loops count it: a clock set back by
+    an hour between two messages delayed the second for that hour, and the run waited for it. Neither has a setting.
     """
     from distributed import batched
     from tornado.ioloop import IOLoop
@@ -120,7 +120,7 @@ def steady_clock() -> None:
 
 
 def trust(address: str) -> str | None:
-    """What computing with the scheduler at an address rests on, in one line; None for one of this machine."""
+    """A note on the trust that the scheduler at an address requires, in one line; None for one of this machine."""
     host = address.partition("://")[2] or address
     host = host.rpartition(":")[0].strip("[]")
     if host == "localhost" or _is_loopback(host):
@@ -144,7 +144,7 @@ def _is_loopback(host: str) -> bool:
 def _security(distributed: ModuleType) -> "Security | None":
     """Keys and certificates of one run, made for it; None without the package `cryptography`, which makes them.
 
-    Those of `Security.temporary` begin at the time of day and end within a year: a clock set back locks workers out.
+    Those of `Security.temporary` are valid from now for a year: a clock set back locks workers out.
     """
     try:
         key, certificate = self_signed()
@@ -193,7 +193,7 @@ class Cluster:
     def __init__(self, workers: int | None = None, scheduler: str | None = None):
         """So many worker processes on this machine, or the workers of the scheduler at an address.
 
-        Raises ConfigError where Dask is missing, the address is wrong, or no worker is there within half a minute.
+        Raises ConfigError where Dask is missing, the address is wrong, or no worker appears within half a minute.
         """
         distributed = _dask()
         steady_clock()
@@ -204,7 +204,7 @@ class Cluster:
         self._dead = distributed.scheduler.KilledWorker
         self._done: SimpleQueue[Future] = SimpleQueue()
         self._tasks: dict[str, tuple[Future, Work, Node | Partial]] = {}  # by key
-        self._running: set[str] = set()  # after a cancel: those let finish
+        self._running: set[str] = set()  # after a cancel: those that may finish
         self._numbers = count()
         self._looked = self._seen = time.monotonic()
         self._scheduler: LocalCluster | None = None
@@ -260,7 +260,7 @@ class Cluster:
             self.close()
 
     def submit(self, work: Work, piece: Node | Partial) -> None:
-        """Hand over a task; returns at once."""
+        """Submit a task; returns at once."""
         number = next(self._numbers)
         key = f"radarsim-{work.identity[:16]}-{piece.name}-{number}"
         given = (pickle.dumps(work), work.identity, piece)
@@ -269,7 +269,7 @@ class Cluster:
         future.add_done_callback(self._done.put)
 
     def finished(self, timeout_s: float) -> list[Outcome]:
-        """What has finished since the last call, waiting at most timeout_s for the first.
+        """Outcomes since the last call, waiting at most timeout_s for the first.
 
         Raises ClusterError when the scheduler or all workers are gone, or a task cannot run there at all.
         """
@@ -294,7 +294,7 @@ class Cluster:
                 raise ClusterError(
                     f"{self._place}: a worker does not send its sums within {RESULT_S} s; what was finished is stored"
                 ) from late
-            except Exception:  # the worker died before it was asked: once more
+            except Exception:  # the worker died before it was reached: retry
                 pass
             self.submit(*task[1:])
             return []
@@ -310,9 +310,9 @@ class Cluster:
         raise ClusterError(f"{self._place}: a worker cannot run the blocks: {type(error).__name__}: {error}")
 
     def _sums(self, future: "Future") -> Outcome:
-        """What a task has found. Raises TimeoutError after RESULT_S.
+        """The result of a task. Raises TimeoutError after RESULT_S.
 
-        If all that hold it have died, it is computed again by others: those of this machine have to be started.
+        If all its holders have died, others compute it again; on this machine these have to be started.
         """
         end = time.monotonic() + RESULT_S
         while self._own is not None:
@@ -325,7 +325,7 @@ class Cluster:
         return future.result(timeout=RESULT_S)
 
     def _look(self) -> None:
-        """About once a second: is the scheduler there, and which workers are connected?"""
+        """About once a second: check the scheduler and which workers are connected."""
         now = time.monotonic()
         if now < self._looked + LOOK_S:
             return
@@ -349,7 +349,7 @@ class Cluster:
         )
 
     def cancel(self) -> int:
-        """Drop the tasks that are not yet started; how many those were."""
+        """Drop the tasks not yet started; their number."""
         waiting = self._tasks.keys() - self._running
         if not waiting:
             return 0
@@ -365,7 +365,7 @@ class Cluster:
         return len(dropped)
 
     def forget(self) -> None:
-        """Drop all tasks, those that run too."""
+        """Drop all tasks, also running ones."""
         futures = [future for future, _, _ in self._tasks.values()]
         self._tasks.clear()
         self._running.clear()
@@ -375,7 +375,7 @@ class Cluster:
                 self._client.cancel(futures, force=True)
 
     def close(self) -> None:
-        """Let the workers go, without waiting for tasks that still run; those of this machine end."""
+        """Release the workers without waiting for running tasks; those of this machine end."""
         if self._own is not None:
             self._own.kill()
         logging.disable(logging.CRITICAL)  # complaints of a cluster that is torn down under its tasks
@@ -400,10 +400,10 @@ def _for_workers(security: Any) -> str:  # whose fields Dask makes at run time
 
 
 class _Processes:
-    """Worker processes on this machine, in sessions of their own: Ctrl-C in a terminal is for the run alone.
+    """Worker processes on this machine, in sessions of their own: Ctrl-C in a terminal reaches only the run.
 
-    They are new processes, not forks of a process with live threads. One that dies is replaced; all end by
-    themselves when the scheduler, and so this process, is gone.
+    They are new processes, not forks of a process with live threads. One that dies is replaced; all end when the
+    scheduler, and so this process, is gone.
     """
 
     def __init__(self, workers: int, address: str, security: "Security | None" = None):
@@ -423,7 +423,7 @@ class _Processes:
         )
 
     def replace(self) -> None:
-        """Start a new one for each that has died."""
+        """Start a new process for each that has died."""
         self._running = [process if process.poll() is None else self._started() for process in self._running]
 
     def kill(self) -> None:
@@ -446,7 +446,7 @@ def _prepared(pickled: bytes) -> Work:
 
 
 def _attempted(pickled: bytes, identity: str, piece: Node | Partial) -> Outcome:
-    """Run one task on a worker. ConfigError if the worker would compute other numbers than the run asks for."""
+    """Run one task on a worker. ConfigError if the worker would compute other numbers than the run expects."""
     with _preparing:
         work = _prepared(pickled)
     if work.identity != identity:

@@ -1,4 +1,4 @@
-"""Where tasks run. An executor takes (work, piece) and gives back outcomes in any order."""
+"""Executors run tasks: they take (work, piece) and return outcomes in any order."""
 
 import threading
 import time
@@ -14,7 +14,7 @@ from radarsim.engine.store import available_cores, platform_name
 
 @dataclass(frozen=True)
 class Outcome:
-    """A finished task: its sums or the exception it ended in, the seconds, and the platform that it ran on."""
+    """A finished task: its sums or its exception, the seconds, and the platform."""
 
     piece: Node | Partial
     result: Sums | Exception
@@ -23,10 +23,10 @@ class Outcome:
 
 
 class Executor(Protocol):
-    """`workers` tasks run at once, `depth` are worth handing over in advance, and one should last from `shortest_s` to
+    """`workers` tasks run at once, `depth` are worth submitting in advance, and one should last from `shortest_s` to
     `longest_s`.
 
-    Tasks must be started in the order of submit, so that what is done when a run is stopped is all from the left.
+    Tasks must start in the order of submit, so that a stopped run has finished its leftmost ones.
     """
 
     workers: int
@@ -35,19 +35,19 @@ class Executor(Protocol):
     longest_s: float
 
     def submit(self, work: Work, piece: Node | Partial) -> None:
-        """Hand over a task; returns at once."""
+        """Submit a task; returns at once."""
 
     def finished(self, timeout_s: float) -> list[Outcome]:
-        """What has finished since the last call, waiting at most timeout_s for the first."""
+        """Outcomes since the last call, waiting at most timeout_s for the first."""
 
     def cancel(self) -> int:
-        """Drop the tasks that are not yet started; how many those were."""
+        """Drop the tasks not yet started; their number."""
 
     def forget(self) -> None:
-        """The run is over, in whatever way: drop all tasks, and never give back the outcome of one that still runs."""
+        """At the end of the run, however it ended: drop all tasks, and never return the outcome of a running one."""
 
     def close(self) -> None:
-        """Let the workers go, without waiting for tasks that still run."""
+        """Release the workers without waiting for running tasks."""
 
 
 def attempted(work: Work, piece: Node | Partial) -> Outcome:
@@ -66,8 +66,8 @@ def attempted(work: Work, piece: Node | Partial) -> Outcome:
 class Threads:
     """Pool threads of this process; kernels release the interpreter's lock.
 
-    One thread is a pool thread too: on the main thread the time of a kernel depends on where its stack happens to lie.
-    They are daemons, so that a task which overruns its time at a stop does not keep the process alive.
+    Even one thread is a pool thread: on the main thread the time of a kernel depends on the address of its stack. They
+    are daemons, so that a task that overruns its time at a stop does not keep the process alive.
     """
 
     shortest_s = 3e-3
@@ -87,11 +87,11 @@ class Threads:
             outcomes.put(attempted(work, piece))
 
     def submit(self, work: Work, piece: Node | Partial) -> None:
-        """Hand over a task; returns at once."""
+        """Submit a task; returns at once."""
         self._tasks.put((self._outcomes, work, piece))
 
     def finished(self, timeout_s: float) -> list[Outcome]:
-        """What has finished since the last call, waiting at most timeout_s for the first."""
+        """Outcomes since the last call, waiting at most timeout_s for the first."""
         outcomes = []
         try:
             outcomes.append(self._outcomes.get(timeout=timeout_s))
@@ -101,7 +101,7 @@ class Threads:
             return outcomes
 
     def cancel(self) -> int:
-        """Drop the tasks that are not yet started; how many those were."""
+        """Drop the tasks not yet started; their number."""
         dropped = 0
         try:
             while True:
@@ -111,7 +111,7 @@ class Threads:
             return dropped
 
     def forget(self) -> None:
-        """Drop all tasks; the outcome of one that still runs is ignored."""
+        """Drop all tasks; the outcome of a running one is ignored."""
         self.cancel()
         self._outcomes = SimpleQueue()
 
@@ -122,7 +122,7 @@ class Threads:
 
 
 class Serial:
-    """Everything in the calling thread, a task at a time: for debuggers, profilers, and where threads are forbidden."""
+    """Everything in the calling thread, one task at a time: for debuggers, profilers, and if threads are forbidden."""
 
     workers, depth, shortest_s, longest_s = 1, 1, Threads.shortest_s, Threads.longest_s
 
@@ -138,7 +138,7 @@ class Serial:
         return [attempted(*self._tasks.popleft())] if self._tasks else []
 
     def cancel(self) -> int:
-        """Drop the tasks that are kept; how many those were."""
+        """Drop the kept tasks; their number."""
         dropped = len(self._tasks)
         self._tasks.clear()
         return dropped

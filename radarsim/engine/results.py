@@ -1,6 +1,6 @@
-"""What a block of realisations leaves behind: a count and a vector of sums. Sums add; the engine needs no more.
+"""The result of a block of realisations: a count and a vector of sums. Sums add; the engine needs no more.
 
-What a finished case hands to the report: its sums, and the axes that say what each of them is.
+The result of a finished case, for the report: its sums, and the axes that label them.
 """
 
 import math
@@ -24,7 +24,7 @@ class Sums:
 
 
 class Layout:
-    """Names and shapes of the arrays that lie one after the other in a vector of sums.
+    """Names and shapes of the arrays concatenated in a vector of sums.
 
     >>> layout = Layout(error=(2, 15, 3, 4), paired=(2, 15, 3))
     >>> layout.size
@@ -59,9 +59,9 @@ class Layout:
 class Axes:
     """Labels of the error sums, (F filters, K scans, C components).
 
-    k (K,) counts scans from 1, t_s (K,) is the time from the first plot. available (F, K, C) says where a filter has an
-    estimate. baseline is the filter that gains are against. exact_sigma and exact_bias (F, K, C) are not-a-number where
-    no exact value is known. What the tables of a study need beside them stands in a subclass of its own.
+    k (K,) counts scans from 1, t_s (K,) is the time from the first plot. available (F, K, C): where a filter has an
+    estimate. baseline: the filter that gains refer to. exact_sigma and exact_bias (F, K, C) are NaN where no exact
+    value is known. A study's subclass adds what its tables need.
     """
 
     filters: tuple[str, ...]
@@ -82,9 +82,9 @@ class Axes:
 
     @property
     def exact_gains(self) -> np.ndarray:
-        """Exact gains (F, K, C) against the baseline, per cent, of the realisations in which both have an estimate.
+        """Exact gains (F, K, C) against the baseline, per cent, in the realisations in which both have an estimate.
 
-        Here all have one wherever it is available.
+        Here each has one wherever it is available.
         """
         sigma = np.asarray(self.exact_sigma, dtype=float)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -96,7 +96,7 @@ A_co = TypeVar("A_co", bound=Axes, covariant=True)
 
 @dataclass(frozen=True)
 class CaseResult(Generic[A_co]):
-    """A case, how many realisations of it are done, and the named arrays of their sums.
+    """A case, its number of finished realisations, and the named arrays of their sums.
 
     A study's own tables take results with its own axes, `CaseResult[RangeDopplerAxes]`; a plain `CaseResult` is any.
 
@@ -124,23 +124,23 @@ class CaseResult(Generic[A_co]):
 
     @property
     def baseline(self) -> str:
-        """The name of the filter that gains are against."""
+        """The name of the filter that gains refer to."""
         return self.axes.filters[self.axes.baseline]
 
 
 @dataclass(frozen=True)
 class Track:
-    """Estimates over recorded plots, F filters at n times: what `radarsim track` writes.
+    """Estimates over recorded plots, F filters at n times: the output of `radarsim track`.
 
-    t_s (n,); estimate and sigma (F, n, C), not-a-number where a filter has none, in the components' units; probability
-    (F, n, M) of a filter's models, not-a-number beyond its own, or None where the study has no models.
+    t_s (n,); estimate and sigma (F, n, C), NaN where a filter has none, in the components' units; probability (F, n, M)
+    of a filter's models, NaN beyond its own, or None where the study has no models.
 
-    What tells whether the stated accuracies fit, where a study gives it: residual (F, n, D), the plot less the
-    estimate, of the measured (name, unit), and residual_sigma (F, n, D), the σ that the filter believes of it; nis
-    (F, n, Q), the squared innovation over its believed variance, of the tested (name, degrees of freedom); not-a-number
-    where there is no plot or no freedom.
+    For checks of the stated accuracies, if the study gives them: residual (F, n, D), plot minus estimate, of the
+    measured (name, unit), and residual_sigma (F, n, D), its σ predicted by the filter; nis (F, n, Q), the squared
+    innovation over its predicted variance, of the tested (name, degrees of freedom); NaN where there is no plot or no
+    freedom.
 
-    Where filters find several tracks, a filter stands once for each: numbers (F,) tell them apart, score (F, n) is the
+    Where filters find several tracks, a filter is listed once for each: numbers (F,) identify them, score (F, n) is the
     logarithm of the likelihood ratio that the track is a target's.
     """
 

@@ -1,8 +1,8 @@
-"""Reasons to stop a run: a stop condition is called between tasks and gives None or the reason as text.
+"""The engine's front: collect the sums of a work, read what is stored, compute a share of the blocks.
 
-One run: what is stored, what is missing, tasks dispatched, outcomes collected, and the resulting sums.
+One run: stored and missing blocks, tasks dispatched, outcomes collected, and the resulting sums.
 
-The engine's front: collect the sums of a work, read what is stored, compute a share of the blocks.
+Reasons to stop a run: a stop condition is called between tasks and gives None or the reason as text.
 """
 
 import math
@@ -27,7 +27,7 @@ Stop = Callable[[], str | None]
 
 
 class TimeLimit:
-    """Stop when that many seconds have passed from `begun`, by default now; `less` earlier, for what comes after."""
+    """Stop when that many seconds have passed from `begun`, by default now; `less` earlier, for work afterwards."""
 
     def __init__(self, seconds: float, begun: float | None = None, less: float = 0.0) -> None:
         self.seconds = seconds
@@ -39,16 +39,16 @@ class TimeLimit:
 
     @property
     def left(self) -> float:
-        """Seconds until then, none after it."""
+        """Seconds until then, at least 0."""
         return max(0.0, self._end - time.monotonic())
 
     def reserving(self, seconds: float) -> "TimeLimit":
-        """The limit that leaves so many seconds of its time over, at most half of what is left of it."""
+        """The limit reduced by so many seconds, by at most half of what is left."""
         return TimeLimit(self.seconds, self.begun, min(seconds, 0.5 * self.left))
 
 
 class Either:
-    """Whichever of several conditions gives a reason first; `grace_s` is then that one's."""
+    """The first of several conditions to give a reason; `grace_s` is then that one's."""
 
     def __init__(self, *conditions: Stop | None) -> None:
         self._conditions = [condition for condition in conditions if condition is not None]
@@ -63,15 +63,15 @@ class Either:
 
 
 class Signals:
-    """While entered, SIGINT and SIGTERM ask for a stop; calling it says whether one came.
+    """While entered, SIGINT and SIGTERM request a stop; calling it shows whether one came.
 
-    The main thread of a process may enter it. A run that asks it between tasks ends by itself. If the process is still
-    there 1.5 s after the signal, whatever it is doing, or if a second signal comes, it exits on the spot with status
-    128 + signal: files appear by renaming only, so none is ever half written.
+    The main thread of a process may enter it. A run that checks it between tasks ends by itself. If the process still
+    exists 1.5 s after the signal, or if a second signal comes, it exits at once with status 128 + signal: files appear
+    by renaming only, so none is ever half written.
 
-    Python runs handlers between two bytecodes of the main thread, which may be far away inside compiled code. So
-    handlers do nothing here, and a thread of its own waits for the numbers that the interpreter writes to a pipe.
-    Where threads are forbidden the handlers do it, with an alarm for the 1.5 s: later by what compiled code takes.
+    Python runs handlers between two bytecodes of the main thread, which may be in compiled code for long. So handlers
+    do nothing here, and a separate thread waits for the numbers that the interpreter writes to a pipe. Where threads
+    are forbidden the handlers do it, with an alarm for the 1.5 s: delayed by compiled code.
     """
 
     grace_s = 1.0
@@ -157,7 +157,7 @@ PROGRESS_S = 0.1
 class Collected(Sums):
     """The sums of realisations 0 … count-1, and how they were obtained.
 
-    count is what was asked for unless `stopped` says why it is less. from_store and computed are realisations: those
+    count is the requested number unless `stopped` says why it is less. from_store and computed are realisations: those
     read, and those simulated in this call. kernel_seconds is the time inside tasks, summed over the workers; kept_as
     the identity under which the store has them, None without a store.
     """
@@ -174,7 +174,7 @@ class Collected(Sums):
 
 @dataclass(frozen=True)
 class Shared:
-    """What computing a share came to, in realisations; `stopped` says why `done` is less than `asked`."""
+    """Result of computing a share, in realisations; `stopped` says why `done` is less than `asked`."""
 
     asked: int
     done: int
@@ -187,18 +187,18 @@ class Shared:
 
 
 class Pace:
-    """How many blocks make a task, from how long one takes. It never changes a number: sums merge in the same tree."""
+    """The number of blocks in a task, from their duration. It changes no number: sums merge in the same tree."""
 
     def __init__(self, executor: Executor):
         self._executor = executor
         self._block_s = math.inf
 
     def note(self, blocks: int, seconds: float) -> None:
-        """The least time counts: the first tasks may contain a compilation."""
+        """The least time counts: the first tasks may include compilation."""
         self._block_s = min(self._block_s, max(seconds, 1e-7) / blocks)
 
     def level(self, blocks_left: int) -> int:
-        """log2 of the blocks of the next task: long enough to be worth handing over, short enough to end together."""
+        """log2 of the blocks of the next task: long enough to be worth submitting, short enough to end together."""
         if math.isinf(self._block_s):
             return 0
         workers = max(self._executor.workers, 1)  # none are there while dead ones are replaced
@@ -209,7 +209,7 @@ class Pace:
 
 
 class Dispatch:
-    """Tasks over realisations 0 … N-1, of which blocks first … stop-1 and the cut one are to be done here."""
+    """Tasks over realisations 0 … N-1, of which blocks first … stop-1 and the partial one are to be done here."""
 
     def __init__(
         self,
@@ -263,7 +263,7 @@ class Dispatch:
         return stopped
 
     def missing(self) -> list[tuple[int, int]]:
-        """Runs (first, stop) of its blocks that are not done."""
+        """Runs (first, stop) of its missing blocks."""
         return gaps(self.forest.nodes, self.stop, self.first)
 
     def _tasks(self, pace: Pace) -> Iterator[Node | Partial]:
@@ -302,7 +302,7 @@ class Dispatch:
             self._progress_due = now + PROGRESS_S
 
     def pieces(self) -> dict[Piece, Sums]:
-        """What is done, as it is stored."""
+        """Finished pieces, as stored."""
         pieces: dict[Piece, Sums] = {}
         for node, sums in self.forest.nodes.items():
             pieces[node] = sums
@@ -330,7 +330,7 @@ class Run(Dispatch):
     total: Sums | None = None
 
     def restored(self) -> bool:
-        """Read what is stored; whether that is all."""
+        """Read stored pieces; whether these are all."""
         if self._keeper is None:
             return False
         self.total = self._keeper.store.read(Total(self.asked))
@@ -341,7 +341,7 @@ class Run(Dispatch):
         return self.from_store == self.asked
 
     def finished(self, stopped: str | None) -> Collected:
-        """The result, once all that it rests on is stored, and itself as a total."""
+        """The result, once it and all its pieces are stored."""
         result = self.result(stopped)
         if self.total is None:
             pieces = self.pieces()
@@ -352,7 +352,7 @@ class Run(Dispatch):
         return result
 
     def result(self, stopped: str | None) -> Collected:
-        """The sums of what is done from realisation 0 on without a gap."""
+        """The sums of the finished blocks from realisation 0 on without a gap."""
         sums = self.total or self.forest.total()
         if self.total is None and self.partial is not None and sums.count == self.full * self.work.block:
             sums = added(sums, self.partial, 0) if self.full else self.partial
@@ -387,18 +387,18 @@ class Share(Dispatch):
         self.asked = (self.stop - self.first) * work.block + self.rest
 
     def restored(self) -> bool:
-        """Read what is stored; whether that is all of the share."""
+        """Read stored pieces; whether these are all of the share."""
         self._read_pieces(self._keeper)
         self.from_store = self.done()
         return self.from_store == self.asked
 
     def done(self) -> int:
-        """Realisations of the share that are done."""
+        """Finished realisations of the share."""
         missing = sum(stop - first for first, stop in self.missing()) * self.work.block
         return self.asked - missing - (self.rest if self.partial is None else 0)
 
     def finished(self, stopped: str | None) -> Shared:
-        """What was done, once it is stored; without a block an empty directory, to be copied too."""
+        """The result, once it is stored; without a block an empty directory, to be copied too."""
         self._keeper.store.make()
         self.keep(self.pieces())
         self._report(last=True)
@@ -428,14 +428,14 @@ def collect(
 ) -> Collected:
     """Sums over realisations 0 … realisations-1 of the work; the same bytes however they are obtained.
 
-    store is the results directory: what it holds of this work is used, what is computed is kept there. threads defaults
+    store is the results directory: its sums of this work are used, and computed ones are kept there. threads defaults
     to all cores; with 0 none is started, and the calling thread does everything. progress(done, total, from_store) is
-    called at most ten times a second, and at the end. stop() is asked between tasks; once it gives a reason, no task
-    starts, those that run are finished (for at most stop.grace_s, if it has that), and the result is of the blocks done
+    called at most ten times a second, and at the end. stop() is called between tasks; once it gives a reason, no task
+    starts, running ones are finished (for at most stop.grace_s, if it has that), and the result is of the blocks done
     without a gap.
 
-    Whatever ends a run, what it has done is stored. NonFiniteError names the first realisations whose sums are
-    not finite, which are not stored; StoreError the file that cannot be written.
+    However a run ends, its finished blocks are stored. NonFiniteError names the first realisations whose sums are not
+    finite, which are not stored; StoreError the file that cannot be written.
     """
     with limited(threads):
         run = Run(work, realisations, store, progress)
@@ -453,10 +453,10 @@ def share(
     stop: Stop | None = None,
     executor: Executor | None = None,
 ) -> Shared:
-    """Put a part of the blocks of N realisations into the store, and nothing else: (2, 3) is the second of three.
+    """Compute a part of the blocks of N realisations into the store, and nothing else: (2, 3) is the second of three.
 
-    Shares are runs of blocks, as equal as blocks can be cut; the last holds the cut block. Stores in which all shares
-    are done are united by copying: `collect` then finds every block. The other arguments are those of `collect`.
+    Shares are runs of blocks, as equal as blocks permit; the last has the partial block. Stores with all shares are
+    united by copying: `collect` then finds every block. The other arguments are those of `collect`.
     """
     with limited(threads):
         run = Share(work, realisations, part, store, progress)
@@ -464,7 +464,7 @@ def share(
 
 
 def _computed(run: Dispatch, threads: int | None, stop: Stop | None, executor: Executor | None) -> str | None:
-    """Compute what a run lacks; the reason, if it was stopped. Whatever ends it, what is done is stored."""
+    """Compute the missing blocks of a run; the reason, if stopped. However it ends, finished blocks are stored."""
     pool = executor or (Serial() if forbidden() else Threads(threads))
     try:
         return run.compute(pool, stop)
@@ -480,9 +480,9 @@ def _computed(run: Dispatch, threads: int | None, stop: Stop | None, executor: E
 
 
 def stored(work: Work, realisations: int, store: str | os.PathLike) -> Collected | None:
-    """What collect would give, if all of it is stored; else None. Computes and writes nothing, but sets damage aside.
+    """The result of collect, if all of it is stored; else None. Computes and writes nothing, but sets damage aside.
 
-    Every N that collect has returned, in whatever way it ended, is there to be read, also after larger runs.
+    Every N that collect has returned, however it ended, can be read, also after larger runs.
     """
     run = Run(work, realisations, store, None)
     return run.result(None) if run.restored() else None

@@ -1,4 +1,4 @@
-"""What made the sums: the platform that decides their last bits, and versions for the record.
+"""The platform, which decides the last bits of sums, and versions for the record.
 
 Finished sums on disk: DIR/.blocks/<identity>/, a file for each piece, so that a killed run loses about a second.
 
@@ -6,29 +6,28 @@ Finished sums on disk: DIR/.blocks/<identity>/, a file for each piece, so that a
     P24-1696.sums   the first 1696 realisations of block 24
     T100000.sums    the total of realisations 0 … 99999, as it was reported
 
-What a run keeps are the largest nodes it has. When a node is safely on disk, the files inside it are removed. Nothing
-else is: a run with a smaller N than was done before leaves the large nodes alone, computes the small ones it lacks
-beside them (the same bytes come out), and stores them too. A total outlives the nodes it was added from, so that what
-was once reported can be read again after a larger run has merged them.
+A run keeps the largest nodes it has. When a node is safely on disk, the files inside it are removed. Nothing else is
+removed: a run with a smaller N than was done before leaves the large nodes alone, computes the small ones it lacks
+beside them (with the same bytes), and stores them too. A total outlives the nodes it was added from, so that a reported
+result can be read again after a larger run has merged them.
 
 A file is one line of magic, one line of JSON, the sums as little-endian float64 and the SHA-256 of all that. It is
-written under a temporary name, synchronised and renamed: it is there whole or not at all. Equal names hold equal sums,
-so that several runs may share a store; a file that another run merged away is looked for in its parent.
+written under a temporary name, synchronised and renamed: it is complete or absent. Equal names hold equal sums, so that
+several runs may share a store; a file merged by another run is found in its parent.
 
-An identity is 32 digits of the question (what is asked) and 32 of the sources that answer it. Where only the sources
-differ, tasks whose sums were marked in the headers are computed again, and totals are added up again from the blocks
-beside them: if all the bytes are the same, the folder is taken over. What was found lies there, so that nobody looks a
-second time:
+An identity is 32 digits of the request and 32 of the sources. Where only the sources differ, tasks whose sums were
+marked in the headers are computed again, and totals are added up again from the blocks beside them: if all bytes are
+equal, the folder is used. The result is kept there, so that this is done once:
 
     <sources>.same              these sources give the bytes of this folder
     <sources>-<platform>.other  on this platform they do not
 
-Puts finished sums into the store about once a second, in a thread of its own, so that no worker waits for a disk.
+Finished sums are put into the store about once a second, in a thread of its own, so that no worker waits for a disk.
 
-What of a run or a share is stored, by the names of files alone; only what other sources made is computed again.
+The stored part of a run or a share, by the names of files alone; only results of other sources are recomputed.
 
-An audit of stored blocks, without the work that made them: is each file what its name says, are all the blocks there
-that a total was added from, do they add up to it? Nothing is changed.
+An audit of stored blocks, without the work that made them: does each file match its name, do all the blocks of a total
+exist, do they add up to it? Nothing is changed.
 """
 
 import functools
@@ -77,10 +76,10 @@ _DECIDING = ("avx512f", "avx2", "fma", "avx", "sse4_2", "asimd")
 
 @functools.cache
 def instruction_set() -> str:
-    """The instruction set, like `x86_64 avx512f avx2 fma`; sums from equal ones are equal to the last bit.
+    """The instruction set, like `x86_64 avx512f avx2 fma`; with equal ones sums are equal to the last bit.
 
     If the compiler targets another processor (NUMBA_CPU_NAME), that is named, since it decides instead; so are features
-    that NumPy is told to leave alone (NPY_DISABLE_CPU_FEATURES).
+    disabled for NumPy (NPY_DISABLE_CPU_FEATURES).
     """
     aimed_at, disabled = os.environ.get("NUMBA_CPU_NAME"), os.environ.get("NPY_DISABLE_CPU_FEATURES")
     found = set(_flags())
@@ -90,7 +89,7 @@ def instruction_set() -> str:
 
 
 def _cpuinfo() -> list[str]:
-    """The lines in which Linux describes the first processor; none elsewhere."""
+    """The lines in which Linux describes the first processor; empty elsewhere."""
     try:
         with open("/proc/cpuinfo", encoding="ascii", errors="replace") as file:
             return file.read(8192).splitlines()
@@ -99,7 +98,7 @@ def _cpuinfo() -> list[str]:
 
 
 def _flags() -> list[str]:
-    """Features of the first processor, as Linux lists them; none elsewhere."""
+    """Features of the first processor, as Linux lists them; empty elsewhere."""
     return next((line.split() for line in _cpuinfo() if line.startswith(("flags", "Features"))), [])
 
 
@@ -129,9 +128,9 @@ def described() -> dict[str, object]:
 
 @functools.cache
 def linear_algebra() -> str:
-    """The BLAS library NumPy has loaded, and the processor that its kernels are made for, like `openblas SkylakeX`.
+    """The BLAS library that NumPy has loaded, and the processor of its kernels, like `openblas SkylakeX`.
 
-    The processor, or OPENBLAS_CORETYPE, chooses the kernels; the order of sums differs between them.
+    The processor, or OPENBLAS_CORETYPE, selects the kernels; the order of sums differs between them.
     """
     from threadpoolctl import threadpool_info
 
@@ -143,25 +142,25 @@ def linear_algebra() -> str:
     return ", ".join(sorted(found))
 
 
-LIBRARIES = ("numba", "llvmlite", "numpy", "scipy")  # what compiles and computes
+LIBRARIES = ("numba", "llvmlite", "numpy", "scipy")  # that compile and compute
 
 
 @functools.cache
 def platform() -> dict[str, str]:
-    """What decides the last bits: processor, instruction set, BLAS, and the versions of what compiles and computes."""
+    """All that decides the last bits: processor, instruction set, BLAS, and the versions of compiler and libraries."""
     here = {"processor": processor(), "instruction_set": instruction_set(), "linear_algebra": linear_algebra()}
     return here | {name: metadata.version(name) for name in LIBRARIES}
 
 
 @functools.cache
 def platform_name() -> str:
-    """The platform in one line, as it stands in the header of stored sums: equal lines, equal bytes."""
+    """The platform in one line, as in the header of stored sums: equal lines, equal bytes."""
     libraries = ", ".join(f"{name} {platform()[name]}" for name in LIBRARIES)
     return f"{processor() or 'unknown processor'}: {instruction_set()}; {linear_algebra()}; {libraries}"
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python and of the libraries that compute, as far as they are loaded."""
+    """Versions of Python and of the loaded libraries that compute."""
     libraries = {name: sys.modules[name].__version__ for name in ("numpy", "numba") if name in sys.modules}
     return {"python": system.python_version()} | libraries
 
@@ -173,11 +172,11 @@ DIGEST = 32
 STALE_S = 600
 LOOKS = 4
 MOST_MARKS = 128  # in a header
-PROOF_S = 2.0  # of CPU time, at least one task: what is computed again of a folder of other sources
+PROOF_S = 2.0  # of CPU time, at least one task: recomputed from a folder of other sources
 
 
 class Damage(Exception):
-    """A file is not what its name says; the text says why."""
+    """A file does not match its name; the text says why."""
 
 
 def piece_named(name: str) -> Piece | None:
@@ -194,7 +193,7 @@ def piece_named(name: str) -> Piece | None:
 class Store:
     """The pieces of one work under a results directory. Makes no directory before the first write.
 
-    `warnings` gathers what was found damaged; `platforms` and `marks` those of all sums read or computed so far.
+    `warnings` collects damage; `platforms` and `marks` those of all sums read or computed so far.
     """
 
     def __init__(self, directory: str | os.PathLike, work: Work):
@@ -208,7 +207,7 @@ class Store:
         self._work = work
 
     def pieces(self) -> set[Piece]:
-        """What is stored, by file names; nothing if the directory does not exist."""
+        """The stored pieces, by file names; empty if the directory does not exist."""
         try:
             names = os.listdir(self.path)
         except FileNotFoundError:
@@ -218,7 +217,7 @@ class Store:
         return {piece for name in names if (piece := piece_named(name)) is not None}
 
     def read(self, piece: Piece) -> Sums | None:
-        """The sums of a piece, checked; None if it is not there (any more) or damaged.
+        """The sums of a piece, checked; None if it is absent or damaged.
 
         A damaged file is renamed to `<name>.damaged` and named in warnings.
         """
@@ -251,7 +250,7 @@ class Store:
         return described_piece(self.path, piece, work.block) | {"block": work.block, "size": work.size}
 
     def make(self, last: bool = True) -> None:
-        """Make the directory, where there is none; unless it is the last try FileNotFoundError is left as it is."""
+        """Make the directory, if absent; FileNotFoundError is passed on except on the last try."""
         try:
             self.path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -260,7 +259,7 @@ class Store:
             raise StoreError(f"{error.filename or self.path}: cannot be written: {error.strerror}") from error
 
     def write(self, pieces: Mapping[Piece, Sums]) -> None:
-        """Put pieces on disk; on return they outlive a power cut. StoreError, with the old files intact, if the disk is
+        """Put pieces on disk; on return they survive a power cut. StoreError, with the old files intact, if the disk is
         full or cannot be written."""
         if not pieces:
             return
@@ -273,7 +272,7 @@ class Store:
     def _write_all(self, pieces: Mapping[Piece, Sums], last: bool) -> None:
         try:
             spans = [(hashed, one, *one.realisations(self._work.block)) for one, hashed in dict(self.marks).items()]
-            spans.sort(key=lambda mark: mark[0])  # the least hashes are a draw that merging does not disturb
+            spans.sort(key=lambda mark: mark[0])  # the least hashes are a sample that merging does not disturb
             for piece, sums in pieces.items():
                 described = self._described(piece)
                 first, count = described["first"], described["count"]
@@ -289,7 +288,7 @@ class Store:
             raise StoreError(f"{where}: cannot be written: {error.strerror}") from error
 
     def mark(self, piece: Node | Partial, sums: Sums) -> None:
-        """Remember the sums of a task by their hash; of many tasks those of the least hashes."""
+        """Remember the sums of a task by their hash; of many tasks those with the least hashes."""
         self.marks[piece] = mark_of(sums)
         if len(self.marks) > 4 * MOST_MARKS:
             self.marks = dict(sorted(self.marks.items(), key=lambda mark: mark[1])[: 2 * MOST_MARKS])
@@ -303,7 +302,7 @@ class Store:
             os.close(descriptor)
 
     def sweep(self, durable: Collection[Node]) -> None:
-        """Remove the files of what lies inside nodes that are durable, and temporary files that a killed run left."""
+        """Remove files of pieces contained in durable nodes, and temporary files of a killed run."""
         highest = max((node.level for node in durable), default=-1)
         now = time.time()
         try:
@@ -319,7 +318,7 @@ class Store:
             raise StoreError(f"{self.path}: cannot be tidied: {error.strerror}") from error
 
     def forest(self, blocks: int) -> Forest:
-        """All that is stored of blocks 0 … blocks-1, merged."""
+        """All stored pieces of blocks 0 … blocks-1, merged."""
         for _ in range(LOOKS):
             forest, lost = Forest(self._work.block, self._work.size), False
             found = self.pieces() - self._damaged
@@ -337,8 +336,8 @@ class Store:
 
 @dataclass(frozen=True)
 class Settled:
-    """What came of blocks that other sources made: whether their bytes are the same, and how many of the stored
-    realisations were computed again to tell."""
+    """Result for blocks from other sources: whether their bytes are equal, and how many of the stored realisations were
+    recomputed to tell."""
 
     identity: str
     same: bool
@@ -346,12 +345,12 @@ class Settled:
     stored: int
 
 
-settled: list[Settled] = []  # found by this process and not yet said to the user
-_unkept: dict[Path, bool] = {}  # what could not be written, by its file
+settled: list[Settled] = []  # of this process, not yet reported to the user
+_unkept: dict[Path, bool] = {}  # files that could not be written
 
 
 def folder_of(blocks: Path, work: Work) -> Path:
-    """The folder with the sums of a work: its own, or one of other sources that give the same bytes."""
+    """The folder with the sums of a work: its own, or one from other sources with the same bytes."""
     own, sources = blocks / work.identity, work.identity[QUESTION:]
     try:
         if not sources or own.is_dir():
@@ -365,7 +364,7 @@ def folder_of(blocks: Path, work: Work) -> Path:
 
 
 def _gives_the_same(folder: Path, work: Work) -> bool:
-    """Whether a work has the marks of a folder, as far as PROOF_S reaches; kept in the folder."""
+    """Whether a work has the marks of a folder, as far as PROOF_S allows; kept in the folder."""
     sources, here = work.identity[QUESTION:], hashlib.sha256(platform_name().encode()).hexdigest()[:8]
     files = folder / f"{sources}-{here}.other", folder / f"{sources}.same"
     if files[0].exists() or _unkept.get(files[0]) is not None:
@@ -395,8 +394,8 @@ def _gives_the_same(folder: Path, work: Work) -> bool:
 
 
 def _distinct(pieces: Collection[tuple[int, int]]) -> int:
-    """How many realisations some pieces are of, each its first and how many: the end of a run may lie in a task of
-    a longer one."""
+    """Number of distinct realisations in some pieces, each with its first and count: the end of a run may lie in a task
+    of a longer one."""
     found = reached = 0
     for first, count in sorted(pieces):
         found += max(first + count - max(first, reached), 0)
@@ -405,7 +404,7 @@ def _distinct(pieces: Collection[tuple[int, int]]) -> int:
 
 
 def _marked(folder: Path, work: Work) -> tuple[dict[Node | Partial, str], int]:
-    """The marks of a folder, and how many realisations it holds; nothing where its blocks are of another length."""
+    """The marks of a folder, and its number of realisations; nothing where its blocks have another length."""
     marks: dict[Node | Partial, str] = {}
     held: list[tuple[int, int]] = []
     pieces = [piece for path in folder.iterdir() if (piece := piece_named(path.name)) is not None]
@@ -424,14 +423,14 @@ def mark_of(sums: Sums) -> str:
 
 
 def marks_in(header: Mapping) -> dict[Node | Partial, str]:
-    """The marks of a header, by task; those of earlier versions have none."""
+    """The marks of a header, by task; earlier versions have none."""
     held = header.get("marks")
     named = {piece_named(name + SUFFIX): hashed for name, hashed in held.items()} if isinstance(held, dict) else {}
     return {piece: str(hashed) for piece, hashed in named.items() if isinstance(piece, Node | Partial)}
 
 
 def put(path: Path, content: bytes) -> None:
-    """Write a file, whole or not at all, and durable but for its name; OSError with the file's name."""
+    """Write a file, completely or not at all, durable except for its name; OSError with the file's name."""
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
     try:
         with open(temporary, "xb") as file:
@@ -448,13 +447,13 @@ def put(path: Path, content: bytes) -> None:
 
 
 def described_piece(folder: Path, piece: Piece, block: int) -> dict:
-    """What a piece of a folder says of itself, blocks having so many realisations."""
+    """The header of a piece in a folder, with so many realisations in a block."""
     first, count = piece.realisations(block)
     return {"identity": folder.name, "piece": piece.name, "first": first, "count": count}
 
 
 def check(header: Mapping, values: np.ndarray, expected: Mapping) -> None:
-    """Damage for a header that says something else than is expected, and for sums that are not finite."""
+    """Damage for an unexpected header, and for sums that are not finite."""
     for key, value in expected.items():
         if header.get(key) != value:
             raise Damage(f"{key}: expected {value}, got {header.get(key)}")
@@ -463,7 +462,7 @@ def check(header: Mapping, values: np.ndarray, expected: Mapping) -> None:
 
 
 def mixture(platforms: Collection[str]) -> str:
-    """What is said of sums that were not all made on one platform; the same line for every case of a run."""
+    """A note on sums from several platforms; the same line for every case of a run."""
     named = "; ".join(f"({number}) {name}" for number, name in enumerate(sorted(platforms), start=1))
     return (
         f"stored sums were made on {len(platforms)} platforms and are equal to rounding, not to the last bit: {named}"
@@ -477,9 +476,9 @@ def encoded(header: Mapping, values: np.ndarray) -> bytes:
 
 
 def is_directory(path: Path) -> bool:
-    """Whether a directory is there; raises OSError where nobody may look.
+    """Whether a directory exists; raises OSError where access is denied.
 
-    Path.is_dir raises it up to Python 3.13 alone: later it takes what may not be seen for what is not there.
+    Path.is_dir raises that only up to Python 3.13: later it returns False without access.
     """
     try:
         return stat.S_ISDIR(path.stat().st_mode)
@@ -488,7 +487,7 @@ def is_directory(path: Path) -> bool:
 
 
 def content(path: Path) -> bytes:
-    """What a stored file holds; Damage for a pipe, a device or a directory, which nobody here has put there."""
+    """The content of a stored file; Damage for a pipe, a device or a directory, which no run writes."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # or a pipe would wait for a writer
     with open(descriptor, "rb") as file:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
@@ -497,7 +496,7 @@ def content(path: Path) -> bytes:
 
 
 def decoded(raw: bytes) -> tuple[dict, np.ndarray]:
-    """Header and sums of a file's content; Damage if it is not exactly what was written."""
+    """Header and sums of a file's content; Damage unless it is exactly as written."""
     body, digest = raw[:-DIGEST], raw[-DIGEST:]
     if not body.startswith(MAGIC):
         raise Damage("not a file of sums" if raw else "empty")
@@ -522,7 +521,7 @@ SMALLEST = 64
 
 
 class Keeper:
-    """Remembers which nodes are on disk, and writes those that are not."""
+    """Tracks which nodes are on disk, and writes the others."""
 
     def __init__(self, store: Store):
         self.store = store
@@ -532,12 +531,12 @@ class Keeper:
         self._due = time.monotonic() + PERIOD_S
 
     def found(self, nodes: Mapping[Node, Sums]) -> None:
-        """These were read; a merger of several is not among the files, and is written like any other."""
+        """These were read; a merged node is not among the files, and is written like any other."""
         stored = self.store.pieces()
         self._durable.update(node for node in nodes if node in stored)
 
     def offer(self, nodes: Mapping[Node, Sums]) -> None:
-        """Start to write those that are new, if a second has passed. Raises the error of the writing before.
+        """Start to write the new nodes, if a second has passed. Raises the error of the writing before.
 
         A node of less than 1/64 of the largest new one is left out: it will soon be part of another, and would cost as
         much to write. All of them together are a thirtieth of what a kill would lose anyway.
@@ -557,7 +556,7 @@ class Keeper:
         self._due = time.monotonic() + PERIOD_S
 
     def finish(self, pieces: Mapping[Piece, Sums]) -> None:
-        """Write all that is not yet on disk, and wait until it is."""
+        """Write all nodes not yet on disk, and wait for that."""
         if self._thread is not None:
             self._thread.join()
         self._raise()
@@ -591,11 +590,11 @@ BY_CHANCE = 0.2  # that what is missing ends where shares do, without being shar
 
 @dataclass(frozen=True)
 class Stock:
-    """What is stored of `asked` realisations.
+    """The stored part of `asked` realisations.
 
-    missing are runs (first, last) of realisations that are not. loose: whether there are blocks beyond a gap, or none
-    that a run reported, as shares leave them, or a run that was killed; shares then says which shares of how many are
-    missing, as far as the ends tell.
+    missing: runs (first, last) of missing realisations. loose: whether there are blocks beyond a gap, or blocks that no
+    run reported, as from shares or a killed run; shares then says which shares of how many are missing, as far as the
+    ends show.
     """
 
     asked: int
@@ -606,8 +605,8 @@ class Stock:
 
 
 def stock(work: Work, realisations: int, store: str | os.PathLike[str] | None, part: tuple[int, int] = (1, 1)) -> Stock:
-    """What a results directory holds of N realisations of a work, or of a share of them, as (2, 3) the second of three;
-    nothing where no directory is given."""
+    """The stored part of N realisations of a work, or of a share of them, as (2, 3) the second of three; nothing
+    without a directory."""
     pieces, block = set() if store is None else Store(store, work).pieces(), work.block
     first, stop, rest = share_of(realisations, block, part)
     asked, full = (stop - first) * block + rest, realisations // block
@@ -627,8 +626,8 @@ def stock(work: Work, realisations: int, store: str | os.PathLike[str] | None, p
 def as_shares(missing: Collection[tuple[int, int]], blocks: int) -> tuple[tuple[int, ...], int] | None:
     """Which shares of how many the missing runs (first, stop) of `blocks` blocks are, as ((2,), 3); None for none.
 
-    The fewest shares that fit, as long as it is no more than likely by chance: each end within lies by chance on one of
-    the n − 1 bounds of n shares.
+    The fewest shares that fit, unless that is likely by chance: each inner end lies by chance on one of the n − 1
+    bounds of n shares.
     """
     ends = [end for run in missing for end in run if 0 < end < blocks]
     chance, of = 0.0, 1
@@ -643,14 +642,14 @@ def as_shares(missing: Collection[tuple[int, int]], blocks: int) -> tuple[tuple[
 
 # ---- audit -----------------------------------------------------------------------------------------------------------
 BESIDE = re.compile(r"[0-9a-f]+(-[0-9a-f]+)?\.(same|other)")  # of other sources
-LEFT = re.compile(r"\.[\w-]+\.(sums|same|other)\.[0-9a-f]+\.tmp")  # by a run that was killed while it wrote
+LEFT = re.compile(r"\.[\w-]+\.(sums|same|other)\.[0-9a-f]+\.tmp")  # of a run that was killed while writing
 ACROSS = 1e-9  # of sums made on several platforms
 
 
 @dataclass
 class Audit:
-    """Of one identity: the pieces that are whole, with their headers and sums; totals that go astray, since they are
-    not the sum of the blocks beside them; faults, each naming its file; notes."""
+    """Of one identity: the intact pieces, with headers and sums; stray totals, which are not the sum of the blocks
+    beside them; faults, each naming its file; notes."""
 
     path: Path
     pieces: dict[Piece, tuple[dict, np.ndarray]] = field(default_factory=dict)
@@ -707,7 +706,7 @@ def _read(found: Audit, piece: Piece) -> None:
 
 
 def _gaps(found: Audit) -> None:
-    """A note on realisations that are not stored before others that are, as where a share was not copied."""
+    """A note on missing realisations before stored ones, as where a share was not copied."""
     nodes = [piece for piece in found.pieces if isinstance(piece, Node)]
     end = max((node.stop for node in nodes), default=0)
     for first, stop in gaps(maximal(nodes, end), end):
@@ -723,7 +722,7 @@ def _missing(found: Audit, piece: Piece) -> None:
 
 
 def _added_up(found: Audit, total: Total) -> None:
-    """Whether the pieces that a total was added from are there, and are its sum."""
+    """Whether the pieces of a total exist, and add up to it."""
     header, values = found.pieces[total]
     block = header["block"]
     full, rest = divmod(total.count, block)
@@ -768,7 +767,7 @@ def _sums(found: Audit, piece: Piece) -> tuple[int, np.ndarray]:
 
 
 def removable(path: Path) -> list[tuple[Path, int]]:
-    """The files of one identity that a store makes, and their bytes; nothing that is a link or somebody else's."""
+    """The files of one identity that a store makes, and their bytes; never links or foreign files."""
     found = []
     for name in _names(path):
         if piece_named(name.removesuffix(".damaged")) is not None or BESIDE.fullmatch(name) or LEFT.fullmatch(name):

@@ -1,7 +1,7 @@
-"""The language in which figures, reports, answers and claims speak: English, or another that has a catalogue here.
+"""The language of figures, reports, answers and claims: English, or another with a catalogue here.
 
-`tr("…")` gives a sentence in the language chosen, `plural` one that counts, `term` marks a word that is said later. A
-sentence is translated whole, with named places for what varies:
+`tr("…")` gives a sentence in the language chosen, `plural` one with a count, `term` marks a word for later translation.
+A sentence is translated as a whole, with named placeholders:
 
 >>> tr("σ of the {quantity} is {value:.4g} m", quantity=term("range"), value=1234.5)
 'σ of the range is 1234 m'
@@ -10,14 +10,14 @@ A catalogue is one file, `<code>.po`, in gettext's format. Numbers that are put 
 language writes them: the catalogue says how under the context "number". A word (`term`) may have several forms: where a
 translation says `{quantity:genitive}`, the word is looked up under the context "genitive".
 
-A package with a study of its own has its own catalogues, `PACKAGE/language/<code>.po`: what its code says, its keys'
-words and the terms that it marks are looked up there and nowhere else. What is said for it by radarsim's code, such as
-its claims, is looked up in radarsim's catalogue first, then in those of the packages.
+A package with a study of its own has its own catalogues, `PACKAGE/language/<code>.po`: messages of its code, names of
+its keys and its terms are looked up there and nowhere else. Messages about it from radarsim's code, such as its claims,
+are looked up in radarsim's catalogue first, then in those of the packages.
 
-Names that shipped configs give (filters, radars, scenarios) stand in radarsim's catalogue under the context "label":
-`called` says them in a text. What is typed and what stands in CSV files stays as the config has it.
+Names in shipped configs (filters, radars, scenarios) are in radarsim's catalogue under the context "label": `called`
+translates them in a text. Typed text and CSV files stay as in the config.
 
-Tables are the same in every language, and so are messages on faults of a config: neither may import this room.
+Tables are the same in every language, and so are messages on faults of a config: neither may import this package.
 """
 
 import os
@@ -48,7 +48,7 @@ NUMBERS = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)")  # in a message, 
 
 
 class Term(str):
-    """A word or sentence that stands in the catalogues of a package; put into another sentence it is translated."""
+    """A word or sentence in a package's catalogues; put into another sentence it is translated."""
 
     __slots__ = ("package",)
     package: str
@@ -58,7 +58,7 @@ OURS = "radarsim"
 
 
 def no_packages() -> tuple[str, ...]:
-    """Packages with studies of their own, by the names of their modules: none, but see radarsim.app.configs."""
+    """Packages with studies of their own, by module name: none, but see radarsim.app.configs."""
     return ()
 
 
@@ -75,12 +75,12 @@ def known() -> tuple[str, ...]:
 
 
 def current() -> str:
-    """The language spoken: the one chosen, else by RADARSIM_LANGUAGE, else English. Raises ConfigError."""
+    """The current language: the chosen one, else that of RADARSIM_LANGUAGE, else English. Raises ConfigError."""
     return _chosen[-1] if _chosen else checked(os.environ.get(VARIABLE) or ENGLISH, VARIABLE)
 
 
 def checked(code: str, by: str) -> str:
-    """A language's code that was given by an option or a variable. Raises ConfigError where there is none such."""
+    """A language's code from an option or a variable. Raises ConfigError for an unknown one."""
     if code not in known():
         raise ConfigError(f"{by}: must be one of {', '.join(known())}, got {code!r}")
     return code
@@ -88,7 +88,7 @@ def checked(code: str, by: str) -> str:
 
 @contextmanager
 def speaking(code: str) -> Iterator[None]:
-    """Speak a language for a while. Raises ConfigError where it is not known."""
+    """Use a language within a context. Raises ConfigError for an unknown one."""
     _chosen.append(checked(code, "language"))
     try:
         yield
@@ -99,7 +99,7 @@ def speaking(code: str) -> Iterator[None]:
 def messages(code: str, package: str = OURS) -> tuple[catalogue.Entry, ...]:
     """The catalogue of a package, which is imported, in a language; English needs none, another package may have none.
 
-    Raises ConfigError where radarsim's file is no catalogue; another package's is then left out, as `faults` says.
+    Raises ConfigError where radarsim's file is not a catalogue; another package's is then left out, see `faults`.
     """
     return _read(code, package)[0]
 
@@ -127,34 +127,34 @@ def _read(code: str, package: str) -> tuple[tuple[catalogue.Entry, ...], NullTra
 
 
 def term(message: str, package: str = "") -> Term:
-    """Mark a message that is said later; of the package that calls this, unless another one is named."""
+    """Mark a message for later translation; of the calling package, unless another one is named."""
     made = Term(message)
     made.package = package or _top(sys._getframe(1))
     return made
 
 
 def tr(message: str, /, **values: Any) -> str:
-    """A message in the language spoken, with its places filled."""
+    """A message in the current language, with its placeholders filled."""
     found = _catalogue(message, sys._getframe(1)) if message else None  # an empty one is a catalogue's header
     said = found.gettext(message) if found else _numbered(message, sys._getframe(1))
     return _Filled().vformat(said, (), values) if values else str(said)
 
 
 def plural(one: str, many: str, count: int, /, **values: Any) -> str:
-    """A message that counts, in the form that the language has for this count, which is `{count}` in it."""
+    """A message with a count, `{count}`, in the language's plural form."""
     found = _catalogue(one, sys._getframe(1)) or NullTranslations()
     return _Filled().vformat(found.ngettext(one, many, count), (), {"count": count, **values})
 
 
 def in_form(word: Term, context: str) -> str:
-    """A word in one of its forms; without it as it stands."""
+    """A word in one of its forms; without a form unchanged."""
     if context and (found := _catalogue(word, sys._getframe(), context)):
         return found.pgettext(context, word)
     return tr(word)
 
 
 def _numbered(message: str, caller: FrameType) -> str:
-    """A message that the catalogue has once for all its numbers; else as it is."""
+    """A message whose catalogue entry stands for all its numbers; else unchanged."""
     if current() == ENGLISH or "{" in message or not NUMBERS.search(message):
         return message
     like = term(NUMBERS.sub(ANY, message), getattr(message, "package", "") or _top(caller))
@@ -165,9 +165,9 @@ def _numbered(message: str, caller: FrameType) -> str:
 
 
 def called(text: str, names: frozenset[str] = frozenset()) -> str:
-    """A text with names of configs as the language calls those that it knows; without names the text is one itself.
+    """A text with known names from configs translated; without names the whole text is one.
 
-    A name that the language does not know stays, and so does a known one within it.
+    Unknown names stay, and so does a known one within them.
     """
     said = _labels(current())
     if not names or not said:
@@ -193,7 +193,7 @@ def _any_of(names: frozenset[str]) -> re.Pattern[str]:
 
 
 def _catalogue(message: str, caller: FrameType, context: str = "") -> NullTranslations | None:
-    """The catalogue that has a message: its package's or its caller's, else the first one; None where none has it."""
+    """The catalogue with a message: its package's or its caller's, else the first one with it; None without any."""
     code = current()
     if code == ENGLISH:
         return None
@@ -213,7 +213,7 @@ def _translated(code: str, package: str) -> frozenset[tuple[str, str]]:
 
 
 def numeral(text: str) -> str:
-    """A number as English writes it (1,234.5), as the language spoken does; with a true minus and raised powers of ten.
+    """An English number (1,234.5) in the current language's notation, with a true minus and raised powers of ten.
 
     >>> [numeral(one) for one in ("-0.5", "6.678e+09", "1e-05")]
     ['−0.5', '6.678·10⁹', '10⁻⁵']
@@ -243,9 +243,9 @@ def listed(names: Sequence[str]) -> str:
 
 
 def few(names: Sequence[str], most: int = 4) -> str:
-    """Names in a sentence, of more than so many the first ones and how many there are besides.
+    """Names in a sentence; of too many the first ones and the number of the others.
 
-    Of several those that hold a comma themselves are quoted.
+    In a list, names that contain a comma are quoted.
     """
     names = [tr("“{name}”", name=one) if ", " in one and len(names) > 1 else one for one in names]
     if len(names) <= most + 1:
@@ -255,7 +255,7 @@ def few(names: Sequence[str], most: int = 4) -> str:
 
 
 class _Filled(Formatter):
-    """Fills places: numbers in the way of the language, words translated, in the form that the place asks for."""
+    """Fills placeholders: numbers in the language's notation, words translated, in the requested form."""
 
     def format_field(self, value: Any, spec: str) -> str:
         if isinstance(value, Term):

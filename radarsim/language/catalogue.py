@@ -1,4 +1,4 @@
-"""Reads a catalogue of gettext, `<code>.po`, and compiles it in memory to what the standard library reads."""
+"""Reads gettext catalogues, `<code>.po`, and compiles them in memory for the standard library."""
 
 import ast
 import io
@@ -24,17 +24,17 @@ class Entry:
 
     @property
     def key(self) -> tuple[str, str]:
-        """What tells it from all others."""
+        """Its key in the catalogue."""
         return self.context, self.id
 
     @property
     def done(self) -> bool:
-        """Whether it is translated, in every form that is there."""
+        """Whether it is translated, in all its forms."""
         return bool(self.said) and all(self.said.values())
 
 
 def entries(text: str) -> list[Entry]:
-    """The entries of a catalogue, the header among them. Raises ValueError, with the line, where it is none."""
+    """The entries of a catalogue, including the header. Raises ValueError, with the line, for any other file."""
     blocks: list[list[tuple[int, str]]] = [[]]
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip():
