@@ -5,11 +5,13 @@ from functools import partial
 from pathlib import Path
 
 from making import claims, commands, keys, modules, readings, tables
+from radarsim.studies import registry
 
 MARK = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
 PARTS = {
     **{"claims": claims.markdown, "commands": commands.markdown, "keys": keys.markdown},
-    **{"modules": modules.markdown, "tables": tables.markdown},
+    **{"modules": modules.markdown, "tables": tables.common_tables},
+    **{f"tables_{study}": partial(tables.own_tables, study) for study in registry.SHIPPED},
     **{f"readings_{paper.lower()}": partial(readings.markdown, paper) for paper in readings.PAPERS},
 }
 

@@ -73,17 +73,26 @@ def modules(study: str) -> Iterator[ModuleType]:
 
 
 def markdown() -> str:
-    """Columns that mean the same everywhere, tables of several studies, and each study's own, as they are made."""
+    """All tables: those of several studies, and each study's own."""
+    return "\n\n".join([common_tables(), *(own_tables(study) for study in registry.SHIPPED)])
+
+
+def common_tables() -> str:
+    """Columns that mean the same everywhere, and tables of several studies."""
     shared = [column for function in SHARED for column in read(function)[1]]
     parts = ["Columns that mean the same everywhere:", listed(shared), "## Tables of several studies"]
     for name, functions in SEVERAL.items():
         parts += [f"### `{name}.csv`", *described(*functions)]
-    for study in registry.SHIPPED:
-        parts.append(f"## {study}")
-        for module in modules(study):
-            parts += described(module)
-            for name, (function, _) in module.table.declared.items():
-                parts += [f"### `{name}.csv`", *described(function)]
+    return "\n\n".join(filter(None, parts))
+
+
+def own_tables(study: str) -> str:
+    """The tables of one study, as they are made."""
+    parts = []
+    for module in modules(study):
+        parts += described(module)
+        for name, (function, _) in module.table.declared.items():
+            parts += [f"### `{name}.csv`", *described(function)]
     return "\n\n".join(filter(None, parts))
 
 

@@ -71,7 +71,7 @@ def test_forest_stands_in_margins():
 
 def test_words_that_markdown_would_read_are_escaped():
     of = row(statement="a | b < c", expected="< 0", config="rls2", original="а")
-    words = "<summary>a \\| b &lt; c</summary>«а» (p)<br>Came out: x: 3 [2, 4] m; expected &lt; 0 m.</details>"
+    words = "<summary>a \\| b &lt; c</summary>«а» (p)<br>Result: x: 3 [2, 4] m; expected &lt; 0 m.</details>"
     text = page.page([of], {"Someone": "range_doppler"})
     assert f"| P9.1 | <details>{words} | **refuted** | `rls2` |" in text
 

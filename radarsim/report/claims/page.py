@@ -237,13 +237,13 @@ def words(kind: str, own: str, depends_on: str = "", say: Callable[..., str] = s
 
 # ---- page ------------------------------------------------------------------------------------------------------------
 TITLE = "# The papers' claims"
-HEAD = """A row a claim: what the paper says, how far it stands, and the config that shows it (`radarsim run
-CONFIG`, then `radarsim claims CONFIG`). All are judged by [one rule](verdicts.md), which was written before
-anything was measured. Where the paper leaves something open the class is over all readings that it allows
-(`radarsim readings`): "refuted as shipped; depends on start" is false with the choices that the config takes, and
-true with another start. Open a claim for its words in the original, how they were read, and the part of it that
-lies furthest from them: measured, with the interval that is judged, or exactly, and what the words leave.
-Extensions are ours, or what a paper only reports of others, and are not counted.
+HEAD = """One row for each claim: the paper's statement, the verdict, and the config that shows it (`radarsim run
+CONFIG`, then `radarsim claims CONFIG`). All are judged by [one rule](verdicts.md), written before anything was
+measured. Where the paper leaves a choice open, the verdict covers all readings that it allows (`radarsim readings`):
+"refuted as shipped; depends on …" is false with the config's choice, and true with another one. Open a claim for its
+original words, their interpretation, and the part furthest from them: its exact value, or the measured one with its
+interval, and the expected range. Extensions are ours, or statements that a paper reports from others, and are not
+counted.
 """
 MARKS = (CONFIRMED, REFUTED)  # in bold
 ORDER = (*CLASSES, NOT_JUDGED, NOT_RUN)
@@ -252,7 +252,7 @@ WORDS = {  # of each class, for the headline
     CONFIRMED: "true as stated",
     REFUTED: "false by more than the margin of their words",
     IMMATERIAL: "about differences too small to matter",
-    CONTRADICTORY: "its numbers come out only under values that it prints otherwise",
+    CONTRADICTORY: "its numbers are reproduced only with values that it contradicts",
     UNJUDGEABLE: "without what a test needs",
     UNDECIDED: "intervals still too wide",
 }
@@ -270,7 +270,7 @@ def page(rows: Sequence[Mapping], pages: Mapping[str, str], parts: bool = True) 
         link = f" Equations and decisions: [{key}]({pages[paper]}.md)." if pages.get(paper) else ""
         claims = [[row for row in own if row["claim"] == claim] for claim in dict.fromkeys(row["claim"] for row in own)]
         text += [f"## {key} {paper}", "", f"{counted(own)}.{link}", ""]
-        text += ["| claim | what the paper says | how far it stands | config |", "|---|---|---|---|"]
+        text += ["| claim | statement | verdict | config |", "|---|---|---|---|"]
         text += [*map(_line, claims), ""]
         lines = [line for every in claims for line in _parts(every)] if parts else []
         if lines:
@@ -384,7 +384,7 @@ def _line(parts: Sequence[Mapping]) -> str:
     if first["reading"]:
         inner.append(f"Read as: {first['reading']}.")
     if found is not None:
-        inner.append(f"Came out: {named(found, parts)}: {shown(found)}; expected {_expected(found)}.")
+        inner.append(f"Result: {named(found, parts)}: {shown(found)}; expected {_expected(found)}.")
     said = f"<details><summary>{_cell(first['statement'])}</summary>{'<br>'.join(map(_cell, inner))}</details>"
     return f"| {first['claim']} | {said} | {_cell(verdict_of(parts))} | `{first['config']}` |"
 
