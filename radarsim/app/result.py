@@ -107,9 +107,9 @@ class Result(Shown):
 
     def _said(self) -> Sequence[str]:
         """The experiment, then the answer."""
-        count, cases = files.span(sorted({case.count for case in self.cases})), len(self.cases)
-        told = {"config": self._label, "cases": plural("{count} case", "{count} cases", cases), "count": count}
-        return (tr("{config}: {cases}, {count} realisations", **told), *self.answer)
+        cases = plural("{count} case", "{count} cases", len(self.cases))
+        told = {"cases": cases, "realisations": files.in_all([case.count for case in self.cases])}
+        return (tr("{config}: {cases}, {realisations}", config=self._label, **told), *self.answer)
 
     @property
     def _label(self) -> str:
@@ -125,8 +125,8 @@ class Result(Shown):
         rows = self.last_scan[columns].dropna(axis=1, how="all")
         table = rows.to_html(index=False, border=0, float_format=lambda v: f"{v:.4g}", na_rep="", max_rows=MOST_ROWS)
         answer = "".join(f"<p>{escape(line)}</p>" for line in self.answer)
-        count = escape(files.span(sorted({case.count for case in self.cases})))
-        return f"<h4>{escape(self.question)}</h4>{answer}<p>{count} realisations; 95 % intervals.</p>", table
+        count = escape(files.in_all([case.count for case in self.cases]))
+        return f"<h4>{escape(self.question)}</h4>{answer}<p>{count}; {tr('95 % intervals')}.</p>", table
 
     @property
     def question(self) -> str:

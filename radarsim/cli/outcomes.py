@@ -266,7 +266,8 @@ def print_inspection(found: "Inspection") -> None:
     say(tr("{folder}: {outputs} and {pieces} checked", folder=str(found.folder), outputs=outputs, pieces=pieces))
     if found.recomputed:
         pieces = plural("{count} piece", "{count} pieces", len(found.recomputed))
-        say(tr("computed again: {pieces}, {count:,} realisations", pieces=pieces, count=found.realisations))
+        count = plural("{count:,} realisation", "{count:,} realisations", found.realisations)
+        say(tr("computed again: {pieces}, {realisations}", pieces=pieces, realisations=count))
     for note in found.notes:
         say(tr("note: {words}", words=note))
     say(

@@ -105,7 +105,8 @@ class Case:
 
     def __repr__(self) -> str:
         filters = ", ".join(member.name for member in (*self.spec.members, *self.outside))
-        return f"<case {self.name}: {self.realisations:,} realisations, seed {self.seed}; filters {filters}>"
+        count = f"{self.realisations:,} realisation{'s' * (self.realisations != 1)}"
+        return f"<case {self.name}: {count}, seed {self.seed}; filters {filters}>"
 
     @property
     def companions(self) -> "tuple[Case, ...]":

@@ -120,7 +120,8 @@ class CaseResult(Generic[A_co]):
 
     def __repr__(self) -> str:
         filters = ", ".join(self.axes.filters)
-        return f"<case {self.name}: {self.count:,} realisations, {len(self.axes.k)} scans; filters {filters}>"
+        count = f"{self.count:,} realisation{'s' * (self.count != 1)}"
+        return f"<case {self.name}: {count}, {len(self.axes.k)} scans; filters {filters}>"
 
     @property
     def baseline(self) -> str:

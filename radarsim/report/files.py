@@ -378,6 +378,11 @@ def span(counts: Sequence[int]) -> str:
     return numeral(f"{low:,}") if low == high else tr("{low:,} to {high:,}", low=low, high=high)
 
 
+def in_all(counts: Sequence[int]) -> str:
+    """The span of numbers of realisations, with the noun."""
+    return plural("{done} realisation", "{done} realisations", max(counts, default=0), done=span(counts))
+
+
 def to_json(value: object) -> bytes:
     """JSON as written to files: readable, keys in their order, without NaN."""
     return (json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()

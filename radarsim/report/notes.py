@@ -505,8 +505,10 @@ def few(results: Sequence[CaseResult]) -> list[str]:
     rough = {result.name: result.count for result in results if result.count < FEW}
     if not rough:
         return []
-    words = tr(
+    words = plural(
+        "{cases}: intervals from {counts} realisation are rough: run at least {least}",
         "{cases}: intervals from {counts} realisations are rough: run at least {least}",
+        max(rough.values()),
         cases=_named(list(rough)),
         counts=files.span(list(rough.values())),
         least=FEW,
