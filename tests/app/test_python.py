@@ -57,7 +57,7 @@ def test_figures_by_the_names_of_their_files():
 def test_one_or_two_realisations_make_no_numeric_warning(config, overrides, n):
     """Here any warning is an error: intervals are infinite, and no word of NumPy's reaches the user."""
     result = radarsim.run(config, realisations=n, overrides=overrides)
-    assert f"intervals from {n} realisations are rough" in result.warnings[-1]
+    assert f"intervals from {n} realisation{'s' * (n > 1)} are rough" in result.warnings[-1]
     assert all("no filter" not in line for line in result.warnings)
 
 
