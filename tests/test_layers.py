@@ -53,8 +53,11 @@ ROOMS = {
         *("errors", "kernels", "physics", *CASE, *DATA),
         *("studies.interface", "studies.noise", "studies.onefile"),
     ),
-    "studies.stepwise": ("errors", "failures", *CASE, *DATA, "kernels", "report", "studies.noise", "studies.onefile"),
     "studies.outside": ("errors", *CASE, *DATA, "studies.interface"),
+    "studies.stepwise": (
+        *("errors", "failures", *CASE, *DATA, "kernels", "report"),
+        *("studies.interface", "studies.noise", "studies.onefile"),
+    ),
     "studies.judged": ("errors", "config", *DATA, "report"),  # claims and readings of studies in one file
     "studies.registry": ("errors", "failures", "config", "report.quantities", "studies.interface"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry"),

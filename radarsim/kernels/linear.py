@@ -206,14 +206,18 @@ def add_block(x, first, count, problem, sums):
 
 
 @kernel
-def fill_simulated(x, first, problem, plots):
-    """`simulate_plots` into plots (n, K, 2), with a work array x (2, CHUNK)."""
-    next_word = np.empty(CHUNK, np.uint64)
-    for done in range(0, plots.shape[0], CHUNK):
-        n = min(CHUNK, plots.shape[0] - done)
+def fill_simulated(x, first, key, truth, sigma, plots):
+    """`simulate_plots` into plots (2, K, n), with a work array x (2, CHUNK)."""
+    z, w, next_word, count = plots[0], plots[1], np.empty(CHUNK, np.uint64), plots.shape[2]
+    for done in range(0, count, CHUNK):
+        n = min(CHUNK, count - done)
         for k in range(plots.shape[1]):
-            fill_plots(problem.key, first + done, k, problem.truth[k], problem.sigma[k], next_word, x[0], x[1])
-            plots[done : done + n, k] = x[:, :n].T
+            if n == CHUNK:
+                to_z, to_w = z[k, done : done + CHUNK], w[k, done : done + CHUNK]
+                fill_plots(key, first + done, k, truth[k], sigma[k], next_word, to_z, to_w)
+            else:
+                fill_plots(key, first + done, k, truth[k], sigma[k], next_word, x[0], x[1])
+                z[k, done:], w[k, done:] = x[0, :n], x[1, :n]
 
 
 @kernel
@@ -257,9 +261,9 @@ def simulate_block(problem: Problem, first: int, count: int, sums: Sums) -> None
 def simulate_plots(problem: Problem, first: int, count: int) -> np.ndarray:
     """The plots (count, K, 2) that `simulate_block` draws for realisations first … first + count - 1."""
     problem = problem.plain()
-    plots = np.empty((count, len(problem.truth), 2))
-    fill_simulated(aligned_zeros(2, CHUNK), int(first), problem, plots)
-    return plots
+    plots = np.empty((2, len(problem.truth), count))
+    fill_simulated(aligned_zeros(2, CHUNK), int(first), problem.key, problem.truth, problem.sigma, plots)
+    return plots.transpose(2, 1, 0)
 
 
 def estimate(problem: Problem, plots: np.ndarray) -> np.ndarray:

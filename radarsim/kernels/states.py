@@ -262,7 +262,7 @@ def scene(begin: Program, move: Program, shape: Shape):
 
 @cache
 def kernels(begin: Program, move: Program, fixed: Program, own: Program, sums: Program, shape: Shape):
-    """The kernels that add a block to sums and that draw one realisation."""
+    """The kernels that add a block to sums and that draw realisations."""
     draw, follow_fixed, follow_own = scene(begin, move, shape), follower(fixed, sums, shape), follower(own, sums, shape)
     n, _, plots_rows, kept, D = shape
 
@@ -288,15 +288,21 @@ def kernels(begin: Program, move: Program, fixed: Program, own: Program, sums: P
                         follow_fixed(groups, own, base, of, seen, there, truth, address(counted), to)
 
     @kernel
-    def realisation(keys, number, probability, at_first, moves, work, truth, plots):
-        for k in range(truth.shape[0]):
-            draw(k, truth.shape[0], 1, keys, number, probability, at_first, moves[k], work)
-            for i in range(n):
-                truth[k, i] = work.truth[i * WIDTH]
-            for i in range(plots_rows):
-                plots[k, i] = work.plots[i * WIDTH] if work.there[0] > 0.0 else np.nan
+    def realisations(keys, first, probability, at_first, moves, work, truth, plots):
+        scans, eights = truth.shape[1], truth.shape[2] // WIDTH
+        for done in range(0, eights, GROUPS):
+            groups = min(GROUPS, eights - done)
+            for k in range(scans):
+                draw(k, scans, groups, keys, first + done * WIDTH, probability, at_first, moves[k], work)
+                for g in range(groups):
+                    at, there, none = done + g, get(address(work.there), g), full(np.nan)
+                    for i in range(n):
+                        put(address(truth), (i * scans + k) * eights + at, get(address(work.truth), g * n + i))
+                    for i in range(plots_rows):
+                        z = where_greater(there, full(0.5), get(address(work.plots), g * plots_rows + i), none)
+                        put(address(plots), (i * scans + k) * eights + at, z)
 
-    return simulate, realisation
+    return simulate, realisations
 
 
 class Simulator:
@@ -347,13 +353,15 @@ class Simulator:
         error += sums[..., :4]
         paired += sums[..., 4]
 
-    def simulate_plots(self, realisation: int) -> tuple[np.ndarray, np.ndarray]:
-        """The truth (K, n) and the plots (G, K, D) of a realisation, not-a-number where one is missed."""
+    def simulate_plots(self, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """The truth (count, K, n) and the plots (count, K, G, D) of realisations first … first + count - 1,
+        not-a-number where one is missed."""
         groups, scans, D, n = self.problem.see.shape
-        truth, plots = np.empty((scans, n)), np.empty((scans, groups * D))
-        of = self.keys, realisation, self.problem.probability, self.at_first, self.moves
+        whole = -(-count // WIDTH) * WIDTH
+        truth, plots = aligned_zeros(n, scans, whole), aligned_zeros(groups, D, scans, whole)
+        of = self.keys, first, self.problem.probability, self.at_first, self.moves
         self.draw(*of, self._work(), truth, plots)
-        return truth, plots.reshape(scans, groups, D).swapaxes(0, 1)
+        return truth.transpose(2, 1, 0)[:count], plots.transpose(3, 2, 0, 1)[:count]
 
 
 # ---- recorded plots --------------------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ import numpy as np
 from radarsim.engine.results import Axes, Layout, Track
 from radarsim.errors import ConfigError
 from radarsim.physics import is_covariance
-from radarsim.studies.interface import CORRELATION, OUTLIERS, Tracker
+from radarsim.studies.interface import CORRELATION, OUTLIERS, Draw, Drawn, Tracker
 from radarsim.studies.onefile import OneFile
 
 if TYPE_CHECKING:
@@ -269,15 +269,21 @@ class LinearStudy(OneFile):
         return np.stack(found)[:, : len(self.components)]
 
     # ---- recorded plots ------------------------------------------------------------------------------------------
-    def realisation(self, case: "Case", i: int) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        simulator = self.prepare(case).simulator
-        truth, plots = simulator.simulate_plots(int(i))
-        columns = {
-            name: plots[group, :, d]
-            for one, group in zip(case.spec.filters, simulator.problem.sees, strict=True)
+    def drawing(self, case: "Case") -> Draw:
+        plan = self.prepare(case)
+        taken = {
+            name: (group, d)
+            for one, group in zip(case.spec.filters, plan.simulator.problem.sees, strict=True)
             for d, name in enumerate(self.columns(case.spec, one))
         }
-        return columns, truth[:, : len(self.components)]
+
+        def draw(first: int, count: int) -> Drawn:
+            truth, plots = plan.simulator.simulate_plots(first, count)
+            columns = {name: plots[:, :, group, d] for name, (group, d) in taken.items()}
+            names = plan.axes.components
+            return Drawn(plan.axes.t_s, columns, names, truth[..., : len(names)], first=first)
+
+        return draw
 
     def tracker(self, case: "Case") -> Tracker:
         return Following(self, case.spec)

@@ -30,7 +30,7 @@ of the file whose first argument is `seen`, or by those of `radarsim.studies.jud
 keys, `sets: {radar.scan_period_s: 2}`.
 
 A base for a kind of model derives from `OneFile` and gives `prepare`, with `axes` and `sums` from here, `simulate`, and
-if it can `limits`, `realisation`, `tracker` and `likelihood`. `radarsim.studies.linear` is one.
+if it can `limits`, `drawing`, `tracker` and `likelihood`. `radarsim.studies.linear` is one.
 
 Whatever a class lacks, or has of the wrong kind, is one line of a ConfigError when its keys are first asked for.
 """
@@ -52,7 +52,7 @@ from radarsim.errors import ConfigError
 from radarsim.failures import call
 from radarsim.language import Term, few, listed, term, tr
 from radarsim.report.quantities import COMMON, Component, Quantity
-from radarsim.studies.interface import Likelihood, Paper, RecordedPlots, Study, Tracker, paper_in, true_column
+from radarsim.studies.interface import Draw, Likelihood, Paper, RecordedPlots, Study, Tracker, paper_in
 
 if TYPE_CHECKING:
     import numpy as np
@@ -91,7 +91,7 @@ NEEDED: Mapping[str, tuple[type, str]] = {
 class OneFile(Study):
     """A study declared by one class of one file; the module's docstring lists what a subclass gives.
 
-    realisation(case, i): the plots of realisation i as a run draws them, columns (K,), and the true components (K, C).
+    drawing(case): as `RecordedPlots.drawing`.
     tracker(case): the filters of a case before their first plot. Without either, or without `measured`, the numbers of
     a recorded plot, the study does nothing with recorded plots. most_scans: bound of `scans`. extra_figures: names of
     figures that a subclass draws beside those of each component, with * for the varying part.
@@ -105,7 +105,7 @@ class OneFile(Study):
     measured: tuple[Measured, ...] = ()
     paper: Paper | None = None
     claims_yaml: str = ""
-    realisation: "Callable[[Case, int], tuple[Mapping[str, np.ndarray], np.ndarray]] | None" = None
+    drawing: "Callable[[Case], Draw] | None" = None
     tracker: "Callable[[Case], Tracker] | None" = None
     most_scans: int = 10_000
     extra_figures: tuple[str, ...] = ()
@@ -371,8 +371,8 @@ class OneFile(Study):
         return None
 
     def recorded(self) -> RecordedPlots | None:
-        draw, tracker = self.realisation, self.tracker
-        return Recorded(self, draw, tracker) if self.measured and draw and tracker else None
+        drawing, tracker = self.drawing, self.tracker
+        return Recorded(self, drawing, tracker) if self.measured and drawing and tracker else None
 
     def shipped(self) -> Path | None:
         folder = Path(str(sys.modules[type(self).__module__].__file__)).parent / "shipped"
@@ -385,8 +385,8 @@ class Recorded(RecordedPlots):
     from_any_origin = True
     of_any_keys = True
 
-    def __init__(self, study: OneFile, draw: "Callable[[Case, int], Any]", tracker: "Callable[[Case], Tracker]"):
-        self.study, self._draw, self._tracker = study, draw, tracker
+    def __init__(self, study: OneFile, drawing: "Callable[[Case], Draw]", tracker: "Callable[[Case], Tracker]"):
+        self.study, self._drawing, self._tracker = study, drawing, tracker
 
     def columns(self, spec: Any) -> Sequence[Sequence[str]]:
         each = list(dict.fromkeys(self.study.columns(spec, one) for one in spec.filters))
@@ -404,11 +404,8 @@ class Recorded(RecordedPlots):
     def scan_period_s(self, spec: Any) -> float:
         return self.study.scan_period_s(spec)
 
-    def simulated(self, case: "Case", realisation: int) -> "Mapping[str, np.ndarray]":
-        plots, truth = self._draw(case, realisation)
-        columns = (true_column(one.name, one.unit) for one in self.study.components)
-        t_s = self.study.axes(case.spec).t_s
-        return {"t_s": t_s, **plots} | dict(zip(columns, truth.T, strict=True))
+    def drawing(self, case: "Case") -> Draw:
+        return self._drawing(case)
 
     def tracker(self, case: "Case") -> Tracker:
         return self._tracker(case)

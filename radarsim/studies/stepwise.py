@@ -43,6 +43,7 @@ from radarsim.engine.results import Axes, CaseResult, Layout, Track
 from radarsim.errors import ConfigError, PlotFault
 from radarsim.failures import call, fault, of_study
 from radarsim.kernels import traced
+from radarsim.studies.interface import Draw, Drawn
 from radarsim.studies.noise import noise_key
 from radarsim.studies.onefile import OneFile
 
@@ -331,10 +332,11 @@ class StepStudy(OneFile):
         Compiled code assumes finite numbers: a NaN error may be stored as zero.
         """
         if "free" not in plan.checked:
-            plots, truth = self.realisation(plan.case, 0)
+            plots = self._drawing(plan)(0, 1)
+            columns, truth = {name: column[0] for name, column in plots.columns.items()}, plots.truth[0]
             try:
                 with np.errstate(all="ignore"):
-                    found = self.tracker(plan.case).feed({"t_s": plan.axes.t_s, **plots}).estimate
+                    found = self.tracker(plan.case).feed({"t_s": plan.axes.t_s, **columns}).estimate
             except ConfigError:  # a division by zero
                 found = np.full_like(plan.axes.exact_sigma, np.nan)
             plan.checked["free"] = np.abs(found - truth) <= ROUNDED * np.abs(truth).max(axis=0)
@@ -393,14 +395,33 @@ class StepStudy(OneFile):
     def columns(self, spec: Any, one: Any) -> tuple[str, ...]:
         return (*super().columns(spec, one), *self.known_columns)
 
-    def realisation(self, case: "Case", i: int) -> "tuple[Mapping[str, np.ndarray], np.ndarray]":
-        plan = self.prepare(case)
-        scans, numbers = plan.axes.k.size, len(self.measured)
-        plots = drawn(plan, i, 1).reshape(scans, plan.shape[1], -1)[..., 0]
-        z = np.where(plots[:, :1] > 0.5, plots[:, 1 : 1 + numbers], np.nan)
-        named = dict(zip((one.column for one in self.measured), z.T, strict=True))
-        known = plan.known.reshape(scans, -1)[:, 1 : 1 + len(self.known_columns)]
-        return named | dict(zip(self.known_columns, known.T, strict=True)), plots[:, 1 + numbers :]
+    def drawing(self, case: "Case") -> Draw:
+        return self._drawing(self.prepare(case))
+
+    def _drawing(self, plan: Plan) -> Draw:
+        from radarsim.kernels.lanes import WIDTH
+
+        scans, rows, numbers = plan.axes.k.size, plan.shape[1], len(self.measured)
+        known = plan.known.reshape(scans, -1)[:, 1 : 1 + len(self.known_columns)].T
+        size = max(1, ROOM // (scans * rows))
+
+        def draw(first: int, count: int) -> Drawn:
+            groups = -(-count // WIDTH)
+            plots = np.empty((rows, scans, groups, WIDTH))
+            for done in range(0, groups, size):
+                some = min(size, groups - done)
+                made = drawn(plan, first + done * WIDTH, some).reshape(some, scans, rows, WIDTH)
+                plots[:, :, done : done + some] = made.transpose(2, 1, 0, 3)
+            plots[1 : 1 + numbers, plots[0] < 0.5] = np.nan
+            each = plots.reshape(rows, scans, -1)[..., :count].swapaxes(1, 2)
+            columns = dict(zip((one.column for one in self.measured), each[1:], strict=False))
+            columns |= {
+                n: np.broadcast_to(one, each[0].shape) for n, one in zip(self.known_columns, known, strict=True)
+            }
+            truth = each[1 + numbers :].transpose(1, 2, 0)
+            return Drawn(plan.axes.t_s, columns, plan.axes.components, truth, first=first)
+
+        return draw
 
     def tracker(self, case: "Case") -> "Tracker":
         with of_study(self.name):

@@ -136,8 +136,8 @@ def test_the_kernel_is_the_textbooks_filter_over_its_own_plots(n, D, probability
     case = case_of(study, FILTERS, probability=probability)
     plan = study.prepare(case)
     for i in (0, 700, 4099):
-        columns, truth = study.realisation(case, i)
-        z = np.stack([columns[f"z{d}_m"] for d in range(D)], axis=1)
+        made = study.drawing(case)(i, 1)
+        z, truth = np.stack([made.columns[f"z{d}_m"][0] for d in range(D)], axis=1), made.truth[0]
         assert np.isnan(z).any() == (probability < 1)
         sums = plan.layout.unpack(study.simulate(plan, i, 1))
         error = sums["error"]

@@ -26,13 +26,12 @@ from radarsim.kernels.algebra import (
     predicted,
     predicted_covariance,
 )
-from radarsim.kernels.lanes import WIDTH
 from radarsim.studies.ambiguous_doppler import filters
 from radarsim.studies.ambiguous_doppler.config import joint_span
-from radarsim.studies.ambiguous_doppler.kernels import records, sums
+from radarsim.studies.ambiguous_doppler.kernels import sums
 from radarsim.studies.ambiguous_doppler.kernels.steps import remainder
 from radarsim.studies.ambiguous_doppler.study import COMPONENTS, prepare
-from radarsim.studies.interface import BIAS, RecordedPlots, true_column
+from radarsim.studies.interface import BIAS, Draw, Drawn, RecordedPlots
 
 # ---- followers -------------------------------------------------------------------------------------------------------
 LEAST = 1e-150  # probability of an order: none is ruled out for good
@@ -455,20 +454,16 @@ UNFOLDS, UNFOLDS_WAVELENGTH_M = "ambiguous_rls2", 0.15  # a shipped config for f
 LEAST_SIGMA, LEAST_MANOEUVRE = 1e-4, 1e-6  # of the stated values, which count as zero
 
 
-def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
-    """The plots of one realisation, velocity folded, not-a-number where missed; and the truth; columns (K,)."""
+def drawing(case: Case) -> Draw:
+    """The plots of realisations of a case, velocity folded."""
     plan = prepare(case)
-    first = realisation - realisation % WIDTH
-    plots, _ = sums.simulated(plan.world, plan.banks, first)
-    own = plots[:, :, realisation - first]
-    detected = own[:, records.DETECTED] > 0
-    measured = {
-        "t_s": plan.axes.t_s,
-        "range_m": np.where(detected, own[:, records.RANGE], np.nan),
-        "velocity_mps": np.where(detected, own[:, records.VELOCITY], np.nan),
-    }
-    truth = own[:, records.TRUTH : records.TRUTH + 3]
-    return measured | dict(zip((true_column(*one) for one in COMPONENTS), truth.T, strict=True))
+
+    def draw(first: int, count: int) -> Drawn:
+        plots, truth = sums.drawn_plots(plan.world, first, count)
+        columns = {name: plots[..., i] for i, (name, _) in enumerate(MEASURED)}
+        return Drawn(plan.axes.t_s, columns, COMPONENTS, truth, first=first)
+
+    return draw
 
 
 class Tracker:
@@ -596,7 +591,7 @@ class Recorded(RecordedPlots):
 
     rows_asked = 100
     from_any_origin = True
-    simulated, tracker = staticmethod(simulated), staticmethod(Tracker)
+    drawing, tracker = staticmethod(drawing), staticmethod(Tracker)
 
     def columns(self, spec: Any) -> Sequence[Sequence[str]]:
         return ((*COLUMNS, SPAN), COLUMNS)

@@ -8,16 +8,15 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
-from radarsim.kernels import random
 from radarsim.kernels.lanes import WIDTH, rows
-from radarsim.studies.interface import OUTLIERS, RecordedPlots, true_column
+from radarsim.studies.interface import OUTLIERS, Draw, Drawn, RecordedPlots
 from radarsim.studies.multimodel import world
 from radarsim.studies.multimodel.config import Filter, Keys, Sensor
 from radarsim.studies.multimodel.kernels import records as rec
 from radarsim.studies.multimodel.kernels import strip as strips
 from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
-from radarsim.studies.multimodel.kernels.strip import NORMALS, STRIP
-from radarsim.studies.multimodel.study import COMPONENTS, banks, measured, prepare
+from radarsim.studies.multimodel.kernels.strip import STRIP
+from radarsim.studies.multimodel.study import COMPONENTS, banks, prepare
 from radarsim.studies.multimodel.world import intervals, local_plots, sensor_frame
 from radarsim.studies.multimodel.world import truth as scan_times
 
@@ -40,32 +39,28 @@ def sigmas(spec: Keys) -> dict[str, tuple[str, ...]]:
     return {"plot": tuple(f"sensor.{name}" for name in names)}
 
 
-def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
-    """The plots of one realisation of the study and the truth, columns (K,); not-a-number where a plot is missed."""
-    plan = prepare(case)
-    truth, frame, count = plan.world.plot_truth, plan.world.frame, len(plan.world.truth)
-    noise = normals(plan.world.keys[0], realisation, count) * frame[rec.SIGMA : rec.SIGMA + 3]
-    if case.spec.sensor.sigma_range_m is None:
-        exact = truth[:, rec.COORDINATES :]
-    else:
-        exact = np.stack([truth[:, rec.RANGE], *np.arcsin(truth[:, [rec.ELEVATION, rec.AZIMUTH]]).T], axis=1)
-    detected = measured(plan, realisation)[2][:, 0] > 0
-    t, *names = columns(case.spec)[0]
-    found = np.where(detected[:, None], exact + noise, np.nan)
-    made = {t: scan_times(case)[0]} | dict(zip(names, found.T, strict=True))
-    if case.spec.sensor.sigma_range_m is not None:
-        made |= {f"true_{name}": exact[:, i] for i, name in enumerate(names)}
-    return made | {true_column(*component): plan.world.truth[:, i] for i, component in enumerate(COMPONENTS)}
+def drawing(case: Case) -> Draw:
+    """The plots of realisations of a case."""
+    world, scans, biconical = prepare(case).world, scan_times(case)[0], case.spec.sensor.sigma_range_m is not None
+    truth, sigma = world.plot_truth, world.frame[rec.SIGMA : rec.SIGMA + 3]
+    exact = truth[:, rec.COORDINATES :].T
+    if biconical:
+        exact = np.stack([truth[:, rec.RANGE], *np.arcsin(truth[:, [rec.ELEVATION, rec.AZIMUTH]]).T])
+    names = columns(case.spec)[0][1:]
 
+    def draw(first: int, count: int) -> Drawn:
+        plots = np.empty((3, count, len(scans)))
+        room = rows(strips.RANDOM), rows(STRIP * rec.PLOT)
+        strips.fill_noise(world.keys, world.frame, truth, rec.START, first, *room, plots)
+        for plot, true, one in zip(plots, exact, sigma, strict=True):
+            plot *= one
+            plot += true
+        same = np.broadcast_to(exact[:, None], plots.shape) if biconical else ()
+        true_plots = {f"true_{name}": column for name, column in zip(names, same, strict=False)}
+        state = np.broadcast_to(world.truth, (count, *world.truth.shape))
+        return Drawn(scans, dict(zip(names, plots, strict=True)), COMPONENTS, state, true_plots, first)
 
-def normals(key: np.ndarray, realisation: int, count: int) -> np.ndarray:
-    """The three normals of each scan (count, 3) of a realisation, in the layout of `kernels.strip`."""
-    half = NORMALS // 2
-    drawn = np.empty((-(-count // STRIP), NORMALS))
-    for strip, row in enumerate(drawn):
-        for j in range(half):
-            random.fill_normal_pairs(key, realisation, strip * half + j, row[j : j + 1], row[half + j : half + j + 1])
-    return drawn.reshape(-1, 3)[:count]
+    return draw
 
 
 class _State(NamedTuple):
@@ -261,7 +256,7 @@ class Recorded(RecordedPlots):
     rows_asked = 600
 
     columns, sigmas = staticmethod(columns), staticmethod(sigmas)
-    simulated, tracker = staticmethod(simulated), staticmethod(Tracker)
+    drawing, tracker = staticmethod(drawing), staticmethod(Tracker)
 
     def scan_period_s(self, spec: Keys) -> float:
         return spec.sensor.scan_period_s

@@ -15,7 +15,7 @@ from radarsim.kernels import linear
 from radarsim.kernels.algebra import pack, unpack
 from radarsim.kernels.hypotheses import lasting, log_likelihood
 from radarsim.physics import transition
-from radarsim.studies.interface import EXPLANATIONS, RecordedPlots, Turning, true_column
+from radarsim.studies.interface import EXPLANATIONS, Draw, Drawn, RecordedPlots, Turning
 from radarsim.studies.range_doppler.config import MOST_SCANS, Filter, FilterKeys, Keys, Turn, variance_of
 from radarsim.studies.range_doppler.filters import least_squares, noise_by_time, observation
 from radarsim.studies.range_doppler.given import GivenGains, Scans, followed
@@ -37,15 +37,21 @@ SIGMAS: dict[str, tuple[str, ...]] = {
 }
 
 
-def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
-    """The plots of one realisation of the study and the truth, columns (K,)."""
+def drawing(case: Case) -> Draw:
+    """The plots of realisations of a case."""
     plan = prepare(case)
-    if isinstance(plan.problem, missed.Problem):
-        plots, truth = missed.simulate_plots(plan.problem, realisation)
-    else:
-        (plots,), truth = linear.simulate_plots(plan.problem, realisation, 1), plan.problem.truth
-    measured = {"t_s": plan.axes.t_s, "range_m": plots[:, 0], "velocity_mps": plots[:, 1]}
-    return measured | dict(zip((true_column(*one) for one in COMPONENTS), truth.T, strict=True))
+    problem = plan.problem
+
+    def draw(first: int, count: int) -> Drawn:
+        if isinstance(problem, missed.Problem):
+            plots, truth = missed.simulate_plots(problem, first, count)
+        else:
+            plots = linear.simulate_plots(problem, first, count)
+            truth = np.broadcast_to(problem.truth, (count, *problem.truth.shape))
+        columns = {name: plots[..., i] for i, (name, _) in enumerate(MEASURED)}
+        return Drawn(plan.axes.t_s, columns, COMPONENTS, truth, first=first)
+
+    return draw
 
 
 def variances_of(case: Case) -> Sequence[float]:
@@ -307,7 +313,7 @@ class _Problem(NamedTuple):
 class Recorded(RecordedPlots):
     """The study's part in `radarsim track` and `radarsim simulate`."""
 
-    simulated, tracker = staticmethod(simulated), staticmethod(Tracker)
+    drawing, tracker = staticmethod(drawing), staticmethod(Tracker)
 
     def likelihood(
         self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]

@@ -25,6 +25,7 @@ from radarsim.studies.sonar.scene import Scene, build_scene, filter_specs, third
 from radarsim.studies.sonar.world import GivenPlotsAxes, conversion_bias, step_correlations
 
 BLOCK = 4096
+AT_ONCE = 4096  # realisations whose plots of a scan are drawn by one call
 FRAMES = ("polar", "cartesian", "cartesian_unbiased")
 THIRD = {"depth": ("d", "m"), "elevation": ("e", "rad")}
 
@@ -74,20 +75,42 @@ def designs(
 
 
 def drawn_plots(
-    world: kernels.World, detections: pattern_kernels.Detections, realisation: int
+    world: kernels.World, detections: pattern_kernels.Detections, first: int, count: int, what: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Plot, error, and deviation of value and rate (K, C, 4) of one realisation; whether each scan gives a plot (K,).
+    """Plots of realisations first … first + count - 1 (C, count, K), or their errors (what = 1), not-a-number where a
+    scan gives none; and the deviation of the target's value and rate (C, 2, count, K), or (C, 2, 1, 1) where none moves
+    at random.
 
     C is the world's padded number of coordinates.
     """
     K, C = world.fresh.shape
-    plots, detected = np.zeros((C, 4, 1)), np.empty(1)
-    drawn, there = np.empty((K, C, 4)), np.empty(K, dtype=bool)
-    for k in range(K):
-        kernels.move_and_measure(world, realisation, k, plots)
-        pattern_kernels.detect(detections, realisation, k, detected)
-        drawn[k], there[k] = plots[..., 0], detected[0] > 0
-    return drawn, there
+    size, several = min(count, AT_ONCE), world.walk.any()
+    plots, deviation = np.empty((C, K, count)), np.zeros((C, 2, K, count) if several else (C, 2, 1, 1))
+    for done in range(0, count, size):
+        n = min(size, count - done)
+        room, detected = np.zeros((C, 4, n)), np.empty(n)
+        for k in range(K):
+            kernels.move_and_measure(world, first + done, k, room)
+            plots[:, k, done : done + n] = room[:, what]
+            if detections.certain[k] <= 0:
+                pattern_kernels.detect(detections, first + done, k, detected)
+                plots[:, k, done : done + n][:, detected == 0] = np.nan
+            if several:
+                deviation[:, :, k, done : done + n] = room[:, 2:]
+    return plots.swapaxes(1, 2), deviation.swapaxes(2, 3)
+
+
+def truth_of(scene: Scene, deviation: np.ndarray, count: int, size: int) -> np.ndarray:
+    """True states (count, K, C size), size components of each coordinate, of realisations with a deviation from
+    `drawn_plots`; a view that cannot be written where all have the same."""
+    K, C, _ = scene.truth.shape
+    true = scene.truth[..., :size].reshape(K, -1)
+    if deviation.shape[-1] == 1:
+        return np.broadcast_to(true, (count, K, C * size))
+    made = np.empty((C * size, K, count))
+    made[:] = true.T[..., None]
+    made.reshape(C, size, K, count)[:, :2] += deviation[:C].swapaxes(2, 3)
+    return made.transpose(2, 1, 0)
 
 
 # ---- labels -------------------------------------------------------------------------------------------------------

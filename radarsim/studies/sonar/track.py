@@ -11,7 +11,7 @@ from radarsim.engine.results import Track
 from radarsim.kernels.hypotheses import log_likelihood
 from radarsim.physics import manoeuvre_covariance, transition
 from radarsim.studies import interface
-from radarsim.studies.interface import OUTLIERS, RecordedPlots, true_column
+from radarsim.studies.interface import OUTLIERS, Draw, Drawn, RecordedPlots
 from radarsim.studies.sonar import filters, world
 from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.config import Keys
@@ -45,27 +45,25 @@ def sigmas(spec: Keys) -> dict[str, tuple[str, ...]]:
     return keys | ({THIRD[third][0]: (THIRD[third][1],)} if third else {})
 
 
-def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
-    """The plots of one realisation of the study and the truth, columns (K,).
-
-    NaN where a plot is missed, or where a further sonar does not measure the coordinate.
-    """
+def drawing(case: Case) -> Draw:
+    """The plots of realisations of a case; not-a-number too where a further sonar does not measure the coordinate."""
     spec, scene = case.spec, build_scene(case)
-    K, C = scene.sigma.shape
-    drawn, there = base.drawn_plots(base.world(case, scene), base.detections(case, scene), realisation)
-    drawn = drawn[:, :C]
-    truth = scene.truth.copy()
-    truth[..., :2] += drawn[..., 2:]
-    if spec.frame == "polar":
-        values, exact = drawn[..., 0], truth[..., 0]
-    else:
-        values, exact = scene.polar[..., 0] + drawn[..., 1], scene.polar[..., 0]
-    measured_there = there[:, None] & np.isfinite(scene.sigma)
-    t, *names = columns(spec)[0]
-    made = {t: scene.t} | dict(zip(names, np.where(measured_there, values, np.nan).T, strict=True))
-    made |= {f"true_{name}": exact[:, c] for c, name in enumerate(names)}
-    components = zip(base.labels(spec, 3), truth.reshape(K, -1).T, strict=True)
-    return made | {true_column(name, unit): state for (name, unit), state in components}
+    world, detections, polar = base.world(case, scene), base.detections(case, scene), spec.frame == "polar"
+    names = columns(spec)[0][1:]
+
+    def draw(first: int, count: int) -> Drawn:
+        plots, deviation = base.drawn_plots(world, detections, first, count, what=0 if polar else 1)
+        plots, truth = plots[: len(names)], base.truth_of(scene, deviation, count, 3)
+        if polar:
+            exact = [truth[..., 3 * c] for c in range(len(names))]
+        else:
+            exact = [np.broadcast_to(true, plots.shape[1:]) for true in scene.polar[..., 0].T]
+            plots += scene.polar[..., 0].T[:, None]
+        plots.swapaxes(1, 2)[~np.isfinite(scene.sigma.T)] = np.nan
+        true_plots = {f"true_{name}": column for name, column in zip(names, exact, strict=True)}
+        return Drawn(scene.t, dict(zip(names, plots, strict=True)), base.labels(spec, 3), truth, true_plots, first)
+
+    return draw
 
 
 class Derived(NamedTuple):
@@ -383,9 +381,9 @@ class Recorded(RecordedPlots):
     def scan_period_s(self, spec: Keys) -> float:
         return spec.sensor.scan_period_s
 
-    def simulated(self, case: Case, realisation: int) -> Mapping[str, np.ndarray]:
-        made: Mapping[str, np.ndarray] = self.file(case.spec).simulated(case, realisation)
-        return made
+    def drawing(self, case: Case) -> Draw:
+        draw: Draw = self.file(case.spec).drawing(case)
+        return draw
 
     def tracker(self, case: Case) -> interface.Tracker:
         tracker: interface.Tracker = self.file(case.spec).Tracker(case)

@@ -124,7 +124,7 @@ def test_track_over_simulated_plots_is_the_study(keys):
     case = load("ambiguous_rls4", [*keys, "filters.2.hypotheses=2"]).cases[0]
     plan = study.prepare(case)
     plots, out = study.sums.simulated(plan.world, plan.banks, 8)
-    columns = track.simulated(case, 11)
+    columns = track.Recorded().simulated(case, 11)
     seen = ~np.isnan(columns["range_m"])
     assert np.array_equal(columns["range_m"][seen], plots[seen, 0, 3])
     assert (np.abs(columns["velocity_mps"][seen]) <= plan.world.spans[seen] / 2).all()
@@ -200,7 +200,7 @@ def test_a_remainder_is_followed_as_the_study_does():
     case = load("ambiguous_rls4", [*keys, f"filters=[{one}]"]).cases[0]
     plan = study.prepare(case)
     _, out = study.sums.simulated(plan.world, plan.banks, 8)
-    made = track.Tracker(case).feed(track.simulated(case, 11))
+    made = track.Tracker(case).feed(track.Recorded().simulated(case, 11))
     there = np.isfinite(made.estimate[0, :, 0])
     assert there.sum() > 8
     assert np.abs((made.estimate[0] - out[0, :, :3, 3])[there] / [1e5, 1e3, 10]).max() < 1e-7
@@ -303,7 +303,9 @@ def test_plots_as_stated_are_found_so_while_folds_are_undecided(name):
     case = load("ambiguous_rls2", ["scans=30"]).cases[0]
     tested = []
     for realisation in range(12):
-        columns = {key: column for key, column in track.simulated(case, realisation).items() if "true" not in key}
+        columns = {
+            key: column for key, column in track.Recorded().simulated(case, realisation).items() if "true" not in key
+        }
         made = track.Tracker(case).feed(columns)
         assert "oracle" not in made.filters  # a recording has no true folds
         tested.append(made.nis[made.filters.index(name), 1:, 0])

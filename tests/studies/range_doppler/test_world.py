@@ -110,7 +110,7 @@ def test_each_realisation_is_that_of_a_textbook_filter(changes):
     Q[:, *np.triu_indices(3)] = problem.Q
     Q = Q + np.triu(Q[0], 1).T
     for realisation in (1, 1030):
-        plots, truth = missed.simulate_plots(problem, realisation)
+        (plots,), (truth,) = missed.simulate_plots(problem, realisation, 1)
         sums = sums_of(plan, 1, realisation)
         for f, observes in enumerate(problem.observes):
             x, P = textbook(plots, observes, problem.start[f], Q[f], dt)
@@ -375,7 +375,7 @@ def test_a_drawn_flight_begins_elsewhere_and_flies_the_same_accelerations(kind):
             position, velocity = np.array([-along, FLY_BY["distance_m"]]), np.array([FLY_BY["speed_mps"], 0.0])
             rate, begin = 0.0, 0.0
         position, velocity, middle = position + shift[:2], velocity + shift[3:5], velocity
-        _, truth = missed.simulate_plots(problem, realisation)
+        _, (truth,) = missed.simulate_plots(problem, realisation, 1)
         step = 0.02
         for k, (r, radial, _) in enumerate(truth):
             np.testing.assert_allclose(np.hypot(*position), r, rtol=0, atol=0.02)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels.compile import inline, kernel, part
+from radarsim.kernels.compile import aligned_zeros, inline, kernel, part
 from radarsim.kernels.hypotheses import Lists
 from radarsim.kernels.lanes import WIDTH, address, exponential, full, get, put, row, rows, total, where_greater
 from radarsim.kernels.random import add_drawn, add_weight, part_of
@@ -184,6 +184,35 @@ def fill_outputs(world, banks, memory, first):
     fill_normals(world, first, memory.normals)
     put_plots(world, first, memory.normals, memory.plots)
     run_filters(world, banks, memory, True)
+
+
+@kernel
+def fill_drawn(world, normals, plots, first, measured, truth):
+    """`drawn_plots` into measured (2, K, n) and truth (3, K, n or 0), n whole eights; normals, plots: work arrays."""
+    scans, groups = measured.shape[1], measured.shape[2] // WIDTH
+    for g in range(groups):
+        fill_normals(world, first + g * WIDTH, normals)
+        put_plots(world, first + g * WIDTH, normals, plots)
+        for k in range(scans):
+            scan = row(address(plots), k * rec.PLOT)
+            detected, half = get(scan, rec.DETECTED), full(0.5)
+            for m in range(2):  # RANGE, VELOCITY
+                value = where_greater(detected, half, get(scan, m), full(np.nan))
+                put(address(measured), (m * scans + k) * groups + g, value)
+            if truth.shape[2] > 0:
+                for c in range(3):
+                    put(address(truth), (c * scans + k) * groups + g, get(scan, rec.TRUTH + c))
+
+
+def drawn_plots(world: World, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Range and folded velocity (count, K, 2) of realisations first …, not-a-number where missed, and the truth (count,
+    K, 3), a view that cannot be written where all have the same."""
+    scans, eights, several = len(world.t), -(-count // WIDTH) * WIDTH, world.spread.any()
+    measured, truth = aligned_zeros(2, scans, eights), aligned_zeros(3, scans, eights if several else 0)
+    single = world._replace(joint=np.zeros_like(world.joint))  # no velocity is unfolded from that of the scan before
+    fill_drawn(single, rows(2 + 2 * scans), rows(scans * rec.PLOT), first, measured, truth)
+    same = np.broadcast_to(world.truth, (count, scans, 3))
+    return measured.transpose(2, 1, 0)[:count], truth.transpose(2, 1, 0)[:count] if several else same
 
 
 def simulate_block(world: World, banks: Banks, sums: Sums, first: int, count: int) -> None:

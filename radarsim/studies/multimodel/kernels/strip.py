@@ -228,6 +228,23 @@ def fill_plots(keys, frame, truth, certain, first, random, plots):
         make_plots(address(random), address(frame), address(truth), k, min(STRIP, scans - k), certain, to)
 
 
+@kernel
+def fill_noise(keys, frame, truth, certain, first, random, plots, noise):
+    """Unit normals of the plots' numbers into noise (3, n, K), of realisations from `first` on; not-a-number where a
+    plot is missed. random, plots: RANDOM rows, and PLOT rows for each scan of a strip."""
+    scans, count = noise.shape[2], noise.shape[1]
+    for g in range(0, count, WIDTH):
+        for k in range(0, scans, STRIP):
+            draw_strip(keys, first + g, k // STRIP, random)
+            length = min(STRIP, scans - k)
+            make_plots(address(random), address(frame), address(truth), k, length, certain, address(plots))
+            for lane in range(min(WIDTH, count - g)):
+                for n in range(length):
+                    missed = plots[(n * rec.PLOT + rec.DETECTED) * WIDTH + lane] < 0.5
+                    for m in range(3):
+                        noise[m, g + lane, k + n] = np.nan if missed else random[(3 * n + m) * WIDTH + lane]
+
+
 # ---- strip -----------------------------------------------------------------------------------------------------------
 class Scans(NamedTuple):
     """The scans first … stop - 1 of a strip."""

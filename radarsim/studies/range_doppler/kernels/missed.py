@@ -146,22 +146,28 @@ def add_block(made, first, count, problem, found):
 
 
 @kernel
-def fill_simulated(made, first, problem, plots, detected, truth):
-    """Realisation `first`: plots (K, 2), detected (K,) 1 where there is one, truth (K, 3); made: work arrays."""
-    spread = problem.sigma_bias, problem.sigma_flight
-    drawn, at = begin_chunk(problem.keys, first, made, problem.bias, *spread), steps.places(made)
-    next_word = np.empty(steps.CHUNK, np.uint64)
-    for k in range(plots.shape[0]):
-        if drawn and problem.flight.shape[0] > 0:
-            steps.displace(made, problem.flight[k], problem.truth[k], k * problem.dt)
-        fill_plots(problem.keys[0], first, k, problem.truth[k], problem.sigma, next_word, made.plots[0], made.plots[1])
-        steps.displace_plots(at)
-        if problem.detection < 1.0 and k % 2 == 0:
-            fill_uniform_pairs(problem.keys[1], first, k // 2, made.detected, made.other)
-        steps.count_plots(at, k, problem.detection, steps.CHUNK)
-        plots[k, 0], plots[k, 1], detected[k] = made.plots[0, 0], made.plots[1, 0], made.detected[0]
-        for c in range(3):
-            truth[k, c] = problem.truth[k, c] + made.state[c, 0]
+def fill_simulated(made, first, problem, plots, displacement):
+    """`simulate_plots` into plots (2, K, n); displacement (3, K, n or 0) of the truth; made: work arrays."""
+    keys, truth, sigma, bias, sigma_bias, sigma_flight, flight, detection, dt = problem[:9]
+    at, next_word = steps.places(made), np.empty(steps.CHUNK, np.uint64)
+    for done in range(0, plots.shape[2], steps.CHUNK):
+        n = min(steps.CHUNK, plots.shape[2] - done)
+        drawn = begin_chunk(keys, first + done, made, bias, sigma_bias, sigma_flight)
+        displaced = drawn or np.any(bias != 0.0)
+        for k in range(plots.shape[1]):
+            if drawn and flight.shape[0] > 0:
+                steps.displace(made, flight[k], truth[k], k * dt)
+            fill_plots(keys[0], first + done, k, truth[k], sigma, next_word, made.plots[0], made.plots[1])
+            if displaced:
+                steps.displace_plots(at)
+            if detection < 1.0 and k % 2 == 0:
+                fill_uniform_pairs(keys[1], first + done, k // 2, made.detected, made.other)
+            steps.count_plots(at, k, detection, n)
+            for m in range(2):
+                for i in range(n):
+                    plots[m, k, done + i] = made.plots[m, i] if made.detected[i] > 0.0 else np.nan
+            if displacement.shape[2] > 0:
+                displacement[:, k, done : done + n] = made.state[:, :n]
 
 
 def add_found(found: np.ndarray, baseline: int, sums: Sums) -> None:
@@ -191,9 +197,14 @@ def simulate_block(problem: Problem, first: int, count: int, sums: Sums) -> None
     add_found(found, problem.baseline, sums)
 
 
-def simulate_plots(problem: Problem, realisation: int) -> tuple[np.ndarray, np.ndarray]:
-    """A realisation's plots (K, 2) as `simulate_block` draws them, not-a-number where missed, and its truth (K, 3)."""
+def simulate_plots(problem: Problem, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The plots (count, K, 2) that `simulate_block` draws for realisations first … first + count - 1, not-a-number
+    where missed, and the truth (count, K, 3), a view that cannot be written where all have the same."""
     problem, scans = problem.plain(), len(problem.truth)
-    plots, detected, truth = np.empty((scans, 2)), np.empty(scans), np.empty((scans, 3))
-    fill_simulated(steps.work(len(problem.observes)), int(realisation), problem, plots, detected, truth)
-    return np.where(detected[:, None] == 1, plots, np.nan), truth
+    several = len(problem.flight) > 0 and problem.sigma_flight.any()
+    plots, displacement = np.empty((2, scans, count)), np.empty((3, scans, count if several else 0))
+    fill_simulated(steps.work(1), int(first), problem, plots, displacement)
+    if several:
+        displacement += problem.truth.T[:, :, None]
+        return plots.transpose(2, 1, 0), displacement.transpose(2, 1, 0)
+    return plots.transpose(2, 1, 0), np.broadcast_to(problem.truth, (count, scans, 3))

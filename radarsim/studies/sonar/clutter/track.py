@@ -14,6 +14,7 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
 from radarsim.errors import ConfigError
+from radarsim.studies.interface import Draw, Drawn
 from radarsim.studies.noise import noise_key
 from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.clutter import filters
@@ -200,39 +201,45 @@ def target_plots(
     world: sonar_kernels.World, detections: pattern_kernels.Detections, realisation: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Plots (K, 2) of the target in one realisation, NaN where missed, and its true positions (K, 2)."""
-    drawn, there = base.drawn_plots(world, detections, realisation)
-    return np.where(there[:, None], drawn[..., 0], np.nan), world.truth[..., 0] + drawn[..., 2]
+    plots, deviation = base.drawn_plots(world, detections, realisation, 1)
+    return plots[:, 0].T, world.truth[..., 0] + deviation[:, 0, 0].T
+
+
+def all_plots(field: kernels.Field, first: int, own: np.ndarray, scan: int = 0) -> np.ndarray:
+    """All plots (3, n, K, M) of realisations from `first` on and scans from `scan` on, as `kernels.fill_scans` orders
+    them; own (2, n, K) the target's, NaN where there is none."""
+    cells, there = field.cells, np.isfinite(own[0])
+    expected = cells.density * cells.dq * cells.nq * cells.db * cells.nb
+    room, most = 0, int(expected + 6 * np.sqrt(expected) + 5)
+    while most > room:
+        room, made = most, np.empty((*there.shape, 3, most))
+        most = kernels.fill_scans(field, first, scan, own, there, made)
+    return made[..., : max(most, 1)].transpose(2, 0, 1, 3)
 
 
 def false_plots(field: kernels.Field, realisation: int, scan: int) -> np.ndarray:
     """All false plots (2, n) of a scan, range and bearing."""
-    cells = field.cells
-    if cells.density == 0:
-        return np.zeros((2, 0))
-    room = np.empty((2, int(20 + 2 * cells.density * cells.dq * cells.nq * cells.db * cells.nb)))
-    n = kernels.whole_field(field, realisation, scan, *room)
-    while n > room.shape[1]:
-        room = np.empty((2, n))
-        n = kernels.whole_field(field, realisation, scan, *room)
-    return room[:, :n]
+    plots = all_plots(field, realisation, np.full((2, 1, 1), np.nan), scan)[:2, 0, 0]
+    return plots[:, np.isfinite(plots[0])]
 
 
-def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
-    """All plots of one realisation in the sector, in order of time and bearing, as the columns of a file of plots.
+def drawing(case: Case) -> Draw:
+    """All plots in the sector of realisations of a case, those of a scan in order of bearing.
 
-    true_target is 1 for the target's plots and 0 for false ones; true_range_m and true_bearing_rad are the target's. A
-    scan without plots has one row without values.
+    true_target is 1 for the target's plots and 0 for false ones; true_range_m and true_bearing_rad are the target's.
     """
     spec, scene = case.spec, build_scene(case)
     field = filters.field(noise_key(case, "false"), spec.sensor.sector, filters.conditions(spec))
-    z, true = target_plots(base.world(case, scene), detected_plots(case, scene), realisation)
-    rows: list[tuple[float, ...]] = []
-    for k, t in enumerate(scene.t):
-        own = [(z[k, 0], z[k, 1], 1.0)] if np.isfinite(z[k, 0]) else []
-        plots = [*own, *((r, b, 0.0) for r, b in false_plots(field, realisation, k).T)] or [(np.nan, np.nan, np.nan)]
-        rows += [(t, r, b, is_target, *true[k]) for r, b, is_target in sorted(plots, key=lambda plot: plot[1])]
-    names = ("t_s", "range_m", "bearing_rad", "true_target", "true_range_m", "true_bearing_rad")
-    return dict(zip(names, np.array(rows).T, strict=True))
+    world, detections = base.world(case, scene), detected_plots(case, scene)
+
+    def draw(first: int, count: int) -> Drawn:
+        own, deviation = base.drawn_plots(world, detections, first, count)
+        r, b, target = all_plots(field, first, own)
+        truth = base.truth_of(scene, deviation, count, SIZE)
+        beside = {"true_target": target, "true_range_m": truth[..., 0], "true_bearing_rad": truth[..., SIZE]}
+        return Drawn(scene.t, {"range_m": r, "bearing_rad": b}, base.labels(spec, SIZE), truth, beside, first)
+
+    return draw
 
 
 class Tracker:

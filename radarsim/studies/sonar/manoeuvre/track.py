@@ -7,7 +7,7 @@ from radarsim.studies.sonar.filters import FilterSpec
 from radarsim.studies.sonar.manoeuvre import study
 from radarsim.studies.sonar.manoeuvre.exact import QUANTITIES
 
-simulated = base.simulated
+drawing = base.drawing
 
 
 class Tracker(base.Tracker):

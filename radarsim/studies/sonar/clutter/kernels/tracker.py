@@ -790,21 +790,42 @@ def even_places(key, field, first, n, z):
         z[1, i] = b0 + db * nb * v
 
 
+@part
+def insert(plot, total, into):
+    """Put a plot (r, b, whether it is the target's) among `total` in order of bearing, into (3, M) if there is room."""
+    if total < into.shape[1]:
+        at = total
+        while at > 0 and into[1, at - 1] > plot[1]:
+            into[0, at], into[1, at], into[2, at] = into[0, at - 1], into[1, at - 1], into[2, at - 1]
+            at -= 1
+        into[0, at], into[1, at], into[2, at] = plot
+    return total + 1
+
+
 @kernel
-def whole_field(field, realisation, scan, r, b):
-    """Write all false plots of a scan to r and b (n,); returns how many there are, even if more than fit."""
-    total, k0, k1, share = 0, field.key[0], field.key[1], address(field.share)
-    q0, dq, nq, b0, db, nb, _, _ = field.cells
-    for cell in range(nq * nb):
-        i, j, number = cell // nb, cell % nb, scan * (nq * nb) + cell
-        u, spare = cell_words(k0, k1, realisation, number, 0)
-        for n in range(number_in(share, uniform(u))):
-            u_q, u_b, spare = place_in(k0, k1, realisation, number, n, spare)
-            if total < r.size:
-                r[total] = math.sqrt(2.0 * (q0 + dq * (i + u_q)))
-                b[total] = b0 + db * (j + u_b)
-            total += 1
-    return total
+def fill_scans(field, first, scan, own, there, plots):
+    """All plots of n realisations from `first` on and K scans from `scan` on, into plots (n, K, 3, M): range, bearing
+    and 1 of the target's, 0 of others, in order of bearing; the rest is not-a-number.
+
+    own (2, n, K) the target's, where `there` (n, K). Returns the most plots of a scan, even if more than fit.
+    """
+    k0, k1, share, most = field.key[0], field.key[1], address(field.share), 0
+    q0, dq, nq, b0, db, nb, _, density = field.cells
+    for i in range(there.shape[0]):
+        for k in range(there.shape[1]):
+            into, total = plots[i, k], 0
+            if there[i, k]:
+                total = insert((own[0, i, k], own[1, i, k], 1.0), total, into)
+            for cell in range(nq * nb if density > 0.0 else 0):  # bearing by bearing, so that little is out of order
+                a, j = cell % nq, cell // nq
+                number = (scan + k) * (nq * nb) + a * nb + j
+                u, spare = cell_words(k0, k1, first + i, number, 0)
+                for n in range(number_in(share, uniform(u))):
+                    u_q, u_b, spare = place_in(k0, k1, first + i, number, n, spare)
+                    total = insert((math.sqrt(2.0 * (q0 + dq * (a + u_q))), b0 + db * (j + u_b), 0.0), total, into)
+            most = max(most, total)
+            into[:, total:] = np.nan
+    return most
 
 
 # ---- tracker ---------------------------------------------------------------------------------------------------------
