@@ -174,7 +174,18 @@ class Wanted(NamedTuple):
 
 def tailed(work: CaseWork, of: Quantity) -> "Table | None":
     """The table of a case's curves where rare large errors may decide a quantity; None where they do not."""
-    return study(work.case.study).curves if of.squares and not work.plan.gaussian else None
+    if not of.squares or (work.plan.gaussian and not work.case.outside):
+        return None
+    return _with_outside(work.case, "curves", study(work.case.study).curves)
+
+
+def _with_outside(case: Case, name: str, table: "Table") -> "Table":
+    """A table of a study with the rows of filters from outside, where a case has such."""
+    if not case.outside:
+        return table
+    from radarsim.report import outside
+
+    return outside.beside(name, table)
 
 
 def table_of(case: Case, of: Quantity) -> "Table":
@@ -185,8 +196,12 @@ def table_of(case: Case, of: Quantity) -> "Table":
     if of == GAIN:
         from radarsim.app.result import gains_of
 
-        return gains_of(own)
-    return lambda results: tables.frame({}) if (made := own.table(of.table, results, of.value)) is None else made
+        return _with_outside(case, of.table, gains_of(own))
+
+    def table(results: Sequence[CaseResult]) -> Any:
+        return tables.frame({}) if (made := own.table(of.table, results, of.value)) is None else made
+
+    return _with_outside(case, of.table, table)
 
 
 def _collected(

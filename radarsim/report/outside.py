@@ -4,7 +4,7 @@ The study's own tables stay as they are; rows of these filters stand below. Thei
 config, each over the realisations in which both have an estimate.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.language import listed, tr
+from radarsim.language import listed, term, tr
 from radarsim.report import notes, panels, statistics, wording
 from radarsim.report import tables as common
 from radarsim.report.drawing import Figure
@@ -74,7 +74,11 @@ def failures(result: CaseResult) -> common.Columns:
     return common.of_rows(rows)
 
 
-REASONS = ("not_a_number", "no_estimate", "diverged")
+REASONS = {  # in the order of the sums
+    "not_a_number": term("not a number after an estimate:"),
+    "no_estimate": term("no estimate:"),
+    "diverged": term("over 100 times the largest error of the config's filters:"),
+}
 
 
 def consistency(result: CaseResult) -> common.Columns:
@@ -114,6 +118,21 @@ def added(made: Made, results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]
     return found
 
 
+def beside(name: str, table: "Callable[[Sequence[CaseResult]], pd.DataFrame]") -> Any:
+    """A table of the study, made from results, with the rows of filters from outside: curves or gains."""
+
+    def made(results: Sequence[CaseResult]) -> "pd.DataFrame":
+        with_own = [one for one in results if one.outside is not None]
+        rows = {
+            "curves": lambda: common.curves([one for result in with_own for one in others(result)]),
+            "gains": lambda: common.joined(map(gains, with_own), common.GAINS),
+        }
+        own = table(results)
+        return _below(own, rows[name]()) if name in rows else own
+
+    return made
+
+
 def without(made: Made, results: Sequence[CaseResult]) -> Made:
     """The tables without these rows, as the study made them."""
     own = {name for result in results for one in others(result) for name in one.axes.filters}
@@ -148,12 +167,14 @@ def answers(results: Sequence[CaseResult]) -> "list[notes.Answer]":
 def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
     """Whether the filter is better than the config's best, how often it fails, then all gains at the last scan."""
     rows = common.where(made["gains"], case=result.name, filter=name)
-    fails = common.where(made["failures"], case=result.name, filter=name, reason="any").iloc[0]
+    fails, *why = common.where(made["failures"], case=result.name, filter=name).to_dict("records")
     share = wording.share(*(100 * fails[key] for key in ("share", "share_lo", "share_hi")))
-    failing = tr("{name} fails in {share} of the realisations; in the others ", name=name, share=share)
-    start = case + (failing if fails["failed"] else "")
+    reasons = listed([f"{tr(REASONS[one['reason']])} {one['failed']:,}" for one in why if one["failed"]])
+    failing = tr("{name} fails in {share} of the realisations ({reasons})", name=name, share=share, reasons=reasons)
     if not len(rows):
-        return [start + tr("{name} has no estimate that could be compared.", name=name)]
+        none = tr("{name} has no estimate that could be compared", name=name)
+        return [f"{case}{failing if fails['failed'] else none}."]
+    start = case + (tr("{failing}; in the others ", failing=failing) if fails["failed"] else "")
     component, unit = next(one for one in result.axes.components if one[0] in set(rows["component"]))
     last = rows[rows["component"].eq(component) & rows["k"].eq(rows.loc[rows["component"].eq(component), "k"].max())]
     curves = common.where(made["curves"], case=result.name, component=component, k=last["k"].iloc[0])

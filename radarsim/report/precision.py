@@ -152,7 +152,8 @@ def needed(
 def grown(result: CaseResult, n: int) -> CaseResult:
     """A case with its sums scaled to n realisations."""
     sums = {name: sums * (n / result.count) for name, sums in result.sums.items()}
-    return replace(result, count=n, sums=sums, against=tuple(grown(one, n) for one in result.against))
+    outside = None if result.outside is None else grown(result.outside, n)
+    return replace(result, count=n, sums=sums, against=tuple(grown(one, n) for one in result.against), outside=outside)
 
 
 def gaussian(result: CaseResult) -> CaseResult:

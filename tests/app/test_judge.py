@@ -1,11 +1,17 @@
 """A filter from outside beside the config's: what its numbers are, and what is refused or said of it."""
 
+import json
+
 import numpy as np
+import pandas as pd
 import pytest
+from click.testing import CliRunner
 
 import radarsim
 from radarsim.app import judge as judging
 from radarsim.app.configs import CaseWork, load
+from radarsim.cli import main
+from radarsim.errors import ConfigError
 from tests.studies.range_doppler import naive
 
 
@@ -25,11 +31,9 @@ class Twin:
         if len(self.plots) == 1:
             return np.hstack([z, none[:, :1, 0]]), none
         if len(self.plots) == 2:
-            starts = [
-                naive.start(np.array(one), 2, 2, np.sqrt(np.diag(self.R)), self.dt)
-                for one in zip(*self.plots, strict=True)
-            ]
-            self.x, self.P = np.array([x for x, _ in starts]), starts[0][1]
+            arguments = 2, 2, np.sqrt(np.diag(self.R)), self.dt
+            units = [naive.start(unit, *arguments) for unit in np.eye(4).reshape(4, 2, 2)]  # it is linear in the plots
+            self.x, self.P = np.hstack(self.plots) @ np.array([x for x, _ in units]), units[0][1]
         else:
             B = naive.transition(self.dt)
             P = B @ self.P @ B.T + naive.manoeuvre(self.variance, self.dt)
@@ -108,3 +112,303 @@ def test_nees_is_that_of_the_run(judged):
     mine = judged.tables["nees"].merge(of(judged.tables["consistency"], filter="r+Vr"), on="k")
     assert len(mine) == 14
     np.testing.assert_allclose(mine["nees_x"], mine["nees_y"], rtol=1e-9)
+
+
+# ---- what is refused -------------------------------------------------------------------------------------------------
+def tried(given, name="mine", **more):
+    """What the checks say of estimates."""
+    return judging.judged(load("rls2"), given, name, **more)[1]
+
+
+def refusal(given, **more):
+    with pytest.raises(ConfigError) as error:
+        tried(given, **more)
+    return "\n".join(error.value.lines)
+
+
+def test_right_estimates_are_taken_without_a_word(estimates):
+    assert tried(estimates) == []
+    assert tried(estimates[..., :1]) == []
+    assert tried(estimates[..., 0]) == []
+    assert tried(twin, realisations=100) == []
+    assert tried(Twin, realisations=100) == []
+
+
+def test_other_shapes_are_refused_with_the_right_one(estimates):
+    assert "(n, K, d) = (256, 15, 1 … 3), got (256, 14, 3)" in refusal(estimates[:, 1:])
+    turned = refusal(lambda plots: twin(plots).transpose(1, 0, 2), realisations=100)
+    assert "transpose(1, 0, 2)" in turned
+    assert "covariances must have shape (256, 15, 3, 3)" in refusal((estimates, np.zeros((300, 15, 3))))
+    assert "an array (n, K, d), a function, an iterator or a file" in refusal(["estimates"])
+    assert "real numbers, got complex128" in refusal(lambda plots: twin(plots) + 0j, realisations=100)
+    assert "fewer than 301" in refusal(estimates, realisations=301)
+
+
+def test_estimates_in_another_order_are_found_by_their_errors(estimates):
+    """Components and scans by the order with small errors; realisations by errors unlike those of the filters."""
+    assert "components in the order Vr, r, ar" in refusal(estimates[..., [1, 0, 2]])
+    assert "components in the order ar, Vr, r" in refusal(estimates[..., [2, 1, 0]])
+    assert "scans from the last to the first" in refusal(estimates[:, ::-1])
+    shuffled = np.random.default_rng(1).permutation(len(estimates))
+    for other in (estimates[shuffled], np.roll(estimates, 1, axis=0), estimates[::-1]):
+        assert "have nothing in common" in refusal(other)
+
+
+def test_estimates_of_another_seed_are_refused(estimates):
+    with pytest.raises(ConfigError, match="another seed than 5"):
+        radarsim.judge("rls2", estimates, seed=5)
+
+
+def test_half_of_the_realisations_shifted_are_still_those_of_the_plots(estimates):
+    """The test is of a wrong order, not of a bad filter: one that follows the plots but poorly is judged."""
+    noisy = estimates + np.random.default_rng(2).normal(0, 400, estimates.shape) * [1, 0.1, 0.01]
+    assert tried(noisy) == []
+
+
+def test_names_are_those_of_no_other_filter(estimates):
+    assert "there is a filter 'r+Vr' already" in refusal(estimates, name="r+Vr")
+    assert "name: must be the name of a filter" in refusal(estimates, name="../mine")
+
+
+def test_named_components_are_taken_in_their_order(estimates):
+    swapped = radarsim.judge("rls2", estimates[..., [1, 0]], components=("Vr", "r"), realisations=200)
+    mine = radarsim.judge("rls2", estimates, realisations=200)
+    shared = mine.curves["component"].isin(["r", "Vr"])
+    assert of(swapped.curves, filter="mine").equals(of(mine.curves[shared], filter="mine"))
+    assert "must be of r, Vr, ar, got x" in refusal(estimates[..., :1], components=("x",))
+
+
+# ---- what is said ----------------------------------------------------------------------------------------------------
+def test_single_precision_is_said():
+    (line,) = tried(lambda plots: twin(plots).astype(np.float32), realisations=100)
+    assert "estimates are float32, rounded by up to" in line
+
+
+def test_looking_ahead_is_said():
+    def smoothed(plots):
+        x = twin(plots)
+        x[:, :-1, 0] = (x[:, :-1, 0] + x[:, 1:, 0]) / 2
+        return x
+
+    (line,) = tried(smoothed, realisations=100)
+    assert "uses later plots: its estimates up to scan 7" in line
+
+
+def test_other_estimates_of_the_same_plots_are_said():
+    noise = np.random.default_rng(3)
+    (line,) = tried(lambda plots: twin(plots) + noise.normal(0, 30, (plots.n, 15, 3)), realisations=100)
+    assert "other estimates for the same plots when called again" in line
+
+
+def test_realisations_that_depend_on_each_other_are_said():
+    def whitened(plots):
+        x = twin(plots)
+        return x + 0.1 * (x - x.mean(axis=0))
+
+    (line,) = tried(whitened, realisations=100)
+    assert "depend on the others in the batch" in line
+
+
+def test_a_filter_that_changes_the_plots_is_said_and_changes_nothing(judged):
+    def careless(plots):
+        x = twin(plots)
+        for column in plots.columns.values():
+            column[:] = 0
+        return x
+
+    result = radarsim.judge("rls2", careless, realisations=3000)
+    assert result.warnings[0] == "mine: changes the plots it is given; it gets copies"
+    assert of(result.curves, filter="mine").equals(of(judged.curves, filter="mine"))
+
+
+# ---- failures --------------------------------------------------------------------------------------------------------
+def test_failures_are_counted_and_sigma_is_of_the_others(estimates):
+    """Of 300 realisations 3 end in not-a-number, 2 in infinity, 4 diverge, 1 has no estimate."""
+    x = estimates.copy()
+    x[:3, 9:] = np.nan
+    x[3:5, 14, 2] = np.inf
+    x[5:9, 12] += 1e6
+    x[9] = np.nan
+    result = radarsim.judge("rls2", x)
+    counted = dict(result.tables["failures"][["reason", "failed"]].itertuples(index=False))
+    assert counted == {"any": 10, "not_a_number": 5, "no_estimate": 1, "diverged": 4}
+    assert result.answer[0].startswith("mine fails in 3.33 % [")
+    mine = of(result.curves, filter="mine")
+    assert set(mine["n"]) == {290}
+    last = mine[(mine["component"] == "r") & (mine["k"] == 15)].iloc[0]
+    truth = radarsim.plots("rls2", n=300).truth[10:, 14, 0]
+    assert last["sigma"] == pytest.approx(np.sqrt(np.mean((estimates[10:, 14, 0] - truth) ** 2)), rel=1e-12)
+    nil = of(result.gains, filter="mine", baseline="r+Vr")
+    assert (nil["gain_percent"].abs() < 1e-9).all()
+
+
+def test_a_filter_that_starts_late_does_not_fail(estimates):
+    x = estimates.copy()
+    x[:, :5] = np.nan
+    result = radarsim.judge("rls2", x)
+    assert result.tables["failures"]["failed"].sum() == 0
+    assert of(result.curves, filter="mine")["k"].min() == 6
+
+
+def test_a_filter_that_always_fails_is_not_compared(estimates):
+    result = radarsim.judge("rls2", np.where(np.arange(15)[:, None] > 7, np.nan, estimates))
+    assert result.answer[0].startswith("mine fails in 100 % [")
+    assert not len(of(result.curves, filter="mine"))
+
+
+def test_a_covariance_that_is_none_does_not_enter_nees(estimates):
+    P = np.broadcast_to(np.diag([250.0**2, 15.0**2, 1.0]), (300, 15, 3, 3)).copy()
+    P[:30, 14, 0, 0] = -1
+    P[30:40, 14, 0, 1] = 1e3  # not symmetric
+    result = radarsim.judge("rls2", (estimates, P))
+    assert of(result.tables["nees"], k=15)["n"].tolist() == [260]
+    assert of(result.tables["nees"], k=14)["n"].tolist() == [300]
+
+
+# ---- other sources ---------------------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def mine(estimates):
+    return radarsim.judge("rls2", estimates)
+
+
+def same(result, mine):
+    """Whether the filter has the same numbers, and the config's too."""
+    return all(result.tables[name].equals(mine.tables[name]) for name in ("curves", "gains", "failures"))
+
+
+def test_chunks_of_any_length_are_the_whole(estimates, mine):
+    for size in (1, 77, 300, 1000):
+        chunks = (estimates[i : i + size] for i in range(0, 300, size))
+        assert same(radarsim.judge("rls2", chunks, realisations=300), mine), size
+
+
+def test_chunks_over_several_blocks_and_looks(plain):
+    """With a precision realisations are looked at 2000 and 4000, 4096 a block: those of a block are asked for again."""
+    whole = twin_of(0, 9000)
+    plots = (whole[first : first + 500] for first in range(0, 9000, 500))
+    result = radarsim.judge("rls2", plots, realisations=9000, precision=5)
+    assert result.cases[0].count == 9000
+    assert set(of(result.curves, filter="mine", component="ar")["n"]) == {9000}
+
+
+def twin_of(first, count):
+    plan = CaseWork(judging.judged(load("rls2"), twin, "mine", realisations=100)[0].cases[0]).plans[-1]
+    return twin(judging.outside.plots_of(plan, plan.draw(first, count)))
+
+
+def test_an_iterator_that_ends_early_is_refused(estimates):
+    with pytest.raises(ConfigError, match="must give 301 realisations, ended after 300"):
+        radarsim.judge("rls2", iter([estimates]), realisations=301)
+
+
+def test_a_function_of_one_realisation(mine):
+    def one(plots):
+        columns = {name: column[None] for name, column in plots.columns.items()}
+        return twin(judging.outside.replace(plots, columns=columns))[0]
+
+    result = radarsim.judge("rls2", one, one_by_one=True, realisations=300)
+    for name, column in (("curves", "sigma"), ("gains", "gain_hi")):  # products of matrices of another size
+        np.testing.assert_allclose(result.tables[name][column], mine.tables[name][column], rtol=1e-9, atol=1e-6)
+
+
+def test_files_hold_what_arrays_do(estimates, mine, tmp_path):
+    order = np.random.default_rng(4).permutation(300)
+    np.savez(tmp_path / "plain.npz", estimates=estimates)
+    np.savez(tmp_path / "numbered.npz", estimates=estimates[order], realisations=order, seed=2017)
+    i, k = (one.ravel() for one in np.indices((300, 15)))
+    state = dict(zip(("r_m", "Vr_mps", "ar"), estimates.reshape(-1, 3).T, strict=True))
+    table = pd.DataFrame({"realisation": i, "t_s": 10.0 * k, **state}).sample(frac=1, random_state=1)
+    table.to_csv(tmp_path / "table.csv", index=False)
+    for name in ("plain.npz", "numbered.npz", "table.csv"):
+        assert same(radarsim.judge("rls2", tmp_path / name), mine), name
+
+
+def test_files_of_other_realisations_are_refused(estimates, tmp_path):
+    def said(name, **arrays):
+        np.savez(tmp_path / name, **arrays)
+        return refusal(tmp_path / name)
+
+    assert "where 0 should be there is 10" in said("late.npz", estimates=estimates, realisations=np.arange(10, 310))
+    assert "where 1 should be there is 0" in said("twice.npz", estimates=estimates, realisations=np.arange(300) // 2)
+    assert "plots with seed 3; the run has seed 2017" in said("seed.npz", estimates=estimates, seed=3)
+    assert "must hold an array `estimates`" in said("none.npz", x=estimates)
+    assert "must be 300 numbers" in said("fewer.npz", estimates=estimates, realisations=np.arange(299))
+    assert "must end in .npz, .csv or .parquet" in refusal(tmp_path / "estimates.mat")
+    assert "cannot be read" in refusal(tmp_path / "nowhere.npz")
+    (tmp_path / "broken.npz").write_bytes(b"PK")
+    assert "cannot be read" in refusal(tmp_path / "broken.npz")
+    rows = pd.DataFrame({"realisation": [0, 0, 1], "k": [1, 2, 1], "r": 1.0})
+    rows.to_csv(tmp_path / "short.csv", index=False)
+    assert "realisation 1: must have a row for each of the 2 scans" in refusal(tmp_path / "short.csv")
+    rows.drop(columns="realisation").to_csv(tmp_path / "unnumbered.csv", index=False)
+    assert "must have the columns realisation, k or t_s, and of r, Vr, ar" in refusal(tmp_path / "unnumbered.csv")
+
+
+def test_the_command_judges_a_file(estimates, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    np.savez("mine.npz", estimates=estimates)
+    done = CliRunner().invoke(main, ["judge", "rls2", "mine.npz", "--name", "mine", "--no-figures"])
+    assert done.exit_code == 0, done.output
+    assert done.output.startswith("mine cannot be told from r+Vr")
+    record = json.loads((tmp_path / "results/rls2_mine/run.json").read_text())
+    assert record["command"] == "radarsim judge rls2 mine.npz --name mine"
+    assert len(record["judged"]["mine"]) == 64
+    assert "mine cannot be told from" in (tmp_path / "results/rls2_mine/report.html").read_text()
+    again = CliRunner().invoke(main, ["judge", "rls2", "mine.npz", "-n", "301"])
+    assert again.exit_code == 2
+    assert not (tmp_path / "results/.blocks").exists()
+
+
+# ---- other studies ---------------------------------------------------------------------------------------------------
+def held(plots):
+    """The first column, held where a plot is missed: an estimate of the range."""
+    z = np.array(next(iter(plots.columns.values())))
+    for k in range(1, z.shape[1]):
+        z[:, k] = np.where(np.isnan(z[:, k]), z[:, k - 1], z[:, k])
+    return z
+
+
+@pytest.mark.parametrize(
+    ("config", "overrides"),
+    [
+        ("rls2", {"radar.detection_probability": 0.8}),
+        ("sonar_smoothing", {}),
+        ("sonar_manoeuvre", {"sweep": {"target.acceleration_mps2": [1]}}),
+        ("ambiguous_rls2", {}),
+    ],
+)
+def test_every_study_with_plots_pairs_each_realisation(config, overrides):
+    """The filter's σ is that of its errors against the truth of the plots; the study's tables are those of a run."""
+    result = radarsim.judge(config, held, realisations=64, overrides=overrides)
+    (case,) = result.cases
+    plots = radarsim.plots(config, n=64, overrides=overrides)
+    x, scans = held(plots), case.axes.k - 1
+    off = x[:, scans] - plots.truth_of(case.axes.components)[:, scans, 0]
+    mine = of(result.curves, filter="mine", component=case.axes.components[0][0])
+    np.testing.assert_allclose(
+        mine["sigma"], np.sqrt(np.nanmean(off**2, axis=0))[mine["k"] - case.axes.k[0]], rtol=1e-9
+    )
+    assert set(of(result.gains, filter="mine")["baseline"]) == set(case.axes.filters)
+    plain = radarsim.run(config, realisations=64, overrides=overrides)
+    for name in plain.tables.keys() - {"claims"}:  # these say what they lack of a shipped config by its name
+        own, table = result.tables[name], plain.tables[name]
+        own = own[own["filter"] != "mine"] if "filter" in own else own
+        assert own[list(table)].equals(table), name
+
+
+def test_errors_of_single_realisations_add_up_to_the_runs(plain):
+    """What gains are paired with: to the rounding of the sums."""
+    for config, overrides in (("rls2", {}), ("rls2", {"radar.detection_probability": 0.8}), ("sonar_smoothing", {})):
+        experiment, _ = judging.judged(load(config, judging.run.merged(overrides)), held, "mine", realisations=64)
+        work = CaseWork(experiment.cases[0])
+        plan = work.plans[-1]
+        error = judging.outside.inner_errors(plan, 0, 64)
+        sums = next(work.unpacked(work.simulate(0, 64)))["error"]
+        for power in range(1, 5):
+            np.testing.assert_allclose(np.nansum(error**power, axis=1), sums[..., power - 1], rtol=1e-9, atol=1e-9)
+
+
+def test_studies_without_paired_plots_are_refused_with_the_reason():
+    for config, why in (("discriminator", "draws no plots"), ("sonar_clutter", "trackers find tracks of their own")):
+        with pytest.raises(ConfigError, match=why):
+            radarsim.judge(config, held, realisations=64)
