@@ -8,8 +8,9 @@
 <Figure size ...>
 
 In a notebook a result shows its answer and first figure; `radarsim.load("rls2")` gives one that was run before.
-`check`, `solve`, `sensitivity`, `compare`, `chart`, `claims` and `readings` answer what the commands of these names do;
-`plots` gives those of many realisations as arrays; `simulate`, `read_plots`, `track` and `fit` are for recorded plots.
+`check`, `solve`, `tune`, `sensitivity`, `compare`, `chart`, `claims` and `readings` do what the commands of these names
+do; `plots` gives those of many realisations as arrays; `simulate`, `read_plots`, `track` and `fit` are for recorded
+plots.
 """
 
 from importlib import import_module
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from radarsim.app.python import chart, check, claims, compare, load, readings, sensitivity, solve
     from radarsim.app.result import Result
     from radarsim.app.run import run
+    from radarsim.app.tune import tune
     from radarsim.errors import ConfigError, RadarsimError
 
 __version__ = "0.3.0"
@@ -44,10 +46,11 @@ __all__ = [
     "simulate",
     "solve",
     "track",
+    "tune",
 ]
 
 _HOMES = {
-    **{"judge": "app.judge:judge", "run": "app.run:run", "Result": "app.result:Result"},
+    **{"judge": "app.judge:judge", "tune": "app.tune:tune", "run": "app.run:run", "Result": "app.result:Result"},
     **{name: f"app.own_data:{name}" for name in ("fit", "plots", "read_plots", "simulate", "track")},
     **{name: f"app.python:{name}" for name in ("chart", "check", "claims", "compare")},
     **{name: f"app.python:{name}" for name in ("load", "readings", "sensitivity", "solve")},

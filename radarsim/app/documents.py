@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from radarsim.app.result import Result
     from radarsim.app.run import Shares
     from radarsim.app.sensitivity import Sensitivity
+    from radarsim.app.tune import Tuned
     from radarsim.config.experiment import Experiment
 
 
@@ -77,6 +78,11 @@ def outlook(experiment: "Experiment", one: "Outlook") -> dict[str, Any]:
 def answer(one: "Answer") -> dict[str, Any]:
     """The answer of `solve`: the value with its interval, or the limit where it is not attainable."""
     return {**asdict(one), "quantity": one.quantity.words}
+
+
+def tuned(one: "Tuned") -> dict[str, Any]:
+    """What tuning found and gains."""
+    return {**asdict(one), "quantity": one.quantity.words, "answer": one.answer}
 
 
 def sensitivity(one: "Sensitivity") -> dict[str, Any]:

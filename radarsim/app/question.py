@@ -5,7 +5,7 @@ import os
 import shlex
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from radarsim.app import quantities
 from radarsim.app.configs import CaseWork, Config, load
@@ -26,7 +26,10 @@ from radarsim.report.statistics import Estimate
 from radarsim.report.wording import labelled, significant_digits
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
+
+V = TypeVar("V")
 
 FACTOR = 1000.0  # the search goes from a thousandth of a positive key's value to a thousand times it
 WHOLE = term("the nearest whole number that is at least as good as the target")
@@ -34,6 +37,7 @@ MOST_NAMED = 6  # cases listed in a message
 JUMPS = term("the quantity jumps over the target there")
 SAME = 1e-12  # relative change of a quantity that may be rounding
 ROUGH = -1  # stands for a number of realisations
+BATCHES = 20  # of one case: their spread has 19 degrees of freedom
 LONG_S = 2.0  # duration of a search from which it is predicted
 
 
@@ -274,8 +278,13 @@ def rounded(value: float) -> float:
     return float(f"{value:.12g}")
 
 
-def range_of(found: Sequence[fields.NumericKey], name: str, between: tuple[float, float] | None) -> quantities.Range:
-    """The search range of a key. Raises ConfigError where it has neither bounds nor a starting value."""
+def range_of(
+    found: Sequence[fields.NumericKey], name: str, between: tuple[float, float] | None, factor: float = FACTOR
+) -> quantities.Range:
+    """The search range of a key, up to `factor` times its value if it has no bounds.
+
+    Raises ConfigError where it has neither bounds nor a starting value.
+    """
     key, values = found[0], [one.value for one in found if one.value]
     if between is not None:
         low, high = between
@@ -293,7 +302,7 @@ def range_of(found: Sequence[fields.NumericKey], name: str, between: tuple[float
         what = "there is no value to search about" if key.value is None else f"is {key.value:g} in the config"
         raise ConfigError(f"{name}: {what}, and its own range has no end: give {_between()}")
     if key.low >= 0:
-        low, high = max(rounded(min(values) / FACTOR), key.low), min(rounded(max(values) * FACTOR), key.high)
+        low, high = max(rounded(min(values) / factor), key.low), min(rounded(max(values) * factor), key.high)
         return quantities.searched(
             math.ceil(low) if key.whole else low, math.floor(high) if key.whole else high, key.whole
         )
@@ -306,15 +315,23 @@ def _between() -> str:
     return argument("between=(low, high)", "--between LO HI")
 
 
+class Altered(Protocol):
+    """A case, and the same case with other values, which raises ConfigError if the config refuses them."""
+
+    base: Case
+
+    def at(self, key: str, value: Any) -> Case: ...
+
+
 class Curve:
-    """The quantity as a function of the key, each value computed once.
+    """The quantity as a function of the key, or of several, each value computed once.
 
     progress is called for each; `simulated` counts the simulated ones.
     """
 
     def __init__(
         self,
-        cases: Cases,
+        cases: "Cases | Altered",
         key: str,
         quantity: Asked,
         threads: int | None,
@@ -323,8 +340,8 @@ class Curve:
     ):
         self.cases, self.key, self.quantity = cases, key, quantity
         self.threads, self.progress, self.realisations = threads, progress, realisations
-        self.known: dict[tuple[float, int], Estimate] = {}
-        self.refused: dict[float, ConfigError] = {}
+        self.known: dict[tuple[Any, int], Estimate] = {}
+        self.refused: dict[Any, ConfigError] = {}
         self.scans = set[int]()  # scans at which the quantity was read, of simulated values
         self.from_tables = False
         self.rough = False  # whether cheaper approximate values exist, for a first search
@@ -343,27 +360,27 @@ class Curve:
         self.from_tables = without_ends or not math.isnan(known)
         return self.from_tables
 
-    def exactly(self, value: float | None) -> float:
+    def exactly(self, value: Any) -> float:
         """The exact quantity at a value (None: the config's own); NaN where there is none."""
         return self._kept(value, 0, self._exact_of).value
 
-    def roughly(self, value: float) -> float:
+    def roughly(self, value: Any) -> float:
         """A cheaper value, to a thousandth of σ, if the study has one; else the exact quantity."""
         if not self.rough:
             return self.exactly(value)
         return self._kept(value, ROUGH, lambda case: self._exact_of(replace(case, roughly=True))).value
 
-    def simulated(self, value: float | None, realisations: int) -> Estimate:
+    def simulated(self, value: Any, realisations: int) -> Estimate:
         """The quantity with its interval, from this number of realisations."""
         return self._kept(value, realisations, lambda case: self._sampled(case, realisations)[0])
 
-    def noted(self, value: float) -> tuple[str, ...]:
+    def noted(self, value: Any) -> tuple[str, ...]:
         """The note of the tables on the interval at a value, in words."""
         note = quantities.noted(self.quantity, self._result(self.cases.at(self.key, value), self.realisations))
         more = argument("realisations=…", "-n")
         return (f"the interval may be too narrow: {note}; use more realisations, {more}",) if note else ()
 
-    def _kept(self, value: float | None, count: int, of: Callable[[Case], Estimate]) -> Estimate:
+    def _kept(self, value: Any, count: int, of: Callable[[Case], Estimate]) -> Estimate:
         place = (math.nan if value is None else value, count)
         if place in self.known:
             return self.known[place]
@@ -396,6 +413,20 @@ class Curve:
         case = replace(case, against=())  # a question is of gains against the first
         work = CaseWork(case)
         return case_result(case, work, collect(work, realisations, threads=self.threads))
+
+
+def without_one(case: Case, of: Callable[[CaseResult], V], count: int) -> tuple[V, list[V], Axes]:
+    """A function of a case's realisations, of all of them and of all but each of n batches; the axes of its sums."""
+    work, each = CaseWork(replace(case, against=())), max(2, count // BATCHES)
+    batches = [work.simulate(n * each, each) for n in range(BATCHES)]
+    total = sum(batches[1:], start=batches[0])
+
+    def value(packed: "np.ndarray", count: int) -> V:
+        sums = work.plan.layout.unpack(packed)
+        return of(CaseResult(case.name, case.study, case.spec, case.swept, count, sums, work.plan.axes))
+
+    whole = value(total, BATCHES * each)
+    return whole, [value(total - one, (BATCHES - 1) * each) for one in batches], work.plan.axes
 
 
 def predict(notify: Callable[[str], None], what: str, seconds: float) -> None:

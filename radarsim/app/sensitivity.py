@@ -17,7 +17,7 @@ import numpy as np
 from radarsim.app import configs, quantities
 from radarsim.app.configs import CaseWork
 from radarsim.app.quantities import UNPAIRED, Asked
-from radarsim.app.question import Cases, Config
+from radarsim.app.question import Cases, Config, without_one
 from radarsim.app.run import case_result
 from radarsim.app.shown import Shown
 from radarsim.config import fields
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MORE = 0.1
-BATCHES = 20  # of one case: their spread has 19 degrees of freedom
 MOST_BARS = 16
 NOTHING = 1e-9  # per cent: changes below it may be rounding
 ROUNDED = NOTHING / 100  # the same of a ratio; of gains, in points, still less
@@ -304,16 +303,8 @@ class Look:
         return np.array(values).reshape(len(self.kinds), len(self.axes.filters), len(self.parts))
 
     def _sampled(self, case: Case) -> Seen:
-        work, each = CaseWork(replace(case, against=())), max(2, self.realisations // BATCHES)
-        batches = [work.simulate(batch * each, each) for batch in range(BATCHES)]
-        total, others = np.sum(batches, axis=0), (BATCHES - 1) * each
-        but_one = [self._of_sums(case, work, total - sums, others) for sums in batches]
-        whole = self._of_sums(case, work, total, BATCHES * each)
-        return Seen(whole, np.stack(but_one, axis=1), np.asarray(work.plan.axes.t_s))
-
-    def _of_sums(self, case: Case, work: CaseWork, packed: np.ndarray, count: int) -> np.ndarray:
-        sums = work.plan.layout.unpack(packed)
-        return self._of_result(CaseResult(case.name, case.study, case.spec, case.swept, count, sums, work.plan.axes))
+        whole, but_one, axes = without_one(case, self._of_result, self.realisations)
+        return Seen(whole, np.stack(but_one, axis=1), np.asarray(axes.t_s))
 
     def _of_result(self, result: CaseResult, exactly: bool = False) -> np.ndarray:
         """(Q, F, C) from the tables of a case: measured, or exact values."""

@@ -307,7 +307,7 @@ def exact_near(
     return quantities.near(missing, over, x, near_enough) if found is None else found
 
 
-def timed(work: Callable[[], float]) -> float:
+def timed(work: Callable[[], object]) -> float:
     """Seconds that a function takes."""
     begun = time.monotonic()
     work()

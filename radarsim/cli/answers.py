@@ -4,14 +4,15 @@ import math
 from collections.abc import Hashable
 from typing import TYPE_CHECKING, Any
 
-from radarsim.app.question import shown, with_unit
+from radarsim.app.question import PLAIN, shown, with_unit
 from radarsim.cli.console import command, field, say, show
-from radarsim.language import tr
+from radarsim.language import term, tr
 
 if TYPE_CHECKING:
     from radarsim.app.compare import DopplerChart
     from radarsim.app.question import Answer
     from radarsim.app.sensitivity import Sensitivity
+    from radarsim.app.tune import Tuned
     from radarsim.report.quantities import Quantity
 
 
@@ -22,6 +23,33 @@ def print_answer(answer: "Answer") -> None:
     for label, words in others:
         field(label, words)
     command("check", answer.command)
+
+
+def print_tuned(found: "Tuned") -> None:
+    """What tuning gains, the keys, the gain of each case, notes, and the run that shows it."""
+    say(found.answer)
+    ends = term("within 0.1 %") if found.exact else "95 %"
+    cells = [
+        [one.key, with_unit(one.stated, one.unit), with_unit(one.tuned, one.unit), _ends(one.lo, one.hi)]
+        for one in found.keys
+    ]
+    show(found.minimised, ["key", "stated", "tuned", ends], cells, right=["stated", "tuned", ends], spare=())
+    if len(found.cases) > 1:
+        rows = [
+            [one.case, shown(one.stated, ".4g"), shown(one.tuned, ".4g"), f"{shown(one.gain, '.3g')} {found.gain_unit}"]
+            + ([] if found.exact else [_ends(one.lo, one.hi, ".3g")])
+            for one in found.cases
+        ]
+        columns = ["case", "stated", "tuned", "gain", *([] if found.exact else ["95 % of gain"])]
+        title = f"{found.quantity.said}, {tr(found.unit)}"
+        show(title, columns, rows, right=columns[1:], spare=())
+    for note in found.notes:
+        field("note", note)
+    command("check", found.command)
+
+
+def _ends(lo: float | None, hi: float | None, form: str = PLAIN) -> str:
+    return "" if lo is None or hi is None else f"{shown(lo, form)} … {shown(hi, form)}"
 
 
 def print_drawn(drawn: "DopplerChart") -> None:

@@ -30,7 +30,16 @@ COLUMNS = (  # of tables
     *(term("statement"), term("place"), term("measured and expected"), term("class"), term("config"), term("key")),
     *(term("RMS error"), term("unit"), term("of own σ"), term("estimates"), term("number"), term("plots"), term("NIS")),
     *(term("95 % from"), term("95 % to"), term("stated σ")),
-    *(term("value"), term("name"), term("what it is"), term("paper and question"), term("study"), term("keys")),
+    *(
+        term("value"),
+        term("stated"),
+        term("tuned"),
+        term("name"),
+        term("what it is"),
+        term("paper and question"),
+        term("study"),
+        term("keys"),
+    ),
 )
 TITLES = (term("reading"), term("tracking"), term("judging"), term("fitting"))  # of what has no known end
 WHAT = (

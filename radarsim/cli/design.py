@@ -1,6 +1,7 @@
-"""The commands on a design: solve, sensitivity, chart. Heavy imports are inside the commands."""
+"""The commands on a design: solve, tune, sensitivity, chart. Heavy imports are inside the commands."""
 
 import functools
+import pathlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -136,6 +137,72 @@ def solve(
         answers.print_answer(answer)
     if answer.value is None:
         raise TargetUnmet(*answer.unattained)
+
+
+@group.main.command()
+@group.config_argument
+@click.option("--filter", "filter_name", metavar="NAME", help="The filter, if there are several.")
+@click.option(
+    "--for", "wanted", required=True, metavar="TEXT", help="Quantity, as in 'sigma r at 60 s', 'gain r', 'lock at k 6'."
+)
+@click.option(
+    "--free",
+    multiple=True,
+    metavar="KEY[=LOW:HIGH]",
+    help="Key of the filter to tune, and its range; repeatable. Default: every real number that is not zero.",
+)
+@click.option(
+    "--over",
+    multiple=True,
+    metavar="SCENARIO|KEY=VALUE",
+    help="One of a family of targets; repeatable. Default: the config's cases.",
+)
+@click.option("--case", multiple=True, metavar="CASE", help="One of the config's cases; repeatable. Default: all.")
+@group.set_option
+@group.realisations_option
+@group.seed_option
+@group.threads_option
+@click.option("--write", metavar="FILE.yaml", help="Also write a config with the tuned values.")
+@group.json_option
+def tune(
+    config: str,
+    filter_name: str | None,
+    wanted: str,
+    threads: int | None,
+    write: str | None,
+    as_json: bool,
+    **asked: Any,
+) -> None:
+    """Find the best values of a filter's keys, and what they gain.
+
+    The quantity is one of `radarsim solve`. Over several cases the root of the mean of σ², or the mean of a rate, is
+    brought to its best. If σ is known exactly, so is the answer. Otherwise values are compared on the same noise, and
+    the gain is measured on other realisations than those used for tuning, with the stated and the tuned filter on the
+    same plots. Whole numbers are tried one by one; elements of a transition matrix keep columns that sum to one.
+
+    \b
+    Examples
+      radarsim tune rls2 --filter r+Vr --for "sigma r at 60 s" --over turn --over jerk_pulse
+      radarsim tune rls2_manoeuvres --filter r+Vr --for "sigma r" --free manoeuvre_variance --free initial_scans=2:7
+      radarsim tune multimodel --filter MMA2-11 --for "sigma y at 60 s" --free models -n 500
+    """
+    from radarsim.app import configs, documents
+    from radarsim.app import tune as tuning
+    from radarsim.cli import answers, console
+    from radarsim.report import wording
+
+    with console.Progress(config, quiet=as_json, what="values") as progress:
+        said = None if as_json else console.say_aside
+        asked |= {"filter": filter_name, "threads": threads, "progress": progress.update, "notify": said}
+        found = tuning.tune(config, wanted, **asked)
+    if as_json:
+        click.echo(documents.text(documents.tuned(found)))
+    else:
+        answers.print_tuned(found)
+    if write:
+        path = pathlib.Path(write)
+        made = configs.new(path.name, config, path.parent, found.settings)
+        click.echo(wording.labelled("config", str(made)), err=as_json)
 
 
 @group.main.command()

@@ -146,6 +146,10 @@ class Added:
     """
 
 
+class ColumnsOfOne:
+    """Mark of a field of rows of probabilities whose columns sum to one."""
+
+
 @dataclass(frozen=True)
 class NameIn:
     """Mark of a field that names a member of a list; a case's identity has its place in the list instead."""

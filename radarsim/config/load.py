@@ -499,4 +499,4 @@ def _put(data: dict[str, Any], key: str, value: float) -> None:
             place = place[int(step)] if isinstance(place, list) else place.setdefault(step, {})
         if last.endswith("_rad"):
             place.pop(f"{last.removesuffix('rad')}deg", None)
-        place[last] = value
+        place[int(last) if isinstance(place, list) else last] = value

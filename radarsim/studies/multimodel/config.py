@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field
 from radarsim.config.fields import (
     At,
     Baseline,
+    ColumnsOfOne,
     DataFile,
     Design,
     Display,
@@ -215,7 +216,7 @@ class Filter(Model):
     models: Annotated[tuple[MotionModel, ...], Field(min_length=1, max_length=MOST_MODELS)] = key(
         "motion models", "the bank of motion models, one to five; kalman has one"
     )
-    transition: Annotated[tuple[Column, ...], Field(min_length=1, max_length=MOST_MODELS)] = key(
+    transition: Annotated[tuple[Column, ...], Field(min_length=1, max_length=MOST_MODELS), ColumnsOfOne()] = key(
         "transition probabilities",
         "transition probabilities: row i, column j from model j to model i; columns sum to one",
         ((1.0,),),

@@ -26,6 +26,7 @@ The world of P2: the true flight, the times of the scans, the sensor, plots in t
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -353,11 +354,26 @@ def truth(case: Case) -> tuple[np.ndarray, np.ndarray]:
         if len(t) < 4:
             raise ConfigError(f"{case.name}: target: lasts only {len(t)} scans; at least 4 are needed")
         coefficient = target.ballistic_coefficient_kgpm2
-        return t, fly(target.position_m, target.velocity_mps, coefficient, target.lag_s, phases, t)
+        return t, _flown(target.position_m, target.velocity_mps, coefficient, target.lag_s, tuple(phases), t.tobytes())
     except Unreadable as error:
         raise ConfigError(*error.faults) from None
     except Unflyable as error:
         raise ConfigError(f"{case.name}: target: {error}") from None
+
+
+@lru_cache(maxsize=4)
+def _flown(
+    position: tuple[float, ...],
+    velocity: tuple[float, ...],
+    coefficient: float,
+    lag: float,
+    phases: tuple[Phase, ...],
+    t: bytes,
+) -> np.ndarray:
+    """`fly`, once for all cases of one flight: it takes most of their preparation."""
+    track = fly(position, velocity, coefficient, lag, phases, np.frombuffer(t))
+    track.flags.writeable = False
+    return track
 
 
 def plot_truth(case: Case, t: np.ndarray, x: np.ndarray) -> np.ndarray:
