@@ -54,7 +54,7 @@ SIMPLEX = 0.5, 0.1  # first steps, one simplex after the other
 POINTS, PILOT_SHARE, PILOT_LEAST = 13, 8, 200  # of the scan of sampled values: values, and realisations of all
 NO_GAIN = 1e-3  # per cent or points of an exact gain that are called nothing
 NEAR_END = 0.01  # on the scale of the search
-DIGITS = 9  # of a tuned value
+DIGITS = 6  # of a tuned value: there the quantity hardly changes with it
 WANTED = re.compile(
     r"(?P<name>[\w-]+)(?: +(?P<part>(?!at )\S.*?))??(?: +at +(?:(?P<s>[\d.eE+-]+) *s|k *=? *(?P<k>\d+)))?"
 )
@@ -162,9 +162,8 @@ class Tuned(Shown):
                 return tr("Tuning gains nothing: {quantity} is at its best as stated (exact).", **of)
             words = tr("exact")
         else:
-            words = f"95 % {shown(one.lo, '+.3g')} … {shown(one.hi, '+.3g')}"
-            of_others = ("{count} other realisation", "{count} other realisations")
-            words = f"{words}; {plural(*of_others, self.judged)}"
+            others = plural("{count} other realisation", "{count} other realisations", self.judged)
+            words = f"95 % {shown(one.lo, '+.3g')} … {shown(one.hi, '+.3g')}; {others}"
         told = of | {"gain": f"{shown(one.gain, '.3g')} {self.gain_unit}", "how": words}
         told |= {
             "stated": f"{shown(one.stated, '.4g')}",
@@ -241,7 +240,7 @@ def natural(searched: Sequence[Searched], place: Place, plain: Mapping[str, Any]
             ratios |= {(top[0], i, *top[2:]): share / most} if share > 0 else {}
         ratios |= {one.path: x for one, x in zip(searched, place, strict=True) if one.of == top}
         found |= {path: ratio / sum(ratios.values()) for path, ratio in ratios.items()}
-    return {path: float(f"{value:.{DIGITS}g}") for path, value in found.items()}
+    return {path: question.rounded(value) for path, value in found.items()}
 
 
 def at_path(plain: Any, path: Path) -> Any:
@@ -380,6 +379,7 @@ def least(of: Objective, searched: Sequence[Searched]) -> Place:
         options |= {"fatol": ALIKE[of.exact], "maxfev": TRIED[of.exact] * len(at)}
         logarithm: Any = lambda u, best=best: float(np.log(max(of(moved(searched, best, u)), 1e-300)))  # noqa: E731
         best = moved(searched, best, minimize(logarithm, at, method="Nelder-Mead", options=options).x)
+    best = tuple(float(f"{x:.{DIGITS}g}") for x in best)
     return min((start, best), key=of)
 
 

@@ -60,7 +60,7 @@ def test_it_is_the_nearest_that_solve_attains():
         "rls2", "manoeuvre_variance", Wanted("sigma", "r+Vr", "r", 60.0), 0.0, overrides=overrides, between=(1e-3, 100)
     )
     found = tune("rls2", **R, overrides=overrides)
-    assert found.all.tuned == pytest.approx(nearest.limit, rel=1e-12)
+    assert found.all.tuned == pytest.approx(nearest.limit, rel=1e-11)
     assert found.keys[0].tuned == pytest.approx(nearest.limit_at, rel=1e-4)
 
 
@@ -102,7 +102,7 @@ def test_whole_numbers_are_all_tried():
             sigma("rls2", "target=turn", f"filters.1.initial_scans={n}", f"filters.1.manoeuvre_variance={float(x)}")
         ]
     )
-    assert found.all.tuned <= best * (1 + 1e-12)
+    assert found.all.tuned <= best
     settings = [f"{key}={value}" for key, value in values.items()]
     assert found.all.tuned == pytest.approx(sigma("rls2", "target=turn", *settings), rel=1e-12)
 
