@@ -14,7 +14,7 @@ import numpy as np
 from radarsim.app import configs, run
 from radarsim.app.configs import CaseWork, Config, Overrides
 from radarsim.config.experiment import Case, Experiment
-from radarsim.errors import ConfigError, DisagreementError, MeasureError
+from radarsim.errors import ConfigError, DisagreementError, MeasureError, argument
 from radarsim.language import tr
 from radarsim.report import statistics
 from radarsim.studies import outside
@@ -39,6 +39,8 @@ def judge(
     name: str = "mine",
     components: Sequence[str] = (),
     one_by_one: bool = False,
+    against: str | None = None,
+    wanted: str | None = None,
     overrides: Overrides = (),
     realisations: float | None = None,
     seed: int | None = None,
@@ -63,6 +65,9 @@ def judge(
     filters, is a failure: `tables["failures"]`. σ and gains are of the other realisations. `warnings` say what is
     unsound: a function that looks ahead, that gives other estimates when called again, single precision.
 
+    against="tuned": the config's filters stand there tuned too, each by `radarsim.tune` with noise of another seed,
+    over all cases, for `wanted`, by default σ of the first component at the last scan.
+
     The other arguments are those of `run`; blocks are not stored, and results are in out/CONFIG_NAME. Raises
     ConfigError for estimates of another shape, order or seed.
 
@@ -73,7 +78,9 @@ def judge(
     """
     asked: dict[str, Any] = {"precision": precision, "threads": threads, "figures": figures, "width_mm": width_mm}
     texts = run.merged(configs.check(overrides, out=out, **asked), None, seed)
-    experiment, warnings = judged(configs.load(config, texts), estimates, name, components, one_by_one, realisations)
+    tuned = {"against": against, "wanted": wanted}
+    loaded = configs.load(config, texts)
+    experiment, warnings = judged(loaded, estimates, name, components, one_by_one, realisations, **tuned)
     (member,) = experiment.cases[0].outside
     asked = {"precision": precision, "of": of, "progress": progress, "threads": 0 if member.in_order else threads}
     return finished(experiment, warnings, out, figures, width_mm, **asked)
@@ -110,8 +117,17 @@ def judged(
     components: Sequence[str] = (),
     one_by_one: bool = False,
     realisations: float | None = None,
+    against: str | None = None,
+    wanted: str | None = None,
 ) -> tuple[Experiment, list[str]]:
     """The experiment with a filter beside its own, under a name with the filter's, and what the checks say of it."""
+    left_out: list[str] = []
+    if against not in (None, "tuned"):
+        raise ConfigError(f"{argument('against', '--against')}: must be tuned, got {against!r}")
+    if against:
+        from radarsim.app import tune
+
+        experiment, left_out = tune.beside(experiment, wanted, realisations=realisations)
     if not isinstance(name, str) or not name.strip() or "/" in name or name.startswith("."):
         raise ConfigError(f"name: must be the name of a filter, got {name!r}")
     n, cases = configs.whole(realisations), experiment.cases
@@ -123,7 +139,7 @@ def judged(
     cases = tuple(replace(case, outside=(member,), **counts) for case in cases)
     stem = f"{experiment.stem}_{'_'.join(name.split())}"
     made = replace(experiment, stem=stem, cases=cases, **counts)
-    return made, [line for case in made.cases for line in tried(case, member)]
+    return made, [*left_out, *(line for case in made.cases for line in tried(case, member))]
 
 
 def source(given: Any, name: str, components: tuple[str, ...], one_by_one: bool, cases: Sequence[Case]) -> Outside:
@@ -153,10 +169,12 @@ def source(given: Any, name: str, components: tuple[str, ...], one_by_one: bool,
     return Given(name, (x, P), found.hexdigest(), components)
 
 
-def command(experiment: Experiment, estimates: str, name: str, overrides: Sequence[str]) -> str:
+def command(
+    experiment: Experiment, estimates: str, name: str, overrides: Sequence[str], options: Sequence[str] = ()
+) -> str:
     """The command that judges a file again."""
     verb, own, *rest = shlex.split(configs.command(experiment, overrides, configs.RESULTS, verb="judge"))[1:]
-    return shlex.join(["radarsim", verb, own, estimates, "--name", name, *rest])
+    return shlex.join(["radarsim", verb, own, estimates, "--name", name, *options, *rest])
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------

@@ -28,19 +28,19 @@ from radarsim.app.solve import timed
 from radarsim.config import fields
 from radarsim.config.check import label
 from radarsim.config.document import did_you_mean
-from radarsim.config.experiment import Case, complete
+from radarsim.config.experiment import Case, Experiment, complete
 from radarsim.config.fields import NumericKey
 from radarsim.config.load import flow
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError, argument
 from radarsim.language import few, plural, tr
 from radarsim.report import tables
+from radarsim.report.outside import TUNED
 from radarsim.studies import registry
 
 if TYPE_CHECKING:
     import pandas as pd
 
-TUNED = "{name}, tuned"  # the filter with the new values beside the stated one
 FACTOR = 1e4  # of its value, to which a positive key is searched on both sides
 TRAINING = 2**32  # more than the seed of the config: the seed of the noise that is searched with
 MOST_KEYS = 6  # that are searched unless they are named
@@ -176,6 +176,14 @@ class Tuned(Shown):
             return tr("Tuning gains nothing that shows in the {quantity}: {gain} ({how}).", **told)
         return tr("Tuning gains {gain} in the {quantity}: {stated} → {tuned} ({how}).", **told)
 
+    def member(self, case: Case) -> dict[str, Any]:
+        """The tuned filter as the keys of a further one of a case."""
+        (i,) = [i for i, one in enumerate(case.spec.members) if one.name == self.filter]
+        made = complete(case.spec.members[i])
+        for key, value in self.settings.items():
+            put(made, path_of(key.split(".", 2)[2]), value)
+        return made | {"name": self.filter + TUNED}
+
     def _said(self) -> list[str]:
         return [self.answer, *(f"{one.key} = {question.with_unit(one.tuned, one.unit)}" for one in self.keys)]
 
@@ -195,17 +203,12 @@ class Variants:
             self.others = [name for name in names if name != chosen]
             self.base = self.of([chosen], against)
 
-    def of(self, names: Iterable[str], baseline: str | None, tuned: Mapping[str, Any] | None = None) -> Case:
-        """The case with these filters beside the others, and a tuned one. Raises ConfigError."""
-        spec, wanted = self.case.spec, {*names, *self.others}
-        members = [self.plain[one.name] for one in spec.members if one.name in wanted]
-        keys = complete(spec) | {type(spec).bare_keys: [*members, *([tuned] if tuned else [])]}
-        keys.pop("baseline", None)
-        keys |= {} if baseline is None else {"baseline": baseline}
-        made = {"study": self.case.study, "realisations": self.case.realisations, "seed": self.seed, **keys}
-        (one,) = load(made).cases
-        noise_of = self.case.noise_of or spec
-        return replace(one, name=self.case.name, stem=self.case.stem, swept=self.case.swept, noise_of=noise_of)
+    def of(self, names: Iterable[str], baseline: str | None, *tuned: Mapping[str, Any]) -> Case:
+        """The case with these filters beside the others, and tuned ones. Raises ConfigError."""
+        wanted = {*names, *self.others}
+        members = [self.plain[one.name] for one in self.case.spec.members if one.name in wanted]
+        made = with_filters(self.case, [*members, *tuned], baseline)
+        return replace(made, seed=self.seed, noise_of=self.case.noise_of or self.case.spec)
 
     def at(self, key: str, place: Place) -> Case:
         """The case with other values. Raises ConfigError where the config refuses them."""
@@ -218,7 +221,7 @@ class Variants:
 
     def beside(self, place: Place) -> Case:
         """The case with the filter as stated and as tuned, with the config's own seed."""
-        tuned = self.filter(place) | {"name": TUNED.format(name=self.chosen)}
+        tuned = self.filter(place) | {"name": self.chosen + TUNED}
         made = self.of([self.chosen], self.base.spec.baseline, tuned)
         return replace(made, seed=self.case.seed)
 
@@ -228,6 +231,14 @@ class Variants:
         for path, value in natural(self.searched, place, made).items():
             put(made, path, value)
         return made
+
+
+def with_filters(case: Case, members: Sequence[Mapping[str, Any]], baseline: str | None) -> Case:
+    """A case with other filters. Raises ConfigError where the config refuses them."""
+    own = {"study": case.study, "realisations": case.realisations, "seed": case.seed, "baseline": baseline}
+    keys = complete(case.spec) | own | {type(case.spec).bare_keys: members}
+    (made,) = load({key: value for key, value in keys.items() if value is not None}).cases
+    return replace(case, spec=made.spec)
 
 
 def natural(searched: Sequence[Searched], place: Place, plain: Mapping[str, Any]) -> dict[Path, float]:
@@ -248,6 +259,11 @@ def at_path(plain: Any, path: Path) -> Any:
     for step in path:
         plain = plain[step]
     return plain
+
+
+def path_of(text: str) -> Path:
+    """The path of a dotted key."""
+    return tuple(int(step) if step.isdecimal() else step for step in text.split("."))
 
 
 def put(plain: Any, path: Path, value: float) -> None:
@@ -302,7 +318,7 @@ def _searched(
 ) -> Searched | None:
     """A key as it is searched; None for the largest of probabilities that sum to one, which follows from the others,
     and for one of them that is zero."""
-    path: Path = tuple(int(step) if step.isdecimal() else step for step in text.split("."))
+    path = path_of(text)
     marks = type(member).model_fields[str(path[0])].metadata
     if any(isinstance(mark, fields.ColumnsOfOne) for mark in marks):
         column: dict[Path, float] = {}
@@ -605,7 +621,7 @@ def tune(
         of.rough = any(curve.rough for curve in curves)
         ends = {one.path: flat(of, searched, best, i) for i, one in enumerate(searched) if one.of is None}
     else:
-        names = chosen, TUNED.format(name=chosen)
+        names = chosen, chosen + TUNED
         pairs = [
             parted(one.beside(best), [replace(curve.quantity, filter=name) for name in names], count)
             for one, curve in zip(variants, curves, strict=True)
@@ -683,3 +699,24 @@ def _minimised(of: Objective, cases: int) -> str:
     if of.of.kind == "size":
         return tr("{quantity}, root mean square of {cases} cases", **told)
     return tr("{quantity}, mean of {cases} cases", **told)
+
+
+def beside(experiment: Experiment, wanted: str | None, **asked: Any) -> tuple[Experiment, list[str]]:
+    """The experiment with each of its filters as tuned over all its cases too, and why some are not.
+
+    wanted: for what, by default σ of the first component at the last scan; asked: as `tune` takes it.
+    """
+    case, found, left_out = experiment.cases[0], list[Tuned](), []
+    wanted = wanted or f"sigma {registry.study(case.study).prepare(case).axes.components[0][0]}"
+    for one in case.spec.members:
+        try:
+            found.append(tune(experiment, wanted, filter=one.name, **asked))
+        except ConfigError as error:
+            left_out.append(tr("{filter} is not tuned: {why}", filter=one.name, why=error.lines[0]))
+    made = [
+        with_filters(
+            each, [*map(complete, each.spec.members), *(one.member(each) for one in found)], each.spec.baseline
+        )
+        for each in experiment.cases
+    ]
+    return replace(experiment, cases=tuple(made)), left_out

@@ -199,6 +199,12 @@ def _compute_each(
 @group.config_argument
 @click.argument("estimates", metavar="ESTIMATES")
 @click.option("--name", default="mine", show_default=True, metavar="NAME", help="What the filter is called.")
+@click.option(
+    "--against",
+    type=click.Choice(["tuned"]),
+    help="Also judge it against the config's filters as `radarsim tune` tunes them.",
+)
+@click.option("--for", "wanted", metavar="TEXT", help="What they are tuned for; default: σ of the first component.")
 @group.realisations_option
 @group.seed_option
 @group.set_option
@@ -213,6 +219,8 @@ def judge(
     config: str,
     estimates: str,
     name: str,
+    against: str | None,
+    wanted: str | None,
     realisations: int | None,
     seed: int | None,
     overrides: tuple[str, ...],
@@ -245,6 +253,7 @@ def judge(
     Example
       radarsim simulate rls2 --realisations 0:10000 -o plots.npz
       radarsim judge rls2 estimates.npz --name mine
+      radarsim judge rls2 estimates.npz --against tuned --for "sigma r at 60 s"
     """
     _refuse_of_nothing(of, precision)
     from radarsim.engine import run as stopping
@@ -254,10 +263,12 @@ def judge(
         from radarsim.app import run as simulation
 
         (loaded,) = simulation.load_all([config], simulation.merged(overrides, None, seed))
-        made, warnings = judging.judged(loaded, estimates, name, realisations=realisations)
+        tuned: dict[str, Any] = {"against": against, "wanted": wanted}
+        options = [word for one in ((against, "--against"), (wanted, "--for")) if one[0] for word in (one[1], one[0])]
+        made, warnings = judging.judged(loaded, estimates, name, realisations=realisations, **tuned)
         if precision is not None:
             simulation.check_precision([made], precision, of)
-        again = judging.command(loaded, estimates, name, simulation.merged(overrides, realisations, seed))
+        again = judging.command(loaded, estimates, name, simulation.merged(overrides, realisations, seed), options)
         asked: dict[str, Any] = {"precision": precision, "of": of, "threads": threads, "stop": stop}
         asked |= {"command": again, **drawing.arguments}
         compute = partial(judging.finished, warnings=warnings, out=out, **asked)

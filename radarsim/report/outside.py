@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 Made = Mapping[str, "pd.DataFrame"]
 ROUNDING = 1e-6  # per cent: half-width of a gain that is nought but for rounding, whose variance is a difference
+TUNED = ", tuned"  # the end of the names of filters that `radarsim tune` has tuned
 GAIN = ("gain_percent", "gain_lo", "gain_hi")
 
 
@@ -180,7 +181,8 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
     curves = common.where(made["curves"], case=result.name, component=component, k=last["k"].iloc[0])
     sigma = dict(zip(curves["filter"], common.exact_first(curves, "sigma", "exact_sigma"), strict=True))
     own = [base for base in last["baseline"] if base in result.axes.filters]
-    best = min(own, key=lambda base: sigma[base])
+    tuned = [base for base in own if base.endswith(TUNED)]
+    best = min(set(own).difference(tuned), key=lambda base: sigma[base])
     row = last[last["baseline"] == best].iloc[0]
     told: dict[str, Any] = {"name": name, "best": best, "component": component, "t": f"{row['t_s']:g}"}
     told["gain"] = wording.estimate((row[key] for key in GAIN), "%", ".3g")
@@ -190,6 +192,16 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
         first = tr("{name} is worse than {best}, the config's best in {component} at {t} s: gain {gain}", **told)
     else:
         first = tr("{name} cannot be told from {best}, the config's best in {component} at {t} s: gain {gain}", **told)
+    if tuned:
+        rival = last[last["baseline"] == min(tuned, key=lambda base: sigma[base])].iloc[0]
+        told |= {"best": rival["baseline"], "gain": wording.estimate((rival[key] for key in GAIN), "%", ".3g")}
+        if rival["gain_lo"] > 0:
+            first += tr(", and better than {best}: gain {gain}", **told)
+        elif rival["gain_hi"] < 0:
+            first += tr(", and worse than {best}: gain {gain}", **told)
+        else:
+            first += tr(", and cannot be told from {best}: gain {gain}", **told)
+        first += tr(", whose σ is {sigma}", sigma=f"{sigma[rival['baseline']]:.4g} {panels.unit_of(unit)}".rstrip())
     mine = curves[curves["filter"] == name].iloc[0]
     sigmas = wording.estimate((mine[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(unit))
     said = [start + first + "; " + tr("its σ is {sigma}, {floor}.", sigma=sigmas, floor=_floor(curves, best, unit))]

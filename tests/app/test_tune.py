@@ -188,6 +188,58 @@ def test_a_rate_is_the_larger_the_better():
     assert "points" in found.answer
 
 
+# ---- the rival at its best -------------------------------------------------------------------------------------------
+def rival(variance):
+    """A filter of somebody else: r+Vr with another manoeuvre variance."""
+    from tests.app.test_judge import Twin
+
+    made = Twin()
+    begun = made.start
+
+    def start(world):
+        begun(world)
+        made.variance = variance
+
+    made.start = start
+    return made
+
+
+def test_a_filter_is_judged_against_the_tuned_one_too():
+    """In a turn a filter of a larger D_M beats the config's, and not the tuned one, which is the best of its kind."""
+    found = tune("rls2", "sigma r", filter="r+Vr", overrides=["target=turn"])
+    result = radarsim.judge(
+        "rls2", rival(20 * found.keys[0].tuned), against="tuned", overrides=["target=turn"], realisations=3000
+    )
+    first = result.answer[0]
+    assert first.startswith("mine is better than r+Vr, the config's best in r at 140 s: gain ")
+    assert ", and worse than r+Vr, tuned: gain −" in first
+    assert f"whose σ is {found.all.tuned:.4g} m; its σ is " in first
+    last = result.curves.query("component == 'r' and k == 15").set_index("filter")
+    assert last.loc["r+Vr, tuned", "exact_sigma"] == pytest.approx(found.all.tuned, rel=1e-9)
+    plain = radarsim.run("rls2", overrides=["target=turn"], realisations=3000).curves
+    own = result.curves[result.curves["filter"].isin(["r", "r+Vr"])]
+    assert own["sigma"].to_numpy() == pytest.approx(plain["sigma"].to_numpy(), rel=1e-12)
+
+
+def test_a_rival_that_is_the_tuned_filter_gains_nothing_on_it():
+    found = tune("rls2", "sigma r at 60 s", filter="r+Vr", overrides=["target=turn"])
+    given = {"against": "tuned", "wanted": "sigma r at 60 s", "overrides": ["target=turn"], "realisations": 2000}
+    gains = radarsim.judge("rls2", rival(found.keys[0].tuned), **given).gains
+    rows = gains.query("filter == 'mine' and baseline == 'r+Vr, tuned' and component == 'r' and k > 2")
+    assert (rows["gain_percent"].abs() < 1e-6).all()
+    assert ((rows["gain_lo"] <= 0) & (rows["gain_hi"] >= 0)).all()
+
+
+def test_what_cannot_be_tuned_is_said():
+    result = radarsim.judge("rls2", rival(1e-3), against="tuned", wanted="sigma Vr at 10 s", realisations=300)
+    assert any(line.startswith("r is not tuned: ") for line in result.warnings)
+
+
+def test_against_is_tuned_or_nothing():
+    with pytest.raises(ConfigError, match="against: must be tuned, got 'best'"):
+        radarsim.judge("rls2", rival(1e-3), against="best", realisations=300)
+
+
 # ---- command ---------------------------------------------------------------------------------------------------------
 def test_the_command_prints_and_writes(tmp_path):
     words = ("tune", "rls2", "--filter", "r+Vr", "--for", "sigma r at 60 s", "--over", "turn", "--over", "jerk_pulse")
