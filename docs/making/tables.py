@@ -8,7 +8,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import NamedTuple
 
-from radarsim.report import notes, rare
+from radarsim.report import notes, outside, rare
 from radarsim.report import tables as common
 from radarsim.studies import registry
 
@@ -19,6 +19,8 @@ SEVERAL = {  # tables that studies have in common
     "believed": (notes.believed, notes.ratio_columns),
     "consistency": (notes.normalised,),
     "rare": (rare.rows,),
+    "failures": (outside.failures,),
+    "nees": (outside.consistency, notes.normalised),
 }
 UNITS = {  # by how a name ends
     **{"_s": "s", "_m": "m", "_mps": "m/s", "_mps2": "m/s²", "_rad": "rad", "_hz": "Hz", "_db": "dB"},

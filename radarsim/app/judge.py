@@ -29,7 +29,6 @@ MATERIAL = 1e-3  # of a component's rms error: changes below it are rounding, wh
 FOLLOWS = 50  # realisations from which on it is tested whether errors follow the plots
 REARRANGED = 10.0  # times: by so much smaller are errors in another order only where that is the right one
 AXES = "realisation", "k", "t_s"  # columns of a table of estimates beside the components
-ARRAYS = "estimates", "covariances", "realisations", "components", "seed", "config"
 
 
 def judge(
@@ -205,7 +204,7 @@ def _of_arrays(
     if "seed" in held and int(held["seed"]) != case.seed:
         raise ConfigError(f"{path}: of plots with seed {int(held['seed'])}; the run has seed {case.seed}")
     x, P = held["estimates"], held.get("covariances")
-    rows = np.asarray(held.get("realisations", np.arange(len(x)))).ravel()
+    rows = next((held[one].ravel() for one in ("realisations", "realisation") if one in held), np.arange(len(x)))
     if len(rows) != len(x):
         raise ConfigError(
             f"{path}: realisations: must be {len(x)} numbers, as many as there are estimates, got {len(rows)}"

@@ -61,8 +61,9 @@ def _gains(result: CaseResult, base: str, of: CaseResult) -> common.Columns:
 def failures(result: CaseResult) -> common.Columns:
     """How often a filter from outside fails, by the reason; σ and gains are of the other realisations.
 
-    reason: `any`; `not_a_number`: after an estimate; `no_estimate` although a filter of the config has one; `diverged`:
-        an error over a hundred times the largest of the config's filters in the realisation
+    reason: `any`, or `not_a_number` after an estimate, `no_estimate` though a filter of the config has one, `diverged`
+        with an error over a hundred times the largest of the config's filters in the realisation
+    failed: realisations
     share ±: of all realisations
     """
     rows = []

@@ -1,6 +1,8 @@
 """A filter from outside beside the config's: what its numbers are, and what is refused or said of it."""
 
 import json
+import time
+import tracemalloc
 
 import numpy as np
 import pandas as pd
@@ -12,6 +14,8 @@ from radarsim.app import judge as judging
 from radarsim.app.configs import CaseWork, load
 from radarsim.cli import main
 from radarsim.errors import ConfigError
+from radarsim.report import outside
+from radarsim.report import tables as common
 from tests.studies.range_doppler import naive
 
 
@@ -412,3 +416,99 @@ def test_studies_without_paired_plots_are_refused_with_the_reason():
     for config, why in (("discriminator", "draws no plots"), ("sonar_clutter", "trackers find tracks of their own")):
         with pytest.raises(ConfigError, match=why):
             radarsim.judge(config, held, realisations=64)
+
+
+# ---- a planted loss --------------------------------------------------------------------------------------------------
+LOSS = 0.02  # of σ, by independent noise of √(1.02² − 1) σ beside the twin's errors
+NOISE = np.sqrt((1 + LOSS) ** 2 - 1)
+SPREAD = np.sqrt(1 - 1 / (1 + LOSS) ** 2)  # of ln σ/σ_base, times √n: √(1 − ρ²), ρ the correlation of the two errors
+
+
+class Worse:
+    """The config's r+Vr, of which only errors are needed, with 2 % of loss in every component at every scan."""
+
+    def __init__(self, n, seed):
+        plan = plan_of(seed)
+        drawn = plan.draw(0, n)
+        truth = drawn.truth_of(plan.axes.components)
+        error = judging.outside.inner_errors(plan, 0, n)[1]
+        noise = np.random.default_rng(seed).normal(size=error.shape)
+        self.estimates = truth + error + NOISE * np.nan_to_num(plan.inner.axes.exact_sigma[1]) * noise
+
+
+def plan_of(seed):
+    experiment, _ = judging.judged(load("rls2", [f"seed={seed}"]), twin, "mine", realisations=10)
+    return CaseWork(experiment.cases[0]).plans[-1]
+
+
+def gains_of(n, seed):
+    result = radarsim.judge("rls2", Worse(n, seed).estimates, seed=seed)
+    return result, of(result.gains, filter="mine", baseline="r+Vr")
+
+
+def test_a_planted_loss_is_known_as_well_as_theory_says():
+    """The half-width of the gain is 1.96·1.02·√(1 − ρ²)/√n, to some 1/√n of it; unpaired it were five times that."""
+    n = 2000
+    result, gains = gains_of(n, 1)
+    theirs = 1.96 * 100 * (1 + LOSS) * SPREAD / np.sqrt(n)
+    mine = (gains["gain_hi"] - gains["gain_lo"]) / 2
+    np.testing.assert_allclose(mine, theirs, rtol=6 / np.sqrt(n))
+    assert "mine is worse than r+Vr" in result.answer[0]
+
+
+@pytest.mark.slow
+def test_a_planted_loss_is_called_worse_with_the_realisations_of_theory():
+    """Where half of the interval is the loss, half of the seeds call it; with four times as many 97.5 %."""
+    n = round((1.96 * SPREAD / np.log(1 + LOSS)) ** 2)
+    seeds = range(1, 61)
+    for count, power in ((n, 0.5), (4 * n, 0.975)):
+        called = [(g := of(gains_of(count, seed)[1], component="r", k=15))["gain_hi"].iloc[0] < 0 for seed in seeds]
+        assert abs(np.mean(called) - power) < 3 * np.sqrt(power * (1 - power) / len(seeds)) + 1 / len(seeds), (count, g)
+
+
+@pytest.mark.slow
+def test_gains_cover_the_true_one():
+    """Over 200 seeds, of all components and scans: 93 … 97 %."""
+    inside = []
+    for seed in range(1, 201):
+        _, gains = gains_of(500, seed)
+        inside.append(((gains["gain_lo"] < -100 * LOSS) & (gains["gain_hi"] > -100 * LOSS)).mean())
+    assert 0.93 < np.mean(inside) < 0.97
+
+
+@pytest.mark.slow
+def test_nees_of_a_right_covariance_covers_one():
+    """Of Gaussian estimates with the covariance that they have, three components: 93 … 97 % of 200 seeds."""
+    inside = []
+    for seed in range(1, 201):
+        plan = plan_of(seed)
+        truth = plan.draw(0, 400).truth
+        P = np.array([[250.0**2, 900, 0], [900, 15.0**2, 1], [0, 1, 0.3]])
+        noise = np.random.default_rng(seed).normal(size=truth.shape) @ np.linalg.cholesky(P).T
+        member = judging.source((truth + noise, np.broadcast_to(P, (*truth.shape, 3))), "mine", (), False, [None])
+        case = judging.replace(load("rls2", [f"seed={seed}"]).cases[0], outside=(member,), realisations=400)
+        work = CaseWork(case)
+        found = judging.run.case_result(case, work, judging.run.collect(work, 400, threads=0))
+        rows = common.joined([outside.consistency(found)])
+        inside.append(((rows["nees_lo"] < 1) & (rows["nees_hi"] > 1)).mean())
+    assert 0.93 < np.mean(inside) < 0.97
+
+
+@pytest.mark.slow
+def test_memory_is_flat_in_the_number_of_realisations():
+    """Twenty blocks more add nothing to the peak of two."""
+    peaks = []
+    for n in (2 * 4096, 22 * 4096):
+        tracemalloc.start()
+        radarsim.judge("rls2", Twin, realisations=n, threads=1)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.2 * peaks[0]
+
+
+@pytest.mark.slow
+def test_a_hundred_thousand_realisations_take_five_seconds():
+    radarsim.judge("rls2", Twin, realisations=300)  # compiles
+    before = time.process_time()
+    radarsim.judge("rls2", Twin, realisations=1e5)
+    assert time.process_time() - before < 5
