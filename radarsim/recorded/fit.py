@@ -15,10 +15,8 @@ does not look like that: it shows in the velocities themselves.
 import itertools
 import math
 import os
-import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -30,7 +28,6 @@ from radarsim.language import tr
 from radarsim.recorded import plots
 from radarsim.recorded.follow import by_track, one_case, recorded_of, refuse_borrowed
 from radarsim.report.wording import significant_digits
-from radarsim.studies import registry
 from radarsim.studies.interface import BIAS, CORRELATION, EXPLANATIONS, OUTLIERS, Likelihood
 
 # ---- along -----------------------------------------------------------------------------------------------------------
@@ -143,7 +140,7 @@ WIDEST = 2.0  # times its usual length that a window of plots may last
 CLEAR = 4.0  # standard deviations by which a range changes faster than a velocity can be
 LEAST_PLOTS, LEAST_SHARE_OF_PLOTS = 3, 0.1  # of the plots examined that must do so
 CHANCE, FOUND = 1.0, 3.0  # standard deviations that distinguish whole spans from chance: for a known span, for any
-VELOCITY, MEASURED = "velocity_mps", ("range_m", "velocity_mps")
+VELOCITY = "velocity_mps"
 STEPS = 200  # of a search for the span, in which the phase of the largest velocity turns once
 
 
@@ -183,14 +180,13 @@ def folding(tracks: Sequence[Mapping[str, np.ndarray]], span_mps: float | None =
 def folded(case: Case, tracks: Sequence[Mapping[str, np.ndarray]]) -> Folding | None:
     """Whether velocities of tracks, columns (n,) each, are folded although a case's study takes them as measured."""
     of = recorded_of(case)
-    if VELOCITY not in tracks[0] or of.unfolding(1.0) is not None:
+    if VELOCITY not in tracks[0] or of.unfolds():
         return None
     return folding(tracks, of.span_mps(case.spec))
 
 
-def said(found: Folding, source: str | os.PathLike, case: Case | None = None) -> str:
-    """A message that velocities are folded, by which span, and the command that unfolds them; source: the file of
-    plots; case: its radar, where there is one."""
+def said(found: Folding, case: Case | None = None) -> str:
+    """The message that velocities are folded, with the settings that unfold them; case: of the radar, if known."""
     told = {
         "velocity": significant_digits(found.velocity_mps, "#.3g"),
         "rate": significant_digits(found.rate_mps, "#.3g"),
@@ -207,24 +203,13 @@ def said(found: Folding, source: str | os.PathLike, case: Case | None = None) ->
         by = tr("the plots suggest a span of about {span} m/s, or an integer fraction of it", span=span)
     else:
         by = tr("the plots suggest a span of about {span} m/s", span=span)
-    return "; ".join([seen, by, *_unfolded(found, source, case)])
-
-
-def _unfolded(found: Folding, source: str | os.PathLike, case: Case | None) -> list[str]:
-    """The command whose filters take the velocities as they are, with the config's statements on their errors."""
-    span = found.span_mps or 2 * found.velocity_mps
-    parts = [one for one in registry.parts(lambda study: study.recorded()).values() if one is not None]
-    ways = [way for part in parts if (way := part.unfolding(float(f"{span:.4g}"))) is not None]
-    if not ways:
-        return []
-    stated = []
-    if case is not None:
-        keys = recorded_of(case).sigmas(case.spec)
-        stated = [f"{key}={attrgetter(key)(case.spec):g}" for name in MEASURED for key in keys.get(name, ())]
-    settings = " ".join(f"--set {one}" for one in (ways[0][1], *stated))
-    plots = shlex.quote(os.fspath(source))
-    command = f"radarsim track {ways[0][0]} {plots} -o unfolded.csv {settings}"
-    return [tr("for filters that unfold them: {command}", command=command)]
+    parts = [seen, by]
+    if case is None:
+        parts.append(tr("with a config of the radar, `radarsim track` names the settings that unfold them"))
+    elif settings := recorded_of(case).unfolding(case.spec, found.span_mps or float(f"{2 * found.velocity_mps:.4g}")):
+        every = " ".join(f"--set {one}" for one in settings)
+        parts.append(tr("for filters that unfold them: the same command with {settings}", settings=every))
+    return "; ".join(parts)
 
 
 def _rates(tracks: Sequence[np.ndarray], least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
@@ -356,7 +341,7 @@ def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name
     found = of.likelihood(case, filter_name, long)
     folding = folded(case, long)
     if folding and found is not None and VELOCITY in found.by_number(np.asarray(found.stated)):
-        raise ConfigError(f"{source}: {said(folding, source, case)}")
+        raise ConfigError(f"{source}: {said(folding, case)}")
     if found is None:
         raise ConfigError(unlikely(case, filter_name, [name for name in names if of.likelihood(case, name, long)]))
     return found

@@ -300,7 +300,6 @@ class Followed:
     """The filters over a file of plots: rows, time, gaps, missing values, tests; data for figures and checks."""
 
     case: Case
-    source: str | os.PathLike = "PLOTS.csv"
     rows: int = 0
     first_s: float = np.nan
     last_s: float = np.nan
@@ -419,7 +418,7 @@ class Follower:
     def __init__(self, case: Case, source: str | os.PathLike, name: str | None):
         of = recorded_of(case)
         self.source, self.name = source, name
-        self.tracker, self.followed = of.tracker(case), Followed(case, source)
+        self.tracker, self.followed = of.tracker(case), Followed(case)
         self.twin = Twin(of.tracker(case), of.scan_period_s(case.spec))
 
     def feed(self, own: "Own") -> Track:

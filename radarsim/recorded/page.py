@@ -162,7 +162,7 @@ def likely(followed: Followed, advised: Advice) -> list[str]:
             )
         )
     if advised.folding is not None:
-        lines.append(labelled("advice", fit.said(advised.folding, followed.source, followed.case)))
+        lines.append(labelled("advice", fit.said(advised.folding, followed.case)))
     elif not advised.findings:
         words = plural(
             "the stated values of {filter} agree with {count} row",

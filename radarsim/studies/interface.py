@@ -261,13 +261,12 @@ class RecordedPlots(ABC):
         """The span by which velocities of a config's radar are ambiguous, m/s; None, the default, if not stated."""
         return None
 
-    def unfolding(self, span_mps: float) -> tuple[str, str] | None:
-        """A shipped config whose filters take velocities folded by this span (m/s), and its setting `KEY=VALUE`; None,
-        the default, where velocities are taken as measured."""
-        return None
+    def unfolding(self, spec: Any, span_mps: float) -> Sequence[str]:
+        """The settings `KEY=VALUE` with which a config takes velocities folded by this span; none by default."""
+        return ()
 
-    def unfolds(self, one: Any) -> bool:
-        """Whether a filter of a config decides by how many spans a velocity is folded; not, by default."""
+    def unfolds(self, one: Any = None) -> bool:
+        """Whether a filter, by default any of the study, unfolds velocities by itself; by default not."""
         return False
 
     def in_a_turn(self, case: "Case", filter_name: str, values: Mapping[str, float]) -> "Turning | None":

@@ -10,7 +10,7 @@ from radarsim.app.run import load_all
 from radarsim.cli.verdicts import report
 from radarsim.recorded import follow, plots
 from radarsim.recorded.figures import DOUBT, FITS, LOST, judged
-from radarsim.recorded.fit import folding
+from radarsim.recorded.fit import folding, said
 from tests.program import Terminal, command
 
 SPAN = 60.0  # m/s: 0.1 m at 1.2 kHz
@@ -75,16 +75,22 @@ def test_track_and_fit_notice_folded_velocities(flown, tmp_path, monkeypatch):
     assert "to use the fitted values" in command("fit", "rls2", "folded.csv", "--filter", "r", *options()).stdout
 
 
-def test_the_command_that_is_named_unfolds_them(flown, tmp_path, monkeypatch):
+@pytest.mark.parametrize("known", [KNOWING, KNOWING[:1]], ids=["rate known", "rate not known"])
+def test_the_settings_that_are_named_unfold_them(flown, tmp_path, monkeypatch, known):
     monkeypatch.chdir(tmp_path)
     plots.write_columns({name: column[:40] for name, column in folded(flown).items()}, "folded.csv")
-    text = command("track", "rls2", "folded.csv", "-o", "track.csv", *options(*KNOWING)).stdout
-    (words,) = re.findall(r"radarsim (track .*)$", text, re.M)
-    assert "radar.sigma_velocity_mps=3" in words
-    command(*shlex.split(words), "-q")
-    rows = [line.split(",") for line in (tmp_path / "unfolded.csv").read_text().splitlines()]
-    *_, last = (float(row[4]) for row in rows if row[1:3] == ["memory", "Vr"])
+    words = ["track", "rls2", "folded.csv", "-o", "track.csv", *options(*known)]
+    (settings,) = re.findall(r"the same command with (.*)$", command(*words).stdout, re.M)
+    assert ("repetition_rate_hz" in settings) == (known != KNOWING)
+    command(*words, *shlex.split(settings), "-q")
+    rows = [line.split(",") for line in (tmp_path / "track.csv").read_text().splitlines()]
+    *_, last = (float(row[4]) for row in rows if row[1:3] == ["r+Vr", "Vr"])
     assert last == pytest.approx(-250, abs=15)  # and not 10
+
+
+def test_of_what_cannot_be_carried_over_no_settings_are_named(flown):
+    (one,) = loaded("radar.bias_range_m=3").cases
+    assert said(folding([folded(flown)], SPAN), one).endswith("the config's span is 60.0 m/s")
 
 
 def test_a_filter_that_lost_its_fold_is_not_taken_for_inaccurate_plots(tmp_path, monkeypatch):
@@ -117,9 +123,9 @@ def test_import_notices_them_where_the_recording_does_not_say_by_what(flown, tmp
     for t, r, v in zip(*folded(flown).values(), strict=True):
         rows += [f"{t},{r},{v},a"] if np.isfinite(r) else []
     (tmp_path / "log.csv").write_text("\n".join(rows))
-    said = command("import", tmp_path / "log.csv", "-o", tmp_path / "plots.csv").stderr
-    assert "the velocities are folded" in said
-    assert "radarsim track ambiguous_rls2" in said
+    told = command("import", tmp_path / "log.csv", "-o", tmp_path / "plots.csv").stderr
+    assert "the velocities are folded" in told
+    assert "`radarsim track` names the settings" in told
     spans = [f"{rows[0]},span", *(f"{row},{SPAN}" for row in rows[1:])]
     (tmp_path / "spans.csv").write_text("\n".join(spans))
     assert "are folded" not in command("import", tmp_path / "spans.csv", "-o", tmp_path / "two.csv").stderr

@@ -184,7 +184,7 @@ def import_recording(
         raise ConfigError("truth: needs the place of one radar, --at LAT,LON,HEIGHT; import other radars by themselves")
     truth = _Truth(path, options) if options.site else None
     with opened(path, options) as (kind, reader):
-        work = _Import(kind, reader, options, truth, output)
+        work = _Import(kind, reader, options, truth)
         with Writer(output, {"the recording": path, "the truth": options.truth}) as file:
             first = True
             for rows in work.rows():
@@ -204,10 +204,8 @@ def import_recording(
 class _Import:
     """An import in progress: batches in, rows out."""
 
-    def __init__(
-        self, kind: Format, reader: Reader, options: Options, truth: "_Truth | None", output: str | os.PathLike
-    ):
-        self.reader, self.options, self.truth, self.output = reader, options, truth, output
+    def __init__(self, kind: Format, reader: Reader, options: Options, truth: "_Truth | None"):
+        self.reader, self.options, self.truth = reader, options, truth
         self.done = Imported(kind)
         self.zero: float | None = None
         self.last: dict[str, float] = {}
@@ -389,7 +387,7 @@ class _Import:
         if note := self.sign.note(self.options.towards):
             done.notes.append(note)
         if (folded := fit.folding(self.folds.tracks())) is not None:
-            done.notes.append(fit.said(folded, self.output))
+            done.notes.append(fit.said(folded))
         return done
 
 

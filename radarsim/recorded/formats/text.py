@@ -114,7 +114,8 @@ class Table:
     def __init__(self, path: str, file: TextIO, given: Mapping[str, str] | None = None, encoding: str = "UTF-8"):
         """encoding: of the file."""
         self.path, self.records, self.highest, self.encoding = path, 0, 0.0, encoding
-        self.commas: set[str] = set()  # numbers with a comma, until one cannot be of thousands
+        self.doubtful = ""  # the first number whose comma may separate thousands
+        self.decimal = False  # a comma that cannot has been read
         self.skipped: Counter[str] = Counter()
         self.faults = Faults(path)
         header = self._opened(file)
@@ -124,6 +125,7 @@ class Table:
         self.maritime = any(name in MARITIME for name, _ in names)
         self.clock = sites.Unrolled(sites.DAY_S, near_s=MIDNIGHT_S)
         self.before_it: dict[str, tuple[float, ...]] = {}  # the last position of each track
+        self.stated: set[str] = set()  # columns whose unit --column states
         self.columns = self._found(header, given or {})
         self.kind = sites.POSITIONS if set(ON_EARTH) <= set(self.columns) else sites.PLOTS
         self._complete(header)
@@ -155,16 +157,16 @@ class Table:
 
     def notes(self) -> list[str]:
         """Assumptions on units, and signs against them."""
-        plain = {ours: c.name for ours, c in self.columns.items() if not split(c.name)[1]}
+        plain = {ours: c.name for ours, c in self.columns.items() if ours not in self.stated and not split(c.name)[1]}
         units = {"range_m": "m", "bearing_rad": "degrees", "velocity_mps": "m/s", "span_mps": "m/s", "altitude_m": "m"}
         units |= {"speed_mps": "m/s", "up_mps": "m/s"} | {ours: c.unit for ours, c in self.columns.items() if c.unit}
         taken = ", ".join(f"{name} in {units[ours]}" for ours, name in plain.items() if ours in units)
         found = [f"assumed because the name has no unit: {taken}"] if taken else []
         if self.encoding != "UTF-8":
             found.append(f"the text is read as {self.encoding}, as it is not UTF-8; for another: --encoding NAME")
-        if self.commas and "" not in self.commas:
-            number = min(self.commas)
-            found.append(f"commas are decimal: {number} is read as {float(number.replace(',', '.')):g}")
+        if self.doubtful and not self.decimal:
+            value = float(self.doubtful.replace(",", "."))
+            found.append(f"commas are decimal: {self.doubtful} is read as {value:g}")
         time = self.columns["t_s"].name
         if others := [name for name in self.header if split(name)[0] in NAMES["t_s"] and name != time]:
             found.append(f"times are {time}; not used: {', '.join(others)}")
@@ -192,11 +194,18 @@ class Table:
         """Our columns in the header; those assigned by the user first."""
         found: dict[str, Column] = {}
         names = [name.strip() for name in header]
-        for ours, theirs in given.items() if header else ():
-            if ours not in NAMES or theirs not in names:
-                allowed = f"one of {', '.join(NAMES)}" if ours not in NAMES else f"a column of {', '.join(names)}"
-                raise ConfigError(f"{self.path}:1: column {ours}={theirs}: must name {allowed}")
-            found[ours] = self._column(ours, names.index(theirs), header)
+        stems = {split(ours)[0]: ours for ours in NAMES}
+        for name, theirs in given.items() if header else ():
+            stem, unit = split(name)
+            ours = name if name in NAMES else stems.get(stem, "")
+            if not ours or theirs not in names:
+                allowed = f"a column of {', '.join(names)}" if ours else f"one of {', '.join(NAMES)}, in any unit"
+                raise ConfigError(f"{self.path}:1: column {name}={theirs}: must name {allowed}")
+            unit, own = "" if name == ours else unit, split(theirs)[1]
+            if unit and own and unit != own:
+                raise ConfigError(f"{self.path}:1: column {name}={theirs}: must have the unit of its own name, {own}")
+            self.stated |= {ours} if unit else set()
+            found[ours] = self._column(ours, names.index(theirs), header, unit)
         earth = any(split(name)[0] in (*NAMES["latitude_deg"], POSITION) for name in header)
         places = {split(name)[0]: i for i, name in reversed(list(enumerate(header)))}
         for ours, known in NAMES.items():
@@ -209,8 +218,9 @@ class Table:
             found |= {ours: self._column(ours, places[POSITION], header) for ours in ON_EARTH}
         return found
 
-    def _column(self, ours: str, place: int, header: list[str]) -> Column:
-        name, unit = header[place].strip(), split(header[place])[1]
+    def _column(self, ours: str, place: int, header: list[str], given: str = "") -> Column:
+        """given: the unit that --column gives it, where its own name has none."""
+        name, unit = header[place].strip(), split(header[place])[1] or given
         if [one.strip() for one in header].count(name) > 1:
             raise ConfigError(f"{self.path}:1: {name}: must be the name of one column; several have it")
         taken = ""
@@ -327,8 +337,10 @@ class Table:
         """A number with a decimal point."""
         if not self.decimal_comma or text.count(",") != 1 or "." in text:
             return text
-        if "" not in self.commas and not (self.commas and THOUSANDS.fullmatch(text)):
-            self.commas.add(text if THOUSANDS.fullmatch(text) else "")
+        if THOUSANDS.fullmatch(text):
+            self.doubtful = self.doubtful or text
+        else:
+            self.decimal = True
         return text.replace(",", ".")
 
     def _fault(self, ours: str, must: str, got: str) -> None:

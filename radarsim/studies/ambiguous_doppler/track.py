@@ -450,7 +450,6 @@ def _smoothest(estimates: np.ndarray, widths: np.ndarray) -> int:
 COLUMNS = ("t_s", "range_m", "velocity_mps")
 SPAN = "span_mps"  # a further column: what each velocity is ambiguous by, where the file says so
 MEASURED = (("range_m", "m"), ("velocity_mps", "m/s"))
-UNFOLDS, UNFOLDS_WAVELENGTH_M = "ambiguous_rls2", 0.15  # a shipped config for folded velocities of any radar
 LEAST_SIGMA, LEAST_MANOEUVRE = 1e-4, 1e-6  # of the stated values, which count as zero
 
 
@@ -602,11 +601,8 @@ class Recorded(RecordedPlots):
     def scan_period_s(self, spec: Any) -> float:
         return spec.radar.scan_period_s
 
-    def unfolding(self, span_mps: float) -> tuple[str, str]:
-        return UNFOLDS, f"radar.repetition_rate_hz={2 * span_mps / UNFOLDS_WAVELENGTH_M:.6g}"
-
-    def unfolds(self, one: Any) -> bool:
-        return bool(getattr(one, "doppler", "") == "folded")
+    def unfolds(self, one: Any = None) -> bool:
+        return one is None or one.doppler == "folded"
 
     def likelihood(
         self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]

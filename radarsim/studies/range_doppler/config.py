@@ -38,6 +38,7 @@ from radarsim.config.fields import (
     readable,
 )
 
+FOLDED = "study=ambiguous_doppler"  # takes the same config over
 PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
 
 
@@ -283,3 +284,20 @@ class Keys(Lasting):
     def _within_reach(self) -> Iterator[At]:
         last = (self.plots - 1) * self.radar.scan_period_s
         yield from fields.within_reach(self.target, self.radar, last)
+
+
+def can_fold(spec: Keys) -> bool:
+    """Whether the config can be carried over to folded velocities: it has nothing that only this study knows."""
+    target, plain = spec.target, all(isinstance(one, Filter) for one in spec.filters)
+    drawn = any(getattr(target, name, 0) for name in ("sigma_position_m", "sigma_velocity_mps"))
+    noises = {getattr(one, "process_noise", "") for one in spec.filters}
+    given = all(isinstance(variance_of(one), float) for one in spec.filters)
+    radar = spec.radar.model_copy(update={"detection_probability": 1.0})
+    return (
+        plain
+        and given
+        and noises == {"random_jerk"}
+        and radar.as_the_papers
+        and not drawn
+        and target.kind != "jerk_pulse"
+    )

@@ -16,7 +16,16 @@ from radarsim.kernels.algebra import pack, unpack
 from radarsim.kernels.hypotheses import lasting, log_likelihood
 from radarsim.physics import transition
 from radarsim.studies.interface import EXPLANATIONS, Draw, Drawn, RecordedPlots, Turning
-from radarsim.studies.range_doppler.config import MOST_SCANS, Filter, FilterKeys, Keys, Turn, variance_of
+from radarsim.studies.range_doppler.config import (
+    FOLDED,
+    MOST_SCANS,
+    Filter,
+    FilterKeys,
+    Keys,
+    Turn,
+    can_fold,
+    variance_of,
+)
 from radarsim.studies.range_doppler.filters import least_squares, noise_by_time, observation
 from radarsim.studies.range_doppler.given import GivenGains, Scans, followed
 from radarsim.studies.range_doppler.kernels import missed, rows
@@ -336,6 +345,10 @@ class Recorded(RecordedPlots):
             if "repetition_rate_hz" in radar.model_fields_set
             else None
         )
+
+    def unfolding(self, spec: Keys, span_mps: float) -> Sequence[str]:
+        rate = f"radar.repetition_rate_hz={2 * span_mps / spec.radar.wavelength_m:.6g}"
+        return (FOLDED, *([] if self.span_mps(spec) == span_mps else [rate])) if can_fold(spec) else ()
 
     def in_a_turn(self, case: Case, filter_name: str, values: Mapping[str, float]) -> Turning | None:
         variance = values.get("manoeuvre_variance")

@@ -10,7 +10,7 @@ from radarsim.language import listed, numeral, plural, term, tr
 from radarsim.report import panels, tables, wording
 from radarsim.report.quantities import RADIAL
 from radarsim.studies.range_doppler import tuning
-from radarsim.studies.range_doppler.config import Best, Filter, variance_of
+from radarsim.studies.range_doppler.config import FOLDED, Best, can_fold, variance_of
 from radarsim.studies.range_doppler.study import prepare
 from radarsim.studies.range_doppler.tables import PERIODS, Result, follows_the_model, span_mps, steady_sigma
 
@@ -360,13 +360,10 @@ def _looked_for(results: Sequence[Result]) -> list[str]:
     return sentences
 
 
-FOLDED = "--set study=ambiguous_doppler"  # takes the same config over
-
-
 def _ambiguity(results: Sequence[Result]) -> list[str]:
     """That velocities are not folded, where a config gives the repetition rate."""
     sentences: dict[str, str] = {}
-    folds = all(_can_fold(result.spec) for result in results)
+    folds = all(can_fold(result.spec) for result in results)
     for result in results:
         if "repetition_rate_hz" in result.spec.radar.model_fields_set and (result.axes.observes == 2).any():
             span, speed = span_mps(result), result.axes.speed_mps
@@ -382,25 +379,8 @@ def _ambiguity(results: Sequence[Result]) -> list[str]:
             "Velocities are assumed unambiguous; the repetition rate alone distinguishes only λF/2 ({spans}).",
             spans="; ".join(f"{name}: {span}" for name, span in sentences.items()),
         ),
-        *([tr("With folded velocities: the same command with {setting}.", setting=FOLDED)] if folds else []),
+        *([tr("With folded velocities: the same command with {setting}.", setting=f"--set {FOLDED}")] if folds else []),
     ]
-
-
-def _can_fold(spec: Any) -> bool:
-    """Whether the config can be carried over to folded velocities: it has nothing that only this study knows."""
-    target, plain = spec.target, all(isinstance(one, Filter) for one in spec.filters)
-    drawn = any(getattr(target, name, 0) for name in ("sigma_position_m", "sigma_velocity_mps"))
-    noises = {getattr(one, "process_noise", "") for one in spec.filters}
-    given = all(isinstance(variance_of(one), float) for one in spec.filters)
-    radar = spec.radar.model_copy(update={"detection_probability": 1.0})
-    return (
-        plain
-        and given
-        and noises == {"random_jerk"}
-        and radar.as_the_papers
-        and not drawn
-        and target.kind != "jerk_pulse"
-    )
 
 
 def _worst(rows: "pd.DataFrame") -> str:

@@ -485,6 +485,14 @@ def test_a_column_named_by_hand(tmp_path):
     assert imported(tmp_path, text, Options(columns=columns))[1]["range_m"].tolist() == [200, 201]
     (line,) = refused_again(tmp_path, text, Options(columns={"range_m": "d3"}))
     assert "must name a column of when, d1, d2" in line
+    columns = {"t_ms": "when", "range_km": "d2"}
+    done, found, _ = imported(tmp_path, text, Options(columns=columns, zero="midnight"))
+    assert (found["range_m"].tolist(), found["t_s"].tolist()) == ([200e3, 201e3], [1e-3, 2e-3])
+    assert not any("assumed" in note for note in done.notes)
+    (line,) = refused_again(tmp_path, text, Options(columns={"height_km": "d2"}))
+    assert "column height_km=d2: must name one of t_s, track" in line
+    (line,) = refused_again(tmp_path, b"t,d [m]\n1,2\n", Options(columns={"range_km": "d [m]"}), write=True)
+    assert "column range_km=d [m]: must have the unit of its own name, m" in line
 
 
 def refused_again(tmp_path, data, options, write=False):
