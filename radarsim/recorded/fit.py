@@ -275,7 +275,6 @@ HALF_CHI2_95 = 1.9207294103470  # half the 95 % point of chi-square with one deg
 LEAST_ROWS = 10  # of a track; shorter ones carry almost no information
 FIRST_STEP, ROUGH = 0.3, 1e-4  # step of a search at its start, and its end before a restart, in the same logarithms
 REACH = 1e4  # ratio to the estimate up to which an end of an interval is searched
-EVALUATIONS = 2000
 # Accuracy of a maximum and of an interval's end, in the logarithm of a key; of the likelihood a tenth of that. Far
 # finer than printed digits, since the path of a search depends on last digits, and these differ between processors.
 CLOSE = 1e-6
@@ -286,6 +285,7 @@ MOST_TOGETHER = 0.999  # of the correlation of two keys
 MOST_STEPS = 40
 SHORT_SIMPLEX = (50, 100, 200)  # evaluations of a simplex before Newton steps are tried again
 RISES = np.array([2.0, 4.0, 6.0])  # below these a key that may be zero is clearly not zero, in that logarithm
+FROM_ZERO = np.arange(1.0, 16.0)  # above what counts as zero: where a key at zero is tried
 NEAR_ZERO = 7.0  # above the value that counts as zero, in that logarithm: zero is tried
 ALMOST = 300.0  # times the accuracy: a Newton step that gains no more ends the search
 LEAST_SHARE, MOST_SHARE = 1e-6, 0.5  # of outliers; fewer are none
@@ -388,9 +388,8 @@ def fitted(likelihood: Likelihood, robust: bool = False, progress: Progress = si
     if robust and OUTLIERS not in likelihood.explains:
         raise ConfigError(f"robust: the likelihood of filter {likelihood.filter} cannot allow for outliers")
     search = _Search(likelihood, robust, progress)
-    while any(coarse := [search.steps_at_zero(i) for i in range(len(likelihood.keys))]):
-        likelihood.least = np.where(coarse, FINER * np.asarray(likelihood.least), likelihood.least)
-        search = _Search(likelihood, robust, progress, search.evaluations)
+    while search.refined():
+        search.settle()
     if search.top <= IMPOSSIBLE:
         raise ConfigError(f"filter {likelihood.filter} cannot take the plots: `radarsim track` says at which row")
     share = float(search.natural(search.best)[-1]) if robust else None
@@ -481,8 +480,8 @@ class _Search:
     """The maximum of a likelihood, and its profile along each key. Coordinates are logarithms of the keys, and the
     logit of the share of outliers."""
 
-    def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress, evaluations: int = 0):
-        self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, evaluations
+    def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress):
+        self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, 0
         self.ends_found, self.ends_begun_at = 0, 0
         start, self.lowest = np.log(units(likelihood)), np.log(likelihood.least)
         self.highest = start + math.log(REACH)
@@ -491,12 +490,12 @@ class _Search:
                 np.append(keys, _logit(share))
                 for keys, share in ((start, 0.05), (self.lowest, LEAST_SHARE), (self.highest, MOST_SHARE))
             )
-        self.top_at = evaluations + TOP * start.size * (1 + robust)
+        self.top_at = TOP * start.size
         self.shape = _Shape(self._value)
         self.best, self.top = self._climbed(start, None, ROUGH)
         # A second start far away: the likelihood of manoeuvre and plot errors may have two maxima.
         for climbs, factor in enumerate((0.1, 10.0), 1):
-            self.top_at = max(self.top_at, evaluations + (self.evaluations - evaluations) * 3 // climbs)
+            self.top_at = max(self.top_at, self.evaluations * 3 // climbs)
             moved = np.where(self.best > self.lowest, self.best, start)
             moved[: len(likelihood.stated)] += math.log(factor)
             other, top = self._climbed(moved, None, ROUGHLY)
@@ -504,13 +503,36 @@ class _Search:
                 other, top = self._climbed(other, None, ROUGH)
             if top > self.top + 1e-6:
                 self.best, self.top = other, top
-        self.best = polished(self._value, self._climbed(self.best, None, CLOSE)[0])
-        self.top = self._value(self.best)
+        self.top = -math.inf
+        self._polish(self.best)
+        self.settle()
+
+    def _polish(self, start: np.ndarray) -> bool:
+        """Take the top near a point as the best, if it is higher; whether it is."""
+        at = polished(self._value, self._climbed(start, None, CLOSE)[0])
+        top = self._value(at)
+        if higher := top > self.top:
+            self.best, self.top = at, top
+        return higher
+
+    def settle(self) -> None:
+        """Raise keys that are zero where that makes the plots likelier, then look about the top."""
+        while (risen := self._risen()) is not None and self._polish(risen):
+            pass
         self.shape = _Shape(self._value)
-        self.shape.step(self.best, self.top, np.arange(start.size))
+        self.shape.step(self.best, self.top, np.arange(self.best.size))
         self.curvature = self.shape.H
-        self.raised = {i: self._raised(i) for i in range(start.size) if self._maybe_zero(i)}
+        self.raised = {i: self._raised(i) for i in range(self.best.size) if self._maybe_zero(i)}
         self.ends_begun_at = self.evaluations
+
+    def _risen(self) -> np.ndarray | None:
+        """The likeliest point above the top with a single key raised from zero; None if there is none."""
+        steps = np.eye(self.best.size)
+        zero = np.flatnonzero((self.best <= self.lowest)[: len(self.likelihood.keys)])
+        trials = [self.best + (self.lowest[i] + rise - self.best[i]) * steps[i] for i in zero for rise in FROM_ZERO]
+        found = [(self._value(at), at) for at in trials]
+        value, at = max(found, key=lambda one: one[0], default=(-math.inf, self.best))
+        return at if value > self.top + CLOSE else None
 
     def natural(self, searched: np.ndarray) -> np.ndarray:
         """The keys, with the share of outliers at the end where allowed for: at most MOST_SHARE, since all plots as
@@ -545,7 +567,7 @@ class _Search:
         free = np.array([i for i in range(len(start)) if i != held])
         at, here = start, self._value(start)
         shape = self.shape if held is not None else _Shape(self._value)
-        for most in (*SHORT_SIMPLEX, EVALUATIONS):
+        for most in SHORT_SIMPLEX:
             at, here, arrived = self._newton(at, here, free, close, shape)
             if arrived:
                 return at, here
@@ -594,8 +616,7 @@ class _Search:
         return at, here
 
     def _by_simplex(self, start: np.ndarray, free: np.ndarray, close: float, most: int) -> tuple[np.ndarray, float]:
-        """As `_climbed`, by a simplex: until it stalls within `close`, twice, since in a flat region a simplex may
-        shrink before it has found the ascent; or after `most` evaluations."""
+        """As `_climbed`, by a simplex, until it stands still within `close` or has taken `most` likelihoods."""
         from scipy.optimize import minimize
 
         whole = start.copy()
@@ -604,16 +625,11 @@ class _Search:
             whole[free] = part
             return -self._value(whole)
 
-        at, top, gain = start[free], IMPOSSIBLE, math.inf
-        while gain > close:
-            simplex = np.concatenate([at[None], at + FIRST_STEP * np.eye(free.size)])
-            options: Any = {"initial_simplex": simplex, "xatol": close, "fatol": close / 10, "maxfev": most}
-            found = minimize(cost, at, method="Nelder-Mead", options=options)
-            at, top, gain = found.x, -float(found.fun), -float(found.fun) - top
-            if most < EVALUATIONS:
-                break
-        whole[free] = at
-        return whole, top
+        simplex = np.concatenate([start[None, free], start[free] + FIRST_STEP * np.eye(free.size)])
+        options: Any = {"initial_simplex": simplex, "xatol": close, "fatol": close / 10, "maxfev": most}
+        found = minimize(cost, start[free], method="Nelder-Mead", options=options)
+        whole[free] = found.x
+        return whole, -float(found.fun)
 
     def _profile(self, i: int, at: float, near: np.ndarray) -> tuple[float, np.ndarray]:
         """The largest likelihood with key i held at the logarithm `at`, and its coordinates; others that are zero rise
@@ -631,10 +647,23 @@ class _Search:
                         break
         return top, where
 
-    def steps_at_zero(self, i: int) -> bool:
-        """Whether the likelihood jumps where a key is small enough to count as zero: it is not small enough then."""
+    def refined(self) -> bool:
+        """Whether a key has to be smaller to count as zero, as the likelihood leaps there; then it does."""
+        begun = self.likelihood.least
+        while coarse := [i for i in range(len(self.likelihood.keys)) if self._leaps_at_zero(i)]:
+            zero = self.best <= self.lowest
+            self.likelihood.least = np.array(self.likelihood.least)
+            self.likelihood.least[coarse] *= FINER
+            self.lowest[coarse] += math.log(FINER)
+            self.best[zero] = self.lowest[zero] - FIRST_STEP
+            self.top = self._value(self.best)
+        return self.likelihood.least is not begun
+
+    def _leaps_at_zero(self, i: int) -> bool:
+        """Whether the likelihood leaps at zero of a key, and is near the top there."""
         above, zero = (self._sliced(i, self.lowest[i] + sign * CLOSE) for sign in (1, -1))
-        return zero > IMPOSSIBLE and above > IMPOSSIBLE and abs(above - zero) > LEAP
+        known = min(above, zero) > IMPOSSIBLE and max(above, zero) > self.top - HALF_CHI2_95
+        return known and abs(above - zero) > LEAP
 
     def _maybe_zero(self, i: int) -> bool:
         """Whether the plots hardly distinguish a key, or the share of outliers, from zero: near zero its logarithm has
