@@ -37,7 +37,8 @@ ROOMS = {
     "report": ("errors", "failures", "config", "language", *DATA),
     "studies.noise": (*CASE, "kernels.random"),
     "studies.radial": ("errors", "constants", "physics"),
-    "studies.interface": ("errors", *CASE, *DATA, "report"),
+    "studies.floor": (*DATA, "report", "studies.interface"),
+    "studies.interface": ("errors", *CASE, *DATA, "report", "studies.floor"),
     "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "report.quantities", "studies.interface"),
     "studies.onefile": (
         "errors",
@@ -51,7 +52,7 @@ ROOMS = {
     ),
     "studies.linear": (
         *("errors", "kernels", "physics", *CASE, *DATA),
-        *("studies.interface", "studies.noise", "studies.onefile"),
+        *("report.quantities", "studies.floor", "studies.interface", "studies.noise", "studies.onefile"),
     ),
     "studies.outside": ("errors", *CASE, *DATA, "studies.interface"),
     "studies.stepwise": (
@@ -86,6 +87,7 @@ ROLES = {
         DESIGN,
     ),  # world, filters, exact, and whatever else prepares numbers
     "study": ((*GROUND, *DATA, "studies.noise"), SUMS),
+    "floor": ((*GROUND, *DATA, "studies.floor"), SUMS),
     "cost": ((*GROUND, *DATA), (*SUMS, "cost")),
     "tables": ((*GROUND, *DATA, "report"), SHOWN),
     "figures": ((*GROUND, *DATA, "report", "language"), SHOWN),
@@ -102,6 +104,7 @@ ROLES = {
             *DATA,
             "studies.interface",
             "studies.folder",
+            "studies.floor",
             "language",
             "report.claims",
             "report.drawing",

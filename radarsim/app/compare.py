@@ -23,7 +23,7 @@ from radarsim.report import files
 from radarsim.report import tables as common
 from radarsim.report.compare import Side
 from radarsim.report.drawing import Chart, Figure, reworded
-from radarsim.report.quantities import COMMON, Quantity
+from radarsim.report.quantities import COMMON, FLOORS, Quantity
 from radarsim.studies import registry
 
 if TYPE_CHECKING:
@@ -218,7 +218,7 @@ def _sides(run: Run) -> list[Side]:
 def _measured(study: str) -> tuple[Quantity, ...]:
     """What a study measures; for a study no longer installed, σ and gain."""
     try:
-        return registry.quantities(study, None)
+        return tuple(one for one in registry.quantities(study, None) if one not in FLOORS)  # which are no measurements
     except (ConfigError, KeyError):
         return COMMON
 

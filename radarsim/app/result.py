@@ -295,6 +295,7 @@ def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
     made = measured(results)
     verdicts = claims.judged(of.claims(), results, made, configs.shipped, stem)
     made["claims"] = over_readings(verdicts, results[0].study)
+    made["floor"] = of.floors(results)
     made = notes.noted(made, results, of.exact_errors, quantities(results[0].study, results[0].spec))
     return outside.added(made, results)
 

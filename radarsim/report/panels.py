@@ -14,7 +14,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.language import plural, power_of_ten, term, tr
 from radarsim.report import seen, wording
 from radarsim.report import tables as common
-from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.report.drawing import COLUMN_MM, GREY, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.report.quantities import Component
 from radarsim.report.statistics import Z95
 
@@ -449,6 +449,28 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: 
     return seen.begun(figure, seen.at_the_end(figure))
 
 
+def floored(figure: Figure, floor: "pd.DataFrame | None", component: str, factor: float = 1.0) -> Figure:
+    """A figure of σ of one case, of few lines, with its floor: with the plots up to a scan, and with all plots.
+
+    Of filters that have other plots it is that of those with the most.
+    """
+    rows = None if floor is None or not len(floor) else floor[floor["component"] == component]
+    if rows is None or not len(rows) or len(figure.panels) != 1 or len(figure.panels[0].marks) > MOST_AT_ENDS:
+        return figure
+    least = factor * rows.groupby("t_s", sort=True)[["floor", "smoothed"]].min()
+    words = {"floor": tr("floor"), "smoothed": tr("floor after the last scan")}
+    lines = (Line(least.index.to_numpy(), least[of].to_numpy(), words[of], GUIDE[of]) for of in words)
+    (panel,) = figure.panels
+    panel = replace(panel, marks=(*(one for one in lines if np.isfinite(one.y).any()), *panel.marks))
+    posterior = rows["kind"].str.startswith("posterior").all()
+    said = tr("Grey: the floor, a posterior Cramér-Rao bound.") if posterior else tr(UNDER_UNBIASED)
+    return replace(figure, panels=(panel,), caption=f"{figure.caption} {said}")
+
+
+UNDER_UNBIASED = term("Grey: the floor, a Cramér-Rao bound of unbiased estimators.")
+GUIDE = {"floor": Style(GREY, 0, width_pt=0.8), "smoothed": Style(GREY, 1, width_pt=0.8)}
+
+
 def in_columns(figure: Figure) -> Figure:
     """A figure with as many columns as its panels fill, at one of the widths of a page."""
     count = len([panel for panel in figure.panels if panel.marks])
@@ -641,6 +663,8 @@ def per_component(
             some, left = shown_families(results, named(experiment, name))
             figure = draw(name, some, rows, of) if some else None
             if figure and any(isinstance(mark, Line) for panel in figure.panels for mark in panel.marks):
+                if kind == "sigma" and len(results) == 1:
+                    figure = floored(figure, tables.get("floor"), of.name)
                 made[name] = replace(figure, caption=figure.caption + left)
     return made
 

@@ -172,6 +172,18 @@ GAIN = Quantity(
     paired=True,
 )
 COMMON = (SIGMA, GAIN)
+SMOOTHED = {  # scans waited, and what σ is called then
+    1: term("least σ one scan later"),
+    2: term("least σ two scans later"),
+    5: term("least σ five scans later"),
+    10: term("least σ ten scans later"),
+}
+FLOOR = Quantity("floor", term("floor under σ"), "floor", "floor", per="component")  # see `radarsim.studies.floor`
+FLOORS = (
+    FLOOR,
+    *(Quantity(f"lag_{lag}", words, "floor", f"lag_{lag}", per="component") for lag, words in SMOOTHED.items()),
+    Quantity("smoothed", term("least σ after the last scan"), "floor", "smoothed", per="component"),
+)
 LOCK = Quantity("lock", term("lock rate"), "locks", "lock_rate|lock", kind="share", more_is_better=True, last=True)
 LOST = LOCK.complement("lost", term("rate of lost locks"))
 RIGHT = Quantity("right", term("rate of right folds"), "folds", "right", kind="share", more_is_better=True, last=True)

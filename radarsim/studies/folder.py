@@ -27,6 +27,7 @@ A study that follows this declares an object and writes no class:
 | `recorded`, if offered | an object of the class `track.Recorded` |
 | `chart`, if offered | the function of `chart` |
 | `own_filters`, if offered | the function of `given` |
+| `floor`, if offered | the function of `floor` |
 | `shipped`, if offered | the folder `shipped` |
 
 A file is imported when a part of it is first asked for, so that `radarsim list` loads no kernels.
@@ -114,7 +115,7 @@ class StudyFolder(Study):
     inputs, cost = part("tables"), part("tables")
     figures, chart = part("figures"), part("chart")
     question, answer, warnings = part("words"), part("words"), part("words")
-    own_filters = part("given")
+    own_filters, floor = part("given"), part("floor")
     readings, recorded = part("readings", "Readings"), part("track", "Recorded")
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from radarsim.report.claims.over import PaperReadings
     from radarsim.report.drawing import Chart, Figure
     from radarsim.report.quantities import Quantity
+    from radarsim.studies.floor import Floor
 
 
 class Plan(Protocol):
@@ -310,7 +311,7 @@ def paper_in(claims: str) -> str:
     return found[1] if found else ""
 
 
-Beside = Literal["readings", "recorded", "shipped", "chart", "shortened", "own_filters"]
+Beside = Literal["readings", "recorded", "shipped", "chart", "shortened", "own_filters", "floor"]
 Costs = Literal["cost", "seconds_per_update", "seconds_at_most"]
 OptionalPart = Literal["curves", "gains", "inputs", Costs, "warnings", "exact_but_for", "costly", Beside]
 
@@ -364,6 +365,13 @@ class Study(ABC):
         """
         return ""
 
+    def floor(self, spec: Any, axes: "Axes") -> "Floor | None":
+        """What no estimator of a case can do better than, with its keys and the axes of its plan; see `studies.floor`.
+
+        Default: none is known.
+        """
+        return None
+
     def costly(self, case: "Case") -> bool:
         """Whether the exact errors of a case are slow to compute, and much faster with `Case.roughly`. Default: no."""
         return False
@@ -407,9 +415,15 @@ class Study(ABC):
 
         return tables.gains(results)
 
+    def floors(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
+        """The table `floor`."""
+        from radarsim.studies import floor
+
+        return floor.floors(self, results)
+
     def table(self, name: str, results: "Sequence[CaseResult]", column: str = "") -> "pd.DataFrame | None":
-        """The table of a name, with this column; None if there is none. `curves` and `gains` without other tables."""
-        common = {"curves": self.curves, "gains": self.gains}.get(name)
+        """The table of a name, with this column; None if there is none. Common ones without other tables."""
+        common = {"curves": self.curves, "gains": self.gains, "floor": self.floors}.get(name)
         made = None if common is None else common(results)
         return self.tables(results).get(name) if made is None or (column and column not in made) else made
 

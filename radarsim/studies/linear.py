@@ -13,7 +13,7 @@ limits are then unknown; those of a filter with gains of its own are known.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
 from operator import attrgetter
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Union, get_args, get_origin
@@ -23,6 +23,9 @@ import numpy as np
 from radarsim.engine.results import Axes, Layout, Track
 from radarsim.errors import ConfigError
 from radarsim.physics import is_covariance
+from radarsim.report.quantities import FLOORS, Quantity
+from radarsim.studies import floor
+from radarsim.studies.floor import Floor
 from radarsim.studies.interface import CORRELATION, OUTLIERS, Draw, Drawn, Tracker
 from radarsim.studies.onefile import OneFile
 
@@ -147,6 +150,9 @@ class LinearStudy(OneFile):
             raise self._fault("detection", f"{self.detection} must be a probability, from 0 to 1, got {given!r}")
         return float(given)
 
+    def quantities(self, spec: Any = None) -> tuple[Quantity, ...]:
+        return (*super().quantities(spec), *FLOORS)
+
     # ---- from matrices to arrays ---------------------------------------------------------------------------------
     def _fault(self, what: str, words: str) -> ConfigError:
         """An error with the line of the method whose name begins `what`."""
@@ -267,6 +273,19 @@ class LinearStudy(OneFile):
         every = [self.matrices(spec, one) for one in spec.filters]
         found = [limit(truth, of, probability) if of.own or probability == 1 else of.x * np.nan for of in every]
         return np.stack(found)[:, : len(self.components)]
+
+    def floor(self, spec: Any, axes: Axes) -> Floor:
+        """The posterior Cramér-Rao bound, of each filter with its own plots."""
+        (F, Q, _, P), probability = self._truth(spec)
+        F, Q = (np.broadcast_to(one, (spec.scans, *one.shape)) for one in (F, Q))
+        of = partial(floor.driven, P, F, Q, chance=probability, shown=len(self.components))
+        seen = [
+            self._rows("plot", partial(self.call, self.plot, spec, one), spec.scans, len(P)) for one in spec.filters
+        ]
+        names = [H.tobytes() + sigma.tobytes() for H, sigma in seen]
+        bounds = {name: of(H=H, R=sigma**2) for name, (H, sigma) in dict(zip(names, seen, strict=True)).items()}
+        each = tuple(bounds[name] for name in names)
+        return Floor(floor.POSTERIOR, each, each[0] if len(bounds) == 1 else None)
 
     # ---- recorded plots ------------------------------------------------------------------------------------------
     def drawing(self, case: "Case") -> Draw:

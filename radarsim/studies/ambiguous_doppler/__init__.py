@@ -1,7 +1,7 @@
 """Folded Doppler velocity: filters that unfold it by hypotheses, with memory and without (the wish that ends P1)."""
 
 from radarsim.language import term
-from radarsim.report.quantities import RIGHT, WRONG, Quantity
+from radarsim.report.quantities import FLOORS, RIGHT, WRONG, Quantity
 from radarsim.studies.folder import StudyFolder
 from radarsim.studies.interface import Paper
 
@@ -25,6 +25,6 @@ STUDY = StudyFolder(
         "merge: each_scan": "the same, hypotheses merged into one each scan (GPB1): no memory",
     },
     paper=Paper("Gorshkov & Zavizhenets 2017, conclusion", page="ambiguous_doppler"),
-    offers=("inputs", "recorded", "warnings"),
-    own_quantities=(ABOVE_ORACLE, RIGHT, WRONG),
+    offers=("inputs", "recorded", "warnings", "floor"),
+    own_quantities=(ABOVE_ORACLE, RIGHT, WRONG, *FLOORS),
 )

@@ -1,6 +1,6 @@
 """P4 (Uss, Baryshev & Djavad 2010): Doppler frequency and its derivatives from one burst, and how often they lock."""
 
-from radarsim.report.quantities import LOCK, LOST
+from radarsim.report.quantities import FLOOR, LOCK, LOST
 from radarsim.studies.folder import StudyFolder
 from radarsim.studies.interface import Paper
 
@@ -23,8 +23,8 @@ STUDY = StudyFolder(
             "discriminator_forecast": ("P4.10",),
         },
     ),
-    offers=("curves", "readings"),
+    offers=("curves", "readings", "floor"),
     exact_errors=False,  # exact_sigma is the bound, which an estimator reaches or does not
     draws_sweeps=True,  # lock is what is swept for, and has figures of its own
-    own_quantities=(LOCK, LOST),
+    own_quantities=(LOCK, LOST, FLOOR),
 )

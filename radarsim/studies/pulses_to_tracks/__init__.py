@@ -1,6 +1,6 @@
 """From pulses to tracks: what a burst's estimate of velocity and acceleration is worth to the track (P4 into P1)."""
 
-from radarsim.report.quantities import LOCK, LOST, RIGHT, WRONG
+from radarsim.report.quantities import FLOORS, LOCK, LOST, RIGHT, WRONG
 from radarsim.studies.folder import StudyFolder
 from radarsim.studies.interface import Paper
 
@@ -16,6 +16,6 @@ STUDY = StudyFolder(
         "estimator: fisher_bound": "the idealisation: Gaussian errors of the Fisher bound, which always lock",
     },
     paper=Paper("Uss, Baryshev & Djavad 2010, into Gorshkov & Zavizhenets 2017", page="pulses_to_tracks"),
-    offers=("inputs", "warnings"),
-    own_quantities=(LOCK, LOST, RIGHT, WRONG),
+    offers=("inputs", "warnings", "floor"),
+    own_quantities=(LOCK, LOST, RIGHT, WRONG, *FLOORS),
 )

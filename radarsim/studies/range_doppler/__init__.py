@@ -1,5 +1,6 @@
 """P1 (Gorshkov & Zavizhenets 2017): range-only against range + Doppler Kalman filters of the second order."""
 
+from radarsim.report.quantities import FLOORS
 from radarsim.studies.folder import StudyFolder
 from radarsim.studies.interface import Paper
 
@@ -33,5 +34,7 @@ STUDY = StudyFolder(
         "costly",
         "seconds_at_most",
         "own_filters",
+        "floor",
     ),
+    own_quantities=FLOORS,
 )

@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from radarsim.language import term
-from radarsim.report.quantities import COMMON, Quantity
+from radarsim.report.quantities import COMMON, FLOORS, Quantity
 from radarsim.studies.interface import Plan, RecordedPlots, Study
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from radarsim.report.claims import PaperClaims
     from radarsim.report.claims.over import PaperReadings
     from radarsim.report.drawing import Figure
+    from radarsim.studies.floor import Floor
     from radarsim.studies.sonar.config import Keys
 
 BASE = "smoothing"
@@ -60,7 +61,9 @@ class Sonar(Study):
         return Keys
 
     def quantities(self, spec: "Keys | None" = None) -> tuple[Quantity, ...]:
-        return COMMON + TRACKING if spec is None or "clutter" in spec.parts else COMMON
+        if spec is None:
+            return COMMON + TRACKING + FLOORS
+        return COMMON + (TRACKING if "clutter" in spec.parts else FLOORS)
 
     def prepare(self, case: "Case") -> Plan:
         plan: Plan = file_of(case.spec.parts[-1], "study").prepare(case)
@@ -69,6 +72,9 @@ class Sonar(Study):
     def simulate(self, plan: Any, first: int, count: int) -> "np.ndarray":
         sums: np.ndarray = plan.simulate(first, count)
         return sums
+
+    def floor(self, spec: "Keys", axes: Any) -> "Floor | None":
+        return None if "clutter" in spec.parts else file_of(BASE, "floor").floor(spec, axes)
 
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
         made: dict[str, pd.DataFrame] = file_of(BASE, "tables").tables(results)

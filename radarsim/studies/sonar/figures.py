@@ -67,7 +67,10 @@ def figures(
         having = [result for result in results if of.name in dict(result.axes.components)]
         chosen, left_out = panels.shown(having, panels.named(experiment, name))
         if chosen:
-            drawn[name] = sigma_figure(name, chosen, curves, of, left_out)
+            figure = sigma_figure(name, chosen, curves, of, left_out)
+            if figure and len(results) == 1:
+                figure = panels.floored(figure, made.get("floor"), of.name, panels.in_degrees(of.unit)[0])
+            drawn[name] = figure
     known: Any = [result for result in results if isinstance(result.axes, GivenPlotsAxes)]
     of_tables = {"plots": plots_figure, "smoothing_gains": gains_figure, "conversion": conversion_figure}
     own = {name: draw(made[name]) for name, draw in of_tables.items() if name in made}

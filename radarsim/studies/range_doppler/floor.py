@@ -1,0 +1,88 @@
+"""The floor under σ of range, velocity and acceleration (P1): of a polynomial, and of a flight that is drawn."""
+
+import numpy as np
+
+from radarsim.engine.results import Axes
+from radarsim.studies import floor as floors
+from radarsim.studies.floor import Bound, Floor
+from radarsim.studies.range_doppler import filters
+from radarsim.studies.range_doppler.config import PLOTS_NEEDED, Keys
+
+
+def floor(spec: Keys, axes: Axes) -> Floor | None:
+    """A polynomial is of the second degree, or of its own where that is higher; of other motions none is defined, but
+    where flights are drawn. A drawn bias of the plots is one more unknown of each realisation."""
+    radar, t = spec.radar, np.asarray(axes.t_s, dtype=float)
+    drawn = filters.is_drawn(spec.target)
+    if drawn and len(t) <= filters.DRAWN_SCANS:
+        prior, maps, products = of_flights(spec, t)
+    elif spec.target.kind == "polynomial":
+        size = max(3, len(spec.target.coefficients))
+        prior, maps = np.zeros((size, size)), floors.polynomial(t, size)
+        products = np.einsum("kdi,kdj->kdij", maps[:, :2], maps[:, :2])
+    else:
+        return None
+    sigma = np.array([radar.sigma_range_m, radar.sigma_velocity_mps])
+    biases = np.array([radar.sigma_bias_range_m, radar.sigma_bias_velocity_mps])
+    found: dict[tuple[int, int], Bound] = {}
+
+    def below(observes: int, start: int) -> Bound:
+        asked = observes, start if radar.detection_probability < 1 else 0
+        if asked not in found:
+            found[asked] = of_plots(start, prior, maps, products[:, :observes], sigma, biases, spec)
+        return found[asked]
+
+    each = tuple(below(len(one.observes), one.plots_to_start) for one in spec.filters)
+    return Floor(floors.POSTERIOR if drawn else floors.CRB, each, below(2, PLOTS_NEEDED[2]))
+
+
+def of_plots(
+    start: int,
+    prior: np.ndarray,
+    maps: np.ndarray,
+    products: np.ndarray,
+    sigma: np.ndarray,
+    biases: np.ndarray,
+    spec: Keys,
+) -> Bound:
+    """Of plots whose numbers d have derivatives with these mean products (K, D, p, p)."""
+    scans, numbers, size = products.shape[:3]
+    of_bias = np.flatnonzero(biases[:numbers])
+    wide = size + len(of_bias)
+    information, before, every = np.zeros((scans, wide, wide)), np.zeros((wide, wide)), np.zeros((scans, 3, wide))
+    before[:size, :size], every[..., :size] = prior, maps
+    for d in range(numbers):
+        information[:, :size, :size] += products[:, d] / sigma[d] ** 2
+    for i, d in enumerate(of_bias.tolist(), start=size):  # the derivative of number d by its bias is 1
+        information[:, i, :size] = information[:, :size, i] = maps[:, d] / sigma[d] ** 2
+        information[:, i, i], before[i, i] = 1 / sigma[d] ** 2, 1 / biases[d] ** 2
+    reached = not filters.is_drawn(spec.target)
+    if (chance := spec.radar.detection_probability) == 1:
+        return floors.static(before, information, every, reached)
+    each, alone = np.ones((scans, 3), dtype=int), (True, numbers == 2, False)
+    return floors.missed(before, information, every, np.full(scans, chance), each, (start,) * 3, alone, reached)
+
+
+def of_flights(spec: Keys, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Information (p, p) on what is drawn of a flight, and means over it of the derivatives (K, 3, p) of range,
+    velocity and acceleration, and of their products (K, 2, p, p) of the first two (Van Trees 1968)."""
+    spread = filters.sigma_flight(spec.target)
+    path, drawn = filters.flight(spec.target, t), np.flatnonzero(spread)
+    maps, products = np.zeros((len(t), 3, len(drawn))), np.zeros((len(t), 2, len(drawn), len(drawn)))
+    for weights, shifts in filters.displacements(spread):
+        each = derivatives(path, shifts, t)[..., drawn]
+        maps += np.einsum("m,mkci->kci", weights, each)
+        products += np.einsum("m,mkdi,mkdj->kdij", weights, each[:, :, :2], each[:, :, :2])
+    return np.diag(spread[drawn] ** -2.0), maps, products
+
+
+def derivatives(path: np.ndarray, shifts: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Derivatives (M, K, 3, 6) of `filters.displaced` by its shifts (M, 6)."""
+    moves, since = shifts[:, None, 3:], t[:, None]
+    p, v = path[:, 0::3] + shifts[:, None, :3] + moves * since, path[:, 1::3] + moves
+    r, radial, a = (part[..., None] for part in np.moveaxis(filters.displaced(path, shifts, t), 2, 0))
+    u = p / r
+    w = (v - radial * u) / r
+    b = (path[:, 2::3] - a * u - 2 * radial * w) / r
+    rows = [(u, since * u), (w, since * w + u), (b, since * b + 2 * w)]
+    return np.stack([np.concatenate(row, axis=2) for row in rows], axis=2)
