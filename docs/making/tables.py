@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from radarsim.report import notes, outside, rare
 from radarsim.report import tables as common
-from radarsim.studies import registry
+from radarsim.studies import floor, registry
 
 SHARED = (common.leading, common.components, common.realisations, common.interval_columns, notes.beside, notes.noted)
 SEVERAL = {  # tables that studies have in common
@@ -21,6 +21,7 @@ SEVERAL = {  # tables that studies have in common
     "rare": (rare.rows,),
     "failures": (outside.failures,),
     "nees": (outside.consistency, notes.normalised),
+    "floor": (floor.floors,),
 }
 UNITS = {  # by how a name ends
     **{"_s": "s", "_m": "m", "_mps": "m/s", "_mps2": "m/s²", "_rad": "rad", "_hz": "Hz", "_db": "dB"},

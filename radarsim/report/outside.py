@@ -206,6 +206,8 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
     mine = curves[curves["filter"] == name].iloc[0]
     sigmas = wording.estimate((mine[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(unit))
     said = [start + first + "; " + tr("its σ is {sigma}, {floor}.", sigma=sigmas, floor=_floor(curves, best, unit))]
+    said += _above_floor(common.where(made["floor"], case=result.name, component=component, k=last["k"].iloc[0]),
+                         {name: mine["sigma"], best: sigma[best]}, panels.unit_of(unit))  # fmt: skip
     against = [f"{one['baseline']} {wording.estimate((one[key] for key in GAIN), '%', '.3g')}"
                for one in last.to_dict("records") if one["baseline"] != best]  # fmt: skip
     if against:
@@ -227,6 +229,24 @@ def _floor(curves: "pd.DataFrame", best: str, unit: str) -> str:
             (row[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(unit)))  # fmt: skip
     return tr("that of {best} {sigma} {unit} exactly", best=best, sigma=f"{row['exact_sigma']:.4g}",
               unit=panels.unit_of(unit))  # fmt: skip
+
+
+def _above_floor(floor: "pd.DataFrame", sigmas: Mapping[str, float], unit: str) -> Iterator[str]:
+    """How far the filter from outside, the first of these σ, and the config's best are from the floor."""
+    (name, own), (best, other) = sigmas.items()
+    rows = common.where(floor, filter=name)
+    if len(rows):
+        least = float(rows["floor"].iloc[0])
+        told = {"name": name, "best": best, "floor": f"{least:.4g} {unit}".rstrip()}
+        told |= {key: f"{100 * (sigma / least - 1):.3g}" for key, sigma in (("own", own), ("other", other))}
+        kind = tr(UNBIASED if rows["kind"].iloc[0].startswith("CRB") else ANY)
+        yield tr(
+            "The floor there, {kind}, is {floor}: {name} is {own} % above it, {best} {other} %.", kind=kind, **told
+        )
+
+
+UNBIASED = term("the Cramér-Rao bound of unbiased estimators")
+ANY = term("the posterior Cramér-Rao bound")
 
 
 def _nees(result: CaseResult, name: str, made: Made) -> Iterator[str]:

@@ -267,6 +267,10 @@ def _smoothed(later: Callable[[np.ndarray], np.ndarray], gained: np.ndarray, F: 
 
 
 # ---- table -----------------------------------------------------------------------------------------------------------
+LATER = tuple(f"lag_{lag}" for lag in LAGS)
+COLUMNS = ("case", "filter", "component", "unit", "k", "t_s", "floor", *LATER, "smoothed", "reached", "kind")
+
+
 def floors(study: "Study", results: "Sequence[CaseResult]") -> "pd.DataFrame":
     """What no estimator can do better than with the plots of a filter; only where a floor is known.
 
@@ -281,24 +285,29 @@ def floors(study: "Study", results: "Sequence[CaseResult]") -> "pd.DataFrame":
     """
     from radarsim.report import tables
 
-    return tables.joined(part for one in results for part in _parts(study.floor(one.spec, one.axes), one))
+    return tables.joined((part for one in results for part in _parts(study.floor(one.spec, one.axes), one)), COLUMNS)
 
 
 def _parts(floor: Floor | None, result: "CaseResult") -> Iterator[dict[str, Any]]:
-    """The rows of a case, filter by filter."""
-    from radarsim.report import tables
-
+    """The rows of a case, filter by filter; filters from outside are given all plots."""
     if floor is None:
         return
-    axes = result.axes
     for f, bound in enumerate(floor.bounds):
-        if bound is None:
-            continue
-        c, k = np.nonzero((axes.available[f] & np.isfinite(bound.sigma)).T)
-        kinds = np.array([", ".join(filter(None, (floor.kind, one))) for one in bound.patterns], dtype="O")
-        rows = tables.leading(result, np.full(k.size, f), k, **tables.components(result, c))
-        if floor.t_s is not None:
-            rows["t_s"] = floor.t_s[f, k]
-        lags = {f"lag_{lag}": waited[k, c] for lag, waited in zip(LAGS, bound.waited, strict=True)}
-        ends = {"smoothed": bound.smoothed[k, c], "reached": np.full(k.size, bound.reached), "kind": kinds[k]}
-        yield rows | {"floor": bound.sigma[k, c]} | lags | ends
+        if bound is not None:
+            yield _rows(floor, f, bound, result)
+    if (other := result.outside) is not None and floor.of_all is not None:
+        for f in range(len(other.axes.filters)):
+            yield _rows(floor, f, floor.of_all, other)
+
+
+def _rows(floor: Floor, f: int, bound: Bound, result: "CaseResult") -> dict[str, Any]:
+    from radarsim.report import tables
+
+    c, k = np.nonzero((result.axes.available[f] & np.isfinite(bound.sigma)).T)
+    kinds = np.array([", ".join(filter(None, (floor.kind, one))) for one in bound.patterns], dtype="O")
+    rows = tables.leading(result, np.full(k.size, f), k, **tables.components(result, c))
+    if floor.t_s is not None:
+        rows["t_s"] = floor.t_s[f, k]
+    lags = {name: waited[k, c] for name, waited in zip(LATER, bound.waited, strict=True)}
+    ends = {"smoothed": bound.smoothed[k, c], "reached": np.full(k.size, bound.reached), "kind": kinds[k]}
+    return rows | {"floor": bound.sigma[k, c]} | lags | ends

@@ -204,7 +204,7 @@ def test_what_a_study_does_not_measure_is_refused_with_what_it_does(radarsim, tm
         assert radarsim(*words, code=2).stderr == f"a: {lacking}"
     named = radarsim("solve", "a.yaml", KEY, "--area", "q", "--filter", "r", "--equals", 1, code=2).stderr
     assert named == "no component 'q'; there are: r, Vr, ar\n"
-    assert radarsim("solve", "rls2", KEY, "--area", "r", "--equals", 1, code=2).stderr.endswith("but sigma, gain\n")
+    assert radarsim("solve", "rls2", KEY, "--area", "r", "--equals", 1, code=2).stderr.endswith(" lag_10, smoothed\n")
 
 
 def test_a_study_that_takes_no_spec_is_one_line(monkeypatch):

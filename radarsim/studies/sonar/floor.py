@@ -93,7 +93,7 @@ def to_polar(states: np.ndarray, polar: np.ndarray) -> np.ndarray:
 
 
 def to_cartesian(states: np.ndarray, polar: np.ndarray) -> np.ndarray:
-    """The same of x and y, of those of range and bearing."""
+    """Derivatives (K, C, 3, p) of x and y and their rates, of those of range and bearing; else as `to_polar`."""
     (r, vr, _), (b, vb, _) = (polar[:, c].T[..., None] for c in range(2))
     (of_r, of_vr, _), (of_b, of_vb, _) = (np.moveaxis(states[:, c], 1, 0) for c in range(2))
     c, s, made = np.cos(b), np.sin(b), states.copy()
@@ -105,7 +105,7 @@ def to_cartesian(states: np.ndarray, polar: np.ndarray) -> np.ndarray:
 
 
 def fluctuating(target: Polynomial, spec: Keys, axes: GivenPlotsAxes, t: np.ndarray, size: int) -> Bound:
-    """Of a target with a random acceleration, constant between scans: each coordinate of its own degree by itself."""
+    """At times t (K,), of a target with a random acceleration, constant between scans: coordinate by coordinate."""
     walk = target.fluctuation_mps2 * lateral_scale(spec, 1)
     given = (target.range_m, target.bearing_rad, target.depth_m or target.elevation_rad)
     sigma_of_plots, made = axes.sigma_of_plots, []
