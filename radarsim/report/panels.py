@@ -458,7 +458,7 @@ def floored(figure: Figure, floor: "pd.DataFrame | None", component: str, factor
     if rows is None or not len(rows) or len(figure.panels) != 1 or len(figure.panels[0].marks) > MOST_AT_ENDS:
         return figure
     least = factor * rows.groupby("t_s", sort=True)[["floor", "smoothed"]].min()
-    words = {"floor": tr("floor"), "smoothed": tr("floor after the last scan")}
+    words = {"floor": tr("floor"), "smoothed": tr("floor, all plots")}
     lines = (Line(least.index.to_numpy(), least[of].to_numpy(), words[of], GUIDE[of]) for of in words)
     (panel,) = figure.panels
     panel = replace(panel, marks=(*(one for one in lines if np.isfinite(one.y).any()), *panel.marks))
