@@ -23,6 +23,7 @@ LIBRARIES = (*(sysconfig.get_path(name) for name in ("stdlib", "platstdlib")), s
 COMPILING = re.compile(r"Failed in |-+$|\[\d\] |During: ")  # lines of a compiler's message that say where it was
 OF_NUMPY = "__array_ufunc__"  # in NumPy's error about the sine of eight realisations
 LONGEST = 300  # characters of a message
+MOST_FRAMES = 8  # of an author's code that are shown
 
 _of: ContextVar[str] = ContextVar("_of", default="")
 homes: Callable[[], Iterable[Path]] = tuple  # the folders, or single files, of packages that offer studies or filters
@@ -72,6 +73,13 @@ def _code(function: Any) -> CodeType | None:
 
 def _is_library(file: str) -> bool:
     return file.startswith(("<", *LIBRARIES)) or "site-packages" in file
+
+
+def frames(error: BaseException, own: str) -> list[str]:
+    """The last lines of an author's files, in the folder `own`, that led to an error, the deepest last."""
+    every = [one for one in traceback.extract_tb(error.__traceback__) if Path(one.filename).is_relative_to(own)]
+    every = [one for one in every if not _is_library(os.path.relpath(one.filename, own))]
+    return [f"  {one.filename}:{one.lineno}, in {one.name}: {one.line}" for one in every[-MOST_FRAMES:]]
 
 
 def words(error: BaseException) -> str:

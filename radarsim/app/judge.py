@@ -267,7 +267,7 @@ def tried(case: Case, member: Outside) -> list[str]:
         step = float(np.nanmax(np.spacing(np.nanmax(np.abs(raw.reshape(-1, x.shape[2])), axis=0)) / rms))
         lines.append(tr("{name}: estimates are {type}, rounded by up to {share:.1g} of their rms error",
                         name=member.name, type=str(raw.dtype), share=step))  # fmt: skip
-    if isinstance(member, Called):
+    if not isinstance(member, Given | Chunks):
         if any(not np.array_equal(plots[one], drawn.columns[one], equal_nan=True) for one in drawn.columns):
             lines.append(tr("{name}: changes the plots it is given; it gets copies", name=member.name))
         lines += _repeatable(plan, member, x, MATERIAL * rms)
@@ -292,7 +292,7 @@ def _differ(one: np.ndarray, other: np.ndarray, least: np.ndarray) -> bool:
         return bool((np.isfinite(one) != np.isfinite(other)).any() or (np.abs(one - other) > least).any())
 
 
-def _repeatable(plan: Plan, member: Called, x: np.ndarray, least: np.ndarray) -> Iterator[str]:
+def _repeatable(plan: Plan, member: Any, x: np.ndarray, least: np.ndarray) -> Iterator[str]:
     """Whether a filter gives the same again, without the rest of its batch, and with other plots after some scan."""
     n, K = x.shape[:2]
     name = member.name

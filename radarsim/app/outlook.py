@@ -144,7 +144,7 @@ def outlook(
         work, started = CaseWork(case), time.perf_counter()
         axes = work.plan.axes
         preparing += time.perf_counter() - started
-        labels = case.name, ", ".join(axes.filters), len(axes.k)
+        labels = case.name, ", ".join((*axes.filters, *(one.name for one in case.outside))), len(axes.k)
         stocked = partial(stock, work, store=out, part=share or (1, 1))
         short = None if precision is not None else surely_short(work, SURELY_SHORT_S / len(experiment.cases))
         if short is not None:
@@ -169,7 +169,7 @@ def surely_short(work: CaseWork, most_s: float) -> float | None:
     """Upper bound on one thread's seconds for all realisations of a case, where it is surely short and the sums are
     small beside the interpreter; else None.
     """
-    if work.plan.axes.available.size > SURELY_SMALL:
+    if work.plan.axes.available.size > SURELY_SMALL or work.case.outside:
         return None
     each = registry.study(work.case.study).seconds_at_most(work.plan)
     return None if each is None or each * work.case.realisations > most_s else each * work.case.realisations

@@ -366,6 +366,12 @@ def load_all(sources: Sequence[str | os.PathLike[str]], overrides: Sequence[str]
     return loaded
 
 
+def codes(experiments: Sequence[Experiment]) -> list[str]:
+    """The user's own code in experiments, a line each; imports it. Raises ConfigError for what cannot be imported."""
+    every = [one for experiment in experiments for case in experiment.cases for one in case.outside if one.written]
+    return list({f"{one.made} in {one.file}": one.target for one in every})
+
+
 def namesakes(experiments: Sequence[Experiment]) -> list[str]:
     """A line for each config whose results would overwrite those of another: folders have the config's name.
 
@@ -435,7 +441,12 @@ def run(
     if decide:
         readings.check(experiment)
     limit = time_limit if time_limit is None or callable(time_limit) else stopping.TimeLimit(time_limit)
-    started, kept = time.perf_counter(), None
+    started, kept, warned = time.perf_counter(), None, list[str]()
+    if codes([experiment]):
+        from radarsim.app.judge import tried
+
+        every = [(case, one) for case in experiment.cases for one in case.outside if one.written]
+        warned += dict.fromkeys(line for case, one in every for line in tried(case, one))
     if out is not None and isinstance(limit, stopping.TimeLimit) and limit.left >= WORTH_MEASURING_S:
         limit = limit.reserving(kept := seconds(experiment, figures, width_mm))
     with cluster(workers, scheduler) if executor is None else nullcontext(executor) as pool:
@@ -458,6 +469,7 @@ def run(
         facts |= {"unmet": [*facts["unmet"], *left], "stop": "; ".join((*facts["unmet"], *left)) or "done"}
     ended_by = None if simulated.stopped or precision is None else (precision, of)
     result = result_of(experiment, simulated, facts, repeated(experiment, simulated.done, overrides, ended_by))
+    result.facts["warnings"] += warned
     if out is None:
         result.check()
     else:

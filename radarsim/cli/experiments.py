@@ -84,6 +84,7 @@ def run(
 
         overrides = simulation.merged(overrides, realisations, seed)
         loaded = _loaded(configs, overrides, None if precision is None else (precision, of), decide)
+        _say_code(loaded, quiet)
         if scheduler and not quiet and (line := simulation.trust(scheduler)):
             click.echo(f"note: {line}", err=True)
         with simulation.cluster(workers, scheduler) as pool:
@@ -135,6 +136,15 @@ def _loaded(
     for one in loaded if decide else ():
         readings.check(one)
     return loaded
+
+
+def _say_code(loaded: "list[Experiment]", quiet: bool) -> None:
+    """Import the user's own code that experiments run, before any runs, and say which it is."""
+    from radarsim.app import run as simulation
+
+    for line in simulation.codes(loaded):
+        if not quiet:
+            click.echo(f"note: runs code of yours: {line}", err=True)
 
 
 def _compute_each(
@@ -322,7 +332,9 @@ def check(
 
     asked: dict[str, Any] = {"precision": precision, "of": of, "share": shard, "out": out}
     made = []
-    for one in simulation.load_all(configs, simulation.merged(overrides, realisations, seed)):
+    loaded = simulation.load_all(configs, simulation.merged(overrides, realisations, seed))
+    _say_code(loaded, as_json)
+    for one in loaded:
         with console.Progress(one.stem, quiet=as_json, what="cases") as bar:
             outlook = python.check(one, progress=bar.update, **asked)
         made.append(documents.outlook(one, outlook))

@@ -272,8 +272,27 @@ def completed(ctx: click.Context, param: click.Parameter, incomplete: str) -> "l
     return found
 
 
-configs_argument = click.argument("configs", nargs=-1, required=True, metavar="CONFIG…", shell_complete=completed)
-config_argument = click.argument("config", metavar="CONFIG", shell_complete=completed)
+def _no_code(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    """Refuse code of the user's in configs, here and in the processes that this one starts."""
+    if value:
+        os.environ["RADARSIM_NO_CODE"] = "1"
+
+
+def of_configs(name: str, **settings: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """The argument of a command that takes configs, and the option that refuses code in them."""
+    option = click.option(
+        "--no-code",
+        is_flag=True,
+        expose_value=False,
+        is_eager=True,
+        callback=_no_code,
+        help="Refuse configs with filters of your own code (`python: FILE.py:NAME`); the same as RADARSIM_NO_CODE=1.",
+    )
+    return lambda command: click.argument(name, shell_complete=completed, **settings)(option(command))
+
+
+configs_argument = of_configs("configs", nargs=-1, required=True, metavar="CONFIG…")
+config_argument = of_configs("config", metavar="CONFIG")
 out_option = click.option(
     "--out", type=Directory(), default="results", show_default=True, metavar="DIR", help="Directory of the results."
 )

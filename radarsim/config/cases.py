@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path as FilePath
 
 from radarsim.config.check import allowed_keys, check, model_at, models_in, unknown_key
+from radarsim.config.code import is_code, parted
 from radarsim.config.document import (
     ABSENT,
     Document,
@@ -76,6 +77,9 @@ def _dotted(document: Document, key: str) -> KeyPath:
     for text in key.split("."):
         holder = document.get(path)
         if isinstance(holder, list):
+            called = [i for i, one in enumerate(holder) if isinstance(one, dict) and one.get("name") == text]
+            if called:
+                text = str(called[0])
             if not text.isdecimal() or int(text) >= len(holder):
                 raise NoSuchKey(f"{'.'.join(map(str, path))} is a list: its items are 0 to {len(holder) - 1}")
             path = (*path, int(text))
@@ -94,7 +98,7 @@ def _in_every_member(document: Document, model: type[Study], key: str) -> list[K
     paths: list[KeyPath] = []
     for i in range(len(members) if isinstance(members, list) else 0):
         schema = model_at(model, document.data, (model.bare_keys, i))
-        keys = allowed_keys(schema) if schema else []
+        keys = list(members[i]) if is_code(members[i]) else allowed_keys(schema) if schema else []
         known += [k for k in keys if k not in known]
         if key in keys:
             paths.append((model.bare_keys, i, key))
@@ -383,7 +387,8 @@ class Expander:
             message = f"must be that of the config, {study}{further}"
             self.faults.add(over.origin(("study",)), ("study",), message, wanted)
             return document, study
-        return document.with_data((), data), wanted
+        members = {key: sorted(one, key=is_code) for key, one in data.items() if isinstance(one, list)}
+        return document.with_data((), data | members), wanted
 
     def _included(self, document: Document, common: Common, chain: tuple[FilePath, ...], over: Over) -> list[Draft]:
         """The drafts of all included configs, with the keys beside `include` laid over each."""
@@ -494,6 +499,7 @@ class Expander:
         model = self.studies.keys(draft.study)
         document = scenarios_inlined(draft.document, model, self.read, self.faults)
         document = data_files_found(document, model, self.faults)
+        document, outside = parted(document, model, self.studies.coded, self.faults)
         document, against = self._baselines(document, model)
         spec = check(model, document, self.faults, also=COMMON_KEYS)
         if draft.realisations is None:
@@ -502,7 +508,9 @@ class Expander:
             return None
         name = " ".join([draft.stem, *(f"{key}={in_name(value)}" for key, value in draft.swept)])
         seed = 1 if draft.seed is None else draft.seed
-        return Case(name, draft.stem, draft.study, spec, draft.swept, draft.realisations, seed, against=against)
+        return Case(
+            name, draft.stem, draft.study, spec, draft.swept, draft.realisations, seed, against=against, outside=outside
+        )
 
     def _baselines(self, document: Document, model: type[Study]) -> tuple[Document, tuple[str, ...]]:
         """The document with only the first of several baselines, and the others, each checked as if alone."""

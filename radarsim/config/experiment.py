@@ -119,8 +119,12 @@ class Case:
     @property
     def keys(self) -> dict[str, Any]:
         """Its keys as plain data, including names: all baselines where there are several."""
-        several = {"baseline": [self.spec.baseline, *self.against]} if self.against else {}
-        return complete(self.spec) | several
+        keys, members = complete(self.spec), self.spec.bare_keys
+        if further := [*self.against, *(one.name for one in self.outside if one.baseline)]:
+            keys["baseline"] = [*filter(None, [keys.get("baseline")]), *further]
+        if codes := [one.written for one in self.outside if one.written]:
+            keys[members] = [*keys[members], *codes]
+        return keys
 
     def resolved(self) -> dict[str, Any]:
         """The case as plain JSON-able data, names included."""

@@ -4,12 +4,13 @@ The schema of the YAML as JSON Schema, for editors and for `radarsim schema`.
 """
 
 import json
+from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field, Strict
 from pydantic.json_schema import GenerateJsonSchema, models_json_schema
 
-from radarsim.config.fields import Anything, Model, Name, Scenario, Stem, Study, Whole, key
+from radarsim.config.fields import Anything, Flag, Member, Model, Name, Scenario, Stem, Study, Whole, key
 
 # ---- schema ----------------------------------------------------------------------------------------------------------
 LARGEST_REALISATIONS = 10**12
@@ -41,6 +42,17 @@ class Common(Model):
         return self.figures if isinstance(self.figures, dict) else dict.fromkeys(self.figures, ("*",))
 
 
+class OwnCode(Member):
+    """A filter that a class or a function of your own code makes; further keys are given to it."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+
+    python: Annotated[str, Strict()] = key(
+        "own code", "FILE.py:NAME, of a file beside the config, or MODULE:NAME: a class or a function of yours"
+    )
+    one_by_one: Flag = key("one by one", "whether the function takes the plots of one realisation at a time", False)
+
+
 COMMON_KEYS = tuple(Common.model_fields)
 
 
@@ -62,6 +74,9 @@ class Studies(Protocol):
     def keys(self, name: str) -> type[Study]:
         """The schema of a study's keys, imported on first use."""
 
+    def coded(self, keys: "OwnCode", place: str, baseline: bool, folder: Path) -> Any:
+        """A filter of the user's own code that a config in a folder names at a place. Raises ConfigError."""
+
 
 # ---- json schema -----------------------------------------------------------------------------------------------------
 TITLE = "radarsim experiment"
@@ -78,7 +93,7 @@ class OwnTitles(GenerateJsonSchema):
 def schema(studies: Studies) -> dict[str, Any]:
     """JSON Schema of a config, of one of the studies or an `include` of others, and of a scenario."""
     models = {name: studies.keys(name) for name in studies.usable()}
-    described: tuple[type[BaseModel], ...] = (Common, *models.values())
+    described: tuple[type[BaseModel], ...] = (Common, OwnCode, *models.values())
     wanted: list[tuple[type[BaseModel], Literal["validation"]]] = [(model, "validation") for model in described]
     references, whole = models_json_schema(wanted, ref_template="#/$defs/{model}", schema_generator=OwnTitles)
     definitions = tidy(whole["$defs"])
@@ -105,6 +120,10 @@ def _experiment(name: str, study: dict[str, Any], common: dict[str, Any]) -> dic
         several = {"type": "array", "items": one, "minItems": 1, "uniqueItems": True}
         said = {key: value for key, value in properties["baseline"].items() if key in ("title", "description")}
         properties["baseline"] = {"anyOf": [one, several], **said}
+    if "filters" in properties:
+        items = properties["filters"]["items"]
+        either = [*items.get("oneOf", [items]), {"$ref": f"#/$defs/{OwnCode.__name__}"}]
+        properties["filters"] = {**properties["filters"], "items": {"oneOf": either}}
     about = {"const": name, "description": study.get("description", name)}  # of a docstring, which -OO leaves out
     return {
         **study,

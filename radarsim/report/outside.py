@@ -41,13 +41,24 @@ def names(result: CaseResult) -> tuple[str, ...]:
 
 
 def gains(result: CaseResult) -> common.Columns:
-    """Gains of the filters from outside of one case against all that come before them."""
-    return common.stacked([_gains(result, name, one) for one in others(result) for name in names(result)])
+    """Gains of the filters from outside of one case against all that come before them; then of the config's own
+    against those that it names as baselines."""
+    every = [_gains(result, name, one) for one in others(result) for name in names(result)]
+    return common.stacked(every + [_gained(result, name, one) for one in others(result) for name in one.axes.baselines])
 
 
 def _gains(result: CaseResult, base: str, of: CaseResult) -> common.Columns:
     every = (*result.axes.filters, *of.axes.filters)
-    both = np.asarray(of.sums["both"])[:, every.index(base)]
+    return _paired(np.asarray(of.sums["both"])[:, every.index(base)], base, of)
+
+
+def _gained(result: CaseResult, base: str, of: CaseResult) -> common.Columns:
+    both = np.asarray(of.sums["both"])[of.axes.filters.index(base), : len(result.axes.filters)]
+    return _paired(both[..., [0, 3, 4, 1, 2, 5]], base, result)
+
+
+def _paired(both: np.ndarray, base: str, of: CaseResult) -> common.Columns:
+    """Gains of a case's filters from sums (F, K, C, 6) with those of a baseline."""
     at = f, k, c = common.shown(of, both[..., 0] > 0)
     n, own, own_4, base_2, base_4, cross = np.moveaxis(both[at], -1, 0)
     gain = statistics.gain(own, own_4, base_2, base_4, cross, n)
@@ -138,7 +149,8 @@ def beside(name: str, table: "Callable[[Sequence[CaseResult]], pd.DataFrame]") -
 def without(made: Made, results: Sequence[CaseResult]) -> Made:
     """The tables without these rows, as the study made them."""
     own = {name for result in results for one in others(result) for name in one.axes.filters}
-    return {name: made[name][~made[name]["filter"].isin(own)] for name in ("curves", "gains")} | {
+    rows = {name: made[name].loc[:, made[name].columns.isin(("filter", "baseline"))] for name in ("curves", "gains")}
+    return {name: made[name][~table.isin(own).any(axis=1)] for name, table in rows.items()} | {
         name: table for name, table in made.items() if name not in ("curves", "gains")
     } if own else made  # fmt: skip
 

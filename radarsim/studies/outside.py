@@ -85,6 +85,8 @@ class Outside(ABC):
     identity: str
     components: tuple[str, ...] = ()
     in_order: bool = False
+    written: Mapping[str, Any] | None = None  #: its keys, where a config has it
+    baseline: bool = False  #: whether gains of the others are against it too
 
     @abstractmethod
     def estimates(self, plots: Plots) -> Any:
@@ -215,6 +217,13 @@ def columns_of(name: str, d: int, components: Sequence[str], own: Sequence[str])
     return [components.index(one) for one in own] or list(range(d))
 
 
+@dataclass(frozen=True)
+class OutsideAxes(Axes):
+    """Axes of filters from outside. baselines: those that the gains of the config's filters are against too."""
+
+    baselines: tuple[str, ...] = ()
+
+
 # ---- plan and sums ---------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Plan:
@@ -271,7 +280,8 @@ def prepare(study: "Study", case: Case, inner: Any) -> Plan:
         failures=(G, len(COUNTS)),
     )
     unknown = np.full((G, K, C), np.nan)
-    own = Axes(tuple(names), axes.components, axes.k, axes.t_s, np.ones((G, K, C), dtype=bool), 0, unknown, unknown)
+    labels = tuple(names), axes.components, axes.k, axes.t_s, np.ones((G, K, C), dtype=bool), 0, unknown, unknown
+    own = OutsideAxes(*labels, tuple(member.name for member in case.outside if member.baseline))
     return Plan(study, inner, draw, world, scans, case.outside, own, layout)
 
 

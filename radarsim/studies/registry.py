@@ -264,6 +264,13 @@ def _fault(name: str, words: str) -> ConfigError:
     return ConfigError(f"study {name}: the package {package(name) or 'radarsim'} {words}")
 
 
+def coded(keys: Any, place: str, baseline: bool, folder: Path) -> Any:
+    """A filter of the user's own code that a config in a folder names at a place. Raises ConfigError."""
+    from radarsim.studies import code
+
+    return code.coded(keys, place, baseline, folder)
+
+
 # ---- filters of packages ---------------------------------------------------------------------------------------------
 class Filters(NamedTuple):
     """Filters of installed packages: the keys of each by study and kind, and by kind why others are unusable."""

@@ -262,7 +262,7 @@ class Filter(Model):
 def _carried_filter(one: Any) -> Any:
     """A filter of range_doppler, as read, as one of this study; what this study cannot say is left as it is."""
     use = {("range",): "none", ("range", "velocity"): "folded"}
-    if not isinstance(one, dict) or not isinstance(observed := one.get("observes"), list | tuple):
+    if not isinstance(one, dict) or "python" in one or not isinstance(observed := one.get("observes"), list | tuple):
         return one
     told = {"observes": None, "initial_scans": None, "kind": "kalman", "process_noise": "random_jerk"}
     kept = {name: value for name, value in one.items() if name not in told or told[name] not in (None, value)}

@@ -1,0 +1,433 @@
+"""Filters of the user's own code in the config of any study with plots: `{name: mine, python: my_filter.py:Mine}`."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+
+import radarsim
+from radarsim.app.configs import CaseWork, load, schema_json
+from radarsim.config import load as reading
+from radarsim.config.document import Faults
+from radarsim.errors import ConfigError
+from tests.program import command, csv_bytes, record
+
+ROOT = Path(__file__).parents[2]
+N = 9000  # two whole blocks and a partial one
+FILTER = '''
+"""A filter of mine."""
+import numpy as np
+import helper
+
+class Mine:
+    """Alpha and beta."""
+    def __init__(self, alpha=0.5, weights=None):
+        self.alpha, self.beta = alpha, np.loadtxt(weights) if weights else helper.BETA
+
+    def start(self, world):
+        self.x = None
+
+    def step(self, plots):
+        z = plots["range_m"]
+        if self.x is None:
+            self.x, self.v = z, 0 * z - 250.0
+        else:
+            dt = plots.t_s - self.t
+            r = z - (self.x + self.v * dt)  # what is new
+            self.x, self.v = self.x + self.v * dt + self.alpha * r, self.v + self.beta * r / dt
+        self.t = plots.t_s
+        return np.stack([self.x, self.v], axis=1)
+
+def everything(plots):
+    return plots["range_m"][:, :, None]
+
+def single(plots):
+    assert plots["range_m"].ndim == 1
+    return plots["range_m"][:, None]
+'''
+MINE = {"name": "mine", "python": "my_filter.py:Mine", "alpha": 0.6}
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """A folder with the filter and a config, in which one works."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("RADARSIM_NO_CODE", raising=False)
+    Path("my_filter.py").write_text(FILTER)
+    Path("helper.py").write_text("BETA = 0.3\n")
+    written("mine", MINE)
+    return tmp_path
+
+
+def written(stem, *further, like="rls2", **keys):
+    """A config as a shipped one, with further filters: its file."""
+    config = shipped(like) | {"realisations": N, **keys}
+    config["filters"] = [*config["filters"], *further]
+    Path(f"{stem}.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
+    return Path(f"{stem}.yaml")
+
+
+def shipped(stem):
+    return reading.read(ROOT / f"configs/{stem}.yaml", Faults()).data
+
+
+def identity(config="mine.yaml", *overrides):
+    (case,) = load(config, overrides).cases
+    return CaseWork(case).identity[:32]  # the question; the rest is a quick answer on radarsim's own sources
+
+
+def run(out, *options, config="mine.yaml", code=0):
+    return command("run", config, "--no-figures", "--out", out, *options, code=code)
+
+
+def rows(out, table, name):
+    lines = (Path(out) / "mine" / f"{table}.csv").read_text().splitlines()
+    return [line.partition(",")[2].rstrip(",") for line in lines if line.split(",")[1] == name]
+
+
+def test_it_stands_in_every_table_and_the_others_are_what_they_are_without_it(place):
+    made = run("with", "--json")
+    assert made.stderr.startswith("note: runs code of yours: Mine in ")
+    assert len([line for line in made.stderr.splitlines() if "code of yours" in line]) == 1
+    (place / "plain").mkdir()
+    written("plain/mine")
+    run("without", config="plain/mine.yaml")
+    for table in ("believed", "steady", "curves"):
+        for name in ("r", "r+Vr"):
+            assert rows("with", table, name) == rows("without", table, name) != []
+    assert rows("with", "gains", "r+Vr") == rows("without", "gains", "r+Vr")
+    assert {line.split(",")[1] for line in rows("with", "gains", "mine")} == {"r", "r+Vr"}
+    assert record(place / "with/mine")["resolved"]["cases"][0]["filters"][2] == MINE
+    assert not list(place.glob("**/__pycache__"))
+
+
+def test_any_means_of_computing_gives_the_same_bytes(place):
+    whole = run("whole", "--threads", 1), csv_bytes(place / "whole/mine")
+    run("threads", "--threads", 3)
+    run("none", "--threads", 0)
+    run("later", "-n", 5000)
+    run("later", "-n", N)
+    for share in ("1/2", "2/2"):
+        run("shares", "--shard", share)
+    run("shares")
+    assert record(place / "shares/mine")["realisations_computed"] == 0
+    assert record(place / "later/mine")["realisations_computed"] == N - 4096  # the partial block is made again
+    for out in ("threads", "none", "later", "shares"):
+        assert csv_bytes(place / out / "mine") == whole[1], out
+
+
+@pytest.mark.slow
+def test_workers_give_the_same_bytes(place):
+    run("whole", "--threads", 1)
+    run("workers", "--workers", 2)
+    assert csv_bytes(place / "workers/mine") == csv_bytes(place / "whole/mine")
+
+
+def test_its_identity_is_what_its_numbers_depend_on(place):
+    before = identity()
+    for same in (FILTER.replace("# what is new", "# the innovation"), FILTER.replace('"""A filter of mine."""', "")):
+        Path("my_filter.py").write_text(same)
+        assert identity() == before
+    Path("my_filter.py").write_text(FILTER)
+    written("mine", MINE | {"name": "other"})
+    assert identity() == before
+    others = {identity("mine.yaml", "filters.other.alpha=0.7"), identity("mine.yaml", "filters.2.one_by_one=true")}
+    others.add(identity("mine.yaml", "filters.other.python=my_filter.py:everything"))
+    Path("my_filter.py").write_text(FILTER.replace("- 250.0", "- 251.0"))
+    others.add(identity())
+    Path("my_filter.py").write_text(FILTER)
+    Path("helper.py").write_text("BETA = 0.31\n")
+    others.add(identity())
+    Path("helper.py").write_text("import deeper\nBETA = 0.3\n")
+    others.add(identity())
+    Path("deeper.py").write_text("ONE = 1\n")
+    others.add(identity())
+    Path("helper.py").write_text("BETA = 0.3\n")
+    Path("my_filter.py").write_text(FILTER + "\nTABLE = 'table.csv'\n")
+    others.add(identity())
+    Path("table.csv").write_text("1")
+    others.add(identity())
+    Path("table.csv").write_text("2")
+    others.add(identity())
+    assert len(others - {before}) == 10
+
+
+def test_a_file_among_its_keys_is_given_as_a_path_and_counts_by_its_content(place):
+    for beta in (0.3, 0.4):
+        Path("b.txt").write_text(str(beta))
+        written("mine", MINE | {"weights": "b.txt"})
+        found = radarsim.run("mine.yaml", realisations=500), identity()
+        Path("helper.py").write_text(f"BETA = {beta}\n")
+        written("mine", MINE)
+        plain = radarsim.run("mine.yaml", realisations=500), identity()
+        assert found[0].curves.equals(plain[0].curves)
+        assert found[1] != plain[1]
+    assert record_of(found[0])["weights"] == "b.txt"
+
+
+def record_of(result):
+    return result.experiment.resolved["cases"][0]["filters"][2]
+
+
+def test_an_edit_counts_at_once_and_begins_anew(place):
+    first = radarsim.run("mine.yaml", realisations=500, out="out", figures=False)
+    Path("helper.py").write_text("BETA = 0.4\n")
+    edited = radarsim.run("mine.yaml", realisations=500, out="out", figures=False)
+    assert edited.facts["realisations_computed"] == 500
+    sigma = [one.curves.query("filter == 'mine' and component == 'r'")["sigma"].iloc[-1] for one in (first, edited)]
+    assert sigma[0] != sigma[1]
+    Path("helper.py").write_text("BETA = 0.3  # as before\n")
+    again = radarsim.run("mine.yaml", realisations=500, out="out", figures=False)
+    assert again.facts["realisations_computed"] == 0
+    assert again.curves.equals(first.curves)
+
+
+def test_what_changes_between_reading_and_running_is_noticed(place):
+    experiment = load("mine.yaml")
+    Path("my_filter.py").write_text(FILTER.replace("- 250.0", "- 260.0"))
+    with pytest.raises(ConfigError, match=r"my_filter\.py is not what it was when the config was read"):
+        radarsim.run(experiment, realisations=500)
+
+
+FAILING = """import numpy as np
+import helper
+class Mine:
+    def start(self, world):
+        pass
+    def step(self, plots):
+        if plots.first >= 4096:
+            {line}
+        return plots["range_m"][:, None]
+    def deep(self):
+        self.deep()
+"""
+FAILURES = {  # a line of the filter: the frame that is shown last, and what is said
+    "z = plots['range']": ("my_filter.py:8, in step: z = plots['range']", "KeyError: 'range'"),
+    "import sys; sys.exit('no licence')": ("my_filter.py:8, in step: import sys;", "SystemExit: no licence"),
+    "helper.broken(plots)": ("helper.py:3, in broken: np.linalg.inv(plots['range_m'])", "LinAlgError: 1-dimensional"),
+    "self.deep()": ("my_filter.py:11, in deep: self.deep()", "RecursionError: maximum recursion depth"),
+    "raise ValueError": ("my_filter.py:8, in step: raise ValueError", "ValueError"),
+}
+
+
+@pytest.mark.parametrize("line", FAILURES)
+def test_its_errors_are_its_own_traceback(place, line):
+    written("mine", {"name": "mine", "python": "my_filter.py:Mine"})
+    Path("helper.py").write_text("import numpy as np\ndef broken(plots):\n    np.linalg.inv(plots['range_m'])\n")
+    Path("my_filter.py").write_text(FAILING.format(line=line))
+    _, where, *frames, said = run("out", "--threads", 2, code=2).stderr.splitlines()
+    assert where.startswith("mine.yaml:")
+    assert where.endswith(": filter mine, my_filter.py:Mine, fails in realisations 4096:4096 (first:count):")
+    assert FAILURES[line][0] in frames[-1]
+    assert said.startswith(FAILURES[line][1])
+    assert 1 <= len(frames) <= 8
+    assert all(frame.startswith(f"  {place}") for frame in frames)
+    with pytest.raises(ConfigError, match="fails in realisations 4096:4096"):
+        radarsim.run("mine.yaml", threads=0)
+
+
+LOADING = {  # what stands in the config and in the module: what is said
+    (
+        "my_filter.py:Mine",
+        "import no_such_thing",
+    ): "cannot be imported:\n  {place}/my_filter.py:1, in <module>: import no_",
+    (
+        "my_filter.py:Mine",
+        "import sys\nsys.exit()",
+    ): "cannot be imported:\n  {place}/my_filter.py:2, in <module>: sys.ex",
+    (
+        "my_filter.py:Mine",
+        "Mine = 7\ndef other(): pass",
+    ): "no class or function Mine in {place}/my_filter.py; it has other",
+    ("my_filter.py:Mine", "def Mine(:"): "filters.2.python: {place}/my_filter.py:1: SyntaxError: invalid syntax",
+    ("my_filter.py:Mine", "\0"): "filters.2.python: {place}/my_filter.py:1: ",
+    ("no.py:Mine", ""): "filters.2.python: no such file: {place}/no.py",
+    (
+        "no_such_module:Mine",
+        "",
+    ): "filters.2.python: no such module, neither beside the config nor installed: no_such_mod",
+    ("my_filter.py", ""): "filters.2.python: must be FILE.py:NAME or MODULE:NAME, got 'my_filter.py'",
+    (7, ""): "filters.2.python: must be text, got 7",
+}
+
+
+@pytest.mark.parametrize(("python", "source"), LOADING)
+def test_what_cannot_be_loaded_is_said_before_anything_runs(place, python, source):
+    Path("my_filter.py").write_text(source)
+    written("mine", {"name": "mine", "python": python})
+    said = command("run", "rls2", "mine.yaml", "--out", "out", code=2)
+    assert said.stderr.startswith("mine.yaml:")
+    assert LOADING[python, source].format(place=place) in said.stderr
+    assert said.stdout == ""
+    assert not Path("out").exists()
+
+
+def test_where_it_may_stand_and_what_it_is_called_is_checked(place):
+    text = Path("mine.yaml").read_text()
+    config = yaml.safe_load(text)
+    for members, said in (
+        (
+            config["filters"][2:],
+            "filters.0.python: must stand after filters of the study itself, and beside at least one",
+        ),
+        (config["filters"][::-1], "filters.0.python: must stand after filters of the study itself"),
+        ([*config["filters"], MINE], "filters.3.name: names must differ, and this is there twice"),
+        ([*config["filters"][:2], {**MINE, "name": "r"}], "filters.2.name: names must differ, and this is there twice"),
+        ([*config["filters"][:2], {"python": "my_filter.py:Mine"}], "filters.2.name: required key is missing"),
+        ([*config["filters"][:2], {**MINE, "name": "=1"}], "filters.2.name: must not begin with = + - or @"),
+        ([{**config["filters"][0], "alpha": 1}, MINE], "filters.0.alpha: unknown key"),
+    ):
+        Path("mine.yaml").write_text(yaml.safe_dump(config | {"filters": members}, sort_keys=False))
+        stderr = command("check", "mine.yaml", code=2).stderr
+        assert said in stderr
+        assert stderr.startswith("mine.yaml:")
+    Path("mine.yaml").write_text(text)
+    unknown = run("out", "--set", "filters.mine.gamma=1", code=2).stderr
+    assert unknown.endswith("TypeError: Mine.__init__() got an unexpected keyword argument 'gamma'\n")
+    assert (
+        "--set baseline=nobody: must be the name of a filter: r, r+Vr"
+        in run("out", "--set", "baseline=nobody", code=2).stderr
+    )
+
+
+def test_no_code_refuses_it_and_runs_none(place):
+    Path("my_filter.py").write_text("open('ran', 'w')\n" + FILTER)
+    refused = "filters.2.python: is code of yours, and --no-code runs none, got 'my_filter.py:Mine'\n"
+    for words in (("run", "mine.yaml"), ("check", "mine.yaml"), ("report", "mine.yaml")):
+        try:
+            assert command(*words, "--no-code", code=2).stderr.endswith(refused)
+        finally:
+            os.environ.pop("RADARSIM_NO_CODE", None)
+    command("run", "rls2", "-n", 200, "--no-figures", "--no-code", "--out", "out")
+    os.environ["RADARSIM_NO_CODE"] = "1"
+    with pytest.raises(ConfigError, match="is code of yours"):
+        radarsim.run("mine.yaml")
+    assert not Path("ran").exists()
+
+
+def test_what_it_prints_is_not_in_the_answer(place):
+    Path("my_filter.py").write_text("print('read')\n" + FILTER.replace("dt = ", "print('a step'); dt = "))
+    done = run("out", "-n", 100, "--json")
+    assert json.loads(done.stdout)[0]["config"] == "mine"
+    assert {"read", "a step"} <= set(done.stderr.splitlines())
+
+
+def test_one_that_never_returns_is_stopped_by_a_signal(place):
+    Path("my_filter.py").write_text(
+        FILTER.replace("dt = ", "open('there', 'w')\n            while True: pass\n            dt = ")
+    )
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    words = [sys.executable, "-m", "radarsim", "run", "mine.yaml", "--out", "out"]
+    process = subprocess.Popen(words, env=environment, stderr=subprocess.PIPE, text=True)
+    while not Path("there").exists():
+        assert process.poll() is None
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "stopped by Ctrl-C" in said
+
+
+def test_its_keys_are_set_swept_and_included_by_its_name(place):
+    swept = load("mine.yaml", ["sweep={filters.mine.alpha: [0.5, 0.6]}", "scans=8"])
+    assert [case.name for case in swept.cases] == ["mine filters.mine.alpha=0.5", "mine filters.mine.alpha=0.6"]
+    result = radarsim.run(swept, realisations=300)
+    own, plain = result.curves["filter"] == "mine", result.curves["filter"] == "r"
+    for which, same in ((own, False), (plain, True)):
+        halves = [one["sigma"].to_numpy() for _, one in result.curves[which & (result.curves["k"] > 2)].groupby("case")]
+        assert (halves[0] == halves[1]).all() == same
+    (bare,) = load("mine.yaml", ["alpha=0.5", "filters.r.manoeuvre_variance=1e-4"]).cases
+    assert bare.keys["filters"][2]["alpha"] == 0.5
+    assert [one["manoeuvre_variance"] for one in bare.keys["filters"][:2]] == [1e-4, 1e-3]
+    Path("sub").mkdir()
+    Path("sub/all.yaml").write_text(
+        "include: [rls2]\nfilters:\n  - {name: r, observes: [range], manoeuvre_variance: 1e-3}\n"
+        "  - {name: mine, python: ../my_filter.py:Mine}\n"
+    )
+    (case,) = load("sub/all.yaml").cases
+    assert case.outside[0].file == str(place / "my_filter.py")
+    Path("both.yaml").write_text("include: [mine, rls1]\n")
+    assert [len(case.outside) for case in load("both.yaml").cases] == [1, 0]
+    assert load(swept.resolved["cases"][0] | {"study": "range_doppler"} and json.loads(json.dumps(keys_of(swept))))
+    (carried,) = load(
+        "mine.yaml",
+        [
+            "study=ambiguous_doppler",
+            "radar.repetition_rate_hz=1000",
+            "prior={sigma_velocity_mps: 100, sigma_acceleration_mps2: 5}",
+        ],
+    ).cases
+    assert [one.name for one in carried.outside] == ["mine"]
+
+
+def keys_of(experiment):
+    keys = dict(experiment.resolved["cases"][0])
+    return {"study": experiment.study} | {key: one for key, one in keys.items() if key not in ("case", "swept")}
+
+
+def test_the_keys_without_it_are_those_of_a_plain_config(place):
+    (case,), (plain,) = load("mine.yaml").cases, load(str(written("plain"))).cases
+    assert case.spec == plain.spec
+    assert type(case.spec) is type(plain.spec)
+
+
+def test_a_function_takes_all_plots_or_those_of_one_realisation(place):
+    made = []
+    for name, keys in (("everything", {}), ("single", {"one_by_one": True})):
+        written("mine", {"name": "mine", "python": f"my_filter.py:{name}", **keys})
+        made.append(radarsim.run("mine.yaml", realisations=300).curves)
+    assert made[0].equals(made[1])
+    sigma = made[0].query("filter == 'mine'")["sigma"]
+    assert (abs(sigma / 250 - 1) < 5 / (2 * 300) ** 0.5).all()
+
+
+def test_modules_and_packages_are_found_beside_the_config_or_installed(place, monkeypatch):
+    package = Path("site-packages/own_package")
+    package.mkdir(parents=True)
+    Path(package, "__init__.py").write_text("")
+    Path(package, "parts.py").write_text("BETA = 0.3\n")
+    Path(package, "deep.py").write_text(FILTER.replace("import helper", "from . import parts as helper"))
+    monkeypatch.syspath_prepend(str(place / "site-packages"))
+    want = radarsim.run("mine.yaml", realisations=300).curves
+    for python in ("my_filter:Mine", "own_package.deep:Mine", "site-packages/own_package/../../my_filter.py:Mine"):
+        written("mine", {"name": "mine", "python": python, "alpha": 0.6})
+        assert radarsim.run("mine.yaml", realisations=300).curves.equals(want)
+    written("mine", {"name": "mine", "python": "own_package.deep:Mine", "alpha": 0.6})
+    before = identity()
+    Path(package, "parts.py").write_text("BETA = 0.4\n")
+    assert identity() != before
+    assert not radarsim.run("mine.yaml", realisations=300).curves.equals(want)
+
+
+@pytest.mark.parametrize("like", ["multimodel", "sonar_missed", "ambiguous_rls2"])
+def test_any_study_with_plots_takes_it(place, like):
+    Path("my_filter.py").write_text("""
+import numpy as np
+def zero(plots):
+    return np.zeros((plots.n, len(plots.t_s), len(plots.world.components)))
+""")
+    written("mine", {"name": "mine", "python": "my_filter.py:zero"}, like=like)
+    result = radarsim.run("mine.yaml", realisations=20)
+    assert set(result.tables["failures"]["filter"]) == {"mine"}
+
+
+def test_studies_without_plots_refuse_it(place):
+    for stem, members in (("discriminator", "estimators"), ("pulses", "filters")):
+        config = shipped(stem)
+        config[members] = [*config[members], {"name": "mine", "python": "my_filter.py:Mine"}]
+        with pytest.raises(ConfigError, match=f"study {config['study']} draws no plots"):
+            radarsim.run(config, realisations=10)
+
+
+def test_the_schema_admits_it(place):
+    definitions = json.loads(schema_json())["$defs"]
+    assert {"$ref": "#/$defs/OwnCode"} in definitions["range_doppler"]["properties"]["filters"]["items"]["oneOf"]
+    own = definitions["OwnCode"]
+    assert own["required"] == ["name", "python"]
+    assert own["additionalProperties"] is True
