@@ -26,6 +26,8 @@ FOREIGN = (
     "yaml",
 )
 OTHERS = (
+    "FILE.py",
+    "my_filter.py",
     "radarsim.filters",
     "scans.errors",
     "STUDY.filters",
