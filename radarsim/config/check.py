@@ -356,8 +356,9 @@ def label(keys: Study | type[Study] | None, key: str) -> Label:
     steps = [step for step in key.split(".") if not step.isdecimal()]
     stem, _, end = steps[-1].rpartition("_")
     unit = UNITS.get(end, "") if stem and not stem.endswith("_per") else ""  # hertz per second are not seconds
-    unnamed = [steps[0], *steps[2:]]  # of filters.NAME.KEY
-    at = None if keys is None else _field(keys, steps) or _field(keys, unnamed)
+    at = _field(keys, steps) if keys is not None else None
+    if keys is not None and at is None and len(steps) > 2:
+        at = _field(keys, [steps[0], *steps[2:]])  # filters.NAME.KEY
     holder, found = at or _field(Common, steps) or (None, None)
     if found is None:
         name = stem if unit else steps[-1]

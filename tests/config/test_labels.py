@@ -14,6 +14,7 @@ from radarsim.config.fields import Model, Positive, Study
         ("rls2", "radar.sigma_range_m", Label("σ of the measured range", "σ_r", "m")),
         ("rls2", "manoeuvre_variance", Label("manoeuvre variance", "D_M", "(m/s³)²")),
         ("rls2", "filters.1.manoeuvre_variance", Label("manoeuvre variance", "D_M", "(m/s³)²")),
+        ("rls2", "filters.r+Vr.manoeuvre_variance", Label("manoeuvre variance", "D_M", "(m/s³)²")),
         ("rls2", "scans", Label("number of scans", "", "")),
         ("rls2", "seed", Label("seed", "", "")),
         ("rls2", "radar.no_such_key_mps2", Label("no such key", "", "m/s²")),

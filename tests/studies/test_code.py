@@ -290,10 +290,20 @@ def test_where_it_may_stand_and_what_it_is_called_is_checked(place):
     Path("mine.yaml").write_text(text)
     unknown = run("out", "--set", "filters.mine.gamma=1", code=2).stderr
     assert unknown.endswith("TypeError: Mine.__init__() got an unexpected keyword argument 'gamma'\n")
-    assert (
-        "--set baseline=nobody: must be the name of a filter: r, r+Vr"
-        in run("out", "--set", "baseline=nobody", code=2).stderr
-    )
+    nobody = run("out", "--set", "baseline=nobody", code=2).stderr
+    assert nobody == "--set baseline: must be the name of a filter: r, r+Vr, got 'nobody'\n"
+
+
+def test_gains_are_against_it_where_it_is_a_baseline(place):
+    made = radarsim.run("mine.yaml", realisations=2000, overrides=["baseline=[r, mine]"])
+    gains = made.gains.set_index(["filter", "baseline", "component", "k"])["gain_percent"]
+    mine, back = gains["mine", "r", "r", 9], gains["r", "mine", "r", 9]
+    assert (1 - mine / 100) * (1 - back / 100) == pytest.approx(1, abs=1e-9)
+    assert {base for _, base, *_ in gains.index} == {"r", "r+Vr", "mine"}
+    assert made.experiment.cases[0].keys["baseline"] == ["r", "mine"]
+    plain = radarsim.run("mine.yaml", realisations=2000, overrides=["baseline=mine"])
+    assert plain.experiment.cases[0].spec.baseline is None
+    assert plain.answer == made.answer
 
 
 def test_no_code_refuses_it_and_runs_none(place):
