@@ -260,7 +260,8 @@ def tried(case: Case, member: Outside) -> list[str]:
     x, _ = outside.checked(member.name, given, drawn.n, len(plan.world.t_s), plan.names, member.components)
     places = outside.columns_of(member.name, x.shape[2], plan.names, member.components)
     _rearranged(plan, member, x, drawn.truth_of(plan.axes.components), places, inner)
-    _follows(case, member, found.error, inner)
+    if not isinstance(member, Called):  # that is given the plots
+        _follows(case, member, found.error, inner)
     rms = np.sqrt(_mean(np.square(found.error), (0, 1)))[places]
     lines = []
     if raw.dtype.kind == "f" and raw.dtype.itemsize < np.dtype(float).itemsize:
@@ -279,6 +280,17 @@ def _mean(values: np.ndarray, axis: int | tuple[int, ...]) -> np.ndarray:
     there = np.isfinite(values)
     with np.errstate(invalid="ignore"):
         return np.asarray(np.where(there, values, 0).sum(axis) / there.sum(axis))
+
+
+def _median(values: np.ndarray) -> np.ndarray:
+    """The median over realisations of what is finite, infinite where nothing is."""
+    return np.asarray(np.median(np.where(np.isfinite(values), values, np.inf), axis=0))
+
+
+def _typical(values: np.ndarray) -> np.ndarray:
+    """The median of each component (d,) of what is finite in values (…, d)."""
+    finite = (one[np.isfinite(one)] for one in np.moveaxis(values, -1, 0))
+    return np.array([np.median(one) if one.size else np.nan for one in finite])
 
 
 def _again(plan: Plan, member: Outside, plots: Plots) -> np.ndarray:
@@ -322,27 +334,27 @@ def _rearranged(
 ) -> None:
     """Raises ConfigError where estimates fit in another order of components or scans, and not as they stand."""
     with np.errstate(all="ignore"):
-        scale = np.sqrt(np.nanmedian(np.square(inner), axis=(0, 1, 2)))[list(places)]
+        scale = _typical(np.abs(inner))[list(places)]
 
         def misfit(order: Sequence[int], step: int) -> float:
             off = np.abs(x[:, ::step][..., list(order)] - truth[..., list(places)])
-            median = np.nanmedian(np.where(np.isinf(off), np.nan, off), axis=(0, 1))
-            return float(np.nanmean(np.log(np.maximum(median / scale, 1e-3))))
+            return float(_mean(np.log(np.maximum(_typical(off) / scale, 1e-3)), 0))
 
         d = len(places)
         swaps = itertools.permutations(range(d)) if d <= 4 else (
             [*range(i), j, *range(i + 1, j), i, *range(j + 1, d)] for i in range(d) for j in range(i + 1, d)
         )  # fmt: skip
         every = [(range(d), 1), (range(d), -1), *((order, 1) for order in swaps)]
-        fits = [misfit(*one) for one in every]
-    order, step = every[int(np.nanargmin(fits))] if np.isfinite(fits).any() else every[0]
-    if fits[0] - np.nanmin(fits) > np.log(REARRANGED):
+        fits = np.nan_to_num([misfit(*one) for one in every], nan=np.inf)
+        better = fits[0] - fits.min()
+    order, step = every[int(fits.argmin())]
+    if better > np.log(REARRANGED):
         stand = (
             "the scans from the last to the first"
             if step < 0
             else "the components in the order " + ", ".join(plan.names[places[list(order).index(i)]] for i in range(d))
         )
-        by, wanted = np.exp(fits[0] - np.nanmin(fits)), ", ".join(plan.names[i] for i in places)
+        by, wanted = np.exp(better), ", ".join(plan.names[i] for i in places)
         raise ConfigError(f"{member.name}: estimates hold {stand}: their errors are then {by:.2g} times smaller; "
                           f"expected {wanted} by rising scans")  # fmt: skip
 
@@ -350,16 +362,16 @@ def _rearranged(
 def _follows(case: Case, member: Outside, error: np.ndarray, inner: np.ndarray) -> None:
     """Raises ConfigError where the errors are no more alike those of any filter of the config than by chance.
 
-    Of all that see the same plots they are correlated. For each realisation the products of the normalised errors are
-    averaged over scans and components; over realisations their mean is tested against nought.
+    Of all that see the same plots they are correlated. For each realisation the products of the normalised errors, cut
+    at three, are averaged over scans and components; over realisations their mean is tested against nought.
     """
     n = len(error)
     if n < FOLLOWS:
         return
     scores = []
     with np.errstate(all="ignore"):
-        off = [one - _mean(one, 0) for one in (error, *inner)]
-        mine, *own = (one / np.sqrt(_mean(np.square(one), 0)) for one in off)
+        off = [one - np.nan_to_num(_median(one)) for one in (error, *inner)]
+        mine, *own = (np.clip(one / _median(np.abs(one)), -3, 3) for one in off)
         for one in own:
             alike = _mean((mine * one).reshape(n, -1), 1)
             alike = alike[np.isfinite(alike)]

@@ -315,6 +315,30 @@ def test_a_function_of_one_realisation(mine):
         np.testing.assert_allclose(result.tables[name][column], mine.tables[name][column], rtol=1e-9, atol=1e-6)
 
 
+def test_a_filter_may_give_its_own_state_and_go_on_to_change_it():
+    class Mean:
+        def start(self, world):
+            self.x, self.k = None, 0
+
+        def step(self, plots):
+            self.k += 1
+            self.x = np.zeros((plots.n, 1)) if self.x is None else self.x
+            self.x += (plots["range_m"][:, None] - self.x) / self.k
+            return self.x
+
+    def mean(plots):
+        return np.cumsum(plots["range_m"], axis=1) / np.arange(1, 16)
+
+    stepped, whole = (radarsim.judge("rls2", one, realisations=300).curves["sigma"] for one in (Mean, mean))
+    np.testing.assert_allclose(stepped, whole, rtol=1e-9)
+
+
+def test_versions_of_a_filter_are_compared_on_the_same_noise(mine):
+    better = radarsim.judge("rls2", Twin, realisations=300)
+    table = radarsim.compare({"one": mine, "two": better}).table
+    assert set(table.query("quantity == 'sigma' and filter == 'mine'")["pairing"]) == {"same numbers"}
+
+
 def test_files_hold_what_arrays_do(estimates, mine, tmp_path):
     order = np.random.default_rng(4).permutation(300)
     np.savez(tmp_path / "plain.npz", estimates=estimates)
@@ -407,9 +431,12 @@ def test_errors_of_single_realisations_add_up_to_the_runs(plain):
         work = CaseWork(experiment.cases[0])
         plan = work.plans[-1]
         error = judging.outside.inner_errors(plan, 0, 64)
-        sums = next(work.unpacked(work.simulate(0, 64)))["error"]
+        sums = next(work.unpacked(work.simulate(0, 64)))
         for power in range(1, 5):
-            np.testing.assert_allclose(np.nansum(error**power, axis=1), sums[..., power - 1], rtol=1e-9, atol=1e-9)
+            whole = sums["error"][..., power - 1]
+            np.testing.assert_allclose(np.nansum(error**power, axis=1), whole, rtol=1e-9, atol=1e-9)
+        counted = sums["estimates"] if "estimates" in sums else 64 * plan.inner.axes.available
+        assert np.array_equal(np.isfinite(error).sum(axis=1), counted)
 
 
 def test_studies_without_paired_plots_are_refused_with_the_reason():
@@ -512,3 +539,24 @@ def test_a_hundred_thousand_realisations_take_five_seconds():
     before = time.process_time()
     radarsim.judge("rls2", Twin, realisations=1e5)
     assert time.process_time() - before < 5
+
+
+def test_errors_are_taken_at_the_scans_that_a_study_reports():
+    """multimodel reports from the fourth scan on; σ is that of the noise put on the truth at these scans."""
+    plots = radarsim.plots("multimodel_1hz", n=16)
+    result = radarsim.run("multimodel_1hz", realisations=16)
+    axes = result.cases[0].axes
+    noise = np.random.default_rng(5).normal(size=(16, len(plots.t_s), 9)) * np.arange(1, 1 + len(plots.t_s))[:, None]
+    judged = radarsim.judge("multimodel_1hz", plots.truth_of(axes.components) + noise, realisations=16)
+    mine = of(judged.curves, filter="mine", component="y")
+    np.testing.assert_allclose(mine["sigma"], np.sqrt((noise[:, axes.k - 1, 3] ** 2).mean(axis=0)), rtol=1e-6)
+    assert axes.k[0] > 1
+
+
+def test_no_estimate_is_a_failure_where_a_filter_of_the_config_has_one():
+    few = {"radar.detection_probability": 0.2, "scans": 4}
+    never = radarsim.judge("rls2", lambda plots: np.full((plots.n, 4, 3), np.nan), realisations=200, overrides=few)
+    columns = radarsim.plots("rls2", n=200, overrides=few).columns
+    seen = np.isfinite(columns["range_m"]).any(axis=1)
+    failed = of(never.tables["failures"], reason="no_estimate")["failed"].item()
+    assert failed == seen.sum() < 200

@@ -146,3 +146,17 @@ def test_the_claims_are_confirmed():
     assert abs(first["nees"] - 1) < 2.5 * half
     assert (first["nees_hi"] - first["nees_lo"]) / 2 == pytest.approx(half, rel=0.1)
     assert result.figure("consistency").axes[0].lines
+
+
+def test_the_textbook_filter_is_judged_as_a_filter_from_outside():
+    """Given plots of one realisation at a time, it equals the config's, so gains are nil; against the others not."""
+    book = Textbook(case_of().spec, "modified_polar")
+
+    def polar_filter(plots):
+        return book.run(plots.t_s, plots["bearing_rad"], np.transpose([plots[name] for name in OWN]))
+
+    judged = radarsim.judge("bearings", polar_filter, one_by_one=True, name="book", realisations=60)
+    gains = judged.gains[judged.gains["filter"] == "book"].groupby("baseline")["gain_percent"]
+    assert gains.agg(lambda g: g.abs().max())["modified polar"] < 1e-3
+    assert set(gains.groups) == {"cartesian", "pseudolinear", "modified polar"}
+    assert judged.tables["failures"]["failed"].sum() == 0

@@ -46,3 +46,11 @@ def test_the_claims_are_confirmed():
     table = radarsim.run("chirp_slopes", realisations=2000).tables["claims"]
     assert set(table["claim"]) == {f"chirp.{n}" for n in range(1, 6)}
     assert set(table["as_shipped"]) == {"confirmed"}
+
+
+def test_a_filter_from_outside_is_judged():
+    """The plots without coupling as they are: their σ is that of a plot, 50 m, and gains are against every filter."""
+    judged = radarsim.judge("chirp", lambda plots: plots["z_none_m"], realisations=400)
+    assert set(judged.gains.query("filter == 'mine'")["baseline"]) == {one.name for one in CASE.spec.filters}
+    last = judged.curves.query("filter == 'mine'").iloc[-1]
+    assert last["sigma_lo"] < 50 < last["sigma_hi"]
