@@ -196,14 +196,14 @@ class Cases:
     def _chosen(self, experiment: Experiment) -> Case:
         named = {case.name: case for case in experiment.cases}
         if self.name is None and len(named) == 1:
-            return experiment.cases[0]
+            return replace(experiment.cases[0], outside=())
         if self.name is None:
             some = ", ".join(repr(one) for one in list(named)[:MOST_NAMED]) + (", …" if len(named) > MOST_NAMED else "")
             raise ConfigError(f"{experiment.stem} has {len(named)} cases: choose one with {argument('case')}: {some}")
         if self.name not in named:
             near = did_you_mean(self.name, named) or f"; there are: {', '.join(named)}"
             raise ConfigError(f"no case {self.name!r} in {experiment.stem}{near}")
-        return named[self.name]
+        return replace(named[self.name], outside=())
 
     def at(self, key: str, value: float) -> Case:
         """The case with another value at a key. Raises ConfigError where the config refuses it."""

@@ -521,7 +521,7 @@ def judged(of: Objective, names: Sequence[str], pairs: Sequence[np.ndarray]) -> 
 def family(config: Config, settings: Sequence[str], members: Sequence[str], names: Sequence[str]) -> list[Case]:
     """The cases over which a filter is tuned; members: settings of each. Raises ConfigError."""
     cases = [
-        replace(case, name=f"{case.name} {member}".strip(), against=())
+        replace(case, name=f"{case.name} {member}".strip(), against=(), outside=())
         for member in members
         for case in load(config, [one for one in (*settings, member) if one]).cases
     ]

@@ -280,15 +280,9 @@ def _no_code(ctx: click.Context, param: click.Parameter, value: bool) -> None:
 
 def of_configs(name: str, **settings: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """The argument of a command that takes configs, and the option that refuses code in them."""
-    option = click.option(
-        "--no-code",
-        is_flag=True,
-        expose_value=False,
-        is_eager=True,
-        callback=_no_code,
-        help="Refuse configs with filters of your own code (`python: FILE.py:NAME`); the same as RADARSIM_NO_CODE=1.",
-    )
-    return lambda command: click.argument(name, shell_complete=completed, **settings)(option(command))
+    about = "Refuse configs with filters of your own code (`python: FILE.py:NAME`); the same as RADARSIM_NO_CODE=1."
+    flag = click.option("--no-code", is_flag=True, expose_value=False, is_eager=True, callback=_no_code, help=about)
+    return lambda command: click.argument(name, shell_complete=completed, **settings)(flag(command))
 
 
 configs_argument = of_configs("configs", nargs=-1, required=True, metavar="CONFIG…")

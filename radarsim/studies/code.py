@@ -21,7 +21,7 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeGuard
+from typing import Any
 
 from radarsim import failures
 from radarsim.config.experiment import digest
@@ -94,7 +94,9 @@ def _read(file: Path, name: str, changed: int, size: int) -> tuple[str, list[str
         raise ConfigError(f"{file}:{getattr(error, 'lineno', None) or 1}: {failures.words(error)}") from error
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-            node.body = [one for one in node.body if not (isinstance(one, ast.Expr) and _is_constant(one.value))]
+            node.body = [
+                one for one in node.body if not (isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant))
+            ]
     package = name if file.name == "__init__.py" else name.rpartition(".")[0]
     imported, texts = [], []
     for node in ast.walk(tree):
@@ -104,13 +106,9 @@ def _read(file: Path, name: str, changed: int, size: int) -> tuple[str, list[str
             above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
             base = ".".join([*above, *([node.module] if node.module else [])])
             imported += [base, *(f"{base}.{alias.name}" for alias in node.names)]
-        elif _is_constant(node) and isinstance(node.value, str):
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             texts.append(node.value)
     return hashlib.sha256(ast.unparse(tree).encode()).hexdigest(), imported, texts
-
-
-def _is_constant(node: ast.AST) -> TypeGuard[ast.Constant]:
-    return isinstance(node, ast.Constant)
 
 
 # ---- filter ----------------------------------------------------------------------------------------------------------
