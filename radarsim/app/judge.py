@@ -204,10 +204,10 @@ def _of_arrays(
     if "seed" in held and int(held["seed"]) != case.seed:
         raise ConfigError(f"{path}: of plots with seed {int(held['seed'])}; the run has seed {case.seed}")
     x, P = held["estimates"], held.get("covariances")
-    rows = next((held[one].ravel() for one in ("realisations", "realisation") if one in held), np.arange(len(x)))
+    rows = next((held[one].ravel() for one in ("realisation", "realisations") if one in held), np.arange(len(x)))
     if len(rows) != len(x):
         raise ConfigError(
-            f"{path}: realisations: must be {len(x)} numbers, as many as there are estimates, got {len(rows)}"
+            f"{path}: realisation: must be {len(x)} numbers, as many as there are estimates, got {len(rows)}"
         )
     order = _in_order(path, rows)
     own = tuple(map(str, held["components"])) if "components" in held else components

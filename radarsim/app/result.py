@@ -356,7 +356,8 @@ def answered(results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"]) 
 
 def asked(experiment: Experiment) -> str:
     """The question of an experiment, in one sentence."""
-    return called(study(experiment.study).question(experiment), names_in(experiment.cases))
+    question = outside.question(experiment) or study(experiment.study).question(experiment)
+    return called(question, names_in(experiment.cases))
 
 
 def answers(results: Sequence[CaseResult]) -> "list[notes.Answer]":

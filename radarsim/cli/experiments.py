@@ -251,8 +251,8 @@ def judge(
     \b
     .npz            estimates (n, K, d): realisations 0 … n - 1, the scans, the leading d
                     components of the state; if you have them covariances (n, K, d, d),
-                    components (names, if not the leading ones), realisations (numbers, if in
-                    another order) and seed
+                    components (names, if not the leading ones), realisation (n,), as in the file
+                    of the plots, and seed; both are checked
     .csv, .parquet  a row for each realisation and scan: realisation, k or t_s, and a column
                     for each component, such as r and Vr (or r_m and Vr_mps)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.language import listed, term, tr
+from radarsim.language import few, listed, term, tr
 from radarsim.report import notes, panels, statistics, wording
 from radarsim.report import tables as common
 from radarsim.report.drawing import Figure
@@ -166,7 +166,13 @@ def _below(above: "pd.DataFrame", below: "pd.DataFrame") -> "pd.DataFrame":
     return common.below([filled(above, below), filled(below, above)]) if len(above) else below
 
 
-# ---- answer ----------------------------------------------------------------------------------------------------------
+# ---- question and answer ---------------------------------------------------------------------------------------------
+def question(experiment: Experiment) -> str:
+    """What an experiment with filters from outside asks; empty where it has none."""
+    every = list(dict.fromkeys(one.name for case in experiment.cases for one in case.outside))
+    return tr("Is {names} better than the filters of the config?", names=few(every)) if every else ""
+
+
 def answers(results: Sequence[CaseResult]) -> "list[notes.Answer]":
     """What says how the filters from outside do, a part for each."""
     several = len(results) > 1
