@@ -80,7 +80,7 @@ def judge(
     tuned = {"against": against, "wanted": wanted}
     loaded = configs.load(config, texts)
     experiment, warnings = judged(loaded, estimates, name, components, one_by_one, realisations, **tuned)
-    (member,) = experiment.cases[0].outside
+    member = experiment.cases[0].outside[-1]
     asked = {"precision": precision, "of": of, "progress": progress, "threads": 0 if member.in_order else threads}
     return finished(experiment, warnings, out, figures, width_mm, **asked)
 
@@ -135,7 +135,7 @@ def judged(
     if there is not None and (n or 0) > there:
         raise ConfigError(f"{name}: there are estimates of {there} realisations, fewer than {n}")
     counts: dict[str, Any] = {"realisations": n or there} if n or there else {}
-    cases = tuple(replace(case, outside=(member,), **counts) for case in cases)
+    cases = tuple(replace(case, outside=(*case.outside, member), **counts) for case in cases)
     stem = f"{experiment.stem}_{'_'.join(name.split())}"
     made = replace(experiment, stem=stem, cases=cases, **counts)
     return made, [*left_out, *(line for case in made.cases for line in tried(case, member))]
@@ -149,12 +149,13 @@ def source(given: Any, name: str, components: tuple[str, ...], one_by_one: bool,
         if hasattr(given, "step") != hasattr(given, "start"):
             raise ConfigError(f"{name}: a filter that is asked scan by scan must have start(world) and step(plots)")
         components = components or tuple(getattr(given, "components", ()))
-        return Called(name, given, f"{id(given)}", components, one_by_one)
+        of = given if hasattr(given, "__qualname__") else type(given)
+        return Called(name, given, f"{of.__module__}.{of.__qualname__}", components, one_by_one)
     if len(cases) > 1:
         every = ", ".join(case.name for case in cases)
         raise ConfigError(f"{name}: estimates are of one case, and there are {every}: give one config, or a function")
     if isinstance(given, Iterator):
-        return Chunks(name, given, f"{id(given)}", components)
+        return Chunks(name, given, "iterator", components)
     if isinstance(given, str | os.PathLike):
         given, components = read(Path(given), cases[0], components)
     given, P = given if isinstance(given, tuple) and len(given) == 2 else (given, None)

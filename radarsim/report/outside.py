@@ -170,7 +170,9 @@ def _below(above: "pd.DataFrame", below: "pd.DataFrame") -> "pd.DataFrame":
 def question(experiment: Experiment) -> str:
     """What an experiment with filters from outside asks; empty where it has none."""
     every = list(dict.fromkeys(one.name for case in experiment.cases for one in case.outside))
-    return tr("Is {names} better than the filters of the config?", names=few(every)) if every else ""
+    if len(every) > 1:
+        return tr("Are {names} better than the filters of the config?", names=few(every))
+    return tr("Is {name} better than the filters of the config?", name=every[0]) if every else ""
 
 
 def answers(results: Sequence[CaseResult]) -> "list[notes.Answer]":

@@ -300,6 +300,23 @@ def twin_of(first, count):
     return twin(judging.outside.plots_of(plan, plan.draw(first, count)))
 
 
+def test_threads_change_no_number():
+    one, two = (radarsim.judge("rls2", Twin, realisations=9000, threads=threads).tables for threads in (1, 2))
+    assert all(one[name].equals(two[name]) for name in one)
+
+
+def test_a_filter_stands_beside_that_of_the_config(tmp_path, monkeypatch):
+    """One of Python in the config, and one that is judged: each is compared with all before it."""
+    monkeypatch.chdir(tmp_path)
+    own = "class Raw:\n    def start(self, world): pass\n    def step(self, plots): return plots['range_m'][:, None]\n"
+    (tmp_path / "own.py").write_text(own)
+    keys = [{"name": "r", "observes": ["range"], "manoeuvre_variance": 1e-3}, {"name": "raw", "python": "own.py:Raw"}]
+    result = radarsim.judge("rls2", held, realisations=300, overrides={"filters": keys})
+    assert set(of(result.gains, filter="mine")["baseline"]) == {"r", "raw"}
+    assert (of(result.gains, filter="mine", baseline="raw")["gain_percent"] == 0).all()
+    assert result.question == "Are raw and mine better than the filters of the config?"
+
+
 def test_an_iterator_that_ends_early_is_refused(estimates):
     with pytest.raises(ConfigError, match="must give 301 realisations, ended after 300"):
         radarsim.judge("rls2", iter([estimates]), realisations=301)
