@@ -10,7 +10,7 @@ import math
 import os
 import re
 import shlex
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -87,11 +87,8 @@ class Searched:
 
 @dataclass(frozen=True)
 class Tuning:
-    """A key as it was stated and is tuned, and from where to where it may be.
-
-    Exact: the values with which the quantity is within 0.1 % of the least, the other keys tuned. Sampled: the 95 %
-    interval of the best value. None where that is not known.
-    """
+    """A key as it was stated and is tuned; exact: the range that is as good to 0.1 %, the other keys tuned; sampled:
+    the 95 % interval of the best value, None where it is not known."""
 
     key: str
     unit: str
@@ -165,14 +162,11 @@ class Tuned(Shown):
             others = plural("{count} other realisation", "{count} other realisations", self.judged)
             words = f"95 % {shown(one.lo, '+.3g')} … {shown(one.hi, '+.3g')}; {others}"
         told = of | {"gain": f"{shown(one.gain, '.3g')} {self.gain_unit}", "how": words}
-        told |= {
-            "stated": f"{shown(one.stated, '.4g')}",
-            "tuned": f"{shown(one.tuned, '.4g')} {tr(self.unit)}".rstrip(),
-        }
+        told |= {"stated": shown(one.stated, ".4g"), "tuned": f"{shown(one.tuned, '.4g')} {tr(self.unit)}".rstrip()}
         if one.hi < 0:
             told["gain"] = f"{shown(-one.gain, '.3g')} {self.gain_unit}"
             return tr("Tuning loses {gain} in the {quantity}: {stated} → {tuned} ({how}).", **told)
-        if one.lo <= 0:
+        if not one.lo > 0:
             return tr("Tuning gains nothing that shows in the {quantity}: {gain} ({how}).", **told)
         return tr("Tuning gains {gain} in the {quantity}: {stated} → {tuned} ({how}).", **told)
 
@@ -192,37 +186,30 @@ class Variants:
     """A case with one filter alone, and what its gains are against, with other values of keys; as `Cases` is."""
 
     def __init__(self, case: Case, chosen: str, searched: Sequence[Searched], paired: bool):
-        self.case, self.searched, self.seed = case, searched, case.seed
+        self.case, self.chosen, self.searched, self.seed = case, chosen, searched, case.seed
         self.plain = {one.name: complete(one) for one in case.spec.members}
-        names = list(self.plain)
-        against = case.spec.baseline or names[0]
-        self.chosen, self.others = chosen, [against] if paired and against != chosen else []
+        own = getattr(case.spec, "baseline", None)
+        self.baseline = (own or next(iter(self.plain))) if paired else None
+        self.kept = {chosen, self.baseline}
         try:
-            self.base = self.of([chosen], against if self.others else None)
+            self.base = self.of(self.plain[chosen])
         except ConfigError:  # other keys name the filters that are left out
-            self.others = [name for name in names if name != chosen]
-            self.base = self.of([chosen], against)
+            self.kept, self.baseline = set(self.plain), own
+            self.base = self.of(self.plain[chosen])
 
-    def of(self, names: Iterable[str], baseline: str | None, *tuned: Mapping[str, Any]) -> Case:
-        """The case with these filters beside the others, and tuned ones. Raises ConfigError."""
-        wanted = {*names, *self.others}
-        members = [self.plain[one.name] for one in self.case.spec.members if one.name in wanted]
-        made = with_filters(self.case, [*members, *tuned], baseline)
+    def of(self, own: Mapping[str, Any], *tuned: Mapping[str, Any]) -> Case:
+        """The case with these keys of the filter, and a tuned one beside it. Raises ConfigError."""
+        members = [own if name == self.chosen else one for name, one in self.plain.items() if name in self.kept]
+        made = with_filters(self.case, [*members, *tuned], self.baseline)
         return replace(made, seed=self.seed, noise_of=self.case.noise_of or self.case.spec)
 
     def at(self, key: str, place: Place) -> Case:
         """The case with other values. Raises ConfigError where the config refuses them."""
-        before = self.plain[self.chosen]
-        self.plain[self.chosen] = self.filter(place)
-        try:
-            return self.of([self.chosen], self.base.spec.baseline)
-        finally:
-            self.plain[self.chosen] = before
+        return self.of(self.filter(place))
 
     def beside(self, place: Place) -> Case:
         """The case with the filter as stated and as tuned, with the config's own seed."""
-        tuned = self.filter(place) | {"name": self.chosen + TUNED}
-        made = self.of([self.chosen], self.base.spec.baseline, tuned)
+        made = self.of(self.plain[self.chosen], self.filter(place) | {"name": self.chosen + TUNED})
         return replace(made, seed=self.case.seed)
 
     def filter(self, place: Place) -> dict[str, Any]:
@@ -443,6 +430,8 @@ def spread(
         return np.asarray(of.cost(found))
 
     size, steps = len(at), STEP * np.eye(len(at))
+    if not size:
+        return {}
     try:
         here = costs(at)
         above, below = ([costs(at + sign * step) for step in steps] for sign in (1, -1))
@@ -480,40 +469,28 @@ def parted(case: Case, asked: Sequence[Asked], count: int) -> np.ndarray:
     return np.array([whole, *but_one])
 
 
-def change(of: Asked, stated: Any, tuned: Any) -> Any:
-    """What is gained: of a size its logarithm, else its difference."""
-    if of.of.kind == "size":
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.log(stated / tuned)
-    return tuned - stated if of.of.more_is_better else stated - tuned
-
-
 def _predict(notify: Callable[[str], None], of: Objective, searched: Sequence[Searched], each: float) -> None:
     """Say what the search will do and about how long it takes, where that is long; each: seconds of one place."""
     grids = [len(one.over.grid(None if of.exact or one.over.whole else POINTS)) for one in searched]
     whole = [one.over.whole for one in searched]
     scans = math.prod(itertools.compress(grids, whole)) * max(1, sum(grids) - sum(itertools.compress(grids, whole)))
-    full = TRIED[of.exact] * whole.count(False)
+    full = TRIED[of.exact] // 2 * whole.count(False)
     for curve in of.curves:
         curve.expected = scans + full
-    what = tr(
-        "searches {keys}, about {count} places",
-        keys=plural("{count} key", "{count} keys", len(grids)),
-        count=scans + full,
-    )
+    keys = plural("{count} key", "{count} keys", len(grids))
+    what = tr("searches {keys}, about {count} places", keys=keys, count=scans + full)
     question.predict(notify, what, each * (scans * (1.0 if of.exact else 1 / PILOT_SHARE) + full))
 
 
 def judged(of: Objective, names: Sequence[str], pairs: Sequence[np.ndarray]) -> list[Judged]:
     """The gain of each case, and the last of all; pairs (1 + n, 2) of each case: stated and tuned."""
-    kind, found = of.curves[0].quantity, []
+    found, less = [], -1 if of.of.more_is_better else 1
     every = [*pairs, np.stack([of.combined([pair[:, i] for pair in pairs]) for i in (0, 1)], axis=1)]
     for name, pair in zip((*names, ""), every, strict=True):
         stated, tuned = pair.T
-        gains = change(kind, stated, tuned)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            gains = less * (stated - tuned) * (100 / stated if of.of.kind == "size" else 1)
         ends: Sequence[float] = interval(gains[1:], float(gains[0])) if len(gains) > 1 else [float(gains[0])] * 3
-        if kind.of.kind == "size":
-            ends = [-100 * math.expm1(-end) for end in ends]
         found.append(Judged(name, float(stated[0]), float(tuned[0]), *ends))
     return found
 
@@ -617,7 +594,7 @@ def tune(
     plain = variants[0].plain[chosen]
     if exact:
         of.rough = False
-        pairs = [np.array([[curve.exactly(start), curve.exactly(best)]]) for curve in curves]
+        pairs = [np.array([[curve.exactly(None), curve.exactly(best)]]) for curve in curves]
         of.rough = any(curve.rough for curve in curves)
         ends = {one.path: flat(of, searched, best, i) for i, one in enumerate(searched) if one.of is None}
     else:
@@ -713,10 +690,8 @@ def beside(experiment: Experiment, wanted: str | None, **asked: Any) -> tuple[Ex
             found.append(tune(experiment, wanted, filter=one.name, **asked))
         except ConfigError as error:
             left_out.append(tr("{filter} is not tuned: {why}", filter=one.name, why=error.lines[0]))
-    made = [
-        with_filters(
-            each, [*map(complete, each.spec.members), *(one.member(each) for one in found)], each.spec.baseline
-        )
-        for each in experiment.cases
-    ]
+    made = []
+    for each in experiment.cases:
+        members = [*map(complete, each.spec.members), *(one.member(each) for one in found)]
+        made.append(with_filters(each, members, getattr(each.spec, "baseline", None)))
     return replace(experiment, cases=tuple(made)), left_out

@@ -29,17 +29,8 @@ COLUMNS = (  # of tables
     *(term("realisations"), term("one thread"), term("known from"), term("last to get there"), term("claim")),
     *(term("statement"), term("place"), term("measured and expected"), term("class"), term("config"), term("key")),
     *(term("RMS error"), term("unit"), term("of own σ"), term("estimates"), term("number"), term("plots"), term("NIS")),
-    *(term("95 % from"), term("95 % to"), term("stated σ")),
-    *(
-        term("value"),
-        term("stated"),
-        term("tuned"),
-        term("name"),
-        term("what it is"),
-        term("paper and question"),
-        term("study"),
-        term("keys"),
-    ),
+    *(term("95 % from"), term("95 % to"), term("stated σ"), term("stated"), term("tuned")),
+    *(term("value"), term("name"), term("what it is"), term("paper and question"), term("study"), term("keys")),
 )
 TITLES = (term("reading"), term("tracking"), term("judging"), term("fitting"))  # of what has no known end
 WHAT = (

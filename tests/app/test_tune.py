@@ -111,6 +111,7 @@ def test_the_textbook_has_the_tuned_sigma():
     found = tune("rls2", **R, free={"manoeuvre_variance": (1e-2, 1)})
     value = impulse.sigmas(2, 7, found.keys[0].tuned, (250.0, 15.0), 10.0)[0]
     assert found.all.tuned == pytest.approx(value, rel=1e-9)
+    assert found.all.stated == pytest.approx(impulse.sigmas(2, 7, 1e-3, (250.0, 15.0), 10.0)[0], rel=1e-9)
     assert "ends at 0.01" in found.notes[0]
 
 
@@ -167,6 +168,16 @@ def test_training_is_of_other_noise():
     assert found.all.tuned == pytest.approx(row["sigma"], rel=1e-12)
 
 
+def test_whole_numbers_alone_have_no_interval():
+    found = tune("ambiguous_rls2", "sigma r", filter="memory", free=["hypotheses=1:3"], realisations=200)
+    (one,) = found.keys
+    assert one.tuned in (1, 2, 3)
+    assert (one.lo, one.hi) == (None, None)
+    assert found.notes == (
+        "hypotheses ends at 3, the end of what was searched; --free KEY=LOW:HIGH searches elsewhere",
+    )
+
+
 def test_columns_of_a_matrix_sum_to_one_and_zeros_stay():
     given = {"transition": None, "models.2.sigma_acceleration_mps2": (3, 300)}
     shorter = ["filters.0.models.0.sigma_acceleration_mps2=1", "scans=30"]
@@ -186,6 +197,19 @@ def test_a_rate_is_the_larger_the_better():
     assert found.all.tuned > found.all.stated
     assert found.all.gain == pytest.approx(found.all.tuned - found.all.stated)
     assert "points" in found.answer
+
+
+def test_a_study_without_a_baseline_is_tuned():
+    found = tune("discriminator", "lock", filter="sequence", free=["main_lobe_threshold"], realisations=60)
+    assert found.settings.keys() == {"estimators.0.main_lobe_threshold"}
+    assert found.all.gain >= 0
+
+
+def test_a_size_that_comes_down_to_nothing_has_an_interval():
+    """Ends of tracks in none of some batches."""
+    case = "sonar_clutter sensor.false_plots_per_km2=1"
+    found = tune("sonar_clutter", "loss", filter="PDA", case=case, free=["manoeuvre_variance"], realisations=100)
+    assert np.isfinite([found.all.gain, found.all.lo, found.all.hi]).all()
 
 
 # ---- the rival at its best -------------------------------------------------------------------------------------------
