@@ -213,8 +213,9 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
         first = tr("{name} is worse than {best}, the config's best in {component} at {t} s: gain {gain}", **told)
     else:
         first = tr("{name} cannot be told from {best}, the config's best in {component} at {t} s: gain {gain}", **told)
+    rivals = [best, *sorted(tuned, key=lambda base: sigma[base])[:1]]
     if tuned:
-        rival = last[last["baseline"] == min(tuned, key=lambda base: sigma[base])].iloc[0]
+        rival = last[last["baseline"] == rivals[1]].iloc[0]
         told |= {"best": rival["baseline"], "gain": wording.estimate((rival[key] for key in GAIN), "%", ".3g")}
         if rival["gain_lo"] > 0:
             first += tr(", and better than {best}: gain {gain}", **told)
@@ -226,8 +227,8 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
     mine = curves[curves["filter"] == name].iloc[0]
     sigmas = wording.estimate((mine[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(unit))
     said = [start + first + "; " + tr("its σ is {sigma}, {floor}.", sigma=sigmas, floor=_floor(curves, best, unit))]
-    said += _above_floor(common.where(made["floor"], case=result.name, component=component, k=last["k"].iloc[0]),
-                         {name: mine["sigma"], best: sigma[best]}, panels.unit_of(unit))  # fmt: skip
+    floor = common.where(made["floor"], case=result.name, component=component, k=last["k"].iloc[0])
+    said += _above_floor(floor, {name: mine["sigma"]} | {one: sigma[one] for one in rivals}, panels.unit_of(unit))
     against = [f"{one['baseline']} {wording.estimate((one[key] for key in GAIN), '%', '.3g')}"
                for one in last.to_dict("records") if one["baseline"] != best]  # fmt: skip
     if against:
@@ -252,17 +253,17 @@ def _floor(curves: "pd.DataFrame", best: str, unit: str) -> str:
 
 
 def _above_floor(floor: "pd.DataFrame", sigmas: Mapping[str, float], unit: str) -> Iterator[str]:
-    """How far the filter from outside, the first of these σ, and the config's best are from the floor."""
-    (name, own), (best, other) = sigmas.items()
+    """How far the filter from outside, the first of these σ, the config's best, and the best tuned one are from the
+    floor."""
+    name, *others = sigmas
     rows = common.where(floor, filter=name)
     if len(rows):
         least = float(rows["floor"].iloc[0])
-        told = {"name": name, "best": best, "floor": f"{least:.4g} {unit}".rstrip()}
-        told |= {key: f"{100 * (sigma / least - 1):.3g}" for key, sigma in (("own", own), ("other", other))}
+        own, *above = (f"{100 * (sigma / least - 1):.3g} %" for sigma in sigmas.values())
+        told = {"name": name, "own": own, "floor": f"{least:.4g} {unit}".rstrip()}
+        told["others"] = listed([f"{one} {size}" for one, size in zip(others, above, strict=True)])
         kind = tr(UNBIASED if rows["kind"].iloc[0].startswith("CRB") else ANY)
-        yield tr(
-            "The floor there, {kind}, is {floor}: {name} is {own} % above it, {best} {other} %.", kind=kind, **told
-        )
+        yield tr("The floor there, {kind}, is {floor}: {name} is {own} above it, {others}.", kind=kind, **told)
 
 
 UNBIASED = term("the Cramér-Rao bound of unbiased estimators")

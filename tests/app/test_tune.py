@@ -254,6 +254,14 @@ def test_a_rival_that_is_the_tuned_filter_gains_nothing_on_it():
     assert ((rows["gain_lo"] <= 0) & (rows["gain_hi"] >= 0)).all()
 
 
+def test_both_rivals_stand_beside_the_floor():
+    result = radarsim.judge("rls2", lambda plots: plots["range_m"], name="raw", against="tuned",
+                            realisations=100)  # fmt: skip
+    (floor,) = [line for line in result.answer if line.startswith("The floor there")]
+    assert floor.count(" % above it, ") == 1
+    assert ", tuned " in floor
+
+
 def test_what_cannot_be_tuned_is_said():
     result = radarsim.judge("rls2", rival(1e-3), against="tuned", wanted="sigma Vr at 10 s", realisations=300)
     assert any(line.startswith("r is not tuned: ") for line in result.warnings)
