@@ -261,7 +261,7 @@ def tried(case: Case, member: Outside) -> list[str]:
     x, _ = outside.checked(member.name, given, drawn.n, len(plan.world.t_s), plan.names, member.components)
     places = outside.columns_of(member.name, x.shape[2], plan.names, member.components)
     _rearranged(plan, member, x, drawn.truth_of(plan.axes.components), places, inner)
-    if not isinstance(member, Called):  # that is given the plots
+    if isinstance(member, Given | Chunks):  # others are given the plots
         _follows(case, member, found.error, inner)
     rms = np.sqrt(_mean(np.square(found.error), (0, 1)))[places]
     lines = []

@@ -169,7 +169,7 @@ class Coded(Outside):
 
     def estimates(self, plots: Plots) -> Any:
         target = self.target
-        with self._running(f"fails in realisations {plots.first}:{plots.n} (first:count)"):
+        with self._running(f"fails in realisations {plots.first}:{plots.n} (first:count) of {plots.world.case}"):
             made = target(**self.given) if isinstance(target, type) else partial(target, **self.given)
             return Called(self.name, made, alone=self.keys.one_by_one).estimates(plots)
 

@@ -49,7 +49,8 @@ class World:
     """What a filter may know beforehand.
 
     t_s (K,) times of the scans, s; columns: what is measured, units in the names; sigma: its standard deviations, where
-    the config states them; components: names and units of the state; keys: the config, as YAML has it.
+    the config states them; components: names and units of the state; keys: the config, as YAML has it;
+    case: what the case is called.
     """
 
     t_s: np.ndarray
@@ -57,6 +58,7 @@ class World:
     sigma: Mapping[str, float]
     components: tuple[tuple[str, str], ...]
     keys: Mapping[str, Any]
+    case: str = ""
 
 
 @dataclass(frozen=True)
@@ -270,7 +272,7 @@ def prepare(study: "Study", case: Case, inner: Any) -> Plan:
     keys = recorded.sigmas(case.spec)
     stated = {one.rpartition("sigma_")[2]: one for of in keys.values() for one in of}
     sigma = {name: attrgetter(stated[name])(case.spec) for name in first.columns if name in stated}
-    world = World(first.t_s, tuple(first.columns), sigma, axes.components, case.keys)
+    world = World(first.t_s, tuple(first.columns), sigma, axes.components, case.keys, case.name)
     G, (F, K, C) = len(names), axes.available.shape
     layout = Layout(
         error=(G, K, C, 4),

@@ -58,7 +58,7 @@ MINE = {"name": "mine", "python": "my_filter.py:Mine", "alpha": 0.6}
 def place(tmp_path, monkeypatch):
     """A folder with the filter and a config, in which one works."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("RADARSIM_NO_CODE", raising=False)
+    monkeypatch.setenv("RADARSIM_NO_CODE", "")  # what a test sets is taken back
     Path("my_filter.py").write_text(FILTER)
     Path("helper.py").write_text("BETA = 0.3\n")
     written("mine", MINE)
@@ -225,7 +225,7 @@ def test_its_errors_are_its_own_traceback(place, line):
     Path("my_filter.py").write_text(FAILING.format(line=line))
     _, where, *frames, said = run("out", "--threads", 2, code=2).stderr.splitlines()
     assert where.startswith("mine.yaml:")
-    assert where.endswith(": filter mine, my_filter.py:Mine, fails in realisations 4096:4096 (first:count):")
+    assert where.endswith(": filter mine, my_filter.py:Mine, fails in realisations 4096:4096 (first:count) of mine:")
     assert FAILURES[line][0] in frames[-1]
     assert said.startswith(FAILURES[line][1])
     assert 1 <= len(frames) <= 8
@@ -312,10 +312,8 @@ def test_no_code_refuses_it_and_runs_none(place):
     Path("my_filter.py").write_text("open('ran', 'w')\n" + FILTER)
     refused = "filters.2.python: is code of yours, and --no-code runs none, got 'my_filter.py:Mine'\n"
     for words in (("run", "mine.yaml"), ("check", "mine.yaml"), ("report", "mine.yaml")):
-        try:
-            assert command(*words, "--no-code", code=2).stderr.endswith(refused)
-        finally:
-            os.environ.pop("RADARSIM_NO_CODE", None)
+        assert command(*words, "--no-code", code=2).stderr.endswith(refused)
+        os.environ["RADARSIM_NO_CODE"] = ""
     command("run", "rls2", "-n", 200, "--no-figures", "--no-code", "--out", "out")
     os.environ["RADARSIM_NO_CODE"] = "1"
     with pytest.raises(ConfigError, match="is code of yours"):
@@ -397,6 +395,20 @@ def test_a_function_takes_all_plots_or_those_of_one_realisation(place):
     assert made[0].equals(made[1])
     sigma = made[0].query("filter == 'mine'")["sigma"]
     assert (abs(sigma / 250 - 1) < 5 / (2 * 300) ** 0.5).all()
+
+
+def test_one_that_looks_ahead_or_cannot_be_repeated_is_told(place):
+    Path("my_filter.py").write_text(
+        "import numpy as np\nrandom = np.random.default_rng(1)\n"
+        "def ahead(plots):\n    return np.roll(plots['range_m'], -1, axis=1)[:, :, None]\n"
+        "def noisy(plots):\n    z = plots['range_m'][:, :, None]\n    return z + random.normal(size=z.shape)\n"
+    )
+    for name, said in (
+        ("ahead", "mine: uses later plots"),
+        ("noisy", "mine: gives other estimates for the same plots"),
+    ):
+        written("mine", {"name": "mine", "python": f"my_filter.py:{name}"})
+        assert any(line.startswith(said) for line in radarsim.run("mine.yaml", realisations=300).warnings)
 
 
 def test_modules_and_packages_are_found_beside_the_config_or_installed(place, monkeypatch):
