@@ -156,6 +156,22 @@ class Count(click.ParamType):
         return int(text) if text.isdigit() else int(number)
 
 
+class Span(click.ParamType):
+    """Two whole numbers FIRST:STOP, of which STOP is beyond the last that is meant."""
+
+    name = "FIRST:STOP"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        first, _, stop = str(value).partition(":")
+        try:
+            found = Count().convert(first, None, None), Count().convert(stop, None, None)
+        except click.BadParameter:
+            found = 0, 0
+        if found[0] >= found[1]:
+            self.fail(f"must be FIRST:STOP with FIRST < STOP, such as 0:1000, got {value!r}", param, ctx)
+        return found
+
+
 class Positive(click.ParamType):
     """A finite number above zero, and up to `most`."""
 

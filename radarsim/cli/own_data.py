@@ -75,33 +75,50 @@ def new_study(name: str, step: bool, folder: bool) -> None:
 
 @main.command()
 @config_argument
-@click.option("-o", "--output", required=True, metavar="PLOTS.csv", help="File for the plots.")
-@click.option(
-    "-i", "--realisation", type=Count(), default=0, show_default=True, help="The realisation, counted from 0."
-)
+@click.option("-o", "--output", required=True, metavar="PLOTS.csv", help="File for the plots; also .npz and .parquet.")
+@click.option("-i", "--realisation", type=Count(), help="The realisation, counted from 0.  [default: 0]")
+@click.option("--realisations", type=group.Span(), help="Several, from FIRST up to, but not including, STOP.")
 @set_option
-def simulate(config: str, output: str, realisation: int, overrides: tuple[str, ...]) -> None:
-    """Write the measurements of one realisation, with the truth.
+def simulate(
+    config: str, output: str, realisation: int | None, realisations: tuple[int, int] | None, overrides: tuple[str, ...]
+) -> None:
+    """Write the measurements of one realisation or of many, with the truth.
 
     The plots are exactly those that a run of CONFIG draws in this realisation: `radarsim track` over them gives the
     errors that the run accumulates. A missed plot is an empty cell; the truth is in columns true_….
+
+    Several realisations follow one another in a CSV or Parquet file, with their number in the column `realisation`. An
+    .npz file holds an array for each column, (realisations, scans), with NaN for a missed plot, and the times t_s.
 
     \b
     Example
       radarsim simulate rls2 -o plots.csv
       radarsim track rls2 plots.csv -o track.csv
+      radarsim simulate rls2 --realisations 0:1e5 -o plots.npz
     """
     from radarsim.app import run
     from radarsim.cli import console
-    from radarsim.recorded import follow
+    from radarsim.recorded import bulk, follow
     from radarsim.recorded import plots as files
 
+    if None not in (realisation, realisations):
+        raise click.UsageError("--realisation and --realisations do not go together: give one of them")
     (loaded,) = run.load_all([config], overrides)
-    columns = follow.simulated(loaded, realisation)
-    files.write_columns(columns, output, loaded.path)
-    count = len(next(iter(columns.values())))
-    rows = plural("{count} row", "{count} rows", count)
-    console.field("plots", f"{output} ({rows}: {', '.join(columns)})")
+    number = realisation or 0
+    if realisations is None and Path(output).suffix.lower() not in bulk.FORMATS:
+        columns = follow.simulated(loaded, number)
+        files.write_columns(columns, output, loaded.path)
+        rows = plural("{count} row", "{count} rows", len(columns["t_s"]))
+        written = f"{rows}: {', '.join(columns)}"
+    else:
+        first, stop = realisations or (number, number + 1)
+        with console.Counter("writing", "realisations") as counter:
+            one = bulk.write(loaded, stop - first, first, output, counter.update)
+        many = plural("{count:,} realisation", "{count:,} realisations", stop - first)
+        scans = plural("{count} scan", "{count} scans", len(one.t_s))
+        told = {"realisations": many, "scans": scans, "names": ", ".join(one.columns)}
+        written = tr("{realisations} of {scans}: {names}, and the truth", **told)
+    console.field("plots", f"{output} ({written})")
     console.print_warnings(run.cache_troubles())
 
 

@@ -168,6 +168,8 @@ def one_case(experiment: Experiment, what: str, command: str) -> Case:
         raise ConfigError(f"{place}: must be one case to {what}, got {count}; {choice(experiment, command)}")
     (case,) = experiment.cases
     if study(case.study).recorded() is None:
+        if what == "simulate":
+            raise ConfigError(f"{place}: study: {case.study} draws no plots: its filters take bursts of pulses")
         raise ConfigError(f"{place}: study: {case.study} has no filters for recorded plots")
     return case
 
@@ -232,7 +234,8 @@ def batches(experiment: Experiment, n: int, first: int = 0, chunk: int | None = 
     given = {"n": (n, 1), "first": (first, 0), "chunk": (n if chunk is None else chunk, 1)}
     n, first, size = (_whole(name, *one) for name, one in given.items())
     if first + n > LARGEST_REALISATIONS:
-        raise ConfigError(f"first + n: must be at most {LARGEST_REALISATIONS}, got {first + n}")
+        what = argument("first + n", "--realisations: STOP")
+        raise ConfigError(f"{what}: must be at most {LARGEST_REALISATIONS}, got {first + n}")
     case = case_with_plots(experiment)
     plots, last = recorded_of(case), first + n
     return (plots.drawn(case, i, min(size, last - i)) for i in range(first, last, size))

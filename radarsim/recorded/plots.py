@@ -356,10 +356,15 @@ def _cell(value: float) -> str:
     return "" if math.isnan(value) else repr(value)
 
 
+def cells(column: np.ndarray) -> Iterator[str]:
+    """Numbers (n,) as text, nothing for not-a-number."""
+    return map(_cell if column.dtype.kind == "f" else str, column.tolist())
+
+
 def write_columns(
     columns: Mapping[str, np.ndarray], path: str | os.PathLike, config: str | os.PathLike | None = None
 ) -> None:
     """Write columns (n,) of numbers as CSV, an empty cell for NaN, never over the config; errors as of `Writer`."""
     with Writer(path, {"the config": config}) as file:
         file.write([tuple(columns)])
-        file.write(zip(*([_cell(v) for v in column.tolist()] for column in columns.values()), strict=True))
+        file.write(zip(*map(cells, columns.values()), strict=True))

@@ -24,7 +24,7 @@ from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import MappingProxyType, ModuleType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 from radarsim.config.experiment import Experiment
 from radarsim.errors import ConfigError, StoreError
@@ -197,7 +197,7 @@ def same_file(one: str | os.PathLike, other: str | os.PathLike) -> bool:
 
 
 class Writer:
-    """A CSV file at a path given by the user: written completely or not at all, or a stream, written directly.
+    """A file at a path given by the user, CSV or bytes: written completely or not at all, or a stream, directly.
 
     sources: files that are read, by their names in messages; a path to one of them raises ConfigError, and so does a
     path to neither a file nor a stream. Disk faults become StoreError.
@@ -227,6 +227,11 @@ class Writer:
         self._rows = csv.writer(self._file, lineterminator="\n")
         return self
 
+    @property
+    def binary(self) -> BinaryIO:
+        """The file for bytes, in place of rows."""
+        return self._file.buffer
+
     def write(self, rows: Iterable[Sequence[str]]) -> None:
         """Write rows of text."""
         try:
@@ -234,8 +239,10 @@ class Writer:
         except OSError as error:
             raise self._fault(error) from error
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, raised: BaseException | None, *_: object) -> None:
         try:
+            if isinstance(raised, OSError):
+                raise raised
             self._file.close()
             if kind is None and self._temporary is not None:
                 rename(self._temporary, self._target)
@@ -246,7 +253,7 @@ class Writer:
                 self._temporary.unlink(missing_ok=True)
 
     def _fault(self, error: OSError) -> StoreError:
-        return StoreError(f"{self.path}: cannot be written: {error.strerror}")
+        return StoreError(f"{self.path}: cannot be written: {error.strerror or error}")
 
 
 # ---- provenance ------------------------------------------------------------------------------------------------------

@@ -24,6 +24,7 @@ from radarsim.errors import ConfigError
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
+    import xarray
 
     from radarsim.config.experiment import Case, Experiment
     from radarsim.config.fields import Model
@@ -121,21 +122,49 @@ class Drawn:
         chosen = [names.index(true_column(*one)) for one in components]
         return self.truth if chosen == list(range(len(names))) else self.truth[..., chosen]
 
-    def rows(self, i: int) -> "dict[str, np.ndarray]":
-        """One of the realisations, counted from 0, as columns (rows,) of a file: `t_s`, what is measured, the truth.
+    def arrays(self) -> "dict[str, np.ndarray]":
+        """All arrays (n, K) or (n, K, M): what is measured, then the truth in columns true_…."""
+        names = (true_column(*one) for one in self.components)
+        state = {name: self.truth[..., c] for c, name in enumerate(names)}
+        return {**self.columns, **self.beside, **state}
+
+    def table(self) -> "dict[str, np.ndarray]":
+        """All realisations one after the other as columns (rows,): `realisation`, `t_s`, what is measured, the truth.
 
         A row a scan; where a scan may have several plots a row a plot, and one without values where it has none; of the
         truth these have what stands beside it alone.
         """
         import numpy as np
 
-        made = {"t_s": self.t_s} | {name: values[i] for name, values in (*self.columns.items(), *self.beside.items())}
+        n, K = self.truth.shape[:2]
+        made = {"realisation": np.arange(self.first, self.first + n)[:, None], "t_s": self.t_s[None]}
         if not self.several:
-            return made | dict(zip((true_column(*one) for one in self.components), self.truth[i].T, strict=True))
-        wide = next(values for values in made.values() if values.ndim == 2)
-        there = np.any([np.isfinite(made[name]) for name in self.columns], axis=0) | (np.arange(wide.shape[1]) == 0)
-        full = (values if values.ndim == 2 else values[:, None] for values in made.values())
-        return {name: np.broadcast_to(v, wide.shape)[there] for name, v in zip(made, full, strict=True)}
+            return {name: np.broadcast_to(v, (n, K)).flatten() for name, v in (made | self.arrays()).items()}
+        made |= {**self.columns, **self.beside}
+        there = np.any([np.isfinite(column) for column in self.columns.values()], axis=0)
+        there[..., 0] = True
+        wide = ((name, values if values.ndim == 3 else values[..., None]) for name, values in made.items())
+        return {name: np.broadcast_to(values, there.shape)[there] for name, values in wide}
+
+    def rows(self, i: int) -> "dict[str, np.ndarray]":
+        """One of the realisations, counted from 0, as in `table`, without its number."""
+        parts = ({name: v[i : i + 1] for name, v in values.items()} for values in (self.columns, self.beside))
+        made = Drawn(self.t_s, next(parts), self.components, self.truth[i : i + 1], next(parts)).table()
+        return {name: column for name, column in made.items() if name != "realisation"}
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """All arrays as a dataset of the package xarray, which must be there: with realisation, t_s and plot as
+        dimensions."""
+        import numpy as np
+
+        try:
+            import xarray
+        except ImportError as error:
+            raise ConfigError("to_xarray needs the package xarray: pip install xarray") from error
+        axes = ("realisation", "t_s", "plot")
+        units = {true_column(name, unit): {"units": unit} for name, unit in self.components}
+        data = {name: (axes[: v.ndim], v, units.get(name, {})) for name, v in self.arrays().items()}
+        return xarray.Dataset(data, {axes[0]: np.arange(self.first, self.first + self.n), axes[1]: self.t_s})
 
 
 Draw = Callable[[int, int], Drawn]
