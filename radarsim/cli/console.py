@@ -32,7 +32,7 @@ COLUMNS = (  # of tables
     *(term("95 % from"), term("95 % to"), term("stated σ"), term("stated"), term("tuned")),
     *(term("value"), term("name"), term("what it is"), term("paper and question"), term("study"), term("keys")),
 )
-TITLES = (term("reading"), term("tracking"), term("judging"), term("fitting"))  # of what has no known end
+TITLES = (term("reading"), term("writing"), term("tracking"), term("judging"), term("fitting"))  # of Counter
 WHAT = (
     term("likelihoods"),
     term("realisations"),

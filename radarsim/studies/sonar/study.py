@@ -25,7 +25,6 @@ from radarsim.studies.sonar.scene import Scene, build_scene, filter_specs, third
 from radarsim.studies.sonar.world import GivenPlotsAxes, conversion_bias, step_correlations
 
 BLOCK = 4096
-AT_ONCE = 4096  # realisations whose plots of a scan are drawn by one call
 FRAMES = ("polar", "cartesian", "cartesian_unbiased")
 THIRD = {"depth": ("d", "m"), "elevation": ("e", "rad")}
 
@@ -84,19 +83,8 @@ def drawn_plots(
     C is the world's padded number of coordinates.
     """
     K, C = world.fresh.shape
-    size, several = min(count, AT_ONCE), world.walk.any()
-    plots, deviation = np.empty((C, K, count)), np.zeros((C, 2, K, count) if several else (C, 2, 1, 1))
-    for done in range(0, count, size):
-        n = min(size, count - done)
-        room, detected = np.zeros((C, 4, n)), np.empty(n)
-        for k in range(K):
-            kernels.move_and_measure(world, first + done, k, room)
-            plots[:, k, done : done + n] = room[:, what]
-            if detections.certain[k] <= 0:
-                pattern_kernels.detect(detections, first + done, k, detected)
-                plots[:, k, done : done + n][:, detected == 0] = np.nan
-            if several:
-                deviation[:, :, k, done : done + n] = room[:, 2:]
+    plots, deviation = np.empty((C, K, count)), np.zeros((C, 2, K, count) if world.walk.any() else (C, 2, 1, 1))
+    pattern_kernels.fill_plots(world, detections, first, what, plots, deviation)
     return plots.swapaxes(1, 2), deviation.swapaxes(2, 3)
 
 

@@ -59,7 +59,8 @@ def drawing(case: Case) -> Draw:
         else:
             exact = [np.broadcast_to(true, plots.shape[1:]) for true in scene.polar[..., 0].T]
             plots += scene.polar[..., 0].T[:, None]
-        plots.swapaxes(1, 2)[~np.isfinite(scene.sigma.T)] = np.nan
+        if not np.isfinite(scene.sigma).all():
+            plots.swapaxes(1, 2)[~np.isfinite(scene.sigma.T)] = np.nan
         true_plots = {f"true_{name}": column for name, column in zip(names, exact, strict=True)}
         return Drawn(scene.t, dict(zip(names, plots, strict=True)), base.labels(spec, 3), truth, true_plots, first)
 

@@ -206,7 +206,7 @@ def target_plots(
 
 
 def all_plots(field: kernels.Field, first: int, own: np.ndarray, scan: int = 0) -> np.ndarray:
-    """All plots (3, n, K, M) of realisations from `first` on and scans from `scan` on, as `kernels.fill_scans` orders
+    """All plots (3, n, K, M) of realisations from `first` on and scans from `scan` on, as `fill_scans` orders
     them; own (2, n, K) the target's, NaN where there is none."""
     cells, there = field.cells, np.isfinite(own[0])
     expected = cells.density * cells.dq * cells.nq * cells.db * cells.nb

@@ -84,6 +84,27 @@ def detect(detections, first, k, detected):
 
 
 @kernel
+def fill_plots(world, detections, first, what, plots, deviation):
+    """Plots (C, K, n), or errors (what = 1), of realisations from `first` on, not-a-number where there is none; and the
+    deviation of value and rate (C, 2, K, n), where a target moves at random."""
+    room, detected, scans = np.zeros((plots.shape[0], 4, CHUNK)), np.empty(CHUNK), plots.shape[1]
+    moves = np.any(world.walk > 0.0)
+    for done in range(0, plots.shape[2], CHUNK):
+        n = min(CHUNK, plots.shape[2] - done)
+        room[:] = 0.0
+        for k in range(scans):
+            move_and_measure(world, first + done, k, room)
+            detect(detections, first + done, k, detected)
+            for c in range(plots.shape[0]):
+                seen, to = room[c, what], plots[c, k]
+                for i in range(n):
+                    to[done + i] = seen[i] if detected[i] > 0.0 else np.nan
+                if moves:
+                    for j in range(2):
+                        deviation[c, j, k, done : done + n] = room[c, 2 + j, :n]
+
+
+@kernel
 def convert(conversion, sigma, k, plots, detected, place, z, weight):
     """Plots z (C, n) in the coordinates of the filters and their weights (C, n), from measured plots (C', 4, n).
 
