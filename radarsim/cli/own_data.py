@@ -82,7 +82,7 @@ def new_study(name: str, step: bool, folder: bool) -> None:
 def simulate(
     config: str, output: str, realisation: int | None, realisations: tuple[int, int] | None, overrides: tuple[str, ...]
 ) -> None:
-    """Write the measurements of one realisation or of many, with the truth.
+    """Write the measurements of realisations, with the truth.
 
     The plots are exactly those that a run of CONFIG draws in this realisation: `radarsim track` over them gives the
     errors that the run accumulates. A missed plot is an empty cell; the truth is in columns true_….
