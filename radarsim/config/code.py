@@ -40,6 +40,10 @@ def parted(document: Document, model: type[Study], coded: Coded, faults: Faults)
     given = document.get(("baseline",))
     baselines = given if isinstance(given, list) else [given]
     names = [one.get("name") for one in members if isinstance(one, dict)]
+    for one in baselines:
+        if isinstance(one, str) and one not in names:
+            message = f"must be the name of a filter: {', '.join(map(str, names))}"
+            faults.spoil(document.origin(("baseline",)), ("baseline",), message, one)
     found = []
     for i, one in enumerate(members):
         at = (model.bare_keys, i)

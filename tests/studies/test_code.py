@@ -293,7 +293,7 @@ def test_where_it_may_stand_and_what_it_is_called_is_checked(place):
     unknown = run("out", "--set", "filters.mine.gamma=1", code=2).stderr
     assert unknown.endswith("TypeError: Mine.__init__() got an unexpected keyword argument 'gamma'\n")
     nobody = run("out", "--set", "baseline=nobody", code=2).stderr
-    assert nobody == "--set baseline: must be the name of a filter: r, r+Vr, got 'nobody'\n"
+    assert nobody == "--set baseline: must be the name of a filter: r, r+Vr, mine, got 'nobody'\n"
 
 
 def test_gains_are_against_it_where_it_is_a_baseline(place):
