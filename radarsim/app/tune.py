@@ -329,8 +329,9 @@ class Objective:
     """What is minimised, at a place of the search: over the family the root of the mean square of a size, the mean of
     anything else; of what is better the more there is, what it leaves of 100 %."""
 
-    def __init__(self, curves: Sequence[Curve], exact: bool, count: int):
-        self.curves, self.exact, self.count = curves, exact, count
+    def __init__(self, variants: Sequence[Variants], curves: Sequence[Curve], exact: bool, count: int):
+        self.variants, self.curves, self.exact, self.count = variants, curves, exact, count
+        self.searched, self.plain = variants[0].searched, variants[0].plain[variants[0].chosen]
         self.of = curves[0].quantity.of
         self.rough = exact and any(curve.rough for curve in curves)
 
@@ -357,12 +358,13 @@ class Objective:
         return math.inf if math.isnan(found) else found
 
 
-def least(of: Objective, searched: Sequence[Searched]) -> Place:
+def least(of: Objective) -> Place:
     """The place with the least value: of every combination of whole numbers the others by scans, one after the other;
     from the best by simplexes (Nelder and Mead)."""
     from scipy.optimize import minimize
 
-    start, real = tuple(one.stated for one in searched), [i for i, one in enumerate(searched) if not one.over.whole]
+    searched, start = of.searched, tuple(one.stated for one in of.searched)
+    real = [i for i, one in enumerate(searched) if not one.over.whole]
     pilot = None if of.exact else min(of.count, max(PILOT_LEAST, of.count // PILOT_SHARE))
     grids = [one.over.grid() if one.over.whole else [one.stated] for one in searched]
     if math.prod(map(len, grids)) > MOST_WHOLE:
@@ -394,9 +396,9 @@ def moved(searched: Sequence[Searched], best: Place, at: np.ndarray) -> Place:
     )
 
 
-def flat(of: Objective, searched: Sequence[Searched], best: Place, i: int) -> tuple[float, float]:
+def flat(of: Objective, best: Place, i: int) -> tuple[float, float]:
     """From where to where along a key the exact quantity is within 0.1 % of its least value."""
-    over, limit = searched[i].over, (1 + FLAT) * of(best)
+    over, limit = of.searched[i].over, (1 + FLAT) * of(best)
     ends = []
     for end in (over.low, over.high):
         inside, outside = over.inner(best[i]), over.inner(end)
@@ -410,24 +412,20 @@ def flat(of: Objective, searched: Sequence[Searched], best: Place, i: int) -> tu
     return ends[0], ends[1]
 
 
-def spread(
-    of: Objective, variants: Sequence[Variants], searched: Sequence[Searched], best: Place
-) -> dict[Path, tuple[float, float]]:
+def spread(of: Objective, best: Place) -> dict[Path, tuple[float, float]]:
     """The 95 % intervals of the best values, of real numbers: by how much they move without each of the batches.
 
     That is a Newton step from the best place, whose gradient is that of the others; nothing where the quantity has no
     minimum there on this scale, as where it is flat or jumps.
     """
+    searched = of.searched
     at = np.array([one.over.inner(x) for one, x in zip(searched, best, strict=True) if not one.over.whole])
 
     def costs(u: np.ndarray) -> np.ndarray:
         """With all realisations, then without each of the batches."""
-        asked = [curve.quantity for curve in of.curves]
-        found = [
-            parted(one.at("", moved(searched, best, u)), (ask,), of.count)[:, 0]
-            for one, ask in zip(variants, asked, strict=True)
-        ]
-        return np.asarray(of.cost(found))
+        cases = [one.at("", moved(searched, best, u)) for one in of.variants]
+        pairs = zip(cases, of.curves, strict=True)
+        return np.asarray(of.cost([parted(case, (curve.quantity,), of.count)[:, 0] for case, curve in pairs]))
 
     size, steps = len(at), STEP * np.eye(len(at))
     if not size:
@@ -445,8 +443,7 @@ def spread(
     if not np.isfinite(curvature).all() or np.linalg.eigvalsh(curvature)[0] <= 0:
         return {}
     newton = at[:, None] - np.linalg.solve(curvature, slopes - slopes[:, :1])
-    plain = variants[0].plain[variants[0].chosen]
-    values = [natural(searched, moved(searched, best, u), plain) for u in newton.T]
+    values = [natural(searched, moved(searched, best, u), of.plain) for u in newton.T]
     found = {}
     for path in values[0]:
         own = [one for one in searched if one.path == path and one.of is None]
@@ -469,10 +466,10 @@ def parted(case: Case, asked: Sequence[Asked], count: int) -> np.ndarray:
     return np.array([whole, *but_one])
 
 
-def _predict(notify: Callable[[str], None], of: Objective, searched: Sequence[Searched], each: float) -> None:
+def _predict(notify: Callable[[str], None], of: Objective, each: float) -> None:
     """Say what the search will do and about how long it takes, where that is long; each: seconds of one place."""
-    grids = [len(one.over.grid(None if of.exact or one.over.whole else POINTS)) for one in searched]
-    whole = [one.over.whole for one in searched]
+    grids = [len(one.over.grid(None if of.exact or one.over.whole else POINTS)) for one in of.searched]
+    whole = [one.over.whole for one in of.searched]
     scans = math.prod(itertools.compress(grids, whole)) * max(1, sum(grids) - sum(itertools.compress(grids, whole)))
     full = TRIED[of.exact] // 2 * whole.count(False)
     for curve in of.curves:
@@ -567,10 +564,9 @@ def tune(
     for other in every:
         quantities.named(chosen, [one.name for one in other.spec.members])
     each = [keys_of(other, chosen, ranges) for other in every]
-    for one, *others in zip(*each, strict=True):
-        if any(same.stated != one.stated for same in others):
-            text = ".".join(map(str, one.path))
-            raise ConfigError(f"{text}: differs between the cases: choose with {argument('case', '--case')}")
+    if apart := {one.path for keys in each for one in {*keys} ^ {*each[0]}}:
+        text = ", ".join(".".join(map(str, path)) for path in apart)
+        raise ConfigError(f"{text}: differs between the cases: choose with {argument('case', '--case')}")
     searched, count = each[0], configs.whole(realisations) or every[0].realisations
     count = question.BATCHES * max(2, count // question.BATCHES)
     variants = [Variants(other, chosen, searched, kind.of.paired) for other in every]
@@ -583,43 +579,40 @@ def tune(
         one.seed = one.seed if exact else (one.seed + TRAINING) % 2**64
         curve.cases.base = one.base = replace(one.base, seed=one.seed)
         curve.rough = exact and registry.study(curve.cases.base.study).costly(curve.cases.base)
-    of = Objective(curves, exact, count)
+    of = Objective(variants, curves, exact, count)
     start = tuple(one.stated for one in searched)
     begun = timed(lambda: of(start, 1))  # compiles
     begun = timed(lambda: of(start)) if not exact else begun
     if not math.isfinite(of(start)):
         raise ConfigError(f"{curves[0].quantity.words}: there is no estimate there")
-    _predict(notify or (lambda line: None), of, searched, begun)
-    best = least(of, searched)
-    plain = variants[0].plain[chosen]
+    _predict(notify or (lambda line: None), of, begun)
+    best = least(of)
     if exact:
         of.rough = False
         pairs = [np.array([[curve.exactly(None), curve.exactly(best)]]) for curve in curves]
         of.rough = any(curve.rough for curve in curves)
-        ends = {one.path: flat(of, searched, best, i) for i, one in enumerate(searched) if one.of is None}
+        ends = {one.path: flat(of, best, i) for i, one in enumerate(searched) if one.of is None}
     else:
         names = chosen, chosen + TUNED
         pairs = [
             parted(one.beside(best), [replace(curve.quantity, filter=name) for name in names], count)
             for one, curve in zip(variants, curves, strict=True)
         ]
-        ends = spread(of, variants, searched, best)
-    return _told(config, every, of, searched, best, ends, pairs, plain, [one for one in (*settings, members[0]) if one])
+        ends = spread(of, best)
+    return _told(config, every, of, best, ends, pairs, [one for one in (*settings, members[0]) if one])
 
 
 def _told(
     config: Config,
     every: Sequence[Case],
     of: Objective,
-    searched: Sequence[Searched],
     best: Place,
     ranges: Mapping[Path, tuple[float, float]],
     pairs: Sequence[np.ndarray],
-    plain: Mapping[str, Any],
     settings: Sequence[str],
 ) -> Tuned:
     """The answer, with the run that shows it."""
-    case, quantity = every[0], of.curves[0].quantity
+    searched, plain, case, quantity = of.searched, of.plain, every[0], of.curves[0].quantity
     chosen = str(quantity.filter)
     (i,) = [i for i, one in enumerate(case.spec.members) if one.name == chosen]
     above, tuned = f"{type(case.spec).bare_keys}.{i}.", deepcopy(dict(plain))
@@ -634,10 +627,8 @@ def _told(
         # An item of a list is set with the whole list, which other items of it may have changed as well.
         text = re.sub(r"(\.\d+)+$", "", ".".join(map(str, path)))
         sets.append(f"{above}{text}={flow(at_path(tuned, path[: text.count('.') + 1]))}")
-    sets = list(dict.fromkeys(sets))
     name = os.fspath(config) if isinstance(config, str | os.PathLike) else "CONFIG.yaml"
-    words = ["radarsim", "run", name, *(word for one in sets for word in ("--set", one))]
-    command = shlex.join(words)
+    words = ["radarsim", "run", name, *(word for one in dict.fromkeys(sets) for word in ("--set", one))]
     axes = quantities.labels(quantity, of.curves[0].cases.base)
     judgements = judged(of, [one.name for one in every], pairs)
     whole = {one.path: one.over.whole for one in searched}
@@ -662,7 +653,7 @@ def _told(
         training=0 if of.exact else of.count,
         judged=0 if of.exact else of.count,
         settings={one.key: one.tuned for one in keys},
-        command=command,
+        command=shlex.join(words),
         notes=tuple(notes),
     )
 
