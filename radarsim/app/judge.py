@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -185,7 +186,7 @@ def read(path: Path, case: Case, components: tuple[str, ...]) -> tuple[Any, tupl
     """
     try:
         if path.suffix == ".npz":
-            with np.load(path, allow_pickle=False) as held:
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as held:  # which leaves a damaged one open
                 return _of_arrays(path, dict(held), case, components)
         import pandas as pd
 
@@ -193,7 +194,7 @@ def read(path: Path, case: Case, components: tuple[str, ...]) -> tuple[Any, tupl
             raise ConfigError(f"{path}: must end in .npz, .csv or .parquet")
         table = pd.read_csv(path, comment="#") if path.suffix == ".csv" else pd.read_parquet(path)
         return _of_table(path, {str(one): table[one].to_numpy() for one in table}, case)
-    except (OSError, ValueError, ImportError) as error:
+    except (OSError, ValueError, TypeError, ImportError, BadZipFile) as error:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
 
 

@@ -380,8 +380,17 @@ def test_files_of_other_realisations_are_refused(estimates, tmp_path):
     assert "must be 300 numbers" in said("fewer.npz", estimates=estimates, realisations=np.arange(299))
     assert "must end in .npz, .csv or .parquet" in refusal(tmp_path / "estimates.mat")
     assert "cannot be read" in refusal(tmp_path / "nowhere.npz")
-    (tmp_path / "broken.npz").write_bytes(b"PK")
-    assert "cannot be read" in refusal(tmp_path / "broken.npz")
+    whole = (tmp_path / "late.npz").read_bytes()
+    for name, content in (
+        ("broken.npz", whole[:3000]),
+        ("text.npz", b"x"),
+        ("damaged.npz", whole[:900] + b"x" + whole[901:]),
+    ):
+        (tmp_path / name).write_bytes(content)
+        assert "cannot be read" in refusal(tmp_path / name)
+    (tmp_path / "words.csv").write_text("realisation,k,r\n0,1,far\n")
+    assert "cannot be read" in refusal(tmp_path / "words.csv")
+    assert "cannot be read" in said("seeds.npz", estimates=estimates, seed=[1, 2])
     rows = pd.DataFrame({"realisation": [0, 0, 1], "k": [1, 2, 1], "r": 1.0})
     rows.to_csv(tmp_path / "short.csv", index=False)
     assert "realisation 1: must have a row for each of the 2 scans" in refusal(tmp_path / "short.csv")
