@@ -586,3 +586,18 @@ def test_no_estimate_is_a_failure_where_a_filter_of_the_config_has_one():
     seen = np.isfinite(columns["range_m"]).any(axis=1)
     failed = of(never.tables["failures"], reason="no_estimate")["failed"].item()
     assert failed == seen.sum() < 200
+
+
+def test_plots_of_a_file_come_back_as_estimates(tmp_path, monkeypatch):
+    """Out by `simulate`, back by `judge`, in each format: the numbers of a function that is given the plots."""
+    monkeypatch.chdir(tmp_path)
+    for kind in ("npz", "csv"):
+        done = CliRunner().invoke(main, ["simulate", "rls2", "--realisations", "0:200", "-o", f"plots.{kind}"])
+        assert done.exit_code == 0, done.output
+    with np.load("plots.npz") as plots:
+        np.savez("back.npz", estimates=plots["range_m"], realisation=plots["realisation"])
+    rows = pd.read_csv("plots.csv")
+    rows.assign(r_m=rows["range_m"])[["realisation", "t_s", "r_m"]].to_csv("back.csv", index=False)
+    wanted = radarsim.judge("rls2", lambda plots: plots["range_m"], realisations=200)
+    for name in ("back.npz", "back.csv"):
+        assert same(radarsim.judge("rls2", name), wanted), name
