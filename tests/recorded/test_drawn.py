@@ -48,10 +48,11 @@ def test_plots_in_bulk_are_those_of_one_realisation_after_the_other(config):
 
 
 def test_a_part_of_a_chunk_of_a_kernel_has_the_same_numbers():
-    for config, overrides in (("rls2", ()), ("rls2", CASES["rls2 missed"]), ("sonar_missed", CASES["sonar_missed"])):
-        whole, part = (radarsim.plots(config, n, first, overrides) for n, first in ((1100, 0), (700, 300)))
-        for name, column in part.columns.items():
-            np.testing.assert_array_equal(column, whole.columns[name][300:1000])
+    for config in ("rls2", "rls2 missed", "rls2_manoeuvres", "sonar_missed", "sonar_fluctuating"):
+        stem, overrides = config.split()[0], CASES[config]
+        whole, part = (radarsim.plots(stem, n, first, overrides) for n, first in ((1100, 0), (700, 300)))
+        for name, column in part.arrays().items():
+            np.testing.assert_array_equal(column, whole.arrays()[name][300:1000])
 
 
 def test_a_filter_of_numpy_over_the_plots_has_the_errors_of_the_run():
