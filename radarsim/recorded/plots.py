@@ -13,9 +13,9 @@ import math
 import os
 import re
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -26,6 +26,8 @@ from radarsim.studies.interface import TRUE
 
 if TYPE_CHECKING:
     import _csv
+
+Name = TypeVar("Name", bound=Hashable)
 
 
 # ---- places ----------------------------------------------------------------------------------------------------------
@@ -283,11 +285,11 @@ def _number_or_missing(text: str) -> float:
     return value if abs(value) <= LARGEST else math.nan
 
 
-def grouped(names: Sequence[str]) -> dict[str, np.ndarray]:
+def grouped(names: "Sequence[Name]") -> "dict[Name, np.ndarray]":
     """The rows of each name, in the order in which the names first appear."""
     if len(set(names)) == 1:
         return {names[0]: np.arange(len(names))}
-    rows: dict[str, list[int]] = {}
+    rows: dict[Name, list[int]] = {}
     for i, name in enumerate(names):
         rows.setdefault(name, []).append(i)
     return {name: np.array(own) for name, own in rows.items()}

@@ -37,15 +37,14 @@ from radarsim.recorded.formats.sites import (
     utc_s,
 )
 from radarsim.recorded.formats.text import Table
+from radarsim.recorded.identity import KINDS, LONGEST_GAP_S, Paths, apart, offsets, too_far
 from radarsim.recorded.plots import grouped
 from radarsim.report.files import Writer
 
 Format = Literal["asterix", "opensky", "ais", "csv"]
 FORMATS: tuple[Format, ...] = ("asterix", "opensky", "ais", "csv")
 HEAD = 4096  # bytes used to detect the format
-LONGEST_GAP_S = 60.0  # over which truth is not interpolated
 MOST_LISTED = 12
-FARTHEST_TRUTH_M = 5000.0  # of plots from their truth in range, by median: 20 s of an airliner
 NOT_LATER = "rows not later than the one before of their track"
 SIGN_TESTS = 2000  # pairs of plots on which the sign of the Doppler speed is tested
 LEAST_TESTS = 20
@@ -259,7 +258,7 @@ class _Import:
             self.sign.take(batch)
             self.folds.take(batch)
         if self.truth is not None:
-            columns |= self.truth.columns(batch, columns["range_m"], self.reader.of_day)
+            columns |= self.truth.columns(batch, columns, self.reader)
         names = {"track": batch.track} | ({"radar": batch.radar} if isinstance(self.reader, Asterix) else {})
         if not self.done.columns:
             self.done.columns = ("t_s", *names, *(name for name in columns if name != "t_s"))
@@ -392,18 +391,15 @@ class _Import:
 
 
 class _Truth:
-    """Truth of each aircraft: positions of the second recording, or of the same one (category 062 beside 048).
-
-    An aircraft is identified by its address (in a CSV: by its track's name). Records without one are ignored.
-    """
+    """Truth of each aircraft: positions of the second recording, or of the same one (category 062 beside 048)."""
 
     def __init__(self, path: str, options: Options):
         assert options.site is not None
-        self.rows = self.unnamed = 0
-        self.misses: dict[str, list[np.ndarray]] = {}  # of the range, by aircraft
+        self.rows = 0
+        self.kinds: Counter[int] = Counter()  # of identity, by their number in KINDS
+        self.missed: dict[int, list[np.ndarray]] = {}  # range and bearing, and the range (n, 3), by aircraft
         self.own = options.truth is None
-        self.tables: dict[str, list[np.ndarray]] = {}
-        self.ready: dict[str, Callable[[np.ndarray], np.ndarray]] = {}
+        self.paths = Paths()
         self.of_day = False
         if self.own:
             self._read_own(path, options)
@@ -411,9 +407,9 @@ class _Truth:
             assert options.truth is not None
             with opened(options.truth, Options(encoding=options.encoding), truth=True) as (_, reader):
                 self._read(reader, options.site)
-            if not self.tables:
-                raise ConfigError(f"{options.truth}: must have positions on the earth of aircraft with an address; "
-                                  f"has {self.unnamed} without")  # fmt: skip
+            if not self.paths.paths:
+                raise ConfigError(f"{options.truth}: must have positions on the earth of aircraft with an address, a "
+                                  f"callsign or a code of their own; has {self.paths.unnamed} without")  # fmt: skip
 
     def _read_own(self, path: str, options: Options) -> None:
         """The positions beside the plots of one ASTERIX file; a stream, which is read once, has none."""
@@ -425,11 +421,11 @@ class _Truth:
             with opened(path, options, truth=True) as (_, reader):
                 if isinstance(reader, Asterix):
                     self._read(reader, options.site)
-                self.own = isinstance(reader, Asterix) and reader.plots and bool(self.tables)
+                self.own = isinstance(reader, Asterix) and reader.plots and bool(self.paths.paths)
         except ConfigError:
             self.own = False  # counted when the records are read, with how many there were before
         if not self.own:
-            self.tables = {}
+            self.paths = Paths()
 
     def _read(self, reader: Reader, site: Site) -> None:
         self.of_day = reader.of_day
@@ -438,92 +434,58 @@ class _Truth:
                 continue
             seen = site.seen(batch.columns)
             table = np.stack([batch.columns["t_s"], *(seen[name] for name in LOCAL)], axis=-1)
-            for name, rows in grouped(batch.address).items():
-                if name:
-                    self.tables.setdefault(name, []).append(table[rows])
-                else:
-                    self.unnamed += len(rows)
+            self.paths.add(table, batch.track, identity_of(batch, reader))
 
-    def columns(self, batch: Batch, range_m: np.ndarray, of_day: bool) -> dict[str, np.ndarray]:
-        """The truth at the times of plots (n,) with these ranges: range, bearing, velocity, place, speeds (n,)."""
-        if not self.tables:
+    def columns(self, batch: Batch, seen: Mapping[str, np.ndarray], reader: Reader) -> dict[str, np.ndarray]:
+        """The truth at the times of plots (n,) seen there: range, bearing, velocity, place, speeds (n,)."""
+        if not self.paths.paths:
             return {}
-        t, states = batch.columns["t_s"], np.full((len(batch.track), 6), np.nan)
-        if of_day != self.of_day:
-            t = t % DAY_S
-        named = grouped(batch.address if any(batch.address) else batch.track)
-        for name, rows in named.items():
-            path = self._path(name, of_day)
-            if path is not None:
-                states[rows] = path(t[rows])
-        seen = described(states[:, :3])
+        if reader.of_day != self.of_day:
+            self.paths.period_s = DAY_S
+        t, r, b = batch.columns["t_s"], seen["range_m"], seen["bearing_rad"]
+        found = self.paths.find(t, r, b, identity_of(batch, reader))
+        states = found.states
+        true = described(states[:, :3])
         self.rows += len(t)
-        miss = np.abs(range_m - seen["range_m"])
-        for name, rows in named.items():
-            if len(known := miss[rows][np.isfinite(miss[rows])]):
-                self.misses.setdefault(name, []).append(known)
-        radial = np.einsum("ni,ni->n", states[:, :3], states[:, 3:]) / seen["range_m"]
+        self.kinds.update(found.kind[found.kind >= 0].tolist())
+        missed = np.column_stack([offsets(states, r, b), r])
+        for number, rows in grouped(found.path.tolist()).items():
+            if number >= 0:
+                self.missed.setdefault(number, []).append(missed[rows])
+        radial = np.einsum("ni,ni->n", states[:, :3], states[:, 3:]) / true["range_m"]
         # Named like the components of the studies' filters.
-        columns = {"r_m": seen["range_m"], "Vr_mps": radial, "b_rad": seen["bearing_rad"]}
+        columns = {"r_m": true["range_m"], "Vr_mps": radial, "b_rad": true["bearing_rad"]}
         columns |= dict(zip((*LOCAL, *SPEEDS), states.T, strict=True))
         return {f"true_{name}": column for name, column in columns.items()}
 
-    def _path(self, name: str, of_day: bool) -> Callable[[np.ndarray], np.ndarray] | None:
-        """Position and speed (n, 6) of one aircraft by time; none where the truth does not have it."""
-        if name not in self.tables:
-            return None
-        if name not in self.ready:
-            table = np.concatenate(self.tables[name])
-            if of_day != self.of_day:
-                table[:, 0] %= DAY_S
-            self.ready[name] = interpolated(table)
-        return self.ready[name]
-
     def faults(self, tracks: Sequence[str]) -> list[str]:
         """Signs that the truth is not that of the plots; tracks: some of theirs."""
-        found = []
-        if self.tables and not self.misses and not self.own:
-            names = list(self.tables)
+        found, names = [], self.paths.names()
+        if names and not self.missed and not self.own:
             more = " …" if len(names) > MOST_LISTED else ""
-            found.append(f"truth: no plot has the address and a time of an aircraft in it; it has "
-                         f"{', '.join(names[:MOST_LISTED])}{more}, the plots "
+            found.append(f"truth: no plot has the address, the callsign or the code of an aircraft in it at that time "
+                         f"and place; it has {', '.join(names[:MOST_LISTED])}{more}, the plots "
                          f"{', '.join(filter(None, tracks)) or 'no names'}")  # fmt: skip
-        for name, misses in self.misses.items():
-            miss = float(np.median(np.concatenate(misses)))
-            if miss > FARTHEST_TRUTH_M:
-                must = (
-                    f"at most {FARTHEST_TRUTH_M:g} m is allowed: another aircraft, another clock or a wrong place --at"
-                )
-                found.append(f"truth: the plots of {name} lie {miss:.0f} m from it in range (median), {must}")
+        for number, parts in self.missed.items():
+            missed = np.concatenate(parts)
+            if words := too_far(missed[:, :2], missed[:, 2]):
+                found.append(f"truth: the plots of {names[number]} lie {words}")
         return found
 
     def notes(self) -> list[str]:
         """How many of the plots have a truth, and how far they are from it."""
-        if not self.misses:
-            return ["truth: of no plot"] if self.tables else []
-        misses = np.concatenate([one for own in self.misses.values() for one in own])
-        return [f"truth: of {len(misses)} of {self.rows} plots, which lie {np.median(misses):.3g} m from it in range "
-                "(median)"]  # fmt: skip
+        if not self.missed:
+            return ["truth: of no plot"] if self.paths.paths else []
+        missed = np.concatenate([one for own in self.missed.values() for one in own])
+        by = ", ".join(f"{KINDS[k]} {count}" for k, count in sorted(self.kinds.items()))
+        share = f"{len(missed)} of {self.rows} plots ({len(missed) / self.rows:.0%}; by {by})"
+        return [f"truth: of {share}, which lie {apart(missed[:, :2])} from it (median)"]
 
 
-def interpolated(table: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """Positions and speeds (m, 6) at times (m,), from fixes (n, 4) of time and position: piecewise cubic with slopes
-    from the neighbouring fixes; NaN outside, and in gaps over LONGEST_GAP_S."""
-    from scipy.interpolate import CubicHermiteSpline
-
-    times, places = np.unique(table[:, 0], return_index=True)
-    fixes = table[places, 1:]
-    if len(times) < 2:
-        return lambda t: np.full((len(t), 6), np.nan)
-    curve = CubicHermiteSpline(times, fixes, np.gradient(fixes, times, axis=0))
-    slope = curve.derivative()
-
-    def at(t: np.ndarray) -> np.ndarray:
-        after = np.clip(np.searchsorted(times, t), 1, len(times) - 1)
-        near = (t >= times[0]) & (t <= times[-1]) & (times[after] - times[after - 1] <= LONGEST_GAP_S)
-        return np.where(near[:, None], np.concatenate([curve(t), slope(t)], axis=1), np.nan)
-
-    return at
+def identity_of(batch: Batch, reader: Reader) -> dict[str, Sequence[str]]:
+    """What identifies each record, by KINDS; a table's tracks are named by their aircraft."""
+    addresses = batch.address if isinstance(reader, Asterix) or any(batch.address) else batch.track
+    return {"address": addresses}
 
 
 class _Sign:

@@ -181,7 +181,8 @@ def test_category_062_is_the_truth_of_the_plots_beside_it(tmp_path):
     done, columns, tracks = imported(tmp_path, data, Options(site=SITE))
     assert tracks == ["3"] * 15
     miss = np.median(np.abs(columns["range_m"] - columns["true_r_m"]))
-    assert done.notes[-1] == f"truth: of 15 of 15 plots, which lie {miss:.3g} m from it in range (median)"
+    of = "truth: of 15 of 15 plots (100%; by address 15), which lie"
+    assert done.notes[-1] == f"{of} {miss:.3g} m in range and 0.22° in bearing from it (median)"
     height = 30000 * 0.3048
     t = columns["t_s"] + 2.5
     for half, names in ((0.0, ("x_m", "y_m", "z_m")), (2.0, ("vx_mps", "vy_mps", "vz_mps"))):
@@ -241,8 +242,16 @@ def test_truth_is_never_another_aircraft(tmp_path):
         assert {track for track, one in zip(tracks, known, strict=True) if one} == {"3"}
         np.testing.assert_allclose(columns["range_m"][known], columns["true_r_m"][known], atol=100)
     for names, expected in (
-        (("0000b2",), "truth: no plot has the address and a time of an aircraft in it; it has 0000b2, the plots 3, 4"),
-        (("", ""), "must have positions on the earth of aircraft with an address; has 60 without"),
+        (
+            ("0000b2",),
+            "truth: no plot has the address, the callsign or the code of an aircraft in it at that time and "
+            "place; it has 0000b2, the plots 3, 4",
+        ),
+        (
+            ("", ""),
+            "must have positions on the earth of aircraft with an address, a callsign or a code of their own; "
+            "has 60 without",
+        ),
     ):
         truth.write_bytes(block(62, *flights(*names)))
         (line,) = refused_again(tmp_path, plots, options)
@@ -250,7 +259,7 @@ def test_truth_is_never_another_aircraft(tmp_path):
     truth.write_bytes(block(62, *flights("0000a1")))
     (line,) = refused_again(tmp_path, plots, Options(site=Site(52.3, 6.76, 0.0), truth=str(truth)))
     assert line.startswith("truth: the plots of 0000a1 lie ")
-    assert "at most 5000 m is allowed: another aircraft, another clock or a wrong place --at" in line
+    assert "(median), allowed are 5000 m, and in bearing 2° more than these make: it is another aircraft" in line
 
 
 FIRST = block(48, plot_048(1, track=1), plot_048(2, track=1, comment=2))

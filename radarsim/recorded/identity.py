@@ -1,0 +1,209 @@
+"""Whose plot it is: of the aircraft that has the same address, callsign or Mode 3/A code at that time, or of none.
+
+An address belongs to one aircraft. Callsigns and codes are used again, so just one aircraft that has it must be near
+the plot. Codes that end in 00 are given to many at once (ICAO Doc 4444, 8.5.2.2) and identify none.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from radarsim.recorded.plots import grouped
+
+KINDS = ("address", "callsign", "mode_3a")  # of identity, the strongest first
+OF_MANY = "00"  # the end of codes that are given to many
+LONGEST_GAP_S = 60.0  # over which positions are not interpolated
+FARTHEST_M = 5000.0  # of a plot from its aircraft in range: 20 s of an airliner
+FARTHEST_RAD = math.radians(2.0)  # in bearing, besides what FARTHEST_M makes: of a radar badly aligned with north
+
+
+class Found(NamedTuple):
+    """The aircraft of plots: position and speed (n, 6), NaN where there is none; the number of its path and the number
+    in KINDS of what identified it (n,), -1 where there is none."""
+
+    states: np.ndarray
+    path: np.ndarray
+    kind: np.ndarray
+
+
+class Path:
+    """Positions of one aircraft, and what identifies it, with the first and last time of each."""
+
+    def __init__(self) -> None:
+        self.fixes: list[np.ndarray] = []
+        self.worn: dict[tuple[str, str], tuple[float, float]] = {}
+        self.at: Callable[[np.ndarray], np.ndarray] | None = None
+
+    def is_another(self, values: Sequence[str]) -> bool:
+        """Whether it has an identity other than these, in the order of KINDS; '' is unknown."""
+        kinds = {kind for kind, _ in self.worn}
+        pairs = zip(KINDS, values, strict=False)
+        return any(value and kind in kinds and (kind, value) not in self.worn for kind, value in pairs)
+
+
+class Paths:
+    """Positions of many aircraft, found by identity."""
+
+    def __init__(self) -> None:
+        self.period_s = math.inf  # of the clock by which all times are taken
+        self.paths: list[Path] = []
+        self.numbers: dict[str, int] = {}
+        self.wearers: dict[tuple[str, str], list[int]] = {}
+        self.addresses: dict[str, str] = {}  # by track
+        self.unnamed = 0  # fixes that nothing identifies
+
+    def names(self) -> list[str]:
+        """What identifies each aircraft best."""
+        return [min(path.worn, key=lambda one: KINDS.index(one[0]))[1] for path in self.paths]
+
+    def add(self, fixes: np.ndarray, track: Sequence[str], identity: Mapping[str, Sequence[str]]) -> None:
+        """Add fixes (n, 4), time and position, each of a track and with identities by KINDS."""
+        columns = cleaned(identity, len(fixes))
+        keys = [self._key(name, values) for name, *values in zip(track, *columns, strict=True)]
+        for key, rows in grouped(keys).items():
+            if not key:
+                self.unnamed += len(rows)
+                continue
+            number = self.numbers.setdefault(key, len(self.paths))
+            if number == len(self.paths):
+                self.paths.append(Path())
+            path, t = self.paths[number], fixes[rows, 0]
+            path.fixes.append(fixes[rows])
+            path.at = None
+            for kind, column in zip(KINDS, columns, strict=True):
+                for value, own in grouped([column[i] for i in rows.tolist()]).items():
+                    if value:
+                        if (kind, value) not in path.worn:
+                            self.wearers.setdefault((kind, value), []).append(number)
+                        lo, hi = path.worn.get((kind, value), (math.inf, -math.inf))
+                        path.worn[kind, value] = (min(lo, t[own].min()), max(hi, t[own].max()))
+
+    def _key(self, track: str, values: list[str]) -> str:
+        """What the path of a fix is kept by: the address that it has, or that its track had before."""
+        address, *others = values
+        if address:
+            self.addresses[track] = address
+            return address
+        if not any(others):
+            return ""
+        known, number = self.addresses.get(track), self.numbers.get(self.addresses.get(track, ""))
+        if track and known and (number is None or not self.paths[number].is_another(values)):
+            return known
+        return f"track {track or others}"
+
+    def find(
+        self, t: np.ndarray, range_m: np.ndarray, bearing_rad: np.ndarray, identity: Mapping[str, Sequence[str]]
+    ) -> Found:
+        """The aircraft of plots (n,) with identities by KINDS."""
+        found = Found(np.full((len(t), 6), np.nan), np.full(len(t), -1), np.full(len(t), -1))
+        for values, rows in grouped(list(zip(*cleaned(identity, len(t)), strict=True))).items():
+            for k, (kind, value) in enumerate(zip(KINDS, values, strict=True)):
+                wearers = [i for i in self.wearers.get((kind, value), ()) if not self.paths[i].is_another(values[:k])]
+                if wearers:
+                    rest = rows[found.path[rows] < 0]
+                    self._take(found, rest, k, wearers, value, t[rest], range_m[rest], bearing_rad[rest])
+        return found
+
+    def _take(
+        self,
+        found: Found,
+        rows: np.ndarray,
+        k: int,
+        wearers: list[int],
+        value: str,
+        t: np.ndarray,
+        range_m: np.ndarray,
+        bearing_rad: np.ndarray,
+    ) -> None:
+        """Give each of the rows the wearer of an identity that may be its own, if there is just one."""
+        states = np.stack([self._at(i, (KINDS[k], value), t) for i in wearers])
+        may = np.isfinite(states[..., 0])
+        if k:
+            may &= near(offsets(states, range_m, bearing_rad), range_m)
+        one = may.sum(axis=0) == 1
+        which = may.argmax(axis=0)[one]
+        found.states[rows[one]] = states[which, np.flatnonzero(one)]
+        found.path[rows[one]] = np.array(wearers)[which]
+        found.kind[rows[one]] = k
+
+    def _at(self, number: int, name: tuple[str, str], t: np.ndarray) -> np.ndarray:
+        """Position and speed (n, 6) of an aircraft at the times at which it has this identity."""
+        path = self.paths[number]
+        if path.at is None:
+            fixes = np.concatenate(path.fixes)
+            fixes[:, 0] = self._clock(fixes[:, 0])
+            path.at = interpolated(fixes)
+        lo, hi = self._clock(np.array(path.worn[name]))
+        t = self._clock(t)
+        worn = (t >= lo - LONGEST_GAP_S) & (t <= hi + LONGEST_GAP_S) | (hi < lo)
+        return np.where(worn[:, None], path.at(t), np.nan)
+
+    def _clock(self, t: np.ndarray) -> np.ndarray:
+        return t % self.period_s if math.isfinite(self.period_s) else t
+
+
+def cleaned(identity: Mapping[str, Sequence[str]], n: int) -> list[list[str]]:
+    """The identities (n,) by KINDS as they are compared; codes of many are no identity."""
+    address, callsign, code = (identity.get(kind) or [""] * n for kind in KINDS)
+    codes = [text.strip().zfill(4) if text.strip() else "" for text in code]
+    return [
+        [text.strip().lower() for text in address],
+        [text.strip().upper() for text in callsign],
+        ["" if text.endswith(OF_MANY) else text for text in codes],
+    ]
+
+
+def offsets(states: np.ndarray, range_m: np.ndarray, bearing_rad: np.ndarray) -> np.ndarray:
+    """How far plots (n,) lie from aircraft there, (…, n, 6), in range and bearing: (…, n, 2)."""
+    r, b = np.linalg.norm(states[..., :3], axis=-1), np.arctan2(states[..., 2], states[..., 0])
+    return np.stack([range_m - r, wrapped(bearing_rad - b)], axis=-1)
+
+
+def near(missed: np.ndarray, range_m: np.ndarray) -> np.ndarray:
+    """Whether plots at these ranges (n,) that miss an aircraft by (…, n, 2) may be its own; an unknown bearing may be
+    any."""
+    with np.errstate(divide="ignore"):
+        turned = np.abs(missed[..., 1]) > FARTHEST_RAD + FARTHEST_M / range_m
+    return (np.abs(missed[..., 0]) <= FARTHEST_M) & ~turned
+
+
+def too_far(missed: np.ndarray, range_m: np.ndarray) -> str:
+    """What is wrong with plots (n,) that miss their aircraft by (n, 2); '' where half of them may be its own."""
+    if near(missed, range_m).sum() * 2 >= len(range_m):
+        return ""
+    allowed = f"allowed are {FARTHEST_M:g} m, and in bearing {math.degrees(FARTHEST_RAD):g}° more than these make"
+    return f"{apart(missed)} from it (median), {allowed}: it is another aircraft or clock, or --at is wrong"
+
+
+def apart(missed: np.ndarray) -> str:
+    """The median distance of plots that miss their aircraft by (n, 2), in words."""
+    (r, b) = np.median(np.abs(missed), axis=0).tolist()
+    turned = "" if math.isnan(b) else f" and {math.degrees(b):.2g}° in bearing"
+    return f"{r:.3g} m in range{turned}"
+
+
+def wrapped(angle: np.ndarray) -> np.ndarray:
+    """Angles between -π and π."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+def interpolated(fixes: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """Positions and speeds (m, 6) at times (m,), from fixes (n, 4) of time and position: piecewise cubic with slopes
+    from the neighbouring fixes; NaN outside, and in gaps over LONGEST_GAP_S."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    times, first = np.unique(fixes[:, 0], return_index=True)
+    places = fixes[first, 1:]
+    if len(times) < 2:
+        return lambda t: np.full((len(t), 6), np.nan)
+    curve = CubicHermiteSpline(times, places, np.gradient(places, times, axis=0))
+    slope = curve.derivative()
+
+    def at(t: np.ndarray) -> np.ndarray:
+        after = np.clip(np.searchsorted(times, t), 1, len(times) - 1)
+        close = (t >= times[0]) & (t <= times[-1]) & (times[after] - times[after - 1] <= LONGEST_GAP_S)
+        return np.where(close[:, None], np.concatenate([curve(t), slope(t)], axis=1), np.nan)
+
+    return at
