@@ -30,7 +30,7 @@ def found(made, at, names, t=T[1:-1] + 1):
     return made.find(t, r + 100, b, {kind: [name] * len(t) for kind, name in names.items()})
 
 
-HERE, THERE = flight(), flight(z=120e3)
+HERE, NEXT, THERE = flight(), flight(z=50.009e3), flight(z=120e3)
 A, B = {"address": "4ca1fa"}, {"address": "3c6444"}
 
 
@@ -47,7 +47,7 @@ A, B = {"address": "4ca1fa"}, {"address": "3c6444"}
         ([(HERE, {"mode_3a": "7000"})], {"mode_3a": "7000"}, None),  # a code of many
         ([(THERE, {"mode_3a": "0421"})], {"mode_3a": "0421"}, None),  # used again elsewhere
         ([(THERE, {"mode_3a": "0421"}), (HERE, {"mode_3a": "0421"})], {"mode_3a": "0421"}, (1, 2)),
-        ([(HERE, {"mode_3a": "0421"}), (HERE + [0, 9, 9, 9], {"mode_3a": "0421"})], {"mode_3a": "0421"}, None),  # either
+        ([(HERE, {"mode_3a": "0421"}), (NEXT, {"mode_3a": "0421"})], {"mode_3a": "0421"}, None),  # either
         ([(HERE, B | {"mode_3a": "0421"})], A | {"mode_3a": "0421"}, None),  # its address is another
         ([(HERE, {"mode_3a": "0421"})], A | {"mode_3a": "0421"}, (0, 2)),
         ([(HERE, {"callsign": "KLM1", "mode_3a": "0421"})], {"callsign": "KLM2", "mode_3a": "0421"}, None),
