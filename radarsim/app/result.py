@@ -151,7 +151,7 @@ class Result(Shown):
 
         >>> import radarsim
         >>> sorted(radarsim.run("rls2", realisations=2000).tables)
-        ['believed', 'claims', 'consistency', 'curves', 'gains', 'radar', 'steady']
+        ['believed', 'claims', 'consistency', 'curves', 'floor', 'gains', 'radar', 'steady']
         """
         return {name: table.copy() for name, table in self._tables.items()}
 

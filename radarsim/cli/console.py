@@ -93,7 +93,8 @@ class Progress:
     def update(self, done: int, total: int | None = None, from_store: int = 0) -> None:
         """How many are done, of how many, and how many of them were read from the store."""
         rate, now = self.rate(done - from_store, total), time.monotonic()
-        if self.quiet or now < max(self.started + SILENT_S, self.due) or not sys.stderr.isatty():
+        early = now < self.started + SILENT_S or (now < self.due and done != total)  # the end is always shown
+        if self.quiet or early or not sys.stderr.isatty():
             return
         self.due = now + REFRESH_S
         self._begin()

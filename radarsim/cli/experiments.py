@@ -242,7 +242,7 @@ def judge(
     quiet: bool,
     as_json: bool,
 ) -> None:
-    """Judge estimates of a filter of your own: is it better than the config's?
+    """Judge a filter of your own: is it better than the config's?
 
     ESTIMATES holds what your filter made of the plots that `radarsim simulate CONFIG --realisations 0:N` wrote. The
     config's filters are run on the same plots; gains of your filter against every one of them are paired, with 95 %

@@ -34,8 +34,8 @@ from radarsim.errors import ConfigError
 from radarsim.language import tr
 from radarsim.report import chart
 from radarsim.report.chart import Scale, contrast, tick_text
+from radarsim.report.drawing import GREY, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.drawing import Axis as Ends
-from radarsim.report.drawing import Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.wording import number, spoken
 
 # ---- legends ---------------------------------------------------------------------------------------------------------
@@ -238,9 +238,14 @@ def draw_on(figure: Figure, axes: Any, label: str = "") -> Canvas:
 
 
 def _beside(panel: Panel, after: int, label: str) -> Panel:
-    """A panel drawn over so many curves: its curves with the next colours and with the label before their names."""
+    """A panel drawn over so many curves: its curves with the next colours and the label before their names.
+
+    Grey lines are left out: they would be taken for those of the other curves.
+    """
     marks: list[Any] = []
     for mark in panel.marks:
+        if isinstance(mark, Line) and mark.style.colour == GREY and mark.style.marker is None:
+            continue
         if isinstance(mark, Line) and (mark.label or mark.name):
             style, name = mark.style, ", ".join(filter(None, (label, mark.label or mark.name)))
             if isinstance(style.colour, int) and style.colour >= 0:

@@ -450,25 +450,24 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: 
 
 
 def floored(figure: Figure, floor: "pd.DataFrame | None", component: str, factor: float = 1.0) -> Figure:
-    """A figure of σ of one case, of few lines, with its floor: with the plots up to a scan, and with all plots.
+    """A figure of σ of one case, of few lines, with its floor.
 
     Of filters that have other plots it is that of those with the most.
     """
     rows = None if floor is None or not len(floor) else floor[floor["component"] == component]
     if rows is None or not len(rows) or len(figure.panels) != 1 or len(figure.panels[0].marks) > MOST_AT_ENDS:
         return figure
-    least = factor * rows.groupby("t_s", sort=True)[["floor", "smoothed"]].min()
-    words = {"floor": tr("floor"), "smoothed": tr("floor, all plots")}
-    lines = (Line(least.index.to_numpy(), least[of].to_numpy(), words[of], GUIDE[of]) for of in words)
+    least = factor * rows.groupby("t_s", sort=True)["floor"].min()
     (panel,) = figure.panels
-    panel = replace(panel, marks=(*(one for one in lines if np.isfinite(one.y).any()), *panel.marks))
+    line = Line(least.index.to_numpy(), least.to_numpy(), tr("floor"), GUIDE)
+    panel = replace(panel, marks=(line, *panel.marks))
     posterior = rows["kind"].str.startswith("posterior").all()
     said = tr("Grey: the floor, a posterior Cramér-Rao bound.") if posterior else tr(UNDER_UNBIASED)
     return replace(figure, panels=(panel,), caption=f"{figure.caption} {said}")
 
 
 UNDER_UNBIASED = term("Grey: the floor, a Cramér-Rao bound of unbiased estimators.")
-GUIDE = {"floor": Style(GREY, 0, width_pt=0.8), "smoothed": Style(GREY, 1, width_pt=0.8)}
+GUIDE = Style(GREY, 0, width_pt=0.8)
 
 
 def in_columns(figure: Figure) -> Figure:

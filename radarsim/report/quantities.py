@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from radarsim.report.statistics import Estimate
 
 Kind = Literal["size", "share", "signed"]
-OTHERS = "at", "at-k", "between", "case", "equals", "filter", "help", "json", "language"
+OTHERS = "at", "at-k", "between", "case", "equals", "filter", "help", "json", "language", "no-code"
 TAKEN = frozenset(f"--{name}" for name in (*OTHERS, "realisations", "seed", "set", "threads"))  # options of `solve`
 
 

@@ -98,7 +98,8 @@ def test_a_precision_of_rates_is_relative_and_of_the_last_window(tmp_path):
     )
     assert 0.5 <= predicted["cases"][0]["need"]["realisations"] / rare["n"] <= 2
     refused = command("run", "rls2", "-n", 4_000, "--precision", 1, "--of", "lock", *PLAIN, "--out", tmp_path, code=2)
-    assert refused.stderr == "rls2: study range_doppler measures no 'lock', but sigma, gain\n"
+    measured = "sigma", "gain", "floor", "lag_1", "lag_2", "lag_5", "lag_10", "smoothed"
+    assert refused.stderr == f"rls2: study range_doppler measures no 'lock', but {', '.join(measured)}\n"
 
 
 def test_all_cases_count_for_a_precision(tmp_path):

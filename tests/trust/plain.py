@@ -294,6 +294,7 @@ def tracks():
     """Plots that are drawn by themselves, and estimates over recorded ones."""
     from radarsim.kernels import linear
     from radarsim.studies.ambiguous_doppler import track as ambiguous_plots
+    from radarsim.studies.ambiguous_doppler.kernels import sums as folds
     from radarsim.studies.multimodel import study as multimodel
     from radarsim.studies.multimodel import track as multimodel_plots
     from radarsim.studies.range_doppler import track as range_doppler_plots
@@ -310,13 +311,17 @@ def tracks():
     made["linear track"] = np.nan_to_num(tracker.feed(recorded).estimate)
     missed = range_doppler_plots.Recorded().simulated(work(*RUNS["linear with misses"][:2]).case, 3)
     made["plots with misses"] = np.nan_to_num(np.stack([missed["range_m"], missed["true_r_m"]]))
-    folded = ambiguous_plots.Recorded().simulated(work(*RUNS["folds missed"][:2]).case, 3)
+    one = work(*RUNS["folds missed"][:2])
+    folded = ambiguous_plots.Recorded().simulated(one.case, 3)
     made["folded plots"] = np.nan_to_num(folded["velocity_mps"])
+    made["folds of one"] = np.nan_to_num(folds.simulated_lists(one.plan.world, one.plan.banks, 0)[1])
+    one = work(*RUNS["linear"][:2])
     likelihood = range_doppler_plots.PlotLikelihood(one.case, None, [recorded])
     made["linear likelihood"] = np.array([likelihood(likelihood.stated), likelihood(likelihood.stated, 0.1, 0.5)])
     one = work(*RUNS["multimodel families"][:2])
     z, R, _ = multimodel.measured(one.plan, 0)
     made["multimodel plots"], made["multimodel covariances"] = z, R
+    made["multimodel drawn"] = np.stack(list(multimodel_plots.drawing(one.case)(0, 3).columns.values()))
     r = np.linalg.norm(z[:, :, 0], axis=1)
     angles = np.arcsin(z[:, 1, 0] / r), np.arcsin(z[:, 2, 0] / r)
     columns = (0.5 * np.arange(len(r)), r, *angles)

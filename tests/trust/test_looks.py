@@ -219,7 +219,7 @@ class Synthetic:
         self.plan = SimpleNamespace(gaussian=gaussian, axes=axes, layout=layout)
         self.plans = (self.plan,)
         self.case = SimpleNamespace(
-            name="case", realisations=most, study="synthetic", spec=None, swept={}, companions=()
+            name="case", realisations=most, study="synthetic", spec=None, swept={}, companions=(), outside=()
         )
 
     def unpacked(self, values):
