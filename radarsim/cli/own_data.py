@@ -159,6 +159,9 @@ def simulate(
 @click.option(
     "--encoding", default="", metavar="NAME", help="Of text that is not UTF-8, as cp1251; default: Windows-1252."
 )
+@click.option(
+    "--keep-marked", is_flag=True, help="Keep test targets, field monitors and coasted records in tracks and truth."
+)
 def import_(
     recording: str,
     output: str,
@@ -175,8 +178,8 @@ def import_(
 
     \b
     asterix  categories 048 and 001 (plots of a radar: range, bearing, height, Doppler speed
-             and the span by which it is ambiguous) and 062 (positions: the truth of the plots
-             of the same aircraft); needs radarsim[asterix]
+             and the span by which it is ambiguous), 021 and 062 (positions: the truth of the
+             plots of the same aircraft), also in pcap and pcapng; needs radarsim[asterix]
     opensky  latitude, longitude, altitude and time of aircraft, in CSV; needs --at; in feet and
              knots if the column names are those of aviation (gs, alt, …)
     ais      sentences !AIVDM of ships; needs --at and radarsim[ais]
@@ -201,6 +204,7 @@ def import_(
         further["doppler_towards"],
         importing.columns_of(further["columns"]),
         importing.encoding_named(further["encoding"]),
+        further["keep_marked"],
     )
     with console.Counter("reading", "records") as counter:
         done = importing.import_recording(recording, output, options, counter.update)

@@ -12,7 +12,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -45,6 +45,7 @@ Format = Literal["asterix", "opensky", "ais", "csv"]
 FORMATS: tuple[Format, ...] = ("asterix", "opensky", "ais", "csv")
 HEAD = 4096  # bytes used to detect the format
 MOST_LISTED = 12
+CONTRADICTS_M = 100.0  # of two places of a radar; a geoid is that far from the ellipsoid
 NOT_LATER = "rows not later than the one before of their track"
 SIGN_TESTS = 2000  # pairs of plots on which the sign of the Doppler speed is tested
 LEAST_TESTS = 20
@@ -64,7 +65,7 @@ class Options:
     to write, all where empty. zero: origin of t_s, "first" (record), "midnight" (of the first record's day, UTC) or s
     from 1970. truth: a second recording, of positions. towards: Doppler speeds are positive where the range falls.
     columns: of a CSV, theirs by ours. encoding: of text that is neither UTF-8 nor UTF-16, Windows-1252 where none is
-    named.
+    named. keep_marked: what is of no aircraft (asterix.NO_AIRCRAFT) is in tracks and truth too.
     """
 
     format: Format | None = None
@@ -77,6 +78,12 @@ class Options:
     towards: bool = False
     columns: Mapping[str, str] = field(default_factory=dict)
     encoding: str = ""
+    keep_marked: bool = False
+
+    @property
+    def only_site(self) -> Site | None:
+        """The place of the radar, if it is one."""
+        return next(iter(self.sites.values())) if len(self.sites) == 1 else self.site
 
 
 @dataclass
@@ -133,7 +140,7 @@ def opened(path: str, options: Options, truth: bool = False) -> Iterator[tuple[F
             head = file.peek(HEAD)[:HEAD]
             kind = options.format or found(path, head)
             if kind == "asterix":
-                yield kind, Asterix(path, file, truth)
+                yield kind, Asterix(path, file, truth, options.keep_marked)
             elif kind == "ais":
                 yield kind, Ais(path, file)
             else:
@@ -179,10 +186,11 @@ def import_recording(
     progress is called from time to time with the number of records read.
     """
     path = os.fspath(source)
-    if options.truth and not options.site:
-        raise ConfigError("truth: needs the place of one radar, --at LAT,LON,HEIGHT; import other radars by themselves")
-    truth = _Truth(path, options) if options.site else None
     with opened(path, options) as (kind, reader):
+        options, contradictions = placed(options, reader)
+        if options.truth and not options.only_site:
+            raise ConfigError("truth: needs the place of one radar, --at LAT,LON,HEIGHT; import others by themselves")
+        truth = _Truth(path, options) if options.only_site else None
         work = _Import(kind, reader, options, truth)
         with Writer(output, {"the recording": path, "the truth": options.truth}) as file:
             first = True
@@ -197,7 +205,22 @@ def import_recording(
                 raise ConfigError(work.nothing())
             if faults := work.faults():
                 raise ConfigError(*faults)
-    return work.finished()
+    done = work.finished()
+    done.notes = contradictions + done.notes
+    return done
+
+
+def placed(options: Options, reader: Reader) -> tuple[Options, list[str]]:
+    """The options with the places of radars that the recording states, and where --at contradicts it."""
+    stated = reader.survey.places if isinstance(reader, Asterix) else {}
+    sites, said = {name: Site(*place) for name, place in stated.items()}, []
+    given = {next(iter(sites)): options.site} if options.site and len(sites) == 1 else options.sites
+    for name, site in given.items():
+        if name in sites and (far := site.distance_m(sites[name])) > CONTRADICTS_M:
+            lat, lon, height = stated[name]
+            said.append(f"--at puts radar {name} {far:.0f} m from where it says it stands, {lat:.5f},{lon:.5f},"
+                        f"{height:.0f} (I034/120); --at is taken")  # fmt: skip
+    return (options if options.site else replace(options, sites=sites | dict(options.sites))), said
 
 
 class _Import:
@@ -206,6 +229,7 @@ class _Import:
     def __init__(self, kind: Format, reader: Reader, options: Options, truth: "_Truth | None"):
         self.reader, self.options, self.truth = reader, options, truth
         self.done = Imported(kind)
+        self.kind: str | None = None  # of the rows
         self.zero: float | None = None
         self.last: dict[str, float] = {}
         self.left = Counter[str]()
@@ -217,8 +241,13 @@ class _Import:
     def rows(self) -> Iterator[Iterable[tuple[str, ...]]]:
         """The rows of the output, in batches."""
         for batch in self.reader.batches():
-            if batch.kind == POSITIONS and self.truth is not None and self.truth.own:
-                continue  # it is the truth of the plots in the same file
+            if self.kind is None:
+                plots = isinstance(self.reader, Asterix) and self.reader.survey.categories & asterix.OF_RADARS
+                self.kind = PLOTS if plots else batch.kind
+            if batch.kind != self.kind:
+                if batch.kind == PLOTS or self.truth is None or not self.truth.own:
+                    self.left[f"{batch.kind} beside {self.kind}"] += len(batch.track)
+                continue
             kept = self._kept(batch)
             if kept is not None:
                 yield self._written(kept)
@@ -231,7 +260,7 @@ class _Import:
             if len(self.seen) < MOST_LISTED:
                 self.seen.add(track)
             if self.options.sites and batch.kind == PLOTS and radar not in self.options.sites:
-                self.left[f"rows of radar {radar or 'without a name'}, whose place --at does not say"] += 1
+                self.left[f"rows of radar {radar or 'without a name'}, whose place neither it nor --at says"] += 1
             elif wanted and track not in wanted:
                 self.left["rows of other tracks"] += 1
             elif track and t <= self.last.get(track, -math.inf):
@@ -239,7 +268,8 @@ class _Import:
             else:
                 keep.append(i)
                 self.last[track] = t
-                self.radars[radar] += batch.kind == PLOTS
+                if batch.kind == PLOTS:
+                    self.radars[radar] += 1
                 self.done.tracks[track] = self.done.tracks.get(track, 0) + 1
         if not keep:
             return None
@@ -259,7 +289,9 @@ class _Import:
             self.folds.take(batch)
         if self.truth is not None:
             columns |= self.truth.columns(batch, columns, self.reader)
-        names = {"track": batch.track} | ({"radar": batch.radar} if isinstance(self.reader, Asterix) else {})
+        names = {"track": batch.track}
+        if isinstance(self.reader, Asterix):
+            names |= {"radar": batch.radar, "address": batch.address, **batch.words}
         if not self.done.columns:
             self.done.columns = ("t_s", *names, *(name for name in columns if name != "t_s"))
         self.done.rows += len(t)
@@ -278,7 +310,7 @@ class _Import:
 
     def _placed(self, batch: Batch) -> dict[str, np.ndarray]:
         """Range, bearing, velocity and other columns that need the radar's place."""
-        site, given = self.options.site, batch.columns
+        site, given = self.options.only_site, batch.columns
         if batch.kind == POSITIONS:
             if site is None:
                 raise ConfigError("at: must say where the radar stands, LAT,LON,HEIGHT: the recording has positions "
@@ -311,9 +343,15 @@ class _Import:
         sites, antenna = dict(self.options.sites), self.options.antenna
         if self.options.site:
             sites[""] = self.options.site
+        named = "track: as in the recording"
+        if isinstance(self.reader, Asterix):
+            named = (
+                "track: number or address or A and the Mode 3/A code; radar: SAC/SIC; address: hexadecimal; mode_3a: "
+                f"octal; report: what saw the aircraft; marks: {' or '.join(asterix.MARKS)}"
+            )
         lines = [
             f"# made by radarsim import from a recording in the format {self.done.format}",
-            f"# t_s: seconds from {self._zero_words()}; track: as in the recording",
+            f"# t_s: seconds from {self._zero_words()}; {named}",
             "# range_m: slant range; bearing_rad: from north to east; velocity_mps: radial and positive where the "
             "range grows; span_mps: what a folded velocity is ambiguous by",
         ]
@@ -379,6 +417,8 @@ class _Import:
             done.notes.append(f"the times of day pass midnight: t_s runs on ({turns} × 24 h)")
         if isinstance(self.reader, Table):
             done.notes += self.reader.notes()
+        if isinstance(self.reader, Asterix):
+            done.notes += self.reader.notes(self.radars)
         if self.truth is not None:
             done.notes += self.truth.notes()
         if unnamed := done.tracks.get("", 0):
@@ -394,7 +434,7 @@ class _Truth:
     """Truth of each aircraft: positions of the second recording, or of the same one (category 062 beside 048)."""
 
     def __init__(self, path: str, options: Options):
-        assert options.site is not None
+        self.site = options.only_site
         self.rows = 0
         self.kinds: Counter[int] = Counter()  # of identity, by their number in KINDS
         self.missed: dict[int, list[np.ndarray]] = {}  # range and bearing, and the range (n, 3), by aircraft
@@ -405,34 +445,35 @@ class _Truth:
             self._read_own(path, options)
         else:
             assert options.truth is not None
-            with opened(options.truth, Options(encoding=options.encoding), truth=True) as (_, reader):
-                self._read(reader, options.site)
+            own = Options(encoding=options.encoding, keep_marked=options.keep_marked)
+            with opened(options.truth, own, truth=True) as (_, reader):
+                self._read(reader)
             if not self.paths.paths:
                 raise ConfigError(f"{options.truth}: must have positions on the earth of aircraft with an address, a "
                                   f"callsign or a code of their own; has {self.paths.unnamed} without")  # fmt: skip
 
     def _read_own(self, path: str, options: Options) -> None:
         """The positions beside the plots of one ASTERIX file; a stream, which is read once, has none."""
-        assert options.site is not None
         if not os.path.isfile(path):
             self.own = False
             return
         try:
             with opened(path, options, truth=True) as (_, reader):
                 if isinstance(reader, Asterix):
-                    self._read(reader, options.site)
+                    self._read(reader)
                 self.own = isinstance(reader, Asterix) and reader.plots and bool(self.paths.paths)
         except ConfigError:
             self.own = False  # counted when the records are read, with how many there were before
         if not self.own:
             self.paths = Paths()
 
-    def _read(self, reader: Reader, site: Site) -> None:
+    def _read(self, reader: Reader) -> None:
+        assert self.site is not None
         self.of_day = reader.of_day
         for batch in reader.batches():
             if batch.kind == PLOTS:
                 continue
-            seen = site.seen(batch.columns)
+            seen = self.site.seen(batch.columns)
             table = np.stack([batch.columns["t_s"], *(seen[name] for name in LOCAL)], axis=-1)
             self.paths.add(table, batch.track, identity_of(batch, reader))
 
@@ -485,7 +526,7 @@ class _Truth:
 def identity_of(batch: Batch, reader: Reader) -> dict[str, Sequence[str]]:
     """What identifies each record, by KINDS; a table's tracks are named by their aircraft."""
     addresses = batch.address if isinstance(reader, Asterix) or any(batch.address) else batch.track
-    return {"address": addresses}
+    return {"address": addresses, **batch.words}
 
 
 class _Sign:

@@ -15,7 +15,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Any, BinaryIO, NamedTuple, Protocol
 
 import numpy as np
@@ -39,7 +39,7 @@ class Batch(NamedTuple):
     kind is PLOTS (measured by a radar: PLOT_COLUMNS) or POSITIONS (on the earth: POSITION_COLUMNS). track holds the
     track of each record, '' where it has none; address identifies the aircraft or ship everywhere (24 bits in
     hexadecimal, MMSI), '' where unknown; radar identifies the sensor (SAC/SIC), '' where the format does not; columns,
-    arrays (n,), NaN where a record has no value.
+    arrays (n,), NaN where a record has no value; words: further columns of text, '' where a record has none.
     """
 
     kind: str
@@ -47,11 +47,15 @@ class Batch(NamedTuple):
     address: list[str]
     radar: list[str]
     columns: dict[str, np.ndarray]
+    words: Mapping[str, list[str]] = MappingProxyType({})
 
     def rows(self, keep: list[int]) -> "Batch":
         """The rows with these indices."""
-        track, address, radar = ([column[i] for i in keep] for column in (self.track, self.address, self.radar))
-        return Batch(self.kind, track, address, radar, {name: column[keep] for name, column in self.columns.items()})
+        track, address, radar, *words = (
+            [column[i] for i in keep] for column in (self.track, self.address, self.radar, *self.words.values())
+        )
+        columns = {name: column[keep] for name, column in self.columns.items()}
+        return Batch(self.kind, track, address, radar, columns, dict(zip(self.words, words, strict=True)))
 
 
 class Reader(Protocol):
@@ -163,6 +167,10 @@ class Site:
         if pymap3d is None:
             raise needs("pymap3d", "recordings")
         self.place = (latitude_deg, longitude_deg, height_m)
+
+    def distance_m(self, other: "Site") -> float:
+        """The distance to another place."""
+        return math.dist(pymap3d.geodetic2ecef(*self.place), pymap3d.geodetic2ecef(*other.place))
 
     def seen(self, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Range, bearing, elevation, local position and, where speeds are known, radial velocity of positions (n,).

@@ -1,7 +1,6 @@
 """Recordings become plots: files made here byte by byte from the specifications, and read back to the last step."""
 
 import csv
-import io
 import math
 import struct
 
@@ -12,94 +11,21 @@ from radarsim.errors import ConfigError
 from radarsim.recorded.formats.importing import Options, encoding_named, import_recording
 from radarsim.recorded.formats.sites import Antenna, Site, Unrolled, biconical, described
 from radarsim.recorded.formats.text import split
+from tests.recorded.formats.made import (
+    PLAIN,
+    SITE,
+    block,
+    fuzz,
+    imported,
+    plot_048,
+    position_062,
+    refused,
+    refused_again,
+    specified,
+)
 
 pytest.importorskip("asterix.base", reason="libasterix is not installed")
 NM, STEP = 1852.0, 2 * math.pi / 65536
-PLAIN = Options()
-SITE = Site(52.3, 4.76, 12.0)
-
-
-def block(category, *records):
-    """A data block: category, length, records."""
-    data = b"".join(records)
-    return bytes([category]) + struct.pack(">H", len(data) + 3) + data
-
-
-def plot_048(time=100.0, rho=12800, theta=5000, radar=(25, 10), **more):
-    """A record of category 048: field specification and items 010, 140, 020, 040, then those that are given.
-
-    time in s; rho in 1/256 NM and theta in 2**-16 turns as they stand in the file; level in 1/4 flight levels; address,
-    track; calculated Doppler speed and (raw speed, span, MHz).
-    """
-    items = {
-        1: bytes(radar),
-        2: round(time * 128).to_bytes(3, "big"),
-        3: b"\x21\x00",
-        4: struct.pack(">HH", rho, theta),
-    }
-    if "level" in more:
-        items[6] = struct.pack(">H", more["level"] & 0x3FFF | more.get("invalid", 0) << 15)
-    if "address" in more:
-        items[8] = more["address"].to_bytes(3, "big")
-    if "comment" in more:  # item 250: a number of blocks of eight bytes, here of zeros
-        items[10] = bytes([more["comment"]]) + bytes(8 * more["comment"])
-    if "track" in more:
-        items[11] = struct.pack(">H", more["track"])
-    if "calculated" in more:
-        items[20] = b"\x80" + struct.pack(">H", more["calculated"] & 0x3FF | more.get("doubtful", 0) << 15)
-    if "raw" in more:
-        first = items.get(20, b"")[1:]
-        parts = 0xC0 if first else 0x40
-        items[20] = bytes([parts]) + first + b"\x01" + struct.pack(">hHH", *more["raw"])
-    return specified(items)
-
-
-def specified(items):
-    """Items by their numbers, after the field specification that names them."""
-    size = (max(items) + 6) // 7
-    bits = [[number in items for number in range(7 * i + 1, 7 * i + 8)] for i in range(size)]
-    head = bytes(sum(bit << (7 - j) for j, bit in enumerate(own)) | (i < size - 1) for i, own in enumerate(bits))
-    return head + b"".join(items[number] for number in sorted(items))
-
-
-def position_062(time, latitude, longitude, **more):
-    """A record of category 062: 010, 070, 105, and speeds, track, address, geometric height (ft)."""
-    items = {
-        1: b"\x19\x01",
-        4: round(time * 128).to_bytes(3, "big"),
-        5: struct.pack(">ii", round(latitude * 2**25 / 180), round(longitude * 2**25 / 180)),
-    }
-    if "speeds" in more:
-        items[7] = struct.pack(">hh", *(round(4 * speed) for speed in more["speeds"]))
-    if "address" in more:
-        items[11] = b"\x80" + more["address"].to_bytes(3, "big")
-    if "track" in more:
-        items[12] = struct.pack(">H", more["track"])
-    if "height_ft" in more:
-        items[18] = struct.pack(">h", round(more["height_ft"] / 6.25))
-    return specified(items)
-
-
-def imported(tmp_path, data, options=PLAIN, name="recording"):
-    """What was done, and the columns that were written: numbers, and the tracks' names."""
-    source, output = tmp_path / name, tmp_path / "plots.csv"
-    source.write_bytes(data)
-    done = import_recording(source, output, options)
-    lines = output.read_text().splitlines()
-    rows = list(csv.DictReader(io.StringIO("\n".join(line for line in lines if not line.startswith("#")))))
-    numbers = [key for key in rows[0] if key not in ("track", "radar")]
-    columns = {key: np.array([float(row[key] or "nan") for row in rows]) for key in numbers}
-    return done, columns, [row["track"] for row in rows]
-
-
-def refused(tmp_path, data, options=PLAIN):
-    """The lines of the fault; nothing is written."""
-    source, output = tmp_path / "recording", tmp_path / "plots.csv"
-    source.write_bytes(data)
-    with pytest.raises(ConfigError) as caught:
-        import_recording(source, output, options)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["recording"]
-    return [line.replace(f"{tmp_path}/", "") for line in caught.value.lines]
 
 
 # ---- ASTERIX ---------------------------------------------------------------------------------------------------------
@@ -143,10 +69,10 @@ def test_category_048_what_is_silent_is_empty(tmp_path):
 
 
 def test_midnight_passes_and_other_categories_are_passed_over(tmp_path):
-    data = block(34, b"\x80\x19\x0a") + block(48, plot_048(86399.5, track=1)) + block(48, plot_048(3.5, track=1))
+    data = block(8, b"\x80\x19\x0a") + block(48, plot_048(86399.5, track=1)) + block(48, plot_048(3.5, track=1))
     done, columns, _ = imported(tmp_path, data)
     np.testing.assert_array_equal(columns["t_s"], [0, 4])
-    assert done.skipped == ["1 data blocks of category 034"]
+    assert done.skipped == ["1 data blocks of category 008"]
 
 
 def test_category_001_takes_its_time_from_the_sectors(tmp_path):
@@ -166,7 +92,7 @@ def test_category_001_takes_its_time_from_the_sectors(tmp_path):
     data += block(1, plot(40449.25, 1, track=5))
     done, columns, tracks = imported(tmp_path, data, Options(zero="midnight"))
     np.testing.assert_array_equal(columns["t_s"], [40001.0, 40001.5, 40449.25])
-    assert tracks == ["5", "", "5"]
+    assert tracks == ["5", "", "5-2"]  # 448 s without a plot
     np.testing.assert_allclose(columns["velocity_mps"], [-2 * NM / 256, np.nan, -2 * NM / 256])
     assert any("belong to no track" in note for note in done.notes)
 
@@ -215,10 +141,10 @@ def test_the_tracks_of_two_radars_stay_apart(tmp_path):
         np.testing.assert_array_equal(np.stack([columns[name][n::2] for name in ("x_m", "y_m", "z_m")], -1), alone)
     done, _, tracks = imported(tmp_path, block(48, *records), Options(sites={"25/13": places["25/13"]}))
     assert set(tracks) == {"25/13:1"}
-    assert done.skipped == ["4 rows of radar 25/12, whose place --at does not say"]
+    assert done.skipped == ["4 rows of radar 25/12, whose place neither it nor --at says"]
     (line,) = refused_again(tmp_path, block(48, *records), Options(sites={"25/99": SITE}))
-    assert line.endswith("(4 rows of radar 25/12, whose place --at does not say; 4 rows of radar 25/13, whose place "
-                         "--at does not say passed over)")  # fmt: skip
+    assert line.endswith("(4 rows of radar 25/12, whose place neither it nor --at says; 4 rows of radar 25/13, whose "
+                         "place neither it nor --at says passed over)")  # fmt: skip
 
 
 def flights(*names, speed=250.0, count=30, step=4.0):
@@ -504,17 +430,6 @@ def test_a_column_named_by_hand(tmp_path):
     assert "column range_km=d [m]: must have the unit of its own name, m" in line
 
 
-def refused_again(tmp_path, data, options, write=False):
-    """As `refused`, in a folder that holds an earlier output, which stays; write: the recording is another."""
-    if write:
-        (tmp_path / "recording").write_bytes(data)
-    before = (tmp_path / "plots.csv").read_bytes()
-    with pytest.raises(ConfigError) as caught:
-        import_recording(tmp_path / "recording", tmp_path / "plots.csv", options)
-    assert (tmp_path / "plots.csv").read_bytes() == before
-    return list(caught.value.lines)
-
-
 FLIGHT = [(1_700_000_000 + 10 * k, 52.0 + 0.01 * k, 4.5 + 0.012 * k) for k in range(4)]
 
 
@@ -653,25 +568,6 @@ def test_described_is_textbook():
     np.testing.assert_allclose(seen["level_elevation_rad"], [math.asin(12 / 13), 0])
 
 
-def spoiled(rng, data):
-    """The data with some bytes changed, cut out or doubled."""
-    data = bytearray(data)
-    for _ in range(rng.integers(1, 6)):
-        at = int(rng.integers(len(data)))
-        match rng.integers(4):
-            case 0:
-                data[at] = rng.integers(256)
-            case 1:
-                del data[at : at + int(rng.integers(1, 20))]
-            case 2:
-                data[at:at] = data[at : at + int(rng.integers(1, 20))]
-            case _:
-                data[at:at] = bytes(rng.integers(0, 256, int(rng.integers(1, 8))).tolist())
-        if not data:
-            return b"0"
-    return bytes(data)
-
-
 def recordings():
     """A small sound file of each format."""
     records = [plot_048(t, 12800 + t, 40, level=1200, track=3, address=0xA1, raw=(5, 60, 3000)) for t in range(1, 20)]
@@ -687,42 +583,13 @@ def recordings():
     )
 
 
-def fault_of(source, output):
-    """The fault that a recording is refused with; none of a sound one."""
-    try:
-        import_recording(source, output, Options(site=SITE))
-    except ConfigError as fault:
-        return fault
-    return None
-
-
-def fuzz(tmp_path, count, seed):
-    """Spoiled files of every format: a fault in one line or a file that is whole, never anything else."""
-    rng, source, output = np.random.default_rng(seed), tmp_path / "recording", tmp_path / "plots.csv"
-    sound = list(recordings())
-    refusals = 0
-    for i in range(count):
-        source.write_bytes(spoiled(rng, sound[i % len(sound)]))
-        output.unlink(missing_ok=True)
-        fault = fault_of(source, output)
-        if fault:
-            refusals += 1
-            assert all("\n" not in line for line in fault.lines)
-            assert not output.exists()
-        else:
-            lines = output.read_text().splitlines()
-            assert len({line.count(",") for line in lines if not line.startswith("#")}) == 1
-        assert len(list(tmp_path.iterdir())) <= 2
-    assert 0 < refusals < count
-
-
 def test_spoiled_files(tmp_path):
-    fuzz(tmp_path, 300, 1)
+    fuzz(tmp_path, recordings(), 300, 1)
 
 
 @pytest.mark.slow
 def test_many_spoiled_files(tmp_path):
-    fuzz(tmp_path, 10_000, 2)
+    fuzz(tmp_path, recordings(), 10_000, 2)
 
 
 @pytest.mark.parametrize(
