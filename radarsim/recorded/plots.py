@@ -360,7 +360,12 @@ def _cell(value: float) -> str:
 
 def cells(column: np.ndarray) -> Iterator[str]:
     """Numbers (n,) as text, nothing for not-a-number."""
-    return map(_cell if column.dtype.kind == "f" else str, column.tolist())
+    if column.dtype.kind != "f":
+        return map(str, column.tolist())
+    missing = np.isnan(column)
+    if missing.all():
+        return itertools.repeat("", len(column))
+    return map(_cell if missing.any() else repr, column.tolist())
 
 
 def write_columns(

@@ -350,6 +350,8 @@ class Asterix:
         """The records in batches; raises ConfigError where a block or record violates the specification."""
         try:
             for category, begin, data in captures.blocks(self.path, self.file, self.skipped):
+                if category == 34:  # which `surveyed` reads
+                    continue
                 held = self.held.get(category)
                 if self.truth and category not in self.trusted:
                     self.plots |= category in OF_RADARS
@@ -357,8 +359,8 @@ class Asterix:
                     self.skipped["data blocks that came twice"] += 1
                 else:
                     self._block(category, begin, data, held)
-                if held is not None and len(held) >= sites.BATCH:
-                    yield self._batch(held)
+                    if held is not None and len(held) >= sites.BATCH:
+                        yield self._batch(held)
         except ConfigError as fault:
             raise ConfigError(*(f"{line}; {self.records} records were read before" for line in fault.lines)) from fault
         for number in (62, 21, 48, 1):
@@ -397,7 +399,7 @@ class Asterix:
                 self._records(data, held)
             elif category == 2:
                 self._sectors(data)
-            elif category != 34:  # which `surveyed` reads
+            else:
                 self.skipped[f"data blocks of category {category:03d}"] += 1
         except Damaged as fault:
             edition = f"{category:03d} in edition {layout.edition(category)}, which is taken for granted"

@@ -65,21 +65,23 @@ def is_final(head: bytes) -> bool:
 
 
 def _bare(path: str, file: BinaryIO) -> Iterator[Block]:
-    data, at, begin = b"", 0, 0
-    while True:
-        length = data[at + 1] << 8 | data[at + 2] if at + 3 <= len(data) else 0
-        if at + max(length, 3) > len(data) and (more := file.read(CHUNK)):
-            begin, data, at = begin + at, data[at:] + more, 0
-            continue
-        if at == len(data):
-            return
-        if length < 4 or at + length > len(data):
-            left = data[at : at + max(length, 3)]
+    data, begin = file.read(CHUNK), 0
+    while data:
+        at, size = 0, len(data)
+        while at + 3 <= size:
+            end = at + (data[at + 1] << 8 | data[at + 2])
+            if not at + 4 <= end <= size:
+                break
+            yield data[at], begin + at, data[at:end]
+            at = end
+        begin, left, more = begin + at, data[at:], file.read(CHUNK)
+        data = left + more
+        length = int.from_bytes(data[1:3], "big")
+        if left and (not more or length < 4):
+            left = left[: max(length, 3)]
             got = f"category {left[0]}, length {length}, {len(left)} bytes" if len(left) > 2 else f"{len(left)} bytes"
-            raise ConfigError(f"{path}: byte {begin + at}: must be a data block: category, length from 4 on, and as "
-                              f"many bytes; got {got}")  # fmt: skip
-        yield data[at], begin + at, data[at : at + length]
-        at += length
+            raise ConfigError(f"{path}: byte {begin}: must be a data block: category, length from 4 on, and as many "
+                              f"bytes; got {got}")  # fmt: skip
 
 
 def _framed(path: str, file: BinaryIO) -> Iterator[Block]:

@@ -38,7 +38,7 @@ from radarsim.recorded.formats.sites import (
 )
 from radarsim.recorded.formats.text import Table
 from radarsim.recorded.identity import KINDS, LONGEST_GAP_S, Paths, apart, offsets, too_far
-from radarsim.recorded.plots import grouped
+from radarsim.recorded.plots import cells, grouped
 from radarsim.report.files import Writer
 
 Format = Literal["asterix", "opensky", "ais", "csv"]
@@ -295,8 +295,8 @@ class _Import:
         if not self.done.columns:
             self.done.columns = ("t_s", *names, *(name for name in columns if name != "t_s"))
         self.done.rows += len(t)
-        cells = [[_cell(value) for value in columns[name].tolist()] for name in columns]
-        return zip(cells[0], *names.values(), *cells[1:], strict=True)
+        t, *others = (cells(column) for column in columns.values())
+        return zip(t, *names.values(), *others, strict=True)
 
     def _zero(self, first: float) -> float:
         """The origin of t_s, in the times of the recording."""
@@ -618,7 +618,3 @@ def columns_of(texts: Sequence[str]) -> dict[str, str]:
     if faults:
         raise ConfigError(*(f"column: must be OURS=THEIRS, got {text!r}" for text in faults))
     return {ours.strip(): theirs.strip() for ours, _, theirs in (text.partition("=") for text in texts)}
-
-
-def _cell(value: float) -> str:
-    return "" if math.isnan(value) else repr(value)
