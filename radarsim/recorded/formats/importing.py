@@ -295,8 +295,8 @@ class _Import:
         if not self.done.columns:
             self.done.columns = ("t_s", *names, *(name for name in columns if name != "t_s"))
         self.done.rows += len(t)
-        t, *others = (cells(column) for column in columns.values())
-        return zip(t, *names.values(), *others, strict=True)
+        times, *others = (cells(column) for column in columns.values())
+        return zip(times, *names.values(), *others, strict=True)
 
     def _zero(self, first: float) -> float:
         """The origin of t_s, in the times of the recording."""
