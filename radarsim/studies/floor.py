@@ -9,7 +9,8 @@ and their errors Gaussian there is an estimator that reaches it.
 Where plots may be missed the bound is averaged over the patterns of plots (enumeration: Farina, Ristic & Timmoneri,
 IEEE Trans. SP 50, 2002). Where these are too many the information of a plot is multiplied by the probability that there
 is one (information reduction: Hernandez, Farina & Ristic, IEEE Trans. AES 42, 2006): a bound too, as the inverse is
-convex, but a lower one.
+convex, but a lower one. Patterns that do not determine a component, and the worst, so rare that samples may have none
+of them, count as if there were no error: a mean that leaves some out is still a bound.
 
 Everything that moves without noise is a function of parameters θ (p,) that stay; a scan adds information (p, p) on it.
 """
@@ -32,6 +33,7 @@ LAGS = tuple(SMOOTHED)
 CRB, POSTERIOR = "CRB", "posterior CRB"
 ENUMERATION, REDUCTION = "enumeration", "information reduction"
 MOST_PATTERNS = 1 << 11  # of plots that came or not that are averaged over, the likeliest
+RAREST = 1e-4  # share of the realisations with an estimate, those of the worst patterns, that counts as nothing
 NOTHING = 1e-12  # of the greatest eigenvalue, of parameters in units of their own errors: nothing is known there
 ROUNDING = 1e-9  # of a variance
 SEEN = 1e-9  # share of a component in what is not known, from which it has no bound
@@ -122,46 +124,55 @@ def missed(
     chance: np.ndarray,
     counts: np.ndarray,
     needed: Sequence[int],
+    settles: int,
     alone: Sequence[bool] = (),
-    reached: bool = True,
 ) -> Bound:
     """As `static`, of the realisations with an estimate, where scan k gives its plots with the probability chance (K,).
 
     counts (K, C): whether they count for a component, which has an estimate from so many `needed` plots (C,) on, and
-    where `alone` (C,) at any scan with a plot.
+    where `alone` (C,) at any scan with a plot. Scans that count for all determine all parameters, `settles` of them.
     """
     shape, needs = maps.shape[:2], np.array(needed)
     lone = np.array(alone or [False] * shape[1])
     sigma, kinds = np.full(shape, np.nan), []
     J, share, count = prior[None], np.ones(1), np.zeros((1, shape[1]), dtype=int)  # of patterns of plots so far
     mean, following = prior.copy(), True
-    enough = [np.eye(1, n + 1)[0] for n in needed]  # probabilities of 0, 1, … and of at least n plots so far
+    enough = [np.eye(1, n + 1)[0] for n in (*needed, settles)]  # probabilities of 0, 1, … and of at least n plots
     for k, (p, information) in enumerate(zip(chance, gained, strict=True)):
-        few = np.array([p * one[:-2].sum() for one in enough])  # a plot now, with which there are too few
-        enough = [_after(one, p) if counts[k, c] else one for c, one in enumerate(enough)]
-        likely = np.array([one[-1] for one in enough]) + np.where(lone & (counts[k] > 0), few, 0.0)
+        few = np.array([p * one[:-2].sum() for one in enough[:-1]])  # a plot now, with which there are too few
+        of_scan = (*counts[k], counts[k].all())
+        enough = [_after(one, p) if counted else one for one, counted in zip(enough, of_scan, strict=True)]
+        *many, settled = (one[-1] for one in enough)
+        likely = np.array(many) + np.where(lone & (counts[k] > 0), few, 0.0)
         mean = mean + p * information
         with np.errstate(divide="ignore", invalid="ignore"):
-            averaged = reduced = likely * spreads(decomposed(mean), maps[k]) ** 2
+            averaged = reduced = settled**2 / likely * spreads(decomposed(mean), maps[k]) ** 2
             if following:
                 (of, came), share = _likeliest(np.array([p, 1 - p])[:, None] * share)
                 J, count = J[of] + came[:, None, None] * information, count[of] + came[:, None] * counts[k]
                 known = (count >= needs) | (came[:, None] * counts[k] > 0) & lone
                 some = known.any(axis=1)
                 variance = np.zeros(known.shape)
-                variance[some] = np.where(known[some], spreads(decomposed(J[some]), maps[k]) ** 2, 0.0)
-                averaged = (share @ variance) / likely
-        sigma[k] = np.sqrt(np.maximum(averaged, reduced))
+                variance[some] = np.where(known[some], np.nan_to_num(spreads(decomposed(J[some]), maps[k])) ** 2, 0.0)
+                averaged = over_patterns(share, variance, likely)
+        sigma[k] = np.sqrt(np.fmax(averaged, reduced))
         following = following and not (reduced > averaged * (1 + ROUNDING)).any()  # too many are left out
         kinds.append(ENUMERATION if following else REDUCTION)
     blank = np.full(shape, np.nan)
-    return Bound(sigma, np.stack([blank] * len(LAGS)), blank, tuple(kinds), reached and len(J) < MOST_PATTERNS)
+    return Bound(np.where(sigma > 0, sigma, np.nan), np.stack([blank] * len(LAGS)), blank, tuple(kinds), False)
+
+
+def over_patterns(share: np.ndarray, variance: np.ndarray, likely: np.ndarray | float) -> np.ndarray:
+    """Mean (C,) of variances (S, C) over patterns with probabilities (S,), of `likely` ones (C,); see RAREST."""
+    worst = np.argsort(-variance, axis=0, kind="stable")
+    rare = np.cumsum(share[worst], axis=0) <= RAREST * likely
+    made: np.ndarray = np.where(rare, 0.0, share[worst] * np.take_along_axis(variance, worst, axis=0)).sum(axis=0)
+    return made / likely
 
 
 def _likeliest(shares: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
     """Of patterns that go on with a plot and without one, with probabilities (2, S), the likeliest: the number of the
-    pattern and 1 or 0 (n,), and their probabilities (n,). A mean that leaves some out, as if they erred by nothing, is
-    still a bound."""
+    pattern and 1 or 0 (n,), and their probabilities (n,)."""
     each = shares.ravel()
     kept = np.flatnonzero(each)
     if len(kept) > MOST_PATTERNS:
@@ -216,14 +227,14 @@ def driven(
         if following:
             (of, came), share = _likeliest(np.array([chance, 1 - chance])[:, None] * share)
             states = np.where(came[:, None, None] > 0, _taken(states, H[k], R[k])[of], states[of])
-            averaged = np.einsum("s,sii->i", share, states)[:shown]
+            averaged = over_patterns(share, np.diagonal(states, axis1=1, axis2=2)[:, :shown], 1.0)
         forward[k] = states[0]
         sigma[k] = np.sqrt(np.maximum(averaged, reduced))
         following = following and not (reduced > averaged * (1 + ROUNDING)).any()
         kinds.append(ENUMERATION if following else REDUCTION)
     if chance < 1:
         blank = np.full(sigma.shape, np.nan)
-        return Bound(sigma, np.stack([blank] * len(LAGS)), blank, tuple(kinds), len(states) < MOST_PATTERNS)
+        return Bound(sigma, np.stack([blank] * len(LAGS)), blank, tuple(kinds), False)
 
     def later(B: np.ndarray) -> np.ndarray:
         every = np.linalg.solve(np.eye(len(P)) + forward @ B, forward)

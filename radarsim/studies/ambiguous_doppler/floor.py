@@ -34,7 +34,8 @@ def floor(spec: Any, axes: Axes) -> Floor | None:
         if radar.detection_probability == 1:
             return floors.static(prior, gained, maps)
         chance, each = np.full(len(t), radar.detection_probability), np.ones((len(t), 3), dtype=int)
-        return floors.missed(prior, gained, maps, chance, each, (1, 1, 1))
+        settles = -(-np.count_nonzero(prior.diagonal() == 0) // observes)
+        return floors.missed(prior, gained, maps, chance, each, (1, 1, 1), settles)
 
     ranges, both = below(1), below(2)
     ways = {"none": ranges, "unfolded": both}

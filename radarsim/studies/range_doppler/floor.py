@@ -56,11 +56,11 @@ def of_plots(
     for i, d in enumerate(of_bias.tolist(), start=size):  # the derivative of number d by its bias is 1
         information[:, i, :size] = information[:, :size, i] = maps[:, d] / sigma[d] ** 2
         information[:, i, i], before[i, i] = 1 / sigma[d] ** 2, 1 / biases[d] ** 2
-    reached = not filters.is_drawn(spec.target)
     if (chance := spec.radar.detection_probability) == 1:
-        return floors.static(before, information, every, reached)
+        return floors.static(before, information, every, not filters.is_drawn(spec.target))
     each, alone = np.ones((scans, 3), dtype=int), (True, numbers == 2, False)
-    return floors.missed(before, information, every, np.full(scans, chance), each, (start,) * 3, alone, reached)
+    settles = 0 if prior.any() else -(-size // numbers)
+    return floors.missed(before, information, every, np.full(scans, chance), each, (start,) * 3, settles, alone)
 
 
 def of_flights(spec: Keys, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

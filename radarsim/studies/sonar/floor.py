@@ -38,7 +38,8 @@ def floor(spec: Keys, axes: GivenPlotsAxes) -> Floor | None:
         chance = seen.any(axis=1).astype(float)
         chance[free] = spec.sensor.detection_probability
         needed = tuple(1 + j for _ in range(seen.shape[1]) for j in range(size))
-        bound = floors.missed(none, information, maps, chance, np.repeat(seen, size, axis=1), needed, reached=reached)
+        settles = rows.shape[2] - 2 * (rows.shape[1] - 1)  # no less than a coordinate has coefficients: others have two
+        bound = floors.missed(none, information, maps, chance, np.repeat(seen, size, axis=1), needed, settles)
     return Floor(floors.CRB, (bound,) * len(axes.filters), bound)
 
 
