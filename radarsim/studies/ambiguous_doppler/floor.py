@@ -34,7 +34,7 @@ def floor(spec: Any, axes: Axes) -> Floor | None:
         if radar.detection_probability == 1:
             return floors.static(prior, gained, maps)
         chance, each = np.full(len(t), radar.detection_probability), np.ones((len(t), 3), dtype=int)
-        settles = -(-np.count_nonzero(prior.diagonal() == 0) // observes)
+        settles = -(-int((prior.diagonal() == 0).sum()) // observes)
         return floors.missed(prior, gained, maps, chance, each, (1, 1, 1), settles)
 
     ranges, both = below(1), below(2)
