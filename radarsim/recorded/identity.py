@@ -94,16 +94,22 @@ class Paths:
         return f"track {track or others}"
 
     def find(
-        self, t: np.ndarray, range_m: np.ndarray, bearing_rad: np.ndarray, identity: Mapping[str, Sequence[str]]
+        self,
+        t: np.ndarray,
+        range_m: np.ndarray,
+        bearing_rad: np.ndarray,
+        identity: Mapping[str, Sequence[str]],
+        turned: Callable[[np.ndarray], np.ndarray] = lambda states: states,
     ) -> Found:
-        """The aircraft of plots (n,) with identities by KINDS."""
+        """The aircraft of plots (n,) with identities by KINDS; turned: states in the axes of their radar."""
         found = Found(np.full((len(t), 6), np.nan), np.full(len(t), -1), np.full(len(t), -1))
         for values, rows in grouped(list(zip(*cleaned(identity, len(t)), strict=True))).items():
             for k, (kind, value) in enumerate(zip(KINDS, values, strict=True)):
                 wearers = [i for i in self.wearers.get((kind, value), ()) if not self.paths[i].is_another(values[:k])]
                 if wearers:
                     rest = rows[found.path[rows] < 0]
-                    self._take(found, rest, k, wearers, value, t[rest], range_m[rest], bearing_rad[rest])
+                    states = turned(np.stack([self._at(i, (kind, value), t[rest]) for i in wearers]))
+                    self._take(found, rest, k, wearers, states, range_m[rest], bearing_rad[rest])
         return found
 
     def _take(
@@ -112,13 +118,11 @@ class Paths:
         rows: np.ndarray,
         k: int,
         wearers: list[int],
-        value: str,
-        t: np.ndarray,
+        states: np.ndarray,
         range_m: np.ndarray,
         bearing_rad: np.ndarray,
     ) -> None:
-        """Give each of the rows the wearer of an identity that may be its own, if there is just one."""
-        states = np.stack([self._at(i, (KINDS[k], value), t) for i in wearers])
+        """Give each of the rows the wearer, with these states there, that may be its own, if there is just one."""
         may = np.isfinite(states[..., 0])
         if k:
             may &= near(offsets(states, range_m, bearing_rad), range_m)

@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -188,9 +189,9 @@ def import_recording(
     path = os.fspath(source)
     with opened(path, options) as (kind, reader):
         options, contradictions = placed(options, reader)
-        if options.truth and not options.only_site:
-            raise ConfigError("truth: needs the place of one radar, --at LAT,LON,HEIGHT; import others by themselves")
-        truth = _Truth(path, options) if options.only_site else None
+        if options.truth and not (options.site or options.sites):
+            raise ConfigError("truth: needs the place of the radar, --at LAT,LON,HEIGHT")
+        truth = _Truth(path, options) if options.site or options.sites else None
         work = _Import(kind, reader, options, truth)
         with Writer(output, {"the recording": path, "the truth": options.truth}) as file:
             first = True
@@ -434,7 +435,8 @@ class _Truth:
     """Truth of each aircraft: positions of the second recording, or of the same one (category 062 beside 048)."""
 
     def __init__(self, path: str, options: Options):
-        self.site = options.only_site
+        self.sites = dict(options.sites)
+        self.site = options.site or next(iter(self.sites.values()))  # in whose axes the paths are kept
         self.rows = 0
         self.kinds: Counter[int] = Counter()  # of identity, by their number in KINDS
         self.missed: dict[int, list[np.ndarray]] = {}  # range and bearing, and the range (n, 3), by aircraft
@@ -468,7 +470,6 @@ class _Truth:
             self.paths = Paths()
 
     def _read(self, reader: Reader) -> None:
-        assert self.site is not None
         self.of_day = reader.of_day
         for batch in reader.batches():
             if batch.kind == PLOTS:
@@ -483,16 +484,19 @@ class _Truth:
             return {}
         if reader.of_day != self.of_day:
             self.paths.period_s = DAY_S
-        t, r, b = batch.columns["t_s"], seen["range_m"], seen["bearing_rad"]
-        found = self.paths.find(t, r, b, identity_of(batch, reader))
-        states = found.states
+        states = np.empty((len(batch.track), 6))
+        for radar, own in grouped(batch.radar).items():
+            site, one = self.sites.get(radar, self.site), batch.rows(own.tolist())
+            t, r, b = one.columns["t_s"], seen["range_m"][own], seen["bearing_rad"][own]
+            found = self.paths.find(t, r, b, identity_of(one, reader), partial(site.turned, self.site))
+            states[own] = found.states
+            self.kinds.update(found.kind[found.kind >= 0].tolist())
+            missed = np.column_stack([offsets(found.states, r, b), r])
+            for number, rows in grouped(found.path.tolist()).items():
+                if number >= 0:
+                    self.missed.setdefault(number, []).append(missed[rows])
+        self.rows += len(states)
         true = described(states[:, :3])
-        self.rows += len(t)
-        self.kinds.update(found.kind[found.kind >= 0].tolist())
-        missed = np.column_stack([offsets(states, r, b), r])
-        for number, rows in grouped(found.path.tolist()).items():
-            if number >= 0:
-                self.missed.setdefault(number, []).append(missed[rows])
         radial = np.einsum("ni,ni->n", states[:, :3], states[:, 3:]) / true["range_m"]
         # Named like the components of the studies' filters.
         columns = {"r_m": true["range_m"], "Vr_mps": radial, "b_rad": true["bearing_rad"]}

@@ -172,6 +172,17 @@ class Site:
         """The distance to another place."""
         return math.dist(pymap3d.geodetic2ecef(*self.place), pymap3d.geodetic2ecef(*other.place))
 
+    def _axes(self) -> np.ndarray:
+        """North, up and east (3, 3) in the axes of the earth."""
+        units = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))  # each east, north, up
+        return np.array([pymap3d.enu2uvw(*one, *self.place[:2]) for one in units])
+
+    def turned(self, other: "Site", states: np.ndarray) -> np.ndarray:
+        """Positions and speeds (…, 6) in this site's local axes, of those in the other's."""
+        turn = other._axes() @ self._axes().T
+        between = np.subtract(pymap3d.geodetic2ecef(*other.place), pymap3d.geodetic2ecef(*self.place)) @ self._axes().T
+        return np.concatenate([states[..., :3] @ turn + between, states[..., 3:] @ turn], axis=-1)
+
     def seen(self, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Range, bearing, elevation, local position and, where speeds are known, radial velocity of positions (n,).
 

@@ -240,6 +240,34 @@ def test_truth_of_the_radar_that_says_where_it_stands(tmp_path):
     assert np.isfinite(columns["true_r_m"]).all()
 
 
+def test_truth_of_each_of_several_radars(tmp_path):
+    """An aircraft between two radars, 200 km apart; each has the truth in its own axes."""
+    sites = {"25/10": Site(52.3, 4.76, 12), "25/11": Site(54.1, 4.76, 300)}
+    truth, plots, height = b"", [], 30000 * 0.3048
+    for k in range(30):
+        at = 53 + k / 111.25
+        truth += block(62, position_062(4.0 * k, at, 4.9, address=0xA1, track=7, height_ft=30000))
+        for site in sites.values():
+            given = dict.fromkeys(("east_mps", "north_mps", "up_mps"), np.zeros(1))
+            place = dict(
+                zip(("latitude_deg", "longitude_deg", "altitude_m"), np.array([[at], [4.9], [height]]), strict=True)
+            )
+            seen = site.seen(given | place)
+            own = polar(float(seen["range_m"][0] * np.cos(seen["bearing_rad"][0])),
+                        float(seen["range_m"][0] * np.sin(seen["bearing_rad"][0])))  # fmt: skip
+            number = 10 + (site is sites["25/11"])
+            plots.append(plot_048(4.0 * k, *own, radar=(25, number), address=0xA1, track=3, level=1200))
+    done, columns, _ = imported(tmp_path, truth + block(48, *plots), Options(sites=sites))
+    assert done.notes[-1].startswith("truth: of 60 of 60 plots (100%; by address 60)")
+    for name in "xyz":
+        np.testing.assert_allclose(columns[f"{name}_m"], columns[f"true_{name}_m"], atol=15)
+    np.testing.assert_allclose(columns["true_r_m"], columns["range_m"], atol=10)
+    np.testing.assert_allclose(np.hypot(columns["true_vx_mps"], columns["true_vz_mps"]), 250, atol=1)
+    assert (columns["true_vx_mps"] > 200).all()
+    assert (columns["true_Vr_mps"][::2] > 200).all()
+    assert (columns["true_Vr_mps"][1::2] < -200).all()
+
+
 # ---- whose plots -----------------------------------------------------------------------------------------------------
 
 
