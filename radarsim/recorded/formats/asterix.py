@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -35,25 +35,196 @@ MARKED = ["; ".join(mark for i, mark in enumerate(MARKS) if bits >> i & 1) for b
 LETTERS = ["", *string.ascii_uppercase, *5 * [""], " ", *15 * [""], *string.digits, *6 * [""]]  # of six bits
 WORDS = ("address", "mode_3a", "callsign", "report", "marks")  # columns of text
 Columns = dict[str, np.ndarray]
+Words = dict[str, list[str]]
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Items of many records of a category: its specification, all bytes, and the places (n,) of each item in them."""
+
+    spec: Any
+    data: np.ndarray
+    at: Columns
+
+    def number(self, item: str, *path: str) -> np.ndarray:
+        """A field (n,); NaN where the record has it not."""
+        return layout.field(self.spec, item, *path).of(self.data, self.at[item])
+
+    def text(self, said: Callable[[int], str], item: str, *path: str) -> list[str]:
+        """What the number in a field is called; '' where the record has it not."""
+        return named(layout.field(self.spec, item, *path).whole(self.data, self.at[item]), self.at[item] >= 0, said)
+
+    def flag(self, item: str, name: str) -> np.ndarray:
+        """Bits (n,) in an item that may go on; 0 where the record has them not."""
+        return layout.flag(self.spec, item, name).of(self.data, self.at[item])
+
+    def tests(self, item: str) -> np.ndarray:
+        """Marks (n,) of what is no aircraft."""
+        flags = (("test target", "TST"), ("simulated", "SIM"), ("field monitor", "RAB"))
+        return np.bitwise_or.reduce([mark(what, self.flag(item, name)) for what, name in flags])
+
+    def code(self, item: str) -> tuple[list[str], np.ndarray]:
+        """Mode 3/A codes that are valid and not garbled, and marks (n,) of those that are."""
+        garbled = self.number(item, "G") == 1
+        known = (self.number(item, "V") == 0) & ~garbled
+        codes = layout.field(self.spec, item, "MODE3A").whole(self.data, self.at[item])
+        return named(codes, known, OCTAL), mark("garbled code", garbled)
+
+    def height(self, geometric: str, level: str) -> np.ndarray:
+        """The height (n,) in m, from the flight level where there is no other."""
+        height = self.number(geometric) * FOOT_M
+        return np.where(np.isnan(height), self.number(level) * FLIGHT_LEVEL_M, height)
+
+
+OCTAL, HEXADECIMAL = "{:04o}".format, "{:06x}".format
+
+
+def named(values: np.ndarray, there: np.ndarray, said: Callable[[int], str]) -> list[str]:
+    """What integers (n,) are called; '' where there is none."""
+    names = {value: said(value) for value in set(values[there].tolist())}
+    return [names[value] if known else "" for value, known in zip(values.tolist(), there.tolist(), strict=True)]
+
+
+def callsign(whole: int) -> str:
+    """Eight characters of six bits (ICAO Annex 10)."""
+    return "".join(LETTERS[whole >> shift & 63] for shift in range(42, -1, -6)).strip()
+
+
+def sensor(whole: int) -> str:
+    """SAC/SIC."""
+    return f"{whole >> 8}/{whole & 255}"
+
+
+def mark(what: str, flags: np.ndarray) -> np.ndarray:
+    """Bits (n,) of MARKS."""
+    return np.asarray(flags, dtype=np.int64) << MARKS.index(what)
+
+
+Read = tuple[Columns, Words, np.ndarray]  # columns (n,) of numbers and of text, and bits (n,) of MARKS
+
+
+def seen_by_radar(cut: Cut, level: str, report: str) -> Read:
+    """What plots of categories 048 and 001 have in common; level, report: what these fields are called."""
+    codes, marks = cut.code("070")
+    garbled = cut.number("090", "G") == 1
+    height = np.where((cut.number("090", "V") == 0) & ~garbled, cut.number("090", level) * FLIGHT_LEVEL_M, np.nan)
+    columns = {
+        "range_m": cut.number("040", "RHO") * NAUTICAL_MILE_M,
+        "bearing_rad": np.radians(cut.number("040", "THETA")),
+        "altitude_m": height,
+    }
+    reports = named(cut.flag("020", report), cut.at["020"] >= 0, REPORTS.__getitem__)
+    words = {"mode_3a": codes, "report": reports}
+    return columns, words, marks | cut.tests("020") | mark("garbled height", garbled)
+
+
+def plots_048(cut: Cut) -> Read:
+    """Plots and tracks of a radar."""
+    columns, words, marks = seen_by_radar(cut, "FL", "TYP")
+    columns["velocity_mps"], columns["span_mps"] = doppler_048(cut)
+    words |= {
+        "track": cut.text(str, "161", "TRN"),
+        "address": cut.text(HEXADECIMAL, "220"),
+        "callsign": cut.text(callsign, "240"),
+    }
+    forecast = (cut.at["020"] >= 0) & (cut.flag("020", "TYP") == 0)  # no detection: the radar's own forecast
+    return columns, words, marks | mark("coasted", forecast)
+
+
+def doppler_048(cut: Cut) -> tuple[np.ndarray, np.ndarray]:
+    """The first raw Doppler speed and its span, both m/s (n,); else the calculated one, which is not folded."""
+    data, at = cut.data, cut.at["120"]
+    variation = cut.spec.cv_items_dict["120"].cv_rule.cv_variation
+    rules = {one.cv_name: one.cv_rule.cv_variation for one in variation.cv_items_list if one}
+    calculated, raw = rules["CAL"], rules["RDS"].cv_variation
+    parts = np.where(at < 0, 0, data[at])
+    first = np.where(parts & 0x80, at + 1, -1)
+    doubtful = layout.field_in(calculated, "D").of(data, first) == 1
+    velocity = np.where(doubtful, np.nan, layout.field_in(calculated, "CAL").of(data, first))
+    count = np.where(parts & 0x40, np.where(parts & 0x80, at + 3, at + 1), -1)
+    second = np.where((count >= 0) & (data[count] > 0), count + 1, -1)
+    # The specification names no sign; no target has 32 km/s, so the upper half is taken as negative.
+    folded = layout.field_in(raw, "DOP")._replace(signed=True).of(data, second)
+    span = layout.field_in(raw, "AMB").of(data, second)
+    return np.where(second < 0, velocity, folded), np.where(span > 0, span, np.nan)
+
+
+def plots_001(cut: Cut) -> Read:
+    """The same of the older category."""
+    columns, words, marks = seen_by_radar(cut, "HGT", "SSRPSR")
+    columns["velocity_mps"] = cut.number("120") * NAUTICAL_MILE_M
+    columns["span_mps"] = np.full(len(marks), np.nan)
+    return columns, words | {"track": cut.text(str, "161")}, marks
+
+
+def tracks_062(cut: Cut) -> Read:
+    """Tracks of a surveillance centre."""
+    columns = {
+        "latitude_deg": cut.number("105", "LAT"),
+        "longitude_deg": cut.number("105", "LON"),
+        "altitude_m": cut.height("130", "136"),
+        "east_mps": cut.number("185", "VX"),
+        "north_mps": cut.number("185", "VY"),
+        "up_mps": np.full(len(cut.at["105"]), np.nan),
+    }
+    codes, marks = cut.code("060")
+    words = {
+        "track": cut.text(str, "040"),
+        "address": address_062(cut),
+        "mode_3a": codes,
+        "callsign": cut.text(callsign, "245", "CHR"),
+    }
+    marks |= mark("simulated", cut.flag("080", "SIM")) | mark("coasted", cut.flag("080", "CST"))
+    return columns, words, marks
+
+
+def address_062(cut: Cut) -> list[str]:
+    """The address, which is the first part of an item of many, after up to four bytes that name these."""
+    data, at = cut.data, cut.at["380"]
+    there = (at >= 0) & (data[at] & 0x80 > 0)
+    for _ in range(3):
+        at = np.where(data[at] & 1 == 1, at + 1, at)
+    (address, *_) = cut.spec.cv_items_dict["380"].cv_rule.cv_variation.cv_items_list
+    return named(layout.field_in(address.cv_rule.cv_variation).whole(data, at + 1), there, HEXADECIMAL)
+
+
+def reports_021(cut: Cut) -> Read:
+    """ADS-B: positions that aircraft report."""
+    speed = np.where(cut.number("160", "RE") == 0, cut.number("160", "GS") * NAUTICAL_MILE_M, np.nan)
+    course = np.radians(cut.number("160", "TA"))
+    climbs = [np.where(cut.number(item, "RE") == 0, cut.number(item, name) * FOOT_M / 60, np.nan)
+              for item, name in (("157", "GVR"), ("155", "BVR"))]  # fmt: skip
+    coarse = cut.at["131"] < 0
+    columns = {
+        "latitude_deg": np.where(coarse, cut.number("130", "LAT"), cut.number("131", "LAT")),
+        "longitude_deg": np.where(coarse, cut.number("130", "LON"), cut.number("131", "LON")),
+        "altitude_m": cut.height("140", "145"),
+        "east_mps": speed * np.sin(course),
+        "north_mps": speed * np.cos(course),
+        "up_mps": np.where(np.isnan(climbs[0]), climbs[1], climbs[0]),
+    }
+    addresses, tracks = cut.text(HEXADECIMAL, "080"), cut.text(str, "161", "TRNUM")
+    words = {
+        "track": ["" if address else track for address, track in zip(addresses, tracks, strict=True)],
+        "address": addresses,
+        "mode_3a": cut.text(OCTAL, "070", "MODE3A"),
+        "callsign": cut.text(callsign, "170"),
+    }
+    return columns, words, cut.tests("040")
 
 
 class _Category:
-    """What is read of a category's records.
+    """What is read of a category's records: the items of which fields are cut out; the first of times and of places
+    that a record has counts."""
 
-    items: those of which fields are cut out; times, places: of which the first that a record has counts.
-    """
-
-    number, kind = 0, sites.PLOTS
-    variant: str | None = None
     time_bytes = 3
-    items: tuple[str, ...] = ()
-    times: tuple[str, ...] = ()
-    places: tuple[str, ...] = ()
 
-    def __init__(self) -> None:
-        self.profile = Profile(self.number, self.items, self.variant)
-        self.spec = self.profile.spec
-        self.when, self.where = ([self.items.index(name) for name in own] for own in (self.times, self.places))
+    def __init__(self, number: int, read: Callable[[Cut], Read], kind: str, times: str, places: str, others: str,
+                 variant: str | None = None):  # fmt: skip
+        self.number, self.read, self.kind = number, read, kind
+        self.items = ("010", *times.split(), *places.split(), *others.split())
+        self.profile = Profile(number, self.items, variant)
+        self.when, self.where = ([self.items.index(name) for name in own.split()] for own in (times, places))
 
     def found(self, data: bytes, at: int) -> tuple[list[int], int]:
         """The places of the items of a record, -1 of those it has not, and its end."""
@@ -63,123 +234,15 @@ class _Category:
         """Time of day in s of a number in the time's item."""
         return whole / 128
 
-    def columns(self, data: np.ndarray, at: Columns) -> tuple[Columns, dict[str, list[str]], np.ndarray]:
-        """Of many records, from the places (n,) of their items: numbers (n,), text, and bits (n,) of MARKS."""
-        raise NotImplementedError
 
-    def field(self, item: str, *path: str) -> layout.Field:
-        return layout.field(self.spec, item, *path)
+class _Category001(_Category):
+    """Category 001, whose records are plots or tracks, with truncated times."""
 
-    def flag(self, item: str, name: str) -> layout.Flag:
-        return layout.flag(self.spec, item, name)
-
-
-def _texts(values: np.ndarray, there: np.ndarray, said: Callable[[int], str]) -> list[str]:
-    """What integers (n,) are called; '' where there is none."""
-    names = {value: said(value) for value in set(values[there].tolist())}
-    return [names[value] if known else "" for value, known in zip(values.tolist(), there.tolist(), strict=True)]
-
-
-def _callsign(whole: int) -> str:
-    """Eight characters of six bits (ICAO Annex 10)."""
-    return "".join(LETTERS[whole >> shift & 63] for shift in range(42, -1, -6)).strip()
-
-
-def _sensor(whole: int) -> str:
-    return f"{whole >> 8}/{whole & 255}"
-
-
-def _marks(**flags: np.ndarray) -> np.ndarray:
-    """Bits of MARKS, from flags (n,) by their names without spaces."""
-    bits = [np.asarray(one, dtype=np.int64) << MARKS.index(name.replace("_", " ")) for name, one in flags.items()]
-    return np.bitwise_or.reduce(bits)
-
-
-class _Radar(_Category):
-    """Common to plots of categories 048 and 001."""
-
-    places = ("040",)
-    level = "FL"
+    time_bytes = 2
 
     def __init__(self) -> None:
-        super().__init__()
-        self.rho, self.theta = self.field("040", "RHO"), self.field("040", "THETA")
-        self.heights = [self.field("090", name) for name in (self.level, "V", "G")]
-        self.codes = [self.field("070", name) for name in ("MODE3A", "V", "G")]
-        self.tests = {name: self.flag("020", own) for name, own in (("test_target", "TST"), ("simulated", "SIM"),
-                                                                     ("field_monitor", "RAB"))}  # fmt: skip
-
-    def common(self, data: np.ndarray, at: Columns) -> tuple[Columns, list[str], np.ndarray]:
-        """Range, bearing and height; the codes; the marks."""
-        level, invalid, garbled = (one.of(data, at["090"]) for one in self.heights)
-        code, invalid_code, garbled_code = (one.of(data, at["070"]) for one in self.codes)
-        columns = {
-            "range_m": self.rho.of(data, at["040"]) * NAUTICAL_MILE_M,
-            "bearing_rad": np.radians(self.theta.of(data, at["040"])),
-            "altitude_m": np.where(invalid + garbled > 0, np.nan, level * FLIGHT_LEVEL_M),
-        }
-        known = invalid_code + garbled_code == 0
-        codes = _texts(np.where(known, code, 0).astype(int), known, "{:04o}".format)
-        tests = {name: one.of(data, at["020"]) for name, one in self.tests.items()}
-        return columns, codes, _marks(**tests, garbled_code=garbled_code == 1, garbled_height=garbled == 1)
-
-
-class _Plots048(_Radar):
-    number = 48
-    items = ("010", "140", "020", "040", "070", "090", "220", "240", "161", "120")
-    times = ("140",)
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.report = self.flag("020", "TYP")
-        self.address, self.track, self.callsign = self.field("220"), self.field("161", "TRN"), self.field("240")
-        doppler = self.spec.cv_items_dict["120"].cv_rule.cv_variation
-        parts = {one.cv_name: one.cv_rule.cv_variation for one in doppler.cv_items_list if one}
-        calculated, raw = parts["CAL"], parts["RDS"].cv_variation
-        self.doubtful, self.calculated = (layout.field_in(calculated, name) for name in ("D", "CAL"))
-        # The specification names no sign; no target has 32 km/s, so the upper half is taken as negative.
-        self.doppler = layout.field_in(raw, "DOP")._replace(signed=True)
-        self.span = layout.field_in(raw, "AMB")
-
-    def columns(self, data: np.ndarray, at: Columns) -> tuple[Columns, dict[str, list[str]], np.ndarray]:
-        columns, codes, marks = self.common(data, at)
-        velocity, span = self._velocity(data, at["120"])
-        report, reported = self.report.of(data, at["020"]), at["020"] >= 0
-        words = {
-            "track": _texts(self.track.whole(data, at["161"]), at["161"] >= 0, str),
-            "address": _texts(self.address.whole(data, at["220"]), at["220"] >= 0, "{:06x}".format),
-            "mode_3a": codes,
-            "callsign": _texts(self.callsign.whole(data, at["240"]), at["240"] >= 0, _callsign),
-            "report": _texts(report, reported, REPORTS.__getitem__),
-        }
-        marks |= _marks(coasted=reported & (report == 0))  # no detection: the radar's own forecast
-        return columns | {"velocity_mps": velocity, "span_mps": span}, words, marks
-
-    def _velocity(self, data: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The first raw Doppler speed and its span, both m/s (n,); else the calculated one, which is not folded."""
-        parts = np.where(at < 0, 0, data[at])
-        calculated = np.where(parts & 0x80, at + 1, -1)
-        doubtful = self.doubtful.of(data, calculated) == 1
-        velocity = np.where(doubtful, np.nan, self.calculated.of(data, calculated))
-        count = np.where(parts & 0x40, np.where(parts & 0x80, at + 3, at + 1), -1)
-        raw = np.where((count >= 0) & (data[count] > 0), count + 1, -1)
-        span = self.span.of(data, raw)
-        return np.where(raw < 0, velocity, self.doppler.of(data, raw)), np.where(span > 0, span, np.nan)
-
-
-class _Plots001(_Radar):
-    """The older category 001, whose records are plots or tracks, with truncated times."""
-
-    number = 1
-    items = ("010", "141", "020", "040", "070", "090", "161", "120")
-    times = ("141",)
-    level, variant, time_bytes = "HGT", "track", 2
-
-    def __init__(self) -> None:
-        super().__init__()
+        super().__init__(1, plots_001, sites.PLOTS, "141", "040", "020 070 090 161 120", "track")
         self.plot = Profile(1, self.items, "plot")
-        self.report = self.flag("020", "SSRPSR")
-        self.track, self.doppler = self.field("161"), self.field("120")
         self.full: float | None = None  # time of day of the last sector message of category 002
         self.unrolled = sites.Unrolled(WRAP_001_S)
 
@@ -194,106 +257,6 @@ class _Plots001(_Radar):
         if self.full is None:
             return self.unrolled(truncated)
         return truncated + WRAP_001_S * round((self.full - truncated) / WRAP_001_S)
-
-    def columns(self, data: np.ndarray, at: Columns) -> tuple[Columns, dict[str, list[str]], np.ndarray]:
-        columns, codes, marks = self.common(data, at)
-        empty = np.full(len(codes), np.nan)
-        words = {
-            "track": _texts(self.track.whole(data, at["161"]), at["161"] >= 0, str),
-            "mode_3a": codes,
-            "report": _texts(self.report.of(data, at["020"]), at["020"] >= 0, REPORTS.__getitem__),
-        }
-        velocity = self.doppler.of(data, at["120"]) * NAUTICAL_MILE_M
-        return columns | {"velocity_mps": velocity, "span_mps": empty}, words, marks
-
-
-class _Tracks062(_Category):
-    number, kind = 62, sites.POSITIONS
-    items = ("010", "070", "105", "130", "136", "185", "040", "060", "080", "245", "380")
-    times, places = ("070",), ("105",)
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.latitude, self.longitude = self.field("105", "LAT"), self.field("105", "LON")
-        self.height, self.flight_level = self.field("130"), self.field("136")
-        self.east, self.north = self.field("185", "VX"), self.field("185", "VY")
-        self.track, self.callsign = self.field("040"), self.field("245", "CHR")
-        self.codes = [self.field("060", name) for name in ("MODE3A", "V", "G")]
-        self.simulated, self.coasted = self.flag("080", "SIM"), self.flag("080", "CST")
-        (address, *_) = self.spec.cv_items_dict["380"].cv_rule.cv_variation.cv_items_list
-        self.address = layout.field_in(address.cv_rule.cv_variation)
-
-    def columns(self, data: np.ndarray, at: Columns) -> tuple[Columns, dict[str, list[str]], np.ndarray]:
-        height, level = self.height.of(data, at["130"]) * FOOT_M, self.flight_level.of(data, at["136"])
-        columns = {
-            "latitude_deg": self.latitude.of(data, at["105"]),
-            "longitude_deg": self.longitude.of(data, at["105"]),
-            "altitude_m": np.where(np.isnan(height), level * FLIGHT_LEVEL_M, height),
-            "east_mps": self.east.of(data, at["185"]),
-            "north_mps": self.north.of(data, at["185"]),
-            "up_mps": np.full(len(height), np.nan),
-        }
-        derived = at["380"].copy()
-        derived[(derived >= 0) & (data[derived] & 0x80 == 0)] = -1  # the address is the first part of the item
-        part = derived.copy()
-        for _ in range(4):  # bytes of its own specification
-            part = np.where((part >= 0) & (data[part] & 1 == 1), part + 1, part)
-        address = np.where(derived >= 0, part + 1, -1)
-        code, invalid, garbled = (one.of(data, at["060"]) for one in self.codes)
-        known = invalid + garbled == 0
-        words = {
-            "track": _texts(self.track.whole(data, at["040"]), at["040"] >= 0, str),
-            "address": _texts(self.address.whole(data, address), address >= 0, "{:06x}".format),
-            "mode_3a": _texts(np.where(known, code, 0).astype(int), known, "{:04o}".format),
-            "callsign": _texts(self.callsign.whole(data, at["245"]), at["245"] >= 0, _callsign),
-        }
-        flags = {"simulated": self.simulated.of(data, at["080"]), "coasted": self.coasted.of(data, at["080"])}
-        return columns, words, _marks(**flags, garbled_code=garbled == 1)
-
-
-class _Reports021(_Category):
-    """ADS-B: the time is that for which the position holds, else that of its reception."""
-
-    number, kind = 21, sites.POSITIONS
-    items = ("010", "071", "073", "131", "130", "140", "145", "160", "157", "155", "161", "080", "070", "170", "040")
-    times, places = ("071", "073"), ("131", "130")
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.where_it_is = [[self.field(item, name) for item in self.places] for name in ("LAT", "LON")]
-        self.height, self.flight_level = self.field("140"), self.field("145")
-        self.speed, self.course, self.beyond = (self.field("160", name) for name in ("GS", "TA", "RE"))
-        self.climbs = [(item, self.field(item, name), self.field(item, "RE"))
-                       for item, name in (("157", "GVR"), ("155", "BVR"))]  # fmt: skip
-        self.address, self.track, self.callsign = self.field("080"), self.field("161", "TRNUM"), self.field("170")
-        self.code = self.field("070", "MODE3A")
-        self.tests = {name: self.flag("040", own) for name, own in (("test_target", "TST"), ("simulated", "SIM"),
-                                                                     ("field_monitor", "RAB"))}  # fmt: skip
-
-    def columns(self, data: np.ndarray, at: Columns) -> tuple[Columns, dict[str, list[str]], np.ndarray]:
-        fine, coarse = (at[item] for item in self.places)
-        places = [np.where(fine < 0, rough.of(data, coarse), exact.of(data, fine)) for exact, rough in self.where_it_is]
-        height, level = self.height.of(data, at["140"]) * FOOT_M, self.flight_level.of(data, at["145"])
-        speed = np.where(self.beyond.of(data, at["160"]) == 1, np.nan, self.speed.of(data, at["160"]) * NAUTICAL_MILE_M)
-        course, up = np.radians(self.course.of(data, at["160"])), np.full(len(height), np.nan)
-        for item, climb, beyond in self.climbs:
-            known = beyond.of(data, at[item]) == 0
-            up = np.where(np.isnan(up) & known, climb.of(data, at[item]) * FOOT_M / 60, up)
-        columns = {
-            "latitude_deg": places[0],
-            "longitude_deg": places[1],
-            "altitude_m": np.where(np.isnan(height), level * FLIGHT_LEVEL_M, height),
-            "east_mps": speed * np.sin(course),
-            "north_mps": speed * np.cos(course),
-            "up_mps": up,
-        }
-        words = {
-            "track": _texts(self.track.whole(data, at["161"]), (at["161"] >= 0) & (at["080"] < 0), str),
-            "address": _texts(self.address.whole(data, at["080"]), at["080"] >= 0, "{:06x}".format),
-            "mode_3a": _texts(self.code.whole(data, at["070"]), at["070"] >= 0, "{:04o}".format),
-            "callsign": _texts(self.callsign.whole(data, at["170"]), at["170"] >= 0, _callsign),
-        }
-        return columns, words, _marks(**{name: one.of(data, at["040"]) for name, one in self.tests.items()})
 
 
 class _Records:
@@ -311,14 +274,14 @@ class _Records:
     def __len__(self) -> int:
         return len(self.times)
 
-    def taken(self) -> tuple[np.ndarray, np.ndarray, Columns]:
-        """Times (n,), all bytes, and the places (n,) of each item in them; the collection is emptied."""
+    def taken(self) -> tuple[np.ndarray, Cut]:
+        """Times (n,) and items; the collection is emptied."""
         data = np.frombuffer(b"".join([*self.blocks, bytes(16)]), np.uint8)
         places = np.array(self.places).reshape(len(self), -1)
         places = np.where(places < 0, -1, places + np.array(self.begins)[:, None])
         t = np.array(self.times)
         self._empty()
-        return t, data, dict(zip(self.category.items, places.T, strict=True))
+        return t, Cut(self.category.profile.spec, data, dict(zip(self.category.items, places.T, strict=True)))
 
 
 class Asterix:
@@ -333,8 +296,16 @@ class Asterix:
         self.records = 0
         self.skipped: Counter[str] = Counter()
         self.marked: Counter[str] = Counter()
-        self.plots_001 = _Plots001()
-        categories = (_Plots048(), self.plots_001, _Tracks062(), _Reports021())
+        self.plots_001 = _Category001()
+        categories = (
+            _Category(48, plots_048, sites.PLOTS, "140", "040", "020 070 090 220 240 161 120"),
+            self.plots_001,
+            _Category(62, tracks_062, sites.POSITIONS, "070", "105", "130 136 185 040 060 080 245 380"),
+            # The time for which a position holds, else that of its reception; the finer position.
+            _Category(
+                21, reports_021, sites.POSITIONS, "071 073", "131 130", "140 145 160 157 155 161 080 070 170 040"
+            ),
+        )
         self.held = {one.number: _Records(one) for one in categories}
         self.sectors = Profile(2, ("030",))
         self.clock = sites.Unrolled(sites.DAY_S)
@@ -432,11 +403,10 @@ class Asterix:
 
     def _batch(self, held: _Records) -> sites.Batch:
         kind = held.category.kind
-        t, data, at = held.taken()
-        columns, words, marks = held.category.columns(data, at)
-        source = at["010"]
-        radars = _texts(data[source].astype(int) << 8 | data[source + 1], source >= 0, _sensor)
-        none = [""] * len(t)
+        t, cut = held.taken()
+        columns, words, marks = held.category.read(cut)
+        source, none = cut.at["010"], [""] * len(t)
+        radars = named(cut.data[source].astype(int) << 8 | cut.data[source + 1], source >= 0, sensor)
         words = {name: words.get(name, none) for name in ("track", *WORDS)} | {"marks": [MARKED[one] for one in marks]}
         for i, mark in enumerate(MARKS):
             self.marked[mark] += int((marks >> i & 1).sum())

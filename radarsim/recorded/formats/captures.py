@@ -150,7 +150,7 @@ def _captured(path: str, file: BinaryIO, left: Counter[str]) -> Iterator[Block]:
             after[more] += 1
         yield from ((category, begin + start + at, block) for category, at, block in found)
     for count, times in after.items():
-        left[f"times {count} bytes after the data blocks of a datagram"] = times
+        left[f"tails of {count} bytes after the data blocks of datagrams"] = times
 
 
 def _packets(path: str, file: BinaryIO, left: Counter[str]) -> Iterator[tuple[int, int, bytes, bool]]:

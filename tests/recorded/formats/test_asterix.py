@@ -149,7 +149,7 @@ def test_what_a_capture_has_besides_is_counted(tmp_path):
         "1 packets cut off by the end of the file",
         "3 fragments of datagrams, which are not put together",
         "4 packets other than UDP",
-        "4 times 8 bytes after the data blocks of a datagram",
+        "4 tails of 8 bytes after the data blocks of datagrams",
     ]
     assert refused_alone(tmp_path, pcap(PLAINLY, cut=1)).endswith(
         "(5 packets of which the capture kept the beginning only passed over)"
