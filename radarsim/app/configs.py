@@ -18,7 +18,6 @@ from radarsim import language
 from radarsim.config import document
 from radarsim.config import load as reading
 from radarsim.config.experiment import Case, Experiment
-from radarsim.config.fields import Model
 from radarsim.errors import ConfigError, argument
 from radarsim.language import term, tr
 from radarsim.report import files
@@ -63,13 +62,13 @@ def _claim_faults(name: str) -> Sequence[str]:
 
 
 @cache
-def shipped(stem: str) -> tuple[Model, ...] | None:
-    """The checked keys of the cases of a shipped config; None where none of that stem is shipped.
+def shipped(stem: str) -> tuple[Case, ...] | None:
+    """The cases of a shipped config; None where none of that stem is shipped.
 
     Never of a user's file of that name: claims are judged by the shipped config.
     """
     file = shipped_file(stem)
-    return None if file is None else tuple(case.spec for case in reading.load(file, (), registry).cases)
+    return None if file is None else reading.load(file, (), registry).cases
 
 
 def shipped_file(stem: str) -> Path | None:

@@ -293,7 +293,7 @@ def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
     """
     of = study(results[0].study)
     made = measured(results)
-    verdicts = claims.judged(of.claims(), results, made, configs.shipped, stem)
+    verdicts = claims.judged(of.claims(), results, outside.for_claims(made, results), configs.shipped, stem)
     made["claims"] = over_readings(verdicts, results[0].study)
     made["floor"] = of.floors(results)
     made = notes.noted(made, results, of.exact_errors, quantities(results[0].study, results[0].spec))

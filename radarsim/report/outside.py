@@ -113,8 +113,8 @@ def added(made: Made, results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]
     if not outside:
         return dict(made)
     with_own = [one for one in results if one.outside is not None]
-    curves = common.curves(outside)
-    rows = {"curves": _below(made["curves"], curves), "gains": common.joined(map(gains, with_own), common.GAINS)}
+    curves, against = _measured(with_own)
+    rows = {"curves": _below(made["curves"], curves), "gains": against}
     rows = notes.noted(rows, [*results, *outside], exact=False)
     if "note" in rows["gains"]:  # of a filter that equals one of the config but for rounding
         equal = rows["gains"]["gain_hi"] - rows["gains"]["gain_lo"] < 4 * ROUNDING
@@ -129,6 +129,19 @@ def added(made: Made, results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]
         if len(table):
             found[name] = _below(made[name], table) if name in made else table
     return found
+
+
+def _measured(with_own: Sequence[CaseResult]) -> "tuple[pd.DataFrame, pd.DataFrame]":
+    """The curves and gains of filters from outside."""
+    outside = [one for result in with_own for one in others(result)]
+    return common.curves(outside), common.joined(map(gains, with_own), common.GAINS)
+
+
+def for_claims(made: Made, results: Sequence[CaseResult]) -> Made:
+    """The tables with the curves and gains of filters from outside."""
+    with_own = [one for one in results if one.outside is not None]
+    rows = dict(zip(("curves", "gains"), _measured(with_own), strict=True)) if with_own else {}
+    return {**made, **{name: _below(made[name], table) for name, table in rows.items()}}
 
 
 def beside(name: str, table: "Callable[[Sequence[CaseResult]], pd.DataFrame]") -> Any:

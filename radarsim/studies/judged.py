@@ -146,28 +146,28 @@ def faults(
     components: of the study; configs: the stems that its package ships.
     """
     for claim in every:
-        if (specs := shipped(claim.config)) is None:
+        if (cases := shipped(claim.config)) is None:
             there = ", ".join(configs) or "none"
             yield f"{claim.source}: config: no such config {claim.config!r} is shipped; there are {there}"
             continue
         for part in claim.parts:
             if isinstance(part.measure, Call):
-                yield from (f"{part.measure.source}: {fault}" for fault in _names(part.measure, specs, components))
+                yield from (f"{part.measure.source}: {fault}" for fault in _names(part.measure, cases, components))
     for choice in choices:
         configs_of = dict.fromkeys(claim.config for claim in every if choice.bears_on(claim.id))
-        specs = [spec for config in configs_of for spec in shipped(config) or ()]
+        specs = [case.spec for config in configs_of for case in shipped(config) or ()]
         for one in choice.alternatives:
             if why := next(filter(None, (_kept_from(spec, one.sets) for spec in specs)), ""):
                 yield f"{one.source}: choices: {choice.key}: {one.name!r} cannot be set: {why}"
 
 
-def _names(measure: Call, specs: Sequence[Model], components: Sequence[str]) -> Iterator[str]:
+def _names(measure: Call, cases: Sequence[Any], components: Sequence[str]) -> Iterator[str]:
     """The unknown case, filter, component, gain or scan of a measure: in arguments of the functions here only."""
     of: list[Any] = []
     for key in (key for key in measure.cases if isinstance(key, Mapping)):
-        if unknown := _unknown(key, specs):
+        if unknown := _unknown(key, [case.spec for case in cases]):
             yield f"of: {unknown}: there is no such key"
-        elif not (found := [spec for spec in specs if _is(spec, key)]):
+        elif not (found := [case for case in cases if _is(case.spec, key)]):
             yield f"of: no case has {', '.join(f'{path} {value}' for path, value in key.items())}"
         else:
             of.append(found[0])
@@ -175,11 +175,12 @@ def _names(measure: Call, specs: Sequence[Model], components: Sequence[str]) -> 
         return
     for argument in ("filter", "over", "component"):
         kind = "component" if argument == "component" else "filter"
-        for spec in of if argument in measure.arguments else ():
-            known = components if kind == "component" else [one.name for one in spec.filters]
+        for case in of if argument in measure.arguments else ():
+            filters = [one.name for one in (*case.spec.filters, *case.outside)]
+            known = components if kind == "component" else filters
             if (name := measure.arguments[argument]) not in known:
                 yield f"no {kind} {name!r}; there are {', '.join(known)}"
-    yield from (fault for spec in of for fault in _no_number(measure, spec))
+    yield from (fault for case in of for fault in _no_number(measure, case.spec))
 
 
 def _no_number(measure: Call, spec: Any) -> Iterator[str]:

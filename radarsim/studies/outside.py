@@ -221,9 +221,11 @@ def columns_of(name: str, d: int, components: Sequence[str], own: Sequence[str])
 
 @dataclass(frozen=True)
 class OutsideAxes(Axes):
-    """Axes of filters from outside. baselines: those that the gains of the config's filters are against too."""
+    """Axes of filters from outside. baselines: those that the gains of the config's filters are against too;
+    identities: what the numbers of each depend on."""
 
     baselines: tuple[str, ...] = ()
+    identities: tuple[str, ...] = ()
 
 
 # ---- plan and sums ---------------------------------------------------------------------------------------------------
@@ -283,7 +285,8 @@ def prepare(study: "Study", case: Case, inner: Any) -> Plan:
     )
     unknown = np.full((G, K, C), np.nan)
     labels = tuple(names), axes.components, axes.k, axes.t_s, np.ones((G, K, C), dtype=bool), 0, unknown, unknown
-    own = OutsideAxes(*labels, tuple(member.name for member in case.outside if member.baseline))
+    baselines = tuple(member.name for member in case.outside if member.baseline)
+    own = OutsideAxes(*labels, baselines, tuple(member.identity for member in case.outside))
     return Plan(study, inner, draw, world, scans, case.outside, own, layout)
 
 

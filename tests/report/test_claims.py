@@ -26,7 +26,7 @@ def judged(results, shipped=configs.shipped):
 def table(paper, swept_all):
     """All claims on exact values, over runs long enough to settle."""
     results = [*paper, *swept_all]
-    return judged(results, lambda config: [result.spec for result in results])
+    return judged(results, lambda config: results)
 
 
 def test_ranges_from_words():
@@ -285,5 +285,5 @@ def test_all_claims_are_listed_run_or_not(table):
 def test_a_manoeuvre_that_begins_after_the_last_scan_is_no_claim():
     overrides = ["scans=12", "uses.at_s=[35]", "sweep.target.acceleration_mps2=[0.2138, 0.4]"]
     result = radarsim.run("sonar_manoeuvre", overrides=overrides, realisations=50)
-    papers = [case.spec for case in result.cases]  # as if the paper's experiment were so short
+    papers = result.cases  # as if the paper's experiment were so short
     assert claims.judged(registry.study("sonar").claims(), result.cases, result.tables, lambda config: papers).empty

@@ -34,12 +34,18 @@ def radarsim(place):
     yield from outside.forking(place / "site", place)
 
 
-LINES = {"chirp": 120, "bearings": 200}  # at most, of its file
+LINES = {"chirp": 120, "bearings": 200, "learned": 260}  # at most, of its file
 
 
 @pytest.mark.parametrize("name", LINES)
 def test_its_own_tests_pass(radarsim, name):
     done = radarsim("-q", "-p", "no:cacheprovider", cwd=EXAMPLES / name, module="pytest")
+    assert " passed" in done.stdout
+
+
+@pytest.mark.slow
+def test_the_long_tests_of_what_is_learned_pass(radarsim):
+    done = radarsim("-q", "-p", "no:cacheprovider", "-m", "slow", cwd=EXAMPLES / "learned", module="pytest")
     assert " passed" in done.stdout
 
 
@@ -69,6 +75,7 @@ def test_a_filter_whose_column_a_file_lacks_is_named(radarsim, tmp_path):
     [
         ("chirp", N, (), {"sigma_r.svg", "gain_v.svg"}),
         ("bearings", 1500, ("believed.csv", "consistency.csv"), {"consistency.svg"}),
+        ("learned", 700, ("believed.csv", "consistency.csv", "failures.csv"), {"sigma_x.svg"}),
     ],
 )
 def test_an_examples_run_is_the_same_by_any_means(radarsim, tmp_path, name, n, further, figures):

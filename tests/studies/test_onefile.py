@@ -268,9 +268,9 @@ def test_what_a_claim_names_and_is_not_there_is_known_without_a_run(what):
     text, said = UNKNOWN[what]
     written = Walk.claims_yaml.replace(what, text)
     study = type("Wrong", (Walk,), {"claims_yaml": written, "__module__": __name__})()
-    specs = {"walk": (case_of(Walk(), 0.1).spec, case_of(Walk()).spec)}
-    assert not Walk().claim_faults(specs.get)
-    (line,) = set(study.claim_faults(specs.get))
+    cases = {"walk": (case_of(Walk(), 0.1), case_of(Walk()))}
+    assert not Walk().claim_faults(cases.get)
+    (line,) = set(study.claim_faults(cases.get))
     assert said in line
     number = int(re.match(r".*test_onefile\.py:(\d+):\d+: ", line)[1])
     lines = written.splitlines()  # a text that is not in the file: its own lines
@@ -306,7 +306,7 @@ def test_a_measure_that_fails_is_one_line_and_the_other_claims_are_judged(made, 
     (claim,) = papers.claims
     part = replace(claim.parts[0], measure=failing(what), cases=())
     both = replace(papers, claims=(replace(claim, id="walk.0", parts=(part,)), claim))
-    shipped = {"walk": [result.spec for result in results]}
+    shipped = {"walk": results}
     table = claims.judged(both, results, every, shipped.get, "walk")
     assert table["class"].tolist() == ["not judged here", "confirmed"]
     (line,) = claims.failed(table)

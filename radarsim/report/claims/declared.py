@@ -5,7 +5,8 @@ Measured values for claims: curves as series, points of them with their interval
 Whether a case is the paper's own experiment; only such cases may judge its claims. A claim names the shipped config
 that holds its experiment. A case is the paper's when its checked keys equal those of a case of that config. These may
 differ: the number of realisations, the seed and the options of a run, which are not keys of a study; display names
-(`config.fields.Display`); and members added to a list that the study declares in `PaperClaims.may_grow`.
+(`config.fields.Display`); and members added to a list that the study declares in `PaperClaims.may_grow`, or filters of
+other code (`python:`) beside the paper's own.
 """
 
 import copy
@@ -16,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from radarsim.config.experiment import canonical
-from radarsim.config.fields import Model, NameIn
+from radarsim.config.experiment import Case, canonical
+from radarsim.config.fields import NameIn
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.report import tables
@@ -223,7 +224,8 @@ class Evidence:
 
     def _lacking(self, result: CaseResult, filter_name: str, component: str, *base: str) -> Missing:
         """Which name an existing case lacks; if it has all names, that it has no such curve."""
-        filters, components = result.axes.filters, tuple(name for name, _ in result.axes.components)
+        filters = *result.axes.filters, *(result.outside.axes.filters if result.outside else ())
+        components = tuple(name for name, _ in result.axes.components)
         for kind, name, known in (("filter", filter_name, filters), ("component", component, components)):
             if name not in known:
                 return NoSuchName(f"no {kind} {name!r}; there are {', '.join(known)}")
@@ -259,17 +261,18 @@ class Evidence:
         return Series(rows["k"].to_numpy(), rows["t_s"].to_numpy(), value, lo, hi)
 
     def ratio(self, key: Any, filter_name: str, over: str, component: str) -> Series:
-        """σ of a filter over that of another one of the case: paired where one of the two is a baseline of it.
+        """σ of a filter over that of another one of the case: paired where one of the two is a baseline of it, or
+        is from outside.
 
         Otherwise as of independent estimates, with an interval wider than under common noise.
         """
         case = self.case(key)
-        baselines = {one.baseline for one in (case, *case.against)}
-        if over in baselines and filter_name != over:
+        gains = self._grouped("gains")
+        if (case.name, filter_name, component, over) in gains:
             of = self._gain(key, filter_name, component, over)
             value, lo, hi = (1 - part / 100 for part in (of.value, of.hi, of.lo))
             return Series(of.k, of.t, value, lo, hi)
-        if filter_name in baselines and filter_name != over:
+        if (case.name, over, component, filter_name) in gains:
             of = self._gain(key, over, component, filter_name)
             value, lo, hi = (1 / (1 - part / 100) for part in (of.value, of.lo, of.hi))
             return Series(of.k, of.t, value, lo, hi)
@@ -296,23 +299,26 @@ class Evidence:
 
 # ---- paper -----------------------------------------------------------------------------------------------------------
 CLOSE = 1e-12  # relative: one number in radians and in degrees
-Shipped = Callable[[str], Sequence[Model] | None]  # config → the checked keys of its cases; None: not shipped
+Shipped = Callable[[str], "Sequence[CaseResult | Case] | None"]  # config → its cases; None: not shipped
 
 
 @dataclass(frozen=True)
 class Described:
     """A case's keys, as plain data: those of its lists that may grow separate from the rest.
 
-    named: for each key that names a member of such a list, that member.
+    named: for each key that names a member of such a list, that member. outside: by the name of a filter of the user's
+    own code what its numbers depend on.
     """
 
     fixed: dict
     members: dict[str, list]
     named: dict[str, object]
+    outside: dict[str, str]
 
 
-def described(spec: Model, may_grow: Sequence[str], may_shorten: Sequence[str] = ()) -> Described:
+def described(one: CaseResult | Case, may_grow: Sequence[str], may_shorten: Sequence[str] = ()) -> Described:
     """The keys of a case for comparison: all but may_shorten."""
+    spec = one.spec
     plain = {key: value for key, value in canonical(spec).items() if key not in may_shorten}
     members = {key: plain.pop(key) for key in may_grow}
     named = {}
@@ -320,7 +326,15 @@ def described(spec: Model, may_grow: Sequence[str], may_shorten: Sequence[str] =
         for mark in info.metadata:
             if isinstance(mark, NameIn) and mark.field in members:
                 named[name] = members[mark.field][plain.pop(name)]
-    return Described(plain, members, named)
+    return Described(plain, members, named, _outside(one))
+
+
+def _outside(one: CaseResult | Case) -> dict[str, str]:
+    """What filters from outside depend on, by their names."""
+    if isinstance(one, Case):
+        return {member.name: member.identity for member in one.outside}
+    axes: Any = one.outside and one.outside.axes
+    return dict(zip(axes.filters, axes.identities, strict=True)) if axes else {}
 
 
 def own_members(mine: Described, shipped: Iterable[Described], may_grow: Sequence[str]) -> dict[str, set[int]] | None:
@@ -330,7 +344,8 @@ def own_members(mine: Described, shipped: Iterable[Described], may_grow: Sequenc
     """
     found: dict[str, set[int]] | None = None
     for papers in shipped:
-        if not (equal(mine.fixed, papers.fixed) and equal(mine.named, papers.named)):
+        same = equal(mine.fixed, papers.fixed) and equal(mine.named, papers.named)
+        if not same or not papers.outside.items() <= mine.outside.items():
             continue
         places = {key: _places(papers.members[key], mine.members[key]) for key in may_grow}
         if all(len(places[key]) == len(papers.members[key]) for key in may_grow):
@@ -353,6 +368,8 @@ def _lacking(mine: Described, papers: Described, may_grow: Sequence[str]) -> lis
         missing = len(papers.members[key]) - len(_places(papers.members[key], mine.members[key]))
         if missing:
             said.append(f"{missing} of the paper's {len(papers.members[key])} {key} changed or missing")
+    if others := [name for name, one in papers.outside.items() if mine.outside.get(name) != one]:
+        said.append(f"filter {', '.join(others)} missing, or of other code")
     if not equal(mine.named, papers.named):
         said.append(f"{', '.join(papers.named)} differs from the paper's")
     return said

@@ -116,11 +116,11 @@ class _Papers:
 
 def _papers(of: PaperClaims, config: str, shipped: Shipped) -> list[Described]:
     """The paper's cases, by the shipped config that claims name."""
-    return [described(spec, of.may_grow, of.may_shorten) for spec in shipped(config) or ()]
+    return [_described(of, case) for case in shipped(config) or ()]
 
 
 def _described(of: PaperClaims, one: "CaseResult | Case") -> Described:
-    return described(one.spec, of.may_grow, of.may_shorten)
+    return described(one, of.may_grow, of.may_shorten)
 
 
 def _differences(
