@@ -233,8 +233,10 @@ class _Reader:
             self.faults.add(lines[i], self._where(j), must, f"{array[i, j]:g}", cure)
 
     def _in_order(self, t: np.ndarray, lines: list[int], tracks: list[str]) -> None:
-        """Note times that do not rise from row to row of a track."""
+        """Note times that do not rise from row to row of a track; rows of no track may have any."""
         for name, rows in grouped(tracks).items():
+            if self.track is not None and not name:
+                continue
             own = np.append(self.last.get(name, math.nan), t[rows])
             rises = np.diff(own) >= 0 if self.several else np.diff(own) > 0
             for i in np.flatnonzero(~rises & np.isfinite(own[:-1]) & np.isfinite(own[1:])):

@@ -107,7 +107,7 @@ PLAINLY = [ethernet(ipv4(udp(one))) for one in BLOCKS]
         pcapng(PLAINLY),
         pcapng(PLAINLY, ">"),
         pcapng(PLAINLY, simple=True),
-        pcapng(PLAINLY[:2], ">") + pcapng(PLAINLY[2:], "<"),  # two sections
+        pcapng(PLAINLY[:2], ">") + pcapng(PLAINLY[2:], simple=True),  # two sections
         pcap([ethernet(ipv4(udp(one)), tags=b"\x81\x00\x00\x05") for one in BLOCKS]),
         pcap([ethernet(ipv4(udp(one)), tags=b"\x88\xa8\x00\x05\x81\x00\x00\x06") for one in BLOCKS]),
         pcap([bytes(14) + b"\x08\x00" + ipv4(udp(one)) for one in BLOCKS], link=113),
