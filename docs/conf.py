@@ -43,7 +43,7 @@ autodoc_typehints_format = "short"
 nitpick_ignore_regex = [
     (
         "py:.*",
-        r"(np|numpy|pd|pandas|matplotlib|collections|contextlib|importlib|_frozen_importlib|ast|os|pathlib|types|numba"
+        r"(np|numpy|pd|pandas|matplotlib|collections|contextlib|importlib|_frozen_importlib|ast|io|os|pathlib|types|numba"
         r"|click|pydantic|markupsafe|xarray)\..*",
     ),
     ("py:class", r"Canvas|DataclassInstance"),

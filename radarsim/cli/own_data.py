@@ -128,7 +128,7 @@ def simulate(
 @click.option(
     "--from",
     "kind",
-    type=click.Choice(["asterix", "opensky", "ais", "csv"]),
+    type=click.Choice(["asterix", "opensky", "ais", "csv", "json", "parquet", "gpx", "nmea"]),
     help="The format; default: detected from the content.",
 )
 @click.option(
@@ -171,7 +171,7 @@ def import_(
     tracks: tuple[str, ...],
     **further: "Any",
 ) -> None:
-    """Read a recording into plots: ASTERIX, ADS-B, AIS or a table.
+    """Read a recording into plots: ASTERIX, ADS-B, AIS, GPS or a table.
 
     PLOTS.csv has one row per plot and all tracks of the recording, each named in the column `track`; `radarsim track`
     and `radarsim fit` read it. Its first lines describe the columns. For a damaged recording nothing is written.
@@ -180,11 +180,16 @@ def import_(
     asterix  categories 048 and 001 (plots of a radar: range, bearing, height, Doppler speed
              and the span by which it is ambiguous), 021 and 062 (positions: the truth of the
              plots of the same aircraft), also in pcap and pcapng; needs radarsim[asterix]
-    opensky  latitude, longitude, altitude and time of aircraft, in CSV; needs --at; in feet and
-             knots if the column names are those of aviation (gs, alt, …)
-    ais      sentences !AIVDM of ships; needs --at and radarsim[ais]
+    opensky  latitude, longitude, altitude and time of aircraft, in CSV; in feet and knots if
+             the column names are those of aviation (gs, alt, …)
+    json     traces and aircraft.json of readsb, states of OpenSky, data frames
+    ais      sentences !AIVDM of ships; needs radarsim[ais]
+    gpx      tracks of GPX; nmea: $GPRMC and $GPGGA of a satellite receiver
     csv      any table with a header: time, and range or latitude and longitude; units as in
-             `range_km` or `Altitude [ft]`; separated by commas, semicolons or tabs
+             `range_km` or `Altitude [ft]`; separated by commas, semicolons or tabs;
+             parquet: the same, needs radarsim[parquet]
+
+    All positions on the earth need --at. Files may be gzipped.
 
     \b
     Example

@@ -79,7 +79,8 @@ def to_parquet(file: Writer, one: Drawn, parts: Parts, n: int) -> None:
         import pyarrow
         from pyarrow import parquet
     except ImportError as error:
-        raise ConfigError(f"{file.path}: Parquet needs pyarrow (pip install pyarrow); .npz and .csv do not") from error
+        need = "Parquet needs pyarrow (pip install 'radarsim[parquet]'); .npz and .csv do not"
+        raise ConfigError(f"{file.path}: {need}") from error
     schema = pyarrow.table(one.table()).schema
     with parquet.ParquetWriter(file.binary, schema) as rows:
         for part in parts():

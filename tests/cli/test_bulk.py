@@ -52,7 +52,7 @@ def test_parquet_has_the_same_rows_or_says_what_it_needs(tmp_path, small):
     try:
         from pyarrow import parquet
     except ImportError:
-        assert "Parquet needs pyarrow (pip install pyarrow)" in command(*words, code=2).stderr
+        assert "Parquet needs pyarrow (pip install 'radarsim[parquet]')" in command(*words, code=2).stderr
         assert not any(tmp_path.iterdir())
         return
     command(*words)

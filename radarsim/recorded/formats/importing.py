@@ -6,21 +6,23 @@ lookup by time. The file is written completely or not at all.
 
 import codecs
 import datetime
+import gzip
 import io
 import math
 import os
+import zlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Literal
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 
 from radarsim.errors import ConfigError
 from radarsim.recorded import fit
-from radarsim.recorded.formats import asterix
+from radarsim.recorded.formats import asterix, logs
 from radarsim.recorded.formats import sites as ais
 from radarsim.recorded.formats.asterix import Asterix
 from radarsim.recorded.formats.sites import (
@@ -37,14 +39,21 @@ from radarsim.recorded.formats.sites import (
     described,
     utc_s,
 )
-from radarsim.recorded.formats.text import Table
+from radarsim.recorded.formats.text import Sheet, Table, comma_separated
 from radarsim.recorded.identity import KINDS, LONGEST_GAP_S, Paths, apart, offsets, too_far
 from radarsim.recorded.plots import cells, grouped
 from radarsim.report.files import Writer
 
-Format = Literal["asterix", "opensky", "ais", "csv"]
-FORMATS: tuple[Format, ...] = ("asterix", "opensky", "ais", "csv")
+Format = Literal["asterix", "opensky", "ais", "csv", "json", "parquet", "gpx", "nmea"]
+FORMATS: tuple[Format, ...] = get_args(Format)
+SHEETS: dict[Format, Callable[[str, io.BufferedReader], Sheet]] = {
+    "json": logs.from_json,
+    "parquet": logs.from_parquet,
+    "gpx": logs.from_gpx,
+    "nmea": logs.from_nmea,
+}
 HEAD = 4096  # bytes used to detect the format
+ZIPPED = b"\x1f\x8b"  # how gzip begins
 MOST_LISTED = 12
 CONTRADICTS_M = 100.0  # of two places of a radar; a geoid is that far from the ellipsoid
 NOT_LATER = "rows not later than the one before of their track"
@@ -111,14 +120,13 @@ def encoding_of(path: str | os.PathLike, named: str) -> str:
     """The encoding of a text file: UTF-16 by its mark or zeros, else UTF-8, or the one named where it is not UTF-8."""
     if not os.path.isfile(path):  # a stream is read once
         return named or "utf-8-sig"
-    with open(path, "rb") as file:
-        head = file.read(HEAD)
+    with unzipped(path) as file:
+        head = file.peek(HEAD)[:HEAD]
         if head[:2] in MARKS:
             return "utf-16"
         even, odd = head[::2].count(0), head[1::2].count(0)
         if max(even, odd) > max(10 * min(even, odd), len(head) / 10):  # for digits and commas one byte of two is zero
             return "utf-16-le" if odd > even else "utf-16-be"
-        file.seek(0)
         decoder = codecs.getincrementaldecoder("utf-8")()
         try:
             while piece := file.read(1 << 20):
@@ -130,6 +138,17 @@ def encoding_of(path: str | os.PathLike, named: str) -> str:
 
 
 @contextmanager
+def unzipped(path: str | os.PathLike) -> Iterator["io.BufferedReader[Any]"]:
+    """The bytes of a file, of a gzipped one those inside."""
+    with open(path, "rb") as file:
+        if file.peek(2)[:2] != ZIPPED:
+            yield file
+        else:
+            with io.BufferedReader(cast(io.RawIOBase, gzip.open(file))) as inside:
+                yield inside
+
+
+@contextmanager
 def opened(path: str, options: Options, truth: bool = False) -> Iterator[tuple[Format, Reader]]:
     """The reader of a recording, by the given format or the one that its first bytes show; raises ConfigError.
 
@@ -137,21 +156,25 @@ def opened(path: str, options: Options, truth: bool = False) -> Iterator[tuple[F
     """
     encoding = "utf-8-sig"
     try:
-        with open(path, "rb") as file:
+        with unzipped(path) as file:
             head = file.peek(HEAD)[:HEAD]
             kind = options.format or found(path, head)
             if kind == "asterix":
                 yield kind, Asterix(path, file, truth, options.keep_marked)
             elif kind == "ais":
                 yield kind, Ais(path, file)
+            elif kind in SHEETS:
+                yield kind, Table(SHEETS[kind](path, file), options.columns)
             else:
                 encoding = encoding_of(path, options.encoding)
                 text = io.TextIOWrapper(file, encoding=encoding, newline="")
-                yield kind, Table(path, text, options.columns, NAMED.get(encoding, encoding))
+                yield kind, Table(comma_separated(path, text, NAMED.get(encoding, encoding)), options.columns)
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: is not {NAMED.get(encoding, encoding)} text: --encoding NAME names it") from error
+    except (EOFError, zlib.error) as error:
+        raise ConfigError(f"{path}: is damaged: {error}") from error
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+        raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from error
 
 
 def found(path: str, head: bytes) -> Format:
@@ -162,6 +185,15 @@ def found(path: str, head: bytes) -> Format:
         head = head.decode("utf-16", "ignore").encode()
     if ais.SENTENCE.search(head):
         return "ais"
+    if logs.RECEIVER.search(head):
+        return "nmea"
+    if head.startswith(b"PAR1"):
+        return "parquet"
+    start = head.removeprefix(codecs.BOM_UTF8).lstrip()
+    if start.startswith(b"<") and b"<gpx" in head:
+        return "gpx"
+    if start.startswith((b"{", b"[")):
+        return "json"
     text = b"\0" not in head and sum(byte < 9 or 13 < byte < 32 for byte in head) == 0
     lines = [line for line in head.splitlines() if line.strip() and not line.startswith(b"#")]
     if text and lines[:1] and lines[0].startswith((b"MSG,", b"STA,", b"AIR,", b"SEL,", b"ID,", b"CLK,")):
@@ -235,7 +267,7 @@ class _Import:
         self.last: dict[str, float] = {}
         self.left = Counter[str]()
         self.radars = Counter[str]()
-        self.behind = self.unplaced = 0
+        self.behind = self.unplaced = self.at_sea_level = 0
         self.sign, self.folds = _Sign(), _Folds()
         self.seen: set[str] = set()
 
@@ -317,6 +349,7 @@ class _Import:
                 raise ConfigError("at: must say where the radar stands, LAT,LON,HEIGHT: the recording has positions "
                                   "on the earth, not ranges")  # fmt: skip
             seen = site.seen(given)
+            self.at_sea_level += int(np.isnan(given["altitude_m"]).sum())
             columns = {name: seen[name] for name in (*PLACED, "level_elevation_rad", *LOCAL)}
             return columns | {"altitude_m": given["altitude_m"]} | self._angles(columns)
         columns = {name: given[name] for name in (*PLACED, "span_mps", "altitude_m")}
@@ -407,6 +440,10 @@ class _Import:
         if self.unplaced:
             fault = "have no height, or one that their range cannot have: x_m, y_m, z_m are empty there"
             done.notes.append(f"{self.unplaced} of {done.rows} plots {fault}")
+        if self.at_sea_level:
+            done.notes.append(
+                f"{self.at_sea_level} of {done.rows} positions have no altitude: they are placed at sea level"
+            )
         if self.behind:
             fault = "are behind the antenna or without height: elevation_rad and azimuth_rad are empty there"
             done.notes.append(f"{self.behind} of {done.rows} plots {fault}")
@@ -416,7 +453,7 @@ class _Import:
                               "first have its name before their number")  # fmt: skip
         if isinstance(self.reader, Table | Asterix) and (turns := self.reader.clock.turns):
             done.notes.append(f"the times of day pass midnight: t_s runs on ({turns} × 24 h)")
-        if isinstance(self.reader, Table):
+        if isinstance(self.reader, Table | Ais):
             done.notes += self.reader.notes()
         if isinstance(self.reader, Asterix):
             done.notes += self.reader.notes(self.radars)
@@ -470,8 +507,8 @@ class _Truth:
             self.paths = Paths()
 
     def _read(self, reader: Reader) -> None:
-        self.of_day = reader.of_day
         for batch in reader.batches():
+            self.of_day = reader.of_day
             if batch.kind == PLOTS:
                 continue
             seen = self.site.seen(batch.columns)

@@ -5,8 +5,8 @@ north, y up, z east, with the origin at the radar. Bearings are counted from nor
 plane that is level at the radar; an aircraft far away and low lies below it.
 
 Ships by AIS: NMEA sentences `!AIVDM…`, by pyais. A message gives only the second of its minute. The time is that of the
-tag block (`\c:1577836800*..\!AIVDM…`) or of a number or ISO time before the sentence, or of a number after it; without
-these, the seconds are unwrapped from minute to minute.
+tag block (`\c:1577836800*..\!AIVDM…`), of a line `$PGHP,1,…`, of a number or ISO time before the sentence, or of a
+number after it; without these, the seconds are unwrapped from minute to minute.
 """
 
 import datetime
@@ -304,6 +304,7 @@ KNOT_MPS = 1852 / 3600
 SENTENCE = re.compile(rb"![A-Z]{2}VD[MO],[^\r\n]*")
 TAG_TIME = re.compile(rb"[\\,]c:(\d{9,13})")
 AFTER = re.compile(rb"\*[0-9A-Fa-f]{2}[,; \t]+(\d{9,13}(?:\.\d+)?)\s*$")
+GATEHOUSE = re.compile(rb"\$PGHP,1,(\d{4})" + 5 * rb",(\d\d?)" + rb",(\d{1,3}),")  # the time of the next sentence
 PARTS = re.compile(rb"![A-Z]{2}VD[MO],(\d),(\d),(\d?),")
 NO_SPEED, NO_COURSE, NO_SECOND = 102.2, 360.0, 60
 MOST_OPEN = 100  # incomplete messages kept
@@ -330,25 +331,38 @@ class Ais:
         self.path, self.file = path, file
         self.records = 0
         self.skipped: Counter[str] = Counter()
-        self.open: dict[bytes, list[bytes]] = {}
+        self.open: dict[bytes, list[tuple[bytes, float]]] = {}
         self.minute = Unrolled(60.0)
+        self.stamp = math.nan  # the last time that a line stated
+        self.ahead = math.nan  # that of a line of time before the next sentence
+        self.untimed = 0  # reports whose minute none states
+
+    def notes(self) -> list[str]:
+        """How times were found where the lines do not state them."""
+        if not self.untimed:
+            return []
+        rest = "are made to run on" if math.isnan(self.stamp) else "are taken as nearest to the time stated before them"
+        return [f"{self.untimed} reports state no time: their seconds of the minute {rest}"]
 
     def batches(self) -> Iterator[Batch]:
         """The position reports in batches; raises ConfigError where most sentences are damaged."""
         gathered, damaged, first = Gathered(POSITIONS, POSITION_COLUMNS), 0, ""
         for number, line in enumerate(self.file, start=1):
             sentence = SENTENCE.search(line)
-            if not sentence and (not line.strip() or line.lstrip().startswith((b"#", b"$"))):
+            if not sentence and (not line.strip() or line.lstrip().startswith((b"#", b"$", b"\\"))):
+                self._passed(line)
                 continue
             try:
                 if not sentence or not sound(sentence[0]):
                     raise AISBaseException
-                message = self._decoded(sentence[0])
+                stated, self.ahead = self._stated(line, sentence.start(), number), math.nan
+                message, t = self._decoded(sentence[0], stated)
             except AISBaseException:
                 damaged, first = damaged + 1, first or f"{self.path}:{number}"
                 continue
+            self.stamp = self.stamp if math.isnan(t) else t
             if message is not None:
-                self._take(message, self._stated(line, sentence.start(), number), gathered)
+                self._take(message, t, gathered)
             if len(gathered) >= BATCH:
                 yield gathered.taken()
         if damaged and damaged >= LEAST_GOOD * (self.records + damaged):
@@ -359,27 +373,41 @@ class Ais:
         if len(gathered):
             yield gathered.taken()
 
-    def _decoded(self, sentence: bytes) -> Any:
-        """The message that a sentence completes; none while further sentences of it are to come."""
+    def _passed(self, line: bytes) -> None:
+        """A line without an AIS sentence: some state the time of the next one."""
+        if found := GATEHOUSE.search(line):
+            try:
+                year, month, day, hour, minute, second, thousandths = map(int, found.groups())
+                moment = datetime.datetime(year, month, day, hour, minute, second, 1000 * thousandths, datetime.UTC)
+                self.ahead = moment.timestamp()
+            except ValueError:
+                self.skipped["damaged lines of time"] += 1
+        elif line.lstrip().startswith(b"$"):
+            self.skipped["sentences other than AIS"] += 1
+
+    def _decoded(self, sentence: bytes, stated: float) -> tuple[Any, float]:
+        """The message that a sentence completes, none while further sentences of it are to come; the first time that
+        they state, s from 1970."""
         assert pyais is not None  # `__init__` has checked it
-        parts = PARTS.match(sentence)
+        parts, whole = PARTS.match(sentence), [(sentence, stated)]
         if parts and parts[1] != b"1":
             held = self.open.setdefault(parts[3], [])
             if parts[2] == b"1":
                 held.clear()
-            held.append(sentence)
+            held += whole
             if len(self.open) > MOST_OPEN:
                 self.open.pop(next(iter(self.open)))
             if parts[2] != parts[1]:
-                return None
+                return None, math.nan
             whole = self.open.pop(parts[3])
-            self.records += 1
-            return pyais.decode(*whole)
         self.records += 1
-        return pyais.decode(sentence)
+        times = [t for _, t in whole if not math.isnan(t)]
+        return pyais.decode(*(one for one, _ in whole)), times[0] if times else math.nan
 
     def _stated(self, line: bytes, before: int, number: int) -> float:
-        """The time before a sentence, s from 1970; NaN where there is none."""
+        """The time stated for a sentence, s from 1970; NaN where there is none."""
+        if not math.isnan(self.ahead):
+            return self.ahead
         head = line[:before]
         if found := TAG_TIME.search(head) or AFTER.search(line):
             stamp = float(found[1])
@@ -410,7 +438,11 @@ class Ais:
         if abs(latitude) > 90 or abs(longitude) > 180 or (math.isnan(stated) and second >= NO_SECOND):
             self.skipped["reports without position or time"] += 1
             return
-        t = self.minute(second) if math.isnan(stated) else stated
+        t = stated
+        if math.isnan(t):
+            self.untimed += 1
+            near = self.stamp + (second - self.stamp + 30) % 60 - 30  # the nearest time with that second
+            t = self.minute(second) if math.isnan(near) else near
         speed, course = float(message.speed), math.radians(float(message.course))
         known = speed <= NO_SPEED and float(message.course) < NO_COURSE
         east, north = (speed * KNOT_MPS * part(course) if known else math.nan for part in (math.sin, math.cos))

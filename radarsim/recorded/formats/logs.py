@@ -1,0 +1,307 @@
+"""Formats that are tables in other clothes: JSON, Parquet, GPX, and the sentences of a satellite receiver. Each becomes
+a `Sheet` whose header states the units, so that `Table` reads it like any CSV."""
+
+import contextlib
+import datetime
+import io
+import itertools
+import json
+import math
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any, BinaryIO
+from xml.etree import ElementTree
+
+from radarsim.errors import ConfigError
+from radarsim.recorded.formats import sites
+from radarsim.recorded.formats.columns import split
+from radarsim.recorded.formats.text import Sheet
+
+# ---- JSON ------------------------------------------------------------------------------------------------------------
+FLIGHT = ["time", "icao24", "lat", "lon", "alt_geom [ft]", "alt_baro [ft]", "gs [kn]", "track [deg]", "climb [fpm]"]
+STATES = {  # of OpenSky's interface: our names for the places of its lists
+    "icao24": 0, "callsign": 1, "time_position": 3, "lon": 5, "lat": 6, "baroaltitude [m]": 7, "velocity [m/s]": 9,
+    "true_track": 10, "vertrate [m/s]": 11, "geoaltitude [m]": 13,
+}  # fmt: skip
+STALE, GEOMETRIC = 1, 8  # flags of a trace
+
+
+def from_json(path: str, file: BinaryIO) -> Sheet:
+    """JSON documents, one in the file or one a line: traces and `aircraft.json` of readsb and tar1090, states of
+    OpenSky, lists of records and tables of columns as data frames are written. A document is held in memory."""
+    sheet = Sheet(path, [], iter(()))
+    documents = _documents(path, file)
+    rows = (row for document in documents for row in _rows_of(document, sheet))
+    first = next(rows, None)
+    if first is not None:
+        sheet.rows = enumerate(itertools.chain([first], rows), start=1)
+    if not sheet.header:
+        must = "a trace or aircraft.json of readsb, states of OpenSky, or records with time, latitude and longitude"
+        raise ConfigError(f"{path}: must be {must}")
+    return sheet
+
+
+def _documents(path: str, file: BinaryIO) -> Iterator[Any]:
+    first = file.readline()
+    try:
+        yield json.loads(first)
+    except (ValueError, RecursionError):
+        lines: Any = [first + file.read()]  # a document over many lines
+        start = 1
+    else:
+        lines, start = file, 2
+    for number, line in enumerate(lines, start):
+        if line.strip():
+            try:
+                yield json.loads(line)
+            except (ValueError, RecursionError) as error:
+                at = number + getattr(error, "lineno", 1) - 1
+                raise ConfigError(f"{path}:{at}: must be JSON: {getattr(error, 'msg', error)}") from error
+
+
+def _rows_of(document: Any, sheet: Sheet) -> Iterator[list[str]]:
+    """The rows of a document; the first one gives the sheet its header."""
+    if not isinstance(document, dict):
+        rows = _records(document, sheet) if isinstance(document, list) else iter(())
+    elif isinstance(document.get("trace"), list):
+        rows = _trace(document, sheet)
+    elif isinstance(document.get("aircraft"), list):
+        rows = _aircraft(document, sheet)
+    elif isinstance(document.get("states"), list):
+        rows = _states(document, sheet)
+    elif document and all(isinstance(column, dict | list) for column in document.values()):
+        columns = [column.values() if isinstance(column, dict) else column for column in document.values()]
+        rows = _records([dict(zip(document, row, strict=True)) for row in zip(*columns, strict=False)], sheet)
+    else:
+        rows = _records([document], sheet)
+    return rows
+
+
+def _trace(document: dict[str, Any], sheet: Sheet) -> Iterator[list[str]]:
+    """A trace of readsb: lists of seconds after its time, latitude, longitude, altitude, speed, course, flags, climb,
+    aircraft, source, geometric altitude (README-json of readsb)."""
+    sheet.header = FLIGHT
+    start, name = _number(document.get("timestamp")), _text(document.get("icao"))
+    for entry in document["trace"]:
+        entry = entry if isinstance(entry, list) else []
+        dt, lat, lon, altitude, speed, course, flags, climb, _, _, geometric = [*entry, *[None] * 11][:11]
+        flags = flags if isinstance(flags, int) else 0
+        if flags & STALE:
+            sheet.skipped["positions marked as stale"] += 1
+            continue
+        if altitude == "ground":  # then the course is where the nose points
+            altitude = course = None
+        if geometric is None and flags & GEOMETRIC:
+            geometric, altitude = altitude, None
+        time = start + _number(dt)
+        yield [
+            "" if math.isnan(time) else repr(time),
+            name,
+            *map(_text, (lat, lon, geometric, altitude, speed, course, climb)),
+        ]
+
+
+def _aircraft(document: dict[str, Any], sheet: Sheet) -> Iterator[list[str]]:
+    """A moment of readsb: what it knows of each aircraft, and how old that is."""
+    sheet.header = FLIGHT
+    now = _number(document.get("now"))
+    for one in document["aircraft"]:
+        one = one if isinstance(one, dict) else {}
+        time = now - _number(one.get("seen_pos"))
+        ground = one.get("alt_baro") == "ground"
+        names = ("lat", "lon", "alt_geom", *(("",) * ground or ("alt_baro",)), "gs", *(("",) * ground or ("track",)))
+        climb = one.get("geom_rate", one.get("baro_rate"))
+        cells = [_text(one.get(name)) for name in ("hex", *names)]
+        yield ["" if math.isnan(time) else repr(time), *cells, _text(climb)]
+
+
+def _states(document: dict[str, Any], sheet: Sheet) -> Iterator[list[str]]:
+    sheet.header = [*STATES]
+    for state in document["states"]:
+        state = [*state, *[None] * 14] if isinstance(state, list) else [None] * 14
+        yield [_text(state[place]) for place in STATES.values()]
+
+
+def _records(document: Sequence[Any], sheet: Sheet) -> Iterator[list[str]]:
+    for record in document:
+        if isinstance(record, dict):
+            sheet.header = sheet.header or list(record)
+            yield [_text(record.get(name)) for name in sheet.header]
+        else:
+            sheet.skipped["entries that are no records"] += 1
+
+
+def _number(value: Any) -> float:
+    return float(value) if isinstance(value, int | float) and abs(value) < 1e18 else math.nan
+
+
+def _text(value: Any) -> str:
+    """A value as a cell: numbers to the last digit, moments in ISO 8601, nothing for what is none of these."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, datetime.datetime | datetime.date):
+        return value.isoformat()
+    return repr(value) if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300 else ""
+
+
+# ---- Parquet ---------------------------------------------------------------------------------------------------------
+def from_parquet(path: str, file: BinaryIO) -> Sheet:
+    """The columns of a Parquet file that are numbers, text or moments."""
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError as error:
+        raise sites.needs("pyarrow", "parquet") from error
+    try:
+        table = parquet.ParquetFile(file)
+        flat = [field.name for field in table.schema_arrow if not pyarrow.types.is_nested(field.type)]
+    except (pyarrow.ArrowException, OSError, ValueError) as error:
+        raise ConfigError(f"{path}: must be a Parquet file: {_one_line(error)}") from error
+
+    def rows() -> Iterator[tuple[int, list[str]]]:
+        number = itertools.count(1)
+        try:
+            for batch in table.iter_batches(batch_size=sites.BATCH, columns=flat):
+                columns = [map(_text, column.to_pylist()) for column in batch.columns]
+                yield from zip(number, map(list, zip(*columns, strict=True)), strict=False)
+        except (pyarrow.ArrowException, OSError, ValueError, OverflowError) as error:
+            raise ConfigError(f"{path}: is damaged at row {next(number)} or after: {_one_line(error)}") from error
+
+    return Sheet(path, flat, rows())
+
+
+def _one_line(error: Exception) -> str:
+    return "".join(c for c in " ".join(str(error).split())[:200] if c.isprintable())
+
+
+# ---- GPX -------------------------------------------------------------------------------------------------------------
+POINT = ["time", "track_id", "lat", "lon", "ele [m]", "speed [m/s]", "course [deg]"]
+
+
+def from_gpx(path: str, file: BinaryIO) -> Sheet:
+    """The points of the tracks of a GPX file, each under its track's name or its number."""
+
+    def rows() -> Iterator[tuple[int, list[str]]]:
+        name, tracks, number = "", 0, 0
+        try:
+            for event, element in ElementTree.iterparse(file, ("start", "end")):
+                tag = _local(element)
+                if event == "start":
+                    if tag == "trk":
+                        tracks, name = tracks + 1, ""
+                elif tag == "name" and not name and tracks:
+                    name = (element.text or "").strip()
+                elif tag == "trkpt":
+                    number += 1
+                    held = {_local(one): (one.text or "").strip() for one in element.iter()}
+                    place = [element.get("lat", ""), element.get("lon", "")]
+                    yield (
+                        number,
+                        [
+                            held.get("time", ""),
+                            name or str(tracks),
+                            *place,
+                            *map(held.get, ("ele", "speed", "course"), [""] * 3),
+                        ],
+                    )
+                    element.clear()
+                elif tag in ("trkseg", "trk"):
+                    element.clear()
+        except ElementTree.ParseError as error:
+            raise ConfigError(f"{path}:{error.position[0]}: must be GPX: {error}; {number} points were read") from error
+
+    return Sheet(
+        path, POINT, rows(), notes=["altitudes are as the file has them, mostly above the sea, not the ellipsoid"]
+    )
+
+
+def _local(element: ElementTree.Element) -> str:
+    """A name without its namespace."""
+    return str(element.tag).rpartition("}")[2]
+
+
+# ---- NMEA 0183 -------------------------------------------------------------------------------------------------------
+FIX = ["time", "lat", "lon", "speed [kn]", "course [deg]", "altitude [m]"]
+RECEIVER = re.compile(rb"\$[A-Z]{2}(?:GGA|RMC),[^\r\n]*")
+DATED = re.compile(rb"\$[A-Z]{2}RMC,[^,]*,A(?:,[^,]*){6},\d{6}")
+CLOCK = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-6]\d(?:\.\d+)?)")
+NO_FIX = "sentences without a fix"
+
+
+def from_nmea(path: str, file: BinaryIO) -> Sheet:
+    """Positions by a satellite receiver, NMEA 0183: RMC (place, speed, course, date) and GGA (place, height), of any
+    talker, those of one time as one row. Heights are above the ellipsoid where GGA has that of the geoid.
+
+    Where no RMC stands among the first sentences, dates are left alone: times are of the day.
+    """
+    dated = bool(DATED.search(file.peek(io.DEFAULT_BUFFER_SIZE)))  # type: ignore[attr-defined]
+    sheet = Sheet(path, FIX, iter(()))
+
+    def rows() -> Iterator[tuple[int, list[str]]]:
+        held: dict[str, float] = {}  # what the sentences of one time have said
+        number, midnight, before = 0, math.nan, math.nan
+        for number, line in enumerate(file, start=1):
+            said = _fix(line, sheet) if line.strip() else {}
+            if held and said and said["clock"] != held["clock"]:
+                yield number - 1, _row(held)
+                held = {}
+            if said:
+                if dated:
+                    fallen = said["clock"] < before - sites.DAY_S / 2
+                    midnight = said.pop("midnight", midnight + sites.DAY_S * fallen)
+                    said["time"] = midnight + said["clock"]
+                before = said["clock"]
+                held |= said
+        if held:
+            yield number, _row(held)
+
+    sheet.rows = rows()
+    return sheet
+
+
+def _row(held: dict[str, float]) -> list[str]:
+    """The cells of FIX; a time without a date as one of day."""
+    minutes, seconds = divmod(held["clock"], 60)
+    clock = f"{minutes // 60:02.0f}:{minutes % 60:02.0f}:{seconds:09.6f}"
+    cells = [held.get(split(name)[0], math.nan) for name in FIX[1:]]
+    return [
+        repr(held["time"]) if "time" in held else clock,
+        *("" if math.isnan(cell) else repr(cell) for cell in cells),
+    ]
+
+
+def _fix(line: bytes, sheet: Sheet) -> dict[str, float]:
+    """The numbers of a sentence by the names of FIX, `clock` in s of the day; nothing where it has no fix."""
+    found = RECEIVER.search(line)
+    if not found or (b"*" in found[0] and not sites.sound(found[0])):
+        sheet.skipped["damaged sentences" if found else "other lines"] += 1
+        return {}
+    kind, clock, *cells = [*found[0].partition(b"*")[0].decode("ascii", "replace").split(","), *[""] * 12]
+    time = CLOCK.fullmatch(clock)
+    first = kind.endswith("RMC")  # the place then begins one later
+    if not time or (cells[0] != "A" if first else cells[4] in ("", "0")):
+        sheet.skipped[NO_FIX] += 1
+        return {}
+    said = {"clock": 3600.0 * int(time[1]) + 60 * int(time[2]) + float(time[3])}
+    said |= {"lat": _angle(*cells[first : 2 + first]), "lon": _angle(*cells[2 + first : 4 + first])}
+    if not first:
+        sea, geoid = _value(cells[7]), _value(cells[9])
+        return said | {"altitude": sea + (0 if math.isnan(geoid) else geoid)}
+    said |= {"speed": _value(cells[5]), "course": _value(cells[6])}
+    day = cells[7]
+    with contextlib.suppress(ValueError):
+        said["midnight"] = sites.utc_s(f"{'19' if day[4:] > '79' else '20'}{day[4:]}-{day[2:4]}-{day[:2]}")
+    return said
+
+
+def _angle(text: str, side: str) -> float:
+    """Degrees of degrees and minutes, as 5236.5, and N, S, E or W."""
+    whole, minutes = divmod(_value(text), 100)
+    return (whole + minutes / 60) * {"N": 1, "E": 1, "S": -1, "W": -1}.get(side, math.nan)
+
+
+def _value(text: str) -> float:
+    try:
+        return _number(float(text))
+    except ValueError:
+        return math.nan
