@@ -34,11 +34,9 @@ FINAL, ORADIS = Frame(8, b"\xa5\xa5\xa5\xa5"), Frame(6, b"")
 PCAP = {magic: order for order in "<>" for magic in (struct.pack(order + "I", one) for one in (0xA1B2C3D4, 0xA1B23C4D))}
 PCAPNG, ORDER = b"\x0a\x0d\x0d\x0a", {struct.pack(order + "I", 0x1A2B3C4D): order for order in "<>"}
 INTERFACE, OLD_PACKET, SIMPLE_PACKET, PACKET = 1, 2, 3, 6  # of pcapng
-# Bytes before the type of a packet's content, by the kind of link; NOTHING: it is IP.
-NOTHING = -1
-LINKS = {1: 12, 113: 14, 276: 0, 12: NOTHING, 14: NOTHING, 101: NOTHING, 228: NOTHING, 229: NOTHING, 0: 4, 108: 4}
-LOOPBACKS, LONG_HEADER, COOKED_2 = (0, 108), 20, 276
-VLAN, IPV4, IPV6, UDP = (0x8100, 0x88A8, 0x9100), 0x0800, 0x86DD, 17
+LINKS = {1: 14, 113: 16, 276: 20, 12: 0, 14: 0, 101: 0, 228: 0, 229: 0, 0: 4, 108: 4}  # bytes before a packet of IP
+VLAN, UDP = (b"\x81\x00", b"\x88\xa8", b"\x91\x00"), 17  # the type before a tag
+FRAGMENTS = "fragments of datagrams, which are not put together"
 EXTENSIONS, FRAGMENT = (0, 43, 60), 44  # headers of IPv6 before the datagram
 
 
@@ -160,9 +158,9 @@ def _packets(path: str, file: BinaryIO, left: Counter[str]) -> Iterator[tuple[in
 
 
 def _pcap(path: str, file: BinaryIO, magic: bytes, left: Counter[str]) -> Iterator[tuple[int, int, bytes, bool]]:
-    order, at, size = PCAP[magic], 24, LONG_HEADER
-    rest = file.read(size)
-    if len(rest) < size:
+    order, at = PCAP[magic], 24
+    rest = file.read(20)
+    if len(rest) < 20:
         raise ConfigError(f"{path}: byte 4: must be the header of a pcap file, 24 bytes; it ends after {4 + len(rest)}")
     link = struct.unpack_from(order + "I", rest, 16)[0] & 0xFFFF  # the upper half: how long a check sum is
     header = struct.Struct(order + "8xII")
@@ -218,38 +216,19 @@ def _datagram(data: bytes, link: int, left: Counter[str]) -> tuple[int, int] | N
     if at is None:
         left[f"packets of the kind of link {link}, which is not read"] += 1
         return None
-    if link == COOKED_2:
-        kind, at = data[:2], LONG_HEADER
-    elif at == NOTHING or link in LOOPBACKS:
-        kind, at = b"", max(at, 0)
-    else:
-        kind, at = data[at : at + 2], at + 2
-        while int.from_bytes(kind, "big") in VLAN:
-            kind, at = data[at + 2 : at + 4], at + 4
-    version = data[at] >> 4 if at < len(data) else 0
-    number = int.from_bytes(kind, "big") or {4: IPV4, 6: IPV6}.get(version, 0)
-    if (number, version) == (IPV4, 4):
-        place = _ipv4(data, at)
-    elif (number, version) == (IPV6, 6):
-        place = _ipv6(data, at)
-    else:
-        place = None
-    if isinstance(place, tuple) and place[0] + 8 <= place[1] <= len(data):
-        start, end = place
-        length = int.from_bytes(data[start + 4 : start + 6], "big")
-        if 8 <= length <= end - start:
-            return start + 8, start + length
-        place = None
+    while data[max(at - 2, 0) : at] in VLAN:
+        at += 4
+    version = {4: _ipv4, 6: _ipv6}.get(data[at] >> 4 if at < len(data) else 0)
+    place = version(data, at) if version else None
+    if isinstance(place, tuple) and place[1] <= len(data):
+        return place[0] + 8, place[1]  # after ports, length and check sum
     left[place if isinstance(place, str) else "packets other than UDP"] += 1
     return None
 
 
-FRAGMENTS = "fragments of datagrams, which are not put together"
-
-
 def _ipv4(data: bytes, at: int) -> tuple[int, int] | str | None:
     """Begin and end of a datagram of UDP in a packet of IPv4; what it is instead."""
-    if len(data) < at + LONG_HEADER or data[at + 9] != UDP:
+    if len(data) < at + 20 or data[at + 9] != UDP:
         return None
     if int.from_bytes(data[at + 6 : at + 8], "big") & 0x3FFF:  # more to come, or not the first
         return FRAGMENTS
