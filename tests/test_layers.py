@@ -60,7 +60,7 @@ ROOMS = {
         *("studies.interface", "studies.noise", "studies.onefile"),
     ),
     "studies.judged": ("errors", "config", *DATA, "report"),  # claims and readings of studies in one file
-    "studies.code": ("errors", "failures", "config", "studies.outside"),
+    "studies.code": ("errors", "failures", "config", "studies.interface", "studies.outside"),
     "studies.registry": ("errors", "failures", "config", "report.quantities", "studies.code", "studies.interface"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry"),
     "recorded": ("errors", "threads", "config", "language", "engine", "kernels", "physics", "report", "studies"),

@@ -27,6 +27,7 @@ from radarsim import failures
 from radarsim.config.experiment import digest
 from radarsim.config.schema import OwnCode
 from radarsim.errors import OF_AUTHORS, ConfigError
+from radarsim.studies.interface import Study
 from radarsim.studies.outside import Called, Outside, Plots
 
 FORBIDDEN = "RADARSIM_NO_CODE"  # in the environment, so that processes of a run keep to it as well
@@ -192,7 +193,8 @@ class Coded(Outside):
         if digest(own) != self.sources:
             raise ConfigError(f"{self.file} is not what it was when the config was read")
         for name in own:
-            sys.modules.pop(name, None)
+            if not any(isinstance(one, Study) for one in vars(sys.modules.get(name, object)).values()):
+                sys.modules.pop(name, None)  # a study stays: its keys must remain the same class
         importlib.invalidate_caches()
         sys.path.insert(0, self.folder)
         kept, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # nothing is written beside the user's files

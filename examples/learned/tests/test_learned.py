@@ -1,5 +1,6 @@
 """What proves the study: textbook filters over its plots, what its targets do, a gradient, what is learned, claims."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -172,6 +173,7 @@ def test_the_config_has_the_fitted_values():
 
 def test_claims_are_judged_with_the_shipped_network_alone(tmp_path):
     tables = radarsim.run("learned", realisations=2000, figures=False).tables
+    assert sys.modules["learned"].STUDY is STUDY  # not imported again with the network
     verdicts = dict(zip(tables["claims"]["claim"], tables["claims"]["overall"], strict=True))
     assert verdicts["learned.1"] == "confirmed"
     assert verdicts["learned.2"] == "refuted"
