@@ -332,6 +332,15 @@ def test_a_code_used_twice_is_two_aircraft(tmp_path):
     assert "1 Mode 3/A codes are of several aircraft or of one seen again: ACODE-2 and so on" in done.notes
 
 
+def test_a_code_is_that_of_the_aircraft_that_flies_there():
+    """Two pass each other 1 km apart, and fly three times as far between plots."""
+    tracks, rng = Tracks(), np.random.default_rng(4)
+    for k in range(40):
+        for name, north, east in (("A7000", 250 * 12 * (k - 20), 0), ("A7000-2", 250 * 12 * (20 - k), 1000)):
+            north, east = (float(one + rng.normal(0, 50)) for one in (north, east))
+            assert tracks.by_code("1/1", "7000", 12.0 * k, north, east) == name
+
+
 def test_codes_that_cross(tmp_path):
     """40 aircraft of one code at random, 4 s apart: no track has plots of two as long as they keep 5 km apart."""
     rng = np.random.default_rng(3)
@@ -349,19 +358,20 @@ def test_codes_that_cross(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("addresses", "tracks"),
+    ("pause", "addresses", "tracks"),
     [
-        ((None, None, None, None), ["77", "77", "77-2", "77-2"]),
-        ((0xA1, 0xA1, 0xA1, 0xA1), ["77", "77", "77", "77"]),
-        ((0xA1, 0xA1, 0xB2, None), ["77", "77", "77-2", "77-2"]),
-        ((0xA1, 0xB2, 0xB2, 0xB2), ["77", "77-2", "77-2", "77-2"]),
-        ((0xA1, None, None, None), ["77", "77", "77-2", "77-2"]),
+        (3500, (None, None, None, None), ["77", "77", "77-2", "77-2"]),
+        (3500, (0xA1, 0xA1, 0xA1, 0xA1), ["77", "77", "77", "77"]),
+        (3500, (0xA1, None, None, None), ["77", "77", "77-2", "77-2"]),
+        (4, (0xA1, 0xA1, 0xB2, None), ["77", "77", "77-2", "77-2"]),
+        (4, (0xA1, None, 0xB2, 0xB2), ["77", "77", "77-2", "77-2"]),
+        (4, (0xA1, None, 0xA1, None), ["77", "77", "77", "77"]),
     ],
 )
-def test_a_number_given_again_is_another_track(tmp_path, addresses, tracks):
-    """After 3500 s without a plot, or at once where the address is another."""
+def test_a_number_given_again_is_another_track(tmp_path, pause, addresses, tracks):
+    """After a pause without a plot, or at once where the address is another."""
     records = [plot_048(t, 9000, track=77, **({"address": own} if own else {}))
-               for t, own in zip((1, 5, 3505, 3509), addresses, strict=True)]  # fmt: skip
+               for t, own in zip((1, 5, 5 + pause, 9 + pause), addresses, strict=True)]  # fmt: skip
     done, _, found = imported(tmp_path, block(48, *records))
     assert found == tracks
     assert any("track numbers are given again to another aircraft 1 times" in note for note in done.notes) == (
