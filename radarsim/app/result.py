@@ -22,7 +22,7 @@ from radarsim.engine import store
 from radarsim.engine.results import CaseResult
 from radarsim.errors import OF_AUTHORS, DisagreementError, MeasureError, RadarsimError
 from radarsim.language import ENGLISH, called, current, few, plural, tr
-from radarsim.report import claims, files, notes, outside, seen
+from radarsim.report import claims, files, notes, outside, panels, seen
 from radarsim.report import tables as common
 from radarsim.report.claims import page
 from radarsim.report.claims.page import OVER, with_classes
@@ -432,7 +432,8 @@ def case_figures(
 
         drawn |= sweeps.figures(results, common.groups(made["curves"], "case", "filter", "component"))
     names = names_in(results)
-    return {name: reworded(seen.crossed(figure), partial(called, names=names)) for name, figure in drawn.items()}
+    said = {name: reworded(seen.crossed(figure), partial(called, names=names)) for name, figure in drawn.items()}
+    return {name: panels.joined(figure) for name, figure in said.items()}
 
 
 def _said(figure: Figure) -> Figure:

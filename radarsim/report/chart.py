@@ -352,6 +352,7 @@ MARKED = 16  # about so many markers or crosses on a line at most
 FEWER = 6  # least points of a line for each marker, where lines have few points, for a small page
 POINTS = 400  # of a line; a panel is as many units wide
 Heats = dict[str, tuple[float, float, bool]]  # of maps with the same words: least, largest value, logarithmic or not
+REFERENCE_SHARE = 0.2  # of an axis of x: the words of a reference line nearer to its left end are right of it
 SEEN = 0.7  # units from the line from which its band is drawn
 
 
@@ -571,7 +572,9 @@ class _Frame:
         else:
             x = float(self.x.place(mark.value))
             made = Markup('<path class="ref" d="M{:.1f} {:.1f}V{:.1f}"/>').format(x, bottom, top)
-            made += text_at(x - 3, bottom - 4, mark.label, "end", "soft") if mark.label else Markup("")
+            near = x - left < REFERENCE_SHARE * (right - left)
+            place = (x + 3, "start") if near else (x - 3, "end")
+            made += text_at(place[0], bottom - 4, mark.label, place[1], "soft") if mark.label else Markup("")
         return Markup('<g data-{}="{:.9g}">{}</g>').format(Markup(mark.across), mark.value, made)
 
     def _bars(self, bars: Bars) -> Markup:
@@ -612,7 +615,14 @@ class _Frame:
 
     def _note(self, note: Note) -> Markup:
         x, y = float(self.x.place(note.x)), float(self.y.place(note.y))
+        if note.place == "top":
+            text = text_at(x, self.top + 0.7 * SIZE, note.text, "middle", "soft on")
+            return Markup('<g data-x="{:.9g}">{}</g>').format(note.x, text)
+        if note.place == "on":
+            text = text_at(x, y + 0.35 * SIZE, note.text, "middle", "on")
+            return Markup('<g data-x="{:.9g}" data-y="{:.9g}">{}</g>').format(note.x, note.y, text)
         right = "e" in note.place
-        place = (x + (5 if right else -5), y - 5 if "n" in note.place else y + SIZE)
+        below = 0.35 * SIZE if note.place == "e" else -5 if "n" in note.place else SIZE
+        place = (x + (5 if right else -5), y + below)
         text = text_at(*place, note.text, "start" if right else "end")
         return Markup('<g data-x="{:.9g}" data-y="{:.9g}">{}</g>').format(note.x, note.y, text)

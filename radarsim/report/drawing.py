@@ -93,7 +93,11 @@ class Heat:
 
 @dataclass(frozen=True)
 class Note:
-    """Words near a point of the data: above or below it ("n", "s"), to its right or left ("e", "w")."""
+    """Words near a point of the data: above or below it ("n", "s"), to its right or left ("e", "w").
+
+    "on": upon it, which interrupts its line. "e" alone: beside it, and be it outside the panel. "top": along the
+    panel's top, whatever y.
+    """
 
     x: float
     y: float
@@ -107,12 +111,13 @@ MARKED = ("label", "name", "text")  # words of marks
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes. keys explain styles (not single lines) in a small legend: (words, style).
+    """One pair of axes. keys explain styles (not single lines) in a small legend: (words, style), under key_title.
 
     direct: lines are named at their ends where the names fit; else always in the figure's legend, below the panels;
-    "right": beside a single panel; "none": they are named in another panel. A remark is above the panel, at its right.
+    "right": beside a single panel; "none": they are named in another panel. line_title: what these names are. A remark
+    is above the panel, at its right.
     A panel without marks adds its keys to the legend. crosses: the name of the exact values' crosses; empty: exact.
-    equal: x and y have one scale, as on a map.
+    equal: x and y have one scale, as on a map. height_mm: other than the figure's, in a figure of one column.
     """
 
     x: Axis
@@ -121,11 +126,13 @@ class Panel:
     title: str = ""
     keys: tuple[tuple[str, Style], ...] = ()
     key_title: str = ""
+    line_title: str = ""
     direct: bool = True
     legend: str = "best"
     remark: str = ""
     crosses: str = ""
     equal: bool = False
+    height_mm: float | None = None
 
 
 @dataclass(frozen=True)
@@ -160,7 +167,7 @@ def reworded(figure: Figure, said: Callable[[str], str]) -> Figure:
 
     panels = tuple(
         replace(
-            with_words(panel, "title", "key_title", "remark", "crosses"),
+            with_words(panel, "title", "key_title", "line_title", "remark", "crosses"),
             **{"x": axis(panel.x), "y": axis(panel.y), "marks": tuple(map(mark, panel.marks))},
             keys=tuple((said(words), style) for words, style in panel.keys),
         )

@@ -88,7 +88,10 @@ def named(figure: Figure) -> Named:
     crossed: set[str] = set()
     keys = [_keys(panel, ends, crossed) for panel, ends in zip(panels, at_ends, strict=True)]
     apart = [dict(panel.keys) for panel in figure.panels if not panel.marks]
-    titles = {panel.key_title for panel in figure.panels if panel.key_title}
+    titled = [_key_title(panel, ends) for panel, ends in zip(panels, at_ends, strict=True)]
+    titles = {title for title in titled if title} | {
+        one.key_title for one in figure.panels if not one.marks and one.key_title
+    }
     merged: dict[str, Style | None] = {}
     clash = len(titles) > 1
     for one in (*keys, *apart):
@@ -99,10 +102,17 @@ def named(figure: Figure) -> Named:
         merged |= one
     none: tuple[Legend | None, ...] = (None,) * len(panels)
     if clash:
-        own = [Legend(one, panel.key_title) if one else None for one, panel in zip(keys, panels, strict=True)]
+        own = [Legend(one, title) if one else None for one, title in zip(keys, titled, strict=True)]
         return Named(panels, at_ends, tuple(own), None, False)
     beside = len(panels) == 1 and panels[0].legend == "right" and len(merged) <= MOST_BESIDE
     return Named(panels, at_ends, none, Legend(merged, next(iter(titles), "")) if merged else None, beside)
+
+
+def _key_title(panel: Panel, at_ends: bool) -> str:
+    """The title of a panel's legend."""
+    if panel.key_title or not panel.line_title:
+        return panel.key_title
+    return tr("at the lines: {key}", key=panel.line_title) if at_ends else panel.line_title
 
 
 def _alike(one: Style | None, other: Style | None) -> bool:
@@ -162,6 +172,7 @@ LABEL_LETTERS_PER_MM = 0.62  # of an axis' side, in the letters of labels
 AXIS_MM = 9.0  # of the ticks and the label of an axis of x
 SIDE_MM = 14.0  # of those of an axis of y, with the gap to the next panel
 LETTER_EM = 0.62  # of a number, in its size: how wide a figure of the font is
+TOPPED_PT = 14.0  # from a panel to its title, over words along its top
 TICK_GAP_PT = 3.0  # between numbers of ticks
 REMEMBERED = ("_update_ticks", "_get_ticklabel_bboxes")  # methods of Matplotlib's axes: of no argument; ticks, renderer
 FEWEST_SCANS, LAST_APART = 5, 0.5  # scans from which ticks stand at them; of an interval, before the last tick
@@ -269,7 +280,8 @@ def _laid_out(figure: Figure) -> Canvas:
     plan = named(figure)
     columns = min(figure.columns, len(plan.panels))
     rows = -(-len(plan.panels) // columns)
-    height = rows * figure.panel_height_mm
+    heights = [panel.height_mm or figure.panel_height_mm for panel in plan.panels[::columns]]
+    height = sum(heights)
     free = rows * columns > len(plan.panels)  # a cell: the legend has it, where it is large enough
     common = plan.common
     cell = figure.width_mm / columns - SIDE_MM  # the room of a legend in a panel's place
@@ -284,7 +296,7 @@ def _laid_out(figure: Figure) -> Canvas:
     FigureCanvasAgg(canvas)
     if headline:
         canvas.suptitle(headline, x=0.01, ha="left", fontsize=STYLE["font.size"])
-    grid = canvas.subplots(rows, columns, squeeze=False, sharey=figure.share_y)
+    grid = canvas.subplots(rows, columns, squeeze=False, sharey=figure.share_y, height_ratios=heights)
     ended: list[list[Annotation]] = []
     letters = TITLE_LETTERS_PER_MM * figure.width_mm / columns
     maps = common_colours(plan.panels)
@@ -439,7 +451,7 @@ def _draw(axes: Axes, panel: Panel, maps: Colours) -> None:
             case Line():
                 _line(axes, mark, panel.crosses)
             case Reference():
-                _reference(axes, mark)
+                _reference(axes, mark, panel.x)
             case Bars():
                 _bars(axes, mark)
             case Heat():
@@ -448,7 +460,8 @@ def _draw(axes: Axes, panel: Panel, maps: Colours) -> None:
                 _note(axes, mark)
     axes.set_xlabel(panel.x.label)
     axes.set_ylabel(panel.y.label, **(UPRIGHT if SYMBOL.fullmatch(panel.y.label) else {}))
-    axes.set_title(panel.title, loc="left", fontweight="bold")
+    topped = any(isinstance(mark, Note) and mark.place == "top" for mark in panel.marks)
+    axes.set_title(panel.title, loc="left", fontweight="bold", pad=TOPPED_PT if topped else None)
     for limits, put in ((panel.x.limits, axes.set_xlim), (panel.y.limits, axes.set_ylim)):
         if limits != (None, None):
             put(*limits)
@@ -604,7 +617,7 @@ def _thinned(line: Line) -> Line:
     return replace(line, **{name: part[::stride] for name, part in parts.items() if part is not None})
 
 
-def _reference(axes: Axes, mark: Reference) -> None:
+def _reference(axes: Axes, mark: Reference, x: Ends) -> None:
     look: dict[str, Any] = {"color": "#555555", "linewidth": 0.7, "linestyle": (0, (2, 2)), "zorder": 1.5}
     text: dict[str, Any] = {"s": f" {mark.label} ", "ha": "right", "va": "bottom", "color": "#555555"}
     if mark.across == "y":
@@ -612,6 +625,10 @@ def _reference(axes: Axes, mark: Reference) -> None:
         axes.text(0.99, mark.value, transform=axes.get_yaxis_transform(), **text)
     else:
         axes.axvline(mark.value, **look)
+        low, high = x.limits
+        if low is not None and high is not None:
+            share = Scale(x.scale == "log", low, high, 0.0, 1.0).place(mark.value)
+            text["ha"] = "left" if share < chart.REFERENCE_SHARE else "right"  # else its words would lie upon the axis
         axes.text(mark.value, 0.02, transform=axes.get_xaxis_transform(), **text)
 
 
@@ -647,9 +664,18 @@ def _heat(axes: Axes, heat: Heat, maps: Colours) -> None:
 
 
 def _note(axes: Axes, note: Note) -> None:
-    up, right = "n" in note.place, "e" in note.place
+    if note.place == "top":
+        grey: dict[str, Any] = {"color": "#555555", "fontsize": 7, "ha": "center", "va": "bottom"}
+        axes.annotate(note.text, (note.x, 1.0), (0, 1.5), axes.get_xaxis_transform(), "offset points", **grey)
+        return
+    if note.place == "on":
+        behind = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
+        axes.text(note.x, note.y, note.text, ha="center", va="center", fontsize=7, zorder=3.5, bbox=behind)
+        return
+    up, right, level = "n" in note.place, "e" in note.place, note.place == "e"
     look: dict[str, Any] = {"ha": "left" if right else "right", "va": "bottom" if up else "top", "fontsize": 7}
-    shift = (3 if right else -3, 3 if up else -3)
+    look |= {"va": "center", "annotation_clip": False} if level else {}
+    shift = (3 if right else -3, 0 if level else 3 if up else -3)
     axes.annotate(note.text, (note.x, note.y), xytext=shift, textcoords="offset points", **look)
 
 

@@ -195,6 +195,7 @@ def report_page(
     figures are described ones (none with --no-figures); record is run.json's; inputs, agreement and cost (against
     accuracy) are tables, or None. drawn_from: of the study, see `Study.drawn_from`.
     """
+    figures = [one for one in figures if one.name != "claims"]  # the page has them in a table, a line each
     written = {name for name, table in made.items() if f"{name}.csv" in record["outputs"] and len(table)}
     sources = {one.name: tables_of(one.name, drawn_from, written) for one in figures}
     claims = _claims(made["claims"], sources, written)
@@ -228,7 +229,7 @@ def report_page(
 
 def _first(figures: Sequence[Figure]) -> int:
     """How many figures are not folded: the first one, others while their panels are few together."""
-    panels = [sum(bool(panel.marks) for panel in one.panels) for one in figures[:FIRST] if one.name != "claims"]
+    panels = [sum(bool(panel.marks) for panel in one.panels) for one in figures[:FIRST]]
     return max(1, sum(sum(panels[: n + 1]) <= FIRST_PANELS for n in range(len(panels))))
 
 

@@ -34,6 +34,7 @@ FEW_FILTERS = 3  # distinguished by dash, while shades distinguish the cases
 LONG = 5  # powers of ten from this one on are written raised
 NEAR_ZERO = 1e-5  # of the largest σ: below it a logarithmic axis would show rounding
 WIDEST_BAND, LOG_MARGIN, MARGIN = 2.0, 1.12, 0.05  # of a shared axis: how far bands count, and room at its ends
+LINE = 0.004  # of a panel's height: half the width of a line
 LOSS = 100.0  # per cent at which much lower gains are cut
 LONGEST_INSIDE = 28  # letters of a name in a legend inside a panel of many lines
 GREEK = {"b": "\\beta", "e": "\\varepsilon"}  # bearing and elevation, as the components' names begin or end
@@ -49,12 +50,10 @@ GAIN = ("t_s", "gain_percent", "gain_lo", "gain_hi", "exact_percent")
 def number(value: object, powers: bool = False) -> str:
     """A number for people: 0.001 as 10⁻³ (with powers, 0.1 as 10⁻¹), others at four digits; text unchanged.
 
-    A mapping of keys as "key value, key value", numbers of a list one after the other.
+    Numbers of a list one after the other.
     """
     if isinstance(value, list | tuple) and all(isinstance(one, int | float) for one in value):
         return wording.in_a_row(map(number, value))
-    if isinstance(value, Mapping):
-        return ", ".join(f"{literal(str(key))} {number(one)}" for key, one in value.items())
     if not isinstance(value, int | float) or isinstance(value, bool):
         return literal(str(value).replace("_", " "))  # of a list of choices, of a scenario
     power = int(f"{value:.0e}".partition("e")[2])
@@ -67,13 +66,25 @@ def number(value: object, powers: bool = False) -> str:
     return wording.number(value, 6 if NEAR_ONE < value < 1 else 4)
 
 
-def in_short(value: object, among: Sequence[object]) -> object:
-    """A mapping by its kind and its differences from others of the kind, as words; any other value unchanged."""
+def in_short(result: CaseResult, key: str, value: object, among: Sequence[object]) -> object:
+    """A mapping of a swept key by its kind and its differences from others of the kind, as words; any other value
+    unchanged.
+    """
     if not isinstance(value, Mapping) or "kind" not in value:
         return value
     alike = [one for one in among if isinstance(one, Mapping) and one.get("kind") == value["kind"]]
-    own = {key: one for key, one in value.items() if any(other.get(key) != one for other in alike)}
-    return ", ".join(filter(None, (number(value["kind"]), number(own))))
+    own = {name: one for name, one in value.items() if any(other.get(name) != one for other in alike)}
+    return in_words(result, key, {"kind": value["kind"], **own})
+
+
+def in_words(result: CaseResult, key: str, value: Mapping) -> str:
+    """A mapping that is a key's value: its kind, and each of its keys by name, with value and unit."""
+    kind = [number(value["kind"])] if "kind" in value else []
+    own = [f"{key}.{name}" for name in value if name != "kind"]
+    named = zip(own, (one for name, one in value.items() if name != "kind"), strict=True)
+    return ", ".join(
+        [*kind, *(f"{key_label(result, name).text} {with_its_unit(result, name, one)}" for name, one in named)]
+    )
 
 
 def literal(name: str) -> str:
@@ -98,6 +109,8 @@ def swept(result: CaseResult) -> str:
 
 def with_its_unit(result: CaseResult, key: str, value: object) -> str:
     """A value of a key with the key's unit, except a unit that would need brackets."""
+    if isinstance(value, Mapping):
+        return in_words(result, key, value)
     if isinstance(value, list | tuple):
         return " ".join(filter(None, (number(value), key_label(result, key).unit)))
     if not isinstance(value, int | float) or isinstance(value, bool):
@@ -389,6 +402,77 @@ def loss_axis(label: str, lines: Sequence[Line]) -> Axis:
     return Axis(label, "log", (float(values[values > 0].min(initial=1.0)) / 2, None))
 
 
+def joined(figure: Figure) -> Figure:
+    """The figure with lines that coincide in all its panels drawn once, their names joined by "=".
+
+    Lines that are named, by themselves or by a legend of their names, not those told apart by dash and shade.
+    """
+    every = [{name: one for one in panel.marks if (name := _own_name(one, figure))} for panel in figure.panels]
+    alike: dict[str, list[str]] = {}
+    for name in dict.fromkeys(name for named in every for name in named):
+        first = next((one for one in alike if _coincide(one, name, every, figure)), name)
+        alike.setdefault(first, []).append(name)
+    renamed = {first: " = ".join(names) for first, names in alike.items()}
+    gone = {name for names in alike.values() for name in names[1:]}
+    if not gone:
+        return figure
+
+    def mark(one: Mark) -> Mark:
+        name = _own_name(one, figure)
+        if not (name and isinstance(one, Line)):
+            return one
+        return replace(one, label=one.label and renamed[name], name=one.name and renamed[name])
+
+    panels = tuple(
+        replace(
+            panel,
+            marks=tuple(mark(one) for one in panel.marks if _own_name(one, figure) not in gone),
+            keys=tuple((renamed.get(words, words), style) for words, style in panel.keys if words not in gone),
+        )
+        for panel in figure.panels
+    )
+    said = tr("Curves that coincide are drawn once, with both names.")
+    return replace(figure, panels=panels, caption=f"{figure.caption} {said}")
+
+
+def _own_name(mark: Mark, figure: Figure) -> str:
+    """The name of a curve that has one of its own, at its end or in a legend; empty for any other mark."""
+    if not isinstance(mark, Line) or mark.style.dash is None or len(mark.x) < 2:
+        return ""
+    if mark.label:
+        return mark.label if mark.name in ("", mark.label) else ""
+    return mark.name if any(mark.name == words for panel in figure.panels for words, _ in panel.keys) else ""
+
+
+def _coincide(one: str, other: str, every: Sequence[Mapping[str, Mark]], figure: Figure) -> bool:
+    """Whether two curves cannot be told apart in any panel: values and bands nearer than half a line's width."""
+    for named, panel in zip(every, figure.panels, strict=True):
+        a, b = named.get(one), named.get(other)
+        if a is None and b is None:
+            continue
+        if not (isinstance(a, Line) and isinstance(b, Line)) or not np.array_equal(a.x, b.x):
+            return False
+        log = panel.y.scale == "log"
+        lines = [
+            line
+            for line in named.values()
+            if isinstance(line, Line) and (line.y > 0 if log else np.isfinite(line.y)).any()
+        ]
+        if not lines:
+            continue
+        low, high = (np.log10(end) if log else end for end in _holding(lines, panel.y))
+        for first, second in ((a.y, b.y), (a.lo, b.lo), (a.hi, b.hi), (a.exact, b.exact)):
+            if first is None or second is None:
+                if first is not second:
+                    return False
+                continue
+            with np.errstate(divide="ignore", invalid="ignore"):
+                ours, theirs = (np.log10(part) if log else np.asarray(part, float) for part in (first, second))
+            if not np.allclose(ours, theirs, rtol=0, atol=LINE * (high - low), equal_nan=True):
+                return False
+    return True
+
+
 def never_lost(lines: Sequence[Line]) -> str:
     """Words on the lines without any losses, after a caption."""
     names = [plain(line.name or line.label) for line in lines if not (line.y > 0).any()]
@@ -460,7 +544,7 @@ def floored(figure: Figure, floor: "pd.DataFrame | None", component: str, factor
     least = factor * rows.groupby("t_s", sort=True)["floor"].min()
     (panel,) = figure.panels
     line = Line(least.index.to_numpy(), least.to_numpy(), tr("floor"), GUIDE)
-    panel = replace(panel, marks=(line, *panel.marks))
+    panel = replace(panel, marks=(*panel.marks, line))
     posterior = rows["kind"].str.startswith("posterior").all()
     said = tr("Grey: the floor, a posterior Cramér-Rao bound.") if posterior else tr(UNDER_UNBIASED)
     return replace(figure, panels=(panel,), caption=f"{figure.caption} {said}")
@@ -507,7 +591,7 @@ def lines_of(members: Sequence[CaseResult], rows: Mapping, component: str, colum
             else:
                 key, value = result.swept[-1] if result.swept else ("", device(result))
                 among = [dict(one.swept).get(key) for one in members]
-                words = _shown_value(result, key, in_short(value, among)) if key else number(value)
+                words = _shown_value(result, key, in_short(result, key, value, among)) if key else number(value)
                 marks.append(line(own, columns, words, style, f"{literal(f)}, {swept(result)}"))
     return marks
 
@@ -562,7 +646,7 @@ def keyed(panel: Panel, members: Sequence[CaseResult], baseline: bool = True) ->
     title = key_title(members[0]) if members[0].swept else ""
     if sum(isinstance(mark, Line) for mark in panel.marks) > MOST_AT_ENDS:
         return _by_colour(panel, dashes, title)
-    return replace(panel, keys=dashes, key_title=tr("at the lines: {key}", key=title) if title else "")
+    return replace(panel, keys=dashes, line_title=title)
 
 
 def key_title(result: CaseResult) -> str:

@@ -67,8 +67,8 @@ def places(result: CaseResult, key: str, values: Sequence) -> tuple[np.ndarray, 
     if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
         x = panels.axis_factor(result, key) * np.array(values, dtype=float)
         return x, Axis(label, "log" if x.min() > 0 and x.max() / x.min() > WIDE else "linear")
-    named = [panels.in_short(v, values) for v in values]
-    words = [panels.number(v if isinstance(v, str | list | tuple | Mapping) else str(v)) for v in named]
+    named = [panels.in_short(result, key, v, values) for v in values]
+    words = [panels.number(v if isinstance(v, str | list | tuple) else str(v)) for v in named]
     ticks = tuple((float(i), textwrap.fill(one, BROAD, break_long_words=False)) for i, one in enumerate(words))
     return np.arange(float(len(values))), Axis(label, ticks=ticks)
 

@@ -1,10 +1,10 @@
 """The page's headline, its lines, and the forest plot, by hand."""
 
-import numpy as np
-
+from radarsim.report import chart
 from radarsim.report.claims import page
 from radarsim.report.claims.judge import NOT_RUN
 from radarsim.report.claims.rule import CONFIRMED, DEPENDS, REFUTED, UNDECIDED
+from radarsim.report.drawing import Line, Note
 
 
 def row(claim="P9.1", kind=REFUTED, **more):
@@ -58,15 +58,33 @@ def test_forest_stands_in_margins():
     assert page.depth_in_forest(-100.0, row()) == page.FURTHEST_IN_FOREST
     between = row(expected_hi=7.0)
     assert page.depth_in_forest(6.5, between) == -0.5
-    figure = page.figure([row(), row("P9.2", CONFIRMED, measured=6.0, lo=5.5, hi=6.5, exact=6.25)])
-    marks = {mark.label: mark for mark in figure.panels[0].marks if mark.label in (CONFIRMED, REFUTED)}
-    refuted, confirmed = marks[REFUTED], marks[CONFIRMED]
-    np.testing.assert_allclose((refuted.lo, refuted.y, refuted.hi), ([1.0], [2.0], [3.0]))
-    np.testing.assert_allclose((confirmed.lo, confirmed.y, confirmed.exact), ([-1.5], [-1.0], [-1.25]))
+    (panel,) = page.figure([row(), row("P9.2", CONFIRMED, measured=6.0, lo=5.5, hi=6.5, exact=6.25)]).panels
+    lines = [mark for mark in panel.marks if isinstance(mark, Line)]
+    confirmed, other_interval, exact, refuted, its_interval = lines
+    assert [(one.label, one.x.tolist(), one.y.tolist()) for one in (refuted, confirmed)] == [
+        (REFUTED, [2.0], [0.0]),
+        (CONFIRMED, [-1.0], [1.0]),
+    ]
+    assert [one.x[:2].tolist() for one in (its_interval, other_interval)] == [[1.0, 3.0], [-1.5, -0.5]]
+    assert (exact.x.tolist(), exact.exact.tolist()) == ([-1.25], [1.0])
+    assert [words for _, words in panel.y.ticks] == ["s  1", "s  2"]
+    assert [mark.text for mark in panel.marks if isinstance(mark, Note)] == ["3 [2, 4] m", "6.25 m exactly"]
     assert page.figure([row(kind=NOT_RUN)]) is None
-    (wide,) = page.figure([row(judged_lo="", judged_hi="")]).panels[0].marks[:1]  # few realisations have no interval
-    assert np.isnan(wide.lo).all()
+    (few,) = page.figure([row(judged_lo="", judged_hi="")]).panels  # few realisations have no interval
+    assert few.marks[1].x[:2].tolist() == [2.0, 2.0]
     assert page.measured(row(judged_lo="", judged_hi="")) == "3 m"
+
+
+def test_what_lies_beyond_the_rim_has_an_arrow():
+    rows = [row(), row("P9.2", measured=-50.0), row("P9.3", CONFIRMED, measured=90.0)]
+    (panel,) = page.figure(rows).panels
+    arrows = {
+        mark.style.marker: (mark.x.tolist(), mark.y.tolist())
+        for mark in panel.marks
+        if isinstance(mark, Line) and mark.x.size and abs(mark.x[0]) == page.BEYOND
+    }
+    left, right = chart.MARKERS.index("m-3.1 0l5.4-3v6z"), chart.MARKERS.index("m3.1 0l-5.4-3v6z")
+    assert arrows == {right: ([page.BEYOND], [1.0]), left: ([-page.BEYOND], [2.0])}
 
 
 def test_words_that_markdown_would_read_are_escaped():

@@ -80,11 +80,11 @@ def agree(out):
 def drawn(rows):
     """The class that the figure's mark of each claim stands for."""
     return {
-        f"{panel.title.split()[0]}.{dict(panel.x.ticks)[x]}": mark.label
+        f"{panel.title.split()[0]}.{dict(panel.y.ticks)[y].split()[-1]}": mark.label
         for panel in page.figure(rows).panels
         for mark in panel.marks
         if getattr(mark, "label", "") in rule.CLASSES
-        for x in mark.x
+        for y in mark.y
     }
 
 

@@ -70,6 +70,64 @@ def test_few_lines_are_named_at_their_ends_many_in_a_legend():
     assert keyed.figure.legends[0].get_title().get_text() == "what"
 
 
+def curves(*values, names="abc", **more):
+    """A panel of lines with these values over the same places."""
+    marks = (
+        Line(np.arange(3.0), np.asarray(y, float), n, Style(i, i))
+        for i, (n, y) in enumerate(zip(names, values, strict=False))
+    )
+    return Panel(Axis("x"), Axis("y", limits=(0, None)), tuple(marks), **more)
+
+
+def test_lines_that_coincide_in_every_panel_are_drawn_once_and_named_together():
+    near, far = [1.0, 2.0, 3.001], [1.0, 2.0, 3.1]
+    both = panels.joined(Figure("f", "", "Drawn.", (curves([1, 2, 3], near, [0, 0, 9]), curves([4, 5, 6], [4, 5, 6]))))
+    assert [[mark.label for mark in panel.marks] for panel in both.panels] == [["a = b", "c"], ["a = b"]]
+    assert both.caption == "Drawn. Curves that coincide are drawn once, with both names."
+    for apart in (
+        (curves([1, 2, 3], far),),  # seen to differ
+        (curves([1, 2, 3], near), curves([4, 5, 6], [4, 5, 7])),  # in one panel
+        (curves([1, 2, 3], near), curves([4, 5, 6])),  # in one panel there is only one of them
+        (curves([1, 2, 3], [1, 2, np.nan]),),
+    ):
+        figure = Figure("f", "", "Drawn.", apart)
+        assert panels.joined(figure) is figure
+
+
+def test_lines_that_a_legend_of_names_explains_are_joined_there_and_those_told_apart_by_dash_are_not():
+    unnamed = panels.in_legend([curves([1, 2, 3], [1, 2, 3]), curves([2, 2, 2], [2, 2, 2])])
+    joined = panels.joined(Figure("f", "", "", tuple(unnamed)))
+    assert [[mark.name for mark in panel.marks] for panel in joined.panels] == [["a = b"], ["a = b"], []]
+    assert [words for words, _ in joined.panels[-1].keys] == ["a = b"]
+    swept = curves([1, 2, 3], [1, 2, 3])
+    swept = replace(swept, marks=tuple(replace(mark, label="1", name=f"{mark.label}, 1") for mark in swept.marks))
+    figure = Figure("f", "", "", (swept,))
+    assert panels.joined(figure) is figure
+
+
+def test_words_along_the_top_lie_between_a_panel_and_its_title():
+    axes = drawn(one(line(), Note(1.0, np.nan, "start", "top"), title="the title"))
+    (words,) = [text for text in axes.texts if text.get_text() == "start"]
+    box, title = words.get_window_extent(), axes._left_title.get_window_extent()
+    assert axes.get_window_extent().y1 <= box.y0 < box.y1 <= title.y0
+    assert axes.transData.transform((1.0, 0.0))[0] == pytest.approx((box.x0 + box.x1) / 2, abs=1)
+
+
+def test_words_of_a_line_at_the_left_rim_stand_right_of_it():
+    for value, side in ((1.0, "left"), (9.0, "right")):
+        panel = Panel(Axis("x", limits=(0, 10)), Axis("y"), (line(), Reference(value, "x", "shipped")))
+        axes = figures.render(Figure("f", "", "", (panel,))).axes[0]
+        assert [text.get_ha() for text in axes.texts if "shipped" in text.get_text()] == [side]
+
+
+def test_panels_of_one_column_have_their_own_heights():
+    short, tall = (Panel(Axis("x"), Axis("y"), (line(),), height_mm=height) for height in (30.0, 90.0))
+    canvas = figures.render(Figure("f", "", "", (short, tall)))
+    assert canvas.get_size_inches()[1] * 25.4 == pytest.approx(120 + 5.5, abs=4)  # and the legend of the crosses
+    low, high = (axes.get_window_extent().height for axes in canvas.axes)
+    assert high > 2.5 * low
+
+
 def test_a_legend_lies_on_no_curve_and_stands_once_a_figure():
     marks = tuple(Line(np.arange(3.0), np.full(3, float(i)), f"filter {i}", Style(i, i, i)) for i in range(9))
     panel = Panel(Axis("x"), Axis("y"), marks, direct=False)

@@ -152,9 +152,11 @@ def test_targets_that_are_swept_are_named_by_their_kind_and_what_sets_them_apart
     """In whole they are wider than a page."""
     past = {"kind": "fly_by", "distance_m": 15e3, "speed_mps": 280.0, "start_range_m": 40e3}
     targets = [past, past | {"speed_mps": 100.0, "sigma_position_m": 800.0}, {"kind": "recorded", "file": "flight.csv"}]
-    words = ["fly by, speed mps 280", "fly by, speed mps 100, sigma position m 800", "recorded"]
-    assert [panels.number(panels.in_short(one, targets)) for one in targets] == words
+    words = ["fly by, speed 280 m/s", "fly by, speed 100 m/s, σ of the first position 800 m", "recorded"]
     result = run.run("rls2", realisations=8, figures=False, overrides=["scans=4"]).cases[0]
+    assert [panels.in_short(result, "target", one, targets) for one in targets] == words
+    whole = "distance of closest approach 15000 m, speed 280 m/s, range at the first plot 40000 m"
+    assert panels.swept(replace(result, swept=(("target", past),))) == f"target = fly by, {whole}"
     x, axis = sweeps.places(result, "target", targets)
     assert x.tolist() == [0, 1, 2]
     assert [" ".join(shown.split()) for _, shown in axis.ticks] == words

@@ -13,7 +13,8 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from radarsim.language import numeral, plural, term, tr
 from radarsim.report.claims import rule
 from radarsim.report.claims.declared import Claim
 from radarsim.report.claims.judge import NOT_JUDGED, NOT_RUN
-from radarsim.report.claims.over import Choice, Over, PaperReadings, Under, depth
+from radarsim.report.claims.over import DEFAULT, Choice, Over, PaperReadings, Under, depth
 from radarsim.report.claims.rule import (
     CLASSES,
     CONFIRMED,
@@ -36,13 +37,15 @@ from radarsim.report.claims.rule import (
     VOID,
     roughly,
 )
-from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
+from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
 from radarsim.report.wording import interval
 
 # ---- curve -----------------------------------------------------------------------------------------------------------
 FURTHEST = 5.0  # margins: larger distances are drawn there
 LETTERS = 44  # of an alternative beside the panel
 HEADING = 1.5  # lines that the name of a choice takes above its alternatives
+BESIDE = 0.02  # of all readings: room left of the first one, which may be as shipped
+ROW_MM, AXIS_MM = 3.6, 14.0  # of a panel of rows: each, and its title and axis
 KINDS = {
     rule.EQUIVALENT: (term("as shipped, or equivalent"), Style(colour=0, dash=None, marker=0)),
     rule.UNSTATED: (term("the paper does not say"), Style(colour=4, dash=None, marker=1)),
@@ -58,20 +61,27 @@ def specification(of: PaperReadings, over: Over) -> Figure:
     where = np.arange(1, len(every) + 1)
     ends = np.clip(np.array([found for _, found in judged]), -FURTHEST, FURTHEST)
     varied = [choice for choice in of.choices if len({one.reading[choice.key] for one in every}) > 1]
+    caption = tr(
+        "{statement}. {outcome}. Above: distance of the claim's worst part from the paper's words, in "
+        "margins of that part, cut at ± {furthest:g}; below 0 it holds, above 1 it fails beyond the "
+        "margin. Below: the choices of each reading.",
+        statement=tr(over.claim.statement),
+        outcome=over.sentence().capitalize(),
+        furthest=FURTHEST,
+    )
+    if gone := len(over.impossible):
+        left = plural(
+            "{count} reading that cannot be flown, designed or measured is left out.",
+            "{count} readings that cannot be flown, designed or measured are left out.",
+            gone,
+        )
+        caption = f"{caption} {left}"
     return Figure(
         name=over.claim.id,
         title=tr("{claim} under every reading", claim=over.claim.id),
-        caption=tr(
-            "{statement}. {outcome}. Above: distance of the claim's worst part from the paper's words, in "
-            "margins of that part, cut at ± {furthest:g}; below 0 it holds, above 1 it fails beyond the "
-            "margin. Below: the choices of each reading.",
-            statement=tr(over.claim.statement),
-            outcome=over.sentence().capitalize(),
-            furthest=FURTHEST,
-        ),
+        caption=caption,
         panels=(_above(every, where, ends, over), *([_below(varied, every, where)] if varied else [])),
         width_mm=PAGE_MM,
-        panel_height_mm=max(62.0, 4.2 * sum(len(choice.alternatives) + HEADING for choice in varied)),
     )
 
 
@@ -83,12 +93,22 @@ def _above(every: list[Under], where: np.ndarray, ends: np.ndarray, over: Over) 
             value, lo, hi = ends[of].T
             marks.append(Line(where[of], value, tr(label), style, lo, hi))
     return Panel(
-        Axis(tr("reading, sorted"), limits=(0, len(every) + 1)),
+        Axis(tr("reading, sorted"), limits=(-BESIDE * len(every), len(every) + 1)),
         Axis(tr("distance of the worst part, margins (cut at ± {furthest:g})", furthest=FURTHEST)),
-        (*marks, Reference(0.0, label=tr("as the paper says")), Reference(1.0, label=tr("beyond the margin"))),
+        (
+            *marks,
+            *_shipped(every, tr("as shipped")),
+            Reference(0.0, label=tr("as the paper says")),
+            Reference(1.0, label=tr("beyond the margin")),
+        ),
         title=f"{over.claim.id}: {over.sentence()}",
         direct=False,
     )
+
+
+def _shipped(every: list[Under], words: str) -> list[Reference]:
+    """A line at the reading of the shipped configs."""
+    return [Reference(float(n), "x", words) for n, one in enumerate(every, 1) if one.name == DEFAULT]
 
 
 def _below(varied: list[Choice], every: list[Under], where: np.ndarray) -> Panel:
@@ -106,10 +126,11 @@ def _below(varied: list[Choice], every: list[Under], where: np.ndarray) -> Panel
                 )
                 marks.append(Line(where[taken], np.full(taken.sum(), float(height)), "", style))
     return Panel(
-        Axis(tr("reading, sorted"), limits=(0, len(every) + 1)),
+        Axis(tr("reading, sorted"), limits=(-BESIDE * len(every), len(every) + 1)),
         Axis("", limits=(height - 1.0, 0.0), ticks=tuple(reversed(ticks))),
-        tuple(marks),
+        (*marks, *_shipped(every, "")),
         legend="none",
+        height_mm=AXIS_MM - ROW_MM * height,
     )
 
 
@@ -511,6 +532,8 @@ def _cell(text: str) -> str:
 
 # ---- forest ----------------------------------------------------------------------------------------------------------
 FURTHEST_IN_FOREST = 4.0  # margins: larger distances are drawn there
+STATEMENT = 56  # letters of a claim beside its row
+BEYOND, RIM = 4.35, 4.6  # where an arrow says so, and where the panel ends
 COLOURS = (5, 2, 4, GREY, 3, 1, 6)  # of the classes in their order: green, red, blue, grey, …
 STYLES = {
     kind: Style(colour=colour, dash=None, marker=i, size_pt=4.0)
@@ -524,7 +547,7 @@ def depth_in_forest(value: float, row: Mapping) -> float:
 
 
 def figure(rows: Sequence[Mapping]) -> Figure | None:
-    """All judged claims of these rows, a panel for each paper; None where there are none."""
+    """All judged claims of these rows, a panel of rows for each paper; None where there are none."""
     judged = [own for own in grouped(rows) if own[0]["class"] not in (NOT_RUN, NOT_JUDGED)]
     found = [(own, row) for own in judged if (row := worst(own)) is not None]
     papers = list(dict.fromkeys(own[0]["paper"] for own, _ in found))
@@ -539,47 +562,58 @@ def figure(rows: Sequence[Mapping]) -> Figure | None:
         caption=plural("Of {count} claim: {counted}. ", "Of {count} claims: {counted}. ", len(judged), counted=counted)
         + tr(
             "For each claim, the part furthest from the paper's words: the measured value with the judged "
-            "interval, and the exact value, in margins of that part, cut at ± {furthest:g}. Below 0 it "
-            "agrees with the words, up to 1 it is within their margin. The marker shows the claim's class "
-            "over all readings that its paper allows.",
+            "interval, and the exact value, in margins of that part; beside it the value itself. What lies beyond "
+            "± {furthest:g} is drawn there, with an arrow. Below 0 it agrees with the words, up to 1 it is within "
+            "their margin. The marker shows the claim's class over all readings that its paper allows.",
             furthest=FURTHEST_IN_FOREST,
         ),
         panels=tuple(panels),
         width_mm=PAGE_MM,
-        panel_height_mm=58.0,
     )
 
 
 def _panel(paper: str, found: Sequence[tuple[Sequence[Mapping], Mapping]]) -> Panel:
-    ticks, marks = [], []
-    for x, (own, _) in enumerate(found, 1):
-        key, _, number = own[0]["claim"].partition(".")
-        ticks.append((float(x), number))
+    """The claims of a paper: statement, distance, and at the right the value."""
+    key = found[0][0][0]["claim"].partition(".")[0]
+    ticks, marks, values = [], [], []
+    for y, (own, row) in enumerate(found):
+        statement = shorten(tr(own[0]["statement"]), STATEMENT, placeholder=" …", break_on_hyphens=False)
+        ticks.append((float(y), f"{statement}  {own[0]['claim'].partition('.')[2]}"))
+        values.append(Note(RIM, float(y), shown(row), "e"))
     for kind, style in STYLES.items():
-        of = [(x, row) for x, (own, row) in enumerate(found, 1) if own[0]["class"] == kind]
-        if of:
-            marks.append(_forest_line(kind, style, of))
+        of = [(y, row) for y, (own, row) in enumerate(found) if own[0]["class"] == kind]
+        marks += _forest_lines(kind, style, of) if of else []
     return Panel(
-        Axis(tr("claim of {paper}", paper=key), limits=(0, len(found) + 1), ticks=tuple(ticks)),
         Axis(
             tr("distance from the words, margins (cut at ± {furthest:g})", furthest=FURTHEST_IN_FOREST),
-            limits=(-FURTHEST_IN_FOREST - 0.3, FURTHEST_IN_FOREST + 0.3),
+            limits=(-RIM, RIM),
         ),
-        (*marks, Reference(0.0), Reference(1.0, label=tr("beyond the margin"))),
+        Axis("", limits=(len(found) - 0.4, -0.6), ticks=tuple(ticks)),
+        (*marks, *values, Reference(0.0, "x"), Reference(1.0, "x")),
         title=f"{key} {tr(paper)}",
         direct=False,
-        legend="right",
+        height_mm=AXIS_MM + ROW_MM * len(found),
     )
 
 
-def _forest_line(kind: str, style: Style, of: Sequence[tuple[int, Mapping]]) -> Line:
-    """The marks of one class: at the exact value where it is known."""
-    rows = [row for _, row in of]
-    ends = np.array([sorted(depth_in_forest(end, row) for end in bounds(row)) for row in rows])
+def _forest_lines(kind: str, style: Style, of: Sequence[tuple[int, Mapping]]) -> list[Line]:
+    """The marks of one class: values, intervals, exact values, and arrows where a value lies beyond the rims."""
+    y, rows = np.array([float(y) for y, _ in of]), [row for _, row in of]
     value = np.array([depth_in_forest(float(row["measured"]), row) for row in rows])
-    exact = [number(row["exact"]) for row in rows]
-    crosses = np.array(
-        [math.nan if one is None else depth_in_forest(one, row) for one, row in zip(exact, rows, strict=True)]
+    ends = np.array([sorted(depth_in_forest(end, row) for end in bounds(row)) for row in rows])
+    lo, hi = np.fmin(ends[:, 0], value), np.fmax(ends[:, 1], value)
+    known = [number(row["exact"]) for row in rows]
+    exact = np.array(
+        [math.nan if one is None else depth_in_forest(one, row) for one, row in zip(known, rows, strict=True)]
     )
-    lo, hi = np.minimum(ends[:, 0], value), np.maximum(ends[:, 1], value)
-    return Line(np.array([float(x) for x, _ in of]), value, tr(kind), style, lo, hi, crosses)
+    gap = np.full(len(y), math.nan)
+    marks = [
+        Line(value, y, tr(kind), style),
+        Line(np.ravel([lo, hi, gap], "F"), np.ravel([y, y, gap], "F"), "", replace(style, dash=0, marker=None)),
+    ]
+    marks += [Line(exact, gap, style=replace(style, dash=None), exact=y)] if np.isfinite(exact).any() else []
+    for sign, arrow in ((-1, 8), (1, 10)):
+        beyond = sign * value >= FURTHEST_IN_FOREST
+        look = replace(style, marker=arrow, size_pt=3.0)
+        marks += [Line(np.full(beyond.sum(), sign * BEYOND), y[beyond], "", look)] if beyond.any() else []
+    return marks

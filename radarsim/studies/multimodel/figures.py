@@ -3,6 +3,7 @@ consistency."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +23,7 @@ SIGMAS = {"y": (term("the height"), "$y$", "m"), "vy": (term("the rate of climb"
 RULES = ("moment", "best", "combined", "modified_combined")
 FAMILIES = {"gpb1": term("MMA1"), "imm": term("MMA2"), "gpb2": term("MMA3")}
 SPREAD = 0.5  # of the points of a stage, stages being one apart
+ACROSS = 60  # letters across the narrowest panel
 MOST_LOOKS = 8  # filters, each of a colour, dash and marker of its own
 DRAWN_FROM = {"families": ("stages",), "cost": ("stages", "operations")}
 
@@ -108,7 +110,7 @@ def _value(result: CaseResult, key: str, value: object) -> str:
     """A swept value: a number with its symbol and unit, a choice as it is called."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return f"{panels.symbol_of(result, key)} = {panels.with_its_unit(result, key, value)}"
-    return panels.number(value)
+    return panels.with_its_unit(result, key, value)
 
 
 def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
@@ -175,10 +177,19 @@ def _arrow(track: Line, at: int) -> str:
     return "→↗↑↖←↙↓↘"[round(float(turn) / (np.pi / 4)) % 8]
 
 
-def _stage_lines(results: Sequence[CaseResult]) -> tuple[Reference, ...]:
-    """The ends of the stages, where all cases have the same."""
-    ends = {result.spec.target.stage_ends_s for result in results}
-    return tuple(Reference(float(end), "x") for end in ends.pop()) if len(ends) == 1 else ()
+def _stage_lines(results: Sequence[CaseResult]) -> tuple[Reference | Note, ...]:
+    """The ends of the stages, and the names of all that are long enough, where all cases have the same."""
+    if len({result.spec.target.stages for result in results}) > 1:
+        return ()
+    stages, last = results[0].spec.target.stages, max(float(result.axes.t_s[-1]) for result in results)
+    ends = [float(stage.end_s) for stage in stages[:-1]]
+    if not ends:
+        return ()
+    marks: list[Reference | Note] = [Reference(end, "x") for end in ends]
+    for stage, (begin, end) in zip(stages, pairwise([0.0, *ends, last]), strict=True):
+        if len(name := tr(stage.name)) <= ACROSS * (end - begin) / last:
+            marks.append(Note((begin + end) / 2, np.nan, name, "top"))
+    return tuple(marks)
 
 
 def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str) -> Figure | None:

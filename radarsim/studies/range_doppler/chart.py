@@ -1,6 +1,7 @@
 """One chart for every radar: what the velocity gains over time and in the long run, and where a radar lies on it."""
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -26,7 +27,8 @@ LINES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)  # of c
 FINE = 40  # scans in the shorter of τ₁ and τ₂: the limit to a quarter of a point
 SETTLED = 12  # of τ₂, after which both filters are steady to a thousandth
 EARLIEST, LATEST = 0.1, 30.0  # of t/τ₁ that is shown
-LEVELS = (0, 10, 20, 30, 40, 50, 60, 70, 80, 90)  # of the map, per cent
+LEVELS = (0, 20, 40, 60, 80)  # of the map, per cent
+LEVEL_AT, LEVEL_APART = 5e-3, 0.45  # Λ of the lowest level's number, and the factor to that of the next
 MAP_C_THETA, MAP_LAMBDA = np.geomspace(1e-2, 1e4, 49), np.geomspace(1e-4, 10.0, 26)
 
 
@@ -291,17 +293,18 @@ def over_groups(own: Sequence[Place], known: Sequence[Place]) -> Figure:
                 )
             )
             marks += _level_note(exactly, level)
+        keys = []
         for n, one in enumerate([*own, *known]):
             style = Style(0, None, n, size_pt=6.0 if n < len(own) else 3.4)
             marks.append(Line(np.array([one.of.C_theta]), np.array([one.of.Lambda]), "", style, name=one.name))
-            marks.append(Note(one.of.C_theta, one.of.Lambda, one.name, "se" if n % 2 else "ne"))
+            keys.append((panels.literal(one.name), style))
         limits = (float(MAP_C_THETA[0]), float(MAP_C_THETA[-1]))
         rows = (float(MAP_LAMBDA[0]), float(MAP_LAMBDA[-1]))
         across, up = (
-            Axis("$C_\\theta = (\\tau_1/\\Delta t)^2$", "log", limits),
-            Axis("$\\Lambda = (\\Delta t/\\tau_2)^3$", "log", rows),
+            Axis(f"$C_\\theta = (\\tau_1/\\Delta t)^2$\n{tr('velocity coarse ← → fine')}", "log", limits),
+            Axis(f"{tr('scan period short ← → long')}\n$\\Lambda = (\\Delta t/\\tau_2)^3$", "log", rows),
         )
-        made.append(Panel(across, up, tuple(marks), tr(name)))
+        made.append(Panel(across, up, tuple(marks), tr(name), tuple(keys) if i == 0 else ()))
     caption = tr(
         "The limit of a short period is valid where Λ is small; above, a long period changes the gain. "
         "Steady gain of the velocity, in per cent along the lines, over C_θ = (τ₁/Δt)² and Λ = (Δt/τ₂)³. "
@@ -312,9 +315,14 @@ def over_groups(own: Sequence[Place], known: Sequence[Place]) -> Figure:
 
 
 def _level_note(places: np.ndarray, level: int) -> list[Mark]:
-    """The level written at its line, at a height of its own so that neighbours stand apart."""
-    at = 4 + level // 10 % 3
-    return [Note(float(np.exp(places[at])), float(MAP_LAMBDA[at]), f"{level}", "nw")] if np.isfinite(places[at]) else []
+    """The level written on its line, lower than the last so that neighbours stand apart; else at a third of it."""
+    inside, rows = np.isfinite(places), np.log(MAP_LAMBDA)
+    if not inside.any():
+        return []
+    wanted = math.log(LEVEL_AT) + LEVELS.index(level) * math.log(LEVEL_APART)
+    row = wanted if rows[inside][0] < wanted else float(np.quantile(rows[inside], 1 / 3))
+    at = float(np.interp(row, rows[inside], places[inside]))
+    return [Note(math.exp(at), math.exp(row), f"{level} %", "on")]
 
 
 def _last_crossing(x: np.ndarray, gain: np.ndarray, level: float) -> float:

@@ -9,6 +9,7 @@ import pytest
 
 import radarsim
 from radarsim.report import claims, html
+from radarsim.report.drawing import Note
 from radarsim.studies.multimodel import STUDY, words
 from radarsim.studies.multimodel.measures import Evidence
 
@@ -83,6 +84,10 @@ def test_figures_are_described(result):
     # `families` needs two families and rules.
     assert set(result.figures) == {*STUDY.keys().figure_names, "claims"} - {"families"}
     assert result.figure("trajectory") is not None
+    for panel in result._described["sigma_y"].panels:
+        tops = [(mark.text, mark.x) for mark in panel.marks if isinstance(mark, Note) and mark.place == "top"]
+        end = float(result.cases[0].axes.t_s[-1])
+        assert tops == [("start", 10), ("ballistic", 72.5), ("manoeuvre", 147.5), ("after", (170 + end) / 2)]
 
 
 def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):

@@ -10,6 +10,7 @@ import pytest
 
 from radarsim.app.compare import chart
 from radarsim.errors import ConfigError
+from radarsim.report.drawing import Note
 from radarsim.studies.range_doppler import chart as drawn
 from radarsim.studies.range_doppler import filters
 from tests.program import command
@@ -120,14 +121,16 @@ def test_ones_own_radar_is_named_and_marked(made):
 
 
 def test_the_lines_of_the_map_are_crossed_where_they_say():
-    """Each line of equal gain, read off the map's grid, has that gain by the solver."""
-    for component, level in ((0, 50), (1, 20), (2, 0), (2, 30)):
-        x = np.log(drawn.MAP_C_THETA)
-        for j in (3, 12, 22):
-            place = drawn._last_crossing(x, drawn.map_gains()[component, j], level)
-            if np.isfinite(place):
-                at = filters.exact_gains(np.array([np.exp(place)]), drawn.MAP_LAMBDA[j : j + 1])
-                assert at[component, 0] == pytest.approx(level, abs=0.4)
+    """The number of each line of equal gain stands at a place that has this gain by the solver."""
+    found = drawn.over_groups([], [])
+    levels = []
+    for component, panel in enumerate(found.panels):
+        notes = [mark for mark in panel.marks if isinstance(mark, Note)]
+        levels.append([note.text for note in notes])
+        for note in notes:
+            at = filters.exact_gains(np.array([note.x]), np.array([note.y]))
+            assert at[component, 0] == pytest.approx(float(note.text.removesuffix(" %")), abs=0.4)
+    assert levels == [["20 %", "40 %", "60 %", "80 %"]] * 2 + [["0 %", "20 %", "40 %", "60 %", "80 %"]]
 
 
 def test_the_page_is_whole_and_fetches_nothing(made):

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language import tr
-from radarsim.report import panels, seen, tables
+from radarsim.language import listed, term, tr
+from radarsim.report import panels, seen, tables, wording
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.sonar.clutter.filters import ClutterAxes
 from radarsim.studies.sonar.clutter.map import realisation_map
+from radarsim.studies.sonar.clutter.tables import ENDED
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,8 +21,12 @@ KEYS = {  # columns of the table of tracking, and the keys that they hold
     "detection_probability": "sensor.detection_probability",
     "gate_probability": "gate_probability",
 }
+LIFE = term("mean time between ends of a confirmed track (no point: no end occurred)")
+ENDS = term("probability, by importance sampling, that the target's first confirmed track has ended")
+ZERO_AWAY = 3.0  # from zero to the least value above it on a logarithmic axis, as a factor
+LEVEL = 0.02  # of its largest value: what changes less over a sweep is said, not drawn
 Results = Sequence[CaseResult[ClutterAxes]]
-DRAWN_FROM = {"confirmation": ("tracks",), "track_life": ("tracking", "curves"), "false_tracks": ("tracking",)}
+DRAWN_FROM = {"confirmation": ("tracks",), "track_life": ("tracking", "curves", "rare"), "false_tracks": ("tracking",)}
 
 
 def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, Figure | None]:
@@ -49,10 +54,19 @@ def middle(results: Results) -> CaseResult[ClutterAxes]:
     return results[(len(results) - 1) // 2]
 
 
-def axis_over(result: CaseResult[ClutterAxes], column: str, values: "pd.Series") -> Axis:
-    """An axis of swept values of a column of KEYS, logarithmic if they span more than a factor of twenty."""
-    least, most = float(np.min(values)), float(np.max(values))
-    return Axis(panels.axis_of(result, KEYS[column]), "log" if least > 0 and most / least > 20 else "linear")
+def axis_over(result: CaseResult[ClutterAxes], column: str, table: "pd.DataFrame") -> "tuple[Axis, pd.DataFrame]":
+    """An axis of the swept values of a column of KEYS, logarithmic if they span more than a factor of twenty, and the
+    rows with their places on it: zero stands left of the least one.
+    """
+    label, values = panels.axis_of(result, KEYS[column]), np.unique(table[column].to_numpy(float))
+    above = values[values > 0]
+    if not len(above) or above[-1] / above[0] <= panels.WIDE:
+        return Axis(label), table
+    if values[0] > 0:
+        return Axis(label, "log"), table
+    zero = above[0] / ZERO_AWAY
+    ticks = ((zero, "0"), *((float(value), wording.number(float(value), 4)) for value in above))
+    return Axis(label, "log", ticks=ticks), table.assign(**{column: table[column].replace(0.0, zero)})
 
 
 def swept_column(tracking: "pd.DataFrame") -> str | None:
@@ -117,27 +131,59 @@ def life_figure(results: Results, made: "Mapping[str, pd.DataFrame]") -> Figure 
     column = swept_column(tracking)
     if column is None:
         return None
-    rows, x = by_line(tracking, column, results[0]), axis_over(results[0], column, tracking[column])
-    shown = {
-        "life": ("life_s", Axis(tr("track life, s"), "log")),
-        "time": ("time_to_confirm_s", Axis(tr("time to confirmation, s"), limits=(0, None))),
-        "wrong": ("wrong_share", Axis(tr("share of wrong plots"), limits=(0, None))),
-    }
-    drawn = [Panel(x, y, tuple(_lines(rows, column, value, ends)), direct=False) for ends, (value, y) in shown.items()]
+    x, tracking = axis_over(results[0], column, tracking)
     curves = made["curves"]
-    at_end = tables.where(curves, component="r", k=results[0].axes.k[-1])
-    at_end = at_end.merge(tracking[["case", *KEYS]].drop_duplicates("case"), on="case", how="left")
-    y = Axis(tr("$\\sigma$ of $r$ of kept tracks, m"), limits=(0, None))
-    drawn.append(
-        Panel(x, y, tuple(_lines(by_line(at_end, column, results[0]), column, "sigma", "sigma")), direct=False)
+    cases = tracking[["case", *KEYS]].drop_duplicates("case")
+    at_end = tables.where(curves, component="r", k=results[0].axes.k[-1]).merge(cases, on="case", how="left")
+    ended = made["rare"][made["rare"]["sought"] & (made["rare"]["event"] == ENDED)] if "rare" in made else at_end[:0]
+    life = ("life_s", "life", Axis(tr("track life, s"), "log"), tracking, tr(LIFE))
+    if len(ended):
+        y = Axis(tr("share of tracks ended by the last scan"), "log")
+        life = ("rate", "rate", y, ended.merge(cases, on="case", how="left"), tr(ENDS))
+    time, wrong, sigma = (
+        Axis(words, limits=(0, None))
+        for words in (
+            tr("time to confirmation, s"),
+            tr("share of wrong plots"),
+            tr("$\\sigma$ of $r$ of kept tracks, m"),
+        )
     )
+    shown = (
+        life,
+        ("time_to_confirm_s", "time", time, tracking, tr("mean time to its confirmation")),
+        ("wrong_share", "wrong", wrong, tracking, tr("weight of false plots among those used")),
+        ("sigma", "sigma", sigma, at_end, tr("root-mean-square error of the range of the tracks kept at the end")),
+    )
+    drawn, said, level = [], [], []
+    for value, ends, y, table, words in shown:
+        lines = _lines(by_line(table, column, results[0]), column, value, ends)
+        if all(np.ptp(line.y) <= LEVEL * line.y.max() for line in lines if len(line.y)):
+            level += [_level(y.label, np.concatenate([line.y for line in lines]))]
+        else:
+            drawn.append(Panel(x, y, tuple(lines), direct=False))
+            said.append(words)
+    if not drawn:
+        return None
+    words = listed(said)
     caption = tr(
-        "Mean time between ends of a confirmed track (no point: no end occurred), mean time to its "
-        "confirmation, weight of false plots among those used, and root-mean-square error of the range "
-        "of the tracks kept at the end, of {realisations}. Bands: 95 % intervals.",
+        "{panels}, of {realisations}. Bands: 95 % intervals.",
+        panels=words[0].upper() + words[1:],
         realisations=panels.realisations(results),
     )
-    return Figure("track_life", tr("Track life and accuracy"), caption, tuple(drawn), 2, PAGE_MM, 58)
+    if level := [words for words in level if words]:
+        caption += " " + tr("Not drawn, as it does not change over the sweep: {quantities}.", quantities=listed(level))
+    columns = min(2, len(drawn))
+    width = panels.WIDE_MM if columns == 1 else PAGE_MM
+    return Figure("track_life", tr("Track life and accuracy"), caption, tuple(drawn), columns, width, 58)
+
+
+def _level(label: str, values: np.ndarray) -> str:
+    """A quantity that does not change, with its values (n,) over the trackers; empty where there is none."""
+    if not len(values):
+        return ""
+    name, _, unit = wording.spoken(label).rpartition(", ")
+    ends = dict.fromkeys(wording.number(float(end), 3) for end in (values.min(), values.max()))
+    return f"{name} ({'–'.join(ends)} {unit})"
 
 
 def _lines(table: "pd.DataFrame", x: str, value: str, ends: str) -> list[Line]:
@@ -168,7 +214,8 @@ def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
         "{realisations} per case. Bands: 95 % intervals.",
         realisations=panels.realisations(results),
     )
-    x, y = axis_over(results[0], column, rows[column]), Axis(tr("false tracks per hour"), "log")
+    x, rows = axis_over(results[0], column, rows)
+    y = Axis(tr("false tracks per hour"), "log")
     panel = Panel(x, y, tuple(_lines(rows, column, rate, "false")), direct=False)
     return Figure("false_tracks", tr("False tracks"), caption, (panel,), width_mm=panels.WIDE_MM)
 

@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 import radarsim
+from radarsim.report import wording
 from radarsim.studies.sonar.clutter import tables as report
 from radarsim.studies.sonar.clutter import words
 from radarsim.studies.sonar.clutter.kernels import tracker
@@ -110,6 +111,24 @@ def test_figures_are_those_of_the_experiment(result):
     assert names <= set(result.figures)
     for name in names:
         assert result.figure(name) is not None
+
+
+def test_what_does_not_change_over_a_sweep_is_said_and_rare_ends_are_drawn():
+    result = radarsim.run("sonar_clutter_ends", realisations=60)
+    figure = result._described["track_life"]
+    assert figure.panels[0].y.label == "share of tracks ended by the last scan"
+    assert "time to confirmation, s" not in {panel.y.label for panel in figure.panels}
+    table = result.tables["tracking"]
+    least, most = (
+        wording.number(float(end), 3) for end in (table["time_to_confirm_s"].min(), table["time_to_confirm_s"].max())
+    )
+    assert f"does not change over the sweep: time to confirmation ({least}–{most} s)" in figure.caption
+    rare = result.tables["rare"]
+    ended = rare[rare["sought"] & (rare["filter"] == "PDA")]
+    line = next(mark for mark in figure.panels[0].marks if mark.label == "PDA")
+    np.testing.assert_allclose(line.y, ended["rate"])
+    assert figure.panels[0].x.ticks[0] == (line.x[0], "0")  # zero has a place on the logarithmic axis
+    np.testing.assert_allclose(line.x, [1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
 
 
 def test_intervals_of_a_ratio_and_of_a_poisson_number_cover():
