@@ -86,7 +86,8 @@ def service_034(radar, place=None, turn_s=None):
 
 
 def position_021(time, latitude, longitude, **more):
-    """A report of ADS-B: 010, 040, 073 (time of reception), 080, 131 (fine position), and what is given."""
+    """A report of ADS-B: 010, 040, 073 (time of reception), 080, 131 (fine position), and what is given; items: bytes
+    by number, in place of these."""
     items = {
         1: b"\x19\x63",
         2: more.get("kind", b"\x00"),
@@ -108,7 +109,8 @@ def position_021(time, latitude, longitude, **more):
         items[29] = letters(more["callsign"])
     if "code" in more:
         items[19] = struct.pack(">H", more["code"])
-    return specified(items)
+    items |= more.get("items", {})
+    return specified({number: item for number, item in items.items() if item})
 
 
 def position_062(time, latitude, longitude, **more):

@@ -229,6 +229,18 @@ def test_radars_stand_where_they_say(tmp_path):
     np.testing.assert_array_equal(alone["x_m"], columns["x_m"][::3])
 
 
+def test_a_radar_that_does_not_know_where_it_stands_sends_zeros(tmp_path):
+    data = block(34, service_034((25, 10), (0, 0, 0))) + block(48, plot_048(1, track=1, level=400))
+    assert "x_m" not in imported(tmp_path, data)[1]
+
+
+def test_an_address_of_two_radars_is_two_tracks(tmp_path):
+    records = [plot_048(k, radar=(25, 10 + k % 2), address=0x4CA1FA) for k in range(4)]
+    done, _, tracks = imported(tmp_path, block(48, *records, plot_048(5, rho=0, address=0x4CA1FA)))
+    assert tracks == ["4ca1fa", "25/11:4ca1fa"] * 2
+    assert done.skipped == ["1 records without time or position"]
+
+
 def test_truth_of_the_radar_that_says_where_it_stands(tmp_path):
     data = block(34, service_034((25, 10), (52.3, 4.76, 12)))
     for k in range(30):
@@ -413,6 +425,23 @@ def test_category_021_to_the_last_step(tmp_path):
     }
     for name, column in SITE.seen(given).items():
         np.testing.assert_allclose(columns[name], column, rtol=1e-9, atol=1e-9)
+
+
+def test_category_021_what_else_it_may_say(tmp_path):
+    """A coarse position alone; a climb by the barometer; speed and climb beyond what the fields hold."""
+    coarse = {7: None, 6: b"".join(round(one * 2**23 / 180).to_bytes(3, "big") for one in (52.5, 4.76))}
+    records = [
+        position_021(1, 0, 0, items=coarse),
+        position_021(2, 52.5, 4.76, ground=(820 / 2**14, 0), items={24: struct.pack(">h", 320)}),
+        position_021(3, 52.5, 4.76, items={24: struct.pack(">H", 0x8000 | 320), 26: b"\xff\xff\x00\x00"}),
+    ]
+    _, columns, _ = imported(tmp_path, block(21, *records), Options(site=SITE))
+    np.testing.assert_allclose(columns["range_m"], columns["range_m"][1], atol=2)
+    moved = {"latitude_deg": 52.5, "longitude_deg": 4.76, "altitude_m": np.nan, "east_mps": 0.0}
+    moved |= {"north_mps": 820 / 2**14 * NM, "up_mps": 2000 * 0.3048 / 60}
+    seen = SITE.seen({name: np.array([one]) for name, one in moved.items()})
+    expected = [np.nan, seen["velocity_mps"][0], np.nan]
+    np.testing.assert_allclose(columns["velocity_mps"], expected, atol=1e-3)
 
 
 def test_ads_b_is_the_truth_before_the_tracks_of_a_centre(tmp_path):

@@ -88,12 +88,17 @@ def test_category_001_takes_its_time_from_the_sectors(tmp_path):
     def sector(time):
         return block(2, specified({1: b"\x19\x0a", 2: b"\x02", 4: round(time * 128).to_bytes(3, "big")}))
 
-    data = sector(40000.0) + block(1, plot(40001.0, 1, track=5), plot(40001.5, 0)) + sector(40448.0)
+    data = (
+        block(1, plot(39999.5, 1, track=6))
+        + sector(40000.0)
+        + block(1, plot(40001.0, 1, track=5), plot(40001.5, 0))
+        + sector(40448.0)
+    )
     data += block(1, plot(40449.25, 1, track=5))
     done, columns, tracks = imported(tmp_path, data, Options(zero="midnight"))
-    np.testing.assert_array_equal(columns["t_s"], [40001.0, 40001.5, 40449.25])
-    assert tracks == ["5", "", "5-2"]  # 448 s without a plot
-    np.testing.assert_allclose(columns["velocity_mps"], [-2 * NM / 256, np.nan, -2 * NM / 256])
+    np.testing.assert_array_equal(columns["t_s"], [39999.5, 40001.0, 40001.5, 40449.25])
+    assert tracks == ["6", "5", "", "5-2"]  # 448 s without a plot
+    np.testing.assert_allclose(columns["velocity_mps"], np.array([-2, -2, np.nan, -2]) * NM / 256)
     assert any("belong to no track" in note for note in done.notes)
 
 
