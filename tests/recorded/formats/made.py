@@ -130,7 +130,7 @@ def position_062(time, latitude, longitude, **more):
         items[18] = struct.pack(">h", round(more["height_ft"] / 6.25))
     if "coasted" in more:
         items[13] = b"\x01\x01\x01\x80"
-    return specified(items)
+    return specified(items | more.get("items", {}))
 
 
 def imported(tmp_path, data, options=PLAIN, name="recording"):

@@ -444,6 +444,21 @@ def test_category_021_what_else_it_may_say(tmp_path):
     np.testing.assert_allclose(columns["velocity_mps"], expected, atol=1e-3)
 
 
+def test_names_of_positions(tmp_path):
+    """ADS-B goes by address, tracks of a centre by their number; the address is a part of a long item."""
+    reports = [
+        position_021(1, 52.5, 4.76, address=0xA1, items={3: b"\0\7"}),
+        position_021(2, 52.5, 4.76, items={3: b"\0\7"}),
+    ]
+    _, _, tracks = imported(tmp_path, block(21, *reports), Options(site=SITE))
+    assert tracks == ["0000a1", "7"]
+    derived = (b"\x81\x01\x01\x08" + b"\x4c\xa1\xfa" + bytes(2), b"\x40" + bytes(6))
+    centre = [position_062(k, 52.5, 4.76, track=5, items={11: item}) for k, item in enumerate(derived)]
+    _, _, tracks = imported(tmp_path, block(62, *centre), Options(site=SITE))
+    assert tracks == ["5", "5"]
+    assert texts(tmp_path, "address") == [["4ca1fa", ""]]
+
+
 def test_ads_b_is_the_truth_before_the_tracks_of_a_centre(tmp_path):
     """Category 021 and, 2 km beside it, 062; test targets and coasted tracks are no truth."""
     data, truth = b"", b""
