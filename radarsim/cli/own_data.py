@@ -145,7 +145,9 @@ def simulate(
 )
 @click.option("--track", "tracks", multiple=True, metavar="ID", help="Only this track; repeatable.")
 @click.option(
-    "--truth", metavar="FILE", help="A recording of positions; adds columns true_…, matched by aircraft and time."
+    "--truth",
+    metavar="[ID=]FILE",
+    help="A recording of positions; adds columns true_…, matched by aircraft and time. ID=: of this track alone.",
 )
 @click.option(
     "--time-from",
@@ -199,17 +201,19 @@ def import_(
     from radarsim.cli import console
     from radarsim.recorded.formats import importing, sites
 
+    truth, whose = importing.truth_of(further["truth"])
     options = importing.Options(
         kind,
         *sites.sites_of(places),
         sites.antenna_of(antenna) if antenna else None,
         tracks,
         importing.zero_of(further["time_from"]),
-        further["truth"],
+        truth,
         further["doppler_towards"],
         importing.columns_of(further["columns"]),
         importing.encoding_named(further["encoding"]),
         further["keep_marked"],
+        whose,
     )
     with console.Counter("reading", "records") as counter:
         done = importing.import_recording(recording, output, options, counter.update)

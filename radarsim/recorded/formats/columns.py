@@ -68,6 +68,11 @@ QUANTITIES = {
     "velocity_mps": Quantity(("radial_velocity", "doppler", "radial_speed", "range_rate", "velocity"), SPEEDS, "m/s"),
     "span_mps": Quantity(("span", "ambiguity", "doppler_span"), SPEEDS, "m/s"),
 }  # fmt: skip
+IDENTITIES = {  # what identifies an aircraft or a ship, by the names of columns
+    "address": ("icao24", "icao", "hex", "mmsi", "address"),
+    "callsign": ("callsign", "flight"),
+    "mode_3a": ("squawk", "mode_3a", "mode3a", "ssr"),
+}
 UNITS = {unit for quantity in QUANTITIES.values() for unit in quantity.units if unit}
 UNNAMED = ("t_s", "date", "track")  # what a bracket says of these is no unit: Time (UTC)
 ON_EARTH = ("latitude_deg", "longitude_deg")
@@ -110,7 +115,8 @@ def _printable(name: str) -> str:
 class Header:
     """The columns of a file by our names, those assigned by the user first; raises ConfigError.
 
-    columns: by name of the quantity; on_earth: whether positions are read, not plots; aviation, maritime: whether
+    columns: by name of the quantity; identities: the indices of those in
+    IDENTITIES; on_earth: whether positions are read, not plots; aviation, maritime: whether
     names are of their customs.
     """
 
@@ -125,6 +131,11 @@ class Header:
         earth = all(self._has(ours) or POSITION in dict(self.stems) for ours in ON_EARTH)
         self.on_earth = earth and not any(ours in self.columns for ours in MEASURED)
         self._found(earth)
+        places = self._places()
+        named = {kind: [places[name] for name in names if name in places] for kind, names in IDENTITIES.items()}
+        self.identities = {kind: found[0] for kind, found in named.items() if found}
+        if "track" in self.columns and not self.identities:
+            self.identities["address"] = self.columns["track"].place  # one's own name of it
         self._judge()
 
     def _has(self, ours: str) -> bool:
@@ -148,9 +159,13 @@ class Header:
                 raise ConfigError(f"{self.path}:1: column {name}={theirs}: must have the unit of its own name, {own}")
             self.columns[ours] = self._column(ours, self.names.index(theirs), own or unit)
 
+    def _places(self) -> dict[str, int]:
+        """The index of each name, of the first column that has it."""
+        return {stem: i for i, (stem, _) in reversed(list(enumerate(self.stems)))}
+
     def _found(self, earth: bool) -> None:
         """The other columns, by the names that are known; earth: whether there are positions."""
-        places = {stem: i for i, (stem, _) in reversed(list(enumerate(self.stems)))}
+        places = self._places()
         left_out = (*MEASURED, "velocity_mps", "span_mps") if self.on_earth else ("speed_mps", "course_deg", *ON_EARTH)
         passed = {("velocity_mps", "velocity")} if earth else set()  # beside a position it is the speed over ground
         passed |= {("course_deg", BOW)} if self.maritime else set()

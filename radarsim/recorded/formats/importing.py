@@ -75,7 +75,9 @@ class Options:
     to write, all where empty. zero: origin of t_s, "first" (record), "midnight" (of the first record's day, UTC) or s
     from 1970. truth: a second recording, of positions. towards: Doppler speeds are positive where the range falls.
     columns: of a CSV, theirs by ours. encoding: of text that is neither UTF-8 nor UTF-16, Windows-1252 where none is
-    named. keep_marked: what is of no aircraft (asterix.NO_AIRCRAFT) is in tracks and truth too.
+    named. keep_marked: what is of no aircraft (asterix.NO_AIRCRAFT) is in tracks and truth too. whose: the track,
+    address, callsign or code of the plots whose truth is the one path of the second recording, for receivers that know
+    nothing of these.
     """
 
     format: Format | None = None
@@ -89,6 +91,7 @@ class Options:
     columns: Mapping[str, str] = field(default_factory=dict)
     encoding: str = ""
     keep_marked: bool = False
+    whose: str = ""
 
     @property
     def only_site(self) -> Site | None:
@@ -479,6 +482,7 @@ class _Truth:
         self.missed: dict[int, list[np.ndarray]] = {}  # range and bearing, and the range (n, 3), by aircraft
         self.own = options.truth is None
         self.paths = Paths()
+        self.whose, self.alone = options.whose.lower(), set[str]()
         self.of_day = False
         if self.own:
             self._read_own(path, options)
@@ -489,7 +493,11 @@ class _Truth:
                 self._read(reader)
             if not self.paths.paths:
                 raise ConfigError(f"{options.truth}: must have positions on the earth of aircraft with an address, a "
-                                  f"callsign or a code of their own; has {self.paths.unnamed} without")  # fmt: skip
+                                  f"callsign or a code of their own; has {self.paths.unnamed} without (if all are of "
+                                  f"one track ID of the plots: --truth ID={options.truth})")  # fmt: skip
+            if self.whose and len(self.alone) > 1:
+                raise ConfigError(f"{options.truth}: must be the path of one alone, as {options.whose}= says; has "
+                                  f"{', '.join(sorted(self.alone)[:MOST_LISTED])}")  # fmt: skip
 
     def _read_own(self, path: str, options: Options) -> None:
         """The positions beside the plots of one ASTERIX file; a stream, which is read once, has none."""
@@ -513,7 +521,15 @@ class _Truth:
                 continue
             seen = self.site.seen(batch.columns)
             table = np.stack([batch.columns["t_s"], *(seen[name] for name in LOCAL)], axis=-1)
-            self.paths.add(table, batch.track, identity_of(batch, reader))
+            self.alone.update(batch.track)
+            self.paths.add(table, batch.track, {"address": [self.whose] * len(table)} if self.whose else batch.identity)
+
+    def _identity(self, batch: Batch) -> Mapping[str, Sequence[str]]:
+        """What identifies plots; where the user says whose the path is, whether it is theirs."""
+        if not self.whose:
+            return batch.identity
+        names = zip(batch.track, *batch.identity.values(), strict=True)
+        return {"address": [self.whose if self.whose in map(str.lower, own) else "" for own in names]}
 
     def columns(self, batch: Batch, seen: Mapping[str, np.ndarray], reader: Reader) -> dict[str, np.ndarray]:
         """The truth at the times of plots (n,) seen there: range, bearing, velocity, place, speeds (n,)."""
@@ -525,7 +541,7 @@ class _Truth:
         for radar, own in grouped(batch.radar).items():
             site, one = self.sites.get(radar, self.site), batch.rows(own.tolist())
             t, r, b = one.columns["t_s"], seen["range_m"][own], seen["bearing_rad"][own]
-            found = self.paths.find(t, r, b, identity_of(one, reader), partial(site.turned, self.site))
+            found = self.paths.find(t, r, b, self._identity(one), partial(site.turned, self.site))
             states[own] = found.states
             self.kinds.update(found.kind[found.kind >= 0].tolist())
             missed = np.column_stack([offsets(found.states, r, b), r])
@@ -562,12 +578,6 @@ class _Truth:
         by = ", ".join(f"{KINDS[k]} {count}" for k, count in sorted(self.kinds.items()))
         share = f"{len(missed)} of {self.rows} plots ({len(missed) / self.rows:.0%}; by {by})"
         return [f"truth: of {share}, which lie {apart(missed[:, :2])} from it (median)"]
-
-
-def identity_of(batch: Batch, reader: Reader) -> dict[str, Sequence[str]]:
-    """What identifies each record, by KINDS; a table's tracks are named by their aircraft."""
-    addresses = batch.address if isinstance(reader, Asterix) or any(batch.address) else batch.track
-    return {"address": addresses, **batch.words}
 
 
 class _Sign:
@@ -640,6 +650,12 @@ def zero_of(text: str) -> str | float:
         return utc_s(text)
     except ValueError:
         raise ConfigError(f"time-from: must be first, midnight or a date and time (ISO 8601), got {text!r}") from None
+
+
+def truth_of(text: str | None) -> tuple[str | None, str]:
+    """The file and the owner of `[ID=]FILE`."""
+    whose, sign, path = (text or "").rpartition("=")
+    return (text, "") if not sign or os.path.exists(text or "") else (path, whose.strip())
 
 
 def encoding_named(name: str) -> str:

@@ -103,7 +103,7 @@ def _trace(document: dict[str, Any], sheet: Sheet) -> Iterator[list[str]]:
 
 def _aircraft(document: dict[str, Any], sheet: Sheet) -> Iterator[list[str]]:
     """A moment of readsb: what it knows of each aircraft, and how old that is."""
-    sheet.header = FLIGHT
+    sheet.header = [*FLIGHT, "callsign", "squawk"]
     now = _number(document.get("now"))
     for one in document["aircraft"]:
         one = one if isinstance(one, dict) else {}
@@ -112,7 +112,11 @@ def _aircraft(document: dict[str, Any], sheet: Sheet) -> Iterator[list[str]]:
         names = ("lat", "lon", "alt_geom", *(("",) * ground or ("alt_baro",)), "gs", *(("",) * ground or ("track",)))
         climb = one.get("geom_rate", one.get("baro_rate"))
         cells = [_text(one.get(name)) for name in ("hex", *names)]
-        yield ["" if math.isnan(time) else repr(time), *cells, _text(climb)]
+        yield [
+            "" if math.isnan(time) else repr(time),
+            *cells,
+            *map(_text, (climb, one.get("flight"), one.get("squawk"))),
+        ]
 
 
 def _states(document: dict[str, Any], sheet: Sheet) -> Iterator[list[str]]:

@@ -49,6 +49,11 @@ class Batch(NamedTuple):
     columns: dict[str, np.ndarray]
     words: Mapping[str, list[str]] = MappingProxyType({})
 
+    @property
+    def identity(self) -> dict[str, list[str]]:
+        """What identifies each record, by kind of identity."""
+        return {"address": self.address, **self.words}
+
     def rows(self, keep: list[int]) -> "Batch":
         """The rows with these indices."""
         track, address, radar, *words = (
@@ -78,6 +83,7 @@ class Gathered:
 
     kind: str
     names: tuple[str, ...]
+    words: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         self._empty()
@@ -85,24 +91,25 @@ class Gathered:
     def _empty(self) -> None:
         self.track: list[str] = []
         self.address: list[str] = []
-        self.radar: list[str] = []
         self.rows: list[tuple[float, ...]] = []
+        self.texts: list[tuple[str, ...]] = []
 
     def __len__(self) -> int:
         return len(self.rows)
 
-    def add(self, track: str, address: str, row: tuple[float, ...], radar: str = "") -> None:
-        """Add a record; row in the order of `names`."""
+    def add(self, track: str, address: str, row: tuple[float, ...], texts: tuple[str, ...] = ()) -> None:
+        """Add a record; row in the order of `names`, texts in that of `words`."""
         self.track.append(track)
         self.address.append(address)
-        self.radar.append(radar)
         self.rows.append(row)
+        self.texts.append(texts)
 
     def taken(self) -> Batch:
         """The records so far as a batch; the collection is emptied."""
         table = np.array(self.rows, dtype=float).reshape(-1, len(self.names))
         columns = dict(zip(self.names, table.T.copy(), strict=True))
-        batch = Batch(self.kind, self.track, self.address, self.radar, columns)
+        words = dict(zip(self.words, map(list, zip(*self.texts, strict=True)), strict=True))
+        batch = Batch(self.kind, self.track, self.address, [""] * len(self), columns, words)
         self._empty()
         return batch
 

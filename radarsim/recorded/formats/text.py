@@ -117,6 +117,7 @@ class Table:
         self.slashed: dict[str, str] = {}  # the first date of 1/2/2024 by what it shows: the order, or nothing
         self.before_it: dict[str, tuple[float, ...]] = {}  # the last position of each track
         self.joint = len({self.columns[ours].place for ours in ON_EARTH if ours in self.columns}) == 1
+        self.words = {kind: place for kind, place in self.header.identities.items() if kind != "address"}
         taken = {column.place for column in self.columns.values()}
         free = [] if "track" in self.columns else [i for i in range(self.width) if i not in taken]
         self.cells: dict[int, set[str]] = {i: set() for i in free}  # of columns that may name the aircraft
@@ -162,7 +163,7 @@ class Table:
         """The rows in batches; raises ConfigError with all faults, each with its line and column."""
         names = sites.POSITION_COLUMNS if self.kind == sites.POSITIONS else sites.PLOT_COLUMNS
         row_of: RowOf = self._position if self.kind == sites.POSITIONS else self._plot
-        gathered = sites.Gathered(self.kind, names)
+        gathered = sites.Gathered(self.kind, names, tuple(self.words))
         try:
             for line, cells in self.sheet.rows:
                 self.line = line
@@ -195,7 +196,9 @@ class Table:
                 self.skipped["rows that repeat the position before them"] += 1
                 return
             self.before_it[name] = row[1:3]
-        gathered.add(name, name.lower(), row)
+        whose = self.header.identities.get("address")
+        address = "" if whose is None else cells[whose].strip().lower()
+        gathered.add(name, address, row, tuple(cells[place].strip() for place in self.words.values()))
 
     def _position(self, cells: list[str]) -> tuple[float, ...]:
         """POSITION_COLUMNS of a row."""

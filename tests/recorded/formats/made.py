@@ -145,13 +145,13 @@ def imported(tmp_path, data, options=PLAIN, name="recording"):
     return done, columns, [row["track"] for row in rows]
 
 
-def refused(tmp_path, data, options=PLAIN):
-    """The lines of the fault; nothing is written."""
+def refused(tmp_path, data, options=PLAIN, beside=()):
+    """The lines of the fault; nothing is written beside what is there."""
     source, output = tmp_path / "recording", tmp_path / "plots.csv"
     source.write_bytes(data)
     with pytest.raises(ConfigError) as caught:
         import_recording(source, output, options)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["recording"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["recording", *beside])
     return [line.replace(f"{tmp_path}/", "") for line in caught.value.lines]
 
 

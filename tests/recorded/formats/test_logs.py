@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from radarsim.recorded.formats.importing import Options
+from radarsim.recorded.formats.importing import Options, truth_of
 from tests.recorded.formats.made import SITE, fuzz, imported, refused
 from tests.recorded.formats.test_importing import NM, local
 
@@ -254,15 +254,52 @@ def test_a_damaged_sentence_is_left_out(tmp_path):
     assert done.skipped == ["1 damaged sentences"]
 
 
-def test_a_log_of_the_way_is_the_truth_of_plots(tmp_path):
-    """A radar sees the ship that logged itself; the table names it as its log does."""
+SEEN = [float(np.linalg.norm(local(52.6 + STEP * (k + 0.45), 4.76, 20.5))) for k in range(4)]  # 5 s after each point
+
+
+@pytest.mark.parametrize("given", ["own.gpx", "1=own.gpx", "7=own.gpx", "4CA1FA=own.gpx", "9=own.gpx"])
+def test_a_log_of_the_way_is_the_truth_of_plots(tmp_path, given):
+    """By the name that both use, or whose it is said to be: a track, an address."""
     (tmp_path / "own.gpx").write_bytes(gpx([point(k) for k in range(6)]))
-    text = "Time,name,range [m],azimuth [deg]\n" + "".join(
-        f"2024-05-01T10:00:{10 * k + 5:02},Ferry,{np.linalg.norm(local(52.6 + STEP * (k + 0.45), 4.76, 20.5)):.3f},0\n"
-        for k in range(4)
+    path, whose = truth_of(given.replace("own.gpx", f"{tmp_path}/own.gpx"))
+    header, cells = {"": ("name", "Ferry"), "7": ("track", "7"), "4CA1FA": ("track_id,icao24", "7,4ca1fa")}.get(
+        whose, ("note", "x")
     )
-    _, columns, _ = imported(tmp_path, text.encode(), Options(site=SITE, truth=str(tmp_path / "own.gpx")))
+    rows = [f"2024-05-01T10:00:{10 * k + 5:02}Z,{cells},{r:.3f},0\n" for k, r in enumerate(SEEN)]
+    text = f"Time,{header},range [m],azimuth [deg]\n{''.join(rows)}".encode()
+    options = Options(site=SITE, truth=path, whose=whose)
+    if whose == "9":
+        (line,) = refused(tmp_path, text, options, beside=["own.gpx"])
+        assert "at that time and place; it has 9, the plots 1" in line
+        return
+    _, columns, _ = imported(tmp_path, text, options)
     np.testing.assert_allclose(columns["true_r_m"], columns["range_m"], atol=0.01)
+
+
+def test_a_log_is_of_nobody_until_that_is_said(tmp_path):
+    """A receiver knows no name; a file of several tracks is not of one."""
+    text, truth = b"Time,range [m]\n2024-02-01T00:00:05Z,34000\n", tmp_path / "truth"
+    truth.write_text(fixes())
+    (line,) = refused(tmp_path, text, Options(site=SITE, truth=str(truth)), beside=["truth"])
+    assert line.endswith("has 4 without (if all are of one track ID of the plots: --truth ID=truth)")
+    truth.write_bytes(gpx([point(1)]).replace(b"</gpx>", b"<trk>" + point(2).encode() + b"</trk></gpx>"))
+    (line,) = refused(tmp_path, text, Options(site=SITE, truth=str(truth), whose="1"), beside=["truth"])
+    assert "must be the path of one alone, as 1= says; has 2, Ferry" in line
+
+
+def test_callsigns_and_codes_of_tables_identify(tmp_path):
+    """Plots with a code, positions with addresses and codes: aircraft.json beside a table of a radar."""
+    lines = []
+    for k in range(6):
+        one = {"hex": "4ca1fa", "flight": "EIN1 ", "squawk": "1234", "lat": 52.6 + STEP * k, "lon": 4.76,
+               "alt_geom": 20.5 / FT, "seen_pos": 0}  # fmt: skip
+        lines.append(json.dumps({"now": 1_714_557_600.5 + 10 * k, "aircraft": [one]}))
+    (tmp_path / "truth").write_text("\n".join(lines))
+    for header, cells in (("squawk", "1234"), ("callsign", "ein1"), ("id,squawk", "5,1234")):
+        rows = [f"2024-05-01T10:00:{10 * k + 5:02}Z,{cells},{r:.3f},0\n" for k, r in enumerate(SEEN)]
+        text = f"Time,{header},range [m],azimuth [deg]\n{''.join(rows)}".encode()
+        _, columns, _ = imported(tmp_path, text, Options(site=SITE, truth=str(tmp_path / "truth")))
+        np.testing.assert_allclose(columns["true_r_m"], columns["range_m"], atol=0.01)
 
 
 # ---- spoiled files ---------------------------------------------------------------------------------------------------
