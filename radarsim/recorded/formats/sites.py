@@ -340,7 +340,7 @@ class Ais:
         self.skipped: Counter[str] = Counter()
         self.open: dict[bytes, list[tuple[bytes, float]]] = {}
         self.minute = Unrolled(60.0)
-        self.stamp = math.nan  # the last time that a line stated
+        self.stamp = math.nan  # the last time that a line stated, or that follows from it
         self.ahead = math.nan  # that of a line of time before the next sentence
         self.untimed = 0  # reports whose minute none states
 
@@ -348,7 +348,7 @@ class Ais:
         """How times were found where the lines do not state them."""
         if not self.untimed:
             return []
-        rest = "are made to run on" if math.isnan(self.stamp) else "are taken as nearest to the time stated before them"
+        rest = "are made to run on" if math.isnan(self.stamp) else "are taken as nearest to the times before them"
         return [f"{self.untimed} reports state no time: their seconds of the minute {rest}"]
 
     def batches(self) -> Iterator[Batch]:
@@ -449,7 +449,10 @@ class Ais:
         if math.isnan(t):
             self.untimed += 1
             near = self.stamp + (second - self.stamp + 30) % 60 - 30  # the nearest time with that second
-            t = self.minute(second) if math.isnan(near) else near
+            if math.isnan(near):
+                t = self.minute(second)
+            else:
+                t = self.stamp = near
         speed, course = float(message.speed), math.radians(float(message.course))
         known = speed <= NO_SPEED and float(message.course) < NO_COURSE
         east, north = (speed * KNOT_MPS * part(course) if known else math.nan for part in (math.sin, math.cos))

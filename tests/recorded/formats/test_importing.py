@@ -1,7 +1,9 @@
 """Recordings become plots: files made here byte by byte from the specifications, and read back to the last step."""
 
 import csv
+import functools
 import math
+import operator
 import struct
 
 import numpy as np
@@ -361,6 +363,54 @@ def test_ships_by_ais(tmp_path):
     (tmp_path / "plots.csv").unlink()
     (line,) = refused(tmp_path, b"!AIVDM,1,1,,A,broken,0*00\nnothing\n", Options(site=SITE))
     assert "must be AIS sentences" in line
+
+
+def ship(second, north=0.0):
+    """A report of a ship at 52.4 + north degrees at a second of the minute."""
+    pyais = pytest.importorskip("pyais")
+    report = {"msg_type": 1, "mmsi": 244660000, "lat": 52.4 + north, "lon": 4.3, "speed": 12.0, "course": 0.0}
+    (sentence,) = pyais.encode_dict({**report, "second": second}, talker_id="AI")
+    return sentence
+
+
+@pytest.mark.parametrize(
+    ("lines", "times", "note"),
+    [
+        (  # of a Gatehouse receiver: the line before each sentence
+            [f"$PGHP,1,{time},0,0,0,1,2C*5B\n{ship(8)}" for time in ("2020,12,31,23,59,58,239", "2021,1,1,0,0,9,7")],
+            [0, 10.768],
+            "",
+        ),
+        (
+            [ship(50), ship(10), "$GPZDA,1,2*00", ship(15)],
+            [0, 20, 25],
+            "3 reports state no time: their seconds of the minute are made to run on",
+        ),
+        (  # some have a time, and 1700000000 is 20 s past the minute
+            [f"\\c:1700000000*00\\{ship(19)}", ship(25), ship(50), ship(5)],
+            [0, 5, 30, 45],
+            "3 reports state no time: their seconds of the minute are taken as nearest to the times before them",
+        ),
+    ],
+)  # fmt: skip
+def test_times_of_ships(tmp_path, lines, times, note):
+    done, columns, _ = imported(tmp_path, "\n".join(lines).encode(), Options(site=SITE))
+    np.testing.assert_allclose(columns["t_s"], times, atol=1e-6)
+    assert [one for one in done.notes if "state no time" in one] == ([note] if note else [])
+    assert done.skipped == (["1 sentences other than AIS"] if "ZDA" in "".join(lines) else [])
+
+
+def test_a_report_in_two_sentences_has_the_time_of_the_first(tmp_path):
+    """A tag block stands before the first part only."""
+    lines = []
+    for k in range(3):
+        *_, payload, rest = ship(7, 0.001 * k).split(",")
+        bodies = f"AIVDM,2,1,{k},A,{payload[:20]},0", f"AIVDM,2,2,{k},A,{payload[20:]},{rest[0]}"
+        first, second = (f"!{body}*{functools.reduce(operator.xor, body.encode()):02X}" for body in bodies)
+        lines += [f"\\g:1-2-{k},s:r1,c:{1_700_000_000 + 20 * k}*00\\{first}", f"\\g:2-2-{k}*00\\{second}"]
+    done, columns, _ = imported(tmp_path, "\n".join(lines).encode(), Options(site=SITE))
+    np.testing.assert_allclose(columns["t_s"], [0, 20, 40])
+    assert not done.notes
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------
