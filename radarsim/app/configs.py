@@ -115,8 +115,19 @@ def new(
     try:
         files.create(path, text.encode())
     except FileExistsError:
-        raise ConfigError(f"{path}: already exists and is never overwritten; choose another name") from None
+        raise ConfigError(TAKEN.format(path=path)) from None
     return path
+
+
+TAKEN = "{path}: already exists and is never overwritten; choose another name"
+
+
+def writable(path: str) -> None:
+    """Check, before a long search, that a config can be written there. Raises ConfigError."""
+    if os.path.lexists(path):
+        raise ConfigError(TAKEN.format(path=path))
+    if not os.path.isdir(os.path.dirname(path) or "."):
+        raise ConfigError(f"{path}: cannot be written: there is no such folder")
 
 
 def schema_json() -> str:

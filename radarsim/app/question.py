@@ -293,14 +293,14 @@ def range_of(
         if key.whole:
             low, high = float(math.ceil(low)), float(math.floor(high))
             if low > high:
-                ends = " ".join(f"{end:g}" for end in between)
-                raise ConfigError(f"{argument('between')}: {name} takes whole numbers, and there is none from {ends}")
+                told = " ".join(f"{end:g}" for end in between)
+                raise ConfigError(f"{argument('between')}: {name} takes whole numbers, and there is none from {told}")
         return quantities.searched(low, high, key.whole)
     if math.isfinite(key.low) and math.isfinite(key.high) and not key.whole:
         return quantities.searched(key.low, key.high)
     if not values:
         what = "there is no value to search about" if key.value is None else f"is {key.value:g} in the config"
-        raise ConfigError(f"{name}: {what}, and its own range has no end: give {_between()}")
+        raise ConfigError(f"{name}: {what}, and its own range has no end: give {ends()}")
     if key.low >= 0:
         low, high = max(rounded(min(values) / factor), key.low), min(rounded(max(values) * factor), key.high)
         return quantities.searched(
@@ -310,7 +310,7 @@ def range_of(
     return quantities.searched(max(-size, key.low), min(size, key.high), key.whole)
 
 
-def _between() -> str:
+def ends() -> str:
     """The argument that sets the search range."""
     return argument("between=(low, high)", "--between LO HI")
 
@@ -496,6 +496,6 @@ def nearest(values: Sequence[float], asked: Question) -> float:
 def boundary(asked: Question, curve: Curve, x: float) -> tuple[str, ...]:
     """Whether the nearest value lies at an end of the search range, or of the config's bounds, in words."""
     if x in (asked.over.low, asked.over.high):
-        return (tr("the end of what was searched; {between} searches elsewhere", between=_between()),)
+        return (tr("the end of what was searched; {between} searches elsewhere", between=ends()),)
     beyond = [other for other in curve.refused if abs(other - x) <= 0.05 * abs(x)]
     return (term("the limit of what the config allows"),) if beyond else ()

@@ -10,7 +10,8 @@ import math
 import os
 import re
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -30,7 +31,7 @@ from radarsim.config.check import label
 from radarsim.config.document import did_you_mean
 from radarsim.config.experiment import Case, Experiment, complete
 from radarsim.config.fields import NumericKey
-from radarsim.config.load import flow
+from radarsim.config.load import flow, given
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError, argument
 from radarsim.language import few, plural, tr
@@ -53,7 +54,7 @@ CLOSE, ALIKE, TRIED = {True: 1e-7, False: 1e-2}, {True: 1e-12, False: 1e-6}, {Tr
 SIMPLEX = 0.5, 0.1  # first steps, one simplex after the other
 POINTS, PILOT_SHARE, PILOT_LEAST = 13, 8, 200  # of the scan of sampled values: values, and realisations of all
 NO_GAIN = 1e-3  # per cent or points of an exact gain that are called nothing
-NEAR_END = 0.01  # on the scale of the search
+NEAR_END = 0.01  # on the scale of the search, or of a linear one
 DIGITS = 6  # of a tuned value: there the quantity hardly changes with it
 WANTED = re.compile(
     r"(?P<name>[\w-]+)(?: +(?P<part>(?!at )\S.*?))??(?: +at +(?:(?P<s>[\d.eE+-]+) *s|k *=? *(?P<k>\d+)))?"
@@ -271,6 +272,18 @@ def parsed(wanted: str, chosen: str | None) -> Wanted:
         raise ConfigError(f"{argument('wanted', '--for')}: no time in s: {at_s}") from None
 
 
+@contextmanager
+def instead(names: Mapping[str, str]) -> Iterator[None]:
+    """Messages with these names of arguments in the place of others."""
+    try:
+        yield
+    except ConfigError as error:
+        lines = list(error.lines)
+        for old, new in names.items():
+            lines = [line.replace(old, new, 1) for line in lines]
+        raise ConfigError(*lines) from None
+
+
 def keys_of(case: Case, chosen: str, free: Mapping[str, tuple[float, float] | None]) -> tuple[Searched, ...]:
     """The keys that are searched: as named, each with its range or None; else all of the filter that are real numbers
     other than zero. Raises ConfigError."""
@@ -293,7 +306,8 @@ def keys_of(case: Case, chosen: str, free: Mapping[str, tuple[float, float] | No
         one = _searched(spec.members[i], plain, path, known[path], between)
         made += [] if one is None else [one]
     if not made:
-        raise ConfigError(f"{option}: filter {chosen!r} has no such key: name one of {', '.join(known)}")
+        near = ", ".join(path for path, one in known.items() if one.value is not None)
+        raise ConfigError(f"{option}: filter {chosen!r} states no real number other than zero: name one of {near}")
     if not free and len(made) > MOST_KEYS:
         names = few(list(dict.fromkeys(path.partition(".")[0] for path in wanted)), 8)
         raise ConfigError(f"{option}: filter {chosen!r} has {len(made)} keys to tune: name those to tune, of {names}")
@@ -318,7 +332,10 @@ def _searched(
         return Searched(path, ratio, quantities.searched(ratio / FACTOR, ratio * FACTOR), top)
     if key.value is None:
         raise ConfigError(f"{key.path}: has no value to begin from: {argument('overrides', '--set')} it")
-    over = question.range_of([key], key.path, between, FACTOR)
+    free = argument("free", "--free")
+    ranged = argument('free={"KEY": (LOW, HIGH)}', f"{free} KEY=LOW:HIGH")
+    with instead({question.ends(): ranged, argument("between"): free}):
+        over = question.range_of([key], key.path, between, FACTOR)
     if not key.whole and (key.low, key.high) == (0, 1) and between is None:
         rest = min(LEAST_SHARE, *(x / 10 for x in (key.value, 1 - key.value) if x > 0))
         over = Share(rest, 1 - rest, False)
@@ -416,9 +433,12 @@ def spread(of: Objective, best: Place) -> dict[Path, tuple[float, float]]:
     """The 95 % intervals of the best values, of real numbers: by how much they move without each of the batches.
 
     That is a Newton step from the best place, whose gradient is that of the others; nothing where the quantity has no
-    minimum there on this scale, as where it is flat or jumps.
+    minimum there on this scale, as where it is flat or jumps, or the search ended.
     """
-    searched = of.searched
+    searched = [
+        replace(one, over=replace(one.over, whole=True)) if at_end(one, x) else one
+        for one, x in zip(of.searched, best, strict=True)
+    ]
     at = np.array([one.over.inner(x) for one, x in zip(searched, best, strict=True) if not one.over.whole])
 
     def costs(u: np.ndarray) -> np.ndarray:
@@ -454,6 +474,12 @@ def spread(of: Objective, best: Place) -> dict[Path, tuple[float, float]]:
         _, lo, hi = interval(inner[1:], float(inner[0]))
         found[path] = over.outer(lo), over.outer(hi)
     return found
+
+
+def at_end(of: Searched, x: float) -> bool:
+    """Whether a value is at an end of what was searched."""
+    low, high, at = (of.over.inner(one) for one in (of.over.low, of.over.high, x))
+    return min(at - low, high - at) < NEAR_END * min(1.0, high - low)
 
 
 def parted(case: Case, asked: Sequence[Asked], count: int) -> np.ndarray:
@@ -494,11 +520,16 @@ def judged(of: Objective, names: Sequence[str], pairs: Sequence[np.ndarray]) -> 
 
 def family(config: Config, settings: Sequence[str], members: Sequence[str], names: Sequence[str]) -> list[Case]:
     """The cases over which a filter is tuned; members: settings of each. Raises ConfigError."""
-    cases = [
-        replace(case, name=f"{case.name} {member}".strip(), against=(), outside=())
-        for member in members
-        for case in load(config, [one for one in (*settings, member) if one]).cases
-    ]
+    cases, set_too = [], {one.partition("=")[0].strip() for one in settings}
+    for member in members:
+        key = member.partition("=")[0].strip()
+        if key in set_too:
+            raise ConfigError(f"{argument('over', '--over')}: {key} is given by {given(key)} too")
+        with instead({str(given(key)): argument("over", "--over")}):
+            experiment = load(config, [*settings, *([member] if member else [])])
+        cases += [
+            replace(case, name=f"{case.name} {member}".strip(), against=(), outside=()) for case in experiment.cases
+        ]
     for name in names:
         quantities.named(name, [case.name for case in cases], "case")
     return [case for case in cases if not names or case.name in names]
@@ -555,10 +586,14 @@ def tune(
     if isinstance(over, Mapping):
         over = [text for key, values in over.items() for value in values for text in configs.check({key: value})]
     configs.texts((*over, *free))
-    ranges = dict(map(_ranged, free.items() if isinstance(free, Mapping) else free))
-    members = [one if "=" in one else f"target={one}" for one in over] or [""]
+    ranges = dict(asked_for := [*map(_ranged, free.items() if isinstance(free, Mapping) else free)])
+    if len(ranges) < len(asked_for):
+        raise ConfigError(f"{argument('free', '--free')}: a key is given twice")
+    members = [*dict.fromkeys(one if "=" in one else f"target={one}" for one in over)] or [""]
     every = family(config, settings, members, [case] if isinstance(case, str) else case)
-    kind = quantities.checked(parsed(wanted, filter), every[0])
+    asked_at = dict.fromkeys((argument("at_k", "--at-k"), argument("at_s", "--at")), argument("wanted", "--for"))
+    with instead(asked_at):
+        kind = quantities.checked(parsed(wanted, filter), every[0])
     chosen = quantities.resolved(kind, quantities.labels(kind, every[0])).filter
     assert chosen is not None  # resolved
     for other in every:
@@ -574,7 +609,9 @@ def tune(
     for one in variants:
         asked = replace(quantities.checked(parsed(wanted, filter), one.base), filter=chosen)
         curves.append(Curve(one, "", asked, threads, progress, count))
-    exact = not sampled and all(curve.exact(quantities.labels(curve.quantity, curve.cases.base)) for curve in curves)
+    with instead(asked_at):
+        known = [curve.exact(quantities.labels(curve.quantity, curve.cases.base)) for curve in curves]
+    exact = all(known) and not sampled
     for one, curve in zip(variants, curves, strict=True):
         one.seed = one.seed if exact else (one.seed + TRAINING) % 2**64
         curve.cases.base = one.base = replace(one.base, seed=one.seed)
@@ -631,14 +668,14 @@ def _told(
     words = ["radarsim", "run", name, *(word for one in dict.fromkeys(sets) for word in ("--set", one))]
     axes = quantities.labels(quantity, of.curves[0].cases.base)
     judgements = judged(of, [one.name for one in every], pairs)
-    whole = {one.path: one.over.whole for one in searched}
+    held = {one.path for one, x in zip(searched, best, strict=True) if one.over.whole or at_end(one, x)}
     notes = [
         tr("{key} ends at {value}, the end of what was searched; --free KEY=LOW:HIGH searches elsewhere", **told)
         for one, x in zip(searched, best, strict=True)
         for told in [{"key": ".".join(map(str, one.path)), "value": shown(x)}]
-        if min(abs(one.over.inner(end) - one.over.inner(x)) for end in (one.over.low, one.over.high)) < NEAR_END
+        if at_end(one, x)
     ]
-    if not of.exact and any(path not in ranges and not whole.get(path) for path in found):
+    if not of.exact and any(path not in ranges and path not in held for path in found):
         notes.append(tr("no intervals of the values: the quantity is flat there, or too noisy to tell its curvature"))
     return Tuned(
         stem=case.stem,

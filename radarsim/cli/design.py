@@ -189,8 +189,13 @@ def tune(
     from radarsim.app import configs, documents
     from radarsim.app import tune as tuning
     from radarsim.cli import answers, console
+    from radarsim.errors import ConfigError
     from radarsim.report import wording
 
+    if write:
+        configs.writable(write)
+    if write and asked["overrides"]:
+        raise ConfigError("--write: writes CONFIG with the tuned values, without --set: put those into a config")
     with console.Progress(config, quiet=as_json, what="values") as progress:
         said = None if as_json else console.say_aside
         asked |= {"filter": filter_name, "threads": threads, "progress": progress.update, "notify": said}

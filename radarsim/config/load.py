@@ -479,6 +479,12 @@ def new(
     if (values or lost) and "include" in data and len(experiment.cases) == 1:  # values have their places in the whole
         (case,) = experiment.cases
         data = {"study": case.study, **case.keys, "realisations": case.realisations, "seed": case.seed}
+    elif "include" in data:
+        for top in {key.partition(".")[0] if "." in key else "filters" for key in values}:
+            each = [case.keys[top] for case in experiment.cases]
+            if any(one != each[0] for one in each):
+                raise ConfigError(f"{experiment.stem}: its cases differ in {top}: begin from a config that it includes")
+            data[top] = copy.deepcopy(each[0])
     for key, value in values.items():
         _put(data, key, value)
     return f"{name}.yaml", starter(data, studies.keys(experiment.study), name, experiment.stem)

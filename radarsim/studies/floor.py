@@ -35,7 +35,7 @@ ENUMERATION, REDUCTION = "enumeration", "information reduction"
 MOST_PATTERNS = 1 << 11  # of plots that came or not that are averaged over, the likeliest
 RAREST = 1e-4  # share of the realisations with an estimate, those of the worst patterns, that counts as nothing
 NOTHING = 1e-12  # of the greatest eigenvalue, of parameters in units of their own errors: nothing is known there
-ROUNDING = 1e-9  # of a variance
+ALIKE = 3e-4  # relative difference of variances that leaving out the worst patterns, and rounding, may make
 SEEN = 1e-9  # share of a component in what is not known, from which it has no bound
 
 
@@ -156,7 +156,7 @@ def missed(
                 variance[some] = np.where(known[some], np.nan_to_num(spreads(decomposed(J[some]), maps[k])) ** 2, 0.0)
                 averaged = over_patterns(share, variance, likely)
         sigma[k] = np.sqrt(np.fmax(averaged, reduced))
-        following = following and not (reduced > averaged * (1 + ROUNDING)).any()  # too many are left out
+        following = following and not (reduced > averaged * (1 + ALIKE)).any()  # too many are left out
         kinds.append(ENUMERATION if following else REDUCTION)
     blank = np.full(shape, np.nan)
     return Bound(np.where(sigma > 0, sigma, np.nan), np.stack([blank] * len(LAGS)), blank, tuple(kinds), False)
@@ -165,9 +165,9 @@ def missed(
 def over_patterns(share: np.ndarray, variance: np.ndarray, likely: np.ndarray | float) -> np.ndarray:
     """Mean (C,) of variances (S, C) over patterns with probabilities (S,), of `likely` ones (C,); see RAREST."""
     worst = np.argsort(-variance, axis=0, kind="stable")
-    rare = np.cumsum(share[worst], axis=0) <= RAREST * likely
-    made: np.ndarray = np.where(rare, 0.0, share[worst] * np.take_along_axis(variance, worst, axis=0)).sum(axis=0)
-    return made / likely
+    counted = np.clip(np.cumsum(share[worst], axis=0) - RAREST * likely, 0, share[worst])
+    made: np.ndarray = (counted * np.take_along_axis(variance, worst, axis=0)).sum(axis=0) / likely
+    return made
 
 
 def _likeliest(shares: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
@@ -230,7 +230,7 @@ def driven(
             averaged = over_patterns(share, np.diagonal(states, axis1=1, axis2=2)[:, :shown], 1.0)
         forward[k] = states[0]
         sigma[k] = np.sqrt(np.maximum(averaged, reduced))
-        following = following and not (reduced > averaged * (1 + ROUNDING)).any()
+        following = following and not (reduced > averaged * (1 + ALIKE)).any()
         kinds.append(ENUMERATION if following else REDUCTION)
     if chance < 1:
         blank = np.full(sigma.shape, np.nan)
