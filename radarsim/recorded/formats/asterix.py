@@ -348,7 +348,7 @@ class Asterix:
             if count := self.marked[mark]:
                 kept = "" if self.keep else ": in no track and no truth; --keep-marked keeps them there"
                 found.append(f"{count} records are marked {mark}{kept}")
-        if garbled := [f"{self.marked[mark]} with a {mark}" for mark in MARKS[4:] if self.marked[mark]]:
+        if garbled := [f"{self.marked[mark]} with a {mark}" for mark in MARKS[len(NO_AIRCRAFT) :] if self.marked[mark]]:
             found.append(f"{' and '.join(garbled)}, which is not used")
         if again := sum(one.again for one in self.tracks.values()):
             found.append(f"track numbers are given again to another aircraft {again} times: NUMBER-2 and so on")
@@ -389,7 +389,7 @@ class Asterix:
             held.places.extend(places)
             held.begins.append(held.size)
             held.times.append(clock(category.time(int.from_bytes(data[when : when + category.time_bytes], "big"))))
-        if held.begins and held.begins[-1] == held.size:
+        if held.begins and held.begins[-1] == held.size:  # there is a record of this block
             held.blocks.append(data)
             held.size += len(data)
 

@@ -11,6 +11,7 @@ from radarsim.recorded.formats import captures
 from radarsim.recorded.formats.importing import Options
 from radarsim.recorded.formats.numbering import Tracks
 from radarsim.recorded.formats.sites import Site
+from tests.program import command
 from tests.recorded.formats.made import (
     SITE,
     block,
@@ -320,8 +321,8 @@ def test_what_is_known_of_a_plot_is_kept(tmp_path):
         "1 with a garbled code and 1 with a garbled height, which is not used",
         "3 of 8 plots belong to no track; `radarsim track` skips them",
     ]
-    _, _, tracks = imported(tmp_path, block(48, *records), Options(keep_marked=True))
-    assert tracks == ["1", "A0012", *6 * ["1"]]
+    command("import", tmp_path / "recording", "-o", tmp_path / "plots.csv", "--keep-marked")
+    assert texts(tmp_path, "track") == [["1", "A0012", *6 * ["1"]]]
 
 
 def polar(north, east):
