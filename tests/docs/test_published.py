@@ -48,6 +48,11 @@ def test_there_is_one_version():
     assert {newest, cited, recipe()["package"]["version"]} == {radarsim.__version__}
 
 
+def test_the_changelog_has_at_most_forty_lines_a_version():
+    versions = re.split(r"^## ", text("CHANGELOG.md"), flags=re.M)[1:]
+    assert {one.split()[0]: lines for one in versions if (lines := len(one.splitlines())) > 40} == {}
+
+
 def test_the_conda_recipe_needs_what_the_package_needs():
     project, made = PROJECT["project"], recipe()
 
