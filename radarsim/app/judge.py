@@ -14,22 +14,29 @@ import numpy as np
 
 from radarsim.app import configs, run
 from radarsim.app.configs import CaseWork, Config, Overrides
+from radarsim.config.check import check
+from radarsim.config.document import Document, Faults, Origin
 from radarsim.config.experiment import Case, Experiment
+from radarsim.config.schema import OwnCode
 from radarsim.errors import ConfigError, DisagreementError, MeasureError, argument
 from radarsim.language import tr
 from radarsim.report import statistics
-from radarsim.studies import outside
+from radarsim.studies import outside, registry
 from radarsim.studies.interface import TRUE, true_column
 from radarsim.studies.outside import Called, Chunks, Given, Outside, Plan, Plots
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from radarsim.app.result import Result
 
 TRIED = 256  # realisations on which a filter is checked before it is judged
 MATERIAL = 1e-3  # of a component's rms error: changes below it are rounding, which also float32 makes
 FOLLOWS = 50  # realisations from which on it is tested whether errors follow the plots
 REARRANGED = 10.0  # times: by so much smaller are errors in another order only where that is the right one
+FACTORS = 1e3, 1e-3, -1.0, 3.6, 1 / 3.6, 180 / np.pi, np.pi / 180  # by which values in another unit are right
 AXES = "realisation", "k", "t_s"  # columns of a table of estimates beside the components
+ROUNDED = 1e-3  # of the time between scans: so far a time in a table may be from that of the plots
 
 
 def judge(
@@ -128,8 +135,7 @@ def judged(
         from radarsim.app import tune
 
         experiment, left_out = tune.beside(experiment, wanted, realisations=realisations)
-    if not isinstance(name, str) or not name.strip() or "/" in name or name.startswith("."):
-        raise ConfigError(f"name: must be the name of a filter, got {name!r}")
+    _nameable(name)
     n, cases = configs.whole(realisations), experiment.cases
     member = source(estimates, name, tuple(components), one_by_one, cases)
     there = len(member.arrays[0]) if isinstance(member, Given) else None
@@ -146,10 +152,8 @@ def source(given: Any, name: str, components: tuple[str, ...], one_by_one: bool,
     """Where the estimates come from. Raises ConfigError for what is none of the kinds."""
     if isinstance(given, Outside):
         return given
-    if callable(given) or hasattr(given, "step"):
-        if hasattr(given, "step") != hasattr(given, "start"):
-            raise ConfigError(f"{name}: a filter that is asked scan by scan must have start(world) and step(plots)")
-        components = components or tuple(getattr(given, "components", ()))
+    if callable(given) or hasattr(given, "step") or hasattr(given, "start"):
+        components = components or outside.components_of(given)
         of = given if hasattr(given, "__qualname__") else type(given)
         return Called(name, given, f"{of.__module__}.{of.__qualname__}", components, one_by_one)
     if len(cases) > 1:
@@ -159,15 +163,24 @@ def source(given: Any, name: str, components: tuple[str, ...], one_by_one: bool,
         return Chunks(name, given, "iterator", components)
     if isinstance(given, str | os.PathLike):
         given, components = read(Path(given), cases[0], components)
-    given, P = given if isinstance(given, tuple) and len(given) == 2 else (given, None)
-    x, P = np.asarray(given), None if P is None else np.asarray(P)
+    x, P = outside.copied(given)
     if x.ndim not in (2, 3) or x.dtype.kind not in "fiu":
-        raise ConfigError(
-            f"{name}: estimates must be an array (n, K, d), a function, an iterator or a file, got {given!r:.60}"
-        )
+        got = f"{x.dtype} {x.shape}" if x.ndim else f"{given!r:.60}"
+        raise ConfigError(f"{name}: estimates must be an array (n, K, d), a function, an iterator or a file, got {got}")
+    if P is not None and len(P) != len(x):
+        raise ConfigError(f"{name}: covariances must be of {len(x)} realisations, as the estimates, got {len(P)}")
     found = hashlib.sha256(np.ascontiguousarray(x).tobytes())
     found.update(b"" if P is None else np.ascontiguousarray(P).tobytes())
     return Given(name, (x, P), found.hexdigest(), components)
+
+
+def _nameable(name: str) -> None:
+    """Raises ConfigError where no filter, or no folder of results, can be called so."""
+    faults, origin = Faults(), Origin(argument("name"), key="name")
+    check(OwnCode, Document({"name": name, "python": ""}, "judge", None, {(): origin}), faults)
+    faults.raise_if_any()
+    if "/" in name or name.startswith("."):
+        raise ConfigError(f"{origin}: must be no path, got {name!r}")
 
 
 def command(
@@ -193,9 +206,10 @@ def read(path: Path, case: Case, components: tuple[str, ...]) -> tuple[Any, tupl
         if path.suffix not in (".csv", ".parquet"):
             raise ConfigError(f"{path}: must end in .npz, .csv or .parquet")
         table = pd.read_csv(path, comment="#") if path.suffix == ".csv" else pd.read_parquet(path)
-        return _of_table(path, {str(one): table[one].to_numpy() for one in table}, case)
-    except (OSError, ValueError, TypeError, ImportError, BadZipFile) as error:
-        raise ConfigError(f"{path}: cannot be read: {error}") from error
+        return _of_table(path, table.rename(columns=lambda name: str(name).strip()), case)
+    except (OSError, EOFError, ValueError, TypeError, ImportError, BadZipFile) as error:
+        why = "it is no .npz archive, or cut short" if "allow_pickle=" in str(error) else error or "it is empty"
+        raise ConfigError(f"{path}: cannot be read: {why}") from error
 
 
 def _of_arrays(
@@ -212,29 +226,51 @@ def _of_arrays(
             f"{path}: realisation: must be {len(x)} numbers, as many as there are estimates, got {len(rows)}"
         )
     order = _in_order(path, rows)
-    own = tuple(map(str, held["components"])) if "components" in held else components
-    return (x[order], P[order]) if P is not None else x[order], own
+    own = tuple(map(str, np.atleast_1d(held["components"]))) if "components" in held else components
+    return (x[order], P[order] if len(P) == len(x) else P) if P is not None else x[order], own
 
 
-def _of_table(path: Path, held: Mapping[str, np.ndarray], case: Case) -> tuple[Any, tuple[str, ...]]:
+def _of_table(path: Path, table: "pd.DataFrame", case: Case) -> tuple[Any, tuple[str, ...]]:
     """One row a realisation and scan: `realisation`, `k` or `t_s`, and a column for each component."""
-    state = CaseWork(case).plan.axes.components
+    world = outside.prepare(registry.study(case.study), case, CaseWork(case).plan).world
     columns = {
-        name: one for name in held for one, unit in state if name in (one, true_column(one, unit).removeprefix(TRUE))
+        name: one
+        for name in table
+        for one, unit in world.components
+        if name in (one, true_column(one, unit).removeprefix(TRUE))
     }
-    scan = next((held[one] for one in AXES[1:] if one in held), None)
-    if "realisation" not in held or scan is None or not columns:
-        wanted = f"realisation, k or t_s, and of {', '.join(one for one, _ in state)} those it estimates"
-        raise ConfigError(f"{path}: must have the columns {wanted}; got {', '.join(held)}")
-    rows, K = np.lexsort((scan, held["realisation"])), len(np.unique(scan))
-    numbers = held["realisation"][rows]
-    if len(rows) % K or (numbers.reshape(-1, K) != numbers[::K, None]).any():
-        short = next(i for i, n in zip(*np.unique(numbers, return_counts=True), strict=True) if n != K)
-        raise ConfigError(f"{path}: realisation {short}: must have a row for each of the {K} scans, empty "
-                          f"cells where there is no estimate")  # fmt: skip
-    order = _in_order(path, numbers[::K])
-    x = np.stack([held[name][rows].astype(float).reshape(-1, K) for name in columns], axis=-1)
+    at = next((one for one in AXES[1:] if one in table), "")
+    if "realisation" not in table or not at or not columns:
+        wanted = f"realisation, k or t_s, and of {', '.join(one for one, _ in world.components)} those it estimates"
+        raise ConfigError(f"{path}: must have the columns {wanted}; got {', '.join(map(str, table))}")
+    held = {name: _numbers(path, table, name) for name in ("realisation", at, *columns)}
+    K, places = len(world.t_s), np.arange(1, len(world.t_s) + 1.0) if at == "k" else world.t_s
+    scan = np.searchsorted((places[1:] + places[:-1]) / 2, held[at])
+    off = np.abs(held[at] - places[scan]) > ROUNDED * np.diff(places).min(initial=np.inf)
+    if off.any():
+        ends = f"{places[0]:g} … {places[-1]:g}"
+        raise ConfigError(f"{path}: {at}: must be one of the {K} scans of the plots, {ends}, got {held[at][off][0]:g}")
+    rows = np.lexsort((scan, held["realisation"]))
+    each, counts = np.unique(held["realisation"], return_counts=True)
+    if (counts != K).any() or (scan[rows].reshape(-1, K) != np.arange(K)).any():
+        odd = each[counts != K] if (counts != K).any() else each[(scan[rows].reshape(-1, K) != np.arange(K)).any(1)]
+        raise ConfigError(f"{path}: realisation {odd[0]:g}: must have a row for each of the {K} scans, empty cells "
+                          f"where there is no estimate")  # fmt: skip
+    order = _in_order(path, each)
+    x = np.stack([held[name][rows].reshape(-1, K) for name in columns], axis=-1)
     return x[order], tuple(columns.values())
+
+
+def _numbers(path: Path, table: "pd.DataFrame", name: str) -> np.ndarray:
+    """A column as numbers, not-a-number where it is empty."""
+    import pandas as pd
+
+    numbers = pd.to_numeric(table[name], errors="coerce")
+    wrong = numbers.isna() & (table[name].notna() | (name in AXES))
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise ConfigError(f"{path}: row {row + 1}, {name}: must be a number, got {table[name].iloc[row]!r}")
+    return numbers.to_numpy(dtype=float)
 
 
 def _in_order(path: Path, rows: np.ndarray) -> np.ndarray:
@@ -267,9 +303,10 @@ def tried(case: Case, member: Outside) -> list[str]:
     rms = np.sqrt(_mean(np.square(found.error), (0, 1)))[places]
     lines = []
     if raw.dtype.kind == "f" and raw.dtype.itemsize < np.dtype(float).itemsize:
-        step = float(np.nanmax(np.spacing(np.nanmax(np.abs(raw.reshape(-1, x.shape[2])), axis=0)) / rms))
-        lines.append(tr("{name}: estimates are {type}, rounded by up to {share:.1g} of their rms error",
-                        name=member.name, type=str(raw.dtype), share=step))  # fmt: skip
+        largest = np.abs(raw.reshape(-1, x.shape[2])).max(0, where=np.isfinite(x).reshape(-1, x.shape[2]), initial=0)
+        step = float(np.nan_to_num(np.spacing(largest) / rms).max())
+        lines += [tr("{name}: estimates are {type}, rounded by up to {share:.1g} of their rms error",
+                        name=member.name, type=str(raw.dtype), share=step)] if step else []  # fmt: skip
     if not isinstance(member, Given | Chunks):
         if any(not np.array_equal(plots[one], drawn.columns[one], equal_nan=True) for one in drawn.columns):
             lines.append(tr("{name}: changes the plots it is given; it gets copies", name=member.name))
@@ -334,7 +371,8 @@ def _repeatable(plan: Plan, member: Any, x: np.ndarray, least: np.ndarray) -> It
 def _rearranged(
     plan: Plan, member: Outside, x: np.ndarray, truth: np.ndarray, places: Sequence[int], inner: np.ndarray
 ) -> None:
-    """Raises ConfigError where estimates fit in another order of components or scans, and not as they stand."""
+    """Raises ConfigError where estimates fit in another order of components or scans, or in another unit, and not as
+    they stand."""
     with np.errstate(all="ignore"):
         scale = _typical(np.abs(inner))[list(places)]
 
@@ -349,6 +387,9 @@ def _rearranged(
         every = [(range(d), 1), (range(d), -1), *((order, 1) for order in swaps)]
         fits = np.nan_to_num([misfit(*one) for one in every], nan=np.inf)
         better = fits[0] - fits.min()
+        off = np.array([_typical(np.abs(x * by - truth[..., list(places)])) for by in (1.0, *FACTORS)])
+        least = np.maximum(off[1:], 1e-3 * scale)
+        ratios = np.nan_to_num(np.minimum(off[0], _typical(np.abs(truth[..., list(places)]))) / least, nan=0.0)
     order, step = every[int(fits.argmin())]
     if better > np.log(REARRANGED):
         stand = (
@@ -359,6 +400,12 @@ def _rearranged(
         by, wanted = np.exp(better), ", ".join(plan.names[i] for i in places)
         raise ConfigError(f"{member.name}: estimates hold {stand}: their errors are then {by:.2g} times smaller; "
                           f"expected {wanted} by rising scans")  # fmt: skip
+    if ratios.max() > REARRANGED:
+        f, i = np.unravel_index(int(ratios.argmax()), ratios.shape)
+        component, unit = plan.axes.components[places[int(i)]]
+        by, times = f"{FACTORS[int(f)]:.4g}", f"{ratios.max():.2g}"
+        raise ConfigError(f"{member.name}: estimates of {component} must be in {unit}, with the sign of the truth: "
+                          f"multiplied by {by} their errors are {times} times smaller")  # fmt: skip
 
 
 def _follows(case: Case, member: Outside, error: np.ndarray, inner: np.ndarray) -> None:

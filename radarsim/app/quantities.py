@@ -93,6 +93,8 @@ def checked(wanted: Wanted, case: Case) -> Asked:
             raise ConfigError(f"{argument(of.name, of.option)} names the filter itself: leave {argument('filter')} out")
         chosen, component = component if chosen is None else chosen, None
     if chosen is not None:
+        if chosen in [one.name for one in case.outside]:
+            raise ConfigError(f"{chosen} is a filter of your own code: only those of the study are asked here")
         named(chosen, [member.name for member in case.spec.members])
     return Asked(of, chosen, component, at_s, at_k)
 

@@ -89,7 +89,10 @@ class Signals:
         if self.received is not None:
             raise Interrupted(self.received)
 
+    inside = False  # whether one is entered
+
     def __enter__(self) -> "Signals":
+        Signals.inside = True
         self._alone = forbidden()
         if self._alone:
             self._before = {number: signal.signal(number, self._handle) for number in (*self.numbers, signal.SIGALRM)}
@@ -103,6 +106,7 @@ class Signals:
         return self
 
     def __exit__(self, *_: object) -> None:
+        Signals.inside = False
         for number, handler in self._before.items():
             signal.signal(number, handler)
         if self._alone:
@@ -145,6 +149,18 @@ class Signals:
 
 def _noted(number: int, frame: object) -> None:
     """The pipe has it already."""
+
+
+def _of_a_fork() -> None:
+    """A process that somebody's code forks is ended by its signals, of which this one does not learn."""
+    if Signals.inside:
+        signal.set_wakeup_fd(-1)
+        for number in Signals.numbers:
+            signal.signal(number, signal.SIG_DFL)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_of_a_fork)
 
 
 # ---- run -------------------------------------------------------------------------------------------------------------

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 Made = Mapping[str, "pd.DataFrame"]
 ROUNDING = 1e-6  # per cent: half-width of a gain that is nought but for rounding, whose variance is a difference
+IMPROPER = "not_positive_definite"  # covariances, counted after the reasons
+SINGLE = 1e-3  # per cent: width of the interval of a gain that is nought but for rounding to single precision
 TUNED = ", tuned"  # the end of the names of filters that `radarsim tune` has tuned
 GAIN = ("gain_percent", "gain_lo", "gain_hi")
 
@@ -73,14 +75,18 @@ def failures(result: CaseResult) -> common.Columns:
     """How often a filter from outside fails, by the reason; σ and gains are of the other realisations.
 
     reason: `any`, or `not_a_number` after an estimate, `no_estimate` though a filter of the config has one, `diverged`
-        with an error over a hundred times the largest of the config's filters in the realisation
+        with an error over a hundred times the largest of the config's filters in the realisation; no failure, but no
+        part of NEES, is `not_positive_definite`, a covariance
     failed: realisations
     share ±: of all realisations
     """
     rows = []
     for one in others(result):
-        for name, counts in zip(one.axes.filters, np.asarray(one.sums["failures"]), strict=True):
-            for reason, count in (("any", counts[:3].sum()), *zip(REASONS, counts[:3], strict=True)):
+        given = (np.asarray(one.sums["nees"])[..., 0] > 0).sum(1)
+        for f, (name, counts) in enumerate(zip(one.axes.filters, np.asarray(one.sums["failures"]), strict=True)):
+            for reason, count in (("any", counts[:3].sum()), *zip((*REASONS, IMPROPER), counts, strict=True)):
+                if reason == IMPROPER and not (count or given[f]):
+                    continue
                 share = statistics.rate(count, one.count)
                 row = {"case": one.name, "filter": name, "reason": reason, "n": one.count, "failed": int(count)}
                 rows.append(row | {"share": statistics.Estimate(*map(float, share))})
@@ -117,7 +123,7 @@ def added(made: Made, results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]
     rows = {"curves": _below(made["curves"], curves), "gains": against}
     rows = notes.noted(rows, [*results, *outside], exact=False)
     if "note" in rows["gains"]:  # of a filter that equals one of the config but for rounding
-        equal = rows["gains"]["gain_hi"] - rows["gains"]["gain_lo"] < 4 * ROUNDING
+        equal = rows["gains"]["gain_hi"] - rows["gains"]["gain_lo"] < SINGLE
         rows["gains"]["note"] = rows["gains"]["note"].mask(equal, "")
     rows["curves"] = rows["curves"].tail(len(curves))
     if "note" in rows["curves"] and not rows["curves"]["note"].any():
@@ -204,7 +210,9 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
     rows = common.where(made["gains"], case=result.name, filter=name)
     fails, *why = common.where(made["failures"], case=result.name, filter=name).to_dict("records")
     share = wording.share(*(100 * fails[key] for key in ("share", "share_lo", "share_hi")))
-    reasons = listed([f"{tr(REASONS[one['reason']])} {one['failed']:,}" for one in why if one["failed"]])
+    reasons = listed(
+        [f"{tr(REASONS[one['reason']])} {one['failed']:,}" for one in why if one["failed"] and one["reason"] in REASONS]
+    )
     failing = tr("{name} fails in {share} of the realisations ({reasons})", name=name, share=share, reasons=reasons)
     if not len(rows):
         none = tr("{name} has no estimate that could be compared", name=name)
@@ -236,12 +244,14 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
             first += tr(", and worse than {best}: gain {gain}", **told)
         else:
             first += tr(", and cannot be told from {best}: gain {gain}", **told)
-        first += tr(", whose σ is {sigma}", sigma=f"{sigma[rival['baseline']]:.4g} {panels.unit_of(unit)}".rstrip())
+        own_sigma = f"{wording.number(sigma[rival['baseline']])} {panels.unit_of(unit)}"
+        first += tr(", whose σ is {sigma}", sigma=own_sigma.rstrip())
     mine = curves[curves["filter"] == name].iloc[0]
     sigmas = wording.estimate((mine[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(unit))
     said = [start + first + "; " + tr("its σ is {sigma}, {floor}.", sigma=sigmas, floor=_floor(curves, best, unit))]
     floor = common.where(made["floor"], case=result.name, component=component, k=last["k"].iloc[0])
-    said += _above_floor(floor, {name: mine["sigma"]} | {one: sigma[one] for one in rivals}, panels.unit_of(unit))
+    sigmas_there = {name: mine["sigma"]} | {one: sigma[one] for one in rivals}
+    said += _above_floor(floor, sigmas_there, float(mine["sigma_hi"]), panels.unit_of(unit))
     against = [f"{one['baseline']} {wording.estimate((one[key] for key in GAIN), '%', '.3g')}"
                for one in last.to_dict("records") if one["baseline"] != best]  # fmt: skip
     if against:
@@ -261,22 +271,25 @@ def _floor(curves: "pd.DataFrame", best: str, unit: str) -> str:
     if np.isnan(row["exact_sigma"]):
         return tr("that of {best} {sigma}", best=best, sigma=wording.estimate(
             (row[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(unit)))  # fmt: skip
-    return tr("that of {best} {sigma} {unit} exactly", best=best, sigma=f"{row['exact_sigma']:.4g}",
+    return tr("that of {best} {sigma} {unit} exactly", best=best, sigma=wording.number(row["exact_sigma"]),
               unit=panels.unit_of(unit))  # fmt: skip
 
 
-def _above_floor(floor: "pd.DataFrame", sigmas: Mapping[str, float], unit: str) -> Iterator[str]:
+def _above_floor(floor: "pd.DataFrame", sigmas: Mapping[str, float], sigma_hi: float, unit: str) -> Iterator[str]:
     """How far the filter from outside, the first of these σ, the config's best, and the best tuned one are from the
-    floor."""
+    floor. sigma_hi: the upper end of its interval."""
     name, *others = sigmas
     rows = common.where(floor, filter=name)
     if len(rows):
         least = float(rows["floor"].iloc[0])
-        own, *above = (f"{100 * (sigma / least - 1):.3g} %" for sigma in sigmas.values())
-        told = {"name": name, "own": own, "floor": f"{least:.4g} {unit}".rstrip()}
+        own, *above = (f"{wording.number(100 * (sigma / least - 1), 3)} %" for sigma in sigmas.values())
+        told = {"name": name, "own": own, "floor": f"{wording.number(least)} {unit}".rstrip()}
         told["others"] = listed([f"{one} {size}" for one, size in zip(others, above, strict=True)])
         kind = tr(UNBIASED if rows["kind"].iloc[0].startswith("CRB") else ANY)
-        yield tr("The floor there, {kind}, is {floor}: {name} is {own} above it, {others}.", kind=kind, **told)
+        said = tr("The floor there, {kind}, is {floor}: {name} is {own} above it, {others}.", kind=kind, **told)
+        if sigma_hi < least:
+            said += " " + tr("Below it is only what is biased, or knows more than these plots.")
+        yield said
 
 
 UNBIASED = term("the Cramér-Rao bound of unbiased estimators")
@@ -291,6 +304,10 @@ def _nees(result: CaseResult, name: str, made: Made) -> Iterator[str]:
         nees = wording.estimate((row[key] for key in ("nees", "nees_lo", "nees_hi")), "", ".3g")
         told = {"name": name, "t": f"{row['t_s']:g}", "nees": nees}
         yield tr("NEES of {name} at {t} s: {nees} (1 if its covariance is right).", **told)
+    none = common.where(made["failures"], case=result.name, filter=name, reason=IMPROPER)
+    if len(none) and (count := int(none["failed"].iloc[0])):
+        yield tr("In {count:,} of {n:,} realisations {name} gives a covariance that is not positive definite: it is no "
+                 "part of NEES.", count=count, n=int(none["n"].iloc[0]), name=name)  # fmt: skip
 
 
 # ---- figures ---------------------------------------------------------------------------------------------------------

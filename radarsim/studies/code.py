@@ -26,9 +26,9 @@ from typing import Any
 from radarsim import failures
 from radarsim.config.experiment import digest
 from radarsim.config.schema import OwnCode
-from radarsim.errors import OF_AUTHORS, ConfigError
+from radarsim.errors import ConfigError
 from radarsim.studies.interface import Study
-from radarsim.studies.outside import Called, Outside, Plots
+from radarsim.studies.outside import Called, Outside, Plots, components_of, made_of
 
 FORBIDDEN = "RADARSIM_NO_CODE"  # in the environment, so that processes of a run keep to it as well
 INSTALLED = {"site-packages", "dist-packages"}
@@ -36,6 +36,7 @@ LONGEST = 255  # characters of the name of a file
 
 _lock = threading.RLock()  # one thread at a time is in code of the user's, which need not know of threads
 _modules: dict[tuple[str, str, str], ModuleType] = {}
+_taken: set[str] = set()  # names of modules that were imported here: they may be imported anew, and from elsewhere
 
 
 # ---- sources ---------------------------------------------------------------------------------------------------------
@@ -166,12 +167,13 @@ class Coded(Outside):
 
     @property
     def components(self) -> tuple[str, ...]:  # type: ignore[override]
-        return tuple(getattr(self.target, "components", ()))
+        return components_of(self.target)
 
     def estimates(self, plots: Plots) -> Any:
         target = self.target
         with self._running(f"fails in realisations {plots.first}:{plots.n} (first:count) of {plots.world.case}"):
-            made = target(**self.given) if isinstance(target, type) else partial(target, **self.given)
+            of = partial(made_of, self.name, target) if isinstance(target, type) else partial(partial, target)
+            made = of(**self.given)
             return Called(self.name, made, alone=self.keys.one_by_one).estimates(plots)
 
     @property
@@ -183,8 +185,10 @@ class Coded(Outside):
                 _modules[known] = self._imported()
             module = _modules[known]
         if not callable(target := getattr(module, self.made, None)):
-            own = [name for name, one in vars(module).items() if getattr(one, "__module__", "") == self.module]
-            raise ConfigError(f"{self.place}: no class or function {self.made} in {self.file}; it has {', '.join(own)}")
+            made = {name: one for name, one in vars(module).items() if callable(one)}
+            own = [name for name, one in made.items() if getattr(one, "__module__", "") == self.module]
+            there = ", ".join(own) or "none"
+            raise ConfigError(f"{self.place}: no class or function {self.made} in {self.file}; it has {there}")
         return target
 
     def _imported(self) -> ModuleType:
@@ -192,9 +196,16 @@ class Coded(Outside):
         own = sources(self.folder, self.module)
         if digest(own) != self.sources:
             raise ConfigError(f"{self.file} is not what it was when the config was read")
+        for name in {self.module, *own}.intersection(sys.modules).difference(_taken):
+            file, at = file_of(self.folder, name), getattr(sys.modules[name], "__file__", None)
+            if file and not (at and os.path.realpath(at) == os.path.realpath(file)):
+                raise ConfigError(
+                    f"{self.place}: {file}: give it another name: {name} is {at or 'of Python itself'} here"
+                )
         for name in own:
             if not any(isinstance(one, Study) for one in vars(sys.modules.get(name, object)).values()):
                 sys.modules.pop(name, None)  # a study stays: its keys must remain the same class
+        _taken.update(own)
         importlib.invalidate_caches()
         sys.path.insert(0, self.folder)
         kept, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # nothing is written beside the user's files
@@ -212,8 +223,12 @@ class Coded(Outside):
         with _lock, contextlib.redirect_stdout(sys.stderr):
             try:
                 yield
-            except OF_AUTHORS as error:
+            except (ConfigError, KeyboardInterrupt):
+                raise
+            except BaseException as error:
                 line = f"{self.place}: filter {self.name}, {self.keys.python}, {what}:"
                 package = self.module.partition(".")[0] if INSTALLED & set(Path(self.folder).parts) else ""
                 own = os.path.join(self.folder, package)
-                raise ConfigError(line, *failures.frames(error, own), failures.words(error)) from error
+                within = f": of a package, it is {Path(self.folder).name}.{self.module}:{self.made}"
+                hint = within if "no known parent package" in str(error) else ""
+                raise ConfigError(line, *failures.frames(error, own), failures.words(error) + hint) from error

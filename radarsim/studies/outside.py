@@ -22,6 +22,7 @@ import itertools
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
@@ -110,15 +111,19 @@ class Called(Outside):
     _lock: Any = field(default_factory=threading.Lock, repr=False)
 
     def estimates(self, plots: Plots) -> Any:
-        with self._lock:
-            if hasattr(self.target, "step"):
-                return stepped(self.target() if isinstance(self.target, type) else self.target, plots)
+        with self._lock, np.errstate():  # which the code may change
+            target = self.target
+            if hasattr(target, "step") or hasattr(target, "start"):
+                made = made_of(self.name, target) if isinstance(target, type) else target
+                if not (hasattr(made, "step") and hasattr(made, "start")):
+                    raise ConfigError(
+                        f"{self.name}: a filter that is asked scan by scan must have start(world) and step(plots)"
+                    )
+                return stepped(self.name, made, plots)
             if not self.alone:
-                return self.target(plots)
-            each = [self.target(of_one(plots, i)) for i in range(plots.n)]
-            if isinstance(each[0], tuple):
-                return tuple(np.stack([np.asarray(one[j]) for one in each]) for j in range(2))
-            return np.stack([np.asarray(one) for one in each])
+                return target(plots)
+            each = [copied(target(of_one(plots, i))) for i in range(plots.n)]
+            return stacked(self.name, each, [f"realisation {plots.first + i}" for i in range(plots.n)], axis=0)
 
 
 def of_one(plots: Plots, i: int) -> Plots:
@@ -126,21 +131,63 @@ def of_one(plots: Plots, i: int) -> Plots:
     return replace(plots, columns={name: v[i] for name, v in plots.columns.items()}, first=plots.first + i, n=1)
 
 
-def stepped(target: Any, plots: Plots) -> Any:
+def made_of(name: str, target: type, **keys: Any) -> Any:
+    """An object of a filter's class."""
+    made = target(**keys)
+    if components_of(made) != components_of(target):
+        raise ConfigError(f"{name}: components must be an attribute of the class itself, not of its objects")
+    return made
+
+
+def stepped(name: str, target: Any, plots: Plots) -> Any:
     """What a filter gives that is asked scan by scan."""
     target.start(plots.world)
-    found, covariances = [], []
+    found = []
     for k, t in enumerate(plots.t_s):
-        columns = {name: np.ascontiguousarray(v[:, k]) for name, v in plots.columns.items()}
+        columns = {column: np.ascontiguousarray(v[:, k]) for column, v in plots.columns.items()}
         given = target.step(replace(plots, t_s=float(t), columns=columns))
-        given, covariance = given if isinstance(given, tuple) else (given, None)
-        found.append(np.array(given))  # a copy: a filter may give its own state, which it goes on to change
-        covariances.append(None if covariance is None else np.array(covariance))
-    if all(one is None for one in covariances):
-        return np.stack(found, axis=1)
-    shape = next(one.shape for one in covariances if one is not None)
-    none = np.full(shape, np.nan)
-    return np.stack(found, axis=1), np.stack([none if one is None else one for one in covariances], axis=1)
+        found.append(copied(given))
+        if (shape := found[-1][0].shape)[:1] != (plots.n,):
+            got = f"shape {shape}" if shape else type(given).__name__
+            raise ConfigError(f"{name}: step must give estimates (n, d) of n = {plots.n} realisations, got {got}")
+    return stacked(name, found, [f"{t:g} s" for t in plots.t_s], axis=1)
+
+
+def parts(given: Any) -> tuple[Any, Any]:
+    """Estimates, and covariances or None, of what a filter gave."""
+    return given if isinstance(given, tuple) and len(given) == 2 else (given, None)
+
+
+def copied(given: Any) -> Estimates:
+    """The same in arrays of their own, which no filter goes on to change."""
+    x, P = parts(given)
+    return plain(x), None if P is None else plain(P)
+
+
+def stacked(name: str, given: Sequence[Estimates], places: Sequence[str], axis: int) -> Any:
+    """Estimates of one place after the other, and covariances if any have them, in one array each."""
+    made = []
+    for what, every in zip(("estimates", "covariances"), zip(*given, strict=True), strict=True):
+        known = {place: one.shape for place, one in zip(places, every, strict=True) if one is not None}
+        first = next(iter(known), "")
+        if other := next((place for place, shape in known.items() if shape != known[first]), ""):
+            both = " and ".join(f"{known[place]} at {place}" for place in (first, other))
+            raise ConfigError(f"{name}: {what} must have one shape, got {both}")
+        if known:
+            none = np.full(known[first], np.nan)
+            made.append(np.stack([none if one is None else one for one in every], axis=axis))
+    return tuple(made) if len(made) > 1 else made[0]
+
+
+def plain(values: Any) -> np.ndarray:
+    """Values of any shape (n, …) as an array of its own: not-a-number where they are masked."""
+    return np.ma.filled(values.astype(float), np.nan) if isinstance(values, np.ma.MaskedArray) else np.array(values)
+
+
+def components_of(target: Any) -> tuple[str, ...]:
+    """The components that a filter names."""
+    named = getattr(target, "components", ())
+    return (named,) if isinstance(named, str) else tuple(named)
 
 
 @dataclass
@@ -181,8 +228,7 @@ class Chunks(Outside):
             if chunk is None:
                 there = self._first + sum(len(x) for x, _ in self._kept)
                 raise ConfigError(f"{self.name}: must give {stop} realisations, ended after {there}")
-            x, P = chunk if isinstance(chunk, tuple) else (chunk, None)
-            self._kept.append((np.asarray(x), None if P is None else np.asarray(P)))
+            self._kept.append(copied(chunk))
         rows = slice(start - self._first, stop - self._first)
         covariances = [P for _, P in self._kept if P is not None]
         x = np.concatenate([x for x, _ in self._kept])[rows]
@@ -194,8 +240,8 @@ def checked(name: str, given: Any, n: int, K: int, components: Sequence[str], ow
 
     own: the components that the filter names, in the order of its last axis.
     """
-    x, P = given if isinstance(given, tuple) and len(given) == 2 else (given, None)
-    x = np.asarray(x)
+    x, P = parts(given)
+    x = plain(x)
     x = x[..., None] if x.ndim == 2 else x
     most = len(own) or len(components)
     wanted = f"(n, K, d) = ({n}, {K}, {f'{most}' if own else f'1 … {most}'})"
@@ -203,11 +249,13 @@ def checked(name: str, given: Any, n: int, K: int, components: Sequence[str], ow
         raise ConfigError(f"{name}: estimates must be real numbers, got {x.dtype}")
     if x.ndim != 3 or x.shape[:2] != (n, K) or not (x.shape[2] == most if own else 1 <= x.shape[2] <= most):
         orders = itertools.permutations(range(3)) if x.ndim == 3 else ()
-        order = next((o for o in orders if x.transpose(o).shape[:2] == (n, K) and 1 <= x.shape[o[2]] <= most), None)
+        order = next((o for o in orders if x.shape[o[1]] == K and 1 <= x.shape[o[2]] <= most and o != (0, 1, 2)), None)
         hint = f"; its axes are in another order: transpose{order} mends it" if order else ""
         raise ConfigError(f"{name}: estimates must have shape {wanted}, got {x.shape}{hint}")
     d = x.shape[2]
-    if P is not None and (P := np.asarray(P)).shape != (n, K, d, d):
+    if P is not None and (P := plain(P)).dtype.kind not in "fiu":
+        raise ConfigError(f"{name}: covariances must be real numbers, got {P.dtype}")
+    if P is not None and P.shape != (n, K, d, d):
         raise ConfigError(f"{name}: covariances must have shape {(n, K, d, d)}, got {P.shape}")
     return x.astype(float), None if P is None else np.asarray(P, dtype=float)
 
@@ -216,6 +264,8 @@ def columns_of(name: str, d: int, components: Sequence[str], own: Sequence[str])
     """The places among the state's components of the d that a filter estimates."""
     if unknown := [one for one in own if one not in components]:
         raise ConfigError(f"{name}: components: must be of {', '.join(components)}, got {', '.join(unknown)}")
+    if len(set(own)) < len(own):
+        raise ConfigError(f"{name}: components: must differ, got {', '.join(own)}")
     return [components.index(one) for one in own] or list(range(d))
 
 
@@ -291,9 +341,10 @@ def prepare(study: "Study", case: Case, inner: Any) -> Plan:
 
 
 def plots_of(plan: Plan, drawn: "Drawn") -> Plots:
-    """What a filter sees of plots: arrays of its own, which it may change."""
+    """What a filter sees of plots: arrays and keys of its own, which it may change."""
     columns = {name: np.array(values) for name, values in drawn.columns.items()}
-    return Plots(np.array(drawn.t_s), columns, plan.world, drawn.first, drawn.n)
+    world = replace(plan.world, t_s=np.array(plan.world.t_s), keys=deepcopy(plan.world.keys))
+    return Plots(np.array(drawn.t_s), columns, world, drawn.first, drawn.n)
 
 
 def inner_errors(plan: Plan, first: int, count: int) -> np.ndarray:

@@ -171,7 +171,73 @@ def test_half_of_the_realisations_shifted_are_still_those_of_the_plots(estimates
 
 def test_names_are_those_of_no_other_filter(estimates):
     assert "there is a filter 'r+Vr' already" in refusal(estimates, name="r+Vr")
-    assert "name: must be the name of a filter" in refusal(estimates, name="../mine")
+    assert refusal(estimates, name="../mine") == "name: must be no path, got '../mine'"
+    assert refusal(estimates, name="=1").startswith("name: must not begin with = + - or @")
+    assert refusal(estimates, name=" ").startswith("name: must be printable text")
+
+
+def test_values_in_another_unit_or_of_the_other_sign_are_found(estimates):
+    assert "estimates of r must be in m, with the sign of the truth: multiplied by 1000 " in refusal(
+        estimates[..., 0] / 1e3
+    )
+    assert "of Vr must be in m/s, with the sign of the truth: multiplied by -1 " in refusal(estimates * [1, -1, 1])
+    assert "of Vr must be in m/s, with the sign of the truth: multiplied by 0.2778 " in refusal(estimates * [1, 3.6, 1])
+
+
+def test_masked_values_are_no_estimates(estimates):
+    masked = np.ma.array(estimates, mask=np.zeros_like(estimates, bool))
+    masked[:, :4] = np.ma.masked
+    found, wanted = (radarsim.judge("rls2", x) for x in (masked, np.ma.filled(masked, np.nan)))
+    assert same(found, wanted)
+    assert of(found.curves, filter="mine")["k"].min() == 5
+
+
+class Odd:
+    """A filter of which a test changes a part."""
+
+    def start(self, world):
+        self.k = 0
+
+    def step(self, plots):
+        self.k += 1
+        return np.stack([plots["range_m"], plots["velocity_mps"]][: 1 + (self.k > 3)], axis=1)
+
+
+def test_what_a_filter_may_not_give_is_said_with_its_place():
+    assert refusal(Odd) == "mine: estimates must have one shape, got (256, 1) at 0 s and (256, 2) at 30 s"
+    for given, got in ((None, "NoneType"), (np.zeros((3, 1)), "shape (3, 1)")):
+        odd = type("Given", (Odd,), {"step": lambda self, plots, given=given: given})
+        assert refusal(odd) == f"mine: step must give estimates (n, d) of n = 256 realisations, got {got}"
+    halves = refusal(lambda plots: plots["range_m"][plots.first % 2 :], one_by_one=True)
+    assert halves == "mine: estimates must have one shape, got (15,) at realisation 0 and (14,) at realisation 1"
+    named = type(
+        "Named",
+        (Odd,),
+        {"start": lambda self, world: None, "__init__": lambda self: setattr(self, "components", ["Vr"])},
+    )
+    assert refusal(named) == "mine: components must be an attribute of the class itself, not of its objects"
+    assert "components: must differ, got r, r" in refusal(
+        lambda plots: np.zeros((plots.n, 15, 2)), components=("r", "r")
+    )
+    assert "must have start(world) and step(plots)" in refusal(type("Half", (), {"step": Odd.step}))
+    for none in (np.full((1, 1), "a"), np.ones((1, 1)) * 1j):
+        given = refusal(lambda plots, none=none: (plots["range_m"], np.broadcast_to(none, (plots.n, 15, 1, 1))))
+        assert given.startswith("mine: covariances must be real numbers, got ")
+
+
+def test_a_filter_changes_nothing_outside_itself():
+    """Neither times and keys of the next block, nor what NumPy does with not-a-number."""
+
+    class Careless(Twin):
+        def start(self, world):
+            super().start(world)
+            np.seterr(all="raise")
+            world.t_s[:] = 0
+            world.keys.clear()
+
+    found = radarsim.judge("rls2", Careless, realisations=5000, threads=0)
+    assert same(found, radarsim.judge("rls2", Twin, realisations=5000, threads=0))
+    assert np.geterr()["invalid"] == "warn"
 
 
 def test_named_components_are_taken_in_their_order(estimates):
@@ -267,6 +333,18 @@ def test_a_covariance_that_is_none_does_not_enter_nees(estimates):
     result = radarsim.judge("rls2", (estimates, P))
     assert of(result.tables["nees"], k=15)["n"].tolist() == [260]
     assert of(result.tables["nees"], k=14)["n"].tolist() == [300]
+    assert of(result.tables["failures"], reason="not_positive_definite")["failed"].tolist() == [40]
+    assert of(result.tables["failures"], reason="any")["failed"].tolist() == [0]
+    assert any(line.startswith("In 40 of 300 realisations mine gives a covariance") for line in result.answer)
+    none = radarsim.judge("rls2", (estimates, -P)).answer
+    assert any(line.startswith("In 300 of 300 realisations mine gives a covariance") for line in none)
+
+
+def test_below_the_floor_it_is_said_why(estimates):
+    truth = radarsim.plots("rls2", n=300).truth
+    found = radarsim.judge("rls2", (estimates + 3 * truth) / 4).answer[1]
+    assert "mine is −7" in found
+    assert found.endswith("Below it is only what is biased, or knows more than these plots.")
 
 
 # ---- other sources ---------------------------------------------------------------------------------------------------
@@ -389,11 +467,22 @@ def test_files_of_other_realisations_are_refused(estimates, tmp_path):
         (tmp_path / name).write_bytes(content)
         assert "cannot be read" in refusal(tmp_path / name)
     (tmp_path / "words.csv").write_text("realisation,k,r\n0,1,far\n")
-    assert "cannot be read" in refusal(tmp_path / "words.csv")
+    assert refusal(tmp_path / "words.csv").endswith("row 1, r: must be a number, got 'far'")
+    for name in ("empty.npz", "empty.csv"):
+        (tmp_path / name).write_bytes(b"")
+        assert "cannot be read" in refusal(tmp_path / name)
+    (tmp_path / "heading.csv").write_text("realisation,k,r\n")
+    assert "must hold" in refusal(tmp_path / "heading.csv")
+    few = said("covariances.npz", estimates=estimates, covariances=np.zeros((299, 15, 3, 3)))
+    assert few == "mine: covariances must be of 300 realisations, as the estimates, got 299"
     assert "cannot be read" in said("seeds.npz", estimates=estimates, seed=[1, 2])
     rows = pd.DataFrame({"realisation": [0, 0, 1], "k": [1, 2, 1], "r": 1.0})
     rows.to_csv(tmp_path / "short.csv", index=False)
-    assert "realisation 1: must have a row for each of the 2 scans" in refusal(tmp_path / "short.csv")
+    assert "realisation 0: must have a row for each of the 15 scans" in refusal(tmp_path / "short.csv")
+    rows.assign(k=[0, 1, 1]).to_csv(tmp_path / "zero.csv", index=False)
+    assert refusal(tmp_path / "zero.csv").endswith("k: must be one of the 15 scans of the plots, 1 … 15, got 0")
+    rows.rename(columns={"k": "t_s"}).to_csv(tmp_path / "times.csv", index=False)
+    assert refusal(tmp_path / "times.csv").endswith("t_s: must be one of the 15 scans of the plots, 0 … 140, got 1")
     rows.drop(columns="realisation").to_csv(tmp_path / "unnumbered.csv", index=False)
     assert "must have the columns realisation, k or t_s, and of r, Vr, ar" in refusal(tmp_path / "unnumbered.csv")
 

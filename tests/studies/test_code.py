@@ -214,6 +214,7 @@ FAILURES = {  # a line of the filter: the frame that is shown last, and what is 
     "import sys; sys.exit('no licence')": ("my_filter.py:8, in step: import sys;", "SystemExit: no licence"),
     "helper.broken(plots)": ("helper.py:3, in broken: np.linalg.inv(plots['range_m'])", "LinAlgError: 1-dimensional"),
     "self.deep()": ("my_filter.py:11, in deep: self.deep()", "RecursionError: maximum recursion depth"),
+    "raise GeneratorExit": ("my_filter.py:8, in step: raise GeneratorExit", "GeneratorExit"),
     "raise ValueError": ("my_filter.py:8, in step: raise ValueError", "ValueError"),
 }
 
@@ -249,6 +250,9 @@ LOADING = {  # what stands in the config and in the module: what is said
     ): "no class or function Mine in {place}/my_filter.py; it has other",
     ("my_filter.py:Mine", "def Mine(:"): "filters.2.python: {place}/my_filter.py:1: SyntaxError: invalid syntax",
     ("my_filter.py:Mine", "\0"): "filters.2.python: {place}/my_filter.py:1: ",
+    ("my_filter.py:Mine", "from .helper import BETA"): "of a package, it is {place.name}.my_filter:Mine",
+    ("my_filter.py:Mine", "Mine = None"): "no class or function Mine in {place}/my_filter.py; it has none",
+    ("json.py:Mine", "class Mine: pass"): ": {place}/json.py: give it another name: json is /",
     ("no.py:Mine", ""): "filters.2.python: no such file: {place}/no.py",
     (
         "no_such_module:Mine",
@@ -261,7 +265,7 @@ LOADING = {  # what stands in the config and in the module: what is said
 
 @pytest.mark.parametrize(("python", "source"), LOADING)
 def test_what_cannot_be_loaded_is_said_before_anything_runs(place, python, source):
-    Path("my_filter.py").write_text(source)
+    Path("json.py" if python == "json.py:Mine" else "my_filter.py").write_text(source)
     written("mine", {"name": "mine", "python": python})
     said = command("run", "rls2", "mine.yaml", "--out", "out", code=2)
     assert said.stderr.startswith("mine.yaml:")
@@ -326,6 +330,16 @@ def test_what_it_prints_is_not_in_the_answer(place):
     done = run("out", "-n", 100, "--json")
     assert json.loads(done.stdout)[0]["config"] == "mine"
     assert {"read", "a step"} <= set(done.stderr.splitlines())
+
+
+@pytest.mark.slow
+def test_one_may_have_processes_of_its_own(place):
+    """Their end by a signal is not that of the run."""
+    pool = "with multiprocessing.get_context('fork').Pool(1) as pool: pool.map(abs, [1])"
+    source = FILTER.replace("import helper", "import helper, multiprocessing")
+    Path("my_filter.py").write_text(source.replace('z = plots["range_m"]', f'z = plots["range_m"]\n        {pool}'))
+    words = [sys.executable, "-m", "radarsim", "run", "mine.yaml", "-n", "300", "--set", "scans=4", "--no-figures"]
+    assert subprocess.run(words, env=os.environ | {"PYTHONPATH": str(ROOT)}, timeout=60).returncode == 0
 
 
 def test_one_that_never_returns_is_stopped_by_a_signal(place):
