@@ -142,8 +142,9 @@ def missed(
         few = np.array([p * one[:-2].sum() for one in enough[:-1]])  # a plot now, with which there are too few
         of_scan = (*counts[k], counts[k].all())
         enough = [_after(one, p) if counted else one for one, counted in zip(enough, of_scan, strict=True)]
-        *many, settled = (one[-1] for one in enough)
-        likely = np.array(many) + np.where(lone & (counts[k] > 0), few, 0.0)
+        many = np.array([one[-1] for one in enough[:-1]])
+        settled = np.minimum(many, enough[-1][-1])
+        likely = many + np.where(lone & (counts[k] > 0), few, 0.0)
         mean = mean + p * information
         with np.errstate(divide="ignore", invalid="ignore"):
             averaged = reduced = settled**2 / likely * spreads(decomposed(mean), maps[k]) ** 2

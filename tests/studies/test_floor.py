@@ -154,9 +154,10 @@ def histories(scans: int, chance: float, needed: int, rows, sigma, maps, alone) 
         weight = chance ** sum(came) * (1 - chance) ** (scans - sum(came))
         whitened = (rows / sigma[:, None])[list(came)].reshape(-1, 3)
         for c in range(3):
-            if sum(came) >= needed:
+            given = sum(came) >= needed or (came[-1] and alone[c])
+            if given and len(whitened) >= 3:
                 variance = maps[-1, c] @ np.linalg.inv(whitened.T @ whitened) @ maps[-1, c]
-            elif came[-1] and alone[c]:
+            elif given:
                 variance = sigma[c] ** 2
             else:
                 continue
@@ -165,15 +166,17 @@ def histories(scans: int, chance: float, needed: int, rows, sigma, maps, alone) 
         return np.sqrt(total / share)
 
 
-@pytest.mark.parametrize("f", [0, 1])
-def test_missed_plots_are_averaged_over_detection_histories(f, monkeypatch):
+@pytest.mark.parametrize(("f", "start"), [(0, 3), (1, 2), (1, 5)])
+def test_missed_plots_are_averaged_over_detection_histories(f, start, monkeypatch):
     monkeypatch.setattr(floors, "RAREST", 0.0)
     scans, chance = 7, 0.7
-    axes, floor = of_case("rls2", f"radar.detection_probability={chance}", f"scans={scans}")
+    axes, floor = of_case(
+        "rls2", f"radar.detection_probability={chance}", f"scans={scans}", f"filters.{f}.initial_scans={start}"
+    )
     bound, maps = known(floor, f), floors.polynomial(axes.t_s, 3)
     rows, sigma = maps[:, : f + 1], np.array([250.0, 15.0])[: f + 1]
     for k in range(1, scans):
-        own = histories(k + 1, chance, 3 - f, rows[: k + 1], sigma, maps[: k + 1], (True, f == 1, False))
+        own = histories(k + 1, chance, start, rows[: k + 1], sigma, maps[: k + 1], (True, f == 1, False))
         assert bound.sigma[k] == pytest.approx(own, rel=1e-9, nan_ok=True)
     assert set(bound.patterns) == {ENUMERATION}
     there = np.isfinite(axes.exact_sigma[f])
