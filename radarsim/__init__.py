@@ -9,8 +9,8 @@
 
 In a notebook a result shows its answer and first figure; `radarsim.load("rls2")` gives one that was run before.
 `check`, `solve`, `tune`, `sensitivity`, `compare`, `chart`, `claims` and `readings` do what the commands of these names
-do; `plots` gives those of many realisations as arrays; `simulate`, `read_plots`, `track` and `fit` are for recorded
-plots.
+do; `plots` gives those of many realisations as arrays; `simulate`, `read_plots`, `track`, `fit` and `register` are for
+recorded plots.
 """
 
 from importlib import import_module
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from radarsim.app.judge import judge
-    from radarsim.app.own_data import fit, plots, read_plots, simulate, track
+    from radarsim.app.own_data import fit, plots, read_plots, register, simulate, track
     from radarsim.app.python import chart, check, claims, compare, load, readings, sensitivity, solve
     from radarsim.app.result import Result
     from radarsim.app.run import run
@@ -41,6 +41,7 @@ __all__ = [
     "plots",
     "read_plots",
     "readings",
+    "register",
     "run",
     "sensitivity",
     "simulate",
@@ -51,7 +52,7 @@ __all__ = [
 
 _HOMES = {
     **{"judge": "app.judge:judge", "tune": "app.tune:tune", "run": "app.run:run", "Result": "app.result:Result"},
-    **{name: f"app.own_data:{name}" for name in ("fit", "plots", "read_plots", "simulate", "track")},
+    **{name: f"app.own_data:{name}" for name in ("fit", "plots", "read_plots", "register", "simulate", "track")},
     **{name: f"app.python:{name}" for name in ("chart", "check", "claims", "compare")},
     **{name: f"app.python:{name}" for name in ("load", "readings", "sensitivity", "solve")},
     **{"ConfigError": "errors:ConfigError", "RadarsimError": "errors:RadarsimError"},

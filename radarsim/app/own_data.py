@@ -1,15 +1,19 @@
-"""Recorded plots from Python: simulate, read, track, fit, with pandas in and out."""
+"""Recorded plots from Python: simulate, read, track, fit, register, with pandas in and out."""
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from radarsim.app.configs import Config, Overrides, load
+from radarsim.app.shown import Shown
 from radarsim.recorded import fit as fitting
 from radarsim.recorded import follow
 from radarsim.recorded import plots as files
+from radarsim.recorded import register as registering
+from radarsim.recorded.formats import asterix
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,6 +21,7 @@ if TYPE_CHECKING:
     from radarsim.studies.interface import Drawn
 
 Found = TypeVar("Found")
+Recorded: TypeAlias = "str | os.PathLike[str] | pd.DataFrame"
 
 
 def simulate(config: Config, realisation: int = 0, overrides: Overrides = ()) -> "pd.DataFrame":
@@ -59,8 +64,8 @@ def plots(
 
 
 def read_plots(path: str | os.PathLike[str]) -> "pd.DataFrame":
-    """Read a file of plots as written by `radarsim import` or `radarsim simulate`: numbers, and the column `track` as
-    text.
+    """Read a file of plots as written by `radarsim import` or `radarsim simulate`: numbers, and text where
+    that names something (`track`, `radar`, `address`, `mode_3a`, …).
 
     Raises ConfigError if it cannot be read.
     """
@@ -71,16 +76,14 @@ def read_plots(path: str | os.PathLike[str]) -> "pd.DataFrame":
     try:
         texts = pd.read_csv(path, comment="#", dtype=str, keep_default_na=False)
         # Python's own parsing of numbers loses no digit.
-        measured = [str(name) for name in texts if name != files.TRACK]
+        measured = [str(name) for name in texts if name not in (files.TRACK, "radar", *asterix.WORDS)]
         numbers = {name: texts[name].replace("", "nan").astype(float) for name in measured}
     except (OSError, ValueError) as error:
         raise ConfigError(f"{os.fspath(path)}: cannot be read: {error}") from error
     return texts.assign(**numbers)
 
 
-def track(
-    config: Config, recorded: "str | os.PathLike[str] | pd.DataFrame", overrides: Overrides = ()
-) -> "pd.DataFrame":
+def track(config: Config, recorded: Recorded, overrides: Overrides = ()) -> "pd.DataFrame":
     """Run the config's filters over recorded plots (a file or a table); returns the columns of `radarsim track`.
 
     Raises ConfigError with all faults of config and plots.
@@ -107,11 +110,7 @@ def track(
 
 
 def fit(
-    config: Config,
-    recorded: "str | os.PathLike[str] | pd.DataFrame",
-    overrides: Overrides = (),
-    filter_name: str | None = None,
-    robust: bool = False,
+    config: Config, recorded: Recorded, overrides: Overrides = (), filter_name: str | None = None, robust: bool = False
 ) -> "pd.DataFrame":
     """Fit σ and the manoeuvre variance to recorded plots (a file or a table), with 95 % intervals.
 
@@ -130,7 +129,51 @@ def fit(
     return pd.DataFrame([{name: getattr(one, name) for name in names} for one in found.keys], columns=names)
 
 
-def _with_file(recorded: "str | os.PathLike[str] | pd.DataFrame", act: Callable[[str], Found]) -> Found:
+class Registered(Shown):
+    """The biases of a radar; its text is the answer.
+
+    biases: a row for each of range_m, range_scale, bearing_rad, time_s with value, lo, hi (95 %), identifiable, why (it
+    is not). aircraft: a row for each with what the biases leave: range_m, bearing_rad (medians), time_s, sigma_time_s.
+    sigma_range_m, sigma_bearing_rad: of a plot, without outliers. plots, matched: their number, and those with a
+    position of their aircraft.
+    """
+
+    def __init__(self, found: registering.Registration):
+        import pandas as pd
+
+        self._found = found
+        self.biases = pd.DataFrame([asdict(one) | {"identifiable": one.identifiable} for one in found.adjusted.biases])
+        self.aircraft = pd.DataFrame([asdict(one) for one in found.aircraft])
+        self.sigma_range_m, self.sigma_bearing_rad = found.adjusted.sigma
+        self.plots, self.matched = found.plots, found.matched
+
+    def _said(self) -> Sequence[str]:
+        return registering.lines(self._found)
+
+
+def register(radar: Recorded, other: Recorded) -> Registered:
+    """Find the biases of a radar's plots against positions of the same aircraft, each a file as `radarsim import`
+    writes it, or a table with its columns, whose times then have the same zero.
+
+    Plots: t_s, range_m, bearing_rad; positions: t_s, x_m, y_m, z_m (north, up, east of the radar); both: address,
+    callsign or mode_3a, or track as the address. The model, its errors and sources: `radarsim.recorded.register`.
+    Raises ConfigError where too few plots have a position.
+
+    >>> import numpy as np, pandas as pd, radarsim
+    >>> t = np.arange(0.0, 300, 5)
+    >>> flown = pd.concat([pd.DataFrame({"t_s": t, "track": name, "x_m": x + 200 * t, "y_m": 9e3, "z_m": 150 * t})
+    ...                    for name, x in (("a", -3e4), ("b", 4e4), ("c", -9e4), ("d", 2e4))])
+    >>> plots = flown.assign(range_m=np.linalg.norm(flown[["x_m", "y_m", "z_m"]], axis=1) + 50,
+    ...                      bearing_rad=np.arctan2(flown["z_m"], flown["x_m"]) % 6.283185307179586)
+    >>> radarsim.register(plots, flown).biases.set_index("key")["value"].round(6).abs().to_dict()
+    {'range_m': 50.0, 'range_scale': 0.0, 'bearing_rad': 0.0, 'time_s': 0.0}
+    """
+    return _with_file(
+        radar, lambda path: _with_file(other, lambda beside: Registered(registering.register(path, beside)))
+    )
+
+
+def _with_file(recorded: Recorded, act: Callable[[str], Found]) -> Found:
     """Call with the file of recorded plots; a table is first written into a temporary one."""
     if isinstance(recorded, str | os.PathLike):
         return act(os.fspath(recorded))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 SECTIONS = {
     "A question": ("list", "check", "run", "report", "compare"),
     "Your own radar": ("new", "solve", "tune", "sensitivity", "chart", "new-study"),
-    "Your own data": ("import", "simulate", "track", "fit", "judge"),
+    "Your own data": ("import", "register", "simulate", "track", "fit", "judge"),
     "The papers": ("claims", "readings"),
     "Upkeep": ("schema", "compile", "doctor", "clean"),
 }

@@ -159,6 +159,13 @@ def simulate(
 @click.option("--doppler-towards", is_flag=True, help="In the recording, Doppler is positive for approach.")
 @click.option("--column", "columns", multiple=True, metavar="OURS=THEIRS", help="Name a CSV column explicitly.")
 @click.option(
+    "--bias",
+    "biases",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Subtract a bias that `radarsim register` found: range_m, range_scale, bearing_deg or time_s; repeatable.",
+)
+@click.option(
     "--encoding", default="", metavar="NAME", help="Of text that is not UTF-8, as cp1251; default: Windows-1252."
 )
 @click.option(
@@ -214,6 +221,7 @@ def import_(
         importing.encoding_named(further["encoding"]),
         further["keep_marked"],
         whose,
+        importing.biases_of(further["biases"]),
     )
     with console.Counter("reading", "records") as counter:
         done = importing.import_recording(recording, output, options, counter.update)
@@ -360,3 +368,34 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
         path = Path(options["write"])
         made = configs.new(path.name, loaded.path or config, path.parent, fitting.settings(found))
         click.echo(wording.labelled("config", str(made)), err=options["as_json"])
+
+
+@main.command()
+@click.argument("radar", metavar="RADAR.csv")
+@click.argument("other", metavar="OTHER.csv")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON document instead of text.")
+def register(radar: str, other: str, as_json: bool) -> None:
+    """Find a radar's biases against ADS-B or another radar.
+
+    Both files are as `radarsim import` writes them. Plots are compared with the positions of the aircraft that has
+    their address, callsign or Mode 3/A code at that time, interpolated in between. A bias is what to subtract:
+    range_scale from 1, the share of the range; time_s from the times, which are then too late. Outliers have no weight;
+    errors may be correlated within an aircraft. What the flights cannot show is unknown, with the reason. OTHER is
+    taken as right; for a radar that is tilted, or has moved, there is no model.
+
+    \b
+    Example
+      radarsim import radar.ast --at 52.30,4.76,12 -o radar.csv
+      radarsim import adsb.csv --at 52.30,4.76,12 -o positions.csv
+      radarsim register radar.csv positions.csv
+    """
+    import json
+
+    from radarsim.cli import verdicts
+    from radarsim.recorded import register as registering
+
+    found = registering.register(radar, other)
+    if as_json:
+        click.echo(json.dumps(registering.as_json(found), indent=2))
+    else:
+        verdicts.report_registration(found, other)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from radarsim.recorded.figures import Judged
     from radarsim.recorded.fit import Fit
     from radarsim.recorded.follow import Followed
+    from radarsim.recorded.register import Registration
 
 
 # ---- findings --------------------------------------------------------------------------------------------------------
@@ -97,6 +98,28 @@ def report_fit(found: "Fit") -> None:
     )
     if settings:
         lines.append(labelled("", tr("to use the fitted values: {settings}", settings=settings)))
+    for line in lines:
+        write(sys.stdout, line)
+
+
+def report_registration(found: "Registration", other: str) -> None:
+    """Print a registration, and the options that correct the radar's plots."""
+    from radarsim.recorded import register
+
+    plots = plural("{count} plot", "{count} plots", found.plots)
+    by = ", ".join(f"{kind} {count}" for kind, count in found.by.items())
+    told = {"plots": plots, "matched": found.matched, "file": other, "by": by}
+    lines = [
+        labelled("plots", tr("{matched} of {plots} have a position of their aircraft in {file} (by {by})", **told))
+    ]
+    far, turn = found.apart
+    apart = tr("{far:.3g} m and {turn:.2g}° from it (median)", far=far, turn=turn)
+    aircraft = tr("{count} aircraft", count=len(found.aircraft))
+    bent = tr("positions in between err by less than {most:.2g} m (95 %)", most=found.bent_m)
+    lines += [labelled("", f"{aircraft}; {apart}; {bent}")]
+    lines += [labelled("", tr("left out: {what}", what=one)) for one in found.left]
+    lines.append(tr("Biases of the plots with 95 % intervals, {file} taken as right", file=other))
+    lines += register.lines(found)
     for line in lines:
         write(sys.stdout, line)
 

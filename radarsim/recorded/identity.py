@@ -18,6 +18,8 @@ LONGEST_GAP_S = 60.0  # over which positions are not interpolated
 FARTHEST_M = 5000.0  # of a plot from its aircraft in range: 20 s of an airliner
 FARTHEST_RAD = math.radians(2.0)  # in bearing, besides what FARTHEST_M makes: of a radar badly aligned with north
 
+At = Callable[[np.ndarray], np.ndarray]  # position and speed (n, 6), m and m/s, at times (n,)
+
 
 class Found(NamedTuple):
     """The aircraft of plots: position and speed (n, 6), NaN where there is none; the number of its path and the number
@@ -34,7 +36,7 @@ class Path:
     def __init__(self) -> None:
         self.fixes: list[np.ndarray] = []
         self.worn: dict[tuple[str, str], tuple[float, float]] = {}
-        self.at: Callable[[np.ndarray], np.ndarray] | None = None
+        self.at: At | None = None  # made when it is first needed
 
     def is_another(self, values: Sequence[str]) -> bool:
         """Whether it has an identity other than these, in the order of KINDS; '' is unknown."""
@@ -134,15 +136,29 @@ class Paths:
 
     def _at(self, number: int, name: tuple[str, str], t: np.ndarray) -> np.ndarray:
         """Position and speed (n, 6) of an aircraft at the times at which it has this identity."""
+        lo, hi = self._clock(np.array(self.paths[number].worn[name]))
+        clock = self._clock(t)
+        worn = (clock >= lo - LONGEST_GAP_S) & (clock <= hi + LONGEST_GAP_S) | (hi < lo)
+        return np.where(worn[:, None], self.at(number, t), np.nan)
+
+    def at(self, number: int, t: np.ndarray) -> np.ndarray:
+        """Position and speed (n, 6) of an aircraft at times (n,)."""
         path = self.paths[number]
         if path.at is None:
-            fixes = np.concatenate(path.fixes)
-            fixes[:, 0] = self._clock(fixes[:, 0])
-            path.at = interpolated(fixes)
-        lo, hi = self._clock(np.array(path.worn[name]))
-        t = self._clock(t)
-        worn = (t >= lo - LONGEST_GAP_S) & (t <= hi + LONGEST_GAP_S) | (hi < lo)
-        return np.where(worn[:, None], path.at(t), np.nan)
+            path.at = interpolated(self.fixes(number))
+        return path.at(self._clock(t))
+
+    def bent(self, number: int, t: np.ndarray) -> np.ndarray:
+        """How far (n,) an aircraft's interpolated position is from the straight line between its fixes, m."""
+        fixes = self.fixes(number)
+        fixes = fixes[np.unique(fixes[:, 0], return_index=True)[1]]
+        straight = [np.interp(self._clock(t), fixes[:, 0], column) for column in fixes.T[1:]]
+        return np.linalg.norm(self.at(number, t)[:, :3] - np.stack(straight, axis=1), axis=1)
+
+    def fixes(self, number: int) -> np.ndarray:
+        """Times and positions (n, 4) of an aircraft, in the order in which they came."""
+        fixes = np.concatenate(self.paths[number].fixes)
+        return np.column_stack([self._clock(fixes[:, 0]), fixes[:, 1:]])
 
     def _clock(self, t: np.ndarray) -> np.ndarray:
         return t % self.period_s if math.isfinite(self.period_s) else t
@@ -173,19 +189,17 @@ def near(missed: np.ndarray, range_m: np.ndarray) -> np.ndarray:
     return (np.abs(missed[..., 0]) <= FARTHEST_M) & ~turned
 
 
-def too_far(missed: np.ndarray, range_m: np.ndarray) -> str:
-    """What is wrong with plots (n,) that miss their aircraft by (n, 2); '' where half of them may be its own."""
-    if near(missed, range_m).sum() * 2 >= len(range_m):
-        return ""
-    allowed = f"allowed are {FARTHEST_M:g} m, and in bearing {math.degrees(FARTHEST_RAD):g}° more than these make"
-    return f"{apart(missed)} from it (median), {allowed}: it is another aircraft or clock, or --at is wrong"
+def are_far(missed: np.ndarray, range_m: np.ndarray) -> bool:
+    """Whether most of the plots (n,) that miss an aircraft by (n, 2) cannot be its own."""
+    return bool(near(missed, range_m).sum() * 2 < len(range_m))
 
 
-def apart(missed: np.ndarray) -> str:
-    """The median distance of plots that miss their aircraft by (n, 2), in words."""
-    (r, b) = np.median(np.abs(missed), axis=0).tolist()
-    turned = "" if math.isnan(b) else f" and {math.degrees(b):.2g}° in bearing"
-    return f"{r:.3g} m in range{turned}"
+def apart(missed: np.ndarray) -> tuple[float, float]:
+    """The median distance of plots that miss their aircraft by (n, 2) in range and in bearing, m and degrees, NaN where
+    there are no bearings."""
+    known = missed[np.isfinite(missed[:, 1]), 1]
+    turn = math.degrees(np.median(np.abs(known))) if len(known) else math.nan
+    return float(np.median(np.abs(missed[:, 0]))), turn
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:
@@ -193,7 +207,7 @@ def wrapped(angle: np.ndarray) -> np.ndarray:
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
-def interpolated(fixes: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+def interpolated(fixes: np.ndarray) -> At:
     """Positions and speeds (m, 6) at times (m,), from fixes (n, 4) of time and position: piecewise cubic with slopes
     from the neighbouring fixes; NaN outside, and in gaps over LONGEST_GAP_S."""
     from scipy.interpolate import CubicHermiteSpline

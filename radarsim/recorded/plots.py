@@ -111,12 +111,14 @@ class Faults:
 
 class Piece(NamedTuple):
     """Some rows of a file of plots: the measured columns (n,); the track of each row, none where the file has no
-    tracks; the columns (n,) of the truth, `true_…`; and those of the plots' places, of PLACES."""
+    tracks; the columns (n,) of the truth, `true_…`; those of the plots' places, of PLACES; and texts, of those asked
+    for that the file has."""
 
     columns: dict[str, np.ndarray]
     tracks: list[str] | None
     truth: dict[str, np.ndarray]
     places: dict[str, np.ndarray]
+    texts: dict[str, list[str]]
 
 
 def pieces(
@@ -125,19 +127,21 @@ def pieces(
     size: int = CHUNK,
     several: bool = False,
     any_origin: bool = False,
+    texts: Sequence[str] | None = None,
 ) -> Iterator[Piece]:
     """The columns of a file, of the first of `choices` that it has, `size` rows at a time, so that memory does not grow
     with the file: `t_s` first; NaN where a cell is empty.
 
     Times rise, within each track; several: rows may have the time of the row before. any_origin: ranges may be
-    negative.
+    negative. texts: further columns; times may then have any order.
 
     After the first fault no more rows come: the rest is checked for faults, and ConfigError raised at the end with all
     of them, each `file:row's line:column: name: what is wrong`.
     """
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
-            yield from _Reader(str(path), csv.reader(file, strict=True), choices, several, any_origin).chunks(size)
+            reader = _Reader(str(path), csv.reader(file, strict=True), choices, several, any_origin, texts)
+            yield from reader.chunks(size)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
@@ -159,8 +163,15 @@ class _Reader:
     """Header, then numbers, then the order of the times; faults are collected."""
 
     def __init__(
-        self, path: str, rows: "_csv.Reader", choices: Sequence[Sequence[str]], several: bool, any_origin: bool
+        self,
+        path: str,
+        rows: "_csv.Reader",
+        choices: Sequence[Sequence[str]],
+        several: bool,
+        any_origin: bool,
+        texts: Sequence[str] | None,
     ):
+        self.any_order = texts is not None
         self.several, self.any_origin = several, any_origin
         self.path, self.rows, self.measured = path, rows, False
         self.faults = Faults(path)
@@ -173,13 +184,14 @@ class _Reader:
         self.track = header.index(TRACK) if TRACK in header else None
         # Columns that the filters do not take: anything but a number is missing.
         self.beside = {name: place for place, name in enumerate(header) if name.startswith(TRUE) or name in PLACES}
+        self.texts = {name: header.index(name) for name in texts or () if name in header}
         self.last: dict[str, float] = {}
 
     def chunks(self, size: int) -> Iterator[Piece]:
         """The wanted columns, the rows' tracks and their truth, `size` rows at a time."""
         any_row = False
         while True:
-            lines, values, tracks = self._some(size)
+            lines, values, tracks, texts = self._some(size)
             if not lines:
                 break
             any_row = True
@@ -187,13 +199,15 @@ class _Reader:
             array = table[:, : len(self.wanted)]
             beside = dict(zip(self.beside, table[:, len(self.wanted) :].T.copy(), strict=True))
             self._judge(array, lines)
-            self._in_order(array[:, 0], lines, tracks)
+            if not self.any_order:
+                self._in_order(array[:, 0], lines, tracks)
             if not self.faults:
                 yield Piece(
                     dict(zip(self.wanted, array.T.copy(), strict=True)),
                     None if self.track is None else tracks,
                     {name: column for name, column in beside.items() if name.startswith(TRUE)},
                     {name: column for name, column in beside.items() if name in PLACES},
+                    texts,
                 )
         if self.faults:
             raise ConfigError(*self.faults.lines())
@@ -202,11 +216,12 @@ class _Reader:
         if not self.measured:
             raise ConfigError(f"{self.path}: has no measured value in {', '.join(self.wanted[1:])}")
 
-    def _some(self, size: int) -> tuple[list[int], list[list[float]], list[str]]:
-        """Line numbers, numbers and tracks of the next rows."""
+    def _some(self, size: int) -> tuple[list[int], list[list[float]], list[str], dict[str, list[str]]]:
+        """Line numbers, numbers, tracks and texts of the next rows."""
         lines: list[int] = []
         values: list[list[float]] = []
         tracks: list[str] = []
+        texts: dict[str, list[str]] = {name: [] for name in self.texts}
         try:
             for row in self.rows:
                 if row:
@@ -215,12 +230,14 @@ class _Reader:
                     values.append(self._numbers(row, line))
                     whole = self.track is not None and len(row) == self.width
                     tracks.append(row[self.track].strip() if whole and self.track is not None else "")
+                    for name, place in self.texts.items():
+                        texts[name].append(row[place].strip() if place < len(row) else "")
                 if len(lines) == size:
                     break
         except csv.Error as error:
             fault = f"{self.path}:{self.rows.line_num}: not a CSV row: {error}"
             raise ConfigError(*self.faults.lines(), fault) from error
-        return lines, values, tracks
+        return lines, values, tracks, texts
 
     def _judge(self, array: np.ndarray, lines: list[int]) -> None:
         """Note values that no sensor can have measured."""

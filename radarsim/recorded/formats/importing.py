@@ -26,6 +26,7 @@ from radarsim.recorded.formats import asterix, logs
 from radarsim.recorded.formats import sites as ais
 from radarsim.recorded.formats.asterix import Asterix
 from radarsim.recorded.formats.sites import (
+    BIASES,
     DAY_S,
     PLOTS,
     POSITIONS,
@@ -40,7 +41,7 @@ from radarsim.recorded.formats.sites import (
     utc_s,
 )
 from radarsim.recorded.formats.text import Sheet, Table, comma_separated
-from radarsim.recorded.identity import KINDS, LONGEST_GAP_S, Paths, apart, offsets, too_far
+from radarsim.recorded.identity import FARTHEST_M, FARTHEST_RAD, KINDS, LONGEST_GAP_S, Paths, apart, are_far, offsets
 from radarsim.recorded.plots import cells, grouped
 from radarsim.report.files import Writer
 
@@ -57,6 +58,7 @@ ZIPPED = b"\x1f\x8b"  # how gzip begins
 MOST_LISTED = 12
 CONTRADICTS_M = 100.0  # of two places of a radar; a geoid is that far from the ellipsoid
 NOT_LATER = "rows not later than the one before of their track"
+LEAST_DATED_S = 1e8  # since 1970; smaller times count from anywhere
 SIGN_TESTS = 2000  # pairs of plots on which the sign of the Doppler speed is tested
 LEAST_TESTS = 20
 FOLD_TESTS = 3000  # rows on which folding of the Doppler speed is tested
@@ -77,7 +79,7 @@ class Options:
     columns: of a CSV, theirs by ours. encoding: of text that is neither UTF-8 nor UTF-16, Windows-1252 where none is
     named. keep_marked: what is of no aircraft (asterix.NO_AIRCRAFT) is in tracks and truth too. whose: the track,
     address, callsign or code of the plots whose truth is the one path of the second recording, for receivers that know
-    nothing of these.
+    nothing of these. biases: of plots, by BIASES, to be subtracted.
     """
 
     format: Format | None = None
@@ -92,6 +94,7 @@ class Options:
     encoding: str = ""
     keep_marked: bool = False
     whose: str = ""
+    biases: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def only_site(self) -> Site | None:
@@ -284,9 +287,22 @@ class _Import:
                 if batch.kind == PLOTS or self.truth is None or not self.truth.own:
                     self.left[f"{batch.kind} beside {self.kind}"] += len(batch.track)
                 continue
-            kept = self._kept(batch)
+            kept = self._kept(self._unbiased(batch))
             if kept is not None:
                 yield self._written(kept)
+
+    def _unbiased(self, batch: Batch) -> Batch:
+        """A batch without the biases of the radar."""
+        biases, columns = self.options.biases, batch.columns
+        if biases and batch.kind == PLOTS:
+            columns["t_s"] -= biases.get("time_s", 0.0)
+            columns["range_m"] = (columns["range_m"] - biases.get("range_m", 0.0)) / (
+                1 + biases.get("range_scale", 0.0)
+            )
+            columns["bearing_rad"] = (columns["bearing_rad"] - biases.get("bearing_rad", 0.0)) % (2 * math.pi)
+        elif biases:
+            raise ConfigError("bias: is subtracted from plots of a radar; the recording has positions")
+        return batch
 
     def _kept(self, batch: Batch) -> Batch | None:
         """The records of a batch that are wanted and later than their track's last."""
@@ -388,7 +404,7 @@ class _Import:
             )
         lines = [
             f"# made by radarsim import from a recording in the format {self.done.format}",
-            f"# t_s: seconds from {self._zero_words()}; {named}",
+            f"# t_s: seconds from {self._zero_words()} ({self.zero!r} s after {self._epoch()}); {named}",
             "# range_m: slant range; bearing_rad: from north to east; velocity_mps: radial and positive where the "
             "range grows; span_mps: what a folded velocity is ambiguous by",
         ]
@@ -410,6 +426,11 @@ class _Import:
         if not isinstance(zero, str):
             return datetime.datetime.fromtimestamp(zero, datetime.UTC).isoformat()
         return "midnight (UTC) before the first record" if zero == "midnight" else "the first record"
+
+    def _epoch(self) -> str:
+        """What the times of the recording count from."""
+        dated = self.zero is not None and self.zero >= LEAST_DATED_S
+        return "midnight" if self.reader.of_day else "1970" if dated else "the start of its clock"
 
     def nothing(self) -> str:
         """The fault of a recording without any row."""
@@ -566,8 +587,10 @@ class _Truth:
                          f"{', '.join(filter(None, tracks)) or 'no names'}")  # fmt: skip
         for number, parts in self.missed.items():
             missed = np.concatenate(parts)
-            if words := too_far(missed[:, :2], missed[:, 2]):
-                found.append(f"truth: the plots of {names[number]} lie {words}")
+            if are_far(missed[:, :2], missed[:, 2]):
+                most = f"{FARTHEST_M:g} m, and in bearing {math.degrees(FARTHEST_RAD):g}° more than these make"
+                found.append(f"truth: the plots of {names[number]} lie {_apart(missed)} from it (median), allowed are "
+                             f"{most}: it is another aircraft or clock, or --at is wrong")  # fmt: skip
         return found
 
     def notes(self) -> list[str]:
@@ -577,7 +600,12 @@ class _Truth:
         missed = np.concatenate([one for own in self.missed.values() for one in own])
         by = ", ".join(f"{KINDS[k]} {count}" for k, count in sorted(self.kinds.items()))
         share = f"{len(missed)} of {self.rows} plots ({len(missed) / self.rows:.0%}; by {by})"
-        return [f"truth: of {share}, which lie {apart(missed[:, :2])} from it (median)"]
+        return [f"truth: of {share}, which lie {_apart(missed)} from it (median)"]
+
+
+def _apart(missed: np.ndarray) -> str:
+    r, b = apart(missed[:, :2])
+    return f"{r:.3g} m in range" + ("" if math.isnan(b) else f" and {b:.2g}° in bearing")
 
 
 class _Sign:
@@ -667,6 +695,25 @@ def encoding_named(name: str) -> str:
             f"encoding: must be an encoding such as cp1251, iso8859-2 or mac-roman, got {name!r}"
         ) from None
     return name
+
+
+def biases_of(texts: Sequence[str]) -> dict[str, float]:
+    """Biases that the user states, `KEY=VALUE` each, by BIASES."""
+    found, faults = {}, []
+    for text in texts:
+        key, _, number = text.partition("=")
+        name = key.strip().replace("_deg", "_rad")
+        try:
+            value = float(number)
+        except ValueError:
+            value = math.nan
+        if name not in BIASES or not math.isfinite(value) or name in found or (name == "range_scale" and value <= -1):
+            must = "must be range_m=NUMBER, range_scale=…, bearing_deg=… or time_s=…, each once"
+            faults.append(f"bias: {must}; got {text!r}")
+        found[name] = math.radians(value) if key.strip().endswith("_deg") else value
+    if faults:
+        raise ConfigError(*faults)
+    return found
 
 
 def columns_of(texts: Sequence[str]) -> dict[str, str]:

@@ -30,6 +30,7 @@ PLOTS, POSITIONS = "plots", "positions"
 
 # What a record can hold besides its track and address. Angles are counted from north to east.
 PLOT_COLUMNS = ("t_s", "range_m", "bearing_rad", "velocity_mps", "span_mps", "altitude_m")
+BIASES = ("range_m", "range_scale", "bearing_rad", "time_s")  # of plots, to be subtracted
 POSITION_COLUMNS = ("t_s", "latitude_deg", "longitude_deg", "altitude_m", "east_mps", "north_mps", "up_mps")
 
 
