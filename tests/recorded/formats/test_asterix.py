@@ -349,7 +349,7 @@ def test_a_code_is_that_of_the_aircraft_that_flies_there():
     """Two pass each other 1 km apart, and fly three times as far between plots."""
     tracks, rng = Tracks(), np.random.default_rng(4)
     for k in range(40):
-        for name, north, east in (("A7000", 250 * 12 * (k - 20), 0), ("A7000-2", 250 * 12 * (20 - k), 1000)):
+        for name, north, east in (("A7000", 250 * 12 * (k - 20), 0), ("A7000-2", 250 * 12 * (20.5 - k), 1000)):
             north, east = (float(one + rng.normal(0, 50)) for one in (north, east))
             assert tracks.by_code("1/1", "7000", 12.0 * k, north, east) == name
 
