@@ -338,7 +338,7 @@ def chart(
 
     Without configs: the study that has a chart, with its paper's own radars. A config given twice counts once. Without
     `out` nothing is written. width_mm overrides the width of the figures' files. progress is called for each figure.
-    Raises ConfigError where the study has no chart, the configs are of several studies, or two have one name.
+    Raises ConfigError where the study has no chart, the configs belong to several studies, or two have one name.
     """
     if out is not None:
         directory(out)

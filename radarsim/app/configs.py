@@ -85,7 +85,7 @@ def shipped_stem(experiment: Experiment) -> str:
 
 
 def shadows(experiment: Experiment) -> list[str]:
-    """Whether an experiment is of a user's file although a config of its name is shipped."""
+    """Whether an experiment comes from a user's file although a config of its name is shipped."""
     if not experiment.path or shipped_stem(experiment) or not shipped_file(experiment.stem):
         return []
     file = Path(experiment.path).resolve()

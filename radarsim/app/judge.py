@@ -69,7 +69,7 @@ def judge(
 
     Gains are against every filter of the config, paired on the same realisations. Not-a-number before the first
     estimate of a realisation is no estimate yet; after it, or an error over a hundred times those of the config's
-    filters, is a failure: `tables["failures"]`. σ and gains are of the other realisations. `warnings` say what is
+    filters, is a failure: `tables["failures"]`. σ and gains count the others. `warnings` say what is
     unsound: a function that looks ahead, that gives other estimates when called again, single precision.
 
     against="tuned": the config's filters stand there tuned too, each by `radarsim.tune` with noise of another seed,

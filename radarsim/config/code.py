@@ -20,7 +20,7 @@ PYTHON = "python"
 
 
 def is_code(member: object) -> bool:
-    """Whether a member of a list of filters, as read, is of the user's own code."""
+    """Whether a member of a list of filters, as read, is the user's own code."""
     return isinstance(member, dict) and PYTHON in member
 
 

@@ -447,7 +447,7 @@ def collect(
     store is the results directory: its sums of this work are used, and computed ones are kept there. threads defaults
     to all cores; with 0 none is started, and the calling thread does everything. progress(done, total, from_store) is
     called at most ten times a second, and at the end. stop() is called between tasks; once it gives a reason, no task
-    starts, running ones are finished (for at most stop.grace_s, if it has that), and the result is of the blocks done
+    starts, running ones are finished (for at most stop.grace_s, if it has that), and the result has the blocks done
     without a gap.
 
     However a run ends, its finished blocks are stored. NonFiniteError names the first realisations whose sums are not

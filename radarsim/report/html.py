@@ -262,7 +262,7 @@ def comparison(
 ) -> str:
     """The page of a comparison: sentences, figures, differing keys, the table.
 
-    differing: tables of keys by their title, empty where the configs are of several studies; outputs: the files beside
+    differing: tables of keys by their title, empty where the configs are of several; outputs: the files beside
     the page.
     """
     return whole(

@@ -72,7 +72,7 @@ def _paired(both: np.ndarray, base: str, of: CaseResult) -> common.Columns:
 
 
 def failures(result: CaseResult) -> common.Columns:
-    """How often a filter from outside fails, by the reason; σ and gains are of the other realisations.
+    """How often a filter from outside fails, by the reason; σ and gains count the others.
 
     reason: `any`, or `not_a_number` after an estimate, `no_estimate` though a filter of the config has one, `diverged`
         with an error over a hundred times the largest of the config's filters in the realisation; no failure, but no
@@ -233,7 +233,9 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
     elif row["gain_hi"] < 0:
         first = tr("{name} is worse than {best}, the config's best in {component} at {t} s: gain {gain}", **told)
     else:
-        first = tr("{name} cannot be told from {best}, the config's best in {component} at {t} s: gain {gain}", **told)
+        first = tr(
+            "{name} cannot be distinguished from {best}, the config's best in {component} at {t} s: gain {gain}", **told
+        )
     rivals = [best, *sorted(tuned, key=lambda base: sigma[base])[:1]]
     if tuned:
         rival = last[last["baseline"] == rivals[1]].iloc[0]
@@ -243,7 +245,7 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
         elif rival["gain_hi"] < 0:
             first += tr(", and worse than {best}: gain {gain}", **told)
         else:
-            first += tr(", and cannot be told from {best}: gain {gain}", **told)
+            first += tr(", and cannot be distinguished from {best}: gain {gain}", **told)
         own_sigma = f"{wording.number(sigma[rival['baseline']])} {panels.unit_of(unit)}"
         first += tr(", whose σ is {sigma}", sigma=own_sigma.rstrip())
     mine = curves[curves["filter"] == name].iloc[0]

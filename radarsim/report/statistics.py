@@ -190,7 +190,7 @@ def normalised_bounds(freedom: Values, looks: Values = 1) -> tuple[np.ndarray, n
 def gain(
     square: Values, fourth: Values, base_square: Values, base_fourth: Values, cross: Values, n: Values
 ) -> Estimate:
-    """Relative gain K = 100 (1 − σ/σ_base) in per cent (P1 eq. 17), paired: both errors are of the same realisations.
+    """Relative gain K = 100 (1 − σ/σ_base) in per cent (P1 eq. 17), paired on the same realisations.
 
     From Σe², Σe⁴ of both and cross = Σ e²·e_base². The interval is that of the logarithm of the ratio of mean
     squares, whose variance holds the covariance of the squares; common noise so makes it narrower. That variance is

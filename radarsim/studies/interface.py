@@ -42,7 +42,7 @@ class Plan(Protocol):
     """The result of `prepare`; a study's own plan adds the arrays that its kernels take.
 
     block: realisations in a block, from the study alone, never from N, threads or the machine. layout: names and shapes
-    of the arrays of sums. axes: the quantities that the sums are of. gaussian: whether all errors are Gaussian, with
+    of the arrays of sums. axes: the quantities that are summed. gaussian: whether all errors are Gaussian, with
     the exact bias and σ of the axes.
     """
 

@@ -15,7 +15,7 @@ are paired with every one of them, in every study that draws plots, and the sums
 
 A realisation fails where not-a-number follows an estimate, where an estimate is infinite, where there is none although
 a filter of the config has one, and where an error is more than a hundred times the largest error of the config's
-filters in it. Its errors enter no sum, so that σ and gains are of the other realisations; how many failed is counted.
+filters in it. Its errors enter no sum, so that σ and gains count the others; how many failed is counted.
 """
 
 import itertools

@@ -56,7 +56,7 @@ def drawn(result: CaseResult[ClutterAxes], f: int | np.ndarray) -> rare.Drawn:
 def false_tracks(result: CaseResult[ClutterAxes], f: int) -> tuple[Estimate, np.ndarray, np.ndarray]:
     """The probability that a track begun by a false plot is confirmed; scans with a confirmed one, and confirmed ones.
 
-    The last two are of all realisations; where false tracks are rare, by their weights.
+    The last two count all realisations; where false tracks are rare, by their weights.
     """
     if "held" not in result.sums:
         begun = result.sums["begun"][f]
