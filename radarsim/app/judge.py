@@ -131,6 +131,8 @@ def judged(
     left_out: list[str] = []
     if against not in (None, "tuned"):
         raise ConfigError(f"{argument('against', '--against')}: must be tuned, got {against!r}")
+    if wanted is not None and not against:
+        raise ConfigError(f"{argument('wanted', '--for')}: needs {argument('against', '--against')} tuned")
     if against:
         from radarsim.app import tune
 

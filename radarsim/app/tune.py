@@ -707,7 +707,8 @@ def _minimised(of: Objective, cases: int) -> str:
 
 
 def beside(experiment: Experiment, wanted: str | None, **asked: Any) -> tuple[Experiment, list[str]]:
-    """The experiment with each of its filters as tuned over all its cases too, and why some are not.
+    """The experiment with each of its filters as tuned over all its cases too, and why some are not; raises ConfigError
+    where none is.
 
     wanted: for what, by default σ of the first component at the last scan; asked: as `tune` takes it.
     """
@@ -718,6 +719,8 @@ def beside(experiment: Experiment, wanted: str | None, **asked: Any) -> tuple[Ex
             found.append(tune(experiment, wanted, filter=one.name, **asked))
         except ConfigError as error:
             left_out.append(tr("{filter} is not tuned: {why}", filter=one.name, why=error.lines[0]))
+    if not found:
+        raise ConfigError(*left_out)
     made = []
     for each in experiment.cases:
         members = [*map(complete, each.spec.members), *(one.member(each) for one in found)]

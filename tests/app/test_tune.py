@@ -273,6 +273,13 @@ def test_what_cannot_be_tuned_is_said():
     assert any(line.startswith("r is not tuned: ") for line in result.warnings)
 
 
+def test_where_no_filter_can_be_tuned_nothing_is_judged():
+    with pytest.raises(ConfigError, match=r"r is not tuned: no component 'q'.*\nr\+Vr is not tuned"):
+        radarsim.judge("rls2", rival(1e-3), against="tuned", wanted="sigma q", realisations=300)
+    with pytest.raises(ConfigError, match="wanted: needs against tuned"):
+        radarsim.judge("rls2", rival(1e-3), wanted="sigma r", realisations=300)
+
+
 def test_against_is_tuned_or_nothing():
     with pytest.raises(ConfigError, match="against: must be tuned, got 'best'"):
         radarsim.judge("rls2", rival(1e-3), against="best", realisations=300)
