@@ -342,7 +342,7 @@ def prepare(study: "Study", case: Case, inner: Any) -> Plan:
 
 def plots_of(plan: Plan, drawn: "Drawn") -> Plots:
     """What a filter sees of plots: arrays and keys of its own, which it may change."""
-    columns = {name: np.array(values) for name, values in drawn.columns.items()}
+    columns = {name: np.array(values, order="C") for name, values in drawn.columns.items()}  # as C code takes them
     world = replace(plan.world, t_s=np.array(plan.world.t_s), keys=deepcopy(plan.world.keys))
     return Plots(np.array(drawn.t_s), columns, world, drawn.first, drawn.n)
 

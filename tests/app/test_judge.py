@@ -410,6 +410,15 @@ def test_a_function_of_one_realisation(mine):
         np.testing.assert_allclose(result.tables[name][column], mine.tables[name][column], rtol=1e-9, atol=1e-6)
 
 
+def test_plots_lie_in_memory_as_c_code_takes_them():
+    seen = []
+    for alone in (False, True):
+        look = lambda plots: seen.append(plots) or plots["range_m"]  # noqa: E731
+        radarsim.judge("rls2", look, one_by_one=alone, realisations=10)
+    assert all(one[name].flags.c_contiguous for one in seen for name in one.columns)
+    assert {one["range_m"].ndim for one in seen} == {1, 2}
+
+
 def test_a_filter_may_give_its_own_state_and_go_on_to_change_it():
     class Mean:
         def start(self, world):
