@@ -284,7 +284,7 @@ def _above_floor(floor: "pd.DataFrame", sigmas: Mapping[str, float], sigma_hi: f
     rows = common.where(floor, filter=name)
     if len(rows):
         least = float(rows["floor"].iloc[0])
-        own, *above = (f"{wording.number(100 * (sigma / least - 1), 3)} %" for sigma in sigmas.values())
+        own, *above = (f"{wording.number(round(100 * (sigma / least - 1), 2), 3)} %" for sigma in sigmas.values())
         told = {"name": name, "own": own, "floor": f"{wording.number(least)} {unit}".rstrip()}
         told["others"] = listed([f"{one} {size}" for one, size in zip(others, above, strict=True)])
         kind = tr(UNBIASED if rows["kind"].iloc[0].startswith("CRB") else ANY)
