@@ -110,11 +110,17 @@ def track(config: Config, recorded: Recorded, overrides: Overrides = ()) -> "pd.
 
 
 def fit(
-    config: Config, recorded: Recorded, overrides: Overrides = (), filter_name: str | None = None, robust: bool = False
+    config: Config,
+    recorded: Recorded,
+    overrides: Overrides = (),
+    filter_name: str | None = None,
+    allowing: Sequence[str] | None = None,
 ) -> "pd.DataFrame":
     """Fit σ and the manoeuvre variance to recorded plots (a file or a table), with 95 % intervals.
 
-    Columns: key, stated, value, lo, hi, identifiable. robust: allow for outliers. Raises ConfigError.
+    Columns: key, stated, value, lo, hi, identifiable; plain, plain_lo, plain_hi: of errors that are normal and
+    independent. allowing: for "outliers", "correlation" (a further key correlation_time_s) or both; default: for what
+    is plain. Raises ConfigError.
 
     >>> import radarsim
     >>> plots = radarsim.simulate("rls2", overrides=["scans=60"])
@@ -124,9 +130,8 @@ def fit(
     import pandas as pd
 
     experiment = load(config, overrides)
-    found = _with_file(recorded, lambda path: fitting.fit(experiment, path, filter_name, robust))
-    names = ("key", "stated", "value", "lo", "hi", "identifiable")
-    return pd.DataFrame([{name: getattr(one, name) for name in names} for one in found.keys], columns=names)
+    found = _with_file(recorded, lambda path: fitting.fit(experiment, path, filter_name, allowing))
+    return pd.DataFrame(fitting.as_rows(found))
 
 
 class Registered(Shown):

@@ -330,6 +330,8 @@ def track(
     help="The filter whose model is fitted; default: the one that uses most of a plot.",
 )
 @click.option("--robust", is_flag=True, help="Allow for outliers: plots with errors of ten times their σ.")
+@click.option("--correlated", is_flag=True, help="Fit the correlation time of the errors, correlation_time_s, too.")
+@click.option("--plain", is_flag=True, help="Allow for neither; default: for what is plain in the plots.")
 @click.option(
     "--write",
     metavar="MINE.yaml",
@@ -344,6 +346,9 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     the likelihood of the plots under the filter's predictions; its interval is a profile-likelihood interval. A key
     whose interval has no lower or no upper bound cannot be determined from these plots.
 
+    Where outliers, or errors that persist from plot to plot, are plain (by chance in one recording of 1000), the fit
+    allows for them, and prints the plain values beside.
+
     \b
     Example
       radarsim simulate rls2 --set scans=60 -o plots.csv
@@ -356,12 +361,17 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     from radarsim.cli import console, verdicts
     from radarsim.recorded import fit as fitting
     from radarsim.report import wording
+    from radarsim.studies.interface import CORRELATION, OUTLIERS
 
     (loaded,) = run.load_all([config], overrides)
+    asked = tuple(what for what in (OUTLIERS, CORRELATION) if options[{OUTLIERS: "robust"}.get(what, "correlated")])
+    if asked and options["plain"]:
+        raise click.UsageError("--plain goes with neither --robust nor --correlated")
+    allowing = asked if asked or options["plain"] else None
     with console.Counter("fitting", "likelihoods") as counter:
-        found = fitting.fit(loaded, plots, options["filter_name"], options["robust"], counter.update)
+        found = fitting.fit(loaded, plots, options["filter_name"], allowing, counter.update)
     if options["as_json"]:
-        click.echo(json.dumps(fitting.as_json(found), indent=2))
+        click.echo(json.dumps(fitting.as_rows(found, endless=None), indent=2))
     else:
         verdicts.report_fit(found)
     if options["write"]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from radarsim.app.result import Result
     from radarsim.recorded.advice import Advice
     from radarsim.recorded.figures import Judged
-    from radarsim.recorded.fit import Fit
+    from radarsim.recorded.fit import Fit, Fitted
     from radarsim.recorded.follow import Followed
     from radarsim.recorded.register import Registration
 
@@ -62,31 +62,35 @@ def report_fit(found: "Fit") -> None:
     tracks = plural("{count} track", "{count} tracks", found.tracks)
     told = tr("{rows} of {tracks}; filter {filter}", rows=page.counted(found.rows), tracks=tracks, filter=found.filter)
     lines = [labelled("plots", told)]
+    if found.doubles:
+        words = plural("{count} plot", "{count} plots", found.doubles)
+        lines.append(
+            labelled("doubles", tr("{plots} left out: the same scan has one nearer to the track", plots=words))
+        )
+    plain = {} if found.plain is None else {one.key: one for one in found.plain.keys}
     for one in found.keys:
-        value, stated = significant_digits(one.value), significant_digits(one.stated)
-        lo, hi = (
-            significant_digits(one.lo),
-            tr("no upper bound") if one.hi == float("inf") else significant_digits(one.hi),
-        )
-        least = one.lo == 0
-        doubt = (
-            tr("; the plots cannot distinguish it from zero")
-            if least
-            else tr("; the plots cannot distinguish it from larger values")
-        )
-        line = tr(
-            "{key}: {value} {interval}, stated {stated}",
-            key=one.key,
-            value=value,
-            interval=interval(lo, hi),
-            stated=stated,
-        )
-        lines.append(line + ("" if one.identifiable else doubt))
+        line = f"{one.key}: {_known(one)}"
+        if one.key != fit.CORRELATION_TIME:
+            line += tr(", stated {stated}", stated=significant_digits(one.stated))
+        if one.key in plain:
+            line += tr(", plain {value}", value=_known(plain[one.key]))
+        if not one.identifiable:
+            line += (
+                tr("; the plots cannot distinguish it from zero")
+                if one.lo == 0
+                else tr("; the plots cannot distinguish it from larger values")
+            )
+        lines.append(line)
     if found.outliers is not None:
         lines.append(tr("outliers: {share} % of the plots", share=significant_digits(100 * found.outliers, "#.2g")))
     settings = " ".join(f"--set {key}={value:g}" for key, value in fit.settings(found).items())
     if found.beside is not None:
-        lines.append(labelled("", tr("the intervals are not valid: {what}", what=page.what(*found.beside))))
+        lines.append(labelled("", tr("the intervals are not valid: {what}", what=page.what(*found.beside[:2]))))
+    if found.plain is not None:
+        words = tr("plain: of errors that are normal and independent")
+        if found.plain.beside is not None:
+            words = tr("{words}; the plots contradict that, so those intervals are too narrow", words=words)
+        lines.append(labelled("", words))
     lines.append(
         labelled(
             "",
@@ -100,6 +104,12 @@ def report_fit(found: "Fit") -> None:
         lines.append(labelled("", tr("to use the fitted values: {settings}", settings=settings)))
     for line in lines:
         write(sys.stdout, line)
+
+
+def _known(one: "Fitted") -> str:
+    """A value with its interval."""
+    hi = tr("no upper bound") if one.hi == float("inf") else significant_digits(one.hi)
+    return f"{significant_digits(one.value)} {interval(significant_digits(one.lo), hi)}"
 
 
 def report_registration(found: "Registration", other: str) -> None:

@@ -9,7 +9,7 @@ The filter used is the one that takes most columns of a plot. One that takes few
 predict the ranges best just because the velocities are bad.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +27,7 @@ from radarsim.recorded.fit import (
     folded,
     polished,
     silent,
+    some,
     value,
 )
 from radarsim.recorded.follow import Followed, borrowed, recorded_of
@@ -63,11 +64,10 @@ class Compared:
 
 @dataclass(frozen=True)
 class Asked:
-    """The rows used: so many altogether, the first `each` of so many tracks (None where the file has one)."""
+    """The rows used: so many altogether, of so many stretches of rows, spread over all tracks and the whole time."""
 
     rows: int
-    each: int
-    tracks: int | None
+    stretches: int
 
 
 @dataclass(frozen=True)
@@ -83,11 +83,11 @@ class Advice:
 
 
 def advised(followed: Followed, progress: Progress = silent) -> Advice | None:
-    """Advice from the first rows of each track; none where the study has no likelihood of recorded plots. progress is
-    called with the number of likelihoods computed."""
+    """Advice from rows of all tracks over the whole time; none where the study has no likelihood of recorded plots.
+    progress is called with the number of likelihoods computed."""
     case, of = followed.case, recorded_of(followed.case)
-    heads = [one.head for one in followed.tracks.values()] or [followed.head]
-    long = [head for head in heads if len(head["t_s"]) >= LEAST_ROWS]
+    every = list(followed.tracks.values()) or [followed]
+    long = [part for one in every for part in one.sample.stretches() if len(part["t_s"]) >= LEAST_ROWS]
     if not long or borrowed(case, "likelihood"):
         return None
     chosen = some(long, of.rows_asked)
@@ -95,8 +95,7 @@ def advised(followed: Followed, progress: Progress = silent) -> Advice | None:
     if not known:
         return None
     found = compared(list(known.values()))
-    rows = sum(len(head["t_s"]) for head in chosen)
-    asked = Asked(rows, max(len(head["t_s"]) for head in chosen), len(chosen) if followed.tracks else None)
+    asked = Asked(sum(len(part["t_s"]) for part in chosen), len(chosen))
     if (folding := folded(case, long)) is not None:
         return Advice(found, [], asked, folding)
     one = known[found.fullest]
@@ -110,13 +109,6 @@ def _judged(case: Case, likelihood: Likelihood, found: Finding) -> Finding:
         return found
     turning = recorded_of(case).in_a_turn(case, likelihood.filter, {found.what: found.value})
     return replace(found, turning=turning)
-
-
-def some(heads: Sequence[Mapping[str, np.ndarray]], most: int) -> list[Mapping[str, np.ndarray]]:
-    """The beginnings of tracks, columns (n,) each, up to `most` rows altogether; as many tracks as possible."""
-    share = max(most // len(heads), LEAST_ROWS)
-    chosen = heads[: max(most // share, 1)]
-    return [{name: column[:share] for name, column in head.items()} for head in chosen]
 
 
 def findings(likelihood: Likelihood, progress: Progress = silent) -> list[Finding]:

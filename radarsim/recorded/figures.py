@@ -303,7 +303,7 @@ def judged(followed: Followed) -> list[Judged]:
     found = [replace(one, verdict=_of_folds(followed.case, one, found)) for one in found]
     improved = {}
     for name in {one.filter for one in found if one.verdict in (SMALL, LARGE)}:
-        improved[name] = better(followed.case, name, followed.head)
+        improved[name] = better(followed.case, name, followed.sample.columns)
     return [replace(one, better=_own(followed.case, one, improved.get(one.filter, {}))) for one in found]
 
 
@@ -336,7 +336,7 @@ def _own(case: Case, one: Judged, improved: Mapping[str, float]) -> dict[str, fl
 def better(case: Case, filter_name: str, columns: Mapping[str, np.ndarray]) -> dict[str, float]:
     """The standard deviations, by config key, for which one filter's mean NIS is 1 in each number it tests.
 
-    The filter runs repeatedly over the first rows, each σ multiplied by the root of its NIS; empty where that does not
+    The filter runs repeatedly over these rows, each σ multiplied by the root of its NIS; empty where that does not
     converge (a filter whose manoeuvre variance alone explains more than the plots' scatter).
     """
     of = recorded_of(case)

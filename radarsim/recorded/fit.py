@@ -3,7 +3,7 @@
 The filter's predictions give each plot a density; their product is the likelihood of the filter's parameters (Schweppe
 1965). Estimates maximise it; an interval holds the values of a key at which the largest likelihood over all other keys
 is within half the 95 % point of chi-square of the maximum (profile likelihood). Beside the keys the plots may have
-outliers, a bias, or errors correlated from plot to plot.
+outliers, a bias, or errors correlated from plot to plot. Where outliers or correlation are plain, they are fitted too.
 
 Whether recorded velocities are folded: from the ranges of the same plots, whatever a config states of their errors. A
 velocity ambiguous by a span D lies within half of it, and differs from the rate of the range by a whole number of
@@ -16,7 +16,7 @@ import itertools
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -290,6 +290,12 @@ NEAR_ZERO = 7.0  # above the value that counts as zero, in that logarithm: zero 
 ALMOST = 300.0  # times the accuracy: a Newton step that gains no more ends the search
 LEAST_SHARE, MOST_SHARE = 1e-6, 0.5  # of outliers; fewer are none
 MOST_OUTLIERS = 0.3  # of plots that may have ten times their σ; beyond, their errors follow another law
+CORRELATION_TIME = "correlation_time_s"
+NO_TIME = 1e-4  # of the usual interval: a correlation time that counts as zero
+PLAIN = 5.4138  # gain of the log-likelihood by chance in one of 1000: half that point of chi-square
+ROUGH_ROWS = 600  # on which the maximum is looked for before all are asked
+LONGEST, SHORTEST = 100, 25  # rows of a stretch of a track, where not all are asked
+NEAR = 30  # as TOP, from near the maximum
 FINER, LEAP = 1e-3, 0.01  # factor on the value that counts as zero where the likelihood jumps by more there
 
 
@@ -311,8 +317,8 @@ class Fitted:
 @dataclass(frozen=True)
 class Fit:
     """The fit: filter, tracks and plots used, the keys, the share of outliers where allowed for, and the increase of
-    the log-likelihood over the stated values; and another explanation that the plots have, of EXPLANATIONS, with its
-    value: then the intervals do not hold."""
+    the log-likelihood over the stated values; another explanation that the plots have: then the intervals do not hold;
+    and the fit without outliers and correlation, where these are allowed for."""
 
     filter: str
     tracks: int
@@ -320,19 +326,72 @@ class Fit:
     keys: tuple[Fitted, ...]
     outliers: float | None
     gain: float
-    beside: tuple[str, float] | None = None
+    beside: "Beside | None" = None
+    plain: "Fit | None" = None
+    doubles: int = 0  # further plots of a track in a scan, left out
 
 
-def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name: str | None = None) -> Likelihood:
-    """The likelihood of a filter of an experiment's one case over all tracks of a file; without a name, of the filter
-    that takes most columns of a plot. Raises ConfigError."""
+class Beside(NamedTuple):
+    """An explanation beside the keys, of EXPLANATIONS, its value, and the increase of the log-likelihood by it."""
+
+    what: str
+    value: float
+    gain: float
+
+
+class Correlated:
+    """A likelihood with the correlation time of the errors as a further key, s: of an error a share exp(-t / it) is
+    left after a time t (first-order Gauss-Markov process)."""
+
+    def __init__(self, of: Likelihood):
+        self.of, self.filter, self.tracks, self.rows, self.usual_s = of, of.filter, of.tracks, of.rows, of.usual_s
+        self.keys, self.stated = (*of.keys, CORRELATION_TIME), np.append(of.stated, 0.0)
+        self.least = np.append(of.least, NO_TIME * of.usual_s)
+        self.explains = tuple(what for what in of.explains if what != CORRELATION)
+
+    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
+        """The logarithm of the likelihood; `correlation` is that of the last of the values (n,), whatever is given."""
+        return self.of(values[:-1], outliers, bias, math.exp(-self.usual_s / values[-1]) if values[-1] else 0.0)
+
+    def by_number(self, values: np.ndarray) -> Mapping[str, float]:
+        """The same for the keys alone, without correlation."""
+        return self.of.by_number(values[:-1])
+
+
+def some(tracks: Sequence[Mapping[str, np.ndarray]], most: int) -> list[Mapping[str, np.ndarray]]:
+    """About `most` rows of tracks, columns (n,) each, spread over all tracks and their whole time: stretches of rows
+    that follow each other; the tracks themselves where they have no more rows. Of very many tracks only some."""
+    total = sum(len(one["t_s"]) for one in tracks)
+    if total <= most:
+        return list(tracks)
+    length = min(max(most // len(tracks), SHORTEST), LONGEST)
+    stretches = [
+        {name: column[start : start + length] for name, column in one.items()}
+        for one in tracks
+        for start in _starts(len(one["t_s"]), length)
+    ]
+    count = min(max(round(most / length), 1), len(stretches))
+    return [stretches[(2 * i + 1) * len(stretches) // (2 * count)] for i in range(count)]
+
+
+def _starts(rows: int, length: int) -> list[int]:
+    """The first rows of as many stretches of a length as fit into a track, spread evenly."""
+    return np.rint(np.linspace(0, max(rows - length, 0), max(rows // length, 1))).astype(int).tolist()
+
+
+def likelihood_of(
+    experiment: Experiment, source: str | os.PathLike, filter_name: str | None = None
+) -> tuple[Likelihood, Likelihood | None, int]:
+    """The likelihood of a filter of an experiment's one case over all tracks of a file, and over a sample of its rows;
+    without a name, of the filter that takes most columns of a plot. And how many further plots of a track in a scan are
+    left out. Raises ConfigError."""
     case = one_case(experiment, "fit", f"radarsim fit {{}} {os.fspath(source)}")
     refuse_borrowed(case, "likelihood")
     of = recorded_of(case)
     names = [member.name for member in case.spec.members]
     if filter_name is not None and filter_name not in names:
         raise ConfigError(f"filter: must be one of {', '.join(names)}; got {filter_name}")
-    tracks = _tracks(source, of.columns(case.spec), of.from_any_origin)
+    tracks, doubles = _tracks(source, of.columns(case.spec), of.from_any_origin)
     long = [columns for columns in tracks if len(columns["t_s"]) >= LEAST_ROWS]
     if not long:
         raise ConfigError(f"{source}: must have a track of at least {LEAST_ROWS} rows")
@@ -344,7 +403,7 @@ def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name
         raise ConfigError(f"{source}: {said(folding, case)}")
     if found is None:
         raise ConfigError(unlikely(case, filter_name, [name for name in names if of.likelihood(case, name, long)]))
-    return found
+    return found, of.likelihood(case, filter_name, some(long, min(ROUGH_ROWS, of.rows_asked))), doubles
 
 
 def unlikely(case: Case, filter_name: str | None, others: Sequence[str]) -> str:
@@ -360,34 +419,67 @@ def unlikely(case: Case, filter_name: str | None, others: Sequence[str]) -> str:
 
 def _tracks(
     source: str | os.PathLike, choices: Sequence[Sequence[str]], any_origin: bool
-) -> list[dict[str, np.ndarray]]:
-    """The columns (n,) of each track of a file of plots."""
-    parts: dict[str | None, list[dict[str, np.ndarray]]] = {}
+) -> tuple[list[dict[str, np.ndarray]], int]:
+    """The columns (n,) of each track of a file of plots, and how many further plots of a scan are left out."""
+    parts, doubles = dict[str | None, list[dict[str, np.ndarray]]](), 0
     for piece in plots.pieces(source, choices, any_origin=any_origin):
+        doubles = piece.doubles
         for own in by_track(piece):
             if own.name != "":
                 parts.setdefault(own.name, []).append(own.columns)
-    return [{key: np.concatenate([part[key] for part in pieces]) for key in pieces[0]} for pieces in parts.values()]
+    whole = [{key: np.concatenate([part[key] for part in pieces]) for key in pieces[0]} for pieces in parts.values()]
+    return whole, doubles
 
 
 def fit(
     experiment: Experiment,
     source: str | os.PathLike,
     filter_name: str | None = None,
-    robust: bool = False,
+    allowing: Sequence[str] | None = None,
     progress: Progress = silent,
 ) -> Fit:
-    """Fit the config's numbers to the plots of a file; robust: allowing for outliers. progress is called with the
-    number of likelihoods computed. Raises ConfigError."""
-    return fitted(likelihood_of(experiment, source, filter_name), robust, progress)
+    """Fit the config's numbers to the plots of a file; allowing: for these of OUTLIERS and CORRELATION; None: for those
+    that are plain. progress is called with the number of likelihoods computed. Raises ConfigError."""
+    likelihood, rough, doubles = likelihood_of(experiment, source, filter_name)
+    return replace(answered(likelihood, rough, allowing, progress), doubles=doubles)
 
 
-def fitted(likelihood: Likelihood, robust: bool = False, progress: Progress = silent) -> Fit:
-    """The keys at the maximum of a likelihood, with profile intervals. Raises ConfigError where outliers cannot be
-    allowed for, or the plots are impossible whatever the keys."""
-    if robust and OUTLIERS not in likelihood.explains:
-        raise ConfigError(f"robust: the likelihood of filter {likelihood.filter} cannot allow for outliers")
-    search = _Search(likelihood, robust, progress)
+def answered(
+    likelihood: Likelihood,
+    rough: Likelihood | None = None,
+    allowing: Sequence[str] | None = None,
+    progress: Progress = silent,
+) -> Fit:
+    """The fit of a likelihood that allows for what is asked, or where None for outliers and correlation that are plain:
+    which raise the likelihood by more than chance does in one recording of 1000. With the plain fit beside it."""
+    plain = found = fitted(likelihood, (), progress, rough)
+    allowed = tuple(allowing or ())
+    if allowed:
+        found = fitted(likelihood, allowed, progress, rough)
+    while allowing is None and (more := found.beside) and more.what in (OUTLIERS, CORRELATION) and more.gain > PLAIN:
+        allowed = (*allowed, more.what)
+        try:
+            found = fitted(likelihood, allowed, progress, rough)
+        except ConfigError:  # so many outliers that they are another law: the plain fit says so beside
+            break
+    return found if found is plain else replace(found, plain=plain)
+
+
+def fitted(
+    likelihood: Likelihood, allowing: Sequence[str] = (), progress: Progress = silent, rough: Likelihood | None = None
+) -> Fit:
+    """The keys at the maximum of a likelihood, with profile intervals; allowing: for these of OUTLIERS and CORRELATION;
+    rough: the likelihood of fewer rows, for a first search. Raises ConfigError where these cannot be allowed for, or
+    the plots are impossible whatever the keys."""
+    for what in allowing:
+        if what not in likelihood.explains:
+            thing = {OUTLIERS: "outliers", CORRELATION: "errors that last"}[what]
+            raise ConfigError(f"the likelihood of filter {likelihood.filter} cannot allow for {thing}")
+    robust = OUTLIERS in allowing
+    if CORRELATION in allowing:
+        likelihood, rough = Correlated(likelihood), rough and Correlated(rough)
+    start = _Search(rough, robust, silent).best if rough and rough.rows < likelihood.rows else None
+    search = _Search(likelihood, robust, progress, start)
     while search.refined():
         search.settle()
     if search.top <= IMPOSSIBLE:
@@ -402,9 +494,9 @@ def fitted(likelihood: Likelihood, robust: bool = False, progress: Progress = si
     return Fit(likelihood.filter, likelihood.tracks, likelihood.rows, keys, share, gain, _beside(search, likelihood))
 
 
-def _beside(search: "_Search", likelihood: Likelihood) -> tuple[str, float] | None:
-    """The explanation, with its value, that raises the maximum most beside the fitted keys, if by more than chance does
-    in one recording of twenty."""
+def _beside(search: "_Search", likelihood: Likelihood) -> Beside | None:
+    """The explanation that raises the maximum most beside the fitted keys, if by more than chance does in one recording
+    of twenty."""
     from scipy.stats import chi2
 
     fitted = search.natural(search.best).tolist()
@@ -413,11 +505,17 @@ def _beside(search: "_Search", likelihood: Likelihood) -> tuple[str, float] | No
     expected = search.evaluations + BESIDE * len(asked)
     counted = Counted(likelihood, search.progress, search.evaluations, expected)
     found = [best(counted, [what], {}, held) for what in asked]
+    if OUTLIERS in asked and likelihood.rows <= ROUGH_ROWS:
+        # They have raised σ, which hides a few of them: so the keys, but those at zero, are fitted again beside them.
+        i, free = asked.index(OUTLIERS), [key for key in likelihood.keys if held[key] > 0]
+        along = Along(counted, [*free, OUTLIERS], {key: value for key, value in held.items() if key not in free})
+        values, top = climbed(along, held | found[i][0])
+        found[i] = max(found[i], ({OUTLIERS: values[OUTLIERS]}, top), key=lambda one: one[1])
     if not found:
         return None
     values, top = max(found, key=lambda one: one[1])
     needed = 0.5 * float(chi2.ppf(0.95 ** (1 / len(found)), 1))
-    return next(iter(values.items())) if top > search.top + needed else None
+    return Beside(*next(iter(values.items())), top - search.top) if top > search.top + needed else None
 
 
 def polished(value: Callable[[np.ndarray], float], at: np.ndarray) -> np.ndarray:
@@ -480,7 +578,7 @@ class _Search:
     """The maximum of a likelihood, and its profile along each key. Coordinates are logarithms of the keys, and the
     logit of the share of outliers."""
 
-    def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress):
+    def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress, near: np.ndarray | None = None):
         self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, 0
         self.ends_found, self.ends_begun_at = 0, 0
         start, self.lowest = np.log(units(likelihood)), np.log(likelihood.least)
@@ -490,15 +588,15 @@ class _Search:
                 np.append(keys, _logit(share))
                 for keys, share in ((start, 0.05), (self.lowest, LEAST_SHARE), (self.highest, MOST_SHARE))
             )
-        self.top_at = TOP * start.size
+        self.top_at = (TOP if near is None else NEAR) * start.size
         self.shape = _Shape(self._value)
-        self.best, self.top = self._climbed(start, None, ROUGH)
+        self.best, self.top = self._climbed(start if near is None else near, None, ROUGH)
         # A second start far away: the likelihood of manoeuvre and plot errors may have two maxima.
-        for climbs, factor in enumerate((0.1, 10.0), 1):
+        for climbs, factor in enumerate((0.1, 10.0) if near is None else (), 1):
             self.top_at = max(self.top_at, self.evaluations * 3 // climbs)
             moved = np.where(self.best > self.lowest, self.best, start)
             moved[: len(likelihood.stated)] += math.log(factor)
-            other, top = self._climbed(moved, None, ROUGHLY)
+            other, top = self._climbed(moved, None, ROUGHLY, SHORT_SIMPLEX[:1])
             if top > self.top - ROUGHLY and np.abs(other - self.best).max() > FIRST_STEP:
                 other, top = self._climbed(other, None, ROUGH)
             if top > self.top + 1e-6:
@@ -561,13 +659,15 @@ class _Search:
         each = (self.evaluations - self.ends_begun_at) / self.ends_found if self.ends_found else END * size
         return max(round(top + each * ends), self.evaluations) + beside
 
-    def _climbed(self, start: np.ndarray, held: int | None, close: float) -> tuple[np.ndarray, float]:
+    def _climbed(
+        self, start: np.ndarray, held: int | None, close: float, simplexes: Sequence[int] = SHORT_SIMPLEX
+    ) -> tuple[np.ndarray, float]:
         """The maximum reached from a start, one coordinate held or none, and the log-likelihood there: by Newton steps,
         until one gains less than `close`; where they fail, by a simplex for a while."""
         free = np.array([i for i in range(len(start)) if i != held])
         at, here = start, self._value(start)
         shape = self.shape if held is not None else _Shape(self._value)
-        for most in SHORT_SIMPLEX:
+        for most in simplexes:
             at, here, arrived = self._newton(at, here, free, close, shape)
             if arrived:
                 return at, here
@@ -749,18 +849,24 @@ def _logit(share: float) -> float:
 
 def settings(found: Fit) -> dict[str, float]:
     """Settings for the config, by key, to four digits; keys that the plots do not determine stay as they are."""
-    return {one.key: float(f"{one.value:.4g}") for one in found.keys if one.identifiable}
+    return {
+        one.key: float(f"{one.value:.4g}") for one in found.keys if one.identifiable and one.key != CORRELATION_TIME
+    }
 
 
-def as_json(found: Fit) -> list[dict[str, object]]:
-    """The keys as `fit --json` prints them; an interval without an upper end has null there."""
+def as_rows(found: Fit, endless: float | None = math.inf) -> list[dict[str, Any]]:
+    """The keys as rows of a table: with the plain answer, if any, beside that which allows for outliers or correlation;
+    endless: for the upper end of an interval that has none."""
+    plain = {one.key: one for one in (found.plain or found).keys}
     return [
         {
-            "key": one.key,
-            "value": one.value,
-            "lo": one.lo,
-            "hi": one.hi if math.isfinite(one.hi) else None,
+            **{"key": one.key, "stated": one.stated, "value": one.value, "lo": one.lo},
+            "hi": endless if math.isinf(one.hi) else one.hi,
             "identifiable": one.identifiable,
+            "plain": beside and beside.value,
+            "plain_lo": beside and beside.lo,
+            "plain_hi": beside and (endless if math.isinf(beside.hi) else beside.hi),
         }
         for one in found.keys
+        for beside in [plain.get(one.key)]
     ]

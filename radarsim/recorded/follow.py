@@ -121,7 +121,7 @@ MOST_DRAWN = 2000  # rows kept for figures; when there are more, every second is
 GAP = 3.0  # in median intervals
 MOST_NAMED = 12  # configs or values listed where one must be chosen
 BEFORE = 10  # first estimates of a filter, which are not compared with the truth
-HEAD = 5000  # rows on which a better σ is searched
+SAMPLE, BLOCK = 5000, 100  # rows of a track kept for the advice, in blocks that follow each other
 BY_ROW = ("estimate", "sigma", "probability", "residual", "nis", "score", "residual_sigma")  # arrays (F, n, …)
 
 
@@ -314,10 +314,12 @@ class Followed:
     estimating: set[str] = field(default_factory=set)
     drawn: list[Track] = field(default_factory=list)
     stride: int = 1
-    head: dict[str, np.ndarray] = field(default_factory=dict)
+    sample: "Sample" = field(default_factory=lambda: Sample())
     median_s: float = np.nan
     tracks: dict[str, "Followed"] = field(default_factory=dict)  # by name, where the file has several
     passed_over: int = 0  # rows of no track
+    again: int = 0  # numbers of tracks that were used again, for another track
+    doubles: int = 0  # further plots of a track in a scan, left out
     errors: dict[tuple[str, str], Errors] = field(default_factory=dict)  # by filter and component, with truth
     places: Places = field(default_factory=Places)  # places of the plots, for the plan view
 
@@ -336,9 +338,7 @@ class Followed:
                 known = known[np.isfinite(known)]
                 tally = self.tallies.setdefault((filter_name, name), Tally(filter_name, name, freedom))
                 tally.count, tally.total = tally.count + known.size, tally.total + float(known.sum())
-        if self.rows < HEAD:
-            before = self.head or {name: column[:0] for name, column in columns.items()}
-            self.head = {name: np.concatenate([before[name], column])[:HEAD] for name, column in columns.items()}
+        self.sample.add(columns)
         self._draw(track)
         self.rows += len(t)
 
@@ -371,7 +371,7 @@ class Followed:
         """The filters that took no plot, as the file has none of their columns, with these."""
         of, spec = recorded_of(self.case), self.case.spec
         wanted = {one.name: list(of.columns_of(spec, one)) for one in spec.members}
-        return {name: names for name, names in wanted.items() if names and self.head.keys().isdisjoint(names)}
+        return {name: names for name, names in wanted.items() if names and self.sample.columns.keys().isdisjoint(names)}
 
     def _gaps(self, t: np.ndarray) -> None:
         if self.rows == 0:
@@ -413,6 +413,36 @@ def joined(parts: list[Track]) -> Track:
         if getattr(first, name) is not None
     }
     return replace(first, t_s=np.concatenate([part.t_s for part in parts]), **whole)
+
+
+@dataclass
+class Sample:
+    """Rows of a track, columns (n,), in blocks spread over its whole time; when there are more than SAMPLE, every
+    second block is dropped. number (n,): of each row."""
+
+    columns: dict[str, np.ndarray] = field(default_factory=dict)
+    number: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    seen: int = 0
+    stride: int = 1
+
+    def add(self, columns: Mapping[str, np.ndarray]) -> None:
+        """Add the next rows."""
+        number = self.seen + np.arange(len(columns["t_s"]))
+        kept = number // BLOCK % self.stride == 0
+        before = self.columns or {name: column[:0] for name, column in columns.items()}
+        self.columns = {name: np.concatenate([before[name], column[kept]]) for name, column in columns.items()}
+        self.number, self.seen = np.concatenate([self.number, number[kept]]), self.seen + len(number)
+        while len(self.number) > SAMPLE:
+            self.stride *= 2
+            kept = self.number // BLOCK % self.stride == 0
+            self.number = self.number[kept]
+            self.columns = {name: column[kept] for name, column in self.columns.items()}
+
+    def stretches(self) -> list[dict[str, np.ndarray]]:
+        """The rows that follow each other, stretch by stretch: the whole track where no block was dropped."""
+        ends = np.flatnonzero(np.diff(self.number) > 1) + 1
+        parts = {name: np.split(column, ends) for name, column in self.columns.items()}
+        return [{name: parts[name][i] for name in parts} for i in range(len(ends) + 1)]
 
 
 class Follower:
@@ -479,11 +509,12 @@ def follow(
     tracker = of.tracker(case)
     size = tracker.most_rows or plots.CHUNK
     followers: dict[str | None, Follower] = {}
-    passed_over = rows = 0
+    passed_over = rows = again = doubles = 0
     with mapping(os.cpu_count() or 1 if threads is None else threads) as mapped:
         for piece in plots.pieces(source, of.columns(case.spec), size, tracker.several, of.from_any_origin):
             if followers and tracker.most_rows:
                 raise ConfigError(f"{source}: must be of at most {size} rows for the study {case.study}")
+            again, doubles = piece.again, piece.doubles
             named_parts = [own for own in by_track(piece) if own.name != ""]
             passed_over += len(piece.columns["t_s"]) - sum(own.rows for own in named_parts)
             for own in named_parts:
@@ -497,7 +528,7 @@ def follow(
     if not followers:
         raise ConfigError(f"{source}: track: must name the track of some rows, all {passed_over} are empty")
     found = {name: one.followed for name, one in followers.items()}
-    return found[None] if None in found else together(case, found, passed_over)
+    return found[None] if None in found else replace(together(case, found, passed_over), again=again, doubles=doubles)
 
 
 class Own(NamedTuple):

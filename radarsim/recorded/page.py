@@ -39,6 +39,14 @@ def rows(followed: Followed) -> list[str]:
         lines.append(labelled("tracks", tr("{count}, the longest of {rows}", count=len(followed.tracks), rows=longest)))
     if followed.passed_over:
         lines.append(labelled("passed", tr("{rows} outside any track", rows=counted(followed.passed_over))))
+    if followed.again:
+        words = plural("{count} track number", "{count} track numbers", followed.again)
+        lines.append(labelled("again", tr("{numbers} used again after a gap: each begins a new track", numbers=words)))
+    if followed.doubles:
+        words = plural("{count} plot", "{count} plots", followed.doubles)
+        lines.append(
+            labelled("doubles", tr("{plots} left out: the same scan has one nearer to the track", plots=words))
+        )
     missing = [tr("{count} of {name}", count=count, name=name) for name, count in followed.missing.items() if count]
     if missing:
         lines.append(labelled("missing", ", ".join(missing)))
@@ -179,17 +187,12 @@ def _partly(followed: Followed, asked: Asked) -> list[str]:
     """The rows behind best filter and advice, where not all."""
     if asked.rows >= followed.rows:
         return []
-    if asked.tracks is None:
-        words = tr("from the first {rows} of {all}", rows=counted(asked.rows), all=followed.rows)
-    else:
-        words = tr(
-            "from {rows} of {all}: the first {each} of each of {tracks} tracks out of {count}",
-            rows=counted(asked.rows),
-            all=followed.rows,
-            each=asked.each,
-            tracks=asked.tracks,
-            count=len(followed.tracks),
-        )
+    words = tr(
+        "from {rows} of {all}, in {stretches} stretches spread over all tracks and the whole time",
+        rows=counted(asked.rows),
+        all=followed.rows,
+        stretches=asked.stretches,
+    )
     return [labelled("", words)]
 
 

@@ -75,6 +75,120 @@ class Path:
             self.t_s, self.places = self.t_s[::2], self.places[::2]
 
 
+# ---- numbers of tracks -----------------------------------------------------------------------------------------------
+USED_AGAIN, USED_AGAIN_S = 30.0, 60.0  # usual intervals and time after which a number is that of another track
+SAME_SCAN = 0.5  # of the usual interval: plots of one track that are nearer than that are of one scan
+REGULAR, NEARLY = 0.75, 0.1  # share of intervals that are whole scans, but for this part of one, of a turning antenna
+LEAST_STEPS, MOST_STEPS = 5, 100  # between the last plots of a track, which tell its usual interval
+
+
+@dataclass
+class _Seen:
+    """A track so far: under which name, how often its number began one, its last two plots (time and place), the last
+    intervals, the usual one, and the time within which a further plot is of the same scan."""
+
+    name: str
+    times: int = 1
+    last: list[tuple[float, np.ndarray]] = field(default_factory=list)
+    steps: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    usual_s: float = math.nan
+    scan_s: float = 0.0
+
+
+class Numbers:
+    """The numbers of tracks over time. One that is used again after a gap is that of another track, with a name of its
+    own: every tracker has dropped the first by then. Of several plots of a track in a scan (equal times; with a turning
+    antenna, times that are no scan apart) the one nearest to where the track leads is kept: the others are reflections,
+    or the same plot once more."""
+
+    def __init__(self) -> None:
+        self.tracks: dict[str, _Seen] = {}
+        self.again = self.doubles = 0
+
+    def tidied(self, t: np.ndarray, names: list[str], places: Mapping[str, np.ndarray]) -> tuple[np.ndarray, list[str]]:
+        """Which of the next rows (n,) are kept, and their tracks; places: columns (n,)."""
+        kept, names, found = np.ones(len(t), dtype=bool), list(names), in_plane(places)
+        where = np.full((len(t), 3), np.nan) if found is None else found
+        for name, rows in grouped(names).items():
+            if name:
+                self._one(self.tracks.setdefault(name, _Seen(name)), t, rows, where, kept, names)
+        return kept, [name for name, one in zip(names, kept.tolist(), strict=True) if one]
+
+    def _one(
+        self, seen: _Seen, t: np.ndarray, rows: np.ndarray, where: np.ndarray, kept: np.ndarray, names: list[str]
+    ) -> None:
+        """The rows of one number; kept and names are changed in place."""
+        own = t[rows]
+        steps = np.diff(own, prepend=seen.last[-1][0] if seen.last else own[0])
+        self._timed(seen, steps[1:] if not seen.last else steps)
+        gap = max(USED_AGAIN * seen.usual_s, USED_AGAIN_S)  # without a usual interval: not-a-number, and no gap
+        begins = steps > gap
+        close = (steps <= 0) | (steps < seen.scan_s)
+        close[:1] &= bool(seen.last)
+        if begins.any() or close.any() or seen.times > 1:
+            self._by_row(seen, own, rows, where, kept, names, gap)
+        else:
+            seen.last = [*seen.last, *((t[i], where[i]) for i in rows[-2:])][-2:]
+
+    @staticmethod
+    def _timed(seen: _Seen, steps: np.ndarray) -> None:
+        """The usual interval of a track, and whether it is that of a turning antenna."""
+        seen.steps = steps = np.concatenate([seen.steps, steps[steps > 0]])[-MOST_STEPS:]
+        if steps.size < LEAST_STEPS:
+            return
+        seen.usual_s = float(np.median(steps))
+        scans = steps / seen.usual_s
+        whole = (np.abs(scans - np.rint(scans)) < NEARLY) & (scans > SAME_SCAN)
+        seen.scan_s = SAME_SCAN * seen.usual_s if whole.mean() >= REGULAR else 0.0
+
+    def _by_row(
+        self,
+        seen: _Seen,
+        own: np.ndarray,
+        rows: np.ndarray,
+        where: np.ndarray,
+        kept: np.ndarray,
+        names: list[str],
+        gap: float,
+    ) -> None:
+        """Row by row, where a number is used again or plots are of one scan."""
+        i = 0
+        while i < len(own):
+            before = seen.last[-1][0] if seen.last else -math.inf
+            if seen.last and own[i] - before > gap:
+                seen.times, seen.last = seen.times + 1, []
+                self.again += 1
+            if seen.last and (
+                own[i] <= before or own[i] - before < seen.scan_s
+            ):  # the rest of a scan that the rows before have begun
+                kept[rows[i]] = False
+                self.doubles, i = self.doubles + 1, i + 1
+                continue
+            end = i + 1
+            while end < len(own) and (own[end] == own[i] or own[end] - own[i] < seen.scan_s):
+                end += 1
+            best = i + self._nearest(seen, own[i:end], where[rows[i:end]])
+            kept[rows[i:end]] = False
+            kept[rows[best]] = True
+            self.doubles += end - i - 1
+            names[rows[best]] = seen.name if seen.times == 1 else f"{seen.name} ({seen.times})"
+            seen.last = [*seen.last, (float(own[best]), where[rows[best]])][-2:]
+            i = end
+
+    @staticmethod
+    def _nearest(seen: _Seen, t: np.ndarray, where: np.ndarray) -> int:
+        """Which of the plots of one scan is nearest to where the last two lead; the first where that is not known."""
+        if len(t) == 1 or not seen.last:
+            return 0
+        led = np.tile(seen.last[-1][1], (len(t), 1))
+        if len(seen.last) == 2:
+            (t0, first), (t1, second) = seen.last
+            led = second + np.outer((t - t1) / (t1 - t0), second - first)
+        off = (where - led)[:, :2] if np.isfinite(where[:, :2]).all() and np.isfinite(led[:, :2]).all() else where - led
+        far = np.nansum(off**2, axis=1)
+        return int(far.argmin()) if np.isfinite(off).any(axis=1).all() else 0
+
+
 # ---- plots -----------------------------------------------------------------------------------------------------------
 NAMED = 3  # rows listed of those with the same fault
 LARGEST = 1e18  # of any number, as in configs
@@ -111,14 +225,17 @@ class Faults:
 
 class Piece(NamedTuple):
     """Some rows of a file of plots: the measured columns (n,); the track of each row, none where the file has no
-    tracks; the columns (n,) of the truth, `true_…`; those of the plots' places, of PLACES; and texts, of those asked
-    for that the file has."""
+    tracks; the columns (n,) of the truth, `true_…`; those of the plots' places, of PLACES; texts, of those asked for
+    that the file has; so far, how many numbers of tracks were used again, and how many further plots of a scan were
+    left out."""
 
     columns: dict[str, np.ndarray]
     tracks: list[str] | None
     truth: dict[str, np.ndarray]
     places: dict[str, np.ndarray]
     texts: dict[str, list[str]]
+    again: int = 0
+    doubles: int = 0
 
 
 def pieces(
@@ -132,8 +249,9 @@ def pieces(
     """The columns of a file, of the first of `choices` that it has, `size` rows at a time, so that memory does not grow
     with the file: `t_s` first; NaN where a cell is empty.
 
-    Times rise, within each track; several: rows may have the time of the row before. any_origin: ranges may be
-    negative. texts: further columns; times may then have any order.
+    Times rise, within each track; several: rows may have the time of the row before. Else the rows of tracks with
+    names are those that `Numbers` keeps, with its names. any_origin: ranges may be negative. texts: further columns;
+    times may then have any order, and all rows are kept.
 
     After the first fault no more rows come: the rest is checked for faults, and ConfigError raised at the end with all
     of them, each `file:row's line:column: name: what is wrong`.
@@ -186,6 +304,7 @@ class _Reader:
         self.beside = {name: place for place, name in enumerate(header) if name.startswith(TRUE) or name in PLACES}
         self.texts = {name: header.index(name) for name in texts or () if name in header}
         self.last: dict[str, float] = {}
+        self.numbers = Numbers()
 
     def chunks(self, size: int) -> Iterator[Piece]:
         """The wanted columns, the rows' tracks and their truth, `size` rows at a time."""
@@ -202,13 +321,18 @@ class _Reader:
             if not self.any_order:
                 self._in_order(array[:, 0], lines, tracks)
             if not self.faults:
-                yield Piece(
+                tables = [
                     dict(zip(self.wanted, array.T.copy(), strict=True)),
-                    None if self.track is None else tracks,
                     {name: column for name, column in beside.items() if name.startswith(TRUE)},
                     {name: column for name, column in beside.items() if name in PLACES},
-                    texts,
-                )
+                ]
+                if self.track is not None and not self.several and not self.any_order:
+                    kept, tracks = self.numbers.tidied(array[:, 0], tracks, tables[2])
+                    if not kept.all():
+                        tables = [{name: column[kept] for name, column in one.items()} for one in tables]
+                columns, true, places = tables
+                named = None if self.track is None else tracks
+                yield Piece(columns, named, true, places, texts, self.numbers.again, self.numbers.doubles)
         if self.faults:
             raise ConfigError(*self.faults.lines())
         if not any_row:
@@ -255,9 +379,9 @@ class _Reader:
             if self.track is not None and not name:
                 continue
             own = np.append(self.last.get(name, math.nan), t[rows])
-            rises = np.diff(own) >= 0 if self.several else np.diff(own) > 0
+            rises = np.diff(own) >= 0 if self.several or name else np.diff(own) > 0
             for i in np.flatnonzero(~rises & np.isfinite(own[:-1]) & np.isfinite(own[1:])):
-                must = f"must {'not be earlier' if self.several else 'be later'} than the row before"
+                must = f"must {'not be earlier' if self.several or name else 'be later'} than the row before"
                 got = f"{own[i + 1]:g} after {own[i]:g}{f' in track {name}' if name else ''}"
                 cure = "" if name else f"if there are several tracks, name their column {TRACK}"
                 self.faults.add(lines[rows[i]], self._where(0), must, got, cure)

@@ -178,7 +178,7 @@ class Likelihood(Protocol):
 
     filter: its name; tracks and rows: numbers of them; keys: dotted names; stated (n,): their values in the config;
     least (n,): values of them that count as zero; explains: other explanations of plots that it can include, of
-    EXPLANATIONS.
+    EXPLANATIONS; usual_s: the usual interval between plots.
     """
 
     filter: str
@@ -188,6 +188,7 @@ class Likelihood(Protocol):
     stated: "np.ndarray"
     least: "np.ndarray"
     explains: tuple[str, ...]
+    usual_s: float
 
     def __call__(
         self, values: "np.ndarray", outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0
@@ -200,6 +201,14 @@ class Likelihood(Protocol):
 
     def by_number(self, values: "np.ndarray") -> Mapping[str, float]:
         """The same for the keys alone, summed for each number of a plot, by its column; NaN where it is unknown."""
+
+
+def usual_interval_s(tracks: "Sequence[Mapping[str, np.ndarray]]") -> float:
+    """The usual interval between plots of tracks, columns (n,) each: the median of their medians; 1 without any."""
+    import numpy as np
+
+    usual = [float(np.median(np.diff(one["t_s"]))) for one in tracks if len(one["t_s"]) > 1]
+    return float(np.median(usual)) if usual else 1.0
 
 
 class Turning(NamedTuple):

@@ -26,7 +26,7 @@ from radarsim.physics import is_covariance
 from radarsim.report.quantities import FLOORS, Quantity
 from radarsim.studies import floor
 from radarsim.studies.floor import Floor
-from radarsim.studies.interface import CORRELATION, OUTLIERS, Draw, Drawn, Tracker
+from radarsim.studies.interface import CORRELATION, OUTLIERS, Draw, Drawn, Tracker, usual_interval_s
 from radarsim.studies.onefile import OneFile
 
 if TYPE_CHECKING:
@@ -609,8 +609,7 @@ class PlotLikelihood:
         self.plots = [
             (np.diff(one["t_s"], prepend=one["t_s"][0]), self.of.numbers(one, len(one["t_s"]))) for one in tracks
         ]
-        usual = [float(np.median(dt[1:])) for dt, _ in self.plots if dt.size > 1]
-        self.usual_s = float(np.median(usual)) if usual else study.scan_period_s(spec)
+        self.usual_s = usual_interval_s(tracks)
 
     def _scores(self, values: np.ndarray, outliers: float, correlation: float) -> np.ndarray:
         """Sums over all tracks for each number of a plot."""

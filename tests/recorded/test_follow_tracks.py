@@ -7,7 +7,7 @@ import pytest
 
 from radarsim.app.run import load_all
 from radarsim.errors import ConfigError
-from radarsim.recorded import follow
+from radarsim.recorded import follow, page
 
 
 def loaded(config="rls2"):
@@ -57,22 +57,13 @@ def test_each_track_is_followed_by_itself(tmp_path, realisations):
         assert tally.count == sum(one.tallies[key].count for one in followed.tracks.values())
 
 
-def test_what_advice_is_asked_of_is_the_beginning_of_each_track(tmp_path, monkeypatch, realisations):
-    """However many pieces of the file it lies in."""
-    monkeypatch.setattr(follow.plots, "CHUNK", 7)
-    monkeypatch.setattr(follow, "HEAD", 40)
-    followed, _ = tracks_of(written(tmp_path / "plots.csv", dict(zip("ab", realisations, strict=False))))
-    for name, table in zip("ab", realisations, strict=False):
-        np.testing.assert_array_equal(followed.tracks[name].head["range_m"], table["range_m"][:40])
-
-
 def test_times_must_rise_within_a_track_alone(tmp_path, realisations):
     path = written(tmp_path / "plots.csv", {"a": realisations[0], "b": realisations[1]})
     lines = path.read_text().splitlines()
     lines[2], lines[4] = lines[4], lines[2]  # two rows of track a
     path.write_text("\n".join(lines))
     with pytest.raises(
-        ConfigError, match=r"plots.csv:\d+:1: t_s: must be later than the row before, got 0 after 10 in track a"
+        ConfigError, match=r"plots.csv:\d+:1: t_s: must not be earlier than the row before, got 0 after 10 in track a"
     ):
         tracks_of(path)
 
@@ -101,3 +92,64 @@ def test_a_cell_of_the_truth_that_is_no_number_is_missing(tmp_path, realisations
     path.write_text(path.read_text().replace("true_Vr_mps", "true_target").replace("text", "more"))
     followed, _ = tracks_of(path)
     assert {component for _, component in followed.errors} == {"r"}
+
+
+# ---- numbers used again, several plots of a scan ---------------------------------------------------------------------
+
+
+def numbered(path, *parts):
+    """A file of rows of one track number: of several tables, by time."""
+    table = {key: np.concatenate([part[key] for part in parts]) for key in ("t_s", "range_m", "velocity_mps")}
+    order = np.argsort(table["t_s"], kind="stable")
+    rows = {key: column[order] for key, column in table.items()}
+    return written(path, {"7": rows}, ("t_s", "track", "range_m", "velocity_mps", "note"))
+
+
+@pytest.mark.parametrize("size", [7, 20_000])
+def test_a_number_used_again_after_a_gap_is_another_track(tmp_path, monkeypatch, realisations, size):
+    """Each as if it were alone; told once; a gap of ten scans is none."""
+    monkeypatch.setattr(follow.plots, "CHUNK", size)
+    first, second = ({key: one[key].copy() for key in ("t_s", "range_m", "velocity_mps")} for one in realisations[:2])
+    second["t_s"] += first["t_s"][-1] + 3524.0
+    second["range_m"] += 150e3
+    followed, together = tracks_of(numbered(tmp_path / "again.csv", first, second))
+    assert (list(followed.tracks), followed.again) == (["7", "7 (2)"], 1)
+    for name, one in (("7", first), ("7 (2)", second)):
+        _, alone = tracks_of(numbered(tmp_path / "alone.csv", one))
+        np.testing.assert_array_equal(together[name], alone["7"])
+    (line,) = (line for line in page.rows(followed) if line.startswith("again"))
+    assert "1 track number used again after a gap: each begins a new track" in line
+    hole = {key: np.delete(first[key], np.arange(20, 30)) for key in first}
+    followed, _ = tracks_of(numbered(tmp_path / "hole.csv", hole))
+    assert (list(followed.tracks), followed.again, followed.gaps) == (["7"], 0, 1)
+
+
+@pytest.mark.parametrize("size", [7, 20_000])
+@pytest.mark.parametrize("late_s", [0.0, 3.0, -3.0])
+def test_of_several_plots_of_a_scan_the_one_on_the_track_is_kept(tmp_path, monkeypatch, realisations, size, late_s):
+    """Reflections 20 km off, at the plot's time or before or after it: as if they were not there, and counted."""
+    monkeypatch.setattr(follow.plots, "CHUNK", size)
+    sound = {key: realisations[0][key] for key in ("t_s", "range_m", "velocity_mps")}
+    ghosts = {key: column[10::9].copy() for key, column in sound.items()}
+    ghosts["range_m"] += 20e3
+    ghosts["t_s"] += late_s
+    parts = (ghosts, sound) if late_s <= 0 else (sound, ghosts)
+    followed, kept = tracks_of(numbered(tmp_path / "ghosts.csv", *parts))
+    _, alone = tracks_of(numbered(tmp_path / "alone.csv", sound))
+    cut = late_s <= 0 and size == 7  # a scan that the end of a piece parts
+    if cut:
+        assert followed.doubles >= len(ghosts["t_s"]) - 1
+    else:
+        assert followed.doubles == len(ghosts["t_s"])
+        np.testing.assert_array_equal(kept["7"], alone["7"])
+        assert any(line.startswith("doubles") and f"{followed.doubles} plots left out" in line
+                   for line in page.rows(followed))  # fmt: skip
+
+
+def test_plots_at_uneven_times_are_no_doubles(tmp_path, realisations):
+    """As ships send them: intervals from a fifth of the usual one on."""
+    rng = np.random.default_rng(6)
+    one = {key: realisations[0][key].copy() for key in ("t_s", "range_m", "velocity_mps")}
+    one["t_s"] = np.cumsum(rng.choice([2.0, 3.0, 6.0, 10.0], one["t_s"].size))
+    followed, _ = tracks_of(numbered(tmp_path / "uneven.csv", one))
+    assert (followed.doubles, followed.rows) == (0, 60)

@@ -177,6 +177,31 @@ def test_the_sonar_likelihood_is_that_of_a_textbook_filter(frame, name):
     )
 
 
+def test_errors_of_a_sonar_that_last_have_the_density_of_their_correlations():
+    """By the joint normal density of all plots given the first, without a filter: of a straight course, at uneven
+    times; less that of the plots that find the state."""
+    case, columns = loaded("sonar_smoothing"), recording("sonar_smoothing")
+    rng, rho = np.random.default_rng(1), 0.7
+    chosen = np.sort(rng.choice(len(columns["t_s"]), 12, replace=False))
+    columns = {name: column[chosen] for name, column in columns.items()}
+    one = likelihood(case, "growing", columns)
+    t = columns["t_s"] - columns["t_s"][0]
+    usual, expected = np.median(np.diff(t)), 0.0
+
+    def density(x, P):
+        return -0.5 * (np.linalg.slogdet(2 * np.pi * P)[1] + x @ np.linalg.solve(P, x))
+
+    for z, sigma in zip((columns["range_m"], columns["bearing_rad"]), one.stated, strict=True):
+        off, rate = z[1:] - z[0] - (z[1] - z[0]) / t[1] * t[1:], sigma * 1e3 / usual
+        lasting = rho ** (np.abs(t[1:, None] - t[1:]) / usual) - rho ** (t[1:, None] / usual) - rho ** (t[1:] / usual)
+        spread = sigma**2 * (lasting + 1) + rate**2 * np.outer(t[1:], t[1:])
+        expected += density(off, spread) - density(off[:2], spread[:2, :2])
+    assert one(one.stated, correlation=rho) == pytest.approx(expected, rel=1e-7)
+    timed = fit.Correlated(one)
+    assert timed(np.append(one.stated, -usual / np.log(rho))) == pytest.approx(expected, rel=1e-7)
+    assert timed(np.append(one.stated, 0.0)) == one(one.stated)
+
+
 @pytest.mark.parametrize("frame", ["polar", "cartesian"])
 def test_a_sonar_without_errors_of_range_has_a_likelihood(frame):
     """A fit asks whether an error can be zero; the rates before the first plot are as unknown then."""
@@ -276,6 +301,19 @@ def test_the_multimodel_likelihood_is_that_of_a_textbook_filter(share):
         assert one(one.stated, share) == pytest.approx(interacting(case, options, columns, T, share), rel=1e-7)
 
 
+def test_the_multimodel_likelihood_does_not_leap():
+    """Along a key, where the filter's own rule of merges, which chooses, makes it leap by units."""
+    case = loaded("multimodel_1hz")
+    one = likelihood(case, "MMA2-122", *(recording("multimodel_1hz", "scans=60", number=i) for i in range(5)))
+    grid = [np.array([2.7948 * (1 + step), 0.00183, 0.001705, 0.0]) for step in np.linspace(-0.02, 0.02, 17)]
+    smooth, leaping = (
+        np.abs(np.diff([of(values) for values in grid], n=2)).max()
+        for of in (one, lambda at: one.by_number(at)["plot"])
+    )
+    assert smooth < 0.02
+    assert leaping > 1
+
+
 def test_pairs_of_equal_models_are_one():
     """GPB2, whose density is found in another way, of two models alike: the Kalman filter."""
     case, columns = loaded("multimodel_1hz", "scans=30", PAIR), recording("multimodel_1hz", "scans=30")
@@ -335,6 +373,29 @@ def test_the_span_beside_a_velocity_counts_before_that_of_the_config():
         plain, with_span = likelihood(case, filter_name, columns), likelihood(other, filter_name, told)
         assert with_span(with_span.stated) == pytest.approx(plain(plain.stated), rel=1e-12)
         assert likelihood(other, filter_name, columns)(plain.stated) != pytest.approx(plain(plain.stated), rel=1e-3)
+
+
+def test_a_velocity_whose_error_is_a_span_tells_nothing():
+    """It is as likely as any other, whatever the filter knew: one over the span; the ranges as without it."""
+    case, columns = loaded("ambiguous_rls4"), recording("ambiguous_rls4")
+    blind = columns | {"velocity_mps": np.full(len(columns["t_s"]), np.nan)}
+    one = likelihood(case, "memory", columns)
+    values = np.array([one.stated[0], 15.0, one.stated[2]])
+    found, without = one.by_number(values), likelihood(case, "memory", blind).by_number(values)
+    assert found["range_m"] == pytest.approx(without["range_m"], rel=1e-12)
+    assert found["velocity_mps"] == pytest.approx(-len(columns["t_s"]) * np.log(15.0), rel=1e-12)
+
+
+def test_the_likeliest_hypotheses_are_kept_in_their_order():
+    from radarsim.studies.ambiguous_doppler.kernels.rows import likeliest
+
+    rng = np.random.default_rng(7)
+    for most, least in ((5, 0.0), (40, 1e-2), (1, 0.5), (100, 1e-6)):
+        w = np.round(-4 * rng.random(60), 1)
+        w -= w.max()
+        order = np.argsort(-w, kind="stable")
+        np.testing.assert_array_equal(likeliest(w, most, least), [i for i in order if np.exp(w[i]) >= least][:most])
+    np.testing.assert_array_equal(likeliest(np.full(4, np.nan), 3, 0.1), [0])
 
 
 def test_a_wrong_velocity_error_is_named_though_velocities_fold(monkeypatch):

@@ -28,15 +28,14 @@ from radarsim.kernels.algebra import (
 )
 from radarsim.studies.ambiguous_doppler import filters
 from radarsim.studies.ambiguous_doppler.config import joint_span
+from radarsim.studies.ambiguous_doppler.kernels import rows as kernels
 from radarsim.studies.ambiguous_doppler.kernels import sums
 from radarsim.studies.ambiguous_doppler.kernels.steps import remainder
 from radarsim.studies.ambiguous_doppler.study import COMPONENTS, prepare
-from radarsim.studies.interface import BIAS, Draw, Drawn, RecordedPlots
+from radarsim.studies.interface import BIAS, Draw, Drawn, RecordedPlots, usual_interval_s
 
 # ---- followers -------------------------------------------------------------------------------------------------------
 LEAST = 1e-150  # probability of an order: none is ruled out for good
-FARTHEST = 9.0  # standard deviations of the velocity's innovation up to which folds are looked at
-MOST_LOOKED_AT = 10_000_000  # sequences of folds at a row: states of 240 MB, seconds
 CERTAIN = 4.0  # standard deviations of the velocity's innovation that half a span must hold for the fold to be certain
 
 
@@ -113,19 +112,22 @@ class Folds:
         """Innovations with the nearest folds."""
         return e - self.span * np.rint(e / self.span)
 
-    def innovations(self, e: np.ndarray, S: np.ndarray) -> np.ndarray:
-        """Innovations e + n D (..., folds) of folds near enough to matter; e (...) as measured, S (...) variances.
+    def near(self, S: np.ndarray | float, count: int) -> int:
+        """How many folds to either side of the nearest may matter, of `count` innovations of variances S (...).
 
         Raises PlotFault where these are too many, or the variances are only rounding errors.
         """
         most = float(np.max(S))
         if not most > 0:
             raise PlotFault("velocity_mps: a filter's numbers are lost in rounding: split the file here")
-        reach = FARTHEST * math.sqrt(most) / self.span
-        if 2 * reach * e.size > MOST_LOOKED_AT:
-            sigma, few = f"its σ before, {math.sqrt(most):g} m/s", f"{MOST_LOOKED_AT:g} sequences"
+        if 2 * kernels.FARTHEST * math.sqrt(most) / self.span * count > kernels.MOST_LOOKED_AT:
+            sigma, few = f"its σ before, {math.sqrt(most):g} m/s", f"{kernels.MOST_LOOKED_AT:g} sequences"
             raise PlotFault(f"velocity_mps: {sigma}, leaves more than {few} of folds by {self.span:g} m/s")
-        farthest = int(reach) + 1
+        return kernels.folds_near(most, self.span)
+
+    def innovations(self, e: np.ndarray, S: np.ndarray) -> np.ndarray:
+        """Innovations e + n D (..., folds) of the folds that matter; e (...) as measured, S (...) variances."""
+        farthest = self.near(S, e.size)
         return self.folded(e)[..., None] + self.span * np.arange(-farthest, farthest + 1)
 
     def certain(self, S: float) -> bool:
@@ -154,23 +156,23 @@ class Single:
         self.folds = Folds(spec.radar)
         self.variances = spec.radar.sigma_range_m**2, spec.radar.sigma_velocity_mps**2
         self.x, self.w = np.zeros((3, 1)), np.zeros(1)
-        self.P: Any = before_plots(member, spec)
-        self.sure = self.P
+        self.P, self.sure = np.array(before_plots(member, spec)), before_plots(member, spec)
         self.known = np.array(member.components)
         self.last = np.nan
         self.began = self.started = False
         self.last_step: filters.Step | None = None
-        self.nis, self.log_density = np.full(2, np.nan), np.zeros(2)  # of the last row, for range and velocity
+        self.nis = np.full(2, np.nan)  # of the last row, for range and velocity
 
     def step(self, t: float, z: float, v: float, span: float = np.nan) -> Row:
         """The estimate after one row; not-a-number before the first range."""
         self.folds.begin(t, span)
-        self.nis, self.log_density = np.full(2, np.nan), np.zeros(2)
+        self.nis = np.full(2, np.nan)
         F, gains, known = np.eye(3), [np.zeros(3), np.zeros(3)], self.started
         if self.began:
             F, f, q = _motion(self.member.order, self.member.manoeuvre_variance, t - self.last)
             self.x = np.array(predicted(self.x, f))
-            self.P, self.sure = predicted_covariance(self.P, f, q), predicted_covariance(self.sure, f, q)
+            self.P = np.array(predicted_covariance(self.P, f, q))
+            self.sure = predicted_covariance(self.sure, f, q)
         self.began, self.last = True, t
         if not np.isnan(z):
             gains[0] = self._take_range(z)
@@ -192,56 +194,39 @@ class Single:
         return Row(estimate, sigma, residual, self.nis)
 
     def _take_range(self, z: float) -> np.ndarray:
-        """Take a range; gives the gains of right folds."""
+        """Take a range; gives the gains of right folds. Tested is the mean over all hypotheses, by a variance that has
+        their spread."""
         R = self.variances[0]
         if not self.started:  # before the first range none is known
             self.x[0] = z
-            self.P, self.sure = (R, 0.0, 0.0, *self.P[3:]), (R, 0.0, 0.0, *self.sure[3:])
+            self.P, self.sure = np.array((R, 0.0, 0.0, *self.P[3:])), (R, 0.0, 0.0, *self.sure[3:])
             self.started = True
             return np.array([1.0, 0.0, 0.0])
-        e = z - self.x[0]
-        self.P, gain, S = TAKE[0](self.P, R, 1.0)
-        self._judge(0, e[:, None], S)
-        self.w, self.x = self.w - e**2 / (2 * S), np.array(add_scaled(self.x, e, gain))
+        p, e = np.exp(self.w - self.w.max()), z - self.x[0]
+        mean = p @ e / p.sum()
+        self.nis[0] = mean**2 / (self.P[0] + R + p @ (e - mean) ** 2 / p.sum())
+        kernels.take_range(self.x, self.w, self.P, R, z)
         self.sure, gain, _ = TAKE[0](self.sure, R, 1.0)
         return np.array(gain)
 
     def _take_velocity(self, v: float) -> np.ndarray:
-        """Take a velocity, folded or not; gives the gains of right folds."""
-        P, gain, S = TAKE[1](self.P, self.variances[1], 1.0)
-        e = (v - self.x[1])[:, None]
+        """Take a velocity, folded or not; gives the gains of right folds. Tested is the most probable hypothesis, where
+        its fold is certain."""
+        R, S = self.variances[1], float(self.P[3] + self.variances[1])
+        e, far = v - self.x[1, np.argmax(self.w)], -1
         if self.member.doppler == "folded":
-            e = self.folds.innovations(e[:, 0], S)
-            if self.options.hypotheses == 1:
-                e = e[:, e.shape[1] // 2, None]
-        self._judge(1, e, S)
-        if self.member.doppler == "folded" and not self.folds.certain(float(S)):
-            self.nis[1] = np.nan
-        if self.member.doppler == "folded" and self.options.merge == "each_scan":
-            mean, variance, _ = _merged(e, np.full(1, S))
-            self.x, self.P = np.array(add_scaled(self.x, mean, gain)), add_outer(P, float(variance[0]), gain)
-        else:
-            w = self.w[:, None] - e**2 / (2 * S)
-            self.x = np.array(add_scaled(self.x[:, :, None], e, gain)).reshape(3, -1)
-            self.P, self.w = P, w.ravel() - w.max()
-            if self.member.doppler == "folded":
-                kept = _kept(self.w, self.options)
-                self.x, self.w = self.x[:, kept], self.w[kept]
-        self.sure, gain, _ = TAKE[1](self.sure, self.variances[1], 1.0)
+            e, far = self.folds.folded(e), self.folds.near(S, len(self.w))
+        if self.member.doppler != "folded" or self.folds.certain(S):
+            self.nis[1] = e**2 / S
+        given = v, self.folds.span, far if self.options.hypotheses != 1 else min(far, 0), *keeping(self.options)
+        self.x, self.w, _ = kernels.take_velocity(self.x, self.w, self.P, R, *given)
+        self.sure, gain, _ = TAKE[1](self.sure, R, 1.0)
         return np.array(gain)
 
-    def _judge(self, number: int, e: np.ndarray, S: np.ndarray) -> None:
-        """Note a number's innovations e (n, folds) before they are taken in: the logarithm of the density that all
-        hypotheses give the number; and the square over the variance S, of a range that of their mean, whose
-        variance has their spread, of a velocity that of the most probable one."""
-        p = np.exp(self.w - self.w.max())
-        mean = p @ e[:, 0] / p.sum()
-        spread = p @ (e[:, 0] - mean) ** 2 / p.sum()
-        self.nis[number] = np.min(e[np.argmax(self.w)] ** 2) / S if number else mean**2 / (S + spread)
-        powers = (self.w[:, None] - e**2 / (2 * S)).ravel()
-        most, whole = powers.max(), self.w.max()
-        given = most + np.log(np.exp(powers - most).sum()) - whole - np.log(np.exp(self.w - whole).sum())
-        self.log_density[number] = given - 0.5 * np.log(2 * np.pi * S)
+
+def keeping(options: Any) -> tuple[bool, int, float]:
+    """Which hypotheses a filter's options keep: merge, most and least of `take_velocity`."""
+    return options.merge == "each_scan", options.hypotheses or 1, options.prune_below or 0.0
 
 
 class Interacting:
@@ -356,7 +341,7 @@ class Interacting:
     def _branch(self, v: float, gain: np.ndarray, S: np.ndarray, logs: np.ndarray) -> None:
         """Every hypothesis with every fold near any of its orders; those kept that weigh enough."""
         mean = np.einsum("ni,ni->n", self.mu, self.x[1])
-        reach = np.max(np.sqrt(S) + np.abs(self.x[1] - mean[:, None]) / FARTHEST) ** 2
+        reach = np.max(np.sqrt(S) + np.abs(self.x[1] - mean[:, None]) / kernels.FARTHEST) ** 2
         u = mean[:, None] + self.folds.innovations(v - mean, reach)
         e = u[:, :, None] - self.x[1][:, None]  # (n, folds, M)
         both = logs[:, None] - e**2 / (2 * S[:, None])
@@ -540,7 +525,7 @@ class PlotLikelihood:
     def __init__(self, case: Case, options: Any, tracks: Sequence[Mapping[str, np.ndarray]]):
         self.spec: Any = case.spec
         self.options, self.filter, self.tracks = options, options.name, len(tracks)
-        self.rows = sum(len(columns["t_s"]) for columns in tracks)
+        self.rows, self.usual_s = sum(len(columns["t_s"]) for columns in tracks), usual_interval_s(tracks)
         radar, number = case.spec.radar, list(case.spec.filters).index(options)
         self.observes = 1 if options.doppler == "none" else 2
         stated = {"radar.sigma_range_m": radar.sigma_range_m, "radar.sigma_velocity_mps": radar.sigma_velocity_mps}
@@ -551,27 +536,50 @@ class PlotLikelihood:
         self.least = np.array([LEAST_SIGMA] * self.observes + [LEAST_MANOEUVRE]) * np.append(
             self.stated[: self.observes], self.stated[-1] or moved
         )
-        self.recorded = [rows_of(columns) for columns in tracks]
         if self.observes == 1:
             self.explains = ()
+        (self.member,) = filters.members(options)
+        self.problems = [self._problem(columns) for columns in tracks]
+
+    def _problem(self, columns: Mapping[str, np.ndarray]) -> "_Problem":
+        """A track for the kernel."""
+        dt = np.diff(columns["t_s"], prepend=columns["t_s"][0])
+        steps, of = np.unique(dt, return_inverse=True)
+        motions = [_motion(self.member.order, 1.0, step) for step in steps.tolist()]
+        f, q = (np.array([motion[i] for motion in motions], dtype=float)[of] for i in (1, 2))
+        rows = np.array(rows_of(columns))
+        folds = Folds(self.spec.radar)
+        for row in rows:
+            folds.begin(row[0], row[3])
+            row[3] = folds.span
+        return _Problem(f, q, rows[:, 1:])
 
     def _scores(self, values: np.ndarray, bias: float) -> np.ndarray:
         """Sums (2,) over all tracks for range and velocity; minus infinity where a filter cannot take a row."""
-        changed = dict(zip(("sigma_range_m", "sigma_velocity_mps"), values[: self.observes].tolist(), strict=False))
-        radar = self.spec.radar.model_copy(update=changed)
-        spec = self.spec.model_copy(update={"radar": radar})
-        options = self.options.model_copy(update={"manoeuvre_variance": float(values[-1])})
-        offset, total = bias * radar.sigma_velocity_mps, np.zeros(2)
-        try:
-            with np.errstate(invalid="ignore", divide="ignore"):  # of σ next to nothing: not-a-number, which is no top
-                for rows in self.recorded:
-                    one = single(options, spec)
-                    for t, z, v, span in rows:
-                        one.step(t, z, v - offset, span)
-                        total += one.log_density
-        except PlotFault:
-            return np.full(2, -np.inf)
+        sigma = np.ones(2)
+        sigma[: self.observes] = values[: self.observes]
+        reach = (1 if self.options.hypotheses == 1 else 2) if self.member.doppler == "folded" else 0
+        prior, total = np.array(before_plots(self.member, self.spec)), np.zeros(2)
+        for one in self.problems:
+            score = np.empty((len(one.rows), 2))
+            given = self._velocities(one.rows, bias * sigma[1]), prior, sigma**2, float(values[-1])
+            if not kernels.log_likelihood(one.F, one.Q, *given, reach, *keeping(self.options), score):
+                return np.full(2, -np.inf)
+            total += score.sum(axis=0)
         return total
+
+    def _velocities(self, rows: np.ndarray, offset: float) -> np.ndarray:
+        """The rows (n, 3) with velocities as the filter takes them, less an offset."""
+        moved = rows.copy()
+        moved[:, 1] -= offset
+        if self.member.doppler == "none":
+            moved[:, 1] = np.nan
+        if self.member.doppler == "remainder":
+            folds = Folds(self.spec.radar)
+            for i in np.flatnonzero(np.isfinite(moved[:, 1])):
+                folds.span = moved[i, 2]
+                moved[i, 1] = folds.remainder(moved[i, 1])
+        return moved
 
     def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
         """The logarithm of the likelihood; outliers are not allowed for; bias: of the velocity, in its σ."""
@@ -585,10 +593,19 @@ class PlotLikelihood:
         }
 
 
+class _Problem(NamedTuple):
+    """A track for the kernel: motions F (n, 5) and Q (n, 6) to each row, of unit variance, and rows (n, 3) of range,
+    velocity and its span."""
+
+    F: np.ndarray
+    Q: np.ndarray
+    rows: np.ndarray
+
+
 class Recorded(RecordedPlots):
     """The study's part in `radarsim track` and `radarsim simulate`."""
 
-    rows_asked = 100
+    rows_asked = 300
     from_any_origin = True
     drawing, tracker = staticmethod(drawing), staticmethod(Tracker)
 

@@ -9,9 +9,9 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
 from radarsim.kernels.lanes import WIDTH, rows
-from radarsim.studies.interface import OUTLIERS, Draw, Drawn, RecordedPlots
+from radarsim.studies.interface import OUTLIERS, Draw, Drawn, RecordedPlots, usual_interval_s
 from radarsim.studies.multimodel import world
-from radarsim.studies.multimodel.config import Filter, Keys, Sensor
+from radarsim.studies.multimodel.config import Filter, Keys
 from radarsim.studies.multimodel.kernels import records as rec
 from radarsim.studies.multimodel.kernels import strip as strips
 from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
@@ -192,13 +192,17 @@ def _lanes(plots: np.ndarray) -> np.ndarray:
 
 class PlotLikelihood:
     """How likely tracks are under a filter: the density that its bank of models gives each plot. The first three whole
-    plots start the track. Its keys are the sensor's σ and the acceleration of the hardest manoeuvring model."""
+    plots start the track. Its keys are the sensor's σ and the acceleration of the hardest manoeuvring model.
+
+    As a function of the keys, hypotheses are merged by moments: under the other rules, which choose between hypotheses,
+    it leaps.
+    """
 
     def __init__(self, case: Case, number: int, tracks: Sequence[Mapping[str, np.ndarray]]):
         self.spec: Keys = case.spec
         self.options = self.spec.filters[number]
         self.filter, self.tracks = self.options.name, len(tracks)
-        self.rows = sum(len(columns["t_s"]) for columns in tracks)
+        self.rows, self.usual_s = sum(len(columns["t_s"]) for columns in tracks), usual_interval_s(tracks)
         # Where the plot's covariance is made by the filter, outliers cannot be given a wider one.
         self.explains: tuple[str, ...] = (OUTLIERS,) if self.options.covariance_at == "plot" else ()
         spreads = [model.sigma_acceleration_mps2 for model in self.options.models]
@@ -207,53 +211,74 @@ class PlotLikelihood:
         self.keys = (*names, f"filters.{number}.models.{self.hardest}.sigma_acceleration_mps2")
         self.stated = np.array([*self.spec.sensor.sigma, spreads[self.hardest]])
         self.least = np.append(LEAST * self.stated[:3], LEAST * (self.stated[3] or 1.0))
-        self.recorded = [(columns["t_s"], np.stack(list(columns.values())[1:], axis=1)) for columns in tracks]
+        self.measured = np.concatenate([np.stack(list(columns.values())[1:], axis=1) for columns in tracks])
+        whole, ends = local_plots(self.spec.sensor, self.measured)[2], np.cumsum([len(one["t_s"]) for one in tracks])
+        parts = ((one["t_s"], end - len(one["t_s"])) for one, end in zip(tracks, ends, strict=True))
+        found = (_problem(self.spec, self.options, t, first, whole[first : first + len(t)]) for t, first in parts)
+        self.problems = [one for one in found if one is not None]
+        self.frame = sensor_frame(self.spec.sensor)
+        self.chances = world.stationary(world.transition_matrix(self.options.transition))
 
-    def _changed(self, values: np.ndarray) -> tuple[Sensor, Filter]:
-        """Sensor and filter with other values of the keys."""
+    def _score(self, values: np.ndarray, merge: str, outliers: float) -> float:
+        """The logarithm of the likelihood of all tracks, with other values of the keys and a rule of merges."""
         names = [key.partition(".")[2] for key in self.keys[:3]]
         sensor = self.spec.sensor.model_copy(update=dict(zip(names, values[:3].tolist(), strict=True)))
         models = list(self.options.models)
         hardest = {"sigma_acceleration_mps2": float(values[3])}
         models[self.hardest] = models[self.hardest].model_copy(update=hardest)
-        return sensor, self.options.model_copy(update={"models": tuple(models)})
+        options = self.options.model_copy(update={"models": tuple(models), "merge": merge})
+        own = banks(self.spec.model_copy(update={"filters": (options,)}), np.ones(1))
+        design, numbers = own.models[0, : rec.MODEL_NUMBERS * len(models)], own.numbers[0]
+        z, R, whole = local_plots(sensor, self.measured)
+        plots, total = np.concatenate([z, R, whole[:, None]], axis=1), 0.0
+        for one in self.problems:
+            work, state = work_arrays()
+            strips.start_strip(work, state, _lanes(plots[one.began]), one.weights, self.chances)
+            following, score = _lanes(plots[one.following]), np.empty(len(one.intervals))
+            given = design, one.transitions, one.intervals, one.times, numbers, self.frame
+            strips.log_likelihood(work, state, following, *given, outliers, score)
+            total += float(score.sum())
+        return total
 
     def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
         """The logarithm of the likelihood; neither a bias nor a correlation is looked for."""
-        sensor, options = self._changed(values)
-        spec = self.spec.model_copy(update={"sensor": sensor, "filters": (options,)})
-        return sum(_score(spec, t, *local_plots(sensor, seen), outliers) for t, seen in self.recorded)
+        return self._score(values, "moment", outliers)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
-        """Of the plot as a whole."""
-        return {"plot": self(values)}
+        """Of the plot as a whole, with the filter's own rule of merges."""
+        return {"plot": self._score(values, self.options.merge, 0.0)}
 
 
-def _score(spec: Keys, t: np.ndarray, z: np.ndarray, R: np.ndarray, whole: np.ndarray, outliers: float) -> float:
-    """The logarithm of the likelihood of one track under the one filter of a config; 0 where it never starts."""
+class _Problem(NamedTuple):
+    """A track for the kernel: which of all plots start it, and with which weights; those that follow, the number of the
+    interval before each of these, the different intervals (s), and the models' transition probabilities over them."""
+
+    began: np.ndarray
+    weights: np.ndarray
+    following: slice
+    intervals: np.ndarray
+    times: np.ndarray
+    transitions: np.ndarray
+
+
+def _problem(spec: Keys, options: Filter, t: np.ndarray, start: int, whole: np.ndarray) -> _Problem | None:
+    """A track at times t (n,) whose plots, of which some are whole (n,), begin at row `start` of all; None where it
+    never starts."""
     began = np.flatnonzero(whole)[: rec.START]
     if len(began) < rec.START or began[-1] + 1 == len(t):
-        return 0.0
-    first, (options,) = int(began[-1]), spec.filters
-    plots = np.concatenate([z, R, whole[:, None]], axis=1)
+        return None
+    index, times = intervals(t[began[-1] :])
+    transitions = banks(spec.model_copy(update={"filters": (options,)}), times).transitions[0]
     weights = world.start_weights(t[began], spec.start_acceleration_mps2)
-    chances = world.stationary(world.transition_matrix(options.transition))
-    work, numbers = work_arrays()
-    strips.start_strip(work, numbers, _lanes(plots[began]), weights, chances)
-    index, times = intervals(t[first:])
-    own = banks(spec, times)
-    size, score = own.numbers[0, rec.SIZE], np.empty(len(t) - first - 1)
-    design = own.models[0, : rec.MODEL_NUMBERS * size], own.transitions[0], index[1:].copy(), times, own.numbers[0]
-    strips.log_likelihood(
-        work, numbers, _lanes(plots[first + 1 :]), *design, sensor_frame(spec.sensor), outliers, score
+    return _Problem(
+        start + began, weights, slice(start + began[-1] + 1, start + len(t)), index[1:].copy(), times, transitions
     )
-    return float(score.sum())
 
 
 class Recorded(RecordedPlots):
     """The study's part in `radarsim track` and `radarsim simulate`."""
 
-    rows_asked = 600
+    rows_asked = 2000
 
     columns, sigmas = staticmethod(columns), staticmethod(sigmas)
     drawing, tracker = staticmethod(drawing), staticmethod(Tracker)

@@ -15,7 +15,7 @@ from radarsim.kernels import linear
 from radarsim.kernels.algebra import pack, unpack
 from radarsim.kernels.hypotheses import lasting, log_likelihood
 from radarsim.physics import transition
-from radarsim.studies.interface import EXPLANATIONS, Draw, Drawn, RecordedPlots, Turning
+from radarsim.studies.interface import EXPLANATIONS, Draw, Drawn, RecordedPlots, Turning, usual_interval_s
 from radarsim.studies.range_doppler.config import (
     FOLDED,
     MOST_SCANS,
@@ -247,15 +247,13 @@ class PlotLikelihood:
         assert options is not None
         self.filter, self.tracks = options.name, len(tracks)
         variance = variances_of(case)[case.spec.filters.index(options)]
-        self.rows = sum(len(columns["t_s"]) for columns in tracks)
+        self.rows, self.usual_s = sum(len(columns["t_s"]) for columns in tracks), usual_interval_s(tracks)
         radar, self.observes = case.spec.radar, len(options.observes)
         sigmas = {"radar.sigma_range_m": radar.sigma_range_m, "radar.sigma_velocity_mps": radar.sigma_velocity_mps}
         stated = dict(list(sigmas.items())[: self.observes]) | {"manoeuvre_variance": variance}
         self.keys, self.stated = tuple(stated), np.array(list(stated.values()), dtype=float)
         self.least = self.stated * np.array([1e-4] * self.observes + [LEAST_MANOEUVRE])
         self.noise = noise_by_time(options.process_noise, 1.0, radar.scan_period_s)
-        usual = [float(np.median(np.diff(columns["t_s"]))) for columns in tracks if len(columns["t_s"]) > 1]
-        self.usual_s = float(np.median(usual)) if usual else radar.scan_period_s
         self.problems = [problem for columns in tracks if (problem := self._problem(columns)) is not None]
 
     def _problem(self, columns: Mapping[str, np.ndarray]) -> "_Problem | None":

@@ -8,10 +8,10 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
-from radarsim.kernels.hypotheses import log_likelihood
+from radarsim.kernels.hypotheses import lasting, log_likelihood
 from radarsim.physics import manoeuvre_covariance, transition
 from radarsim.studies import interface
-from radarsim.studies.interface import OUTLIERS, Draw, Drawn, RecordedPlots
+from radarsim.studies.interface import CORRELATION, OUTLIERS, Draw, Drawn, RecordedPlots, usual_interval_s
 from radarsim.studies.sonar import filters, world
 from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.config import Keys
@@ -243,13 +243,13 @@ class PlotLikelihood:
     derivative is random; errors of range, bearing and a third coordinate that are independent. The state before the
     first whole plot is taken as unknown."""
 
-    explains: tuple[str, ...] = (OUTLIERS,)
-
     def __init__(self, case: Case, number: int, tracks: Sequence[Mapping[str, np.ndarray]]):
         self.spec: Any = case.spec
+        # Errors that last are of range and bearing, which in other frames are not measured along one direction each.
+        self.explains: tuple[str, ...] = (OUTLIERS, CORRELATION) if self.spec.frame == "polar" else (OUTLIERS,)
         member, scale = self.spec.filters[number], lateral_scale(self.spec, 2)
         self.filter, self.tracks, self.size = member.name, len(tracks), member.degree + 1
-        self.rows = sum(len(columns["t_s"]) for columns in tracks)
+        self.rows, self.usual_s = sum(len(columns["t_s"]) for columns in tracks), usual_interval_s(tracks)
         sensor = self.spec.sensor
         third, third_sigma = third_coordinate(sensor)
         sigma = {RANGE: sensor.sigma_range_m, BEARING: sensor.sigma_bearing_rad}
@@ -307,7 +307,7 @@ class PlotLikelihood:
             variance[:, :2], along[:, :2, :2] = np.maximum(values, 0.0), np.swapaxes(vectors, 1, 2)
         return place, along, variance
 
-    def _score(self, values: np.ndarray, outliers: float) -> float:
+    def _score(self, values: np.ndarray, outliers: float, correlation: float = 0.0) -> float:
         sigma, C, size = values[: self.coordinates], self.coordinates, self.size
         manoeuvre, total = float(values[C]) if len(values) > C else 0.0, 0.0
         for one in self.problems:
@@ -323,14 +323,24 @@ class PlotLikelihood:
             P[::size, ::size] = start
             for i, rate in enumerate(one.rates, start=1):
                 P[np.arange(C) * size + i, np.arange(C) * size + i] = rate**2
+            model, scale, white = (x, P, one.F, one.Q, H), manoeuvre, 1.0
+            if correlation:
+                first, of = (
+                    np.zeros((C * size, C)),
+                    np.arange(C),
+                )  # it is where the first plot is, and errs by its errors
+                first[of * size, of] = -sigma
+                shares = correlation ** (np.diff(one.t, prepend=0.0) / self.usual_s)
+                model = lasting(x, P, first, one.F, manoeuvre * one.Q, H, variance, shares)
+                scale, white = 1.0, 0.0
             score = np.empty(z.shape)
-            log_likelihood(x, P, one.F, one.Q, H, z, variance, one.there, manoeuvre, outliers, 1.0, score)
+            log_likelihood(*model, z, variance, one.there, scale, outliers, white, score)
             total += float(score[one.settled :].sum())
         return total
 
     def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
-        """The logarithm of the likelihood; neither a bias nor a correlation is looked for."""
-        return self._score(values, outliers)
+        """The logarithm of the likelihood; no bias is looked for."""
+        return self._score(values, outliers, correlation)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """Of the plot as a whole: its numbers are not apart in every frame."""
@@ -373,7 +383,7 @@ class Recorded(RecordedPlots):
     file: of keys, the `track` of their part.
     """
 
-    rows_asked = 1000
+    rows_asked = 3000
     columns, sigmas, likelihood = staticmethod(columns), staticmethod(sigmas), staticmethod(likelihood)
 
     def __init__(self, file: Callable[[Any], Any]):
