@@ -130,6 +130,7 @@ def of_seeds(count, realisations):
         yield *held, 2 * 2.093 * (found.all.gain - true) / (found.all.hi - found.all.lo)
 
 
+@pytest.mark.slow
 def test_sampled_is_near_exact():
     values, _, off = np.array(list(of_seeds(3, 1000))).T
     assert values.any()
@@ -155,6 +156,7 @@ def test_in_the_matched_world_sampled_intervals_hold_the_variance(matched):
     assert np.mean(nothing) >= 0.94  # tuned on noise, the filter is a little worse than as stated
 
 
+@pytest.mark.slow
 def test_a_gain_is_not_that_of_the_training(matched):
     """Of a filter at its best: on the noise of its training a gain is never negative, on other noise it is, often."""
     given = {"sampled": True, "realisations": 200}

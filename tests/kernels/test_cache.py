@@ -193,6 +193,7 @@ def test_the_command_goes_on_and_says_so_in_one_line(tmp_path):
     assert (tmp_path / "range_doppler" / "curves.csv").read_bytes() == selftest.tables("range_doppler")["curves"]
 
 
+@pytest.mark.slow
 def test_what_is_compiled_beforehand_is_not_compiled_by_a_run(tmp_path):
     """As after an installation: an empty cache, the command, then a run of another process."""
     environment = os.environ | {"RADARSIM_CACHE_DIR": str(tmp_path / "cache")}

@@ -187,7 +187,9 @@ def check_notes_and_warning(config):
         assert asked is None or float(asked[1]) > FEW
 
 
-@pytest.mark.parametrize("config", ["ambiguous_missed", "pulses_rls4", "sonar_missed", "rls2"])
+@pytest.mark.parametrize(
+    "config", [pytest.param("ambiguous_missed", marks=pytest.mark.slow), "pulses_rls4", "sonar_missed", "rls2"]
+)
 def test_a_warning_is_true_of_the_answer(config):
     check_notes_and_warning(config)
 

@@ -72,6 +72,7 @@ def test_all_that_is_whole_is_listed_and_of_the_others_why_they_are_not(radarsim
     assert any(one["name"] == "sonar" and "Butyrskiy" in one["paper and question"] for one in studies)
 
 
+@pytest.mark.slow
 def test_schema_claims_and_other_studies_take_no_harm(radarsim):
     kinds = json.loads(radarsim("schema").stdout)["$defs"]
     assert "sonar" in kinds

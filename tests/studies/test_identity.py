@@ -103,6 +103,7 @@ def simulate(plan, first, count):
 """
 
 
+@pytest.mark.slow
 def test_a_last_digit_of_few_realisations_begins_anew_and_says_so(edited):
     edited()
     computed, line = edited("studies/range_doppler/study.py", lambda text: f"{text}\nimport numpy as np\n{MOVED}")

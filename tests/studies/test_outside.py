@@ -160,6 +160,7 @@ def test_its_kernels_are_compiled_once(ran, radarsim, tmp_path):
     assert kept() == compiled
 
 
+@pytest.mark.slow
 def test_blocks_from_before_an_edit_are_taken_over_where_their_bytes_are_the_same(tmp_path):
     site = tmp_path / "site"
     site.mkdir()

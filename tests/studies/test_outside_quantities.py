@@ -157,6 +157,7 @@ def test_a_run_ends_at_its_precision(radarsim, tmp_path):
     assert need[0]["cases"][0]["need"]["realisations"] == 8000
 
 
+@pytest.mark.slow
 def test_sensitivity_is_of_it(radarsim, tmp_path):
     """To first order a square changes by twice as much; exactly by the square of the factor."""
     words = ("--at-k", 9, "--out", tmp_path, "--no-figures", "--json")

@@ -102,6 +102,7 @@ def test_a_run_and_its_continuation(run, untouched, tmp_path, step_s):
     assert facts["realisations_from_store"] >= 131_072  # whole nodes; what is left of a cut one is computed again
 
 
+@pytest.mark.slow
 def test_a_time_limit_is_not_of_the_day(run, tmp_path):
     """A clock set forward by ten days reaches no limit; one set back does not stretch it."""
     done = run(tmp_path / "forward", TEN_DAYS_S, "-n", 20_000, "--time-limit", 250)
@@ -111,6 +112,7 @@ def test_a_time_limit_is_not_of_the_day(run, tmp_path):
     assert "time limit of 1 s" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step_s", [-3600, pytest.param(TEN_DAYS_S, marks=pytest.mark.slow)])
 def test_workers(run, untouched, tmp_path, step_s):
     """Certificates made for the run hold on either side of the step."""

@@ -48,6 +48,7 @@ def test_a_sample_has_every_kind_and_is_the_seeds():
     assert set(mutate.sample(sites, len(sites) + 1, 1)) == set(sites)
 
 
+@pytest.mark.slow
 def test_every_module_of_formulas_has_its_tests():
     paths, tests = mutate.modules(), mutate.Tests(mutate.ROOT)
     assert {"radarsim/kernels/random.py", "radarsim/report/statistics.py"} <= set(paths)
@@ -108,6 +109,7 @@ def test_what_no_test_notices_is_found(tried):
     assert code == 1
 
 
+@pytest.mark.slow
 def test_a_change_that_never_ends_is_noticed(tried):
     formulas = "def area(a, b):\n    while a - b:\n        pass\n"
     code, lines = tried(
