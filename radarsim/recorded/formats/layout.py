@@ -235,7 +235,7 @@ def after_specification(data: bytes, at: int) -> int:
     return at + 1
 
 
-class _Step(NamedTuple):
+class Step(NamedTuple):
     """A stretch of items of fixed length: the wanted ones and where in it they begin; its length; then an item of any
     length, which may be wanted too (-1: no)."""
 
@@ -258,7 +258,7 @@ class Profile:
             else None
             for one in self.spec.cv_items_list
         ]
-        self.plans: dict[bytes, list[_Step]] = {}
+        self.plans: dict[bytes, list[Step]] = {}
 
     def places(self, data: bytes, at: int) -> tuple[list[int], int]:
         """The start of each wanted item, -1 where it is absent, and the end of the record."""
@@ -279,10 +279,10 @@ class Profile:
                 raise Damaged(begin, f"item {self._cut(data, begin)} ends after the data block")
         return places, at
 
-    def _plan(self, data: bytes, begin: int) -> list[_Step]:
+    def _plan(self, data: bytes, begin: int) -> list[Step]:
         base, _ = _library()
         numbers, at = _named(data, begin)
-        plan: list[_Step] = []
+        plan: list[Step] = []
         fixed: list[tuple[int, int]] = []
         size = 0
         for name, variation in self._of(numbers, begin):
@@ -291,9 +291,9 @@ class Profile:
                 fixed += [(index, size)] if index >= 0 else []
                 size += size_in_bits(base, variation) // 8
             else:
-                plan.append(_Step(fixed, size, index, skip(variation)))
+                plan.append(Step(fixed, size, index, skip(variation)))
                 fixed, size = [], 0
-        plan += [_Step(fixed, size, -1, None)] if size else []
+        plan += [Step(fixed, size, -1, None)] if size else []
         if not plan:
             raise Damaged(begin, "a record without items")
         self.plans[data[begin:at]] = plan

@@ -434,14 +434,18 @@ def test_category_021_what_else_it_may_say(tmp_path):
     records = [
         position_021(1, 0, 0, items=coarse),
         position_021(2, 52.5, 4.76, ground=(820 / 2**14, 0), items={24: struct.pack(">h", 320)}),
-        position_021(3, 52.5, 4.76, items={24: struct.pack(">H", 0x8000 | 320), 26: b"\xff\xff\x00\x00"}),
+        position_021(3, 52.5, 4.76, ground=(820 / 2**14, 0), items={24: struct.pack(">H", 0x8000 | 320)}),
+        position_021(4, 52.5, 4.76, items={26: b"\xff\xff\x00\x00"}),
     ]
     _, columns, _ = imported(tmp_path, block(21, *records), Options(site=SITE))
     np.testing.assert_allclose(columns["range_m"], columns["range_m"][1], atol=2)
     moved = {"latitude_deg": 52.5, "longitude_deg": 4.76, "altitude_m": np.nan, "east_mps": 0.0}
     moved |= {"north_mps": 820 / 2**14 * NM, "up_mps": 2000 * 0.3048 / 60}
-    seen = SITE.seen({name: np.array([one]) for name, one in moved.items()})
-    expected = [np.nan, seen["velocity_mps"][0], np.nan]
+    level = moved | {"up_mps": np.nan}
+    speeds = [
+        SITE.seen({name: np.array([one]) for name, one in own.items()})["velocity_mps"][0] for own in (moved, level)
+    ]
+    expected = [np.nan, *speeds, np.nan]
     np.testing.assert_allclose(columns["velocity_mps"], expected, atol=1e-3)
 
 
