@@ -271,7 +271,12 @@ def _numbers(path: Path, table: "pd.DataFrame", name: str) -> np.ndarray:
     wrong = numbers.isna() & (table[name].notna() | (name in AXES))
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise ConfigError(f"{path}: row {row + 1}, {name}: must be a number, got {table[name].iloc[row]!r}")
+        got = table[name].iloc[row]
+        raise ConfigError(
+            f"{path}: row {row + 1}, {name}: must be a number, got {got!r}"
+            if isinstance(got, str)
+            else f"{path}: row {row + 1}, {name}: has no value"
+        )
     return numbers.to_numpy(dtype=float)
 
 

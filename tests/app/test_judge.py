@@ -477,6 +477,8 @@ def test_files_of_other_realisations_are_refused(estimates, tmp_path):
         assert "cannot be read" in refusal(tmp_path / name)
     (tmp_path / "words.csv").write_text("realisation,k,r\n0,1,far\n")
     assert refusal(tmp_path / "words.csv").endswith("row 1, r: must be a number, got 'far'")
+    (tmp_path / "blank.csv").write_text("realisation, k, r\n0, 1, 5\n0,, 5\n")
+    assert refusal(tmp_path / "blank.csv").endswith("row 2, k: has no value")
     for name in ("empty.npz", "empty.csv"):
         (tmp_path / name).write_bytes(b"")
         assert "cannot be read" in refusal(tmp_path / name)
