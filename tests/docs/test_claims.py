@@ -73,7 +73,7 @@ def test_results_that_cannot_be_read_are_no_full_reproduction(tmp_path, text):
 
 
 def test_the_figure_is_drawn_beside_the_page():
-    assert {mark.label for panel in page.figure(claims.kept()).panels for mark in panel.marks} >= {
+    assert {getattr(mark, "label", "") for panel in page.figure(claims.kept()).panels for mark in panel.marks} >= {
         "confirmed",
         "refuted",
     }
