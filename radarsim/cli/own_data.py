@@ -382,7 +382,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
 
 @main.command()
 @click.argument("radar", metavar="RADAR.csv")
-@click.argument("other", metavar="OTHER.csv")
+@click.argument("other", metavar="[ID=]OTHER.csv")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON document instead of text.")
 def register(radar: str, other: str, as_json: bool) -> None:
     """Find a radar's biases against ADS-B or another radar.
@@ -391,7 +391,8 @@ def register(radar: str, other: str, as_json: bool) -> None:
     their address, callsign or Mode 3/A code at that time, interpolated in between. A bias is what to subtract:
     range_scale from 1, the share of the range; time_s from the times, which are then too late. Outliers have no weight;
     errors may be correlated within an aircraft. What the flights cannot show is unknown, with the reason. OTHER is
-    taken as right; for a radar that is tilted, or has moved, there is no model.
+    taken as right; for a radar that is tilted, or has moved, there is no model. ID is the track, address, callsign or
+    code of the plots to which a lone receiver's positions belong.
 
     \b
     Example

@@ -204,9 +204,18 @@ class Recording:
 def register(radar: str, other: str) -> Registration:
     """The biases of a radar's plots against positions of the same aircraft, both as `radarsim import` writes them.
 
-    Raises ConfigError where too few plots have a position, or these lie too far apart.
+    other: `[ID=]FILE`, with the track, address, callsign or code of the plots whose positions are all in the file, of a
+    receiver that knows nothing of these. Raises ConfigError where too few plots have a position, or these lie too far
+    apart.
     """
+    from radarsim.recorded.formats.importing import truth_of
+
+    other, whose = str((owned := truth_of(other))[0]), owned[1].lower()
     plots, positions = read(radar, RADAR), read(other, OTHER)
+    if whose:
+        named = zip(plots.tracks, *plots.identity.values(), strict=True)
+        plots.identity["address"] = [whose if whose in map(str.lower, one) else "" for one in named]
+        positions.identity["address"] = [whose] * len(positions.tracks)
     fixes, t = np.stack([positions.columns[name] for name in OTHER[0]], axis=1), plots.columns["t_s"]
     if plots.place and positions.place and plots.place != positions.place:
         states = np.pad(fixes[:, 1:], ((0, 0), (0, 3)))

@@ -340,3 +340,23 @@ def test_a_radar_that_knows_codes_alone(tmp_path):
     assert len(one.aircraft) == 8
     for bias, true in zip(one.adjusted.biases, SOME, strict=True):
         assert bias.lo < true < bias.hi
+
+
+def test_tables_are_matched_by_what_identifies_their_rows(tmp_path):
+    """Flights are numbered in one file and named in the other; two lone tracks without a name are not the same."""
+    radar, adsb = recordings(tmp_path)
+    names = {f"{0x4CA100 + n:06x}": f"KLM{n}" for n in range(8)}
+    plots = [line.split(",") for line in radar.read_text().splitlines()[1:]]
+    rows = [",".join([t, str(int(name, 16) % 100), names[name], *rest]) for t, name, *rest in plots]
+    radar.write_text("\n".join(["time,id,callsign,range_m,bearing_rad", *rows]))
+    fixes = [line.split(",") for line in adsb.read_text().splitlines()[1:]]
+    rows = [",".join([t, name, names[name].lower() + " ", *rest]) for t, name, *rest in fixes]
+    adsb.write_text("\n".join(["time,icao24,callsign,lat,lon,geoaltitude", *rows]))
+    assert register.register(*imported(tmp_path, (radar, adsb))).by == {"callsign": 480}
+    lone = [[row for row in table if row[1] == "4ca100"] for table in (plots, fixes)]
+    for file, header, table in ((radar, "range_m,bearing_rad", lone[0]), (adsb, "lat,lon,geoaltitude", lone[1])):
+        file.write_text("\n".join([f"time,{header}", *(",".join([t, *rest]) for t, _, *rest in table)]))
+    with pytest.raises(ConfigError, match="0 of 60 plots have a position of their aircraft"):
+        register.register(*imported(tmp_path, (radar, adsb)))
+    plots, positions = imported(tmp_path, (radar, adsb))
+    assert register.register(plots, f"1={positions}").by == {"address": 60}

@@ -270,6 +270,7 @@ class _Import:
         self.done = Imported(kind)
         self.kind: str | None = None  # of the rows
         self.zero: float | None = None
+        self.by_track: bool | None = None  # whether tracks are addresses, and nothing else identifies an aircraft
         self.last: dict[str, float] = {}
         self.left = Counter[str]()
         self.radars = Counter[str]()
@@ -343,7 +344,11 @@ class _Import:
             columns |= self.truth.columns(batch, columns, self.reader)
         names = {"track": batch.track}
         if isinstance(self.reader, Asterix):
-            names |= {"radar": batch.radar, "address": batch.address, **batch.words}
+            names["radar"] = batch.radar
+        if self.by_track is None:
+            self.by_track = not batch.words and batch.address == [track.lower() for track in batch.track]
+        if not self.by_track:
+            names |= batch.identity
         if not self.done.columns:
             self.done.columns = ("t_s", *names, *(name for name in columns if name != "t_s"))
         self.done.rows += len(t)
