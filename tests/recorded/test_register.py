@@ -360,3 +360,15 @@ def test_tables_are_matched_by_what_identifies_their_rows(tmp_path):
         register.register(*imported(tmp_path, (radar, adsb)))
     plots, positions = imported(tmp_path, (radar, adsb))
     assert register.register(plots, f"1={positions}").by == {"address": 60}
+
+
+def test_an_aircraft_that_is_another_is_left_out_and_named(tmp_path):
+    """Two plots' aircraft have swapped addresses: their plots lie far from the positions of these."""
+    radar, adsb = recordings(tmp_path)
+    text = radar.read_text()
+    radar.write_text(text.replace("4ca101", "x").replace("4ca106", "4ca101").replace("x", "4ca106"))
+    one = register.register(*imported(tmp_path, (radar, adsb)))
+    assert one.matched == 360
+    assert sorted(line.split(",")[0] for line in one.left) == ["the plots of 4ca101", "the plots of 4ca106"]
+    for bias, true in zip(one.adjusted.biases, SOME, strict=True):
+        assert bias.lo < true < bias.hi
