@@ -14,7 +14,6 @@ from xml.etree import ElementTree
 
 from radarsim.errors import ConfigError
 from radarsim.recorded.formats import sites
-from radarsim.recorded.formats.columns import split
 from radarsim.recorded.formats.text import Sheet
 
 # ---- JSON ------------------------------------------------------------------------------------------------------------
@@ -186,13 +185,14 @@ def from_gpx(path: str, file: BinaryIO) -> Sheet:
     """The points of the tracks of a GPX file, each under its track's name or its number."""
 
     def rows() -> Iterator[tuple[int, list[str]]]:
-        name, tracks, number = "", 0, 0
+        name, tracks, number, segment = "", 0, 0, ElementTree.Element("")
         try:
             for event, element in ElementTree.iterparse(file, ("start", "end")):
                 tag = _local(element)
                 if event == "start":
                     if tag == "trk":
                         tracks, name = tracks + 1, ""
+                    segment = element if tag == "trkseg" else segment
                 elif tag == "name" and not name and tracks:
                     name = (element.text or "").strip()
                 elif tag == "trkpt":
@@ -208,9 +208,7 @@ def from_gpx(path: str, file: BinaryIO) -> Sheet:
                             *map(held.get, ("ele", "speed", "course"), [""] * 3),
                         ],
                     )
-                    element.clear()
-                elif tag in ("trkseg", "trk"):
-                    element.clear()
+                    segment.clear()  # so that memory does not grow
         except ElementTree.ParseError as error:
             raise ConfigError(f"{path}:{error.position[0]}: must be GPX: {error}; {number} points were read") from error
 
@@ -225,7 +223,7 @@ def _local(element: ElementTree.Element) -> str:
 
 
 # ---- NMEA 0183 -------------------------------------------------------------------------------------------------------
-FIX = ["time", "lat", "lon", "speed [kn]", "course [deg]", "altitude [m]"]
+FIX = {"lat": "lat", "lon": "lon", "speed": "speed [kn]", "course": "course [deg]", "altitude": "altitude [m]"}
 RECEIVER = re.compile(rb"\$[A-Z]{2}(?:GGA|RMC),[^\r\n]*")
 DATED = re.compile(rb"\$[A-Z]{2}RMC,[^,]*,A(?:,[^,]*){6},\d{6}")
 CLOCK = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-6]\d(?:\.\d+)?)")
@@ -239,7 +237,7 @@ def from_nmea(path: str, file: BinaryIO) -> Sheet:
     Where no RMC stands among the first sentences, dates are left alone: times are of the day.
     """
     dated = bool(DATED.search(file.peek(io.DEFAULT_BUFFER_SIZE)))  # type: ignore[attr-defined]
-    sheet = Sheet(path, FIX, iter(()))
+    sheet = Sheet(path, ["time", *FIX.values()], iter(()))
 
     def rows() -> Iterator[tuple[int, list[str]]]:
         held: dict[str, float] = {}  # what the sentences of one time have said
@@ -267,7 +265,7 @@ def _row(held: dict[str, float]) -> list[str]:
     """The cells of FIX; a time without a date as one of day."""
     minutes, seconds = divmod(held["clock"], 60)
     clock = f"{minutes // 60:02.0f}:{minutes % 60:02.0f}:{seconds:09.6f}"
-    cells = [held.get(split(name)[0], math.nan) for name in FIX[1:]]
+    cells = [held.get(name, math.nan) for name in FIX]
     return [
         repr(held["time"]) if "time" in held else clock,
         *("" if math.isnan(cell) else repr(cell) for cell in cells),

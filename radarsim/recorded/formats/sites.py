@@ -10,7 +10,9 @@ number after it; without these, the seconds are unwrapped from minute to minute.
 """
 
 import datetime
+import functools
 import math
+import operator
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -322,10 +324,7 @@ LEAST_GOOD = 0.5  # of the sentences; a file with fewer is not AIS
 def sound(sentence: bytes) -> bool:
     """Whether a sentence has the checksum stated after its asterisk: the exclusive or of all its characters."""
     body, star, stated = sentence[1:].partition(b"*")
-    total = 0
-    for byte in body:
-        total ^= byte
-    return bool(star) and stated[:2].upper() == b"%02X" % total
+    return bool(star) and stated[:2].upper() == b"%02X" % functools.reduce(operator.xor, body, 0)
 
 
 class Ais:

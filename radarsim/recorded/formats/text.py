@@ -168,7 +168,7 @@ class Table:
             for line, cells in self.sheet.rows:
                 self.line = line
                 self._take(cells, gathered, row_of)
-                if len(gathered) >= sites.BATCH and not self.faults:
+                if len(gathered) >= sites.BATCH:
                     yield gathered.taken()
         except ConfigError as error:
             raise ConfigError(*self.faults.lines(), *error.lines) from error
@@ -183,6 +183,8 @@ class Table:
             self.faults.add(self.line, "", f"must have {self.width} cells as the header", len(cells))
             return
         row = row_of(cells)
+        if self.faults:  # the rest is only read for further ones
+            return
         if any(math.isnan(row[i]) for i in ((0, 1, 2) if self.kind == sites.POSITIONS else (0, 1))):
             self.skipped["records without time or position"] += 1
             return
