@@ -365,10 +365,10 @@ def test_ships_by_ais(tmp_path):
     assert "must be AIS sentences" in line
 
 
-def ship(second, north=0.0):
+def ship(second, north=0.0, mmsi=244660000):
     """A report of a ship at 52.4 + north degrees at a second of the minute."""
     pyais = pytest.importorskip("pyais")
-    report = {"msg_type": 1, "mmsi": 244660000, "lat": 52.4 + north, "lon": 4.3, "speed": 12.0, "course": 0.0}
+    report = {"msg_type": 1, "mmsi": mmsi, "lat": 52.4 + north, "lon": 4.3, "speed": 12.0, "course": 0.0}
     (sentence,) = pyais.encode_dict({**report, "second": second}, talker_id="AI")
     return sentence
 
@@ -387,9 +387,9 @@ def ship(second, north=0.0):
             "3 reports state no time: their seconds of the minute are made to run on",
         ),
         (  # some have a time, and 1700000000 is 20 s past the minute
-            [f"\\c:1700000000*00\\{ship(19)}", ship(25), ship(50), ship(5)],
-            [0, 5, 30, 45],
-            "3 reports state no time: their seconds of the minute are taken as nearest to the times before them",
+            [f"\\c:1700000000*00\\{ship(19)}", ship(18, mmsi=2), ship(25), ship(50), ship(5)],
+            [0, -2, 5, 30, 45],
+            "4 reports state no time: their seconds of the minute are taken as nearest to the times before them",
         ),
     ],
 )  # fmt: skip
@@ -401,13 +401,16 @@ def test_times_of_ships(tmp_path, lines, times, note):
 
 
 def test_a_report_in_two_sentences_has_the_time_of_the_first(tmp_path):
-    """A tag block stands before the first part only."""
+    """The second comes later."""
     lines = []
     for k in range(3):
         *_, payload, rest = ship(7, 0.001 * k).split(",")
         bodies = f"AIVDM,2,1,{k},A,{payload[:20]},0", f"AIVDM,2,2,{k},A,{payload[20:]},{rest[0]}"
         first, second = (f"!{body}*{functools.reduce(operator.xor, body.encode()):02X}" for body in bodies)
-        lines += [f"\\g:1-2-{k},s:r1,c:{1_700_000_000 + 20 * k}*00\\{first}", f"\\g:2-2-{k}*00\\{second}"]
+        lines += [
+            f"\\g:1-2-{k},s:r1,c:{1_700_000_000 + 20 * k}*00\\{first}",
+            f"\\g:2-2-{k},c:{1_700_000_009 + 21 * k}*00\\{second}",
+        ]
     done, columns, _ = imported(tmp_path, "\n".join(lines).encode(), Options(site=SITE))
     np.testing.assert_allclose(columns["t_s"], [0, 20, 40])
     assert not done.notes

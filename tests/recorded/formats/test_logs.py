@@ -56,11 +56,11 @@ def test_moments_of_readsb_one_a_line(tmp_path):
     for k in range(4):
         one = {"hex": "4ca1fa", "flight": "EIN1 ", "alt_baro": 30000, "alt_geom": 30500, "gs": 300,
                "track": 0, "geom_rate": 0, "lat": 52.6 + STEP * (k // 2 * 2), "lon": 4.76,
-               "seen_pos": 0.5 + 10 * (k % 2)}  # fmt: skip
+               "seen_pos": 0.5 + 10 * (k % 2) + k // 2}  # fmt: skip
         silent = {"hex": "~3c6444", "seen": 1.0}
         lines.append(json.dumps({"now": 1.7e9 + 10 * k, "messages": 5, "aircraft": [one, silent]}))
     done, columns, tracks = imported(tmp_path, "\n".join(lines).encode(), AT)
-    np.testing.assert_allclose(columns["t_s"], [0, 20])
+    np.testing.assert_allclose(columns["t_s"], [0, 19])
     assert set(tracks) == {"4ca1fa"}
     assert sorted(done.skipped) == ["2 rows that repeat the position before them", "4 records without time or position"]
     _, alone, _ = imported(tmp_path, json.dumps(json.loads(lines[0]), indent=1).encode(), AT)
@@ -244,6 +244,12 @@ def test_a_satellite_receiver(tmp_path, kinds, talker):
     dated = Options(site=SITE, zero=1_706_659_200.0)  # 2024-01-31
     _, columns, _ = imported(tmp_path, fixes(kinds=kinds).encode(), dated)
     assert columns["t_s"][0] == pytest.approx(86385)
+
+
+def test_midnight_passes_between_the_dates_of_a_receiver(tmp_path):
+    """RMC, which has the date, comes seldom."""
+    _, columns, _ = imported(tmp_path, (fixes(2, start=86375.0) + fixes(kinds=("GGA",), start=86395.0)).encode(), AT)
+    np.testing.assert_allclose(columns["t_s"], 10 * np.arange(6))
 
 
 def test_a_damaged_sentence_is_left_out(tmp_path):
