@@ -34,6 +34,7 @@ FEW_FILTERS = 3  # distinguished by dash, while shades distinguish the cases
 LONG = 5  # powers of ten from this one on are written raised
 NEAR_ZERO = 1e-5  # of the largest σ: below it a logarithmic axis would show rounding
 WIDEST_BAND, LOG_MARGIN, MARGIN = 2.0, 1.12, 0.05  # of a shared axis: how far bands count, and room at its ends
+SAME = 0.01  # of a value
 LINE = 0.004  # of a panel's height: half the width of a line
 LOSS = 100.0  # per cent at which much lower gains are cut
 LONGEST_INSIDE = 28  # letters of a name in a legend inside a panel of many lines
@@ -445,7 +446,10 @@ def _own_name(mark: Mark, figure: Figure) -> str:
 
 
 def _coincide(one: str, other: str, every: Sequence[Mapping[str, Mark]], figure: Figure) -> bool:
-    """Whether two curves cannot be told apart in any panel: values and bands nearer than half a line's width."""
+    """Whether two curves cannot be told apart in any panel where they are drawn: values and bands nearer than half a
+    line's width, and to a per cent.
+    """
+    drawn = False
     for named, panel in zip(every, figure.panels, strict=True):
         a, b = named.get(one), named.get(other)
         if a is None and b is None:
@@ -461,6 +465,7 @@ def _coincide(one: str, other: str, every: Sequence[Mapping[str, Mark]], figure:
         if not lines:
             continue
         low, high = (np.log10(end) if log else end for end in _holding(lines, panel.y))
+        drawn |= bool((a.y > 0 if log else np.isfinite(a.y)).any())
         for first, second in ((a.y, b.y), (a.lo, b.lo), (a.hi, b.hi), (a.exact, b.exact)):
             if first is None or second is None:
                 if first is not second:
@@ -468,9 +473,11 @@ def _coincide(one: str, other: str, every: Sequence[Mapping[str, Mark]], figure:
                 continue
             with np.errstate(divide="ignore", invalid="ignore"):
                 ours, theirs = (np.log10(part) if log else np.asarray(part, float) for part in (first, second))
-            if not np.allclose(ours, theirs, rtol=0, atol=LINE * (high - low), equal_nan=True):
+                within = np.log10(1 + SAME) if log else SAME * np.abs(ours) + SAME * LINE * (high - low)
+                near = np.abs(ours - theirs) <= np.minimum(LINE * (high - low), within)
+            if not (near | (ours == theirs) | (np.isnan(ours) & np.isnan(theirs))).all():
                 return False
-    return True
+    return drawn
 
 
 def never_lost(lines: Sequence[Line]) -> str:

@@ -15,12 +15,17 @@ from radarsim.app import readings as reading
 from radarsim.cli import main
 from tests.cli.test_every_study import CONFIGS, SOLVED
 
+IN_PYTHON = {"--between LO HI": "between=(low, high)", "--at:": "at_s:"}  # how its notes call options
+
 
 def printed(*words):
-    """What a command prints with --json."""
+    """What a command prints with --json, its options called as Python's arguments."""
     done = CliRunner().invoke(main, [*map(str, words), "--json"])
     assert done.exit_code in (0, 3), done.output
-    return json.loads(done.stdout)
+    text = done.stdout
+    for option, argument in IN_PYTHON.items():
+        text = text.replace(option, argument)
+    return json.loads(text)
 
 
 def document(value):

@@ -89,6 +89,8 @@ def test_lines_that_coincide_in_every_panel_are_drawn_once_and_named_together():
         (curves([1, 2, 3], near), curves([4, 5, 6], [4, 5, 7])),  # in one panel
         (curves([1, 2, 3], near), curves([4, 5, 6])),  # in one panel there is only one of them
         (curves([1, 2, 3], [1, 2, np.nan]),),
+        (curves([1, 1, 1], [1.1, 1.1, 1.1], [0, 0, 90]),),  # a tenth apart, on an axis that hides it
+        (replace(curves([0, 0, 0], [0, 0, 0], [1, 10, 100]), y=Axis("y", "log")),),  # not drawn at all
     ):
         figure = Figure("f", "", "Drawn.", apart)
         assert panels.joined(figure) is figure

@@ -23,7 +23,7 @@ SIGMAS = {"y": (term("the height"), "$y$", "m"), "vy": (term("the rate of climb"
 RULES = ("moment", "best", "combined", "modified_combined")
 FAMILIES = {"gpb1": term("MMA1"), "imm": term("MMA2"), "gpb2": term("MMA3")}
 SPREAD = 0.5  # of the points of a stage, stages being one apart
-ACROSS = 60  # letters across the narrowest panel
+ACROSS, ACROSS_NARROW = 60, 28  # letters across a panel of two in a row, and of three
 MOST_LOOKS = 8  # filters, each of a colour, dash and marker of its own
 DRAWN_FROM = {"families": ("stages",), "cost": ("stages", "operations")}
 
@@ -177,7 +177,7 @@ def _arrow(track: Line, at: int) -> str:
     return "→↗↑↖←↙↓↘"[round(float(turn) / (np.pi / 4)) % 8]
 
 
-def _stage_lines(results: Sequence[CaseResult]) -> tuple[Reference | Note, ...]:
+def _stage_lines(results: Sequence[CaseResult], letters: int = ACROSS) -> tuple[Reference | Note, ...]:
     """The ends of the stages, and the names of all that are long enough, where all cases have the same."""
     if len({result.spec.target.stages for result in results}) > 1:
         return ()
@@ -187,7 +187,7 @@ def _stage_lines(results: Sequence[CaseResult]) -> tuple[Reference | Note, ...]:
         return ()
     marks: list[Reference | Note] = [Reference(end, "x") for end in ends]
     for stage, (begin, end) in zip(stages, pairwise([0.0, *ends, last]), strict=True):
-        if len(name := tr(stage.name)) <= ACROSS * (end - begin) / last:
+        if len(name := tr(stage.name)) <= letters * (end - begin) / last:
             marks.append(Note((begin + end) / 2, np.nan, name, "top"))
     return tuple(marks)
 
@@ -198,7 +198,7 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
     quantity, symbol, unit = SIGMAS[component]
     drawn = []
     for result in results:
-        marks: list = list(_stage_lines([result]))
+        marks: list = list(_stage_lines([result], ACROSS if len(results) == 1 else ACROSS_NARROW))
         for f, style in zip(result.axes.filters, _styles(result), strict=True):
             own = rows.get((result.name, f))
             if own is not None:
@@ -238,7 +238,9 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
         for name, options in zip(result.axes.filters, result.spec.filters, strict=True):
             if len(options.models) < 2:
                 continue
-            marks: list = list(_stage_lines([result]))
+            marks: list = list(
+                _stage_lines([result], ACROSS if len(result.axes.filters) < MOST_LOOKS else ACROSS_NARROW)
+            )
             for m, motion in enumerate(_motions(options.models)):
                 columns = ("t_s", "probability", "probability_lo", "probability_hi")
                 own = rows[(result.name, name, m + 1)]
