@@ -838,7 +838,7 @@ class _Search:
         H = -self.curvature
         try:
             spread = float(np.linalg.inv(H)[i, i])
-        except np.linalg.LinAlgError:
+        except (np.linalg.LinAlgError, IndexError):  # IndexError: no curvature, where neighbours are impossible
             return 0.1
         return min(1.2 * math.sqrt(2 * HALF_CHI2_95 * spread), 1.0) if 0 < spread < math.inf else 0.1
 

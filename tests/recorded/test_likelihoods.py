@@ -386,6 +386,19 @@ def test_a_velocity_whose_error_is_a_span_tells_nothing():
     assert found["velocity_mps"] == pytest.approx(-len(columns["t_s"]) * np.log(15.0), rel=1e-12)
 
 
+@pytest.mark.parametrize("name", ["memory", "no memory", "nearest fold", "range only"])
+def test_missing_plots_count_as_nothing(name):
+    """Rows without a plot among those with one: as without these rows, where no manoeuvre parts two steps from one."""
+    case, columns = loaded("ambiguous_rls4"), recording("ambiguous_rls4")
+    there = np.arange(len(columns["t_s"])) % 3 != 1
+    some = columns | {key: np.where(there, columns[key], np.nan) for key in ("range_m", "velocity_mps")}
+    one, kept = (
+        likelihood(case, name, plots) for plots in (some, {key: column[there] for key, column in columns.items()})
+    )
+    values = np.append(one.stated[:-1], 1e-15)
+    assert one.by_number(values) == pytest.approx(kept.by_number(values), rel=1e-5)
+
+
 def test_the_likeliest_hypotheses_are_kept_in_their_order():
     from radarsim.studies.ambiguous_doppler.kernels.rows import likeliest
 

@@ -315,6 +315,10 @@ def tracks():
     folded = ambiguous_plots.Recorded().simulated(one.case, 3)
     made["folded plots"] = np.nan_to_num(folded["velocity_mps"])
     made["folds of one"] = np.nan_to_num(folds.simulated_lists(one.plan.world, one.plan.banks, 0)[1])
+    measured = {name: folded[name] for name in ("t_s", "range_m", "velocity_mps")}
+    for options in one.case.spec.filters:
+        if likelihood := ambiguous_plots.Recorded().likelihood(one.case, options.name, [measured]):
+            made[f"folded likelihood {options.name}"] = np.array([likelihood(likelihood.stated)])
     one = work(*RUNS["linear"][:2])
     likelihood = range_doppler_plots.PlotLikelihood(one.case, None, [recorded])
     made["linear likelihood"] = np.array([likelihood(likelihood.stated), likelihood(likelihood.stated, 0.1, 0.5)])

@@ -562,7 +562,9 @@ class PlotLikelihood:
         prior, total = np.array(before_plots(self.member, self.spec)), np.zeros(2)
         for one in self.problems:
             score = np.empty((len(one.rows), 2))
-            given = self._velocities(one.rows, bias * sigma[1]), prior, sigma**2, float(values[-1])
+            rows = self._velocities(one.rows, bias * sigma[1])
+            there = np.isfinite(rows[:, :2])
+            given = np.where(np.isfinite(rows), rows, 0.0), there, prior, sigma**2, float(values[-1])
             if not kernels.log_likelihood(one.F, one.Q, *given, reach, *keeping(self.options), score):
                 return np.full(2, -np.inf)
             total += score.sum(axis=0)

@@ -14,7 +14,7 @@ from radarsim.recorded import fit, plots
 from radarsim.report import notes, statistics
 from radarsim.studies import registry
 from radarsim.studies.ambiguous_doppler import figures, study, track
-from radarsim.studies.ambiguous_doppler.kernels import records
+from radarsim.studies.ambiguous_doppler.kernels import records, rows
 from radarsim.studies.ambiguous_doppler.tables import FEW_FOLDS
 from tests.recorded import whole
 
@@ -74,8 +74,8 @@ def test_orders_and_their_sentence():
     first, *sentences = sentences
     assert len(sentences) == 3
     assert all("the best combination" in sentence for sentence in sentences)
-    rows = made.curves.query("component == 'r' and k > 1")
-    largest = rows.assign(exact=rows["exact_sigma"].fillna(rows["sigma"])).groupby("filter")["exact"].max()
+    curves = made.curves.query("component == 'r' and k > 1")
+    largest = curves.assign(exact=curves["exact_sigma"].fillna(curves["sigma"])).groupby("filter")["exact"].max()
     singles = largest[["order 0", "order 1", "order 2", "order 2 range only"]]
     assert first.startswith(f"{largest.idxmin()} keeps σ of the range after the first plot within ")
     assert f"the best single order, {singles.idxmin()}, comes to " in first
@@ -237,19 +237,19 @@ def test_plots_with_too_many_folds_are_a_fault_of_their_row(tmp_path, change, wo
 
 def test_plots_with_too_many_folds_have_no_likelihood():
     case = load("ambiguous_rls4").cases[0]
-    t = np.arange(15) * 10.0
-    columns = {"t_s": t, "range_m": 1e5 + 0 * t, "velocity_mps": 0 * t, "span_mps": np.full(15, 1e-9)}
+    t = np.arange(15) * 1e7  # over which a speed may have become anything
+    columns = {"t_s": t, "range_m": 1e5 + 0 * t, "velocity_mps": 0 * t, "span_mps": np.full(15, 2.0)}
     likelihood = track.PlotLikelihood(case, case.spec.filters[5], [columns])
     assert likelihood(likelihood.stated) == -np.inf
-    with pytest.raises(ConfigError, match="filter memory cannot take the plots"):
-        fit.fitted(likelihood)
+    _, sigma, _ = fit.fitted(likelihood).keys  # unless the velocities tell nothing
+    assert sigma.value >= 2.0
 
 
 def test_sequences_of_folds_are_counted_before_they_are_made():
     folds = track.Folds(load("ambiguous_rls4").cases[0].spec.radar)
     folds.begin(0.0, 18.0)
-    most = (track.MOST_LOOKED_AT / 2) ** 2 * 4  # a reach of half as many spans as may be, to either side
-    assert folds.innovations(np.zeros(1), np.array([most * 0.999])).shape[1] <= track.MOST_LOOKED_AT + 1
+    most = (rows.MOST_LOOKED_AT / 2) ** 2 * 4  # a reach of half as many spans as may be, to either side
+    assert folds.innovations(np.zeros(1), np.array([most * 0.999])).shape[1] <= rows.MOST_LOOKED_AT + 1
     for e, S in ((np.zeros(1), most * 1.001), (np.zeros(300), most / 299**2), (np.zeros(1), np.nan), (np.zeros(1), 0)):
         with pytest.raises(PlotFault, match="velocity_mps"):
             folds.innovations(e, np.array([S]))
@@ -271,8 +271,8 @@ def test_what_memory_is_worth_is_measured_by_the_error_and_not_by_right_folds():
     result = radarsim.run("ambiguous", realisations=2000, figures=False)
     folds = result.tables["folds"]
     assert folds[(folds["filter"] == "no memory") & (folds["k"] > 10)]["right"].max() < 0.05
-    rows = result.tables["claims"]
-    own = rows[rows["claim"] == "P1.E2"]
+    claims = result.tables["claims"]
+    own = claims[claims["claim"] == "P1.E2"]
     assert set(own["class"]) == {"refuted"}
     nearest = own["what"].str.endswith("nearest fold")
     assert set(own[nearest]["verdict"]) == {"confirmed"}

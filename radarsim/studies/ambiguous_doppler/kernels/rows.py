@@ -67,7 +67,7 @@ def likeliest(w, most, least):
         if w[i] >= bar and np.exp(w[i]) >= least:
             if w[i] == bar:
                 equal -= 1
-            if w[i] > bar or equal >= 0:
+            if (w[i] > bar or equal >= 0) and count < found.size:
                 found[count] = i
                 count += 1
     if count == 0:  # weights that are no numbers: whoever asks finds the density to be none
@@ -115,13 +115,13 @@ def take_velocity(x, w, P, R, v, D, far, merge, most, least):
 
 
 @kernel
-def log_likelihood(F, Q, rows, prior, variances, manoeuvre, reach, merge, most, least, score):
+def log_likelihood(F, Q, rows, there, prior, variances, manoeuvre, reach, merge, most, least, score):
     """The logarithm of the likelihood of a track of n rows under a filter; false where it leaves too many folds.
 
-    F (n, 5), Q (n, 6): motion to each row, of unit variance; rows (n, 3): range, velocity and its span, not-a-number
-    where missing; prior (6,): covariance before the first plot; variances (2,) of range and velocity; manoeuvre:
-    variance; reach: 0: velocities as measured, 1: with the nearest fold, 2: with all that matter; merge, most, least as
-    in `take_velocity`. Out: score (n, 2), zero where there is none.
+    F (n, 5), Q (n, 6): motion to each row, of unit variance; rows (n, 3): range, velocity and its span; there (n, 2):
+    which of the first two count (a kernel knows no not-a-number); prior (6,): covariance before the first plot;
+    variances (2,) of range and velocity; manoeuvre: variance; reach: 0: velocities as measured, 1: with the nearest
+    fold, 2: with all that matter; merge, most, least as in `take_velocity`. Out: score (n, 2), zero where there is none.
     """
     x, w, P, started = np.zeros((3, 1)), np.zeros(1), prior.copy(), False
     for k in range(len(rows)):
@@ -129,13 +129,13 @@ def log_likelihood(F, Q, rows, prior, variances, manoeuvre, reach, merge, most, 
         if k > 0:
             extrapolate(x, P, F[k], Q[k], manoeuvre)
         score[k] = 0.0
-        if not np.isnan(z):
+        if there[k, 0]:
             if started:
                 score[k, 0] = take_range(x, w, P, variances[0], z)
             else:
                 x[0, :] = z
                 P[0], P[1], P[2], started = variances[0], 0.0, 0.0, True
-        if started and not np.isnan(v):
+        if started and there[k, 1]:
             S, far = P[3] + variances[1], reach - 1
             if not S > 0.0:
                 return False
