@@ -121,7 +121,7 @@ def log_likelihood(F, Q, rows, there, prior, variances, manoeuvre, reach, merge,
     F (n, 5), Q (n, 6): motion to each row, of unit variance; rows (n, 3): range, velocity and its span; there (n, 2):
     which of the first two count (a kernel knows no not-a-number); prior (6,): covariance before the first plot;
     variances (2,) of range and velocity; manoeuvre: variance; reach: 0: velocities as measured, 1: with the nearest
-    fold, 2: with all that matter; merge, most, least as in `take_velocity`. Out: score (n, 2), zero where there is none.
+    fold, 2: with all that matter; merge, most, least as in `take_velocity`. Out: score (n, 2), zero where none is.
     """
     x, w, P, started = np.zeros((3, 1)), np.zeros(1), prior.copy(), False
     for k in range(len(rows)):
