@@ -210,7 +210,7 @@ def read(path: Path, case: Case, components: tuple[str, ...]) -> tuple[Any, tupl
         table = pd.read_csv(path, comment="#") if path.suffix == ".csv" else pd.read_parquet(path)
         return _of_table(path, table.rename(columns=lambda name: str(name).strip()), case)
     except (OSError, EOFError, ValueError, TypeError, ImportError, BadZipFile) as error:
-        why = "it is no .npz archive, or cut short" if "`pickle.load()`" in str(error) else error
+        why = "it is no .npz archive, or cut short" if "pickled" in str(error) else error
         raise ConfigError(f"{path}: cannot be read: {why}") from error
 
 
