@@ -263,7 +263,7 @@ def pieces(
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: is not UTF-8 text") from error
+        raise ConfigError(f"{path}: is not UTF-8 text; other recordings: {_imported(str(path))}") from error
 
 
 def place_of(path: str | os.PathLike, row: int) -> str:

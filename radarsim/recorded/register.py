@@ -133,7 +133,9 @@ def lines(found: Registration) -> list[str]:
     of = plural("{count} outlier", "{count} outliers", adjusted.outliers)
     said.append(tr("left: {sigma}; {outliers}", sigma=", ".join(rest), outliers=of))
     if len(found.aircraft) < LEAST_AIRCRAFT:
-        said.append(tr("errors common to a whole flight are not in the intervals: {n} flights tell", n=LEAST_AIRCRAFT))
+        said.append(
+            tr("errors common to a whole flight are not in the intervals: that takes {n} flights", n=LEAST_AIRCRAFT)
+        )
     for own in apart_in_time(found):
         told = {"name": own.name, "lag": significant_digits(own.time_s, "+.2g")}
         said.append(tr("{name} alone is {lag} s from the others in time: its positions err, not the radar", **told))

@@ -65,7 +65,10 @@ def test_the_second_choice_of_columns(tmp_path):
             "plots.csv:2:3: bearing_rad: must be in radians, from -2 pi to 2 pi, got 45",
         ),
         ("t_s,range_m,bearing_rad\n0,-100,1\n", "plots.csv:2:2: range_m: must be > 0, got -100"),
-        (b"t_s,x_m,y_m\n0,\xff,1\n", "plots.csv: is not UTF-8 text"),
+        (
+            b"t_s,x_m,y_m\n0,\xff,1\n",
+            "plots.csv: is not UTF-8 text; other recordings: radarsim import plots.csv -o imported.csv",
+        ),
     ],
 )
 def test_what_is_wrong_is_told_with_its_place(tmp_path, text, expected):

@@ -142,17 +142,21 @@ class Table:
         if self.highest > HIGHEST_M and not self.header.aviation:
             name = (self.columns.get("altitude_m") or self.columns["barometric_m"]).name
             found.append(f"altitudes up to {self.highest:.0f} m: if {name} is in feet, name it {name}_ft")
+        if likely := self._likely():
+            found.append(f"no column identifies the tracks, all rows are taken as one; if a column does, "
+                         f"--column track=THEIRS; it may be: {likely}")  # fmt: skip
         return found
+
+    def _likely(self) -> str:
+        """The columns that may name the aircraft, where none is known to: each value in two rows or more on average."""
+        likely = [(i, len(cells)) for i, cells in self.cells.items() if 1 < len(cells) <= self.records / 2]
+        return ", ".join(f"{self.header.names[i]} ({count} different)" for i, count in likely)
 
     def whose(self, late: int) -> str | None:
         """The question which column names the aircraft, where none does and so many rows are out of time order."""
         if not late or "track" in self.columns:
             return None
-        likely = [(i, len(cells)) for i, cells in self.cells.items() if 1 < len(cells) <= self.records / 2]
-        named = (
-            ", ".join(f"{self.header.names[i]} ({count} different)" for i, count in likely)
-            or "none: each has too many different values"
-        )
+        named = self._likely() or "none: each has too many different values"
         rows = "1 row is" if late == 1 else f"{late} rows are"
         return (
             f"{self.path}: track: no column identifies the tracks, and {rows} not later than the one before; "

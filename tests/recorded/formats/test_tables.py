@@ -24,6 +24,21 @@ def test_ranges_and_angles_without_units_are_asked_for(tmp_path):
     np.testing.assert_allclose(columns["bearing_rad"], np.radians([350, 351]))
 
 
+def test_a_table_in_order_of_time_says_that_its_rows_are_taken_as_one_track(tmp_path):
+    """Two aircraft in turn, by a name that is not known: no row is late, and none is left out."""
+    rows = "".join(f"{k},{k % 2},{20 + k},{k}\n" for k in range(1, 9))
+    text = f"time,Target No,range_km,Quality\n{rows}".encode()
+    done, _, tracks = imported(tmp_path, text)
+    assert tracks == ["1"] * 8
+    said = (
+        "no column identifies the tracks, all rows are taken as one; if a column does, --column track=THEIRS; it may be"
+    )
+    assert f"{said}: Target No (2 different)" in done.notes
+    done, _, tracks = imported(tmp_path, text, Options(columns={"track": "Target No"}))
+    assert tracks == ["1", "0"] * 4
+    assert not [note for note in done.notes if note.startswith(said)]
+
+
 @pytest.mark.parametrize(
     ("unit", "east"),
     [("[deg]", math.sin(math.radians(1.5))), ("[rad]", math.sin(1.5)), ("", math.sin(math.radians(1.5)))],
