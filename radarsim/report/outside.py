@@ -314,14 +314,18 @@ def _nees(result: CaseResult, name: str, made: Made) -> Iterator[str]:
 
 # ---- figures ---------------------------------------------------------------------------------------------------------
 def figures(
-    results: Sequence[CaseResult], made: Made, experiment: Experiment, drawn: Mapping[str, Figure]
+    results: Sequence[CaseResult],
+    made: Made,
+    experiment: Experiment,
+    drawn: Mapping[str, Figure],
+    shown: Sequence[Component],
 ) -> dict[str, Figure]:
     """σ and gain with the filters from outside: in place of the study's figures of these names, at least of the first
-    component."""
+    component. shown: the components as the study calls them."""
     joint = [_joint(result) for result in results if result.outside is not None]
     if not joint:
         return {}
-    known = {one.name: one for one in RADIAL}
+    known = {one.name: one for one in (*RADIAL, *shown)}
     each = [
         known.get(name, Component(name, unit, panels.letter(name), name)) for name, unit in joint[0].axes.components
     ]

@@ -17,7 +17,7 @@ A study that follows this declares an object and writes no class:
 | `prepare`, `simulate` | functions of `study` |
 | `tables`; if offered `curves`, `gains`, `inputs`, `cost` | functions of `tables` |
 | `figures` | the function of `figures` |
-| `drawn_from` | `figures.DRAWN_FROM`, where there is one |
+| `shown`, `drawn_from` | `figures.COMPONENTS` and `figures.DRAWN_FROM`, where there are such |
 | `question`, `answer` | functions of `words` |
 | `warnings`, if offered | the function of `words` |
 | `claims`, if there is a paper | those of `claims.yaml`, or `claims.CLAIMS`, judged by `measures.Evidence` |
@@ -40,7 +40,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, get_args
 
-from radarsim.report.quantities import COMMON, Quantity
+from radarsim.report.quantities import COMMON, Component, Quantity
 from radarsim.studies.interface import OptionalPart, Paper, Study, paper_in
 
 if TYPE_CHECKING:
@@ -117,6 +117,9 @@ class StudyFolder(Study):
     question, answer, warnings = part("words"), part("words"), part("words")
     own_filters, floor = part("given"), part("floor")
     readings, recorded = part("readings", "Readings"), part("track", "Recorded")
+
+    def shown(self) -> Sequence[Component]:
+        return getattr(self.file("figures"), "COMPONENTS", ())
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
         return getattr(self.file("figures"), "DRAWN_FROM", {})

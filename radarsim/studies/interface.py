@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from radarsim.report.claims.declared import Shipped
     from radarsim.report.claims.over import PaperReadings
     from radarsim.report.drawing import Chart, Figure
-    from radarsim.report.quantities import Quantity
+    from radarsim.report.quantities import Component, Quantity
     from radarsim.studies.floor import Floor
 
 
@@ -470,6 +470,10 @@ class Study(ABC):
         self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
         """The figures, described, by the stem of their file, from results and all their tables."""
+
+    def shown(self) -> "Sequence[Component]":
+        """The components in letters and words, for figures of filters from outside. Default: range and its rates."""
+        return ()
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
         """The tables behind figures, by the beginning of the figure's name. Default: none named.

@@ -271,11 +271,15 @@ class OneFile(Study):
     ) -> "dict[str, Figure]":
         from radarsim.report import panels
 
-        shown = [
+        return panels.per_component(results, made, self.shown(), experiment)
+
+    def shown(self) -> "list[Component]":
+        from radarsim.report import panels
+
+        return [
             one._replace(symbol=one.symbol or panels.letter(one.name), words=self._term(one.words or one.name))
             for one in self.components
         ]
-        return panels.per_component(results, made, shown, experiment)
 
     def question(self, experiment: "Experiment") -> str:
         names = dict.fromkeys(one.name for case in experiment.cases for one in case.spec.filters)

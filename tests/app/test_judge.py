@@ -12,6 +12,7 @@ from click.testing import CliRunner
 import radarsim
 from radarsim.app import judge as judging
 from radarsim.app.configs import CaseWork, load
+from radarsim.app.result import case_figures
 from radarsim.cli import main
 from radarsim.errors import ConfigError
 from radarsim.report import outside
@@ -677,6 +678,13 @@ def test_errors_are_taken_at_the_scans_that_a_study_reports():
     mine = of(judged.curves, filter="mine", component="y")
     np.testing.assert_allclose(mine["sigma"], np.sqrt((noise[:, axes.k - 1, 3] ** 2).mean(axis=0)), rtol=1e-6)
     assert axes.k[0] > 1
+
+
+def test_figures_call_components_as_the_study_does():
+    result = radarsim.judge("sonar_smoothing", held, realisations=64, overrides={"frame": "cartesian"})
+    drawn = case_figures(result.cases, result.tables, result.experiment)
+    assert drawn["sigma_x"].title == "σ of the distance north"
+    assert drawn["gain_x"].title == "Gain in σ of the distance north"
 
 
 def test_no_estimate_is_a_failure_where_a_filter_of_the_config_has_one():

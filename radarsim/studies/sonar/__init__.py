@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from radarsim.language import term
-from radarsim.report.quantities import COMMON, FLOORS, Quantity
+from radarsim.report.quantities import COMMON, FLOORS, Component, Quantity
 from radarsim.studies.interface import Plan, RecordedPlots, Study
 
 if TYPE_CHECKING:
@@ -90,6 +90,10 @@ class Sonar(Study):
             drawn |= file_of(part, "figures").figures(chosen, made) if part != BASE else {}
         drawn |= file_of(BASE, "figures").figures(results, made, experiment)
         return {name: figure for name, figure in drawn.items() if figure}
+
+    def shown(self) -> "Sequence[Component]":
+        shown: Sequence[Component] = file_of(BASE, "figures").COMPONENTS
+        return shown
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
         return {name: tables for part in PARTS for name, tables in file_of(part, "figures").DRAWN_FROM.items()}
