@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from radarsim.app.configs import Config, Overrides, load
 from radarsim.app.shown import Shown
+from radarsim.errors import ConfigError
 from radarsim.recorded import fit as fitting
 from radarsim.recorded import follow
 from radarsim.recorded import plots as files
@@ -71,8 +72,6 @@ def read_plots(path: str | os.PathLike[str]) -> "pd.DataFrame":
     """
     import pandas as pd
 
-    from radarsim.errors import ConfigError
-
     try:
         texts = pd.read_csv(path, comment="#", dtype=str, keep_default_na=False)
         # Python's own parsing of numbers loses no digit.
@@ -129,6 +128,10 @@ def fit(
     """
     import pandas as pd
 
+    if allowing is not None and (
+        not isinstance(allowing, list | tuple) or any(what not in list(fitting.SHARES) for what in allowing)
+    ):
+        raise ConfigError(f"allowing: must be a list of {', '.join(fitting.SHARES)}, got {allowing!r}")
     experiment = load(config, overrides)
     found = _with_file(recorded, lambda path: fitting.fit(experiment, path, filter_name, allowing))
     return pd.DataFrame(fitting.as_rows(found))
@@ -182,6 +185,8 @@ def _with_file(recorded: Recorded, act: Callable[[str], Found]) -> Found:
     """Call with the file of recorded plots; a table is first written into a temporary one."""
     if isinstance(recorded, str | os.PathLike):
         return act(os.fspath(recorded))
+    if not hasattr(recorded, "to_csv"):
+        raise ConfigError(f"recorded: must be the path of a file or a table (pandas), got {recorded!r}")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "plots.csv"
         recorded.to_csv(path, index=False)

@@ -122,8 +122,7 @@ def report_registration(found: "Registration", other: str) -> None:
     lines = [
         labelled("plots", tr("{matched} of {plots} have a position of their aircraft in {file} (by {by})", **told))
     ]
-    far, turn = found.apart
-    apart = tr("{far:.3g} m and {turn:.2g}° from it (median)", far=far, turn=turn)
+    apart = tr("{distance} from it (median)", distance=register.distance(*found.apart))
     aircraft = tr("{count} aircraft", count=len(found.aircraft))
     bent = tr("positions in between err by less than {most:.2g} m (95 %)", most=found.bent_m)
     lines += [labelled("", f"{aircraft}; {apart}; {bent}")]

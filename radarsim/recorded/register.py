@@ -127,7 +127,7 @@ def lines(found: Registration) -> list[str]:
         options.append(f"--bias {name}={factor * one.value:.4g}")
         shown |= not zero
     r, b = adjusted.sigma
-    rest = [f"σ {significant_digits(r)} m"]
+    rest = [f"σ {significant_digits(r)} {tr('m')}"]
     if math.isfinite(b):
         rest.append(f"{significant_digits(math.degrees(b))}°")
     of = plural("{count} outlier", "{count} outliers", adjusted.outliers)
@@ -142,6 +142,14 @@ def lines(found: Registration) -> list[str]:
     command = f"radarsim import … {' '.join(options)}"
     said.append(tr("to correct: `{command}`", command=command) if shown else tr("no bias differs from 0"))
     return said
+
+
+def distance(far_m: float, turn_deg: float) -> str:
+    """A distance in range and, where it is known, in bearing."""
+    far = f"{significant_digits(far_m, '.3g')} {tr('m')}"
+    if not math.isfinite(turn_deg):
+        return far
+    return tr("{first} and {last}", first=far, last=f"{significant_digits(turn_deg, '.2g')}°")
 
 
 def apart_in_time(found: Registration) -> list[Aircraft]:
@@ -242,9 +250,8 @@ def register(radar: str, other: str) -> Registration:
         if number < 0:
             continue
         if are_far(missed[rows], r[rows]):
-            far, turn = apart(missed[rows])
-            told = {"name": names[number], "far": f"{far:.3g}", "turn": f"{turn:.2g}"}
-            left.append(tr("the plots of {name}, which lie {far} m and {turn}° away: it is another", **told))
+            told = {"name": names[number], "away": distance(*apart(missed[rows]))}
+            left.append(tr("the plots of {name}, which lie {away} away: it is another", **told))
             own[rows] = False
         bent[rows] = paths.bent(number, t[rows])
     if wide := int((own & (bent > MOST_BENT_M)).sum()):
@@ -252,9 +259,9 @@ def register(radar: str, other: str) -> Registration:
         left.append(tr("{of} in turns, where positions are too far apart to {most:g} m", of=of, most=MOST_BENT_M))
         own &= bent <= MOST_BENT_M
     if own.sum() < LEAST_PLOTS:
-        why = "; ".join([tr("left out: {what}", what=one) for one in left])
+        why = "".join("; " + tr("left out: {what}", what=one) for one in left)
         raise ConfigError(f"{radar}: {own.sum()} of {len(t)} plots have a position of their aircraft in {other}, by "
-                          f"address, callsign or Mode 3/A code and time; needs {LEAST_PLOTS}; {why}")  # fmt: skip
+                          f"address, callsign or Mode 3/A code and time; needs {LEAST_PLOTS}{why}")  # fmt: skip
     adjusted = adjust(Pairs(t[own], r[own], b[own], found.path[own], paths.at))
     aircraft = []
     for number, rows in grouped(found.path[own].tolist()).items():
@@ -300,11 +307,20 @@ def _stated(path: str) -> tuple[set[tuple[float, float, float]], tuple[float, st
     sites, zero = set(), (0.0, UNKNOWN)
     with open(path, encoding="utf-8-sig") as file:
         for line in itertools.takewhile(lambda line: line.startswith("#"), file):
-            if found := SITE.match(line):
-                lat, lon, height = map(float, found.groups())
-                sites.add((lat, lon, height))
-            if found := ZERO.match(line):
-                zero = (float(found[1]), found[2])
+            known = True
+            try:
+                if found := SITE.match(line):
+                    lat, lon, height = map(float, found.groups())
+                    sites.add((lat, lon, height))
+                    known = abs(lat) <= 90 and math.isfinite(lon + height)
+                if found := ZERO.match(line):
+                    zero = (float(found[1]), found[2])
+                    known = math.isfinite(zero[0])
+            except ValueError:
+                known = False
+            if not known:
+                fault = "must be as radarsim import writes it, with finite numbers"
+                raise ConfigError(f"{path}: {fault}; got {line.rstrip()[:120]!r}")
     return sites, zero
 
 
@@ -470,7 +486,7 @@ def _alike(key: str, other: str, slopes: np.ndarray) -> str:
     lo, hi = np.quantile(values, (0.05, 0.95)).tolist()
     return tr(
         "the {what} are alike ({lo:.3g} to {hi:.3g} {unit}), so that it shows as {other} does, which holds if it is 0",
-        **{"what": what, "lo": lo, "hi": hi, "unit": unit, "other": other},
+        **{"what": what, "lo": lo, "hi": hi, "unit": tr(unit), "other": other},
     )
 
 

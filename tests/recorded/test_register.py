@@ -2,7 +2,9 @@
 
 import json
 import math
+import re
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pymap3d
@@ -15,7 +17,7 @@ from radarsim.cli import main
 from radarsim.errors import ConfigError
 from radarsim.recorded import register
 from radarsim.recorded.formats.importing import Options, biases_of, import_recording
-from radarsim.recorded.formats.sites import BIASES, Site
+from radarsim.recorded.formats.sites import BIASES, Site, sites_of
 from radarsim.recorded.identity import interpolated
 from tests.recorded.formats.made import block, plot_048, position_021
 
@@ -295,6 +297,51 @@ def test_recordings_that_do_not_belong_together(tmp_path):
         register.register(str(undated), positions)
     with pytest.raises(ConfigError, match="must have the columns t_s, x_m, y_m, z_m"):
         register.register(plots, str(undated))
+    text = Path(positions).read_text()
+    for k, (was, spoilt) in enumerate(
+        ((r"84\): \S+", "84): north"), (r"84\): \S+", "84): 95"), (r"\S+ s after", "(nan s after"))
+    ):
+        spoiled = re.sub(was, spoilt, text, count=1)
+        assert spoiled != text
+        (wrong := tmp_path / f"wrong{k}.csv").write_text(spoiled)
+        with pytest.raises(ConfigError, match=r"must be as radarsim import writes it, with finite numbers; got '# "):
+            register.register(plots, str(wrong))
+    lines = Path(plots).read_text().splitlines(keepends=True)
+    few = tmp_path / "few.csv"
+    few.write_text("".join(lines[: [line[0] for line in lines].index("0") + 1]))
+    with pytest.raises(ConfigError, match=r"1 of 1 plots have .* needs 20$"):
+        register.register(str(few), positions)
+
+
+def test_ranges_alone_have_a_distance_in_range_alone():
+    assert register.distance(98.94, math.nan) == "98.9 m"
+    assert register.distance(98.94, 0.123) == "98.9 m and 0.12°"
+
+
+@pytest.mark.parametrize("wrong", [None, 5, [], b"plots.csv"])
+def test_python_takes_files_and_tables_alone(wrong):
+    for call in (lambda: radarsim.register(wrong, "positions.csv"), lambda: radarsim.fit("rls2", wrong)):
+        with pytest.raises(ConfigError, match=r"recorded: must be the path of a file or a table \(pandas\), got"):
+            call()
+
+
+@pytest.mark.parametrize("wrong", ["outliers", ["x"], [None], 5, True])
+def test_a_fit_allows_for_what_it_knows(wrong):
+    with pytest.raises(ConfigError, match="allowing: must be a list of outliers, correlation, got"):
+        radarsim.fit("rls2", "plots.csv", allowing=wrong)
+
+
+def test_a_bias_leaves_no_range_that_is_not_positive(tmp_path):
+    table, out = tmp_path / "table.csv", tmp_path / "plots.csv"
+    table.write_text("time_s,track,range_m,bearing_deg\n0,1,90,20\n4,1,100,20\n8,1,110,20\n")
+    done = import_recording(table, out, Options(biases={"range_m": 100.0}))
+    assert [line.split(",")[2] for line in out.read_text().splitlines() if line[0].isdigit()] == ["10.0"]
+    assert any("2 rows no farther away than the bias of their range" in note for note in done.skipped)
+
+
+def test_a_radar_has_one_place():
+    with pytest.raises(ConfigError, match=r"of each radar, once; got 1/2=52,4,0 1/2=53,4,0"):
+        sites_of(["1/2=52,4,0", "1/2=53,4,0"])
 
 
 @pytest.mark.parametrize("text", ["range=1", "range_m", "range_m=x", "range_m=nan", "range_scale=-1", "range_m=1,2"])

@@ -297,10 +297,12 @@ class _Import:
         biases, columns = self.options.biases, batch.columns
         if biases and batch.kind == PLOTS:
             columns["t_s"] -= biases.get("time_s", 0.0)
-            columns["range_m"] = (columns["range_m"] - biases.get("range_m", 0.0)) / (
-                1 + biases.get("range_scale", 0.0)
-            )
+            measured = columns["range_m"]
+            columns["range_m"] = (measured - biases.get("range_m", 0.0)) / (1 + biases.get("range_scale", 0.0))
             columns["bearing_rad"] = (columns["bearing_rad"] - biases.get("bearing_rad", 0.0)) % (2 * math.pi)
+            if (gone := (measured > 0) & (columns["range_m"] <= 0)).any():
+                self.left["rows no farther away than the bias of their range"] += int(gone.sum())
+                return batch.rows(np.flatnonzero(~gone).tolist())
         elif biases:
             raise ConfigError("bias: is subtracted from plots of a radar; the recording has positions")
         return batch

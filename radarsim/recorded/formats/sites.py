@@ -280,10 +280,9 @@ def sites_of(texts: Sequence[str]) -> tuple[Site | None, dict[str, Site]]:
     """The site of the one radar, `LAT,LON,HEIGHT`, or of each of several, `SAC/SIC=LAT,LON,HEIGHT`."""
     named = {name.strip(): site_of(place) for name, sign, place in (text.partition("=") for text in texts) if sign}
     plain = [text for text in texts if "=" not in text]
-    if len(plain) > 1 or (plain and named):
-        raise ConfigError(
-            f"at: must be one LAT,LON,HEIGHT, or SAC/SIC=LAT,LON,HEIGHT of each radar; got {' '.join(texts)}"
-        )
+    if len(plain) > 1 or (plain and named) or len(plain) + len(named) < len(texts):
+        must = "must be one LAT,LON,HEIGHT, or SAC/SIC=LAT,LON,HEIGHT of each radar, once"
+        raise ConfigError(f"at: {must}; got {' '.join(texts)}")
     if faults := [name for name in named if not re.fullmatch(r"\d{1,3}/\d{1,3}", name)]:
         raise ConfigError(*(f"at: SAC/SIC must be two numbers, as 25/12; got {name!r}" for name in faults))
     return (site_of(plain[0]) if plain else None), named
