@@ -138,9 +138,11 @@ def _from_zero(likelihood: Counted, what: str, found: dict[str, float], top: flo
     stated = dict(zip(likelihood.keys, likelihood.stated.tolist(), strict=True))
     if what not in stated or found[what] >= stated[what]:
         return True
-    zero = {what: float(likelihood.of.least[likelihood.keys.index(what)])}
     others = {one: value for one, value in (stated | found).items() if one != what}
-    return climbed(Along(likelihood, list(others), zero), others)[1] < top - HALF_CHI2_95
+    # An interval ends where it first leaves the maximum: in x and y a needle of σ = 0 across and kilometres along,
+    # which turns with each measured bearing, explains errors across too.
+    smaller = (float(likelihood.of.least[likelihood.keys.index(what)]), found[what] / 2)
+    return any(climbed(Along(likelihood, list(others), {what: at}), others)[1] < top - HALF_CHI2_95 for at in smaller)
 
 
 def compared(likelihoods: Sequence[Likelihood]) -> Compared:

@@ -347,6 +347,30 @@ def test_what_is_not_told_from_zero_has_an_upper_end(seed):
     assert at[0] > at[1] + 1.9
 
 
+COAST = """
+study: sonar
+sensor: {name: coast, sigma_range_m: 15, sigma_bearing_deg: 0.3, scan_period_s: 10}
+target: sonar_straight
+frame: cartesian
+filters: [{name: steady, kind: growing_memory, degree: 1}]
+scans: 15
+realisations: 1000
+"""
+
+
+def test_a_sigma_of_bearing_that_the_plots_tell_is_advised(tmp_path):
+    """Positions that err by 8 m: σ of range in the kilometres, and of bearing none, is likelier still in x and y."""
+    (tmp_path / "coast.yaml").write_text(COAST)
+    (config,) = load_all([str(tmp_path / "coast.yaml")], ())
+    rng, t = np.random.default_rng(1), 10.0 * np.arange(60)
+    north, east = 3000 + rng.normal(0, 8, 60), 5.14 * t + rng.normal(0, 8, 60)
+    columns = {"t_s": t, "range_m": np.hypot(north, east), "bearing_rad": np.arctan2(east, north)}
+    found, _ = advised(tmp_path, columns, config)
+    values = {one.what: one.value for one in found.findings if one.from_zero}
+    assert values["sensor.sigma_range_m"] == pytest.approx(8, rel=0.25)
+    assert values["sensor.sigma_bearing_rad"] == pytest.approx(8 / 3500, rel=0.25)
+
+
 def test_what_a_turn_costs_is_the_exact_error_in_it():
     """Of a run over that turn, by the config's keys."""
     found = follow.recorded_of(loaded().cases[0]).in_a_turn(loaded().cases[0], "r+Vr", {"manoeuvre_variance": 1e-5})
