@@ -143,7 +143,8 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
         bought.append(Line(x, measured, tr(WHAT[str(what)]), Style(n, n, n), exact=formula))
     x_axis = panels.counts(tr("plots n"), float(rows["plots"].max()))
     left = Axis(tr("$\\sigma$ / $\\sigma$ of a plot"), limits=(0, None))
-    right = Axis(tr("gained by the n-th plot, %"), limits=(0, None))
+    lost = bool((rows["bought_percent"] < 0).any())  # by chance: of few realisations
+    right = Axis(tr("gained by the n-th plot, %"), limits=(None if lost else 0, None))
     drawn = (
         Panel(x_axis, left, tuple(accuracy), key_title=tr("measured"), direct=False, crosses=tr("the paper's formula")),
         Panel(x_axis, right, tuple(bought), direct=False, crosses=tr("the paper's formula")),

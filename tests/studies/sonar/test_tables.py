@@ -1,12 +1,14 @@
 """P3's tables, figures and claims from small runs: the right rows, the right words, verdicts from intervals."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import radarsim
 from radarsim.app import result as output
 from radarsim.report import claims, figures, statistics
 from radarsim.studies.sonar import STUDY, exact, scene
+from radarsim.studies.sonar.figures import plots_figure
 
 FIGURES = {
     "sonar_smoothing": {"plots", "smoothing_gains", "sigma_r", "sigma_vb"},
@@ -150,3 +152,13 @@ def test_what_is_known_exactly_is_judged_exactly(results):
         assert row["exact"].item() * exact.sigma_smoothed(n) == pytest.approx(
             curves["growing", "r", n] / sigma, rel=1e-9
         )
+
+
+@pytest.mark.parametrize(("percent", "low"), [(-3.0, None), (3.0, 0)])
+def test_the_axis_of_further_plots_reaches_below_zero_where_one_loses(percent, low):
+    table = pd.DataFrame({"component": "r", "degree": 1, "what": "smoothed", "plots": [2, 3, 4]})
+    table[["ratio", "ratio_lo", "ratio_hi", "formula"]] = 1.0
+    table[["bought_percent", "formula_bought_percent"]] = [[np.nan] * 2, [5.0, 5.0], [percent, 5.0]]
+    figure = plots_figure(table)
+    assert figure is not None
+    assert figure.panels[1].y.limits == (low, None)
