@@ -420,7 +420,8 @@ def case_figures(
         others = [result.against[n] for result in results if len(result.against) > n]
         found = own.figures(others, {**alone, "gains": common.against_own(alone["gains"], others)}, experiment)
         drawn |= {f"{name}_{n + 2}": figure for name, figure in found.items() if name.startswith("gain_")}
-    drawn |= outside.figures(results, banded, experiment, drawn, own.shown())
+    of_outside = outside.figures(results, banded, experiment, drawn, own.shown())  # first: the answer is about them
+    drawn = of_outside | {name: figure for name, figure in drawn.items() if name not in of_outside}
     if made["claims"]["claim"].nunique() > FEW_CLAIMS and (judged := page.figure(made["claims"].to_dict("records"))):
         drawn["claims"] = judged
     if any(notes.heavy(made[name]).any() for name in ("curves", "gains")):

@@ -685,6 +685,7 @@ def test_figures_call_components_as_the_study_does():
     drawn = case_figures(result.cases, result.tables, result.experiment)
     assert drawn["sigma_x"].title == "σ of the distance north"
     assert drawn["gain_x"].title == "Gain in σ of the distance north"
+    assert list(drawn)[:2] == ["gain_x", "sigma_x"]  # before the study's own: the answer is about the judged filter
 
 
 def test_no_estimate_is_a_failure_where_a_filter_of_the_config_has_one():
