@@ -106,10 +106,8 @@ def test_a_ratio_is_paired_where_either_is_a_baseline(both):
     value = curves.loc["slow", "sigma"] / curves.loc["r", "sigma"]
     assert paired.value == pytest.approx(value, rel=1e-12)
     assert [1 / swapped.value, 1 / swapped.hi, 1 / swapped.lo] == pytest.approx(paired, rel=1e-12)
-    alone = Evidence(radarsim.run(THREE | {"baseline": "r+Vr"}).cases, both.tables, {}).ratio(
-        "config", "slow", "r", "r"
-    )
-    independent = alone.last()
+    alone = radarsim.run(THREE | {"baseline": "r+Vr"})
+    independent = Evidence(alone.cases, alone.tables, {}).ratio("config", "slow", "r", "r").last()
     assert independent.value == pytest.approx(value, rel=1e-12)
     assert paired.hi - paired.lo < 0.8 * (independent.hi - independent.lo)
 
