@@ -292,12 +292,12 @@ def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
     config's: all its claims are in the table, also those that it can no longer judge.
     """
     of = study(results[0].study)
-    made = measured(results)
-    verdicts = claims.judged(of.claims(), results, outside.for_claims(made, results), configs.shipped, stem)
+    made, from_outside = measured(results), outside.measured(results)
+    verdicts = claims.judged(of.claims(), results, outside.for_claims(made, from_outside), configs.shipped, stem)
     made["claims"] = over_readings(verdicts, results[0].study)
     made["floor"] = of.floors(results)
     made = notes.noted(made, results, of.exact_errors, quantities(results[0].study, results[0].spec))
-    return outside.added(made, results)
+    return outside.added(made, results, from_outside)
 
 
 def over_readings(verdicts: "pd.DataFrame", name: str, out: Path | None = None) -> "pd.DataFrame":

@@ -355,9 +355,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
       radarsim fit rls2 plots.csv
       radarsim fit rls2 plots.csv --write mine.yaml
     """
-    import json
-
-    from radarsim.app import configs, run
+    from radarsim.app import configs, documents, run
     from radarsim.cli import console, verdicts
     from radarsim.recorded import fit as fitting
     from radarsim.report import wording
@@ -371,7 +369,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     with console.Counter("fitting", "likelihoods") as counter:
         found = fitting.fit(loaded, plots, options["filter_name"], allowing, counter.update)
     if options["as_json"]:
-        click.echo(json.dumps(fitting.as_rows(found, endless=None), indent=2))
+        click.echo(documents.text(fitting.as_rows(found)))
     else:
         verdicts.report_fit(found)
     if options["write"]:
@@ -400,13 +398,12 @@ def register(radar: str, other: str, as_json: bool) -> None:
       radarsim import adsb.csv --at 52.30,4.76,12 -o positions.csv
       radarsim register radar.csv positions.csv
     """
-    import json
-
+    from radarsim.app import documents
     from radarsim.cli import verdicts
     from radarsim.recorded import register as registering
 
     found = registering.register(radar, other)
     if as_json:
-        click.echo(json.dumps(registering.as_json(found), indent=2))
+        click.echo(documents.text(registering.as_json(found)))
     else:
         verdicts.report_registration(found, other)

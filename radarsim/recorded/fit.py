@@ -854,18 +854,17 @@ def settings(found: Fit) -> dict[str, float]:
     }
 
 
-def as_rows(found: Fit, endless: float | None = math.inf) -> list[dict[str, Any]]:
-    """The keys as rows of a table: with the plain answer, if any, beside that which allows for outliers or correlation;
-    endless: for the upper end of an interval that has none."""
+def as_rows(found: Fit) -> list[dict[str, Any]]:
+    """The keys as rows of a table, with the plain answer beside that which allows for outliers or correlation."""
     plain = {one.key: one for one in (found.plain or found).keys}
     return [
         {
             **{"key": one.key, "stated": one.stated, "value": one.value, "lo": one.lo},
-            "hi": endless if math.isinf(one.hi) else one.hi,
+            "hi": one.hi,
             "identifiable": one.identifiable,
             "plain": beside and beside.value,
             "plain_lo": beside and beside.lo,
-            "plain_hi": beside and (endless if math.isinf(beside.hi) else beside.hi),
+            "plain_hi": beside and beside.hi,
         }
         for one in found.keys
         for beside in [plain.get(one.key)]

@@ -102,7 +102,7 @@ class Numbers:
     or the same plot once more."""
 
     def __init__(self) -> None:
-        self.tracks: dict[str, _Seen] = {}
+        self._tracks: dict[str, _Seen] = {}
         self.again = self.doubles = 0
 
     def tidied(self, t: np.ndarray, names: list[str], places: Mapping[str, np.ndarray]) -> tuple[np.ndarray, list[str]]:
@@ -111,7 +111,7 @@ class Numbers:
         where = np.full((len(t), 3), np.nan) if found is None else found
         for name, rows in grouped(names).items():
             if name:
-                self._one(self.tracks.setdefault(name, _Seen(name)), t, rows, where, kept, names)
+                self._one(self._tracks.setdefault(name, _Seen(name)), t, rows, where, kept, names)
         return kept, [name for name, one in zip(names, kept.tolist(), strict=True) if one]
 
     def _one(

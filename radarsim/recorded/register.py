@@ -164,9 +164,9 @@ def apart_in_time(found: Registration) -> list[Aircraft]:
 
 
 def as_json(found: Registration) -> dict[str, Any]:
-    """The result as one JSON document."""
+    """The result as one document of plain data."""
     r, b = found.adjusted.sigma
-    document = {
+    return {
         "biases": [{**asdict(one), "identifiable": one.identifiable} for one in found.adjusted.biases],
         "sigma_range_m": r,
         "sigma_bearing_rad": b,
@@ -179,16 +179,6 @@ def as_json(found: Registration) -> dict[str, Any]:
         "left_out": found.left,
         "aircraft": [asdict(one) for one in found.aircraft],
     }
-    return finite(document)
-
-
-def finite(value: Any) -> Any:
-    """A document without numbers that JSON has not: these become null."""
-    if isinstance(value, dict):
-        return {key: finite(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(one) for one in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 # ---- recordings ------------------------------------------------------------------------------------------------------

@@ -113,19 +113,18 @@ def consistency(result: CaseResult) -> common.Columns:
     return common.stacked(parts)
 
 
-def added(made: Made, results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
-    """The tables with the rows of filters from outside below their own."""
-    outside = [one for result in results for one in others(result)]
-    if not outside:
+def added(made: Made, results: Sequence[CaseResult], own: Made) -> "dict[str, pd.DataFrame]":
+    """The tables with the rows of filters from outside below their own; own: those that are `measured`."""
+    if not own:
         return dict(made)
+    outside = [one for result in results for one in others(result)]
     with_own = [one for one in results if one.outside is not None]
-    curves, against = _measured(with_own)
-    rows = {"curves": _below(made["curves"], curves), "gains": against}
+    rows = {"curves": _below(made["curves"], own["curves"]), "gains": own["gains"]}
     rows = notes.noted(rows, [*results, *outside], exact=False)
     if "note" in rows["gains"]:  # of a filter that equals one of the config but for rounding
         equal = rows["gains"]["gain_hi"] - rows["gains"]["gain_lo"] < SINGLE
         rows["gains"]["note"] = rows["gains"]["note"].mask(equal, "")
-    rows["curves"] = rows["curves"].tail(len(curves))
+    rows["curves"] = rows["curves"].tail(len(own["curves"]))
     if "note" in rows["curves"] and not rows["curves"]["note"].any():
         rows["curves"] = rows["curves"].drop(columns="note")
     rows["failures"] = common.joined(map(failures, with_own))
@@ -137,17 +136,18 @@ def added(made: Made, results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]
     return found
 
 
-def _measured(with_own: Sequence[CaseResult]) -> "tuple[pd.DataFrame, pd.DataFrame]":
-    """The curves and gains of filters from outside."""
-    outside = [one for result in with_own for one in others(result)]
-    return common.curves(outside), common.joined(map(gains, with_own), common.GAINS)
-
-
-def for_claims(made: Made, results: Sequence[CaseResult]) -> Made:
-    """The tables with the curves and gains of filters from outside."""
+def measured(results: Sequence[CaseResult]) -> Made:
+    """The curves and gains of filters from outside; nothing where there are none."""
     with_own = [one for one in results if one.outside is not None]
-    rows = dict(zip(("curves", "gains"), _measured(with_own), strict=True)) if with_own else {}
-    return {**made, **{name: _below(made[name], table) for name, table in rows.items()}}
+    if not with_own:
+        return {}
+    outside = [one for result in with_own for one in others(result)]
+    return {"curves": common.curves(outside), "gains": common.joined(map(gains, with_own), common.GAINS)}
+
+
+def for_claims(made: Made, own: Made) -> Made:
+    """The tables with the rows of those that are `measured` below their own."""
+    return {**made, **{name: _below(made[name], table) for name, table in own.items()}}
 
 
 def beside(name: str, table: "Callable[[Sequence[CaseResult]], pd.DataFrame]") -> Any:
