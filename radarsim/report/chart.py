@@ -539,16 +539,15 @@ class _Frame:
             lo = np.clip(np.nan_to_num(self.y.place(whole["lo"]), nan=edge, posinf=edge, neginf=edge), -edge, edge)
             hi = np.clip(np.nan_to_num(self.y.place(whole["hi"]), nan=-edge, posinf=-edge, neginf=-edge), -edge, edge)
         there = np.isfinite(x) & np.isfinite(y) & known
-        if style.dash is None:
-            parts = [f"M{a:.1f} {b:.1f}V{c:.1f}" for a, b, c in zip(x[there], lo[there], hi[there], strict=True)]
-            return Markup('<path class="w" d="{}"/>').format("".join(parts))
-        if not there.any() or np.max(lo[there] - hi[there]) < 2 * SEEN:
-            return Markup("")
-        d = ""
-        for run in unbroken(there):
-            outline = np.concatenate([hi[run], lo[run][::-1]])
-            d += path(np.concatenate([x[run], x[run][::-1]]), outline) + "z"
-        return Markup('<path class="b" d="{}"/>').format(d)
+        runs = unbroken(there)
+        alone = there if style.dash is None else [run[0] for run in runs if len(run) == 1]
+        bars = "".join(f"M{a:.1f} {b:.1f}V{c:.1f}" for a, b, c in zip(x[alone], lo[alone], hi[alone], strict=True))
+        made = Markup('<path class="w" d="{}"/>').format(bars) if bars else Markup("")
+        wide = [run for run in runs if len(run) > 1 and style.dash is not None]
+        if not wide or np.max(lo[there] - hi[there]) < 2 * SEEN:
+            return made
+        outlines = ((np.append(x[run], x[run][::-1]), np.append(hi[run], lo[run][::-1])) for run in wide)
+        return made + Markup('<path class="b" d="{}"/>').format("".join(path(*ends) + "z" for ends in outlines))
 
     def _keep(self, name: str, whole: dict[str, np.ndarray], group: int, style: Style) -> None:
         """Numbers for the pointer; times shared by curves are kept once."""

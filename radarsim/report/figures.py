@@ -604,6 +604,8 @@ def _line(axes: Axes, line: Line, crosses: str) -> None:
             axes.vlines(line.x, line.lo, line.hi, color=_colour(line.style), linewidth=0.8, zorder=2.8)
         else:
             axes.fill_between(line.x, line.lo, line.hi, color=_colour(line.style), alpha=0.25, linewidth=0, zorder=2)
+            alone = [run[0] for run in chart.unbroken(np.isfinite(line.y)) if len(run) == 1]  # no band has its width
+            axes.vlines(line.x[alone], line.lo[alone], line.hi[alone], color=_colour(line.style), linewidth=0.8)
     if line.exact is not None:
         first = 0 if step == 1 else step
         axes.plot(line.x[first::every], line.exact[first::every], zorder=4, label=crosses or tr("exact"), **EXACT)

@@ -181,3 +181,9 @@ def test_where_neither_end_is_known_there_is_no_band():
         1
     ]
     assert open_end.count("M") == 1
+
+
+def test_a_point_of_a_band_without_a_neighbour_has_a_whisker():
+    x, y = np.arange(6.0), np.array([5, 5, np.nan, 5, np.nan, 5])
+    drawn = one(Line(x, y, "a", lo=y - 2, hi=y + 2)).panels[0].svg
+    assert [re.search(rf'class="{kind}" d="([^"]*)"', drawn)[1].count("M") for kind in "bw"] == [1, 2]

@@ -40,6 +40,12 @@ def test_the_line_is_drawn_as_given():
     assert axes.get_xlabel() == "x, s"
 
 
+def test_a_point_of_a_band_without_a_neighbour_has_a_whisker():
+    y = np.array([5, 5, np.nan, 5])
+    _, bars = drawn(one(Line(np.arange(4.0), y, "a", lo=y - 2, hi=y + 1))).collections
+    np.testing.assert_array_equal(bars.get_segments(), [[[3, 3], [3, 6]]])
+
+
 def test_markers_and_crosses_take_turns():
     axes = drawn(one(line(marker=0)))
     curve, crosses = axes.lines

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language import listed, term, tr
+from radarsim.language import few, listed, term, tr
 from radarsim.report import panels, seen, tables, wording
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.sonar.clutter.filters import ClutterAxes
@@ -24,6 +24,7 @@ KEYS = {  # columns of the table of tracking, and the keys that they hold
 LIFE = term("mean time between ends of a confirmed track (no point: no end occurred)")
 ENDS = term("probability, by importance sampling, that the target's first confirmed track has ended")
 ZERO_AWAY = 3.0  # from zero to the least value above it on a logarithmic axis, as a factor
+UPPER = Style(GREY, None, 4)
 LEVEL = 0.02  # of its largest value: what changes less over a sweep is said, not drawn
 Results = Sequence[CaseResult[ClutterAxes]]
 DRAWN_FROM = {"confirmation": ("tracks",), "track_life": ("tracking", "curves", "rare"), "false_tracks": ("tracking",)}
@@ -157,8 +158,9 @@ def life_figure(results: Results, made: "Mapping[str, pd.DataFrame]") -> Figure 
     drawn, said, level = [], [], []
     for value, ends, y, table, words in shown:
         lines = _lines(by_line(table, column, results[0]), column, value, ends)
-        if all(np.ptp(line.y) <= LEVEL * line.y.max() for line in lines if len(line.y)):
-            level += [_level(y.label, np.concatenate([line.y for line in lines]))]
+        known = [line.y[np.isfinite(line.y)] for line in lines]
+        if all(np.ptp(values) <= LEVEL * values.max() for values in known if len(values)):
+            level += [_level(y.label, np.concatenate(known))]
         else:
             drawn.append(Panel(x, y, tuple(lines), direct=False))
             said.append(words)
@@ -187,36 +189,42 @@ def _level(label: str, values: np.ndarray) -> str:
 
 
 def _lines(table: "pd.DataFrame", x: str, value: str, ends: str) -> list[Line]:
-    """A line for each filter of a table's finite values over x; an infinite end of an interval is left out."""
+    """A line for each filter of a table's values over x, none where infinite; an infinite end of an interval too."""
     lines = []
     for n, (name, rows) in enumerate(table.groupby("filter", sort=False)):
-        rows = rows[np.isfinite(rows[value])].sort_values(x)
+        rows = rows.sort_values(x).replace(np.inf, np.nan)
         lo, hi = (rows[key].where(np.isfinite(rows[key]), rows[value]) for key in (f"{ends}_lo", f"{ends}_hi"))
         lines.append(panels.line(rows.assign(lo=lo, hi=hi), (x, value, "lo", "hi"), str(name), n))
     return lines
 
 
 def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
-    """False tracks per hour over what is swept, on a logarithmic axis."""
-    column = swept_column(tracking)
-    rate = "false_tracks_per_hour"
-    if column is None or not (tracking[rate] > 0).any():
+    """False tracks per hour over what is swept, on a logarithmic axis; of none that occurred, how many there may be.
+
+    Without false plots there are no false tracks, and no point.
+    """
+    column, rate = swept_column(tracking), "false_tracks_per_hour"
+    rows = tracking[tracking["false_plots_per_km2"] > 0]
+    if column is None or not (rows[rate] > 0).any():
         return None
-    rows = by_line(tracking, column, results[0])
-    rows = rows[rows[rate] > 0]
-    rules = {row["filter"]: tr("{count} of {of}", count=int(row["m"]), of=int(row["of"])) for _, row in rows.iterrows()}
-    rows = rows.assign(
-        filter=[f"{name} ({rules[name]})" for name in rows["filter"]],
-        false_lo=np.maximum(rows["false_lo"], rows[rate] / 10),
-    )
+    rules: dict[str, list[str]] = {}
+    for name, count, of in rows[["filter", "m", "of"]].drop_duplicates("filter").itertuples(index=False, name=None):
+        rules.setdefault(tr("{count} of {of}", count=int(count), of=int(of)), []).append(name)
+    x, rows = axis_over(results[0], column, by_line(rows, column, results[0]))
+    none = rows[rows[rate] == 0]
+    upper = Line(none[column].to_numpy(), none["false_hi"].to_numpy(), "", UPPER)
+    rows = rows.assign(**{name: rows[name].where(rows[rate] > 0) for name in (rate, "false_lo", "false_hi")})
+    keys = ((tr("none occurred: upper end of the interval"), UPPER),) if len(none) else ()
+    marks = (*_lines(rows, column, rate, "false"), *([upper] if keys else []))
     caption = tr(
-        "False tracks confirmed per hour in the whole sector; every false plot starts a tentative track. "
-        "{realisations} per case. Bands: 95 % intervals.",
+        "False tracks confirmed per hour in the whole sector; every false plot starts a tentative track. Plots that "
+        "confirm it: {rules}. {realisations} per case. Bands and bars: 95 % intervals.",
+        rules="; ".join(f"{rule} ({few(names)})" for rule, names in rules.items()),
         realisations=panels.realisations(results),
     )
-    x, rows = axis_over(results[0], column, rows)
-    y = Axis(tr("false tracks per hour"), "log")
-    panel = Panel(x, y, tuple(_lines(rows, column, rate, "false")), direct=False)
+    if never := rows.groupby("filter", sort=False)[rate].sum().loc[lambda rates: rates == 0].index.tolist():
+        caption += " " + tr("None occurred: {names}.", names=few(never))
+    panel = Panel(x, Axis(tr("false tracks per hour"), "log"), marks, keys=keys, direct=False)
     return Figure("false_tracks", tr("False tracks"), caption, (panel,), width_mm=panels.WIDE_MM)
 
 

@@ -6,8 +6,8 @@ from scipy import stats
 
 import radarsim
 from radarsim.report import wording
+from radarsim.studies.sonar.clutter import figures, words
 from radarsim.studies.sonar.clutter import tables as report
-from radarsim.studies.sonar.clutter import words
 from radarsim.studies.sonar.clutter.kernels import tracker
 
 
@@ -111,6 +111,25 @@ def test_figures_are_those_of_the_experiment(result):
     assert names <= set(result.figures)
     for name in names:
         assert result.figure(name) is not None
+
+
+def test_false_tracks_that_did_not_occur_are_drawn_as_the_upper_end_of_their_interval(result):
+    table = result.tables["tracking"].copy()
+    rows, sparse = table.columns.get_indexer(["false_tracks_per_hour", "false_lo"]), table["false_plots_per_km2"] == 1
+    table.iloc[sparse.to_numpy().nonzero()[0], rows] = 0.0
+    figure = figures.false_figure(result.cases, table)
+    *lines, upper = figure.panels[0].marks
+    for line, name in zip(lines, ("nearest", "PDA"), strict=True):
+        row = table[(table["filter"] == name) & (table["false_plots_per_km2"] == 2)].iloc[0]
+        np.testing.assert_array_equal(line.x, [1, 2])  # and no point without false plots
+        np.testing.assert_allclose(line.y, [np.nan, row["false_tracks_per_hour"]])
+        np.testing.assert_allclose([line.lo[1], line.hi[1]], [row["false_lo"], row["false_hi"]])
+    np.testing.assert_allclose(upper.y, table[sparse]["false_hi"])
+    assert figure.panels[0].keys == (("none occurred: upper end of the interval", upper.style),)
+    assert "Plots that confirm it: 2 of 3 (nearest); 3 of 4 (PDA)." in figure.caption
+    table.loc[table["filter"] == "PDA", "false_tracks_per_hour"] = 0.0
+    assert figures.false_figure(result.cases, table).caption.endswith("None occurred: PDA.")
+    assert figures.false_figure(result.cases, table.assign(false_tracks_per_hour=0.0)) is None
 
 
 def test_what_does_not_change_over_a_sweep_is_said_and_rare_ends_are_drawn():
