@@ -16,6 +16,7 @@ Keys of rare events that several studies share: realisations drawn where an even
 
 import math
 import re
+import typing
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -23,40 +24,10 @@ from copy import copy
 from dataclasses import dataclass
 from functools import cache
 from types import FunctionType
-from typing import (
-    TYPE_CHECKING,
-    Annotated,
-    Any,
-    ClassVar,
-    Literal,
-    NamedTuple,
-    Protocol,
-    Self,
-    TypeVar,
-    Union,
-    cast,
-    get_args,
-    get_origin,
-)
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, Protocol, Self, TypeVar, cast, get_args
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    Strict,
-    StringConstraints,
-    Tag,
-    TypeAdapter,
-    ValidationError,
-    WithJsonSchema,
-    create_model,
-    model_validator,
-)
+import pydantic
+from pydantic import AfterValidator, BaseModel, Field, GetJsonSchemaHandler, Strict, StringConstraints, model_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
@@ -232,7 +203,7 @@ def readable(members: Iterable[T], value: Callable[[T], V]) -> list[V]:
 class Model(BaseModel):
     """A frozen mapping of known keys; `_deg` twins are turned into radians before anything is checked."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = pydantic.ConfigDict(frozen=True, extra="forbid")
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
@@ -364,8 +335,8 @@ def _allowed(info: FieldInfo, value: Any) -> bool:
     """Whether a field of a model accepts a value from another model."""
     allowed: Any = Annotated[info.annotation, *info.metadata] if info.metadata else info.annotation
     try:
-        TypeAdapter(allowed).validate_python(value)
-    except ValidationError:
+        pydantic.TypeAdapter(allowed).validate_python(value)
+    except pydantic.ValidationError:
         return False
     return True
 
@@ -429,7 +400,7 @@ Flag = Annotated[bool, Strict()]
 Label = Annotated[str, Strict(), StringConstraints(min_length=1, max_length=64), AfterValidator(_printable)]
 Name = Annotated[Label, AfterValidator(_no_formula)]
 Stem = Annotated[str, Strict(), StringConstraints(min_length=1, max_length=100)]
-Anything = Annotated[Any, WithJsonSchema({})]
+Anything = Annotated[Any, pydantic.WithJsonSchema({})]
 
 
 @dataclass(frozen=True)
@@ -439,7 +410,7 @@ class Whole:
     least: int
     most: int
 
-    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+    def __get_pydantic_core_schema__(self, source: object, handler: pydantic.GetCoreSchemaHandler) -> CoreSchema:
         bounded = core_schema.int_schema(strict=True, ge=self.least, le=self.most)
         return core_schema.no_info_before_validator_function(_whole, bounded)
 
@@ -553,10 +524,12 @@ def widened(
             raise PydanticCustomError("no_such_kind", "must be one of {kinds}{reason}", told)
         return data
 
-    tagged: Any = Union[tuple(Annotated[one, Tag(f"kind: {kind}")] for kind, one in kinds.items())]  # noqa: UP007
-    choice: Any = Annotated[tagged, Discriminator(lambda data: f"kind: {kind_of(data)}"), BeforeValidator(known)]
+    tagged: Any = typing.Union[tuple(Annotated[one, pydantic.Tag(f"kind: {kind}")] for kind, one in kinds.items())]  # noqa: UP007
+    choice: Any = Annotated[
+        tagged, pydantic.Discriminator(lambda data: f"kind: {kind_of(data)}"), pydantic.BeforeValidator(known)
+    ]
     members: Any = (tuple[choice, ...], copy(info))
-    made: Any = create_model(
+    made: Any = pydantic.create_model(
         keys.__name__, __base__=keys, __module__=keys.__module__, __doc__=keys.__doc__, **{keys.bare_keys: members}
     )
     made.__reduce__ = lambda self: (_again, (*again, dict(self), self.model_fields_set))
@@ -620,7 +593,7 @@ def keys_of(
         ),
         "scans": (Annotated[int, Whole(2, most_scans), Design()], key("number of scans", "number of plots")),
     }
-    made: type[Study] = create_model(name, __base__=Study, __module__=module, **own)
+    made: type[Study] = pydantic.create_model(name, __base__=Study, __module__=module, **own)
     return made
 
 
@@ -679,7 +652,7 @@ def _parts(annotation: Any) -> Iterator[Any]:
 
 def _is_choice(allowed: Any) -> bool:
     """Whether only listed values are allowed, even though they are numbers."""
-    return any(get_origin(part) is Literal for part in _parts(allowed))
+    return any(typing.get_origin(part) is Literal for part in _parts(allowed))
 
 
 def _takes_numbers(allowed: Any) -> bool:

@@ -17,21 +17,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from radarsim.kernels import lanes
 from radarsim.kernels.compile import aligned_zeros, kernel, part
 from radarsim.kernels.hypotheses import extrapolate, innovation
-from radarsim.kernels.lanes import (
-    WIDTH,
-    address,
-    emitted,
-    emitted_sums,
-    full,
-    get,
-    put,
-    row,
-    total,
-    where_greater,
-    zeros,
-)
+from radarsim.kernels.lanes import WIDTH, address, emitted, emitted_sums, full, get, put, row, total, where_greater
 from radarsim.kernels.random import U, fill_normal_strip, fill_uniform_strip
 from radarsim.kernels.traced import Program, Trace, row_of, where
 
@@ -204,7 +193,7 @@ class Shape(NamedTuple):
 
 def follower(program: Program, sums: Program, shape: Shape):
     """The part that runs a filter through a scan of a chunk and adds to its sums."""
-    step, judged, nothing, many = emitted(program), emitted_sums(sums), zeros(len(sums.sums)), len(sums.sums)
+    step, judged, nothing, many = emitted(program), emitted_sums(sums), lanes.zeros(len(sums.sums)), len(sums.sums)
     n, _, plots, kept, _ = shape
 
     @part

@@ -8,37 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from radarsim.config import fields
-from radarsim.config.fields import (
-    COEFFICIENTS,
-    FASTEST_MPS,
-    HARDEST_MPS2,
-    AccelerationStart,
-    Added,
-    At,
-    Baseline,
-    Coefficients,
-    Design,
-    Display,
-    FlyBy,
-    Lasting,
-    Members,
-    Model,
-    Name,
-    NonNegative,
-    Number,
-    Polynomial,
-    Positive,
-    Probability,
-    Recorded,
-    Scenario,
-    Turn,
-    Whole,
-    at,
-    cross_check,
-    key,
-    of_each,
-    polynomial_reach_m,
-)
+from radarsim.config.fields import At, Design, Model, NonNegative, Positive, Probability, Whole, at, cross_check, key
 from radarsim.constants import STANDARD_GRAVITY_MPS2
 
 MOST_RARE_SCANS = 64  # sequences of folds are looked for before the run, and each shifts the noise of every scan
@@ -121,12 +91,12 @@ class RandomPolynomial(Model):
 
     kind: Literal["random_polynomial"] = key("kind", "a polynomial of the second degree, drawn in each realisation")
     range_m: Positive = key("range", "range at the first scan, m", 100e3)
-    sigma_velocity_mps: Annotated[NonNegative, Field(le=FASTEST_MPS)] | None = key(
+    sigma_velocity_mps: Annotated[NonNegative, Field(le=fields.FASTEST_MPS)] | None = key(
         "σ of the target's radial velocity",
         "standard deviation of the radial velocity, m/s; default: that of `prior`",
         None,
     )
-    sigma_acceleration_mps2: Annotated[NonNegative, Field(le=HARDEST_MPS2)] | None = key(
+    sigma_acceleration_mps2: Annotated[NonNegative, Field(le=fields.HARDEST_MPS2)] | None = key(
         "σ of the target's radial acceleration",
         "standard deviation of the radial acceleration, m/s²; default: that of `prior`",
         None,
@@ -137,8 +107,8 @@ class AccelerationPulse(Model):
     """A polynomial with a constant acceleration for a while; the velocity it has built up stays."""
 
     kind: Literal["acceleration_pulse"] = key("kind", "a constant acceleration for a while")
-    coefficients: Coefficients = key("derivatives of the range at the first plot", COEFFICIENTS)
-    acceleration_g: Annotated[Number, Field(ge=-100, le=100)] = key(
+    coefficients: fields.Coefficients = key("derivatives of the range at the first plot", fields.COEFFICIENTS)
+    acceleration_g: Annotated[fields.Number, Field(ge=-100, le=100)] = key(
         "acceleration", "radial acceleration added, standard gravities", symbol="a", unit="g"
     )
     start_s: NonNegative = key("start time", "start time, counted from the first scan, s")
@@ -147,11 +117,17 @@ class AccelerationPulse(Model):
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
         added = abs(self.acceleration_g) * STANDARD_GRAVITY_MPS2 * t**2 / 2
-        return polynomial_reach_m(self.coefficients, t) + added
+        return fields.polynomial_reach_m(self.coefficients, t) + added
 
 
 Target = Annotated[
-    Polynomial | RandomPolynomial | AccelerationStart | AccelerationPulse | Turn | FlyBy | Recorded,
+    fields.Polynomial
+    | RandomPolynomial
+    | fields.AccelerationStart
+    | AccelerationPulse
+    | fields.Turn
+    | fields.FlyBy
+    | fields.Recorded,
     Field(discriminator="kind"),
 ]
 
@@ -166,7 +142,7 @@ class Manoeuvres(Model):
 class Filter(Model):
     """A Kalman filter of range, or several of different order, with the velocity or without."""
 
-    name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
+    name: Annotated[fields.Name, fields.Display()] = key("name", "label; every filter has its own")
     doppler: Literal["none", "unfolded", "folded", "remainder"] = key(
         "use of Doppler",
         "none: range alone; unfolded: the velocity with its true fold, a bound; folded: as measured, by hypotheses; "
@@ -272,14 +248,14 @@ def _carried_filter(one: Any) -> Any:
 class RareFolds(fields.RareEvent):
     """Wrong folds that are rare: realisations shifted towards them, and weights that make up for it."""
 
-    filter: Name = key("filter", "the filter whose wrong folds at the last scan are sampled")
+    filter: fields.Name = key("filter", "the filter whose wrong folds at the last scan are sampled")
 
     @property
     def aimed_at(self) -> str:
         return self.filter
 
 
-class Keys(Lasting):
+class Keys(fields.Lasting):
     """Folded Doppler: what it is worth, and how many scans it takes."""
 
     figure_names = (
@@ -292,21 +268,21 @@ class Keys(Lasting):
     most_scans: ClassVar[int] = MOST_SCANS
 
     radar: Radar = key("radar", "the radar")
-    target: Annotated[Target, Scenario()] = key("target", "the target: a scenario's stem, or inline")
+    target: Annotated[Target, fields.Scenario()] = key("target", "the target: a scenario's stem, or inline")
     prior: Annotated[Prior, Design()] = key(
         "prior", "what the filters know before the first plot", Prior.model_validate({})
     )
-    filters: Members[Filter] = key("filters", "the filters; all see the same plots")
-    baseline: Baseline = key(
+    filters: fields.Members[Filter] = key("filters", "the filters; all see the same plots")
+    baseline: fields.Baseline = key(
         "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
     )
     scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = key(
         "number of scans", "number of scans; or give duration_s", None
     )
-    duration_s: Annotated[Positive | None, Design(), Added()] = key(
+    duration_s: Annotated[Positive | None, Design(), fields.Added()] = key(
         "duration", "time from the first scan to the last, s, in place of scans: to the last scan within it", None
     )
-    rare: Annotated[RareFolds | None, Design(), Added()] = key(
+    rare: Annotated[RareFolds | None, Design(), fields.Added()] = key(
         "rare wrong folds",
         "importance sampling of wrong folds, for filters that are almost always right: rare.csv",
         None,
@@ -364,7 +340,7 @@ class Keys(Lasting):
 
     @cross_check
     def _remainders_exist(self) -> Iterator[At]:
-        yield from of_each(self.filters, self._remainder_exists)
+        yield from fields.of_each(self.filters, self._remainder_exists)
 
     def _remainder_exists(self, i: int, one: Filter) -> Iterator[At]:
         if one.doppler != "remainder":
@@ -398,7 +374,7 @@ class Keys(Lasting):
 
     @cross_check
     def _variances_in_proportion(self) -> Iterator[At]:
-        yield from of_each(self.filters, self._variance_in_proportion)
+        yield from fields.of_each(self.filters, self._variance_in_proportion)
 
     def _variance_in_proportion(self, i: int, one: Filter) -> Iterator[At]:
         radar = self.radar

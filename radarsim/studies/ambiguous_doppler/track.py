@@ -15,17 +15,8 @@ from radarsim import physics
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
 from radarsim.errors import PlotFault
-from radarsim.kernels.algebra import (
-    NO_NOISE,
-    TAKE,
-    add_outer,
-    add_scaled,
-    add_spread,
-    pack,
-    pack_transition,
-    predicted,
-    predicted_covariance,
-)
+from radarsim.kernels import algebra
+from radarsim.kernels.algebra import NO_NOISE, TAKE, add_scaled, pack, pack_transition, predicted, predicted_covariance
 from radarsim.studies.ambiguous_doppler import filters
 from radarsim.studies.ambiguous_doppler.config import joint_span
 from radarsim.studies.ambiguous_doppler.kernels import rows as kernels
@@ -288,7 +279,7 @@ class Interacting:
         share = passes * self.mu[:, :, None] / before[:, None, :]  # (n, from, to)
         x = np.einsum("nji,xnj->xni", share, self.x)
         apart = self.x[:, :, :, None] - x[:, :, None]  # (3, n, from, to)
-        self.P = np.array(add_spread(NO_NOISE, share, self.P[:, :, :, None], apart)).sum(axis=2)
+        self.P = np.array(algebra.add_spread(NO_NOISE, share, self.P[:, :, :, None], apart)).sum(axis=2)
         self.x, self.mu = x, before
 
     def _take_range(self, z: float) -> None:
@@ -333,7 +324,7 @@ class Interacting:
         elif self.options.merge == "each_scan":
             mean, variance, log_sum = _merged(self.folds.innovations(e, S), S)
             self.x = np.array(add_scaled(self.x, mean, gain))
-            self.P = np.array(add_outer(P, variance, gain))
+            self.P = np.array(algebra.add_outer(P, variance, gain))
             self._weigh(logs + log_sum)
         else:
             self._branch(v, np.array(gain), S, logs)

@@ -7,26 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from radarsim.config import fields
-from radarsim.config.fields import (
-    Added,
-    At,
-    Design,
-    Display,
-    Flag,
-    Members,
-    Model,
-    Name,
-    NonNegative,
-    Number,
-    Positive,
-    Scenario,
-    Study,
-    Whole,
-    at,
-    cross_check,
-    key,
-    of_each,
-)
+from radarsim.config.fields import Added, At, Design, Flag, Model, Name, Number, Positive, Whole, at, cross_check, key
 
 MOST_SAMPLES = 1_000_000
 MOST_DERIVATIVES = 4
@@ -77,7 +58,7 @@ class Truth(Model):
             None,
         )
     )
-    times_s: Annotated[tuple[NonNegative, ...], Field(min_length=2, max_length=100)] | None = key(
+    times_s: Annotated[tuple[fields.NonNegative, ...], Field(min_length=2, max_length=100)] | None = key(
         "times of the velocity profile",
         "instants of the velocity profile from the start of the burst, s; the first is 0",
         None,
@@ -145,7 +126,7 @@ class Prior(Model):
 class Estimator(Model):
     """A sequence of windows that grow to the whole burst, Fisher scoring in each; or the classical rival."""
 
-    name: Annotated[Name, Display()] = key("name", "label; every estimator has its own")
+    name: Annotated[Name, fields.Display()] = key("name", "label; every estimator has its own")
     method: Literal["sequence", "ridge"] = key(
         "method", "sequence of discriminators, or short-time spectrum, robust fit, unwrapping, scoring", "sequence"
     )
@@ -209,16 +190,16 @@ class Rare(fields.RareEvent):
         return self.estimator
 
 
-class Keys(Study):
+class Keys(fields.Study):
     """Doppler frequency and its derivatives from one burst."""
 
     bare_keys = "estimators"
     figure_names = ("residuals", "locks", "accuracy", "lock_*")  # the last: of what a sweep varies
 
     burst: Burst = key("burst", "the burst")
-    truth: Annotated[Truth, Scenario()] = key("true phase", "the echo's phase: a scenario's stem, or inline")
+    truth: Annotated[Truth, fields.Scenario()] = key("true phase", "the echo's phase: a scenario's stem, or inline")
     prior: Prior = key("prior", "the forecast")
-    estimators: Members[Estimator] = key("estimators", "the estimators; all see the same bursts")
+    estimators: fields.Members[Estimator] = key("estimators", "the estimators; all see the same bursts")
     engine: Annotated[Literal["auto", "block_sums", "samples", "demodulated"], Design()] = key(
         "way of simulation",
         "block_sums: exact sums over short blocks are drawn; samples: every step over every sample; demodulated: "
@@ -246,7 +227,7 @@ class Keys(Study):
     @cross_check
     def _estimators_fit(self) -> Iterator[At]:
         for check in (self._schedule_fits, self._ridge_fits, self._engine_fits):
-            yield from of_each(self.estimators, check)
+            yield from fields.of_each(self.estimators, check)
 
     def _schedule_fits(self, i: int, estimator: Estimator) -> Iterator[At]:
         if estimator.schedule != "designed" and estimator.schedule[-1] > self.burst.duration_s * (1 + 1e-9):

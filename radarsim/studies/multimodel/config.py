@@ -7,28 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from radarsim.config.fields import (
-    At,
-    Baseline,
-    ColumnsOfOne,
-    DataFile,
-    Design,
-    Display,
-    Flag,
-    Model,
-    Name,
-    NonNegative,
-    Number,
-    Positive,
-    Probability,
-    Scenario,
-    Study,
-    Whole,
-    at,
-    cross_check,
-    key,
-    unique_names,
-)
+from radarsim.config import fields
+from radarsim.config.fields import At, Design, Display, Model, Name, NonNegative, Number, Positive, at, cross_check, key
 
 MOST_SCANS = 100_000
 MOST_MODELS = 5
@@ -73,7 +53,7 @@ class Sensor(Model):
         "antenna elevation", "elevation of the antenna's normal above the horizon, rad", 0.0, symbol="ε_A"
     )
     antenna_height_m: Number = key("antenna height", "height of the phase centre above the origin, m", 0.0, symbol="h")
-    detection_probability: Annotated[Probability, Field(gt=0)] = key(
+    detection_probability: Annotated[fields.Probability, Field(gt=0)] = key(
         "detection probability",
         "probability that a scan gives a plot; the three that start the track are never missed",
         1.0,
@@ -116,7 +96,7 @@ class Stage(Model):
     end_s: Positive | None = key("end time", "end, s from the first plot; only the last stage has none", None)
 
 
-Stages = Annotated[tuple[Stage, ...], Field(min_length=1, max_length=12), AfterValidator(unique_names)]
+Stages = Annotated[tuple[Stage, ...], Field(min_length=1, max_length=12), AfterValidator(fields.unique_names)]
 
 
 class Target(Model):
@@ -150,7 +130,7 @@ class Phase(Model):
     period_s: Positive | None = key(
         "period of the weave", "the commands follow a sine of this period, s; none: constant", None
     )
-    trimmed: Flag = key("gravity and drag balanced", "lift and thrust balance gravity and drag as well", False)
+    trimmed: fields.Flag = key("gravity and drag balanced", "lift and thrust balance gravity and drag as well", False)
 
 
 class Flight(Target):
@@ -184,7 +164,7 @@ class Recorded(Target):
     """A flight recorded in a file, smoothed by a spline whose derivatives are the true velocity and acceleration."""
 
     kind: Literal["recorded"] = key("kind", "a flight from a CSV file with columns t_s, x_m, y_m, z_m")
-    file: Annotated[str, DataFile()] = key("file", "path of the file, relative to this one")
+    file: Annotated[str, fields.DataFile()] = key("file", "path of the file, relative to this one")
 
 
 AnyTarget = Annotated[Flight | Recorded, Field(discriminator="kind")]
@@ -203,7 +183,7 @@ class MotionModel(Model):
     )
 
 
-Column = Annotated[tuple[Probability, ...], Field(min_length=1, max_length=MOST_MODELS)]
+Column = Annotated[tuple[fields.Probability, ...], Field(min_length=1, max_length=MOST_MODELS)]
 
 
 class Filter(Model):
@@ -216,7 +196,7 @@ class Filter(Model):
     models: Annotated[tuple[MotionModel, ...], Field(min_length=1, max_length=MOST_MODELS)] = key(
         "motion models", "the bank of motion models, one to five; kalman has one"
     )
-    transition: Annotated[tuple[Column, ...], Field(min_length=1, max_length=MOST_MODELS), ColumnsOfOne()] = key(
+    transition: Annotated[tuple[Column, ...], Field(min_length=1, max_length=MOST_MODELS), fields.ColumnsOfOne()] = key(
         "transition probabilities",
         "transition probabilities: row i, column j from model j to model i; columns sum to one",
         ((1.0,),),
@@ -253,17 +233,17 @@ class Filter(Model):
             yield at("transition", f"its columns must sum to one (column j: from model j){hint}")
 
 
-class Keys(Study):
+class Keys(fields.Study):
     """Multiple-model filters on an aeroballistic target."""
 
     figure_names = ("trajectory", "sigma_y", "sigma_vy", "probabilities", "families", "cost", "consistency")
 
     sensor: Sensor = key("sensor", "the radar")
-    target: Annotated[AnyTarget, Scenario()] = key("target", "the target: a scenario's stem, or inline")
+    target: Annotated[AnyTarget, fields.Scenario()] = key("target", "the target: a scenario's stem, or inline")
     filters: Annotated[
-        tuple[Filter, ...], Field(min_length=1, max_length=32), AfterValidator(unique_names), Design()
+        tuple[Filter, ...], Field(min_length=1, max_length=32), AfterValidator(fields.unique_names), Design()
     ] = key("filters", "the filters; all see the same plots")
-    baseline: Baseline = key(
+    baseline: fields.Baseline = key(
         "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
     )
     start_acceleration_mps2: Annotated[NonNegative, Design()] = key(
@@ -271,9 +251,9 @@ class Keys(Study):
         "spread of the acceleration that the start of a track allows for, m/s²",
         30.0,
     )
-    scans: Annotated[int | None, Whole(4, MOST_SCANS), Design()] = key(
+    scans: Annotated[int | None, fields.Whole(4, MOST_SCANS), Design()] = key(
         "number of scans", "number of plots; default: to the end of the flight", None
     )
-    report_every: Annotated[int, Whole(1, MOST_SCANS), Design()] = key(
+    report_every: Annotated[int, fields.Whole(1, MOST_SCANS), Design()] = key(
         "every n-th scan reported", "tables and figures contain every n-th scan and the last; stages use all scans", 1
     )

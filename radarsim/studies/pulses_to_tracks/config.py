@@ -6,35 +6,9 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
+from radarsim.config import fields
 from radarsim.config.document import short
-from radarsim.config.fields import (
-    NEAREST_M,
-    AccelerationStart,
-    At,
-    Baseline,
-    Design,
-    Display,
-    FlyBy,
-    InBand,
-    Lasting,
-    Members,
-    Model,
-    Name,
-    NonNegative,
-    NotRead,
-    Number,
-    Polynomial,
-    Positive,
-    Probability,
-    Recorded,
-    Scenario,
-    Turn,
-    Whole,
-    at,
-    cross_check,
-    key,
-    of_each,
-)
+from radarsim.config.fields import NEAREST_M, At, Design, Display, Lasting, Model, Positive, Whole, at, cross_check, key
 from radarsim.constants import Band
 
 MOST_SCANS = 1000  # each scan has windows of its own
@@ -44,13 +18,16 @@ MOST_DERIVATIVES = 1
 MOST_HYPOTHESES = 1000
 UNFOLDING = {"prune_below": 1e-6, "estimate": "mean"}  # keys of several hypotheses, and defaults
 SEQUENCES = ("sequence", "dense", "cured")
-Target = Annotated[Polynomial | AccelerationStart | Turn | FlyBy | Recorded, Field(discriminator="kind")]
+Target = Annotated[
+    fields.Polynomial | fields.AccelerationStart | fields.Turn | fields.FlyBy | fields.Recorded,
+    Field(discriminator="kind"),
+]
 
 
-class Radar(InBand):
+class Radar(fields.InBand):
     """A surveillance radar: wavelength, accuracy of a range, period of its scans. Its velocity comes from the burst."""
 
-    name: Annotated[Name | None, Display()] = key("name", "display name", None)
+    name: Annotated[fields.Name | None, Display()] = key("name", "display name", None)
     band: Annotated[Band | None, Display()] = key(
         "band", "wave band, for display: by its wavelength, or by its letter (IEEE Std 521)", None
     )
@@ -81,7 +58,7 @@ class Burst(Model):
         "length of a pulse, s: the matched filter loses sinc² of it times the Doppler frequency",
         symbol="t_p",
     )
-    snr_db: Annotated[Number, Field(ge=-60, le=100)] = key(
+    snr_db: Annotated[fields.Number, Field(ge=-60, le=100)] = key(
         "signal-to-noise ratio of a pulse",
         "ratio of the power of the echo to that of the noise in the sample of a pulse, dB",
         unit="dB",
@@ -127,11 +104,11 @@ class Forecast(Model):
 class Filter(Model):
     """A Kalman filter of range, and of what an estimator finds in the burst."""
 
-    name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
+    name: Annotated[fields.Name, Display()] = key("name", "label; every filter has its own")
     observes: tuple[Literal["range", "velocity", "acceleration"], ...] = key(
         "observes", "measurements that it uses: [range], [range, velocity] or [range, velocity, acceleration]"
     )
-    manoeuvre_variance: NonNegative = key(
+    manoeuvre_variance: fields.NonNegative = key(
         "manoeuvre variance",
         "variance of the random jerk it allows for, (m/s³)²; as in P1, not during its initial scans",
         symbol="D_M",
@@ -186,7 +163,7 @@ class Filter(Model):
         "bursts locked), as for folded velocity; default: 1, the fold nearest to the prediction",
         None,
     )
-    prune_below: Annotated[Probability, Field(lt=1)] | None = key(
+    prune_below: Annotated[fields.Probability, Field(lt=1)] | None = key(
         "ratio below which a hypothesis is dropped",
         "several hypotheses: one is dropped below this ratio to the best one's probability; 0: never; default: 1e-6",
         None,
@@ -270,10 +247,10 @@ class Keys(Lasting):
 
     radar: Radar = key("radar", "the radar")
     burst: Burst = key("burst", "the burst of each scan")
-    target: Annotated[Target, Scenario()] = key("target", "the target: a scenario's stem, or inline")
+    target: Annotated[Target, fields.Scenario()] = key("target", "the target: a scenario's stem, or inline")
     prior: Prior = key("designation", "what is known when the track begins")
-    filters: Members[Filter] = key("filters", "the filters; all see the same ranges and bursts")
-    baseline: Baseline = key(
+    filters: fields.Members[Filter] = key("filters", "the filters; all see the same ranges and bursts")
+    baseline: fields.Baseline = key(
         "baseline", "filter against which gains are computed, or a list of several; default: the first", None
     )
     scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = key(
@@ -290,7 +267,7 @@ class Keys(Lasting):
         if burst.pulses is not None:
             return burst.pulses
         if burst.pulses_per_second is None:
-            raise NotRead("pulses")
+            raise fields.NotRead("pulses")
         return round(burst.pulses_per_second * self.radar.scan_period_s)
 
     @property
@@ -334,7 +311,7 @@ class Keys(Lasting):
 
     @cross_check
     def _enough_pulses(self) -> Iterator[At]:
-        yield from of_each(self.filters, self._determined)
+        yield from fields.of_each(self.filters, self._determined)
 
     def _determined(self, i: int, one: Filter) -> Iterator[At]:
         fewest = 2 + (one.derivatives if one.derivatives is not None else max(one.takes - 1, 0))
@@ -361,5 +338,5 @@ class Keys(Lasting):
         last = (self.plots - 1) * self.radar.scan_period_s
         if not math.isfinite(target.reach_m(last)) or target.reach_m(last) > 1e12:
             yield at("target", "must stay within 1e12 m of the radar up to the last scan")
-        elif isinstance(target, Turn) and target.closest_m(last) < NEAREST_M:
+        elif isinstance(target, fields.Turn) and target.closest_m(last) < NEAREST_M:
             yield at("target", f"must not fly over the radar: it comes within {short(NEAREST_M)} m of it")

@@ -7,36 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from radarsim.config import fields
-from radarsim.config.fields import (
-    COEFFICIENTS,
-    HARDEST_MPS2,
-    MOST_SCANS,
-    AccelerationStart,
-    Added,
-    At,
-    Baseline,
-    Coefficients,
-    Design,
-    Display,
-    Lasting,
-    Members,
-    Model,
-    Name,
-    NonNegative,
-    Number,
-    Polynomial,
-    Positive,
-    Probability,
-    Scenario,
-    Starting,
-    Whole,
-    at,
-    cross_check,
-    key,
-    of_each,
-    polynomial_reach_m,
-    readable,
-)
+from radarsim.config.fields import MOST_SCANS, Added, At, Model, NonNegative, Number, Positive, at, cross_check, key
 
 FOLDED = "study=ambiguous_doppler"  # takes the same config over
 PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
@@ -51,7 +22,7 @@ class Radar(fields.Radar):
         1000.0,
         symbol="F_r",
     )
-    detection_probability: Annotated[Probability, Field(gt=0), Added()] = key(
+    detection_probability: Annotated[fields.Probability, Field(gt=0), Added()] = key(
         "detection probability",
         "probability that a scan gives its plot, range and velocity together",
         1.0,
@@ -81,19 +52,19 @@ class Radar(fields.Radar):
         return self.detection_probability == 1 and not any(errors)
 
 
-class JerkPulse(Starting):
+class JerkPulse(fields.Starting):
     """A polynomial with a jerk for a while; the acceleration it has built up stays."""
 
     kind: Literal["jerk_pulse"] = key("kind", "a constant jerk for a while")
-    coefficients: Coefficients = key("derivatives of the range at the first plot", COEFFICIENTS)
-    jerk_mps3: Annotated[Number, Field(ge=-HARDEST_MPS2, le=HARDEST_MPS2)] = key(
+    coefficients: fields.Coefficients = key("derivatives of the range at the first plot", fields.COEFFICIENTS)
+    jerk_mps3: Annotated[Number, Field(ge=-fields.HARDEST_MPS2, le=fields.HARDEST_MPS2)] = key(
         "jerk", "radial jerk added during the pulse, m/s³"
     )
     duration_s: Positive = key("duration", "length of the pulse, s")
 
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
-        return polynomial_reach_m(self.coefficients, t) + abs(self.jerk_mps3) * t**3 / 6
+        return fields.polynomial_reach_m(self.coefficients, t) + abs(self.jerk_mps3) * t**3 / 6
 
 
 Displaced = Annotated[NonNegative, Added()]
@@ -126,7 +97,9 @@ class Recorded(Flying, fields.Recorded):
     """A flight recorded in a file, smoothed by a spline whose derivatives are the true velocity and acceleration."""
 
 
-Target = Annotated[Polynomial | AccelerationStart | JerkPulse | Turn | FlyBy | Recorded, Field(discriminator="kind")]
+Target = Annotated[
+    fields.Polynomial | fields.AccelerationStart | JerkPulse | Turn | FlyBy | Recorded, Field(discriminator="kind")
+]
 Noise = Literal["random_jerk", "white_jerk", "white_acceleration"]
 
 
@@ -137,18 +110,18 @@ class Best(Model):
     over: Literal["worst", "mean", "last"] = key(
         "taken over scans as", "value over the scans from from_k on: the greatest, their mean, or the last"
     )
-    from_k: Annotated[int, Whole(1, MOST_SCANS)] = key("first scan that counts", "first scan that counts", 3)
+    from_k: Annotated[int, fields.Whole(1, MOST_SCANS)] = key("first scan that counts", "first scan that counts", 3)
 
 
 class FilterKeys(Model):
     """What every filter has, those of packages too: what it observes, and a start by least squares."""
 
-    name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
+    name: Annotated[fields.Name, fields.Display()] = key("name", "label; every filter has its own")
     kind: str = key("kind", "which filter it is")
     observes: tuple[Literal["range", "velocity"], ...] = key(
         "observed quantities", "measurements that it uses: [range] or [range, velocity]"
     )
-    initial_scans: Annotated[int, Whole(2, MOST_SCANS)] | None = key(
+    initial_scans: Annotated[int, fields.Whole(2, MOST_SCANS)] | None = key(
         "plots in the initialisation",
         "plots in its least-squares start; default and least: 3 for range, 2 with velocity",
         None,
@@ -196,7 +169,7 @@ def variance_of(one: FilterKeys) -> float | Best:
     return getattr(one, "manoeuvre_variance", math.nan)
 
 
-class Keys(Lasting):
+class Keys(fields.Lasting):
     """Range alone against range and radial velocity."""
 
     figure_names = (
@@ -206,15 +179,15 @@ class Keys(Lasting):
     )
 
     radar: Radar = key("radar", "the radar")
-    target: Annotated[Target, Scenario()] = key("target", "the target: a scenario's stem, or inline")
-    filters: Members[Filter] = key("filters", "the filters; all see the same plots")
-    baseline: Baseline = key(
+    target: Annotated[Target, fields.Scenario()] = key("target", "the target: a scenario's stem, or inline")
+    filters: fields.Members[Filter] = key("filters", "the filters; all see the same plots")
+    baseline: fields.Baseline = key(
         "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
     )
-    scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = key(
+    scans: Annotated[Annotated[int, fields.Whole(2, MOST_SCANS)] | None, fields.Design()] = key(
         "number of scans", "number of scans; or give duration_s", None
     )
-    duration_s: Annotated[Positive | None, Design(), Added()] = key(
+    duration_s: Annotated[Positive | None, fields.Design(), Added()] = key(
         "duration", "time from the first scan to the last, s, in place of scans: to the last scan within it", None
     )
 
@@ -224,13 +197,13 @@ class Keys(Lasting):
 
     @cross_check
     def _long_enough(self) -> Iterator[At]:
-        starts = readable(self.filters, lambda one: (one.plots_to_start, one.name))
+        starts = fields.readable(self.filters, lambda one: (one.plots_to_start, one.name))
         plots, slowest = max(starts, key=lambda start: start[0], default=(0, ""))
         if self.plots < plots:
             which = "scans" if self.duration_s is None else "duration_s"
             many = "" if which == "scans" else " scans of radar.scan_period_s"
             yield at(which, f"must be >= {plots}{many} for the initialisation of filter {slowest}")
-        yield from of_each(self.filters, self._counts_from)
+        yield from fields.of_each(self.filters, self._counts_from)
 
     def _counts_from(self, i: int, one: FilterKeys) -> Iterator[At]:
         best = variance_of(one)
@@ -243,7 +216,7 @@ class Keys(Lasting):
 
     @cross_check
     def _of_every_plot(self) -> Iterator[At]:
-        yield from of_each(self.filters, self._sees_every_plot)
+        yield from fields.of_each(self.filters, self._sees_every_plot)
 
     def _sees_every_plot(self, i: int, one: FilterKeys) -> Iterator[At]:
         if not isinstance(one, Filter) and self.radar.detection_probability < 1:
@@ -265,7 +238,7 @@ class Keys(Lasting):
     def _variances_in_proportion(self) -> Iterator[At]:
         """The same of manoeuvre variances."""
         if not any(True for _ in self._accuracies_in_proportion()):  # else that is the fault
-            yield from of_each(self.filters, self._in_proportion)
+            yield from fields.of_each(self.filters, self._in_proportion)
 
     def _in_proportion(self, i: int, one: FilterKeys) -> Iterator[At]:
         variance = variance_of(one)

@@ -16,16 +16,8 @@ from radarsim.kernels.algebra import pack, unpack
 from radarsim.kernels.hypotheses import lasting, log_likelihood
 from radarsim.physics import transition
 from radarsim.studies.interface import EXPLANATIONS, Draw, Drawn, RecordedPlots, Turning, usual_interval_s
-from radarsim.studies.range_doppler.config import (
-    FOLDED,
-    MOST_SCANS,
-    Filter,
-    FilterKeys,
-    Keys,
-    Turn,
-    can_fold,
-    variance_of,
-)
+from radarsim.studies.range_doppler import config
+from radarsim.studies.range_doppler.config import FOLDED, MOST_SCANS, Filter, FilterKeys, Keys, Turn, can_fold
 from radarsim.studies.range_doppler.filters import least_squares, noise_by_time, observation
 from radarsim.studies.range_doppler.given import GivenGains, Scans, followed
 from radarsim.studies.range_doppler.kernels import missed, rows
@@ -66,7 +58,7 @@ def drawing(case: Case) -> Draw:
 def variances_of(case: Case) -> Sequence[float]:
     """D_M of each filter, (m/s³)²: as given, or the best on the config's target."""
     spec: Keys = case.spec
-    stated = [variance for variance in map(variance_of, spec.filters) if isinstance(variance, float)]
+    stated = [variance for variance in map(config.variance_of, spec.filters) if isinstance(variance, float)]
     return stated if len(stated) == len(spec.filters) else designed(case).variances
 
 

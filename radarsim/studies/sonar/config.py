@@ -10,31 +10,8 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
-from radarsim.config.fields import (
-    PLAIN_SHARE,
-    Added,
-    At,
-    Baseline,
-    Correlation,
-    Design,
-    Display,
-    Members,
-    Model,
-    Name,
-    NonNegative,
-    Number,
-    Positive,
-    Probability,
-    Scenario,
-    Study,
-    Whole,
-    at,
-    cross_check,
-    key,
-    of_each,
-    readable,
-    unique_names,
-)
+from radarsim.config import fields
+from radarsim.config.fields import At, Design, Model, Name, NonNegative, Number, Positive, Whole, at, cross_check, key
 
 MOST_SCANS = 100_000
 MOST_FALSE = 1e7  # in a scan of the whole sector
@@ -48,7 +25,7 @@ FIGURES = (
 )
 AngleSigma = Annotated[Positive, Field(le=0.5)]  # rad: beyond about 30 degrees the error of an angle is not Gaussian
 Derivatives = Annotated[tuple[Number, ...], Field(min_length=1, max_length=12)]
-Rate = Annotated[Probability, Field(gt=0, lt=1)]
+Rate = Annotated[fields.Probability, Field(gt=0, lt=1)]
 Rates = Annotated[tuple[Rate, ...], Field(min_length=1, max_length=32)]
 Thresholds = Annotated[tuple[Positive, ...], Field(min_length=1, max_length=32)]
 WindowPlots = Annotated[int, Whole(3, 100)]
@@ -58,9 +35,9 @@ TestPeriod = Annotated[int, Whole(1, 1000)]
 class Correlations(Model):
     """A correlation for each coordinate; zero where none is given."""
 
-    range: Correlation = key("correlation of errors in range", "correlation of the errors in range", 0.0)
-    bearing: Correlation = key("correlation of errors in bearing", "correlation of the errors in bearing", 0.0)
-    third: Correlation = key(
+    range: fields.Correlation = key("correlation of errors in range", "correlation of the errors in range", 0.0)
+    bearing: fields.Correlation = key("correlation of errors in bearing", "correlation of the errors in bearing", 0.0)
+    third: fields.Correlation = key(
         "correlation of errors in depth or elevation", "correlation of the errors in depth or elevation", 0.0
     )
 
@@ -110,7 +87,7 @@ class Sector(Model):
 class Sensor(Model):
     """A sonar: accuracy of its plots, scan period, how plots are missed, and false ones."""
 
-    name: Annotated[Name | None, Display()] = key("name", "display name", None)
+    name: Annotated[Name | None, fields.Display()] = key("name", "display name", None)
     sigma_range_m: Positive = key("σ of the measured range", "standard deviation of a measured range, m", symbol="σ_r")
     sigma_bearing_rad: AngleSigma = key(
         "σ of the measured bearing", "standard deviation of a measured bearing, rad", symbol="σ_β"
@@ -125,13 +102,13 @@ class Sensor(Model):
         symbol="σ_ε",
     )
     scan_period_s: Positive = key("scan period", "time between two plots, s: T0 of the paper", symbol="Δt")
-    error_correlation: Correlation | Correlations = key(
+    error_correlation: fields.Correlation | Correlations = key(
         "correlation of neighbouring errors",
         "correlation ρ of the errors of neighbouring plots, eq. (15); one number, or by coordinate",
         0.0,
         symbol="ρ",
     )
-    detection_probability: Annotated[Probability, Field(gt=0)] = key(
+    detection_probability: Annotated[fields.Probability, Field(gt=0)] = key(
         "detection probability",
         "probability that a scan gives a plot; the first scan always does, except for filters with an association",
         1.0,
@@ -337,7 +314,7 @@ class OwnDetector(Model):
 class Detector(Model):
     """A manoeuvre detector that is measured at one or several thresholds."""
 
-    name: Annotated[Name, Display()] = key("name", "label; must differ from those of the other detectors")
+    name: Annotated[Name, fields.Display()] = key("name", "label; must differ from those of the other detectors")
     plots: WindowPlots = key("plots of the parabola", "plots n of the parabola")
     threshold_k: Thresholds | None = key(
         "threshold",
@@ -395,7 +372,7 @@ TRACKER = {"association": ("nearest", "pda", "known")}
 class Filter(Model):
     """A filter that processes each coordinate separately."""
 
-    name: Annotated[Name, Display()] = key("name", "label; must differ from those of the other filters")
+    name: Annotated[Name, fields.Display()] = key("name", "label; must differ from those of the other filters")
     kind: Literal[
         "growing_memory", "window", "kalman", "fixed_gain", "kalman_augmented", "kalman_differenced", "adaptive", "imm"
     ] = key(
@@ -421,7 +398,7 @@ class Filter(Model):
         unit="",
         only={"kind": MODELLED},
     )
-    error_correlation: Correlation | Correlations | None = key(
+    error_correlation: fields.Correlation | Correlations | None = key(
         "correlation of neighbouring errors",
         "correlation that the filter assumes; default: that of the sonar",
         None,
@@ -434,7 +411,7 @@ class Filter(Model):
         "as a reference",
         None,
     )
-    gate_probability: Annotated[Probability, Field(gt=0)] | None = key(
+    gate_probability: Annotated[fields.Probability, Field(gt=0)] | None = key(
         "gate probability",
         "probability that the gate contains the target's plot; 1: an open gate; default 0.99",
         0.99,
@@ -540,9 +517,9 @@ class RareTracks(Model):
     def shares(self) -> tuple[float, float, float]:
         """Shares of the laws that false tracks are drawn from: as they are, so that they are confirmed, and held on."""
         laws = ("false_tracks", "long_false_tracks")
-        each = (1.0 - PLAIN_SHARE) / max(sum(event in self.events for event in laws), 1)
+        each = (1.0 - fields.PLAIN_SHARE) / max(sum(event in self.events for event in laws), 1)
         found, long = (each if event in self.events else 0.0 for event in laws)
-        return PLAIN_SHARE, found, long
+        return fields.PLAIN_SHARE, found, long
 
     @property
     def seeks_false_tracks(self) -> bool:
@@ -560,32 +537,32 @@ class RareTracks(Model):
             yield at("events", f"must differ: {self.events[0]} is there twice")
 
 
-class Keys(Study):
+class Keys(fields.Study):
     """Sonar plots smoothed and extrapolated."""
 
     figure_names = FIGURES
 
     sensor: Sensor = key("sensor", "the sonar")
-    target: Annotated[Target, Scenario()] = key("target", "the target: the stem of a scenario, or inline")
+    target: Annotated[Target, fields.Scenario()] = key("target", "the target: the stem of a scenario, or inline")
     frame: Annotated[Literal["polar", "cartesian", "cartesian_unbiased"], Design()] = key(
         "frame of coordinates",
         "coordinates of the filters; plots are converted to x, y plainly, or without bias",
         "polar",
     )
-    filters: Members[Filter] = key("filters", "the filters; all of them process the same plots")
-    baseline: Baseline = key(
+    filters: fields.Members[Filter] = key("filters", "the filters; all of them process the same plots")
+    baseline: fields.Baseline = key(
         "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
     )
     scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = key("number of scans", "number of scans of the first sonar")
-    detectors: Annotated[tuple[Detector, ...], Field(max_length=8), AfterValidator(unique_names), Design()] = key(
-        "detectors", "manoeuvre detectors that are evaluated on the plots", ()
+    detectors: Annotated[tuple[Detector, ...], Field(max_length=8), AfterValidator(fields.unique_names), Design()] = (
+        key("detectors", "manoeuvre detectors that are evaluated on the plots", ())
     )
     uses: Annotated[Uses | None, Design()] = key(
         "uses of the track",
         "course, speed, predicted position and closest approach, with their σ; none: left out",
         None,
     )
-    rare: Annotated[RareTracks | None, Design(), Added()] = key(
+    rare: Annotated[RareTracks | None, Design(), fields.Added()] = key(
         "rare events",
         "importance sampling of false tracks, for trackers that hardly have any, and of the target's track, for "
         "those that hardly lose it: rare.csv",
@@ -611,7 +588,7 @@ class Keys(Study):
 
     @cross_check
     def _long_enough(self) -> Iterator[At]:
-        most = max(readable(self.filters, lambda member: member.degree), default=0) + 1
+        most = max(fields.readable(self.filters, lambda member: member.degree), default=0) + 1
         if self.scans < most:
             yield at("scans", f"must be >= {most} for a filter of degree {most - 1}")
 
@@ -649,7 +626,7 @@ class Keys(Study):
                 yield at(f"filters.{i}.kind", f"{member.kind} works only in the polar frame")
 
         if self.frame != "polar":
-            yield from of_each(self.filters, check)
+            yield from fields.of_each(self.filters, check)
 
     @cross_check
     def _rare_fits(self) -> Iterator[At]:
@@ -707,8 +684,8 @@ class Keys(Study):
             if detector.plots > self.scans:
                 yield at(f"detectors.{i}.plots", f"must be <= {self.scans}, the number of scans")
 
-        yield from of_each(self.detectors, check)
-        if self.scans * sum(readable(self.detectors, lambda detector: len(detector.levels()))) > MOST_TESTED:
+        yield from fields.of_each(self.detectors, check)
+        if self.scans * sum(fields.readable(self.detectors, lambda detector: len(detector.levels()))) > MOST_TESTED:
             yield at("detectors", f"must have at most {MOST_TESTED // self.scans} thresholds for {self.scans} scans")
 
     @cross_check
@@ -727,7 +704,7 @@ class Keys(Study):
             if member.detector is not None and member.detector.plots > self.scans:
                 yield at(f"filters.{i}.detector.plots", f"must be <= {self.scans}, the number of scans")
 
-        yield from of_each(self.filters, check)
+        yield from fields.of_each(self.filters, check)
 
     @cross_check
     def _manoeuvres_of_one_sonar(self) -> Iterator[At]:

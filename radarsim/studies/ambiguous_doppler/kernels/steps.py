@@ -25,28 +25,11 @@ leaves possible, and drops what is too far below the best or beyond the number t
 
 import math
 
+from radarsim.kernels import lanes
 from radarsim.kernels.algebra import add_outer, add_scaled, predicted, predicted_covariance, take_rate, take_value
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.hypotheses import FALL, FARTHEST, INNOVATION, NEAR, NOTHING, branched, column, greatest
-from radarsim.kernels.lanes import (
-    WIDTH,
-    address,
-    any_greater,
-    choose3,
-    exponential,
-    full,
-    get,
-    get3,
-    lane3,
-    nearest,
-    put,
-    put3,
-    put_lane3,
-    root,
-    row,
-    total,
-    where_greater,
-)
+from radarsim.kernels.lanes import WIDTH, address, exponential, full, get, nearest, put, put3, row, total, where_greater
 from radarsim.kernels.random import fill_normal_strip, fill_uniform_pairs
 from radarsim.studies.ambiguous_doppler.kernels import records as rec
 
@@ -65,7 +48,7 @@ def range_taken(P, first, taken, variance):
     it."""
     zero = full(0.0)
     P, gain, S = take_value(P, variance, taken)
-    of_range = choose3(first, zero, (full(variance), zero, zero), (P[0], P[1], P[2]))
+    of_range = lanes.choose3(first, zero, (full(variance), zero, zero), (P[0], P[1], P[2]))
     return (*of_range, P[3], P[4], P[5]), gain, 0.5 * taken / S
 
 
@@ -99,7 +82,7 @@ def fill_gains(design, sigma, scans, plots, gains):
 def with_range(x, plot, scan):
     """A state after a plot's range; the track's first sets it."""
     z = get(plot, rec.RANGE)
-    x = add_scaled(x, z - x[0], get3(scan, rec.RANGE_GAIN))
+    x = add_scaled(x, z - x[0], lanes.get3(scan, rec.RANGE_GAIN))
     return where_greater(get(plot, rec.FIRST), full(0.0), z, x[0]), x[1], x[2]
 
 
@@ -143,7 +126,7 @@ def run_single(kind, design, spans, plots, gains, out):
                 z = get(plot, rec.VELOCITY)
                 u = z + D * nearest((x[1] - z) / D)
                 right = whether_right(right, plot, u, D)
-            x = add_scaled(x, u - x[1], get3(scan, rec.VELOCITY_GAIN))
+            x = add_scaled(x, u - x[1], lanes.get3(scan, rec.VELOCITY_GAIN))
         put_single(row(out, k * rec.OUTPUT), x, right)
 
 
@@ -154,9 +137,9 @@ def folds_merged(e, S, D):
     And the sum of the weights over that of e.
     """
     total, mean, square = full(1.0), e, e * e
-    limit, scale = root(S * FARTHEST), -0.5 / S
+    limit, scale = lanes.root(S * FARTHEST), -0.5 / S
     n = 1.0
-    while any_greater(limit + 0.5 * D, full(n * D)):
+    while lanes.any_greater(limit + 0.5 * D, full(n * D)):
         for sign in (-1.0, 1.0):
             f = e + sign * n * D
             weight = exponential(scale * (f * f - e * e))
@@ -279,7 +262,7 @@ def moved_and_weighed(lists, which, count, F, z, scan):
     """Move `count` hypotheses over a scan and take the range z: columns in place; scan: this lane of the gains."""
     r, v, a, w = column(lists, which, 0), column(lists, which, 1), column(lists, which, 2), column(lists, which, 3)
     weight = scan[rec.WEIGHT * WIDTH]
-    gain = lane3(scan, rec.RANGE_GAIN)
+    gain = lanes.lane3(scan, rec.RANGE_GAIN)
     for i in range((count + WIDTH - 1) // WIDTH):
         x = predicted((get(r, i), get(v, i), get(a, i)), F)
         e = z - x[0]
@@ -315,7 +298,7 @@ def inherited(lists, which, count, best, scan):
     to_r, to_v, to_a = column(lists, 1 - which, 0), column(lists, 1 - which, 1), column(lists, 1 - which, 2)
     to_w = column(lists, 1 - which, 3)
     weights, found, parents = lists.children, row(lists.children, lists.most // WIDTH), lists.parents
-    gain = lane3(scan, rec.VELOCITY_GAIN)
+    gain = lanes.lane3(scan, rec.VELOCITY_GAIN)
     first, top = 0, NOTHING
     for i in range(count):
         j, f = parents[i], found[i]
@@ -340,8 +323,8 @@ def put_estimates(lists, which, count, best, right, to):
         all_, mean_r = all_ + weight, mean_r + weight * get(r, i)
         mean_v, mean_a = mean_v + weight * get(v, i), mean_a + weight * get(a, i)
     sum_ = total(all_)
-    put_lane3(to, rec.MEAN, (total(mean_r) / sum_, total(mean_v) / sum_, total(mean_a) / sum_))
-    put_lane3(to, rec.BEST, (r[best], v[best], a[best]))
+    lanes.put_lane3(to, rec.MEAN, (total(mean_r) / sum_, total(mean_v) / sum_, total(mean_a) / sum_))
+    lanes.put_lane3(to, rec.BEST, (r[best], v[best], a[best]))
     to[rec.RIGHT * WIDTH] = 1.0 if best == right else 0.0
     to[rec.LISTED * WIDTH] = 1.0 if right >= 0 else 0.0
     to[rec.COUNT * WIDTH] = count

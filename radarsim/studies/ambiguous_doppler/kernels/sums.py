@@ -19,22 +19,10 @@ from radarsim.kernels.hypotheses import Lists
 from radarsim.kernels.lanes import WIDTH, address, exponential, full, get, put, row, rows, total, where_greater
 from radarsim.kernels.random import add_drawn, add_weight, part_of
 from radarsim.studies.ambiguous_doppler.kernels import records as rec
+from radarsim.studies.ambiguous_doppler.kernels import steps, together
 from radarsim.studies.ambiguous_doppler.kernels.records import Banks, Sums, World, memory
-from radarsim.studies.ambiguous_doppler.kernels.steps import (
-    fill_gains,
-    fill_normals,
-    put_plots,
-    run_merged,
-    run_remembering,
-    run_single,
-)
-from radarsim.studies.ambiguous_doppler.kernels.together import (
-    Orders,
-    run_choosing,
-    run_interacting,
-    run_together,
-    run_weighing,
-)
+from radarsim.studies.ambiguous_doppler.kernels.steps import fill_gains, fill_normals, put_plots, run_merged, run_single
+from radarsim.studies.ambiguous_doppler.kernels.together import Orders, run_choosing, run_interacting, run_together
 
 
 # ---- sums ------------------------------------------------------------------------------------------------------------
@@ -58,7 +46,7 @@ def run_filters(world, banks, memory, fresh):
         outputs = address(memory.out)
         out = row(outputs, b * scans * rec.OUTPUT)
         if kind == rec.WEIGHS:
-            run_weighing(outputs, bank, banks.reads[b], shares, scans, out)
+            together.run_weighing(outputs, bank, banks.reads[b], shares, scans, out)
         elif kind == rec.CHOOSES:
             run_choosing(outputs, bank, banks.reads[b], shares, scans, out)
         elif kind == rec.INTERACTS:
@@ -75,7 +63,7 @@ def run_filters(world, banks, memory, fresh):
                 run_together(bank, limits, sigma, world.spans, address(memory.plots[lane:]), own, room)
         elif kind == rec.REMEMBERS:
             for lane in range(WIDTH):
-                run_remembering(
+                steps.run_remembering(
                     address(banks.designs[part]),
                     banks.most[b],
                     banks.deepest[b],

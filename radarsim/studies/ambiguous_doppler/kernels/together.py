@@ -23,26 +23,11 @@ covariances depend on the data, so that each hypothesis has its own; lanes are e
 import math
 from typing import Any, NamedTuple
 
+from radarsim.kernels import lanes
 from radarsim.kernels.algebra import add_outer, add_scaled, add_spread, predicted, predicted_covariance, take_rate
 from radarsim.kernels.compile import part
 from radarsim.kernels.hypotheses import FARTHEST, column, keep_greatest
-from radarsim.kernels.lanes import (
-    WIDTH,
-    exponential,
-    full,
-    get,
-    get3,
-    get6,
-    nearest,
-    put,
-    put3,
-    put6,
-    put_lane3,
-    root,
-    row,
-    total,
-    where_greater,
-)
+from radarsim.kernels.lanes import WIDTH, full, get, get3, nearest, put, put3, put6, root, row, total, where_greater
 from radarsim.studies.ambiguous_doppler.kernels import records as rec
 from radarsim.studies.ambiguous_doppler.kernels.steps import (
     folds_merged,
@@ -88,7 +73,7 @@ def mixed(old, new, size, stay):
         for j in range(size):
             p, other = stay if i == j else (1.0 - stay) / (size - 1), row(old, j * ROWS)
             apart = add_scaled(get3(other, STATE), -1.0, x)
-            P = add_spread(P, p * get(other, PROBABILITY) / c, get6(other, COVARIANCE), apart)
+            P = add_spread(P, p * get(other, PROBABILITY) / c, lanes.get6(other, COVARIANCE), apart)
         put3(own, STATE, x)
         put6(own, COVARIANCE, P)
 
@@ -101,7 +86,7 @@ def taken(own, design, sigma, plot, D, unfolding, moves):
     """
     F, Q = motion(design)
     zero, one = full(0.0), full(1.0)
-    x, P = get3(own, STATE), get6(own, COVARIANCE)
+    x, P = get3(own, STATE), lanes.get6(own, COVARIANCE)
     detected, first = get(plot, rec.DETECTED), get(plot, rec.FIRST)
     if moves:
         x, P = predicted(x, F), predicted_covariance(P, F, Q)
@@ -142,7 +127,7 @@ def weighed(new, size):
         least = where_greater(least, distance, distance, least)
     for i in range(size):
         own = row(new, i * ROWS)
-        mu = get(own, BEFORE) * get(own, PROBABILITY) * exponential(0.5 * (least - get(own, DISTANCE)))
+        mu = get(own, BEFORE) * get(own, PROBABILITY) * lanes.exponential(0.5 * (least - get(own, DISTANCE)))
         put(own, PROBABILITY, mu)
         total = total + mu
     for i in range(size):
@@ -303,7 +288,7 @@ def ranged(bank, sigma, plot, moves, groups, states, lists):
     nearest_of_all = extreme(column(lists, 0, 2), False)
     for g in range(groups):
         off = nearest_of_all - get(distances, g)
-        put(weights, g, get(weights, g) * exponential(0.5 * where_greater(zero, off, off, zero)))
+        put(weights, g, get(weights, g) * lanes.exponential(0.5 * where_greater(zero, off, off, zero)))
 
 
 @part
@@ -334,7 +319,7 @@ def nearest_branch(size, variance, z, D, groups, new, lists):
             e = e - D * nearest(e / D)
             off = 0.5 * (of_all - e * e / S)
             off = where_greater(zero, off, off, zero)
-            p = get(weights, g) * get(own, PROBABILITY) * exponential(off) / root(S)
+            p = get(weights, g) * get(own, PROBABILITY) * lanes.exponential(off) / root(S)
             top = where_greater(p, top, p, top)
     put(at, 0, top)
     return of_all, extreme(at, True)
@@ -385,7 +370,7 @@ def branched(size, velocity, limits, count, new, plot, lists):
                 v, S = order[(STATE + 1) * WIDTH + lane], order[(COVARIANCE + 3) * WIDTH + lane] + variance
                 c, e = weights[h] * order[PROBABILITY * WIDTH + lane] / math.sqrt(S), u - v
                 off = 0.5 * least - (0.5 / S) * (e * e)
-                p = p + c * exponential(where_greater(full(200.0), off, off, full(200.0)))
+                p = p + c * lanes.exponential(where_greater(full(200.0), off, off, full(200.0)))
             put(at_p, 0, p)
             put(at_u, 0, u)
             for i in range(WIDTH):
@@ -437,7 +422,7 @@ def inherited(size, variance, count, top, new, old, lists):
         for i in range(size):
             order = row(own, i * ROWS)
             x, e = get3(order, STATE), u - get(order, STATE + 1)
-            P, gain, S = take_rate(get6(order, COVARIANCE), variance, 1.0)
+            P, gain, S = take_rate(lanes.get6(order, COVARIANCE), variance, 1.0)
             put3(order, STATE, add_scaled(x, e, gain))
             put6(order, COVARIANCE, P)
             put(order, BEFORE, get(order, PROBABILITY))
@@ -467,9 +452,9 @@ def put_estimates(size, orders, count, right, states, lists, to):
                 of_orders[2] + (share if orders[i] == 2 else zero),
             )
     whole = total(sum_)
-    put_lane3(to, rec.MEAN, (total(x[0]) / whole, total(x[1]) / whole, total(x[2]) / whole))
+    lanes.put_lane3(to, rec.MEAN, (total(x[0]) / whole, total(x[1]) / whole, total(x[2]) / whole))
     shares = total(of_orders[0]) / whole, total(of_orders[1]) / whole, total(of_orders[2]) / whole
-    put_lane3(to, rec.WEIGHTS, shares)
+    lanes.put_lane3(to, rec.WEIGHTS, shares)
     for c in range(3):
         y = 0.0
         for i in range(size):

@@ -38,34 +38,10 @@ the banks before and after the plot.
 
 import numpy as np
 
-from radarsim.kernels.algebra import (
-    add_spread,
-    dot,
-    factored,
-    predicted,
-    predicted_covariance,
-    predicted_cross,
-    scaled,
-    shrunk_cross,
-    shrunk_own,
-    whitened,
-)
+from radarsim.kernels import algebra, lanes
+from radarsim.kernels.algebra import dot, predicted, predicted_covariance, predicted_cross, scaled, shrunk_own, whitened
 from radarsim.kernels.compile import inline, part
-from radarsim.kernels.lanes import (
-    any_greater,
-    exponential,
-    full,
-    get,
-    get3,
-    get6,
-    put,
-    put3,
-    put6,
-    root,
-    row,
-    rows,
-    where_greater,
-)
+from radarsim.kernels.lanes import any_greater, exponential, full, get, get3, get6, put, put6, row, rows, where_greater
 from radarsim.studies.multimodel.kernels import records as rec
 
 
@@ -81,7 +57,7 @@ def work_arrays() -> tuple[np.ndarray, np.ndarray]:
 def put9(pointer, first, x):
     """Write nine neighbours, from number `first` on."""
     put6(pointer, first, (x[0], x[1], x[2], x[3], x[4], x[5]))
-    put3(pointer, first + 6, (x[6], x[7], x[8]))
+    lanes.put3(pointer, first + 6, (x[6], x[7], x[8]))
 
 
 # ---- merging: eq. (4) with the shares of any rule --------
@@ -112,7 +88,7 @@ def mixed_own(listed, count, shares, block, means, mean):
         return get6(block, listed[0])
     p = full(0.0), full(0.0), full(0.0), full(0.0), full(0.0), full(0.0)
     for n in range(count):
-        p = add_spread(p, get(shares, n), get6(block, listed[n]), offset(means, listed[n], mean))
+        p = algebra.add_spread(p, get(shares, n), get6(block, listed[n]), offset(means, listed[n], mean))
     return p
 
 
@@ -220,7 +196,7 @@ def predict_and_update(work, mixture, F, Q, target, result, plot, noise):
 
     R = get6(noise, 0)
     S = xx[0] + R[0], xy[0] + R[1], xz[0] + R[2], yy[0] + R[3], yz[0] + R[4], zz[0] + R[5]
-    L, i, determinant = factored(S)  # i: the diagonal of D⁻¹
+    L, i, determinant = algebra.factored(S)  # i: the diagonal of D⁻¹
     detected = get(plot, rec.DETECTED)
     i = i[0] * detected, i[1] * detected, i[2] * detected
     v = whitened(
@@ -244,7 +220,7 @@ def predict_and_update(work, mixture, F, Q, target, result, plot, noise):
             (z[0] + dot(gz[0], v), z[1] + dot(gz[1], v), z[2] + dot(gz[2], v)),
         ),
         (shrunk_own(xx, gx, wx), shrunk_own(yy, gy, wy), shrunk_own(zz, gz, wz)),
-        (shrunk_cross(xy, gx, wy), shrunk_cross(xz, gx, wz), shrunk_cross(yz, gy, wz)),
+        (algebra.shrunk_cross(xy, gx, wy), algebra.shrunk_cross(xz, gx, wz), algebra.shrunk_cross(yz, gy, wz)),
     )
 
 
@@ -346,7 +322,7 @@ def likelihood(work, least, result):
     every hypothesis.
     """
     x, most = 0.5 * (least - get(work, result)), full(200.0)
-    return exponential(minimum(x, most)) / root(get(work, result + 1))
+    return exponential(minimum(x, most)) / lanes.root(get(work, result + 1))
 
 
 @part

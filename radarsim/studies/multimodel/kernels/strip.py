@@ -50,24 +50,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.kernels import lanes
 from radarsim.kernels.algebra import dot, factored, scaled, whitened
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.hypotheses import FACTOR
-from radarsim.kernels.lanes import (
-    WIDTH,
-    address,
-    any_greater,
-    full,
-    get,
-    get3,
-    put,
-    put3,
-    root,
-    row,
-    rows,
-    total,
-    where_greater,
-)
+from radarsim.kernels.lanes import WIDTH, address, full, get, get3, put, put3, root, row, rows, total, where_greater
 from radarsim.kernels.random import U, fill_normal_strip, sine_cosine_polynomial, threefry, uniform
 from radarsim.studies.multimodel.kernels import records as rec
 from radarsim.studies.multimodel.kernels.hypothesis import merge, merge_gpb1, mixed_mean, shares_by_rule, step
@@ -417,7 +404,7 @@ def run_strip(work, numbers, listed, rules, models, transitions, scans, plots, f
             for i in range(rec.STATES):
                 x = get(to, rec.ESTIMATED + i)
                 put(work, rec.ESTIMATE + i, where_greater(detected, full(0.5), x, get(work, rec.ESTIMATE + i)))
-        if any_greater(full(0.5), detected):
+        if lanes.any_greater(full(0.5), detected):
             keep_missed(work, old, new, rules.size, detected)
             numbers[rec.SETTLED] = 0
         elif numbers[rec.SETTLED] == 0:

@@ -30,16 +30,8 @@ from radarsim.bursts.kernels.lanes import LIVE, PASSES, PRIOR, X, lane, merge, s
 from radarsim.bursts.kernels.lanes import ROWS as WORK
 from radarsim.bursts.kernels.scoring import SIZE
 from radarsim.bursts.kernels.strip import evaluate, put_drawn, take_window
-from radarsim.kernels.algebra import (
-    NO_NOISE,
-    add_scaled,
-    add_spread,
-    predicted,
-    predicted_covariance,
-    take_rate,
-    take_second_rate,
-    take_value,
-)
+from radarsim.kernels import algebra
+from radarsim.kernels.algebra import NO_NOISE, add_scaled, add_spread, take_rate, take_second_rate, take_value
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.hypotheses import FALL, INNOVATION, NEAR, NOTHING, Lists, branched, column, keep_greatest
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, rows, where_greater
@@ -140,7 +132,8 @@ def a_scan_later(world, own, k, x, P):
     """State and covariance a scan later, at scan k."""
     Q = own.noise
     q = (Q[0], Q[1], Q[2], Q[3], Q[4], Q[5]) if k >= own.start else NO_NOISE
-    return add_scaled(predicted(x, world.motion), 1.0, world.missed[k]), predicted_covariance(P, world.motion, q)
+    x = add_scaled(algebra.predicted(x, world.motion), 1.0, world.missed[k])
+    return x, algebra.predicted_covariance(P, world.motion, q)
 
 
 @inline

@@ -11,23 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels import algebra
+from radarsim.kernels import algebra, lanes
 from radarsim.kernels.compile import aligned_zeros, inline, kernel, part
-from radarsim.kernels.lanes import (
-    WIDTH,
-    address,
-    full,
-    get,
-    get3,
-    get6,
-    put,
-    put3,
-    put6,
-    root,
-    row,
-    total,
-    where_greater,
-)
+from radarsim.kernels.lanes import WIDTH, address, full, get, get3, get6, put, put3, put6, root, row, where_greater
 
 # ---- merging ---------------------------------------------------------------------------------------------------------
 FURTHER = 3  # rows of a block after those of the errors
@@ -405,7 +391,7 @@ def note_started(rows, n, columns, world, found):
         m0, m1, m2 = m0 + w * M[0], m1 + w * M[3], m2 + w * M[5]
         v0, v1, v2 = v0 + w * P[0], v1 + w * P[3], v2 + w * P[5]
     for i, sum_of in enumerate((w0, q0, b0, b1, b2, m0, m1, m2, v0, v1, v2)):
-        found[i] += total(sum_of)
+        found[i] += lanes.total(sum_of)
     for g in range(len(world.others)):
         note_beside(rows, n, columns, world.others[g], found[OWN + g * BESIDE :])
 
@@ -426,7 +412,7 @@ def note_beside(rows, n, columns, other, found):
         s0, s1, s2 = s0 + w0, s1 + w1, s2 + w2
         m0, m1, m2 = m0 + w0 * M[0], m1 + w1 * M[3], m2 + w2 * M[5]
     for i, sum_of in enumerate((s0, s1, s2, m0, m1, m2)):
-        found[i] += total(sum_of)
+        found[i] += lanes.total(sum_of)
 
 
 @part

@@ -3,14 +3,8 @@
 Value and rate are measured independently, so a plot is taken in one number after the other, which needs no inverse.
 """
 
-from radarsim.kernels.algebra import (
-    add_scaled,
-    constant_acceleration,
-    predicted,
-    predicted_covariance,
-    take_rate,
-    take_value,
-)
+from radarsim.kernels import algebra
+from radarsim.kernels.algebra import add_scaled, constant_acceleration, predicted, predicted_covariance, take_rate
 from radarsim.kernels.compile import kernel
 from radarsim.kernels.formula import inline
 
@@ -44,7 +38,7 @@ def filter_rows(x, P, dt, z, detected, variance, noise, estimate, spread, nis):
         state, of = predicted(state, F), predicted_covariance(of, F, noise_over(noise, dt[k]))
         for m in range(2):
             if detected[k, m] > 0.0:
-                of, gain, S = take_value(of, variance[0], 1.0) if m == 0 else take_rate(of, variance[1], 1.0)
+                of, gain, S = algebra.take_value(of, variance[0], 1.0) if m == 0 else take_rate(of, variance[1], 1.0)
                 e = z[k, m] - (state[0] if m == 0 else state[1])
                 state, nis[k, m] = add_scaled(state, e, gain), e * e / S
         estimate[k, 0], estimate[k, 1], estimate[k, 2] = state

@@ -17,30 +17,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels import algebra
+from radarsim.kernels import algebra, lanes
 from radarsim.kernels.compile import aligned_zeros, inline, part
-from radarsim.kernels.lanes import (
-    WIDTH,
-    add_totals,
-    address,
-    any_greater,
-    choose3,
-    choose6,
-    full,
-    get,
-    get3,
-    get6,
-    put,
-    put3,
-    put6,
-    row,
-    where_greater,
-)
+from radarsim.kernels.lanes import add_totals, address, full, get, get3, get6, put, put3, put6, row, where_greater
 from radarsim.kernels.random import fill_normal_pairs
 
 # ---- chunk -----------------------------------------------------------------------------------------------------------
 CHUNK = 512  # realisations; a row is 4 KB; fewer, and the calls of its parts cost as much as their work
-EIGHTS = CHUNK // WIDTH
+EIGHTS = CHUNK // lanes.WIDTH
 
 
 class Work(NamedTuple):
@@ -149,7 +133,7 @@ def make_starts(at, f, k, start, weights, dt):
     all_run = True
     for i in range(EIGHTS):
         here, count = get(at.detected, i), get(at.count, i)
-        if any_greater(last, count - here):
+        if lanes.any_greater(last, count - here):
             all_run = False
             u = float(k) - get(at.first, i)
             of_plot = weights[0] * here, weights[1] * here
@@ -158,13 +142,13 @@ def make_starts(at, f, k, start, weights, dt):
             put6(normal, i, sums, EIGHTS)
             put3(right, i, y, EIGHTS)
             now = where_greater(count, last, one, none) * where_greater(last, count - here, one, none)
-            if any_greater(now, full(0.5)):
+            if lanes.any_greater(now, full(0.5)):
                 s0, s1, s2, s3, s4, s5 = sums
                 rest = 1.0 - now  # makes the matrices of the others regular
                 new, made = solved((s0 + rest, s1, s2, s3 + rest, s4, s5 + rest), y, u, dt)
                 half = full(0.5)
-                put3(x, i, choose3(now, half, new, get3(x, i, EIGHTS)), EIGHTS)
-                put6(p, i, choose6(now, half, made, get6(p, i, EIGHTS)), EIGHTS)
+                put3(x, i, lanes.choose3(now, half, new, get3(x, i, EIGHTS)), EIGHTS)
+                put6(p, i, lanes.choose6(now, half, made, get6(p, i, EIGHTS)), EIGHTS)
     return all_run
 
 

@@ -27,35 +27,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels import algebra
+from radarsim.kernels import algebra, lanes
 from radarsim.kernels.compile import inline, kernel, part
-from radarsim.kernels.lanes import (
-    address,
-    any_greater,
-    choose3,
-    choose6,
-    exponential,
-    full,
-    get,
-    get3,
-    get6,
-    put,
-    put3,
-    put6,
-    root,
-    total,
-    where_greater,
-)
-from radarsim.studies.sonar.kernels.steps import (
-    GROUPS,
-    get_information,
-    leading_inverse,
-    least_squares,
-    manoeuvre_covariance,
-    memory_of,
-    normal_equations,
-    put_information,
-)
+from radarsim.kernels.lanes import address, choose3, choose6, full, get, get6, put, put3, put6, total, where_greater
+from radarsim.studies.sonar.kernels import steps
+from radarsim.studies.sonar.kernels.steps import GROUPS, leading_inverse, least_squares, manoeuvre_covariance, memory_of
 
 # ---- detector --------------------------------------------------------------------------------------------------------
 UNTESTED = -1.0  # the statistic where there was no test: it exceeds no threshold
@@ -99,7 +75,7 @@ def parabola(recent, length, longest, i):
     Without the newest plot's value the sums lose no digits.
     """
     newest = get(recent, i)
-    Y, b = normal_equations(recent, length, longest, i, newest, 0.5)
+    Y, b = steps.normal_equations(recent, length, longest, i, newest, 0.5)
     return Y, b, newest
 
 
@@ -214,12 +190,12 @@ def adapt(filters, plots, f, c, rules, size, length, dt, period):
         Y = (Y[0] + w, Y[1], Y[2], Y[3], Y[4], Y[5])
         most_now, rank = where_greater(mode, half, raised, most), get(an, i) + detected
         P = leading_inverse(Y, where_greater(rank, most_now, most_now, rank))
-        x = algebra.predicted(get3(ax, i, GROUPS), F)
+        x = algebra.predicted(lanes.get3(ax, i, GROUPS), F)
         x = algebra.add_scaled(x, w * (get(az, i) - x[0]), (P[0], per * P[1], twice * P[2]))
         mode_now, quiet = next_mode(get(at, i), threshold, mode, get(am, QUIET * GROUPS + i), patience)
         kept = get(am, PLOTS * GROUPS + i) + detected
         restarted = (mode_now - mode) * (mode_now - mode) + (zero if raises else mode_now)
-        if any_greater(restarted, half):
+        if lanes.any_greater(restarted, half):
             Y_recent, b, newest = parabola(ar, length, longest, i)
             P_recent = leading_inverse(Y_recent, where_greater(mode_now, half, raised, most))
             r, v, a = algebra.times(P_recent, b)
@@ -297,7 +273,8 @@ def imm_step(first, second, mu, chain, tau, Q, z, w):
     x1, P1, nis1, S1 = filtered(x1, P1, tau, Q[0], z, w)
     x2, P2, nis2, S2 = filtered(x2, P2, tau, Q[1], z, w)
     least = where_greater(nis1, nis2, nis2, nis1)
-    c1, c2 = c1 * exponential(0.5 * (least - nis1)) / root(S1), c2 * exponential(0.5 * (least - nis2)) / root(S2)
+    c1 = c1 * lanes.exponential(0.5 * (least - nis1)) / lanes.root(S1)
+    c2 = c2 * lanes.exponential(0.5 * (least - nis2)) / lanes.root(S2)
     return (x1, P1), (x2, P2), c1 / where_greater(c1 + c2, zero, c1 + c2, one)
 
 
@@ -320,9 +297,9 @@ def interact(filters, plots, f, c, pairs, size, dt, period, sigma):
     P_first, P_second = COVARIANCE * GROUPS, (COVARIANCE + 6) * GROUPS
     for i in range(GROUPS):
         z, w, n = get(az, i), get(aw, i), get(an, i)
-        Y, K, P_start = least_squares(get_information(ay, i), n, w, tau, 0.0, size)
-        put_information(ay, i, Y)
-        x_now = algebra.predicted(get3(ax, i, GROUPS), F)
+        Y, K, P_start = least_squares(steps.get_information(ay, i), n, w, tau, 0.0, size)
+        steps.put_information(ay, i, Y)
+        x_now = algebra.predicted(lanes.get3(ax, i, GROUPS), F)
         x_now = algebra.add_scaled(x_now, z - x_now[0], (K[0], per * K[1], per * per * K[2]))
         x_start = (unit * x_now[0], unit * period * x_now[1], unit * period * period * x_now[2])
         x, mu = get6(am, STATE * GROUPS + i, GROUPS), (get(am, to_first + i), get(am, to_second + i))

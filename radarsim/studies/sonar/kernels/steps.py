@@ -25,23 +25,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels import algebra
+from radarsim.kernels import algebra, lanes
 from radarsim.kernels.compile import inline, kernel, part
-from radarsim.kernels.lanes import (
-    WIDTH,
-    address,
-    choose3,
-    choose6,
-    full,
-    get,
-    get4,
-    get6,
-    put,
-    put3,
-    put4,
-    put6,
-    where_greater,
-)
+from radarsim.kernels.lanes import WIDTH, address, choose3, choose6, full, get, get4, put, put4, put6, where_greater
 
 CHUNK = 512  # realisations, as in `shared_gains`
 GROUPS = CHUNK // WIDTH
@@ -267,7 +253,7 @@ def recur(filters, plots, f, c, by_covariance, model, dt, period):
         Y, K, P = least_squares(get_information(ay, i), n, w, tau, model.c, model.size)
         put_information(ay, i, Y)
         if by_covariance:
-            J = get6(aj, i, GROUPS) + get4(aj, 6 * GROUPS + i, GROUPS)
+            J = lanes.get6(aj, i, GROUPS) + get4(aj, 6 * GROUPS + i, GROUPS)
             J, K, P = kalman(J, (K, P), n, w, tau, model)
             put6(aj, i, J, GROUPS)
             put4(aj, 6 * GROUPS + i, J[6:], GROUPS)
@@ -306,5 +292,5 @@ def fit(filters, plots, f, c, length, size, period):
         rank = get(an, i)
         P = leading_inverse(Y, where_greater(rank, most, most, rank))
         r, v, acceleration = algebra.times(P, b)
-        put3(ax, i, (r, per * v, twice * acceleration), GROUPS)
+        lanes.put3(ax, i, (r, per * v, twice * acceleration), GROUPS)
         put6(ap, i, P, GROUPS)

@@ -13,17 +13,10 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Layout
+from radarsim.studies.sonar import filters
 from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.config import RESPONDING_KINDS, Accelerating, Detector, Filter, Keys, Target, Turning, Uses
-from radarsim.studies.sonar.filters import (
-    AdaptiveRule,
-    DetectorTest,
-    FilterSpec,
-    ModelPair,
-    detector_arrays,
-    needed_tests,
-    window_weights,
-)
+from radarsim.studies.sonar.filters import AdaptiveRule, DetectorTest, FilterSpec, ModelPair, detector_arrays
 from radarsim.studies.sonar.kernels.detector import Detectors
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes, UsesAxes
@@ -120,13 +113,13 @@ def all_detectors(spec: Keys, scene: Scene, specs: Sequence[FilterSpec]) -> Dete
     """The measured detectors of a case, then those of its adaptive filters."""
     C = len(scene.nominal)
     measured = [DetectorTest(one.plots, one.test_every, thresholds(one, C)) for one in spec.detectors]
-    return detector_arrays(measured, needed_tests(specs), phases(spec.target, scene.t), C)
+    return detector_arrays(measured, filters.needed_tests(specs), phases(spec.target, scene.t), C)
 
 
 # ---- exact laws ---------------------------------------------------------------------------------------------------
 def shift_laws(scene: Scene, c: int, detected: np.ndarray, plots: int, k: int) -> tuple[np.ndarray, ...]:
     """Mean, true and believed variance (M,) of the acceleration â of a parabola through the last plots at scan k."""
-    first, weights, believed = window_weights(scene.plots(c, detected), k, plots, 3)
+    first, weights, believed = filters.window_weights(scene.plots(c, detected), k, plots, 3)
     t, sigma = scene.t[first : k + 1], scene.sigma[first : k + 1, c]
     C = error_covariance(np.where(np.isfinite(sigma), sigma, 0.0), scene.rho[c], t, scene.period)
     steps = np.diff(t)

@@ -67,34 +67,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from radarsim.kernels import lanes
 from radarsim.kernels.algebra import add_outer, constant_acceleration, predicted, predicted_covariance, take_value
 from radarsim.kernels.compile import aligned_zeros, inline, kernel, part
-from radarsim.kernels.lanes import (
-    address,
-    choose3,
-    choose6,
-    full,
-    get,
-    get3,
-    get4,
-    get6,
-    put,
-    put4,
-    put6,
-    where_greater,
-)
+from radarsim.kernels.lanes import address, choose3, choose6, full, get, get3, get4, get6, put, put4, put6
 from radarsim.kernels.random import U, log_polynomial, threefry, uniform, uniforms
+from radarsim.studies.sonar.kernels import steps
 from radarsim.studies.sonar.kernels.patterns import detect
 from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
-from radarsim.studies.sonar.kernels.steps import (
-    CHUNK,
-    GROUPS,
-    copy_row,
-    get_information,
-    least_squares,
-    manoeuvre_covariance,
-    put_information,
-)
+from radarsim.studies.sonar.kernels.steps import CHUNK, GROUPS, copy_row, get_information, least_squares
 from radarsim.studies.sonar.kernels.sums import Course, add_ahead, add_sums, rows_of
 
 if TYPE_CHECKING:
@@ -352,7 +333,7 @@ def clear(tracks, i):
 @inline
 def predicted_line(P, n, tau, q):
     """Covariance (6) of a line after tau periods."""
-    moved = predicted_covariance(P, constant_acceleration(tau), manoeuvre_covariance(q, tau, 2))
+    moved = predicted_covariance(P, constant_acceleration(tau), steps.manoeuvre_covariance(q, tau, 2))
     return choose6(full(STARTED), n, P, moved)
 
 
@@ -491,9 +472,9 @@ def update(tracks, dt, period, sigma, manoeuvre, joint, association):
         put(ab, GROUPS + i, vb + per * K_bb[1] * nu_b)
         put6(pr, i, P_r, GROUPS)
         put6(pb, i, P_b, GROUPS)
-        put_information(yr, i, Y_r)
-        put_information(yb, i, Y_b)
-        put(an, i, n + where_greater(w, full(0.0), full(1.0), full(0.0)))
+        steps.put_information(yr, i, Y_r)
+        steps.put_information(yb, i, Y_b)
+        put(an, i, n + lanes.where_greater(w, full(0.0), full(1.0), full(0.0)))
 
 
 # ---- rules -----------------------------------------------------------------------------------------------------------
