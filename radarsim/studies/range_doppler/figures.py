@@ -1,6 +1,8 @@
 """P1's figures: 1a to 3b of the paper, steady error against settling, and what the filters believe of themselves."""
 
+import math
 from collections.abc import Mapping, Sequence
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -8,7 +10,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.language import tr
 from radarsim.report import panels, seen, tables, wording
-from radarsim.report.chart import spoken
+from radarsim.report.chart import Scale, spoken
 from radarsim.report.drawing import GREY, Axis, Figure, Line, Note, Panel, Reference, Style
 from radarsim.report.quantities import RADIAL
 from radarsim.studies.range_doppler.tables import PERIODS, Result
@@ -55,6 +57,8 @@ def consistency_figure(results: Sequence[Result], table: "pd.DataFrame", left_ou
 
 
 BEST = 7  # marker of the best manoeuvre variance
+ROOM = 1.5  # above and below all points of a logarithmic axis, as a factor
+LETTER, HIGH, TOUCHING = 0.031, 0.09, 0.02  # of a label, as shares of a panel; how near points share one
 MOST_NAMED = 2  # cases that are named at the ends of lines in half a page
 
 
@@ -71,10 +75,12 @@ def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure 
     """Steady σ of the range against its settling time over D_M, with the ten-period line and the best D_M named."""
     rows = table[table["component"] == "r"]
     drawn: list[Panel] = []
+    steady = rows[np.isfinite(rows["settling_s"])]["steady_sigma"]
+    up = float(steady.min()) / ROOM, float(steady.max()) * ROOM
     for title, members in panels.by_panel(results, np.inf).items():
         own = rows[rows["case"].isin([r.name for r in members])].drop_duplicates(["filter", "manoeuvre_variance"])
         if own["manoeuvre_variance"].nunique() > 1:
-            drawn.append(_settling_panel(title, members[0], own))
+            drawn.append(_settling_panel(title, members[0], own, up))
     titles = [panel.title for panel in drawn]
     drawn = panels.spread_out(drawn, panels.MOST_PANELS)
     if not drawn:
@@ -107,33 +113,73 @@ def _best_settled(drawn: Sequence[Panel]) -> str:
     )
 
 
-def _settling_panel(title: str, result: Result, rows: "pd.DataFrame") -> Panel:
-    """rows: of one radar and the range, one for each filter and manoeuvre variance."""
+def _settling_panel(title: str, result: Result, rows: "pd.DataFrame", up: tuple[float, float]) -> Panel:
+    """rows: of one radar and the range, one for each filter and manoeuvre variance; up: limits of the axis of y."""
     settled = rows[np.isfinite(rows["settling_s"])]
     limit = PERIODS * result.axes.scan_period_s
+    longest = max([limit, *settled["settling_s"]])
+    across = -0.04 * longest, 1.15 * longest
     marks: list = [Reference(limit, "x")]
+    points: list[tuple[float, float, str]] = []
     for variance, same in settled.sort_values("steady_sigma").groupby("manoeuvre_variance"):
         t, sigma = same["settling_s"].to_numpy(), same["steady_sigma"].to_numpy()
         marks.append(Line(t, sigma, "", Style(GREY, 0, width_pt=0.5)))
-        marks.append(Note(float(t[-1]), float(sigma[-1]), panels.number(float(variance), powers=True)))
+        points.append((float(t[-1]), float(sigma[-1]), panels.number(float(variance), powers=True)))
+    marks += _labels(points, limit, Scale(False, *across, 0.0, 1.0), Scale(True, *up, 0.0, 1.0))
     keys = []
     for n, name in enumerate(result.axes.filters):
         own = settled[settled["filter"] == name].sort_values("manoeuvre_variance")
         best, style = own[own["best"]], Style(n, n, n)
         words, star = panels.literal(name), Style(n, None, BEST, size_pt=8)
         marks.append(Line(own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy(), "", style, name=words))
-        x, y = (best[key].to_numpy() for key in ("settling_s", "steady_sigma"))
-        marks.append(Line(x, y, "", star, name=tr("{words}: best $D_M$", words=words)))
+        at = best["settling_s"].to_numpy(), best["steady_sigma"].to_numpy()
+        marks.append(Line(*at, "", star, name=tr("{words}: best $D_M$", words=words)))
         keys.append((panels.literal(name), style))
-    longest = max([limit, *settled["settling_s"]])
-    x = Axis(tr("settling time of $\\sigma$ of $r$, s"), limits=(-0.04 * longest, 1.15 * longest))
     keys += [
         (tr("best $D_M$"), Style(0, None, BEST, size_pt=8)),
         (tr("{periods} scan periods", periods=PERIODS), Style(GREY, 2, width_pt=0.7)),
     ]
-    y, words = Axis(tr("steady $\\sigma$ of $r$, m"), "log"), tr("at the points: $D_M$, (m/s³)²")
+    x = Axis(tr("settling time of $\\sigma$ of $r$, s"), limits=across)
+    y, words = Axis(tr("steady $\\sigma$ of $r$, m"), "log", up), tr("at the points: $D_M$, (m/s³)²")
     remark = _not_settled(rows[~np.isfinite(rows["settling_s"])])
     return Panel(x, y, tuple(marks), title, tuple(keys), words, direct=False, remark=remark)
+
+
+def _labels(points: Sequence[tuple[float, float, str]], limit: float, x: Scale, y: Scale) -> list[Note]:
+    """Labels of points (x, y, words), at their right or their left: as few as possible meet a label, curve or limit.
+
+    Points at one place share a label.
+    """
+    joined: list[tuple[float, float, str]] = []
+    for t, sigma, words in sorted(points):
+        if joined and math.dist(*((x.place(at[0]), y.place(at[1])) for at in ((t, sigma), joined[-1]))) < TOUCHING:
+            joined[-1] = (*joined[-1][:2], f"{joined[-1][2]}, {words}")
+        else:
+            joined.append((t, sigma, words))
+    line = (float(x.place(limit)),) * 2 + (0.0, 1.0)  # left, right, lower and upper edge, as shares of the panel
+    ways: list[tuple[float, list[Note], tuple[float, ...]]] = [(0.0, [], (-1.0,) * 4)]  # the best, by the last label
+    before = 0.0, 0.0
+    for t, sigma, words in joined:
+        u, v, wide = float(x.place(t)), float(y.place(sigma)), LETTER * len(words)
+        steep = (before[1] - v) * wide > TOUCHING * (u - before[0])  # a curve that falls from the left is in the way
+        own = ("ne", (u, u + wide, v, v + HIGH), 0.0), ("nw", (u - wide, u, v, v + HIGH), steep + 0.1 + 9 * (u < wide))
+        ways = [
+            min(
+                (
+                    (cost + more + _meet(box, line) / 2 + _meet(box, last), [*notes, Note(t, sigma, words, place)], box)
+                    for cost, notes, last in ways
+                ),
+                key=itemgetter(0),
+            )
+            for place, box, more in own
+        ]
+        before = u, v
+    return min(ways, key=itemgetter(0))[1]
+
+
+def _meet(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+    """Whether two boxes have a place in common."""
+    return a[0] <= b[1] and b[0] <= a[1] and a[2] <= b[3] and b[2] <= a[3]
 
 
 def _not_settled(rows: "pd.DataFrame") -> str:

@@ -1,12 +1,14 @@
 """P1's own tables against what is known, and its figures against the tables."""
 
 from dataclasses import replace
+from itertools import combinations
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from radarsim.report import figures as drawing
 from radarsim.report import panels, statistics, tables
 from radarsim.report.drawing import Line, Style
 from radarsim.studies.range_doppler import figures as range_doppler_figures
@@ -157,6 +159,18 @@ def test_settling_figure_draws_the_table(swept):
     rows = made["steady"][(made["steady"]["filter"] == "r+Vr") & (made["steady"]["component"] == "r")]
     np.testing.assert_array_equal(line.y, rows["steady_sigma"])
     np.testing.assert_array_equal(line.x, rows["settling_s"])
+
+
+def test_labels_of_settled_points_do_not_touch(expected_radar):
+    radars, variances = ("rls1", "rls2", "rls3", "rls4", "rls5"), (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+    results = [expected_radar(radar, v, f"{radar} D_M={v:g}") for radar in radars for v in variances]
+    labelled = []
+    for axes in drawing.render(drawn_of(results)["settling"]).axes:
+        places = [note.get_window_extent() for note in axes.texts if note.get_text().startswith("10")]
+        assert not any(a.overlaps(b) for a, b in combinations(places, 2))
+        assert all(one.y1 < axes.get_window_extent().y1 for one in places)
+        labelled.append(len(places))
+    assert labelled == [4, 4, 4, 5, 5, 0]  # RLS 1: two points share one; RLS 2 and 3: one does not settle
 
 
 def test_dynamic_error_is_drawn_where_there_is_one(expected_radar):
