@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.warm import Start
+
 TESTS = Path(__file__).parent
 # Folders, in the order in which their groups begin; what is short is left for the end, where processes wait.
 LONG = ("studies", "trust", "cli", "app", "engine", "docs", "report", "language", "kernels", "recorded")
@@ -59,3 +61,17 @@ def command_line():
     before = ON_COMMAND_LINE.set(True)
     yield
     ON_COMMAND_LINE.reset(before)
+
+
+@pytest.fixture(scope="session")
+def warm(tmp_path_factory):
+    """Processes that have imported radarsim already."""
+    with Start(tmp_path_factory.mktemp("printed")) as start:
+        yield start
+
+
+@pytest.fixture(scope="session")
+def libraries(tmp_path_factory):
+    """Processes that have imported only what radarsim imports."""
+    with Start(tmp_path_factory.mktemp("printed"), radarsim=False) as start:
+        yield start

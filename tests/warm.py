@@ -1,12 +1,14 @@
-"""The command in a process of its own, forked from one that has its imports: a second less than a fresh interpreter.
+"""A program in a process of its own, forked from one that has its imports: a second less than a fresh interpreter.
 
 Streams, exit code, working directory, environment, memory and signals are those of any process. Only what Python and
 its libraries read when they start is that of the first process: where this is tested, and for the seed of hashes, a
 test starts a fresh interpreter.
 """
 
+import gc
 import json
 import os
+import pkgutil
 import runpy
 import signal
 import subprocess
@@ -15,23 +17,24 @@ from importlib import import_module
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-IMPORTS = (  # most of what commands import
+LIBRARIES = (  # most of what commands import
     *("numba", "pandas", "scipy.linalg", "scipy.special", "jinja2", "rich.console", "rich.table"),
-    *("radarsim.cli", "radarsim.app.run", "radarsim.app.result", "radarsim.app.readings", "radarsim.report.html"),
-    *("radarsim.kernels.linear", "radarsim.kernels.lanes"),
+    *("pydantic", "yaml", "click"),
 )
+PARTS = ("app", "cli", "kernels", "report", "studies")  # of radarsim
+APART = ("__main__", "template", "one_file", "one_step", "reproduce")  # no command imports them
 LIMIT_S = 300
 
 
 class Start:
-    """A process that has imported the program; what is given here is its surroundings and those of all commands."""
+    """A process that has imported the libraries and, if asked, radarsim; what is given is the surroundings of all."""
 
-    def __init__(self, place: Path, *, path: tuple[Path, ...] = (), preexec_fn=None, **environment: str):
-        """`place`: where commands leave what they print; `path`: folders of packages before those installed."""
+    def __init__(self, place: Path, *, radarsim: bool = True, preexec_fn=None, **environment: str):
+        """`place`: where programs leave what they print."""
         self.printed = place / "stdout", place / "stderr"
         self.process = subprocess.Popen(
-            [sys.executable, __file__],
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (*path, ROOT)))} | environment,
+            [sys.executable, __file__, *PARTS[: len(PARTS) * radarsim]],
+            env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
             preexec_fn=preexec_fn,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -44,21 +47,35 @@ class Start:
     def __exit__(self, *_) -> None:
         self.process.communicate()
 
-    def run(self, *words, module: str = "radarsim", cwd: Path = ROOT, **environment: str):
-        """`python -m MODULE WORDS` as this process forks it; what it answers."""
-        argv = [str(word) for word in words]
-        asked = {"module": module, "argv": argv, "cwd": str(cwd), "environment": environment}
-        asked["printed"] = [str(path) for path in self.printed]
+    def run(self, *words, module: str = "radarsim", code: str = "", path=(), cwd: Path = ROOT, **environment: str):
+        """`python -m MODULE WORDS`, or `-c CODE WORDS`, as this process forks it; what it answers.
+
+        `path`: folders before those of installed packages.
+        """
+        path, argv = [str(folder) for folder in path], [str(word) for word in words]
+        environment = {"PYTHONPATH": os.pathsep.join((*path, str(ROOT)))} | environment
+        asked = {"module": module, "code": code, "argv": argv, "path": path, "cwd": str(cwd)}
+        asked |= {"environment": environment, "printed": [str(file) for file in self.printed]}
         print(json.dumps(asked), file=self.process.stdin, flush=True)
-        code = int(self.process.stdout.readline())
-        said = [path.read_text(encoding="utf-8") for path in self.printed]
-        return subprocess.CompletedProcess([module, *argv], code, *said)
+        ended = int(self.process.stdout.readline())
+        said = [file.read_text(encoding="utf-8") for file in self.printed]
+        return subprocess.CompletedProcess([module, *argv], ended, *said)
+
+
+def load(parts: list[str]) -> None:
+    """Import the libraries, and the parts of radarsim that are named."""
+    for name in LIBRARIES:
+        import_module(name)
+    for part in parts:
+        for found in pkgutil.walk_packages([str(ROOT / "radarsim" / part)], f"radarsim.{part}."):
+            if not set(APART) & set(found.name.split(".")):
+                import_module(found.name)
+    gc.freeze()
 
 
 def forked() -> dict | None:
     """Fork a process for each request and answer with its exit code; returns the request in that process."""
-    for module in IMPORTS:
-        import_module(module)
+    load(sys.argv[1:])
     answers = os.fdopen(os.dup(1), "w")
     for line in sys.stdin:
         if child := os.fork():
@@ -77,9 +94,12 @@ def become(asked: dict) -> None:
         os.dup2(opened, number)
         os.close(opened)
     sys.stdin = open(0, closefd=False)  # noqa: SIM115
-    sys.argv[1:], sys.path[0] = asked["argv"], asked["cwd"]
+    sys.argv[1:], sys.path[:1] = asked["argv"], [asked["cwd"], *asked["path"]]
     signal.alarm(LIMIT_S)
-    runpy.run_module(asked["module"], run_name="__main__", alter_sys=True)
+    if asked["code"]:
+        exec(compile(asked["code"], "<string>", "exec"), {"__name__": "__main__"})
+    else:
+        runpy.run_module(asked["module"], run_name="__main__", alter_sys=True)
 
 
 if __name__ == "__main__" and (asked := forked()):

@@ -58,15 +58,15 @@ def place(tmp_path):
     return tmp_path
 
 
-def test_a_borrowed_part_refuses_keys_that_it_does_not_know(place):
+def test_a_borrowed_part_refuses_keys_that_it_does_not_know(place, warm):
+    command = outside.beside(warm, place / "site", place)
     for words in (("track", "mine.yaml", "plots.csv"), ("fit", "mine.yaml", "plots.csv"), ("simulate", "mine.yaml")):
-        told = outside.command(*words, *(("-o", "out.csv") if words[0] != "fit" else ()),
-                               site=place / "site", cwd=place, code=2).stderr  # fmt: skip
+        told = command(*words, *(("-o", "out.csv") if words[0] != "fit" else ()), code=2).stderr
         assert "does not know filters.0.frozen_from_k" in told
         assert not (place / "out.csv").exists()
     # Of its own it knows them; what it still borrows is not asked for advice.
     (place / "site/frozen/track.py").write_text(OWN)
-    said = outside.command("track", "mine.yaml", "plots.csv", "-o", "out.csv", site=place / "site", cwd=place).stdout
+    said = command("track", "mine.yaml", "plots.csv", "-o", "out.csv").stdout
     assert "NIS" in said
     assert "advice" not in said
 

@@ -1,13 +1,7 @@
 """Packages that offer studies or filters, as pip leaves them: a folder on the path with the package's metadata."""
 
-import os
-import subprocess
-import sys
 import tomllib
-from functools import partial
 from pathlib import Path
-
-from tests.warm import Start
 
 ROOT = Path(__file__).parents[2]
 
@@ -30,32 +24,13 @@ def metadata(site: Path, name: str, version: str, offers: dict[str, str], group:
     (folder / "entry_points.txt").write_text("\n".join([f"[{group}]", *lines, ""]))
 
 
-def forking(site: Path, place: Path):
-    """The command with the packages in `site`, without a start for each; what is yielded is called as `command`."""
+def beside(start, site: Path, place: Path):
+    """The command with the packages in `site`, in processes of `start`; what is returned is called as `command`."""
 
-    def asked(start, *arguments, code: int = 0, **options):
-        return whole(start.run(*arguments, **{"cwd": place} | options), code)
+    def asked(*arguments, code: int = 0, **options):
+        done = start.run(*arguments, **{"path": [site], "cwd": place} | options)
+        assert done.returncode == code, (done.args, done.stdout, done.stderr)
+        assert "Traceback" not in done.stderr
+        return done
 
-    with Start(place, path=(site,)) as start:
-        yield partial(asked, start)
-
-
-def command(*arguments, site: Path, cwd: Path, code: int = 0, module: str = "radarsim", **environment):
-    """Run the command in an interpreter of its own with the packages in `site`; what it printed."""
-    path = os.pathsep.join([str(site), str(ROOT)])
-    done = subprocess.run(
-        [sys.executable, "-m", module, *map(str, arguments)],
-        cwd=cwd,
-        env=os.environ | {"PYTHONPATH": path} | environment,
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    return whole(done, code)
-
-
-def whole(done, code):
-    """What a command answered, once its exit code is right and it has not failed in Python."""
-    assert done.returncode == code, (done.args, done.stdout, done.stderr)
-    assert "Traceback" not in done.stderr
-    return done
+    return asked

@@ -46,7 +46,7 @@ PACKAGES = {  # study: source of its module, what is said
 
 
 @pytest.fixture(scope="module")
-def radarsim(tmp_path_factory):
+def radarsim(tmp_path_factory, warm):
     """The real command beside all these packages; further, two of one study and one of a shipped study's name."""
     folder = tmp_path_factory.mktemp("broken")
     site = folder / "site"
@@ -61,7 +61,7 @@ def radarsim(tmp_path_factory):
     (site / "packed" / "__init__.py").write_text("raise ImportError('no numba here')")
     (site / "packed" / "shipped" / "configs" / "packed_slopes.yaml").write_text("study: shipping\nrealisations: 9\n")
     outside.metadata(site, "pack-thief", "2.0", {"sonar": "module_of_typed:STUDY"})
-    return lambda *arguments, **options: outside.command(*arguments, **{"site": site, "cwd": folder} | options)
+    return outside.beside(warm, site, folder)
 
 
 def test_all_that_is_whole_is_listed_and_of_the_others_why_they_are_not(radarsim):

@@ -29,9 +29,9 @@ def place(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def radarsim(place):
+def radarsim(place, warm):
     """The real command, beside the installed packages."""
-    yield from outside.forking(place / "site", place)
+    return outside.beside(warm, place / "site", place)
 
 
 LINES = {"chirp": 120, "bearings": 200, "learned": 260}  # at most, of its file
@@ -146,6 +146,14 @@ def test_the_bearings_questions_and_recorded_plots(radarsim, tmp_path):
     assert "speed_mps" in radarsim("sensitivity", "bearings", "-n", 512, "--out", tmp_path).stdout
 
 
+@pytest.fixture
+def copied(tmp_path, warm):
+    """The command beside a copy of an example, and the file to edit."""
+    shutil.copytree(EXAMPLES / "chirp", tmp_path / "chirp")
+    outside.installed(tmp_path / "chirp", tmp_path / "site")
+    return outside.beside(warm, tmp_path / "site", tmp_path), tmp_path / "chirp/src/chirp/__init__.py"
+
+
 FAULTS = {  # what is put into the file: what is said, and whether the tables are written
     "words": (
         "    def question(self, experiment):\n        return self.aks\n",
@@ -158,16 +166,14 @@ FAULTS = {  # what is put into the file: what is said, and whether the tables ar
 
 
 @pytest.mark.parametrize("what", FAULTS)
-def test_what_its_code_does_wrong_is_one_line_with_its_place(tmp_path, what):
+def test_what_its_code_does_wrong_is_one_line_with_its_place(copied, tmp_path, what):
+    command, file = copied
     text, said, written = FAULTS[what]
-    shutil.copytree(EXAMPLES / "chirp", tmp_path / "chirp")
-    outside.installed(tmp_path / "chirp", tmp_path / "site")
-    file = tmp_path / "chirp/src/chirp/__init__.py"
     before, after = file.read_text(encoding="utf-8").split("\n\nSTUDY = ")
     file.write_text(f"{before}\n{text}\n\nSTUDY = {after}", encoding="utf-8")
     run = ("run", "chirp", "-n", 100, "--no-figures", "--out", "results")
     code = 1 if written else 2  # without numbers there is nothing to show
-    (line,) = outside.command(*run, site=tmp_path / "site", cwd=tmp_path, code=code).stderr.splitlines()
+    (line,) = command(*run, code=code).stderr.splitlines()
     place = f"/chirp/__init__.py:{before.count(chr(10)) + 3}"
     if written:
         assert line.startswith(f"the code of an installed package fails: {said}")
@@ -177,22 +183,20 @@ def test_what_its_code_does_wrong_is_one_line_with_its_place(tmp_path, what):
     assert (tmp_path / "results/chirp/curves.csv").exists() == written
 
 
-def test_a_claims_fault_is_found_before_the_run_and_its_measures_after_the_tables_are_written(tmp_path):
-    shutil.copytree(EXAMPLES / "chirp", tmp_path / "chirp")
-    outside.installed(tmp_path / "chirp", tmp_path / "site")
-    file = tmp_path / "chirp/src/chirp/__init__.py"
+def test_a_claims_fault_is_found_before_the_run_and_its_measures_after_the_tables_are_written(copied, tmp_path):
+    command, file = copied
     whole = file.read_text(encoding="utf-8")
     run = ("run", "chirp", "-n", 100, "--no-figures", "--out", "results")
     file.write_text(whole.replace("{gain: {filter: up,", "{gain: {filter: upp,", 1), encoding="utf-8")
     for asked in (run, ("check", "chirp")):
-        (line,) = outside.command(*asked, site=tmp_path / "site", cwd=tmp_path, code=2).stderr.splitlines()
+        (line,) = command(*asked, code=2).stderr.splitlines()
         assert "/chirp/__init__.py:" in line
         assert ": no filter 'upp'; there are " in line
     assert not (tmp_path / "results").exists()
     measure = "def own(seen, case):\n    return None\n\n\n"
     other = whole.replace("{gain: {filter: up, component: r}}", "own", 1).replace("\n\nSTUDY", f"\n\n{measure}STUDY")
     file.write_text(other, encoding="utf-8")
-    line = outside.command(*run, site=tmp_path / "site", cwd=tmp_path, code=1).stderr.splitlines()[-1]
+    line = command(*run, code=1).stderr.splitlines()[-1]
     assert line.endswith(": own: must give an Estimate or a number, got nothing")
     assert "confirmed" in (tmp_path / "results/chirp/claims.csv").read_text(encoding="utf-8")
 

@@ -67,9 +67,9 @@ def place(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def radarsim(place):
+def radarsim(place, warm):
     """The real command beside the installed package."""
-    yield from outside.forking(place / "site", place)
+    return outside.beside(warm, place / "site", place)
 
 
 @pytest.fixture(scope="module")
@@ -166,7 +166,7 @@ def test_an_edit_of_the_package_begins_anew_its_own_cases_alone(ran, place, rada
 
 
 @pytest.fixture(scope="module")
-def beside_broken(tmp_path_factory):
+def beside_broken(tmp_path_factory, warm):
     """The command beside packages that cannot be used, two of one kind, and some whose gains fail; and where."""
     folder = tmp_path_factory.mktemp("broken")
     site = folder / "site"
@@ -179,9 +179,7 @@ def beside_broken(tmp_path_factory):
         offers = {"twice": "module_of_twice:Own"}
         outside.metadata(site, f"pack-twice{number}", "2.0", offers, "radarsim.filters")
     (site / "module_of_twice.py").write_text(CLASS.format(kind="twice", body="pass"))
-    started = outside.forking(site, folder)
-    yield next(started), site
-    started.close()
+    return outside.beside(warm, site, folder), site
 
 
 def test_what_cannot_be_used_is_named_where_it_is_asked_for_and_listed(beside_broken, tmp_path):

@@ -4,7 +4,10 @@ The package is the one that `radarsim new-study` writes, so this proves the temp
 """
 
 import json
+import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -16,13 +19,20 @@ from tests.studies import outside
 N = 10_000  # two whole blocks and a partial one
 
 
+def new_study(warm, folder, name, *options):
+    """The command beside a new package in a folder, installed in its folder `site`."""
+    (folder / "site").mkdir()
+    command = outside.beside(warm, folder / "site", folder)
+    command("new-study", name, *options)
+    outside.installed(folder / name, folder / "site")
+    return command
+
+
 @pytest.fixture(scope="module")
-def place(tmp_path_factory):
+def place(tmp_path_factory, warm):
     """A folder with the package `fifth`, installed in its folder `site`."""
     folder = tmp_path_factory.mktemp("outside")
-    (folder / "site").mkdir()
-    outside.command("new-study", "fifth", "--folder", site=folder / "site", cwd=folder)
-    outside.installed(folder / "fifth", folder / "site")
+    new_study(warm, folder, "fifth", "--folder")
     page = (outside.ROOT / "docs/howto/translate.md").read_text(encoding="utf-8")
     (folder / "fifth/src/fifth/language").mkdir()
     catalogue = page.partition("```po\n")[2].partition("```")[0]
@@ -31,16 +41,19 @@ def place(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def radarsim(place):
+def radarsim(place, warm):
     """The real command, beside the installed package."""
-    yield from outside.forking(place / "site", place)
+    return outside.beside(warm, place / "site", place)
 
 
 @pytest.fixture(scope="module")
 def ran(place):
     """The folder of results of a finished run, in an interpreter with hashes of its own."""
-    arguments = ("run", "fifth", "-n", N, "--threads", 1, "--out", "results")
-    outside.command(*arguments, site=place / "site", cwd=place)
+    words = ("run", "fifth", "-n", str(N), "--threads", "1", "--out", "results")
+    path = os.pathsep.join([str(place / "site"), str(outside.ROOT)])
+    subprocess.run(
+        [sys.executable, "-m", "radarsim", *words], cwd=place, env=os.environ | {"PYTHONPATH": path}, check=True
+    )
     return place / "results/fifth"
 
 
@@ -161,15 +174,12 @@ def test_its_kernels_are_compiled_once(ran, radarsim, tmp_path):
 
 
 @pytest.mark.slow
-def test_blocks_from_before_an_edit_are_taken_over_where_their_bytes_are_the_same(tmp_path):
-    site = tmp_path / "site"
-    site.mkdir()
-    outside.command("new-study", "edited", "--folder", site=site, cwd=tmp_path)
-    outside.installed(tmp_path / "edited", site)
+def test_blocks_from_before_an_edit_are_taken_over_where_their_bytes_are_the_same(tmp_path, warm):
+    command = new_study(warm, tmp_path, "edited", "--folder")
     source = tmp_path / "edited/src/edited"
 
     def computed():
-        outside.command("run", "edited", "-n", 9000, "--no-figures", "--out", "results", site=site, cwd=tmp_path)
+        command("run", "edited", "-n", 9000, "--no-figures", "--out", "results")
         return json.loads((tmp_path / "results/edited/run.json").read_text())["realisations_computed"]
 
     assert [computed(), computed()] == [9000, 0]
@@ -187,19 +197,14 @@ def test_its_own_tests_pass(place, radarsim):
 
 
 @pytest.mark.parametrize("options", [(), ("--step",)], ids=["linear", "step"])
-def test_what_new_study_writes_in_one_file_passes_its_own_tests(tmp_path, options):
-    outside.command("new-study", "short", *options, site=tmp_path, cwd=tmp_path)
-    outside.installed(tmp_path / "short", tmp_path / "site")
-    ran = {"site": tmp_path / "site", "cwd": tmp_path / "short"}
-    assert "2 passed" in outside.command("-q", "-p", "no:cacheprovider", module="pytest", **ran).stdout
+def test_what_new_study_writes_in_one_file_passes_its_own_tests(tmp_path, warm, options):
+    command = new_study(warm, tmp_path, "short", *options)
+    assert "2 passed" in command("-q", "-p", "no:cacheprovider", module="pytest", cwd=tmp_path / "short").stdout
 
 
-def test_a_wrong_number_in_kernel_or_exact_value_ends_the_run_in_exit_code_4(tmp_path):
+def test_a_wrong_number_in_kernel_or_exact_value_ends_the_run_in_exit_code_4(tmp_path, warm):
     """A walk 5 % longer than the filters are told, in a config without claims; then a bias that there is not."""
-    site = tmp_path / "site"
-    site.mkdir()
-    outside.command("new-study", "wrong", "--folder", site=site, cwd=tmp_path)
-    outside.installed(tmp_path / "wrong", site)
+    command = new_study(warm, tmp_path, "wrong", "--folder")
     run = ("run", "wrong", "-n", 100_000, "--set", "sensor.sigma_x_m=1.1", "--no-figures", "--out")
 
     def edited(file, old, new):
@@ -208,16 +213,16 @@ def test_a_wrong_number_in_kernel_or_exact_value_ends_the_run_in_exit_code_4(tmp
         assert old in text
         path.write_text(text.replace(old, new), encoding="utf-8")
 
-    outside.command(*run, "right", site=site, cwd=tmp_path)
+    command(*run, "right")
     edited("study.py", "exact_bias=np.zeros(shape)", "exact_bias=np.full(shape, 0.02)")
-    said = outside.command(*run, "biased", site=site, cwd=tmp_path, code=4).stderr
+    said = command(*run, "biased", code=4).stderr
     assert said.startswith("wrong: curves.csv: wrong, ")
     assert "bias measured " in said
     assert "exactly 0.02: " in said
     assert "sigma measured" not in said
     edited("study.py", "exact_bias=np.full(shape, 0.02)", "exact_bias=np.zeros(shape)")
     edited("kernels/walk.py", "x[i] += step * noise[i]", "x[i] += 1.05 * step * noise[i]")
-    said = outside.command(*run, "longer", site=site, cwd=tmp_path, code=4).stderr
+    said = command(*run, "longer", code=4).stderr
     assert "curves.csv: wrong, fixed, x, k = " in said
     assert "sigma measured " in said
     assert "claims" not in said
@@ -225,5 +230,5 @@ def test_a_wrong_number_in_kernel_or_exact_value_ends_the_run_in_exit_code_4(tmp
     record = json.loads((tmp_path / "longer/wrong/run.json").read_text(encoding="utf-8"))
     assert "sigma measured " in record["warnings"][0]
     assert "sigma measured " in (tmp_path / "longer/wrong/report.html").read_text(encoding="utf-8")
-    told = outside.command("report", "wrong", *run[4:], "longer", site=site, cwd=tmp_path, code=4).stderr
+    told = command("report", "wrong", *run[4:], "longer", code=4).stderr
     assert told == said

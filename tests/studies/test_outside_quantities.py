@@ -85,9 +85,9 @@ def place(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def radarsim(place):
+def radarsim(place, warm):
     """The real command, beside the installed package."""
-    yield from outside.forking(place / "site", place)
+    return outside.beside(warm, place / "site", place)
 
 
 def solved(radarsim, *words):
