@@ -266,6 +266,11 @@ def simulate_plots(problem: Problem, first: int, count: int) -> np.ndarray:
     return plots.transpose(2, 1, 0)
 
 
+def errors(problem: Problem, first: int, count: int) -> np.ndarray:
+    """The errors (F, count, K, 3) of the realisations of `simulate_block`; NaN where a filter has no estimate."""
+    return (estimate(problem, simulate_plots(problem, first, count)) - problem.truth).swapaxes(0, 1)
+
+
 def estimate(problem: Problem, plots: np.ndarray) -> np.ndarray:
     """Estimates (n, F, K, 3) of a problem's filters over plots (n, K, 2) of n tracks; NaN where a filter has none yet.
 

@@ -256,8 +256,8 @@ def kernels(begin: Program, move: Program, fixed: Program, own: Program, sums: P
     n, _, plots_rows, kept, D = shape
 
     @kernel
-    def simulate(keys, first, count, probability, at_first, moves, numbers, which, starts, work, held):
-        scans = numbers.shape[1]
+    def simulate(keys, first, count, probability, at_first, moves, numbers, which, starts, work, held, each):
+        scans, shown, eights = numbers.shape[1], each.shape[2], each.shape[3] // WIDTH
         truth, plots, there, counted = address(work.truth), address(work.plots), address(work.there), work.counted
         for done in range(0, count, GROUPS * WIDTH):
             groups = min(GROUPS, (count - done + WIDTH - 1) // WIDTH)
@@ -275,6 +275,12 @@ def kernels(begin: Program, move: Program, fixed: Program, own: Program, sums: P
                         follow_own(groups, own, base, of, seen, there, truth, address(counted), to)
                     else:
                         follow_fixed(groups, own, base, of, seen, there, truth, address(counted), to)
+                    if eights > 0:
+                        at = (f * scans + k) * shown * eights + done // WIDTH
+                        for g in range(groups):
+                            for i in range(shown):
+                                e = get(own, g * kept + i) - get(truth, g * n + i)
+                                put(address(each), at + i * eights + g, e)
 
     @kernel
     def realisations(keys, first, probability, at_first, moves, work, truth, plots):
@@ -335,12 +341,22 @@ class Simulator:
         error (F, K, C, 4) takes e, e², e³, e⁴ of the first C states, paired (F, K, C) e² times the baseline's e².
         Realisation i has the same plots and estimates in any block.
         """
-        held = np.zeros((*self.numbers.shape[:2], self.components * POWERS))
-        of = self.keys, first, count, self.problem.probability, self.at_first, self.moves
-        self.block(*of, self.numbers, self.which, self.starts, self._work(), held)
-        sums = held.reshape(*error.shape[:3], POWERS)
+        sums = self._simulated(first, count, 0)[0].reshape(*error.shape[:3], POWERS)
         error += sums[..., :4]
         paired += sums[..., 4]
+
+    def errors(self, first: int, count: int) -> np.ndarray:
+        """The errors (F, count, K, C) of the same realisations."""
+        each = self._simulated(first, count, -(-count // WIDTH) * WIDTH)[1]
+        return each[..., :count].transpose(0, 3, 1, 2)
+
+    def _simulated(self, first: int, count: int, kept: int) -> tuple[np.ndarray, np.ndarray]:
+        """Sums (F, K, …) of a block, and the errors (F, K, C, kept) of whole eights or of none."""
+        shape = self.numbers.shape[:2]
+        held, each = np.zeros((*shape, self.components * POWERS)), aligned_zeros(*shape, self.components, kept)
+        of = self.keys, first, count, self.problem.probability, self.at_first, self.moves
+        self.block(*of, self.numbers, self.which, self.starts, self._work(), held, each)
+        return held, each
 
     def simulate_plots(self, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
         """The truth (count, K, n) and the plots (count, K, G, D) of realisations first … first + count - 1,

@@ -22,7 +22,7 @@ A study that follows this declares an object and writes no class:
 | `warnings`, if offered | the function of `words` |
 | `claims`, if there is a paper | those of `claims.yaml`, or `claims.CLAIMS`, judged by `measures.Evidence` |
 | `seconds_per_update`, `seconds_at_most`, if offered | functions of `cost` |
-| `shortened`, `exact_but_for`, `costly`, if offered | functions of `study` |
+| `errors`, `shortened`, `exact_but_for`, `costly`, if offered | functions of `study` |
 | `readings`, if offered | an object of the class `readings.Readings` |
 | `recorded`, if offered | an object of the class `track.Recorded` |
 | `chart`, if offered | the function of `chart` |
@@ -109,7 +109,7 @@ class StudyFolder(Study):
         return (*COMMON, *self.own_quantities)
 
     prepare, simulate = part("study"), part("study")
-    shortened, exact_but_for, costly = part("study"), part("study"), part("study")
+    errors, shortened, exact_but_for, costly = part("study"), part("study"), part("study"), part("study")
     seconds_per_update, seconds_at_most = part("cost"), part("cost")
     tables, curves, gains = part("tables"), part("tables"), part("tables")
     inputs, cost = part("tables"), part("tables")

@@ -351,7 +351,7 @@ def paper_in(claims: str) -> str:
 
 Beside = Literal["readings", "recorded", "shipped", "chart", "shortened", "own_filters", "floor"]
 Costs = Literal["cost", "seconds_per_update", "seconds_at_most"]
-OptionalPart = Literal["curves", "gains", "inputs", Costs, "warnings", "exact_but_for", "costly", Beside]
+OptionalPart = Literal["curves", "gains", "inputs", Costs, "warnings", "errors", "exact_but_for", "costly", Beside]
 
 
 class Study(ABC):
@@ -387,6 +387,21 @@ class Study(ABC):
 
         Realisation i has the same noise in any block, whatever N, threads or machine.
         """
+
+    def errors(self, plan: Any, first: int, count: int) -> "np.ndarray":
+        """The errors (F, count, K, C) of the same realisations' estimates, not-a-number where a filter has none.
+
+        What is not available by the axes may hold anything. Default: the sums of each realisation alone.
+        """
+        import numpy as np
+
+        found = np.empty((count, *np.shape(plan.axes.available)))
+        for i in range(count):
+            sums = plan.layout.unpack(self.simulate(plan, first + i, 1))
+            found[i] = sums["error"][..., 0]
+            if "estimates" in sums:
+                found[i][sums["estimates"] == 0] = np.nan
+        return np.moveaxis(found, 0, 1)
 
     def shortened(self, case: "Case", at_s: float | None, at_k: int | None) -> "Case":
         """A case with the same exact errors at a time (s) or scan, cheaper to prepare. Default: the case itself.

@@ -268,6 +268,9 @@ class LinearStudy(OneFile):
         plan.simulator.simulate_block(int(first), int(count), sums["error"], sums["paired"])
         return plan.layout.pack(**sums)
 
+    def errors(self, plan: Plan, first: int, count: int) -> np.ndarray:
+        return plan.simulator.errors(int(first), int(count))
+
     def limits(self, spec: Any) -> np.ndarray:
         truth, probability = self._truth(spec)
         every = [self.matrices(spec, one) for one in spec.filters]

@@ -10,8 +10,8 @@ or a function of all scans, `f(plots) -> estimates (n, K, d)`, or `(estimates, c
 (n, K); or one of a single realisation, columns (K,), estimates (K, d). An estimate holds the leading components of the
 state, or those that the attribute `components` names. Not-a-number stands where a filter has no estimate yet.
 
-Of each realisation the errors of the config's own filters are computed again, alone: the gains of a filter from outside
-are paired with every one of them, in every study that draws plots, and the sums of the study stay what they are.
+Of each realisation the errors of the config's own filters are computed again: the gains of a filter from outside are
+paired with every one of them, in every study that draws plots, and the sums of the study stay what they are.
 
 A realisation fails where not-a-number follows an estimate, where an estimate is infinite, where there is none although
 a filter of the config has one, and where an error is more than a hundred times the largest error of the config's
@@ -348,17 +348,10 @@ def plots_of(plan: Plan, drawn: "Drawn") -> Plots:
 
 
 def inner_errors(plan: Plan, first: int, count: int) -> np.ndarray:
-    """Errors (F, n, K, C) of the study's own filters, not-a-number where one has no estimate, one by one."""
-    layout, available = plan.inner.layout, np.asarray(plan.inner.axes.available)
-    found = np.empty((count, *available.shape))
-    simulate = plan.study.simulate
-    for i in range(count):
-        sums = layout.unpack(simulate(plan.inner, first + i, 1))
-        found[i] = sums["error"][..., 0]
-        if "estimates" in sums:
-            found[i][sums["estimates"] == 0] = np.nan
-    found[:, ~available] = np.nan
-    return np.moveaxis(found, 0, 1)
+    """Errors (F, n, K, C) of the study's own filters, not-a-number where one has no estimate."""
+    found = np.ascontiguousarray(plan.study.errors(plan.inner, first, count))
+    found.swapaxes(0, 1)[:, ~np.asarray(plan.inner.axes.available)] = np.nan
+    return found
 
 
 @dataclass(frozen=True)

@@ -301,11 +301,34 @@ class StepStudy(OneFile):
         return made[0], made[1], traced.count(state)
 
     def simulate(self, plan: Plan, first: int, count: int) -> np.ndarray:
+        values = np.zeros(plan.layout.size)
+        sums = plan.layout.unpack(values)
+        for _ in self._followers(plan, first, count, sums):
+            pass
+        if (never := sums["error"][..., 1] == 0).any():
+            sums["error"][never & ~self._free_of_error(plan)] = np.nan
+        if "believed" in sums and (lost := (sums["believed"] < 0).any(axis=2)).any():
+            sums["believed"][lost] = sums["nees"][lost] = np.nan
+        return values
+
+    def errors(self, plan: Plan, first: int, count: int) -> np.ndarray:
+        found = np.empty((count, *plan.axes.available.shape))
+        sums = plan.layout.unpack(np.zeros(plan.layout.size))
+        for f, start, many, errors in self._followers(plan, first, count, sums):
+            found[start : start + many, f] = errors[:many]
+        if (never := found == 0).any():
+            found[never & ~self._free_of_error(plan)] = np.nan
+        return np.moveaxis(found, 0, 1)
+
+    def _followers(
+        self, plan: Plan, first: int, count: int, sums: Mapping[str, np.ndarray]
+    ) -> Iterator[tuple[int, int, int, np.ndarray]]:
+        """Runs the filters over a block and adds up: each filter, the first of some realisations and how many they are,
+        and their errors (≥ many, K, C), valid till the next."""
         from radarsim.kernels.compile import aligned_zeros
         from radarsim.kernels.lanes import WIDTH
 
-        values = np.zeros(plan.layout.size)
-        sums, nothing = plan.layout.unpack(values), np.zeros((1, 2))
+        nothing = np.zeros((1, 2))
         scans, components = plan.axes.k.size, len(plan.axes.components)
         most = max(1, ROOM // (scans * (plan.shape[1] + 2 * components)))
         work = aligned_zeros(max(one.rows for one in plan.filters) * WIDTH)
@@ -320,11 +343,8 @@ class StepStudy(OneFile):
                 tested = [sums[name][f] if one.tested else nothing for name in ("believed", "nees")]
                 of = sums["error"][f], sums["paired"][f], *tested
                 one.kernel(groups, many, plan.known, plan.width, one.numbers, plots, work, errors, base, *of)
-        if (never := sums["error"][..., 1] == 0).any():
-            sums["error"][never & ~self._free_of_error(plan)] = np.nan
-        if "believed" in sums and (lost := (sums["believed"] < 0).any(axis=2)).any():
-            sums["believed"][lost] = sums["nees"][lost] = np.nan
-        return values
+                each = errors.reshape(most, scans, components, WIDTH)[:groups]
+                yield f, start, many, each.transpose(0, 3, 1, 2).reshape(-1, scans, components)
 
     def _free_of_error(self, plan: Plan) -> np.ndarray:
         """Where (F, K, C) estimates equal the truth in plain Python too, in realisation 0.

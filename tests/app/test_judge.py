@@ -551,21 +551,6 @@ def test_every_study_with_plots_pairs_each_realisation(config, overrides):
         assert own[list(table)].equals(table), name
 
 
-def test_errors_of_single_realisations_add_up_to_the_runs(plain):
-    """What gains are paired with: to the rounding of the sums."""
-    for config, overrides in (("rls2", {}), ("rls2", {"radar.detection_probability": 0.8}), ("sonar_smoothing", {})):
-        experiment, _ = judging.judged(load(config, judging.run.merged(overrides)), held, "mine", realisations=64)
-        work = CaseWork(experiment.cases[0])
-        plan = work.plans[-1]
-        error = judging.outside.inner_errors(plan, 0, 64)
-        sums = next(work.unpacked(work.simulate(0, 64)))
-        for power in range(1, 5):
-            whole = sums["error"][..., power - 1]
-            np.testing.assert_allclose(np.nansum(error**power, axis=1), whole, rtol=1e-9, atol=1e-9)
-        counted = sums["estimates"] if "estimates" in sums else 64 * plan.inner.axes.available
-        assert np.array_equal(np.isfinite(error).sum(axis=1), counted)
-
-
 def test_studies_without_paired_plots_are_refused_with_the_reason():
     for config, why in (("discriminator", "draws no plots"), ("sonar_clutter", "trackers find tracks of their own")):
         with pytest.raises(ConfigError, match=why):

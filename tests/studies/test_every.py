@@ -11,8 +11,13 @@ from radarsim.app import result as output
 from radarsim.app.configs import CaseWork
 from radarsim.report.drawing import GREY, Line
 from radarsim.studies import registry
-from tests.trust.cases import CASES, MORE
+from radarsim.studies.interface import Study
+from tests.trust.cases import CASES, MORE, Small
 
+MISSED = Small("rls2", ("radar.detection_probability=0.8",), 1, 1)
+OF_SONAR = "sonar", "sonar_manoeuvre", "missed_plots"
+PAIRED = "range_doppler", "missed range_doppler", "multimodel", "ambiguous_doppler", *OF_SONAR
+EVERY = CASES | MORE | {"missed range_doppler": MISSED}
 every = pytest.mark.parametrize("study", CASES | MORE)
 
 
@@ -23,7 +28,7 @@ def works():
 
     def of(study):
         if study not in made:
-            made[study] = CaseWork((CASES | MORE)[study].loaded().cases[0])
+            made[study] = CaseWork(EVERY[study].loaded().cases[0])
         return made[study]
 
     return of
@@ -40,6 +45,24 @@ def test_blocks_add_up_whatever_their_bounds(works, study):
         # Sums of large and small numbers in another order: to rounding of the largest of their kind.
         np.testing.assert_allclose(added, values, rtol=1e-9, atol=1e-11 * np.abs(values).max(initial=0), err_msg=name)
     assert np.isfinite(work.simulate(3, 37)).all()
+
+
+@pytest.mark.parametrize("study", PAIRED)
+def test_errors_of_realisations_are_those_of_the_sums(works, study):
+    """What gains of other people's filters are paired with: to the rounding of the sums, and of a realisation alone."""
+    of, plan = registry.study(works(study).case.study), works(study).plan
+    error = of.errors(plan, 3, 37)
+    alone = Study.errors(of, plan, 11, 9)
+    for one in (error, alone):
+        one.swapaxes(0, 1)[:, ~plan.axes.available] = np.nan
+    sums = plan.layout.unpack(of.simulate(plan, 3, 37))
+    for power in range(1, 5):
+        whole = sums["error"][..., power - 1]
+        atol = 1e-11 * np.abs(whole).max((0, 1))
+        assert (np.abs(np.nansum(error**power, axis=1) - whole) <= 1e-9 * np.abs(whole) + atol).all(), power
+    assert np.array_equal(np.isfinite(error).sum(axis=1), sums.get("estimates", 37 * plan.axes.available))
+    largest = np.nanmax(np.abs(error), axis=(0, 1, 2))
+    np.testing.assert_allclose(error[:, 8:17] / largest, alone / largest, atol=1e-9)
 
 
 @every

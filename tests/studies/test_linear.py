@@ -153,8 +153,10 @@ def test_a_realisation_is_itself_in_any_block(probability):
     study = study_of(2, 1)
     plan = study.prepare(case_of(study, FILTERS, probability=probability))
     together = study.simulate(plan, 509, 6)
-    apart = sum(study.simulate(plan, i, 1) for i in range(509, 515))
-    np.testing.assert_allclose(together, apart, rtol=1e-11, atol=1e-11)
+    apart = [study.simulate(plan, i, 1) for i in range(509, 515)]
+    np.testing.assert_allclose(together, sum(apart), rtol=1e-11, atol=1e-11)
+    alone = [plan.layout.unpack(values)["error"][..., 0] for values in apart]
+    np.testing.assert_allclose(study.errors(plan, 509, 6), np.stack(alone, axis=1), rtol=1e-11, atol=1e-11)
 
 
 @pytest.mark.parametrize(("n", "D"), [(2, 1), (3, 2)])

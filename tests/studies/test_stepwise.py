@@ -198,7 +198,9 @@ def test_the_plots_of_a_realisation_followed_in_plain_python_are_what_the_run_ma
     track = study.tracker(case).feed(plots)
     plan = study.prepare(case)
     sums = plan.layout.unpack(study.simulate(plan, i, 1))
-    np.testing.assert_allclose(track.estimate[..., 0] - plots["true_x_m"], sums["error"][..., 0, 0], atol=1e-12)
+    error = track.estimate[..., 0] - plots["true_x_m"]
+    np.testing.assert_allclose(error, sums["error"][..., 0, 0], atol=1e-12)
+    np.testing.assert_allclose(error, study.errors(plan, i - 20, 23)[:, 20, :, 0], atol=1e-12)
     np.testing.assert_allclose(track.sigma[0, :, 0] ** 2, sums["believed"][0, :, 0], rtol=1e-12)
     assert np.isnan(track.sigma[1]).all()
 

@@ -25,6 +25,6 @@ STUDY = StudyFolder(
         "merge: each_scan": "the same, hypotheses merged into one each scan (GPB1): no memory",
     },
     paper=Paper("Gorshkov & Zavizhenets 2017, conclusion", page="ambiguous_doppler"),
-    offers=("inputs", "recorded", "warnings", "floor"),
+    offers=("inputs", "recorded", "warnings", "floor", "errors"),
     own_quantities=(ABOVE_ORACLE, RIGHT, WRONG, *FLOORS),
 )

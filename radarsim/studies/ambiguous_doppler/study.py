@@ -354,3 +354,8 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
         losses = sums.Losses(arrays["events"], arrays["drawn"])
         sums.simulate_weighted_block(plan.world, plan.banks, plan.mixture, common, losses, first, count)
     return values
+
+
+def errors(plan: Plan, first: int, count: int) -> np.ndarray:
+    """The errors (F, count, K, 3) of plain realisations; not-a-number where a filter has not started."""
+    return sums.errors_of(plan.world, plan.banks, first, count)

@@ -124,12 +124,22 @@ def axes(spec: Keys, t: np.ndarray, world: records.World, lengths: np.ndarray) -
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     """Sums of one block, in the order of the plan's layout."""
+    return _simulated(plan, first, count, 0)[0]
+
+
+def errors(plan: Plan, first: int, count: int) -> np.ndarray:
+    """The errors (F, count, K, 9) of its realisations."""
+    return _simulated(plan, first, count, count)[1][..., :count].transpose(0, 3, 1, 2)
+
+
+def _simulated(plan: Plan, first: int, count: int, kept: int) -> tuple[np.ndarray, np.ndarray]:
+    """Sums of one block, and the errors (F, K, 9, kept) of all its realisations, in whole eights, or of none."""
     values = np.zeros(plan.layout.size)
     arrays = plan.layout.unpack(values)
     plain = records.Sums(*(arrays[name] for name in records.Sums._fields))
-    memory = strip.memory(len(plan.banks.numbers), len(plan.world.lengths))
+    memory = strip.memory(len(plan.banks.numbers), len(plan.world.lengths), len(plan.axes.k), kept)
     strip.simulate_block(plan.world, plan.banks, memory, plain, plan.axes.baseline, first, count)
-    return values
+    return values, memory.each
 
 
 def measured(plan: Plan, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -32,6 +32,7 @@ STUDY = StudyFolder(
         "shortened",
         "exact_but_for",
         "costly",
+        "errors",
         "seconds_at_most",
         "own_filters",
         "floor",

@@ -64,6 +64,11 @@ def own_gains(case: Case, made: Designed, baseline: int) -> missed.Problem:
     )
 
 
+def errors(of: Problem, first: int, count: int) -> np.ndarray:
+    """The errors (F, count, K, 3) of the realisations of a block; NaN where a filter has no estimate."""
+    return (missed if isinstance(of, missed.Problem) else linear).errors(of, first, count)
+
+
 def sums(of: Problem, where: Layout, first: int, count: int) -> np.ndarray:
     """Sums (size,) of one block, in the order of the layout."""
     if isinstance(of, missed.Problem):

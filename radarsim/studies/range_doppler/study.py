@@ -210,3 +210,10 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     from radarsim.studies.range_doppler import blocks
 
     return blocks.sums(plan.problem, plan.layout, first, count)
+
+
+def errors(plan: Plan, first: int, count: int) -> np.ndarray:
+    """The errors (F, count, K, 3) of its realisations."""
+    from radarsim.studies.range_doppler import blocks
+
+    return blocks.errors(plan.problem, first, count)

@@ -73,6 +73,10 @@ class Sonar(Study):
         sums: np.ndarray = plan.simulate(first, count)
         return sums
 
+    def errors(self, plan: Any, first: int, count: int) -> "np.ndarray":
+        found: np.ndarray = plan.errors(first, count)
+        return found
+
     def floor(self, spec: "Keys", axes: Any) -> "Floor | None":
         return None if "clutter" in spec.parts else file_of(BASE, "floor").floor(spec, axes)
 

@@ -189,6 +189,11 @@ def packed(layout: Layout, sums: kernels.Sums, **more: np.ndarray) -> np.ndarray
     return layout.pack(**{name: values for name, values in arrays.items() if name in layout.shapes})
 
 
+def of_components(each: np.ndarray) -> np.ndarray:
+    """Errors (F, n, K, C S) of those (F, K, C, S, n) of each coordinate."""
+    return np.moveaxis(each.reshape(*each.shape[:2], -1, each.shape[4]), 3, 1)
+
+
 @dataclass(frozen=True)
 class RealisationPlan:
     """A plan of filters whose gains differ between realisations; kept (A,) are scans whose estimates are kept."""
@@ -208,13 +213,19 @@ class RealisationPlan:
         """The sums of one block, in the order of the layout."""
         return packed(self.layout, self.block_sums(first, count).errors)
 
-    def block_sums(self, first: int, count: int) -> pattern_kernels.BlockSums:
-        """The sums of one block as the kernels compute them."""
+    def errors(self, first: int, count: int) -> np.ndarray:
+        """The errors (F, count, K, C S) of one block's realisations."""
+        return of_components(self.block_sums(first, count, count).each)
+
+    def block_sums(self, first: int, count: int, kept: int = 0) -> pattern_kernels.BlockSums:
+        """The sums of one block as the kernels compute them, and the errors of all its realisations or of none."""
         F, K, C = self.bank.carry.shape
         D, G, T = self.detectors.threshold.shape
         alarms = detector.Alarms(np.zeros((D, G, K)), np.zeros((D, G, T, K)), np.zeros((D, G, T, K)))
         estimates = np.zeros((len(self.kept), F, 2, 6, count))
-        sums = pattern_kernels.BlockSums(empty_sums(F, K, C), alarms, np.zeros((F, K, C, 3)), self.kept, estimates)
+        each = np.full((F, K, C, int(self.bank.size.max()), kept), np.nan)
+        modes = np.zeros((F, K, C, 3))
+        sums = pattern_kernels.BlockSums(empty_sums(F, K, C), alarms, modes, self.kept, estimates, each)
         inputs = (self.world, self.detections, self.conversion, self.bank, self.detectors)
         pattern_kernels.simulate_block(*inputs, first, count, self.axes.baseline, sums)
         return sums
@@ -260,11 +271,20 @@ class SharedPlan:
 
     def simulate(self, first: int, count: int) -> np.ndarray:
         """The sums of one block, in the order of the layout."""
-        sums = empty_sums(*self.bank.known.shape)
-        kernels.simulate_block(self.world, self.bank, first, count, self.axes.baseline, sums)
+        sums, _ = self._simulated(first, count, 0)
         sums.believed[:] = count * self.believed
         sums.estimates[:] = count * (self.bank.known[..., None] > np.arange(3))
         return packed(self.layout, sums)
+
+    def errors(self, first: int, count: int) -> np.ndarray:
+        """The errors (F, count, K, C S) of one block's realisations."""
+        return of_components(self._simulated(first, count, count)[1])
+
+    def _simulated(self, first: int, count: int, kept: int) -> tuple[kernels.Sums, np.ndarray]:
+        """The sums of one block, and the errors (F, K, C, S, kept) of all its realisations or of none."""
+        sums, each = empty_sums(*self.bank.known.shape), np.empty((*self.bank.known.shape, self.bank.size.max(), kept))
+        kernels.simulate_block(self.world, self.bank, first, count, self.axes.baseline, sums, each)
+        return sums, each
 
 
 def prepare(case: Case) -> SharedPlan | RealisationPlan:

@@ -208,6 +208,20 @@ def simulate_block(world: World, banks: Banks, sums: Sums, first: int, count: in
     add_block(world, banks, memory(len(world.t), banks), sums, first, count)
 
 
+def errors_of(world: World, banks: Banks, first: int, count: int) -> np.ndarray:
+    """The errors (F, count, K, 3) of realisations first … first + count - 1; NaN where a filter has not started."""
+    scans, work = len(world.t), memory(len(world.t), banks)
+    plots, out = work.plots.reshape(scans, rec.PLOT, WIDTH), work.out.reshape(-1, scans, rec.OUTPUT, WIDTH)
+    rows_of_estimates = banks.place[:, None] + np.arange(3)
+    found = np.empty((len(banks.bank), -(-count // WIDTH), WIDTH, scans, 3))
+    for group in range(found.shape[1]):
+        fill_outputs(world, banks, work, first + group * WIDTH)
+        e = out[banks.bank[:, None], :, rows_of_estimates] - plots[:, rec.TRUTH : rec.TRUTH + 3].swapaxes(0, 1)
+        e[:, :, plots[:, rec.STARTED] == 0] = np.nan
+        found[:, group] = e.transpose(0, 3, 2, 1)
+    return found.reshape(len(found), -1, scans, 3)[:, :count]
+
+
 def simulated(world: World, banks: Banks, first: int) -> tuple[np.ndarray, np.ndarray]:
     """Plots (K, PLOT, 8) and outputs (B, K, OUTPUT, 8) of the realisations first … first + 7, see `records`."""
     plots, out, _ = simulated_lists(world, banks, first)

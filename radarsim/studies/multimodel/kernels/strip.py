@@ -445,10 +445,11 @@ class SumsMemory(NamedTuple):
     counted: np.ndarray  #: one row  #: one row
     numbers: np.ndarray  #: (F, 8) whole numbers of each filter, see `run_strip`
     listed: np.ndarray  #: (MOST,) likewise
+    each: np.ndarray  #: (F, scans reported, 9, n or 0) errors of all realisations of a block, in whole eights
 
 
-def memory(filters: int, stages: int) -> SumsMemory:
-    """Memory for a number of filters and of stages."""
+def memory(filters: int, stages: int, scans: int = 0, kept: int = 0) -> SumsMemory:
+    """Memory for a number of filters and of stages; of reported scans, and of realisations whose errors are kept."""
     return SumsMemory(
         works=rows(filters * rec.WORK),
         random=rows(RANDOM),
@@ -458,6 +459,7 @@ def memory(filters: int, stages: int) -> SumsMemory:
         counted=rows(1),
         numbers=np.zeros((filters, 8), dtype=np.int64),
         listed=np.zeros(rec.MOST, dtype=np.int64),
+        each=rows(filters * scans * rec.STATES * (-(-kept // WIDTH))).reshape(filters, scans, rec.STATES, -1),
     )
 
 
@@ -585,6 +587,8 @@ def simulate_block(world, banks, memory, sums, baseline, first, count):
                 out = row(address(memory.out), f * STRIP * rec.OUTPUT)
                 run_strip(work, numbers, address(memory.listed), *design, span, plots, frame, out)
             add_strip(world, banks, memory, sums, baseline, k, begin, length)
+            if memory.each.shape[3] > 0:
+                keep_errors(world, memory, k, begin, length, group // WIDTH)
         lengths, counted = address(world.lengths), get(address(memory.counted), 0)
         close_stages(
             address(memory.stages), filters, stages, lengths, counted, address(sums.stage), address(sums.pairs)
@@ -608,6 +612,19 @@ def add_strip(world, banks, memory, sums, baseline, k, begin, length):
                 of_filter = address(sums.error[f, place]), address(sums.paired[f, place])
                 places = *of_filter, address(sums.probability[f, place]), address(sums.believed[f, place])
                 add_scan(out, row(base, n * rec.OUTPUT), truth, counted, banks.numbers[f, rec.SIZE], places)
+
+
+@part
+def keep_errors(world, memory, k, begin, length, group):
+    """Store the errors of all filters at the reported scans of a strip from scan k on, of an eight of a block."""
+    filters, scans, states, kept = memory.each.shape
+    for f in range(filters):
+        for n in range(begin, length):
+            if world.reported[k + n] == 1:
+                out, truth = row(address(memory.out), (f * STRIP + n) * rec.OUTPUT), address(world.truth[k + n])
+                at = (f * scans + world.place[k + n]) * states * (kept // WIDTH) + group
+                for c in range(states):
+                    put(address(memory.each), at + c * (kept // WIDTH), get(out, c) - truth[c])
 
 
 # ---- likelihood ------------------------------------------------------------------------------------------------------

@@ -107,9 +107,19 @@ def begin_chunk(keys, first, made, bias, sigma_bias, sigma_flight):
     return drawn
 
 
+@part
+def keep_errors(e, has, each):
+    """Errors e (F, 3, CHUNK) into each (F, 3, n), not-a-number where there is no estimate."""
+    for f in range(each.shape[0]):
+        for c in range(3):
+            for i in range(each.shape[2]):
+                each[f, c, i] = e[f, c, i] if has[f, c, i] > 0.0 else np.nan
+
+
 @kernel
-def add_block(made, first, count, problem, found):
-    """`simulate_block` for a plain problem, with the work arrays of one chunk, into found (F, K, OWN + PAIRED)."""
+def add_block(made, first, count, problem, found, each):
+    """`simulate_block` for a plain problem, with a chunk's work arrays, into found (F, K, OWN + PAIRED), `errors`
+    into each (F, K, 3, count or 0)."""
     keys, truth, sigma, bias, sigma_bias, sigma_flight, flight, detection, dt = problem[:9]
     observes, start, Q, baseline, given, gains, believed = problem[9:]
     filters, scans, R, at, sums = observes.size, truth.shape[0], sigma * sigma, steps.places(made), address(found)
@@ -143,6 +153,8 @@ def add_block(made, first, count, problem, found):
             for f in range(filters):
                 if f != baseline:
                     steps.pair(at, f, baseline, row(sums, (f * scans + k) * ROWS + steps.OWN // WIDTH))
+            if each.shape[3] > 0:
+                keep_errors(made.e, made.has, each[:, k, :, done : done + n])
 
 
 @kernel
@@ -191,10 +203,22 @@ def simulate_block(problem: Problem, first: int, count: int, sums: Sums) -> None
 
     The arrays of sums are float64 and contiguous. Realisation i has the same plots and estimates in any block.
     """
+    found, _ = simulated(problem, first, count, 0)
+    add_found(found, int(problem.baseline), sums)
+
+
+def errors(problem: Problem, first: int, count: int) -> np.ndarray:
+    """The errors (F, count, K, 3) of the realisations of `simulate_block`; NaN where a filter has no estimate."""
+    return simulated(problem, first, count, count)[1].transpose(0, 3, 1, 2)
+
+
+def simulated(problem: Problem, first: int, count: int, kept: int) -> tuple[np.ndarray, np.ndarray]:
+    """Sums (F, K, OWN + PAIRED) of a block, and the errors (F, K, 3, kept) of all its realisations or of none."""
     problem = problem.plain()
-    found = aligned_zeros(len(problem.observes), len(problem.truth), steps.OWN + steps.PAIRED)
-    add_block(steps.work(len(problem.observes)), int(first), int(count), problem, found)
-    add_found(found, problem.baseline, sums)
+    filters, scans = len(problem.observes), len(problem.truth)
+    found, each = aligned_zeros(filters, scans, steps.OWN + steps.PAIRED), np.empty((filters, scans, 3, kept))
+    add_block(steps.work(filters), int(first), int(count), problem, found, each)
+    return found, each
 
 
 def simulate_plots(problem: Problem, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:

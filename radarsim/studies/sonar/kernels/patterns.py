@@ -68,6 +68,7 @@ class BlockSums(NamedTuple):
     #: (A, F, 2, 6, count) of the first two coordinates: value, rate, believed variance of the value, covariance,
     #: variance of the rate, and 1 where the state is complete
     kept: np.ndarray
+    each: np.ndarray  #: (F, K, C, S, count or 0) errors of all realisations, NaN where a filter has no estimate
 
 
 # ---- plots --------------------------------------------------------------------------------------------------------
@@ -199,6 +200,16 @@ def keep(x, P, n, size, units, first, count, kept):
         kept[4, first + i] = P[3, i] * sigma * sigma / (period * period)
 
 
+@part
+def keep_errors(x, course, c, n, first, count, each):
+    """Store the errors of `count` realisations in a coordinate in each (S, total) from `first` on, not-a-number where a
+    component has no estimate; n (CHUNK,) plots so far."""
+    truth, shift = course.truth[c], course.shift[c]
+    for j in range(each.shape[0]):
+        for i in range(count):
+            each[j, first + i] = x[j, i] - (truth[j] + shift[j, i]) if n[i] > j + 0.5 else np.nan
+
+
 # ---- a block ------------------------------------------------------------------------------------------------------
 class Chunk(NamedTuple):
     """A chunk of a block at a scan: `count` realisations from number `first` of the block on, scan k, and dt since the
@@ -228,6 +239,8 @@ def step_filters(bank, baseline, chunk, filters, plots, out, sums):
                 if sums.at[a] == k:
                     kept = sums.kept[a, f, c]
                     keep(filters.x[f, c], filters.P, n, bank.size[f], units, chunk.first, chunk.count, kept)
+            if sums.each.shape[4] > 0:
+                keep_errors(filters.x[f, c], course, c, n, chunk.first, chunk.count, sums.each[f, k, c, : bank.size[f]])
             rows = rows_of(filters.x[f, c], course, c, n, chunk.used)
             add_sums(rows, filters.P, bank.size[f], x_base, size_base, units, (f, k, c), out, sums.errors)
 

@@ -235,9 +235,21 @@ def add_ahead(bank, x, plots, truth, k, dt, n, sums):
                     sums.ahead[f, k - 1, c, q] += found[q]
 
 
+@part
+def keep_errors(x, plots, truth, each):
+    """Errors of x (F, C, 4, CHUNK) into each (F, C, S, n)."""
+    for f in range(each.shape[0]):
+        for c in range(each.shape[1]):
+            for j in range(each.shape[2]):
+                for i in range(each.shape[3]):
+                    true = truth[c, j] + plots[c, 2 + j, i] if j < 2 else truth[c, j]
+                    each[f, c, j, i] = x[f, c, j, i] - true
+
+
 @kernel
-def simulate_block(world, bank, first, count, baseline, sums):
-    """Add the sums of realisations first … first + count - 1; gains refer to filter `baseline`.
+def simulate_block(world, bank, first, count, baseline, sums, each):
+    """Add the sums of realisations first … first + count - 1; gains refer to filter `baseline`. each (F, K, C, S,
+    count or 0) takes the errors of all of them.
 
     The last chunk is always computed in full, and only the realisations asked for are summed.
     """
@@ -254,3 +266,5 @@ def simulate_block(world, bank, first, count, baseline, sums):
                 add_ahead(bank, x, plots, world.truth[k], k, world.dt[k], n, sums)
             advance(bank, x, ring, plots, k, world.dt[k])
             add_sums(bank, x, plots, world.truth[k], k, n, baseline, sums)
+            if each.shape[4] > 0:
+                keep_errors(x, plots, world.truth[k], each[:, k, :, :, done : done + n])
