@@ -235,6 +235,8 @@ RUNS = {
     "discriminator ridge": (DISCRIMINATOR | RIVAL | {"engine": "samples"}, [], 2),
     "discriminator complex demodulated": (DISCRIMINATOR | COMPLEX | {"engine": "demodulated"}, [], 2),
 }
+# Runs whose realisations' errors are taken too: scans.
+ERRORS = {"linear with misses": 4, "sonar alike": 4, "sonar missed": 12, "multimodel irregular": 6}
 
 
 def words():
@@ -277,9 +279,12 @@ def work(config, overrides):
         return Work(load(config, overrides).cases[-1])
 
 
-def sums(config, overrides, count):
-    """Sums by name, from realisation 8 on."""
+def sums(config, overrides, count, errors=False):
+    """Sums by name, from realisation 8 on; with `errors` the realisations' own in their place."""
     one = work(config, overrides)
+    if errors:
+        found = one.study.errors(one.plan, 8, count).swapaxes(0, 1)
+        return {"each": np.where(one.plan.axes.available & np.isfinite(found), found, 0.0)}
     return one.plan.layout.unpack(one.simulate(8, count))
 
 
@@ -408,6 +413,9 @@ def numbers():
     made |= {f"matrices of {name}": array for name, array in matrices().items()}
     made |= {f"given gains/{name}": array for name, array in given().items()}
     made |= bursts(*RUNS["discriminator on block sums"])
+    for run, scans in ERRORS.items():
+        config, overrides, _ = RUNS[run]
+        made |= {f"{run}/{name}": v for name, v in sums(config, [*overrides, f"scans={scans}"], 1, errors=True).items()}
     for run, arguments in RUNS.items():
         made |= {f"{run}/{name}": array for name, array in sums(*arguments).items()}
     return made
