@@ -23,7 +23,7 @@ from radarsim.errors import ConfigError, argument
 from radarsim.language import term, tr
 from radarsim.report import tables
 from radarsim.report.statistics import Estimate
-from radarsim.report.wording import labelled, significant_digits
+from radarsim.report.wording import labelled, shown, with_unit
 
 if TYPE_CHECKING:
     import numpy as np
@@ -148,7 +148,6 @@ AT_MOST = term(
 AT_LEAST = term(
     "{quantity}: {wanted} is not attainable with {key} from {low} to {high}: the smallest is {limit}, at {at}"
 )
-PLAIN = ".6g"
 MOST_DIGITS = 12  # behind the point: beyond is rounding
 NEAR_ZERO = 1e-9  # of a quantity: accuracy of an exact root
 
@@ -163,16 +162,6 @@ def _rate(percent: float) -> str:
     if not 0.0 < rest < 1.0:
         return shown(percent, ".4g")
     return shown(percent, f".{min(2 - math.floor(math.log10(rest)), MOST_DIGITS)}f")
-
-
-def with_unit(value: float, unit: str) -> str:
-    """A number with its unit, in words."""
-    return f"{shown(value)} {tr(unit)}".rstrip()
-
-
-def shown(value: float, form: str = PLAIN) -> str:
-    """A number in words."""
-    return significant_digits(value, form)
 
 
 @dataclass

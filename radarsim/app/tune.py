@@ -21,7 +21,7 @@ import numpy as np
 from radarsim.app import configs, quantities, question
 from radarsim.app.configs import Config, load
 from radarsim.app.quantities import Asked, Range, Wanted
-from radarsim.app.question import Curve, shown
+from radarsim.app.question import Curve
 from radarsim.app.run import merged
 from radarsim.app.sensitivity import interval
 from radarsim.app.shown import Shown
@@ -37,6 +37,7 @@ from radarsim.errors import ConfigError, argument
 from radarsim.language import few, plural, tr
 from radarsim.report import tables
 from radarsim.report.outside import TUNED
+from radarsim.report.wording import shown, with_unit
 from radarsim.studies import registry
 
 if TYPE_CHECKING:
@@ -180,7 +181,7 @@ class Tuned(Shown):
         return made | {"name": self.filter + TUNED}
 
     def _said(self) -> list[str]:
-        return [self.answer, *(f"{one.key} = {question.with_unit(one.tuned, one.unit)}" for one in self.keys)]
+        return [self.answer, *(f"{one.key} = {with_unit(one.tuned, one.unit)}" for one in self.keys)]
 
 
 class Variants:

@@ -4,7 +4,7 @@ import gc
 import os
 import sys
 
-from radarsim.cli import design, experiments, maintenance, own_data, papers
+from radarsim.cli import design, experiments, maintenance, own_data
 from radarsim.cli.group import main
 
 # Matrices here are of a few rows: where other processes run too, a second thread of OpenBLAS made a Riccati equation

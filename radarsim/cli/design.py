@@ -122,7 +122,7 @@ def solve(
           --case "sonar_clutter sensor.false_plots_per_km2=1" -n 2000
     """
     from radarsim.app import documents, python
-    from radarsim.cli import answers, console
+    from radarsim.cli import console, outcomes
     from radarsim.errors import TargetUnmet
 
     asked: dict[str, Any] = {name.removeprefix(OF): value for name, value in quantities.items()}
@@ -134,7 +134,7 @@ def solve(
     if as_json:
         click.echo(documents.text(documents.answer(answer)))
     elif answer.value is not None:
-        answers.print_answer(answer)
+        outcomes.print_answer(answer)
     if answer.value is None:
         raise TargetUnmet(*answer.unattained)
 
@@ -188,7 +188,7 @@ def tune(
     """
     from radarsim.app import configs, documents
     from radarsim.app import tune as tuning
-    from radarsim.cli import answers, console
+    from radarsim.cli import console, outcomes
     from radarsim.errors import ConfigError
     from radarsim.report import wording
 
@@ -203,7 +203,7 @@ def tune(
     if as_json:
         click.echo(documents.text(documents.tuned(found)))
     else:
-        answers.print_tuned(found)
+        outcomes.print_tuned(found)
     if write:
         path = pathlib.Path(write)
         made = configs.new(path.name, config, path.parent, found.settings)
@@ -231,14 +231,14 @@ def chart(
       radarsim chart rls2 --set radar.sigma_velocity_mps=5
     """
     from radarsim.app import documents, python
-    from radarsim.cli import answers, console
+    from radarsim.cli import console, outcomes
 
     with console.Progress("chart", quiet=as_json, what="figures") as progress:
         drawn = python.chart(*configs, overrides=overrides, out=out, progress=progress.update, **drawing.arguments)
     if as_json:
         click.echo(documents.text(documents.drawn(drawn)))
     else:
-        answers.print_drawn(drawn)
+        outcomes.print_drawn(drawn)
 
 
 @group.main.command()
@@ -283,7 +283,7 @@ def sensitivity(
       radarsim sensitivity discriminator --of lock -n 2000
     """
     from radarsim.app import documents, python
-    from radarsim.cli import answers, console
+    from radarsim.cli import console, outcomes
 
     asked: dict[str, Any] = {"at_s": at_s, "at_k": at_k, "of": of, "component": component, "case": case}
     asked |= {"overrides": overrides, "realisations": realisations, "seed": seed}
@@ -292,4 +292,4 @@ def sensitivity(
     if as_json:
         click.echo(documents.text(documents.sensitivity(found)))
     else:
-        answers.print_sensitivity(found)
+        outcomes.print_sensitivity(found)

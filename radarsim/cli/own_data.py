@@ -278,7 +278,7 @@ def track(
     import contextlib
 
     from radarsim.app import run
-    from radarsim.cli import console, verdicts
+    from radarsim.cli import console, outcomes
     from radarsim.recorded import advice, follow, page
     from radarsim.recorded import figures as accuracy
     from radarsim.recorded import plots as files
@@ -299,7 +299,7 @@ def track(
 
     sources = [plots, *([loaded.path] if loaded.path else [])]
     with contextlib.ExitStack() as stack:
-        write = stack.enter_context(Writer(output, read)).write if output else verdicts.echo
+        write = stack.enter_context(Writer(output, read)).write if output else outcomes.echo
         counter = stack.enter_context(console.Counter("tracking", "rows"))
         followed = follow.follow(loaded, plots, sink, further["threads"], counter.update)
     drawn = follow.draw(followed, figures, sources) if figures else []
@@ -309,7 +309,7 @@ def track(
             judged = accuracy.judged(followed)
             advised = advice.advised(followed, counter.update)
     if not quiet:
-        verdicts.report(followed, judged, advised, stderr=output is None)
+        outcomes.report(followed, judged, advised, stderr=output is None)
     if output:
         console.field("track", output)
     if drawn:
@@ -356,7 +356,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
       radarsim fit rls2 plots.csv --write mine.yaml
     """
     from radarsim.app import configs, documents, run
-    from radarsim.cli import console, verdicts
+    from radarsim.cli import console, outcomes
     from radarsim.recorded import fit as fitting
     from radarsim.report import wording
     from radarsim.studies.interface import CORRELATION, OUTLIERS
@@ -371,7 +371,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     if options["as_json"]:
         click.echo(documents.text(fitting.as_rows(found)))
     else:
-        verdicts.report_fit(found)
+        outcomes.report_fit(found)
     if options["write"]:
         path = Path(options["write"])
         made = configs.new(path.name, loaded.path or config, path.parent, fitting.settings(found))
@@ -399,11 +399,11 @@ def register(radar: str, other: str, as_json: bool) -> None:
       radarsim register radar.csv positions.csv
     """
     from radarsim.app import documents
-    from radarsim.cli import verdicts
+    from radarsim.cli import outcomes
     from radarsim.recorded import register as registering
 
     found = registering.register(radar, other)
     if as_json:
         click.echo(documents.text(registering.as_json(found)))
     else:
-        verdicts.report_registration(found, other)
+        outcomes.report_registration(found, other)

@@ -147,6 +147,16 @@ def significant_digits(value: float, form: str = "#.4g") -> str:
     return numeral(text if float(text) else text.removeprefix("-"))
 
 
+def shown(value: float, form: str = ".6g") -> str:
+    """A number in words."""
+    return significant_digits(value, form)
+
+
+def with_unit(value: float, name: str) -> str:
+    """A number with its unit, in words."""
+    return f"{shown(value)} {tr(name)}".rstrip()
+
+
 def known(value: float, form: str = "#.4g", after: str = "") -> str:
     """`figures` of a number and its suffix, or nothing for NaN."""
     return significant_digits(value, form) + after if value == value else ""

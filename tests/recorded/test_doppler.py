@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from radarsim.app.run import load_all
-from radarsim.cli.verdicts import report
+from radarsim.cli.outcomes import report
 from radarsim.recorded import follow, plots
 from radarsim.recorded.figures import DOUBT, FITS, LOST, judged
 from radarsim.recorded.fit import folding, said
