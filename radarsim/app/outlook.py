@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -248,28 +248,8 @@ def timed(work: CaseWork, count: int) -> float:
     return min(seconds)
 
 
-@dataclass(frozen=True)
-class Lacking:
-    """Cases with gaps in their stored blocks, from shares not all copied or from a killed run.
-
-    Their number, their realisations requested and stored, name and stock of the first, and seconds for the rest on
-    `threads` threads.
-    """
-
-    cases: int
-    asked: int
-    stored: int
-    name: str
-    first: Stock
-    threads: int
-    seconds: float
-
-
-def lacking(experiment: Experiment, out: str | os.PathLike[str], threads: int | None = None) -> Lacking | None:
-    """What a run would compute first of a store with gaps, and how long that takes; None without gaps.
-
-    A few realisations are timed, as for `outlook`. Cases with nothing stored, or complete, are not even prepared.
-    """
+def lacking(experiment: Experiment, out: str | os.PathLike[str]) -> str | None:
+    """The realisations that a store with gaps lacks, in words; None without gaps, as of cases with nothing stored."""
     found: dict[str, tuple[CaseWork, Stock]] = {}
     for case in experiment.cases:
         work = CaseWork(case)
@@ -280,15 +260,11 @@ def lacking(experiment: Experiment, out: str | os.PathLike[str], threads: int | 
                 found.setdefault(work.identity, (work, held))
     if not found:
         return None
-    seconds = 0.0
-    for work, held in found.values():
-        work.simulate(0, 1)
-        each = seconds_each(work, work.case.realisations, PILOT_S / len(found))
-        seconds += each * (held.asked - held.stored)
-    asked, stored = (sum(getattr(held, name) for _, held in found.values()) for name in ("asked", "stored"))
-    work, held = next(iter(found.values()))
-    threads = available_cores() if threads is None else max(threads, 1)
-    return Lacking(len(found), asked, stored, work.case.name, held, threads, seconds / threads)
+    (work, held), *others = found.values()
+    told: dict[str, Any] = {"config": experiment.stem, "case": work.case.name, "count": len(found)}
+    told |= {name: sum(getattr(one, name) for _, one in found.values()) for name in ("asked", "stored")}
+    words = tr("{config}: {stored:,} of {asked:,} realisations are stored; missing: {missing}", **told, missing=missing(held))
+    return words + (tr(" (of {case}, the first of {count} such cases)", **told) if others else "")
 
 
 def missing(held: Stock) -> str:

@@ -314,7 +314,6 @@ def claims(*names: str, out: Out = RESULTS) -> Claims:
 
 def readings(
     *names: str,
-    only: Mapping[str, str] | Sequence[str] = (),
     realisations: float | None = None,
     decide: bool = False,
     threads: int | None = None,
@@ -327,9 +326,8 @@ def readings(
     """Judge claims (P1.4) or whole papers (P1) under every reading that the papers allow; default: all.
 
     Readings are judged exactly where possible, otherwise by runs of `realisations`, by default the number that the
-    paper's readings declare. decide: extend the runs, up to `realisations`, until each claim is decided. only: restrict
-    to readings with these alternatives, `{"start": "unweighted"}`. time_limit is in seconds. out: directory for
-    readings.csv, a figure for each claim, and the stored runs.
+    paper's readings declare. decide: extend the runs, up to `realisations`, until each claim is decided. time_limit is
+    in seconds. out: directory for readings.csv, a figure for each claim, and the stored runs.
 
     `table` is readings.csv: a row for each claim, reading and part. Raises ConfigError for unknown names, TargetUnmet
     if the time did not suffice.
@@ -344,13 +342,8 @@ def readings(
     from radarsim.engine import run
 
     configs.check(threads=threads, time_limit=time_limit, out=out, figures=figures)
-    if isinstance(only, str) or not isinstance(only, Iterable):
-        raise ConfigError(
-            f'only: must be a mapping such as {{"start": "unweighted"}}, or texts KEY=VALUE, got {only!r}'
-        )
-    alternatives = [f"{key}={value}" for key, value in only.items()] if isinstance(only, Mapping) else list(only)
     configs.texts(names)
-    wanted = reading.asked(names, alternatives)
+    wanted = reading.asked(names)
     limit = time_limit if time_limit is None or callable(time_limit) else run.TimeLimit(time_limit)
     asked: dict[str, Any] = {"realisations": configs.whole(realisations), "decide": decide}
     asked |= {"progress": progress, "figures": figures, "stop": stop, "write": out is not None}

@@ -8,15 +8,11 @@ at a border.
 """
 
 import csv
-import hashlib
 import io
-import json
 import tempfile
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
-from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,7 +39,6 @@ from radarsim.report.claims.over import (
     Under,
     Unreadable,
     columns,
-    depth,
     joint,
     rows,
     under,
@@ -70,17 +65,11 @@ class Paper:
 
 @dataclass(frozen=True)
 class Asked:
-    """The part of a paper to judge: its claims, which readings of them, and whether the whole paper was requested."""
+    """The part of a paper to judge: its claims, and whether the whole paper was requested."""
 
     paper: Paper
     claims: list[Claim]
     whole: bool
-    only: Mapping[str, str] = field(default_factory=dict)
-
-    def readings(self, claim: Claim) -> list[Reading]:
-        """The readings of a claim, the default one first; `only` selects those with these alternatives."""
-        default, *others = self.paper.readings.of_claim(claim.id)
-        return [default, *(one for one in others if all(one[key] == value for key, value in self.only.items()))]
 
 
 class Plan:
@@ -99,7 +88,7 @@ class Plan:
         self._claims = {claim.id: claim for claim in wanted.claims}
         self.held = 0  # realisations not computed, but read or impossible
         for claim in wanted.claims:
-            for reading in wanted.readings(claim):
+            for reading in self._paper.readings.of_claim(claim.id):
                 if not self._paper.readings.exact(claim, reading):
                     self._add(claim, reading)
 
@@ -141,9 +130,9 @@ class Plan:
                 self.held = before + count  # these are not computed
             done += count
         contradicting = frozenset(choice.key for choice in self._paper.readings.choices if choice.contradicts)
-        found, every = list[Over](), sum(len(self._wanted.readings(claim)) for claim in self._wanted.claims)
+        found, every = list[Over](), sum(len(self._paper.readings.of_claim(claim.id)) for claim in self._wanted.claims)
         for claim in self._wanted.claims:
-            verdicts = tuple(self._under(claim, one) for one in self._wanted.readings(claim))
+            verdicts = tuple(self._under(claim, one) for one in self._paper.readings.of_claim(claim.id))
             found.append(Over(claim, verdicts, contradicting))
             _without_runs(judging, sum(len(over.under) for over in found), every)
         return found
@@ -315,8 +304,6 @@ def _most(parts: Sequence[Any]) -> float:
 
 
 # ---- readings --------------------------------------------------------------------------------------------------------
-FOLDER, TABLE, DRAWN = *PLACE.parts, "drawn.json"
-DRAW = (("claims", "page.py"), ("figures.py",), ("drawing.py",), ("chart.py",))
 
 
 @dataclass(frozen=True)
@@ -357,16 +344,12 @@ class Readings(Shown):
     @property
     def _described(self) -> dict[str, Figure]:
         every = ((read.paper.readings, over) for read in self.read for over in read.over)
-        return {over.claim.id: page.specification(of, over) for of, over in every if drawable(over)}
+        several = ((of, over) for of, over in every if len(over.under) > 1 and over.outcome is not None)
+        return {over.claim.id: page.specification(of, over) for of, over in several}
 
     def _said(self) -> list[str]:
         lines = [f"{over.claim.id} {tr(over.outcome.kind)}: {over.sentence()}" for over in self.over if over.outcome]
         return lines + [read.counted.sentence() for read in self.read if read.counted is not None]
-
-
-def drawable(over: Over) -> bool:
-    """Whether a claim has a specification curve: verdicts under several readings."""
-    return len(over.under) > 1 and over.outcome is not None
 
 
 def papers(keys: Collection[str] = ()) -> dict[str, Paper]:
@@ -379,10 +362,10 @@ def papers(keys: Collection[str] = ()) -> dict[str, Paper]:
     return dict(sorted(found.items()))
 
 
-def asked(names: Sequence[str] = (), only: Sequence[str] = ()) -> list[Asked]:
+def asked(names: Sequence[str] = ()) -> list[Asked]:
     """Requests from names of papers (P1) and claims (P1.4); without names, all papers.
 
-    only: texts CHOICE=VALUE. Raises ConfigError for an unknown paper, claim, choice or value, with the known ones.
+    Raises ConfigError for an unknown paper or claim, with the known ones.
     """
     every = papers()
     owner = {claim.id: key for key, paper in every.items() for claim in paper.claims.claims}
@@ -390,15 +373,12 @@ def asked(names: Sequence[str] = (), only: Sequence[str] = ()) -> list[Asked]:
     faults += [fault for paper in every.values() for fault in _closed(paper, names)]
     if faults:
         raise ConfigError(*faults)
-    kept = _only(
-        only, [paper for key, paper in every.items() if not names or any(n.split(".")[0] == key for n in names)]
-    )
     found = []
     for key, paper in every.items():
         whole = not names or key in names
         claims = [one for one in paper.claims.claims if (whole or one.id in names) and paper.readings.open(one)]
         if claims:
-            found.append(Asked(paper, claims, whole, kept))
+            found.append(Asked(paper, claims, whole))
     return found
 
 
@@ -422,22 +402,6 @@ def _unknown(name: str, every: Mapping[str, Paper], owner: Mapping[str, str]) ->
     ids = [claim for claim, key in owner.items() if key == paper]
     allowed = f"its claims: {', '.join(ids)}" if ids else f"papers: {', '.join(every)}; claims as P1.4"
     return f"readings: no paper or claim {name!r}; {allowed}"
-
-
-def _only(texts: Sequence[str], wanted: Sequence[Paper]) -> dict[str, str]:
-    choices = {choice.key: choice for paper in wanted for choice in paper.readings.choices}
-    found, faults = {}, []
-    for text in texts:
-        where = f"{argument('only:', '--only')} {text}"
-        key, _, value = (part.strip() for part in text.partition("="))
-        if key not in choices:
-            faults.append(f"{where}: no choice {key!r}; choices: {', '.join(choices)}")
-        elif value not in (values := [one.name for one in choices[key].alternatives]):
-            faults.append(f"{where}: no value {value!r} of {key}; values: {', '.join(values)}")
-        found[key] = value
-    if faults:
-        raise ConfigError(*faults)
-    return found
 
 
 def readings(
@@ -471,9 +435,9 @@ def readings(
             over = plan.decided(over, realisations or one.paper.readings.most, options, progress, stop)
             left += [line for each in over if (line := _left(each))]
         done, held = done + plan.total, held + plan.held
-        read.append(Read(one.paper, over, _counted(one.paper, over) if one.whole and not one.only else None))
-    made = Readings(read, Path(out) / FOLDER, left=tuple(left))
-    if write and not any(one.only for one in wanted):
+        read.append(Read(one.paper, over, _counted(one.paper, over) if one.whole else None))
+    made = Readings(read, Path(out) / PLACE.parent, left=tuple(left))
+    if write:
         made.files = _write(made, figures, progress)
         made.outdated = _outdated(made)
     return made
@@ -507,48 +471,16 @@ def _counted(paper: Paper, over: list[Over]) -> Search | Joint:
 
 # ---- files -----------------------------------------------------------------------------------------------------------
 def _write(done: Readings, figures: bool, progress: Progress | None) -> tuple[str, ...]:
-    """Write the table, with the stored rows of other claims, and a curve for each claim.
+    """Write the table, with the stored rows of other claims, and a curve for each claim."""
+    contents = {PLACE.name: _table(done).encode(), CLASSES.name: _classes(done).encode()}
+    described = done._described if figures else {}
+    for n, (name, figure) in enumerate(described.items(), 1):
+        from radarsim.report.figures import save  # Matplotlib
 
-    A curve whose claim is unchanged is not drawn again, unless the drawing code has changed: `drawn.json` keeps what
-    the files were drawn from.
-    """
-    contents = {TABLE: _table(done).encode(), CLASSES.name: _classes(done).encode()}
-    if figures:
-        drawn, shown = _drawn(done.folder), [over for over in done.over if drawable(over)]
-        for n, over in enumerate(shown, 1):
-            contents |= _curve(done, over, drawn)
-            _without_runs(progress, n, len(shown))
-        contents[DRAWN] = (json.dumps(drawn, indent=1, sort_keys=True) + "\n").encode()
+        contents[f"{name}.svg"] = save(figure, ("svg",))["svg"]
+        _without_runs(progress, n, len(described))
     files.replace_all(done.folder, contents)
-    return tuple(sorted(name for name in contents if name != DRAWN))
-
-
-def _curve(done: Readings, over: Over, drawn: dict[str, str]) -> dict[str, bytes]:
-    """The files of a claim's specification curve; none where they exist already."""
-    of = next(read.paper.readings for read in done.read if over in read.over)
-    content = repr([(one.name, one.kind, depth(one), one.why) for one in over.under]) + over.sentence()
-    mark = hashlib.sha256(content.encode() + _sources()).hexdigest()
-    name = f"{over.claim.id}.svg"
-    if drawn.get(name) == mark and (done.folder / name).is_file():
-        return {}
-    from radarsim.report.figures import save  # Matplotlib
-
-    drawn[name] = mark
-    return {name: save(page.specification(of, over), ("svg",))["svg"]}
-
-
-@cache
-def _sources() -> bytes:
-    """The sources of the code that draws the curves."""
-    return b"".join(resources.files("radarsim.report").joinpath(*name).read_bytes() for name in DRAW)
-
-
-def _drawn(folder: Path) -> dict[str, str]:
-    try:
-        found = json.loads(files.read(folder / DRAWN))
-    except (OSError, ValueError):
-        return {}
-    return {str(name): str(mark) for name, mark in found.items()} if isinstance(found, dict) else {}
+    return tuple(sorted(contents))
 
 
 def _table(done: Readings) -> str:

@@ -8,6 +8,7 @@ import click
 
 from radarsim.cli import group
 from radarsim.errors import ClusterError, DisagreementError, MeasureError, TargetUnmet
+from radarsim.language import tr
 
 if TYPE_CHECKING:
     from radarsim.app.result import Result
@@ -95,18 +96,7 @@ def run(
             compute = partial(draw, overrides=overrides, precision=precision, of=of, decide=decide)
             if shard:
                 compute = partial(simulation.run_share, part=shard)
-            whole, at_once = precision is None and not decide, pool.workers if pool else threads
-            look = None if shard or quiet else partial(_say_what_lacks, out, at_once, whole)
-            _compute_each(loaded, partial(compute, **means), out, quiet, as_json, look)
-
-
-def _say_what_lacks(out: str, threads: int | None, whole: bool, one: "Experiment") -> None:
-    """A line on gaps in a store, such as a missing share, and on the time they take."""
-    from radarsim.app.outlook import lacking
-    from radarsim.cli import outcomes
-
-    if (found := lacking(one, out, threads)) is not None:
-        outcomes.print_lacking(one, found, whole)
+            _compute_each(loaded, partial(compute, **means), out, quiet, as_json, gaps=not (shard or quiet))
 
 
 def _refuse_of_nothing(of: str, precision: float | None) -> None:
@@ -153,15 +143,16 @@ def _compute_each(
     out: str,
     quiet: bool,
     as_json: bool,
-    look: "Callable[[Experiment], None] | None",
+    gaps: bool = False,
 ) -> None:
-    """Compute experiments one by one, each after a forecast, and print the results.
+    """Compute experiments one by one and print the results; gaps: say before what a store with gaps lacks.
 
     Raises DisagreementError at the end for differences beyond chance, else MeasureError where the measure of a claim
     failed, else TargetUnmet for targets that were not reached.
     """
     from radarsim.app import documents
     from radarsim.app import run as simulation
+    from radarsim.app.outlook import lacking
     from radarsim.cli import console, outcomes
 
     made: list[dict[str, Any]] = []
@@ -169,8 +160,8 @@ def _compute_each(
     wrong: list[str] = []
     unmeasured: list[str] = []
     for one in loaded:
-        if look is not None:
-            look(one)
+        if gaps and (line := lacking(one, out)) is not None:
+            console.say_aside(tr("note: {words}", words=line))
         try:
             with console.Progress(one.stem, quiet=quiet) as progress:
                 done = compute(one, progress=progress.update)
@@ -282,7 +273,7 @@ def judge(
         asked: dict[str, Any] = {"precision": precision, "of": of, "threads": threads, "stop": stop}
         asked |= {"command": again, **drawing.arguments}
         compute = partial(judging.finished, warnings=warnings, out=out, **asked)
-        _compute_each([made], compute, out, quiet, as_json, None)
+        _compute_each([made], compute, out, quiet, as_json)
 
 
 @group.main.command()
@@ -380,7 +371,7 @@ def report(
         result.write(out, **drawing.arguments)
         return result
 
-    _compute_each(simulation.load_all(configs, overrides), written, out, False, as_json, None)
+    _compute_each(simulation.load_all(configs, overrides), written, out, False, as_json)
 
 
 @group.main.command()
@@ -466,9 +457,6 @@ def compare(sources: tuple[str, ...], out: str, drawing: group.Drawing, as_json:
 @click.argument("names", nargs=-1, metavar="[CLAIM | PAPER …]")
 @group.realisations_option
 @click.option(
-    "--only", "only", multiple=True, metavar="CHOICE=VALUE", help="Use only readings with this choice; writes no file."
-)
-@click.option(
     "--decide",
     is_flag=True,
     help="Extend the runs, up to N realisations, until each claim is decided over all readings.",
@@ -483,7 +471,6 @@ def compare(sources: tuple[str, ...], out: str, drawing: group.Drawing, as_json:
 def readings(
     names: tuple[str, ...],
     realisations: int | None,
-    only: tuple[str, ...],
     decide: bool,
     threads: int | None,
     time_limit: float | None,
@@ -507,7 +494,6 @@ def readings(
       radarsim readings P1.4                          with every reading of this claim
       radarsim readings P2 -n 200 --threads 2         a quick look; a larger N continues it
       radarsim readings P2 --decide -n 3.2e4          up to 32 000 realisations; undecided claims: exit code 3
-      radarsim readings P1.4 --only start=unweighted
       radarsim readings P1 --json | jq '.[] | select(.depends_on != [])'
     """
     from radarsim.engine import run
@@ -519,7 +505,7 @@ def readings(
         from radarsim.app import readings as app
         from radarsim.cli import console, outcomes
 
-        asked: dict[str, Any] = {"only": only, "realisations": realisations, "decide": decide, "threads": threads}
+        asked: dict[str, Any] = {"realisations": realisations, "decide": decide, "threads": threads}
         asked |= {"time_limit": limit, "out": out, "figures": not no_figures, "stop": stop}
         with console.Progress("readings", quiet=quiet or as_json or markdown) as progress:
             done = python.readings(*names, progress=progress.update, **asked)

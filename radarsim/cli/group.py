@@ -212,12 +212,6 @@ class Share(click.ParamType):
         return int(match[1]), int(match[2])
 
 
-def _plain(ctx: click.Context, param: click.Parameter, value: bool) -> None:
-    """Switch off colours in the terminal's tables for this run."""
-    if value:
-        os.environ["NO_COLOR"] = "1"
-
-
 def _language(ctx: click.Context, param: click.Parameter, value: str | None) -> None:
     """Choose the language of this run and of the processes that it starts; refuse one that is not known."""
     try:
@@ -240,14 +234,6 @@ language_option = click.option(
 
 @click.group(cls=Commands, context_settings=SETTINGS)
 @click.version_option(radarsim.__version__, prog_name="radarsim")
-@click.option(
-    "--no-color",
-    is_flag=True,
-    expose_value=False,
-    is_eager=True,
-    callback=_plain,
-    help="No colours; the same as NO_COLOR=1.",
-)
 @language_option
 def main() -> None:
     """Monte-Carlo experiments on radar and sonar track processing.
@@ -264,8 +250,8 @@ def main() -> None:
       radarsim new mine --like rls2              a radar of your own
       radarsim solve rls2 radar.sigma_velocity_mps --gain r --at 60 --equals 30
 
-    Tab completes commands, options and configs after `eval "$(_RADARSIM_COMPLETE=bash_source radarsim)"` (bash; or
-    zsh_source, fish_source).
+    NO_COLOR=1 switches off colours. Tab completes commands, options and configs after `eval
+    "$(_RADARSIM_COMPLETE=bash_source radarsim)"` (bash; or zsh_source, fish_source).
     """
 
 

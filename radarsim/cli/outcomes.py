@@ -11,17 +11,7 @@ from textwrap import shorten
 from typing import TYPE_CHECKING, Any, TextIO
 
 from radarsim.app import configs
-from radarsim.cli.console import (
-    PIPED_WIDTH,
-    broken,
-    command,
-    counted_cases,
-    field,
-    print_warnings,
-    say,
-    say_aside,
-    show,
-)
+from radarsim.cli.console import PIPED_WIDTH, broken, command, counted_cases, field, print_warnings, say, show
 from radarsim.language import few, listed, numeral, plural, term, tr
 from radarsim.report.wording import interval, known, labelled, printable, shown, significant_digits, with_unit
 from radarsim.report.wording import unit as unit_of
@@ -32,7 +22,7 @@ if TYPE_CHECKING:
     from radarsim.app.compare import Comparison, DopplerChart
     from radarsim.app.configs import Inventory
     from radarsim.app.doctor import Inspection
-    from radarsim.app.outlook import CaseOutlook, Lacking, Need, Outlook
+    from radarsim.app.outlook import CaseOutlook, Need, Outlook
     from radarsim.app.question import Answer
     from radarsim.app.readings import Readings
     from radarsim.app.result import Result
@@ -211,28 +201,6 @@ def _seconds(case: "CaseOutlook") -> str:
     if case.timed or not case.seconds:
         return tr("{t_s:.3g} s", t_s=case.seconds)
     return tr("under {t_s:.2g} s", t_s=case.seconds)
-
-
-def print_lacking(experiment: "Experiment", lacking: "Lacking", whole: bool) -> None:
-    """Gaps in the store of a run, and the time to fill them; whole: whether the run surely computes all of them."""
-    from radarsim.app.outlook import about, missing
-
-    told = {
-        "config": experiment.stem,
-        "stored": lacking.stored,
-        "asked": lacking.asked,
-        "missing": missing(lacking.first),
-        "seconds": about(lacking.seconds),
-        "threads": plural("{count} thread", "{count} threads", lacking.threads),
-    }
-    words = tr("{config}: {stored:,} of {asked:,} realisations are stored; missing: {missing}", **told)
-    if lacking.cases > 1:
-        words += tr(" (of {case}, the first of {count} such cases)", case=lacking.name, count=lacking.cases)
-    if whole:
-        words += tr("; computed now, {seconds} on {threads}", **told)
-    else:
-        words += tr("; all of it takes {seconds} on {threads}", **told)
-    say_aside(tr("note: {words}", words=words))
 
 
 def print_needs(experiment: "Experiment", outlook: "Outlook") -> None:
@@ -687,8 +655,8 @@ def print_readings(done: "Readings", detailed: bool) -> None:
             say(f"{read.paper.readings.paper}: {read.counted.sentence()}")
     if done.files:
         curves = sum(name.endswith(".svg") for name in done.files)
-        drawn = plural("{count} figure redrawn", "{count} figures redrawn", curves)
-        field("table", tr("{file}; curves: {drawn}", file=str(done.folder / "readings.csv"), drawn=drawn))
+        drawn = plural("{count} curve", "{count} curves", curves)
+        field("table", tr("{file}, {curves} beside it", file=str(done.folder / "readings.csv"), curves=drawn))
     if done.outdated:
         command = f"radarsim report {shlex.join(done.outdated)}{configs.into(done.folder.parent)}"
         told = {"configs": listed(done.outdated), "command": command}

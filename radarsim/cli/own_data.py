@@ -240,18 +240,11 @@ def import_(
 @click.argument("plots", metavar="PLOTS.csv")
 @click.option("-o", "--output", metavar="TRACK.csv", help="File for the track; default: the terminal.")
 @click.option("--report", metavar="DIR", help="Write a report into DIR: report.html and its figures.")
-@click.option("--figures", metavar="DIR", help="Write only the figures into DIR.")
 @group.threads_option
 @click.option("-q", "--quiet", is_flag=True, help="Do not report gaps and accuracies.")
 @set_option
 def track(
-    config: str,
-    plots: str,
-    output: str | None,
-    figures: str | None,
-    quiet: bool,
-    overrides: tuple[str, ...],
-    **further: "Any",
+    config: str, plots: str, output: str | None, quiet: bool, overrides: tuple[str, ...], **further: "Any"
 ) -> None:
     """Run the config's filters over recorded measurements.
 
@@ -302,7 +295,6 @@ def track(
         write = stack.enter_context(Writer(output, read)).write if output else outcomes.echo
         counter = stack.enter_context(console.Counter("tracking", "rows"))
         followed = follow.follow(loaded, plots, sink, further["threads"], counter.update)
-    drawn = follow.draw(followed, figures, sources) if figures else []
     folder = further["report"]
     if folder or not quiet:
         with console.Counter("judging", "likelihoods") as counter:
@@ -312,8 +304,6 @@ def track(
         outcomes.report(followed, judged, advised, stderr=output is None)
     if output:
         console.field("track", output)
-    if drawn:
-        console.field("figures", f"{figures} ({', '.join(drawn)})")
     if folder:
         page.write(followed, loaded, plots, judged, advised, folder, sources)
         click.echo(wording.labelled("report", str(Path(folder) / page.NAME)), err=output is None)

@@ -8,12 +8,10 @@ better.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from operator import attrgetter
 
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.config.fields import Model
 from radarsim.engine.results import Track
 from radarsim.language import term, tr
 from radarsim.recorded.follow import Followed, Tally, recorded_of
@@ -273,19 +271,13 @@ def probabilities(track: Track) -> Figure | None:
 
 # ---- accuracy --------------------------------------------------------------------------------------------------------
 LEAST_TESTS = 10  # below which there is no verdict
-CLOSE = 0.005  # relative accuracy to which the mean is brought to 1
-ROUNDS = 60
 FITS, SMALL, LARGE, UNKNOWN = term("fits"), term("too small"), term("too large"), term("too few plots")
 LOST, DOUBT = term("fold lost"), term("too small?")
 
 
 @dataclass(frozen=True)
 class Judged:
-    """One test: filter, measured number, mean NIS with its bounds for a consistent filter, verdict, and the fitting σ.
-
-    better: by config key, the standard deviations for which the mean is one; empty where the stated ones fit, or where
-    there are none such.
-    """
+    """One test: filter, measured number, mean NIS with its bounds for a consistent filter, verdict."""
 
     filter: str
     name: str
@@ -294,17 +286,12 @@ class Judged:
     lo: float
     hi: float
     verdict: str
-    better: Mapping[str, float]
 
 
 def judged(followed: Followed) -> list[Judged]:
-    """Every filter's tests, with the better standard deviations where the stated ones do not fit."""
+    """Every filter's tests."""
     found = [_judge(tally) for tally in followed.tallies.values()]
-    found = [replace(one, verdict=_of_folds(followed.case, one, found)) for one in found]
-    improved = {}
-    for name in {one.filter for one in found if one.verdict in (SMALL, LARGE)}:
-        improved[name] = better(followed.case, name, followed.sample.columns)
-    return [replace(one, better=_own(followed.case, one, improved.get(one.filter, {}))) for one in found]
+    return [replace(one, verdict=_of_folds(followed.case, one, found)) for one in found]
 
 
 def _judge(tally: Tally) -> Judged:
@@ -313,7 +300,7 @@ def _judge(tally: Tally) -> Judged:
     verdict = SMALL if tally.mean > hi else LARGE if tally.mean < lo else FITS
     if tally.count < LEAST_TESTS:
         verdict = UNKNOWN
-    return Judged(tally.filter, tally.name, tally.count, tally.mean, lo, hi, verdict, {})
+    return Judged(tally.filter, tally.name, tally.count, tally.mean, lo, hi, verdict)
 
 
 def _of_folds(case: Case, one: Judged, every: Sequence[Judged]) -> str:
@@ -323,57 +310,3 @@ def _of_folds(case: Case, one: Judged, every: Sequence[Judged]) -> str:
     if one.verdict != SMALL or one.filter not in folds:
         return one.verdict
     return LOST if any(other.name == one.name and other.verdict in (FITS, LARGE) for other in every) else DOUBT
-
-
-def _own(case: Case, one: Judged, improved: Mapping[str, float]) -> dict[str, float]:
-    """The better values of this test's keys."""
-    if one.verdict not in (SMALL, LARGE):
-        return {}
-    keys = recorded_of(case).sigmas(case.spec)[one.name]
-    return {key: improved[key] for key in keys if key in improved}
-
-
-def better(case: Case, filter_name: str, columns: Mapping[str, np.ndarray]) -> dict[str, float]:
-    """The standard deviations, by config key, for which one filter's mean NIS is 1 in each number it tests.
-
-    The filter runs repeatedly over these rows, each σ multiplied by the root of its NIS; empty where that does not
-    converge (a filter whose manoeuvre variance alone explains more than the plots' scatter).
-    """
-    of = recorded_of(case)
-    (options,) = (f for f in case.spec.filters if f.name == filter_name)
-    spec = case.spec.model_copy(update={"filters": (options,), "baseline": None})
-    keys = of.sigmas(spec)
-    stated = {key: float(attrgetter(key)(spec)) for own in keys.values() for key in own}
-    factors = dict.fromkeys(stated, 1.0)
-    for _ in range(ROUNDS):
-        trial = spec
-        for key, factor in factors.items():
-            trial = _set(trial, key, stated[key] * factor)
-        track = of.tracker(replace(case, spec=trial)).feed(dict(columns))
-        off: list[float] = []
-        change: dict[str, list[float]] = {key: [] for key in factors}
-        for q, (name, freedom) in enumerate(track.tested):
-            assert track.nis is not None  # a tested number has its NIS
-            values = track.nis[0, :, q]
-            values = values[np.isfinite(values)]
-            if values.size >= LEAST_TESTS:
-                mean = float(values.mean()) / freedom
-                off.append(abs(mean - 1))
-                for key in keys[name]:
-                    change[key].append(mean)
-        if not off or not np.isfinite(off).all():
-            return {}
-        if max(off) < CLOSE:
-            return {key: stated[key] * factor for key, factor in factors.items() if change[key]}
-        for key, means in change.items():
-            if means:
-                factors[key] *= float(np.clip(np.sqrt(np.mean(means)), 0.25, 4.0))
-        if not all(1e-6 < factor < 1e6 for factor in factors.values()):
-            return {}
-    return {}
-
-
-def _set(spec: Model, key: str, value: float) -> Model:
-    part, name = key.split(".")
-    inner = getattr(spec, part)
-    return spec.model_copy(update={part: inner.model_copy(update={name: value})})

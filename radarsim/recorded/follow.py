@@ -592,16 +592,6 @@ def drawn(followed: Followed) -> "dict[str, Figure]":
     return figures.figures(followed.track(), {name: ways[name] for name in order})
 
 
-def draw(followed: Followed, folder: str | os.PathLike, sources: Iterable[str | os.PathLike] = ()) -> list[str]:
-    """Figures of a track as SVG and PNG into a folder; their names. Errors of `put`."""
-    from radarsim.report import figures
-
-    made = drawn(followed)
-    saved = {f"{name}.{kind}": data for name, one in made.items() for kind, data in figures.save(one).items()}
-    put(folder, saved, sources)
-    return list(made)
-
-
 def put(folder: str | os.PathLike, contents: Mapping[str, bytes], sources: Iterable[str | os.PathLike] = ()) -> None:
     """Write files into a folder. Raises StoreError, and ConfigError, with nothing written, where a file would overwrite
     one of the sources."""

@@ -25,8 +25,8 @@ CLEAR = 3.0  # of the log-likelihood, twenty times: from there on one filter is 
 
 
 def verdict(followed: Followed, judged: Sequence[accuracy.Judged], advised: Advice | None) -> list[str]:
-    """The best filter, and the changes advised: by the likelihood where it is known."""
-    return nearest(judged) if advised is None else likely(followed, advised)
+    """The best filter and the changes advised, by the likelihood; where that is not known, the consistent filters."""
+    return consistent(judged) if advised is None else likely(followed, advised)
 
 
 def rows(followed: Followed) -> list[str]:
@@ -137,22 +137,14 @@ def findings(judged: Sequence[accuracy.Judged]) -> list[str]:
     return [f"{tr(verdict)}: {tr(words)}" for verdict, words in FINDINGS.items() if verdict in there]
 
 
-def nearest(judged: Sequence[accuracy.Judged]) -> list[str]:
-    """Advice for the config: from the filter whose tests are most nearly consistent."""
+def consistent(judged: Sequence[accuracy.Judged]) -> list[str]:
+    """The filters that are consistent in all their tests, unless all are."""
     verdicts: dict[str, set[str]] = {}
     for one in judged:
         verdicts.setdefault(one.filter, set()).add(one.verdict)
-    if fitting := [name for name, found in verdicts.items() if found == {accuracy.FITS}]:
-        words = tr("{names}: consistent in all tests", names=", ".join(fitting))
-        return [labelled("", words)] if len(fitting) < len(verdicts) else []
-    wrong = [one for one in judged if one.better]
-    if not wrong:
-        return []
-    best = min((one for one in wrong), key=lambda one: abs(one.nis - 1))
-    own = {key: value for one in wrong if one.filter == best.filter for key, value in one.better.items()}
-    settings = " ".join(f"--set {key}={value:.4g}" for key, value in own.items())
-    words = tr("closest is {filter}; with its fitted values: {settings}", filter=best.filter, settings=settings)
-    return [labelled("", words)]
+    fitting = [name for name, found in verdicts.items() if found == {accuracy.FITS}]
+    words = tr("{names}: consistent in all tests", names=", ".join(fitting))
+    return [labelled("", words)] if 0 < len(fitting) < len(verdicts) else []
 
 
 def likely(followed: Followed, advised: Advice) -> list[str]:

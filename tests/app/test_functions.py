@@ -146,18 +146,15 @@ def test_claims(tmp_path):
         radarsim.claims("P9", out=tmp_path)
 
 
-@pytest.mark.parametrize("only", [{}, {"start": "unweighted"}])
-def test_readings(tmp_path, only):
-    words = [part for key, value in only.items() for part in ("--only", f"{key}={value}")]
-    found = radarsim.readings("P1.4", only=only)
-    assert document(reading.documents(found)) == printed("readings", "P1.4", *words, "--out", tmp_path, "--no-figures")
+def test_readings(tmp_path):
+    found = radarsim.readings("P1.4")
+    assert document(reading.documents(found)) == printed("readings", "P1.4", "--out", tmp_path, "--no-figures")
     assert found.files == ()
     assert found.figures == ("P1.4",)
     assert repr(found).startswith("P1.4 ")
-    if not only:
-        stored = pd.read_csv(tmp_path / "readings" / "readings.csv")
-        assert found.table.columns.isin(stored.columns).all()
-        pd.testing.assert_frame_equal(found.table, stored[found.table.columns], check_dtype=False)
+    stored = pd.read_csv(tmp_path / "readings" / "readings.csv")
+    assert found.table.columns.isin(stored.columns).all()
+    pd.testing.assert_frame_equal(found.table, stored[found.table.columns], check_dtype=False)
 
 
 @pytest.mark.parametrize("config", ["rls2", "range_doppler"])
@@ -211,9 +208,6 @@ def endless():
         (lambda: radarsim.compare("rls2"), "takes two results or more, got 1"),
         (lambda: radarsim.compare("rls2", "rls4", out="nowhere"), "`radarsim run rls4 --out nowhere` computes it"),
         (lambda: radarsim.chart("sonar_missed"), "study sonar has no chart"),
-        (lambda: radarsim.readings("P1.4", only={"strt": "x"}), "only: strt=x: no choice 'strt'"),
-        (lambda: radarsim.readings("P1.4", only="start=x"), "only: must be a mapping such as"),
-        (lambda: radarsim.readings("P1.4", only=None), "or texts KEY=VALUE, got None"),
         (lambda: radarsim.claims("P1."), "claims: P1. is no claim and no paper; did you mean P1?"),
         (lambda: radarsim.claims("p1.3"), "claims: p1.3 is no claim and no paper; did you mean P1.3?"),
         (lambda: radarsim.run("rls2", overrides=endless()), "overrides['radar.radar.radar']: nested more than 50 deep"),

@@ -150,15 +150,13 @@ def followed(tmp_path, config, overrides, stated=()):
     ],
 )
 @pytest.mark.parametrize("factor", [0.5, 2])
-def test_a_wrong_accuracy_is_seen_and_the_right_one_found(tmp_path, config, overrides, key, true, factor):
+def test_a_wrong_accuracy_is_seen(tmp_path, config, overrides, key, true, factor):
     found = followed(tmp_path, config, overrides, (f"{key}={true * factor!r}",))
     name = {"sigma_range_m": "range_m", "sigma_velocity_mps": "velocity_mps"}.get(key.split(".")[1], "bearing_rad")
     judged = [one for one in accuracy.judged(found) if one.name == name and one.tests]
     assert judged
     for one in judged:
         assert one.verdict == (accuracy.SMALL if factor < 1 else accuracy.LARGE)
-        # σ from n residuals is known to 1/sqrt(2n), and a tenth more for what the filters leave of their freedom.
-        assert one.better[key] == pytest.approx(true, rel=5.85 / np.sqrt(2 * found.rows) + 0.1)
 
 
 def test_a_right_accuracy_is_called_so(tmp_path):
@@ -173,21 +171,21 @@ def test_a_right_accuracy_is_called_so(tmp_path):
 
 
 def test_the_command_tells_gaps_missing_values_and_draws(tmp_path):
-    source, track, figures = tmp_path / "plots.csv", tmp_path / "track.csv", tmp_path / "figures"
+    source, track, report = tmp_path / "plots.csv", tmp_path / "track.csv", tmp_path / "report"
     assert "60 rows" in command("simulate", "rls2", "-o", source, "--set", "scans=60").stdout
     rows = table_of(source)
     rows[10][2] = ""
     del rows[20:30]
     with source.open("w", newline="") as file:
         csv.writer(file).writerows(rows)
-    result = command("track", "rls2", source, "-o", track, "--figures", figures)
+    result = command("track", "rls2", source, "-o", track, "--report", report)
     assert "plots    50 rows over 590 s, from 0 s" in result.stdout
     assert "missing  1 of velocity_mps" in result.stdout
     assert (
         "gaps     1 longer than three times the usual interval of 10 s; the longest 110 s, after 180 s" in result.stdout
     )
     assert "NIS" in result.stdout
-    assert {path.name for path in figures.iterdir()} == {
+    assert {path.name for path in (report / "figures").iterdir()} == {
         f"{n}.{k}" for n in ("plan", "track", "residuals", "nis") for k in ("svg", "png")
     }
     written = table_of(track)
@@ -377,19 +375,11 @@ def test_help_is_grouped_with_one_whole_line_for_each_command():
 
 
 def test_no_colour_when_asked(tmp_path):
-    """On a terminal, with and without."""
-    shell = f"{sys.executable} -m radarsim {{}} claims rls2 --out {tmp_path}"
-    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "120"}
-    environment.pop("NO_COLOR", None)
-    shown = [
-        subprocess.run(
-            ["script", "-qec", shell.format(option), "/dev/null"], capture_output=True, env=environment, check=True
-        )
-        for option in ("", "--no-color")
-    ]
-    for one in shown:
-        assert b"not run" in one.stdout or b"no claims" in one.stdout
-    assert b"\x1b[3" not in shown[1].stdout
+    shell = ["script", "-qec", f"{sys.executable} -m radarsim claims rls2 --out {tmp_path}", "/dev/null"]
+    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "120", "NO_COLOR": "1"}
+    shown = subprocess.run(shell, capture_output=True, env=environment, check=True).stdout
+    assert b"not run" in shown or b"no claims" in shown
+    assert b"\x1b[3" not in shown
 
 
 @pytest.mark.parametrize("name", ["=1+1", "+cmd", "-x", "@sum"])

@@ -130,7 +130,7 @@ def test_recorded_plots_and_a_config_of_ones_own(radarsim, tmp_path):
     for arguments in (
         ("new", "own", "--like", "fifth"),
         ("simulate", "own.yaml", "-o", "plots.csv"),
-        ("track", "own.yaml", "plots.csv", "-o", "track.csv", "--figures", "drawn"),
+        ("track", "own.yaml", "plots.csv", "-o", "track.csv", "--report", "drawn"),
     ):
         radarsim(*arguments, cwd=tmp_path)
     assert "standard deviation of a measured position, m" in (tmp_path / "own.yaml").read_text(encoding="utf-8")

@@ -70,7 +70,7 @@ def proved(python, place):
     told(python, place, "radarsim", "run", "rls2", "-n", 20_000, "--out", "results", "--workers", 1, "--no-figures")
     assert "all intact" in told(python, place, "radarsim", "doctor", "results/rls2", "--recompute", 1)
     told(python, place, "radarsim", "simulate", "sonar_smoothing", "-o", "plots.csv")
-    told(python, place, "radarsim", "track", "sonar_smoothing", "plots.csv", "-o", "track.csv", "--figures", "drawn")
+    told(python, place, "radarsim", "track", "sonar_smoothing", "plots.csv", "-o", "track.csv", "--report", "drawn")
     told(python, place, "radarsim", "new", "mine", "--like", "multimodel")
     told(python, place, "radarsim", "check", "mine.yaml", "--set", "realisations=4000", "--precision", 5)
     assert "must be > 0" in told_fault(python, place, "radarsim", "check", "rls2", "--set", "radar.wavelength_m=-1")
