@@ -263,7 +263,8 @@ def lacking(experiment: Experiment, out: str | os.PathLike[str]) -> str | None:
     (work, held), *others = found.values()
     told: dict[str, Any] = {"config": experiment.stem, "case": work.case.name, "count": len(found)}
     told |= {name: sum(getattr(one, name) for _, one in found.values()) for name in ("asked", "stored")}
-    words = tr("{config}: {stored:,} of {asked:,} realisations are stored; missing: {missing}", **told, missing=missing(held))
+    told["missing"] = missing(held)
+    words = tr("{config}: {stored:,} of {asked:,} realisations are stored; missing: {missing}", **told)
     return words + (tr(" (of {case}, the first of {count} such cases)", **told) if others else "")
 
 
