@@ -7,8 +7,9 @@ import pytest
 import radarsim
 from radarsim.app import result as output
 from radarsim.report import claims, figures, statistics
-from radarsim.studies.sonar import STUDY, exact, scene
+from radarsim.studies.sonar import STUDY, exact
 from radarsim.studies.sonar.figures import plots_figure
+from tests.studies.sonar import counted
 
 FIGURES = {
     "sonar_smoothing": {"plots", "smoothing_gains", "sigma_r", "sigma_vb"},
@@ -67,16 +68,20 @@ def test_conversion_table(results):
     assert (np.abs(middle - table["formula_m"]) < 5.85 / statistics.Z95 * half).all()
 
 
-def test_operations_are_counted():
-    assert scene.recursion().total == 19
-    assert scene.batch_of(6).total > 3 * scene.recursion().total
-    assert scene.augmented().total > 2 * scene.differenced().total
+def test_operations_are_counted(results):
+    table = results["sonar_smoothing"].tables["operations"].set_index("algorithm")
+    found = {"recursion (12)-(14)": counted.recursion(), "Kalman (11), degree 1": counted.kalman_of(2)}
+    found |= {"differenced": counted.differenced(), "augmented": counted.augmented()}
+    found |= {f"least squares (2) on {n} plots": counted.batch_of(n) for n in (2, 3, 5, 6, 10)}
+    assert set(found) == set(table.index)
+    for name, of in found.items():
+        assert table.loc[name, ["products", "sums", "operations"]].tolist() == [of.products, of.sums, of.total]
 
 
 def test_counted_formulas_are_the_filters():
     """What is counted computes: recursion and batch agree with each other on numbers."""
-    numbers = scene.Number
-    tally = scene.Tally()
+    numbers = counted.Number
+    tally = counted.Tally()
 
     def wrap(values):
         return [numbers(float(v), tally) for v in values]
@@ -86,8 +91,8 @@ def test_counted_formulas_are_the_filters():
     for k in range(1, 4):
         step = wrap([times[k] - times[k - 1]])[0]
         u, w = wrap([plots[k]])[0], wrap([weights[k]])[0]
-        memory, estimate = scene.line_step(memory, estimate, u, w, step)
-    anew = scene.batch(wrap(times), wrap(plots), wrap(weights))
+        memory, estimate = counted.line_step(memory, estimate, u, w, step)
+    anew = counted.batch(wrap(times), wrap(plots), wrap(weights))
     assert [n.value for n in estimate] == pytest.approx([n.value for n in anew])
 
 
