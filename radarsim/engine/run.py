@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, Work, added, gaps, share_of, widest
 from radarsim.engine.executors import Executor, Outcome, Serial, Threads
@@ -169,13 +169,11 @@ POLL_S = 0.05
 PROGRESS_S = 0.1
 
 
-@dataclass(frozen=True)
-class Collected(Sums):
-    """The sums of realisations 0 … count-1, and how they were obtained.
+@dataclass(frozen=True, kw_only=True)
+class Progress:
+    """How realisations were obtained: those asked for, those read, those simulated in this call.
 
-    count is the requested number unless `stopped` says why it is less. from_store and computed are realisations: those
-    read, and those simulated in this call. kernel_seconds is the time inside tasks, summed over the workers; kept_as
-    the identity under which the store has them, None without a store.
+    kernel_seconds is the time inside tasks, summed over the workers; stopped says why there are less than asked.
     """
 
     asked: int
@@ -185,21 +183,21 @@ class Collected(Sums):
     kernel_seconds: float
     stopped: str | None
     warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Collected(Progress, Sums):
+    """The sums of realisations 0 … count-1, and how they were obtained; kept_as the identity under which the store has
+    them, None without a store."""
+
     kept_as: str | None
 
 
-@dataclass(frozen=True)
-class Shared:
-    """Result of computing a share, in realisations; `stopped` says why `done` is less than `asked`."""
+@dataclass(frozen=True, kw_only=True)
+class Shared(Progress):
+    """Result of computing a share, of which `done` realisations are there."""
 
-    asked: int
     done: int
-    from_store: int
-    computed: int
-    seconds: float
-    kernel_seconds: float
-    stopped: str | None
-    warnings: tuple[str, ...]
 
 
 class Pace:
@@ -331,13 +329,15 @@ class Dispatch:
         if self._keeper is not None:
             self._keeper.finish(pieces)
 
-    def _warnings(self) -> tuple[str, ...]:
-        if self._keeper is None:
-            return ()
-        store = self._keeper.store
-        if len(store.platforms) < 2:
-            return tuple(store.warnings)
-        return (*store.warnings, mixture(store.platforms))
+    def _progressed(self, stopped: str | None) -> dict[str, Any]:
+        """The fields of `Progress`."""
+        warnings: tuple[str, ...] = ()
+        if self._keeper is not None:
+            platforms = self._keeper.store.platforms
+            warnings = (*self._keeper.store.warnings, *([mixture(platforms)] if len(platforms) > 1 else []))
+        seconds, stopped_by = time.perf_counter() - self.started, {"stopped": stopped, "warnings": warnings}
+        counts = {"asked": self.asked, "from_store": self.from_store, "computed": self.computed}
+        return counts | {"seconds": seconds, "kernel_seconds": self.kernel_seconds} | stopped_by
 
 
 class Run(Dispatch):
@@ -372,18 +372,9 @@ class Run(Dispatch):
         sums = self.total or self.forest.total()
         if self.total is None and self.partial is not None and sums.count == self.full * self.work.block:
             sums = added(sums, self.partial, 0) if self.full else self.partial
-        return Collected(
-            count=sums.count,
-            values=sums.values,
-            asked=self.asked,
-            from_store=self.from_store,
-            computed=self.computed,
-            seconds=time.perf_counter() - self.started,
-            kernel_seconds=self.kernel_seconds,
-            stopped=stopped if sums.count < self.asked else None,
-            warnings=self._warnings(),
-            kept_as=None if self._keeper is None else self._keeper.store.path.name,
-        )
+        short = stopped if sums.count < self.asked else None
+        kept_as = None if self._keeper is None else self._keeper.store.path.name
+        return Collected(count=sums.count, values=sums.values, kept_as=kept_as, **self._progressed(short))
 
 
 class Share(Dispatch):
@@ -419,16 +410,7 @@ class Share(Dispatch):
         self.keep(self.pieces())
         self._report(last=True)
         done = self.done()
-        return Shared(
-            asked=self.asked,
-            done=done,
-            from_store=self.from_store,
-            computed=self.computed,
-            seconds=time.perf_counter() - self.started,
-            kernel_seconds=self.kernel_seconds,
-            stopped=stopped if done < self.asked else None,
-            warnings=self._warnings(),
-        )
+        return Shared(done=done, **self._progressed(stopped if done < self.asked else None))
 
 
 # ---- collect ---------------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ The work array x (F + 1, 3, n) holds the filters' states and, last, the plots (i
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,18 +39,8 @@ class Problem(NamedTuple):
 
     def plain(self) -> "Problem":
         """The same with arrays as the kernels take them, sigma (K, 2) and dt (K,); itself where they are so."""
-        filters, scans = np.shape(self.gains)[:2]
-        return Problem(
-            plain(self.key, 2, dtype=np.uint64),
-            plain(self.truth, scans, 3),
-            plain(self.sigma, scans, 2),
-            plain(self.dt, scans),
-            plain(self.observes, filters, dtype=np.int64),
-            plain(self.start, filters, dtype=np.int64),
-            plain(self.weights, *np.shape(self.weights)),
-            plain(self.gains, *np.shape(self.gains)),
-            int(self.baseline),
-        )
+        scans = len(self.truth)
+        return as_taken(self, sigma=(scans, 2), dt=(scans,))
 
 
 class Sums(NamedTuple):
@@ -246,6 +236,20 @@ def plain(array, *shape, dtype=np.float64):
     made = np.empty(shape, dtype=dtype)
     made[...] = array
     return made
+
+
+WHOLE: dict[str, type] = {
+    **dict.fromkeys(("key", "keys"), np.uint64),
+    **dict.fromkeys(("observes", "start", "given"), int),
+}
+
+
+def as_taken(problem: Any, **shapes: tuple[int, ...]) -> Any:
+    """A problem with its arrays as the kernels take them, by name: of these shapes, else of their own."""
+    arrays = {name: value for name, value in problem._asdict().items() if name in shapes or np.ndim(value)}
+    types = {name: WHOLE.get(name, np.float64) for name in arrays}
+    made = {name: plain(one, *shapes.get(name, np.shape(one)), dtype=types[name]) for name, one in arrays.items()}
+    return problem._replace(**made)
 
 
 def simulate_block(problem: Problem, first: int, count: int, sums: Sums) -> None:

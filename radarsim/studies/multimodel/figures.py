@@ -314,10 +314,8 @@ def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
             count = operations[(result.name, stage, row["filter"])]["operations"].to_numpy(float)
             lo, hi, value = (np.array([row[key]]) for key in ("sigma_lo", "sigma_hi", "sigma"))
             marks.append(Line(count, value, panels.literal(row["filter"]), style, lo, hi))
-        x, y = (
-            Axis(tr("operations per update"), limits=(0, 1.06 * float(most))),
-            Axis(panels.sigma_of("$y$", "m"), "log"),
-        )
+        x = Axis(tr("operations per update"), limits=(0, 1.06 * float(most)))
+        y = Axis(panels.sigma_of("$y$", "m"), "log")
         drawn.append(Panel(x, y, tuple(marks), tr(str(stage)), direct=False))
     points = [mark for mark in drawn[-1].marks if isinstance(mark, Line)]
     cheap, good = min(points, key=lambda one: float(one.x[0])), min(points, key=lambda one: float(one.y[0]))

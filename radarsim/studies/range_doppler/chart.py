@@ -300,10 +300,8 @@ def over_groups(own: Sequence[Place], known: Sequence[Place]) -> Figure:
             keys.append((panels.literal(one.name), style))
         limits = (float(MAP_C_THETA[0]), float(MAP_C_THETA[-1]))
         rows = (float(MAP_LAMBDA[0]), float(MAP_LAMBDA[-1]))
-        across, up = (
-            Axis(f"$C_\\theta = (\\tau_1/\\Delta t)^2$\n{tr('velocity coarse ← → fine')}", "log", limits),
-            Axis(f"{tr('scan period short ← → long')}\n$\\Lambda = (\\Delta t/\\tau_2)^3$", "log", rows),
-        )
+        across = Axis(f"$C_\\theta = (\\tau_1/\\Delta t)^2$\n{tr('velocity coarse ← → fine')}", "log", limits)
+        up = Axis(f"{tr('scan period short ← → long')}\n$\\Lambda = (\\Delta t/\\tau_2)^3$", "log", rows)
         made.append(Panel(across, up, tuple(marks), tr(name), tuple(keys) if i == 0 else ()))
     caption = tr(
         "The limit of a short period is valid where Λ is small; above, a long period changes the gain. "

@@ -211,10 +211,8 @@ def believed_figure(
         name=BY_NAME[component].words,
         last=last,
     )
-    x, y = (
-        Axis(tr("correlation $\\rho$ of neighbouring errors")),
-        Axis(tr("$\\sigma$ / $\\sigma$ of a plot"), limits=(0, 1.75)),
-    )
+    x = Axis(tr("correlation $\\rho$ of neighbouring errors"))
+    y = Axis(tr("$\\sigma$ / $\\sigma$ of a plot"), limits=(0, 1.75))
     drawn = (
         Panel(x, y, tuple(left), direct=False, legend="upper left"),
         Panel(x, Axis(tr("normalised squared error"), "log"), tuple(right), direct=False),

@@ -325,10 +325,8 @@ class PlotLikelihood:
                 P[np.arange(C) * size + i, np.arange(C) * size + i] = rate**2
             model, scale, white = (x, P, one.F, one.Q, H), manoeuvre, 1.0
             if correlation:
-                first, of = (
-                    np.zeros((C * size, C)),
-                    np.arange(C),
-                )  # it is where the first plot is, and errs by its errors
+                first = np.zeros((C * size, C))
+                of = np.arange(C)
                 first[of * size, of] = -sigma
                 shares = correlation ** (np.diff(one.t, prepend=0.0) / self.usual_s)
                 model = lasting(x, P, first, one.F, manoeuvre * one.Q, H, variance, shares)

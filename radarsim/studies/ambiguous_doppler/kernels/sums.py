@@ -54,10 +54,8 @@ def run_filters(world, banks, memory, fresh):
             if how != rec.REMEMBERS:
                 run_interacting(bank, how, sigma, world.spans, plots, out, address(memory.interacting))
                 continue
-            room, limits = (
-                (address(memory.together), address(memory.broad), lists),
-                (np.exp(-banks.deepest[b]), banks.most[b]),
-            )
+            room = (address(memory.together), address(memory.broad), lists)
+            limits = (np.exp(-banks.deepest[b]), banks.most[b])
             for lane in range(WIDTH):
                 own = address(memory.out[b * scans * rec.OUTPUT * WIDTH + lane :])
                 run_together(bank, limits, sigma, world.spans, address(memory.plots[lane:]), own, room)

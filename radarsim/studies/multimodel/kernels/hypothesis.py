@@ -118,17 +118,13 @@ def mixed_cross(listed, count, shares, block, means, mean, others, other):
 @inline
 def mixed(work, listed, count):
     """Means of the three axes, own blocks, blocks between axes: of the listed hypotheses, by the shares."""
-    shares, of_x, of_y, of_z = (
-        row(work, rec.SHARE),
-        row(work, rec.MEAN),
-        row(work, rec.MEAN + 3),
-        row(work, rec.MEAN + 6),
-    )
-    x, y, z = (
-        mixed_mean(listed, count, shares, of_x),
-        mixed_mean(listed, count, shares, of_y),
-        mixed_mean(listed, count, shares, of_z),
-    )
+    shares = row(work, rec.SHARE)
+    of_x = row(work, rec.MEAN)
+    of_y = row(work, rec.MEAN + 3)
+    of_z = row(work, rec.MEAN + 6)
+    x = mixed_mean(listed, count, shares, of_x)
+    y = mixed_mean(listed, count, shares, of_y)
+    z = mixed_mean(listed, count, shares, of_z)
     return (
         (x, y, z),
         (
@@ -187,11 +183,9 @@ def predict_and_update(work, mixture, F, Q, target, result, plot, noise):
     """Predict a mixture (means, own blocks, blocks between axes), update it with a plot, write it: see `advance`."""
     means, own, cross = mixture
     x, y, z = predicted(means[0], F), predicted(means[1], F), predicted(means[2], F)
-    xx, yy, zz = (
-        predicted_covariance(own[0], F, Q),
-        predicted_covariance(own[1], F, Q),
-        predicted_covariance(own[2], F, Q),
-    )
+    xx = predicted_covariance(own[0], F, Q)
+    yy = predicted_covariance(own[1], F, Q)
+    zz = predicted_covariance(own[2], F, Q)
     xy, xz, yz = predicted_cross(cross[0], F), predicted_cross(cross[1], F), predicted_cross(cross[2], F)
 
     R = get6(noise, 0)

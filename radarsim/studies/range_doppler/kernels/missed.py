@@ -11,7 +11,7 @@ import numpy as np
 
 from radarsim.kernels.compile import aligned_zeros, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, row
-from radarsim.kernels.linear import CROSSED, fill_plots, plain
+from radarsim.kernels.linear import CROSSED, as_taken, fill_plots
 from radarsim.kernels.random import fill_uniform_pairs
 from radarsim.studies.range_doppler.kernels import steps
 
@@ -43,25 +43,7 @@ class Problem(NamedTuple):
 
     def plain(self) -> "Problem":
         """The same with arrays and numbers as the kernels take them."""
-        filters, scans = len(self.observes), len(self.truth)
-        return Problem(
-            plain(self.keys, 3, 2, dtype=np.uint64),
-            plain(self.truth, scans, 3),
-            plain(self.sigma, 2),
-            plain(self.bias, 2),
-            plain(self.sigma_bias, 2),
-            plain(self.sigma_flight, 6),
-            plain(self.flight, len(self.flight), 9),
-            float(self.detection),
-            float(self.dt),
-            plain(self.observes, filters, dtype=np.int64),
-            plain(self.start, filters, dtype=np.int64),
-            plain(self.Q, filters, 6),
-            int(self.baseline),
-            plain(self.given, filters, dtype=np.int64),
-            plain(self.gains, filters, scans, 3, 2),
-            plain(self.believed, filters, scans, 6),
-        )
+        return as_taken(self)
 
 
 class Sums(NamedTuple):

@@ -287,10 +287,8 @@ def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
         tracker=shown.tracker,
         k=len(result.axes.k),
     )
-    x, y = (
-        Axis(tr("distance east, km"), limits=(west * km, east * km)),
-        Axis(tr("distance north, km"), limits=(south * km, north * km)),
-    )
+    x = Axis(tr("distance east, km"), limits=(west * km, east * km))
+    y = Axis(tr("distance north, km"), limits=(south * km, north * km))
     panel = Panel(x, y, tuple(marks), direct=False, equal=True)
     return Figure(
         "track_map", tr("Plots, gates and tracks"), caption, (panel,), width_mm=panels.WIDE_MM, panel_height_mm=100

@@ -217,12 +217,8 @@ def prepare(case: Case) -> Plan:
     F, K = len(specs), len(scene.t)
     common = base.shapes(F, K, COORDINATES, SIZE)
     del common["paired"]  # trackers keep tracks in different realisations
-    own, labels, shift, drawn = (
-        tracker.shapes(F, K, len(filters.THRESHOLDS)),
-        axes(case, scene, specs, given),
-        None,
-        None,
-    )
+    own, labels = tracker.shapes(F, K, len(filters.THRESHOLDS)), axes(case, scene, specs, given)
+    shift = drawn = None
     if spec.rare is not None and spec.rare.seeks_false_tracks:
         del own["begun"]
         own |= {"held": (F, K, 4), "drawn": (F, 3)}

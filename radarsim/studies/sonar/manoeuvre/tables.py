@@ -7,8 +7,6 @@ threshold_k: its threshold k
 false_alarm_probability: of the threshold, by the χ² law
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from radarsim.engine.results import CaseResult
@@ -19,9 +17,6 @@ from radarsim.studies.sonar.exact import sigma_acceleration
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre.exact import QUANTITIES, ManoeuvreAxes
 from radarsim.studies.sonar.tables import Index
-
-if TYPE_CHECKING:
-    pass
 
 table = common.Tables()
 PHASES = np.array(["steady", "manoeuvre", "after"], dtype=object)
