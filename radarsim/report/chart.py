@@ -257,13 +257,14 @@ def markers(places: Sequence[tuple[float, float]], style: Style) -> Markup:
     return Markup('<path class="{}" d="{}"/>').format(full, path)
 
 
-def extent_of(mark: Mark) -> tuple[np.ndarray, np.ndarray]:
-    """The extent of a mark in x and y, for the limits."""
+def extent_of(mark: Mark, log: bool) -> tuple[np.ndarray, np.ndarray]:
+    """The extent of a mark in x and y, for the limits; points that an axis of y (logarithmic or not) lacks are out."""
     none = np.zeros(0)
     match mark:
         case Line():
-            ends = [part for part in (mark.lo, mark.hi) if part is not None]
-            return np.asarray(mark.x, float), np.concatenate([np.asarray(part, float) for part in (mark.y, *ends)])
+            y = np.asarray(mark.y, float)
+            ends = [np.asarray(part, float) for part in (mark.lo, mark.hi) if part is not None]
+            return np.asarray(mark.x, float)[np.isfinite(y) & ((y > 0) | (not log))], np.concatenate([y, *ends])
         case Reference():
             return (none, np.array([mark.value])) if mark.across == "y" else (np.array([mark.value]), none)
         case Bars():
@@ -439,7 +440,7 @@ class _Frame:
 
     def __init__(self, panel: Panel, heats: Heats):
         self.heats = heats
-        self.panel, extent = panel, [extent_of(mark) for mark in panel.marks]
+        self.panel, extent = panel, [extent_of(mark, panel.y.scale == "log") for mark in panel.marks]
         if any(isinstance(mark, Heat | Bars) for mark in panel.marks):
             panel = self.panel = by_number(panel)
         above = len(panel.y.label.split("\n"))
@@ -524,7 +525,9 @@ class _Frame:
             made += Markup('<path class="l" d="{}"{}/>').format(path(x, y), dashed(line.style))
         step = 1 if line.style.dash is None else max(1, -(-len(x) // min(MARKED, max(1, points // FEWER))))
         if line.style.marker is not None:
-            made += markers(places(x[::step], y[::step]), line.style)
+            alone = [run[0] for run in unbroken(np.isfinite(x) & np.isfinite(y)) if len(run) == 1]
+            shown = np.union1d(np.arange(0, len(x), step), np.array(alone, int))
+            made += markers(places(x[shown], y[shown]), line.style)
         if "exact" in whole:
             first = 0 if step == 1 else step // 2  # of many, markers and crosses by turns
             known = places(x[first::step], self.y.place(whole["exact"])[first::step])

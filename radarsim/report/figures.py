@@ -598,13 +598,14 @@ def _line(axes: Axes, line: Line, crosses: str) -> None:
     scattered = line.style.dash is None
     step = 1 if scattered else max(1, -(-len(line.x) // MARKED))
     every = step if line.exact is None or step == 1 else 2 * step  # of many, markers and crosses by turns
-    axes.plot(line.x, line.y, markevery=every, zorder=3, label=line.label or line.name or None, **_look(line.style))
+    alone = [run[0] for run in chart.unbroken(np.isfinite(line.y)) if len(run) == 1]  # no line and no band shows it
+    marked = sorted({*range(0, len(line.x), every), *alone}) if alone else every
+    axes.plot(line.x, line.y, markevery=marked, zorder=3, label=line.label or line.name or None, **_look(line.style))
     if line.lo is not None and line.hi is not None:
         if line.style.dash is None:
             axes.vlines(line.x, line.lo, line.hi, color=_colour(line.style), linewidth=0.8, zorder=2.8)
         else:
             axes.fill_between(line.x, line.lo, line.hi, color=_colour(line.style), alpha=0.25, linewidth=0, zorder=2)
-            alone = [run[0] for run in chart.unbroken(np.isfinite(line.y)) if len(run) == 1]  # no band has its width
             axes.vlines(line.x[alone], line.lo[alone], line.hi[alone], color=_colour(line.style), linewidth=0.8)
     if line.exact is not None:
         first = 0 if step == 1 else step

@@ -480,10 +480,15 @@ def _coincide(one: str, other: str, every: Sequence[Mapping[str, Mark]], figure:
     return drawn
 
 
-def never_lost(lines: Sequence[Line]) -> str:
-    """Words on the lines without any losses, after a caption."""
-    names = [plain(line.name or line.label) for line in lines if not (line.y > 0).any()]
-    return " " + tr("Never lost: {names}.", names=seen.named(names, MOST_GONE)) if names else ""
+def ever_lost(lines: Sequence[Line]) -> tuple[tuple[Line, ...], str]:
+    """The complements of shares that have a loss, and words on zeros, which a logarithmic axis lacks, for a caption."""
+    losses = tuple(map(lost, lines))
+    drawn = tuple(line for line in losses if (line.y > 0).any())
+    names = [plain(line.name or line.label) for line in losses if not (line.y > 0).any()]
+    said = " " + tr("Zero throughout, so not drawn: {names}.", names=seen.named(names, MOST_GONE)) if names else ""
+    if any((line.y == 0).any() for line in drawn):
+        said += " " + tr("A zero has no point on this axis.")
+    return drawn, said
 
 
 def shared(drawn: Sequence[Panel]) -> list[Panel]:

@@ -187,3 +187,15 @@ def test_a_point_of_a_band_without_a_neighbour_has_a_whisker():
     x, y = np.arange(6.0), np.array([5, 5, np.nan, 5, np.nan, 5])
     drawn = one(Line(x, y, "a", lo=y - 2, hi=y + 2)).panels[0].svg
     assert [re.search(rf'class="{kind}" d="([^"]*)"', drawn)[1].count("M") for kind in "bw"] == [1, 2]
+
+
+def test_points_that_a_logarithmic_axis_lacks_do_not_widen_the_other_and_lone_ones_are_marked():
+    x, y = np.arange(1.0, 101.0), np.zeros(100)
+    y[[50, 51, 52, 77]] = 1.0
+    lines = Line(x, y, "a", Style(0, 0, 0))
+    panel = chart.chart(Figure("f", "t", "c", (Panel(Axis("x"), Axis("y", "log"), (lines,)),))).panels[0]
+    _, low, high, *_ = panel.data["x"]
+    assert 49 < low < 51
+    assert 78 < high < 80
+    markers = re.search(r'class="m" d="([^"]*)"', panel.svg)[1].count("M")
+    assert markers == len({i for i in range(0, 100, 7) if y[i]} | {77})

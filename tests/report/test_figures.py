@@ -42,8 +42,19 @@ def test_the_line_is_drawn_as_given():
 
 def test_a_point_of_a_band_without_a_neighbour_has_a_whisker():
     y = np.array([5, 5, np.nan, 5])
-    _, bars = drawn(one(Line(np.arange(4.0), y, "a", lo=y - 2, hi=y + 1))).collections
-    np.testing.assert_array_equal(bars.get_segments(), [[[3, 3], [3, 6]]])
+    axes = drawn(one(Line(np.arange(4.0), y, "a", lo=y - 2, hi=y + 1)))
+    np.testing.assert_array_equal(axes.collections[1].get_segments(), [[[3, 3], [3, 6]]])
+    y = np.where(np.arange(60) == 55, 5.0, np.nan)
+    assert drawn(one(Line(np.arange(60.0), y, "a", Style(0, 0, 0)))).lines[0].get_markevery()[-2:] == [55, 56]
+
+
+def test_lines_that_never_lose_are_named_and_not_drawn():
+    shares = [Line(np.arange(3.0), np.array(y), name) for y, name in (([1, 1, 1], "a"), ([1, 0.9, 0.8], "b"))]
+    (line,), said = panels.ever_lost(shares)
+    assert line.label == "b"
+    np.testing.assert_allclose(line.y, [0, 0.1, 0.2])
+    assert said == " Zero throughout, so not drawn: a. A zero has no point on this axis."
+    assert panels.ever_lost([replace(shares[1], y=np.full(3, 0.5))])[1] == ""
 
 
 def test_markers_and_crosses_take_turns():

@@ -369,7 +369,7 @@ class Panel {
     for (const line of this.lines) {
       if (this.off.has(line.g)) continue;
       const xs = this.xs[line.x];
-      if (axis === "x") values.push(...xs);
+      if (axis === "x") values.push(...xs.filter((_, i) => line.y[i] !== null && (!this.log.y || line.y[i] > 0)));
       else {
         for (let i = 0; i < xs.length; i++) {
           if (range && (xs[i] < range[0] || xs[i] > range[1])) continue;
@@ -518,10 +518,11 @@ class Panel {
       if (path) path.setAttribute("d", d);
     };
     const round = (v) => v.toFixed(1);
+    const alone = (i) => good[i] && !good[i - 1] && !good[i + 1];
     const sprinkled = (values, first, kind) => {
       let d = "";
-      for (let i = first; i < xs.length; i += step) {
-        if (Number.isFinite(xs[i]) && Number.isFinite(values[i])) d += `M${round(xs[i])} ${round(values[i])}${kind}`;
+      for (let i = 0; i < xs.length; i++) {
+        if ((i % step === first || alone(i)) && Number.isFinite(xs[i]) && Number.isFinite(values[i])) d += `M${round(xs[i])} ${round(values[i])}${kind}`;
       }
       return d;
     };
@@ -536,12 +537,12 @@ class Panel {
     const edge = (key, end) => at(key).map((v) => (Number.isFinite(v) ? v : end));
     const low = edge("l", 1e4), high = edge("h", -1e4), known = (i) => line.l[i] !== null || line.h[i] !== null;
     const there = xs.map((_, i) => i).filter((i) => good[i] && known(i));
-    if (line.p) put("w", there.map((i) => `M${round(xs[i])} ${round(low[i])}V${round(high[i])}`).join(""));
-    else {
+    put("w", there.filter((i) => line.p || alone(i)).map((i) => `M${round(xs[i])} ${round(low[i])}V${round(high[i])}`).join(""));
+    if (!line.p) {
       const broad = there.some((i) => low[i] - high[i] >= 2 * SEEN);
       const runs = [];
       there.forEach((i, n) => { if (n && there[n - 1] === i - 1) runs.at(-1).push(i); else runs.push([i]); });
-      const rings = runs.map((run) => [...run.map((i) => [xs[i], high[i]]), ...run.reverse().map((i) => [xs[i], low[i]])]);
+      const rings = runs.filter((run) => run.length > 1).map((run) => [...run.map((i) => [xs[i], high[i]]), ...run.reverse().map((i) => [xs[i], low[i]])]);
       put("b", broad ? rings.map((ring) => `M${ring.map(([a, b]) => `${round(a)} ${round(b)}`).join("L")}z`).join("") : "");
     }
   }

@@ -116,6 +116,7 @@ def share_figure(
 def rare_figure(results: Sequence[Result], table: "pd.DataFrame") -> dict[str, Figure]:
     """Instead of `right`, where all folds are right almost always: how often not at the last scan, over a swept key."""
     drawn: list[Panel] = []
+    said: list[str] = []
     rows = tables.groups(table, "case", "filter")
     for (_, keys), members in sweeps.families(results).items():
         x, axis = sweeps.places(members[0], keys[0], [dict(one.swept)[keys[0]] for one in members])
@@ -128,15 +129,16 @@ def rare_figure(results: Sequence[Result], table: "pd.DataFrame") -> dict[str, F
                 marks.append(panels.line_of(x[order], ends, ("right", "right_lo", "right_hi"), panels.literal(f), look))
         if len(keys) > 1 or axis.ticks or not marks or min(float(mark.y.min()) for mark in marks) < 1 - panels.RARE:
             return {}
-        losses = [panels.lost(mark) for mark in marks]
-        drawn.append(Panel(axis, panels.loss_axis(tr("P(a fold is wrong)"), losses), tuple(losses)))
+        losses, none = panels.ever_lost(marks)
+        said += [none]
+        drawn += [Panel(axis, panels.loss_axis(tr("P(a fold is wrong)"), losses), losses)] if losses else []
     if not drawn:
         return {}
     caption = tr(
         "Share of realisations in which a fold is wrong by the last scan, for the best hypothesis, of "
         "{realisations} each. Bands: 95 % intervals.",
         realisations=panels.realisations(results),
-    )
+    ) + "".join(dict.fromkeys(said))
     figure = panels.in_columns(Figure("right", tr("P(a fold is wrong)"), caption, tuple(drawn)))
     return {"right": seen.begun(figure, seen.extremes(figure))}
 

@@ -188,9 +188,8 @@ def _shares(x: Axis, marks: Sequence[Line], least: float | None = None) -> tuple
     """Shares of locked bursts over x, where some lock almost always those that do not; and words for the caption."""
     if not panels.is_rare(marks):
         return Panel(x, Axis(tr("share locked"), limits=(least, 1)), tuple(marks), direct=False), ""
-    losses = [panels.lost(mark) for mark in marks]
-    panel = Panel(x, panels.loss_axis(tr("share not locked"), losses), tuple(losses), direct=False)
-    return panel, panels.never_lost(losses)
+    losses, said = panels.ever_lost(marks)
+    return Panel(x, panels.loss_axis(tr("share not locked"), losses), losses, direct=False), said
 
 
 def accuracy(result: CaseResult, made: Mapping) -> Figure:

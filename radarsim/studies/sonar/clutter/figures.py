@@ -223,7 +223,7 @@ def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
         realisations=panels.realisations(results),
     )
     if never := rows.groupby("filter", sort=False)[rate].sum().loc[lambda rates: rates == 0].index.tolist():
-        caption += " " + tr("None occurred: {names}.", names=few(never))
+        caption += " " + tr("Zero throughout, so not drawn: {names}.", names=few(never))
     panel = Panel(x, Axis(tr("false tracks per hour"), "log"), marks, keys=keys, direct=False)
     return Figure("false_tracks", tr("False tracks"), caption, (panel,), width_mm=panels.WIDE_MM)
 
