@@ -78,7 +78,7 @@ GROUND = ("errors", "failures", "threads", "constants", "kernels", "physics", "b
 KEYS = ("errors", "constants", "config.document", "config.fields", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
-SHOWN = (*SUMS, "cost", "tables", "figures", "map")
+SHOWN = (*SUMS, "cost", "tables", "figures")
 READ = (*SHOWN, "words", "measures", "readings", "search")
 ROLES = {
     "kernels": (("kernels", "bursts.kernels"), ("kernels",)),
@@ -91,14 +91,13 @@ ROLES = {
     "floor": ((*GROUND, *DATA, "studies.floor"), SUMS),
     "cost": ((*GROUND, *DATA), (*SUMS, "cost")),
     "tables": ((*GROUND, *DATA, "report"), SHOWN),
-    "figures": ((*GROUND, *DATA, "report", "language"), SHOWN),
+    "figures": ((*GROUND, *DATA, "report", "language"), (*SHOWN, "track")),  # of one realisation, followed as a record
     "words": ((*GROUND, *DATA, "report", "language"), READ),
     "measures": ((*GROUND, *DATA, "report"), READ),
     "readings": ((*GROUND, *DATA, "report"), READ),  # what the paper leaves open
     "search": ((*GROUND, *DATA, "report"), READ),  # its printed numbers under many readings
     "chart": ((*GROUND, *DATA, "report", "language"), READ),
     "track": ((*GROUND, *DATA, "studies.noise", "studies.interface"), (*SUMS, "track")),
-    "map": ((*GROUND, *DATA), (*SUMS, "track")),  # one realisation followed as recorded plots are, for a figure
     "__init__": (
         (
             *CASE,

@@ -25,7 +25,7 @@ from radarsim.studies.registry import SHIPPED, module, study
 
 PACKAGE = Path(__file__).parents[1]
 ROOMS = ("app/configs.py", "bursts", "config", "engine", "constants.py", "kernels", "physics.py")
-SHOW = {"claims", "figures", "map", "measures", "readings", "tables", "words"}  # a study's files, by stem
+SHOW = {"claims", "figures", "measures", "readings", "tables", "words"}  # a study's files, by stem
 
 
 def identity(case: Case) -> str:

@@ -6,7 +6,7 @@ import radarsim
 from radarsim.app.configs import load
 from radarsim.config.load import as_yaml
 from radarsim.errors import ConfigError
-from radarsim.studies.ambiguous_doppler.search import cures
+from radarsim.studies.ambiguous_doppler.words import cures
 
 RADAR = {
     "wavelength_m": 0.1,

@@ -9,9 +9,9 @@ from radarsim.engine.results import CaseResult
 from radarsim.language import few, listed, term, tr
 from radarsim.report import panels, seen, tables, wording
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Style
-from radarsim.studies.sonar.clutter.filters import ClutterAxes
-from radarsim.studies.sonar.clutter.map import realisation_map
+from radarsim.studies.sonar.clutter.filters import ClutterAxes, TrackerSpec, conditions, gate_threshold, tracker_specs
 from radarsim.studies.sonar.clutter.tables import ENDED
+from radarsim.studies.sonar.clutter.track import confirmed_tracks, false_plots, target_plots
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -260,36 +260,83 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
     )
 
 
+NEAR_M = 2500.0  # the map shows what is nearer than this to the target's course
+EVERY = 4  # scans between the gates that the map shows
+Curve = tuple[np.ndarray, np.ndarray]  # distances north and east, m
+
+
 def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
-    """Plots, gates and tracks of realisation 0 of a case on a map."""
-    shown = realisation_map(result)
-    km = 1e-3
-    marks = [Line(shown.false[1] * km, shown.false[0] * km, tr("false plots"), Style(GREY, None, 0, 1.1, 1.0))]
+    """Realisation 0 of a case on a map, near the target's course: its course and plots, false plots, and the confirmed
+    tracks and gates of the first tracker that has to find its plots."""
+    spec, axes, specs = result.spec, result.axes, tracker_specs(result.spec)
+    z, true = target_plots(axes.world, axes.detections, 0)
+    course = _flat(*true.T)
+    (south, north), (west, east) = ((side.min() - NEAR_M, side.max() + NEAR_M) for side in course)
+    scans, near_ones = [], []
+    for k, t in enumerate(np.cumsum(axes.world.dt)):
+        r, b = false_plots(axes.field, 0, k)
+        x, y = _flat(r, b)
+        near = (south < x) & (x < north) & (west < y) & (y < east)
+        near_ones.append(np.stack([x[near], y[near]]))
+        own = z[k][:, None] if np.isfinite(z[k, 0]) else np.zeros((2, 0))
+        scans.append((t, *np.concatenate([own, np.stack([r[near], b[near]])], axis=1)))
+    f = next((i for i, one in enumerate(specs) if one.association != "known"), None)
+    found = [] if f is None else confirmed_tracks(specs[f], conditions(spec), scans)
+    states = [np.array(track.states) for track in found]
+    every = [_flat(own[:, 0], own[:, 2]) for own in states]
+    order = sorted(range(len(found)), key=lambda n: _distance(every[n], course))
+    tracks, false = [every[n] for n in order], np.concatenate(near_ones, axis=1)
+    gates = [
+        _ellipse(gate, specs[f or 0])
+        for n in order[:1]
+        for k, gate in zip(found[n].scans, found[n].gates, strict=True)
+        if not k % EVERY
+    ]
+    marks = [_on_map((false[0], false[1]), tr("false plots"), Style(GREY, None, 0, 1.1, 1.0))]
     curves = (
-        (tr("its gates"), shown.gates, Style(3, 0, None, 0.6)),
-        (tr("other tracks"), shown.tracks[1:], Style(GREY, 0, None, 1.0)),
-        (tr("track nearest to the course"), shown.tracks[:1], Style(2, 0, None, 1.8)),
+        (tr("its gates"), [gate for gate in gates if np.isfinite(gate[0]).all()], Style(3, 0, None, 0.6)),
+        (tr("other tracks"), tracks[1:], Style(GREY, 0, None, 1.0)),
+        (tr("track nearest to the course"), tracks[:1], Style(2, 0, None, 1.8)),
     )
     for label, drawn, style in curves:
-        marks += [Line(y * km, x * km, "" if n else label, style) for n, (x, y) in enumerate(drawn)]
-    marks += [
-        Line(shown.truth[1] * km, shown.truth[0] * km, tr("target"), Style(1, 1, None)),
-        Line(shown.plots[1] * km, shown.plots[0] * km, tr("target plots"), Style(1, None, 1, 1.1, 2.0)),
-    ]
-    (south, north), (west, east) = shown.window
+        marks += [_on_map(one, "" if n else label, style) for n, one in enumerate(drawn)]
+    marks.append(_on_map(course, tr("target"), Style(1, 1, None)))
+    marks.append(_on_map(_flat(*z[np.isfinite(z[:, 0])].T), tr("target plots"), Style(1, None, 1, 1.1, 2.0)))
     caption = tr(
         "Confirmed tracks near the target: {tracks}, among {false} false plots in {k} scans. The target's course and "
         "plots, the false plots of all scans, the tracks, and at every fourth scan the gate of the one nearest to the "
         "course, in realisation 0 of {name}, tracker {tracker}.",
-        tracks=len(shown.tracks),
-        false=len(shown.false[0]),
+        tracks=len(tracks),
+        false=len(false[0]),
         name=panels.plain_label(result),
-        tracker=shown.tracker,
-        k=len(result.axes.k),
+        tracker="" if f is None else spec.filters[f].name,
+        k=len(axes.k),
     )
-    x = Axis(tr("distance east, km"), limits=(west * km, east * km))
-    y = Axis(tr("distance north, km"), limits=(south * km, north * km))
-    panel = Panel(x, y, tuple(marks), direct=False, equal=True)
-    return Figure(
-        "track_map", tr("Plots, gates and tracks"), caption, (panel,), width_mm=panels.WIDE_MM, panel_height_mm=100
-    )
+    x_axis = Axis(tr("distance east, km"), limits=(west / 1e3, east / 1e3))
+    y_axis = Axis(tr("distance north, km"), limits=(south / 1e3, north / 1e3))
+    panel, title = Panel(x_axis, y_axis, tuple(marks), direct=False, equal=True), tr("Plots, gates and tracks")
+    return Figure("track_map", title, caption, (panel,), width_mm=panels.WIDE_MM, panel_height_mm=100)
+
+
+def _on_map(curve: Curve, label: str, style: Style) -> Line:
+    return Line(curve[1] * 1e-3, curve[0] * 1e-3, label, style)
+
+
+def _flat(r: np.ndarray, b: np.ndarray) -> Curve:
+    """Distances north and east."""
+    return r * np.cos(b), r * np.sin(b)
+
+
+def _distance(track: Curve, course: Curve) -> float:
+    """The median distance of a track's points to the course, m."""
+    north, east = (own[:, None] - other for own, other in zip(track, course, strict=True))
+    return float(np.median(np.hypot(north, east).min(axis=1)))
+
+
+def _ellipse(gate: np.ndarray, tracker: TrackerSpec) -> Curve:
+    """The edge of a gate on the map; an open gate is drawn as if its probability were 0.9999."""
+    angle, (r, b, rr, rb, bb) = np.linspace(0, 2 * np.pi, 61), gate
+    size = np.sqrt(gate_threshold(min(tracker.gate_probability, 0.9999)))
+    low = rb / np.sqrt(rr)
+    u, v = size * np.cos(angle), size * np.sin(angle)
+    return _flat(r + np.sqrt(rr) * u, b + low * u + np.sqrt(max(bb - low**2, 0.0)) * v)
