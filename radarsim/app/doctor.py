@@ -1,9 +1,19 @@
 """`radarsim doctor`: the machine, and all that is stored of a result.
 
 `radarsim compile`: compilation before the first run.
+
+The self-test of `radarsim doctor`: a small case of every study, its tables compared with known ones.
+
+radarsim/app/known holds for each study (the sonar is three) a config and its tables on the platform of platform.json.
+Elsewhere (instruction set, compiler, BLAS, mathematical library) the last bits differ: an ulp here and there, which
+later arithmetic magnifies by its condition number κ. So a number may differ by what κ allows, see `Tolerance`. `make
+known` makes the tables again, after an intended change of numbers. A study of an installed package has its known
+answers in its own tests; here it is only loaded.
 """
 
+import csv
 import hashlib
+import io
 import json
 import os
 import re
@@ -16,10 +26,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from radarsim.app import run
 from radarsim.app.configs import CaseWork, load
 from radarsim.app.configs import document as lookup
 from radarsim.app.result import recorded_case
-from radarsim.app.selftest import tolerance
 from radarsim.config.experiment import Case
 from radarsim.engine.blocks import Node, Partial, simulated
 from radarsim.engine.results import Sums
@@ -31,10 +41,12 @@ from radarsim.engine.store import (
     folder_of,
     instruction_set,
     is_directory,
+    platform,
     platform_name,
 )
 from radarsim.errors import ConfigError, StoreError
 from radarsim.report import files
+from radarsim.studies import registry
 
 # ---- doctor ----------------------------------------------------------------------------------------------------------
 LOOKS, LOOK_S = 4, 0.25
@@ -248,3 +260,143 @@ def compiled(configs: Sequence[str]) -> Iterator[Compiled]:
             if "write" in compile.troubles:
                 raise ConfigError(compile.troubles["write"])
         yield Compiled(name, time.process_time() - started)
+
+
+# ---- selftest --------------------------------------------------------------------------------------------------------
+KNOWN = Path(__file__).parent / "known"
+TABLES = ("curves", "gains")
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """By how much a study's numbers may differ between platforms, in σ: sampled and exact ones.
+
+    Spreads, standard errors and half-widths of intervals are compared by their squares, as each is the root of a
+    difference of sums: where all realisations err alike, a rounding ε of σ² makes √(2ε) |bias| of the spread. Notes are
+    not compared: each turns at a threshold, that on equal filters at a difference of zero.
+    """
+
+    sampled: float = 1e-12
+    exact: float = 1e-12
+
+
+TOLERANCES = {
+    # Gains of up to three states from fits with κ < 10³ when balanced: some tens of roundings, 10⁻¹² leaves a factor 5.
+    "range_doppler": Tolerance(),
+    "sonar": Tolerance(),
+    # The same, and thresholds: a test of a detector, or a plot at the edge of a gate, might fall otherwise within
+    # rounding of it, once in 10⁹ of them; the cases hold some 10⁴. Likelihoods multiply: κε of a few hundred roundings.
+    "sonar_manoeuvre": Tolerance(sampled=1e-10),
+    "sonar_clutter": Tolerance(sampled=1e-10),
+    # Innovation covariances of bearings have κ of up to 3·10⁶ (kernels.algebra.factored), so κε = 7·10⁻¹⁰.
+    "multimodel": Tolerance(sampled=1e-9),
+    # Balanced information of five parameters, κ = 2.1·10⁵: its inverse is known to κε/2 = 2.3·10⁻¹¹. Estimates are
+    # found by scoring steps that use the inverse, each a fraction of σ long and ended by a threshold.
+    "discriminator": Tolerance(sampled=1e-9, exact=1e-10),
+    # Covariances of each realisation's own begin with a prior of (300 m/s)² beside plots of (15 m/s)², over scans of
+    # 10 s: κ near 10⁴, κε = 2·10⁻¹². Weights of hypotheses are exponentials of up to −40, multiplying that by 40. A
+    # hypothesis within rounding of `prune_below` might be dropped or kept: once in 10¹⁰ of some 10⁶ looked at.
+    "ambiguous_doppler": Tolerance(sampled=1e-10, exact=1e-11),
+    # Balanced information of a burst's three parameters, κ = 230: 10⁻¹³; covariances of the track from (3 m/s)² to
+    # (0.04 m/s)², κ near 10⁴, κε = 2·10⁻¹². Estimates are found by scoring steps that end by a threshold, so that one
+    # more or less, where two numbers nearly tie, shows by what it leaves: as in the discriminator.
+    "pulses_to_tracks": Tolerance(sampled=1e-9, exact=1e-11),
+}
+UNKNOWN = Tolerance(sampled=1e-9, exact=1e-9)  # of a study from another package
+
+
+def tolerance(study: str) -> Tolerance:
+    """By how much a study's numbers may differ between platforms."""
+    return TOLERANCES.get(study, UNKNOWN)
+
+
+EXACT = ("exact_sigma", "exact_bias", "exact_percent", "posterior_sigma")
+LABELS_DIFFER = (float("inf"), float("inf"))
+FIRST_NUMBER = {"curves": "sigma", "gains": "gain_percent"}  # columns before it are labels and counts
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The outcome of a study's case, and whether it is as expected."""
+
+    study: str
+    good: bool
+    words: str
+
+
+def tables(study: str) -> dict[str, bytes]:
+    """The tables of a study's known case, as computed here: CSV by name."""
+    from radarsim.report.tables import to_csv
+
+    result = run.run(KNOWN / f"{study}.yaml", threads=1)
+    return {name: to_csv(result.tables[name]) for name in TABLES}
+
+
+def verdicts() -> list[Verdict]:
+    """One for each study. An unusable package is reported, but is not damage."""
+    same_platform = platform() == json.loads((KNOWN / "platform.json").read_text())
+    broken = registry.unusable()
+    return [
+        *(verdict(study, tables(study), same_platform) for study in TOLERANCES),
+        *(Verdict(name, True, f"{registry.package(name)}: loads") for name in registry.offered() if name not in broken),
+        *(Verdict(name, True, f"cannot be used: {words}") for name, words in broken.items()),
+    ]
+
+
+def verdict(study: str, made: dict[str, bytes], same_platform: bool) -> Verdict:
+    """Compare tables with the known ones."""
+    known = {name: (KNOWN / f"{study}.{name}.csv").read_bytes() for name in TABLES}
+    if made == known:
+        return Verdict(study, True, "the known bytes")
+    allowed, off = TOLERANCES[study], [distances(name, made[name], known[name]) for name in TABLES]
+    sampled, exact = (max(pair) for pair in zip(*off, strict=True))
+    if sampled > allowed.sampled or exact > allowed.exact:
+        words = f"differs from the known answer by {sampled:.1e} of sigma (exact values {exact:.1e}); "
+        return Verdict(study, False, words + f"at most {allowed.sampled:.0e} ({allowed.exact:.0e}) is rounding")
+    words = f"the known numbers to {max(sampled, exact):.1e} of sigma"
+    return Verdict(
+        study, True, words + (", not the known bytes, though the platform is the same" if same_platform else "")
+    )
+
+
+def distances(table: str, one: bytes, other: bytes) -> tuple[float, float]:
+    """The largest differences of two tables' sampled and exact numbers, in σ or 100 %; infinite where labels differ."""
+    first, second = (list(csv.DictReader(io.StringIO(text.decode()))) for text in (one, other))
+    if len(first) != len(second):
+        return LABELS_DIFFER
+    farthest = {False: 0.0, True: 0.0}
+    for a, b in zip(first, second, strict=True):
+        columns = list(b)
+        numbers = [name for name in columns[columns.index(FIRST_NUMBER[table]) :] if name != "note"]
+        if any(a.get(name) != b[name] for name in columns if name not in (*numbers, "note")):
+            return LABELS_DIFFER
+        centre = FIRST_NUMBER[table]
+        scale = float(b["sigma"] or 1) if table == "curves" else 100.0  # ends of intervals may lie far above σ
+        for name in numbers:
+            if (a.get(name) or "") == b[name]:
+                continue
+            if not (a.get(name) and b[name]):
+                return LABELS_DIFFER
+            of = max(scale, abs(float(b[name])))
+            here, there = (_compared(name, float(row[name]) / of, float(row[centre] or 0) / of) for row in (a, b))
+            exact = name in EXACT
+            farthest[exact] = max(farthest[exact], abs(here - there))
+    return farthest[False], farthest[True]
+
+
+def _compared(name: str, value: float, centre: float) -> float:
+    """The compared number of a column; see `Tolerance`."""
+    if name in ("spread", "bias_se"):
+        return value**2
+    return (value - centre) ** 2 if name.endswith(("_lo", "_hi")) else value
+
+
+def write() -> None:
+    """Make the known tables again, on this platform."""
+    made = {study: tables(study) for study in TOLERANCES}
+    contents = {f"{study}.{name}.csv": content for study, own in made.items() for name, content in own.items()}
+    files.replace_all(KNOWN, contents | {"platform.json": (json.dumps(platform(), indent=2) + "\n").encode()})
+
+
+if __name__ == "__main__":
+    write()

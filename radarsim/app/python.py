@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
     from radarsim.app.compare import Comparison, DopplerChart, Source
     from radarsim.app.outlook import Outlook
-    from radarsim.app.question import Answer
     from radarsim.app.readings import Readings
     from radarsim.app.result import Result
     from radarsim.app.sensitivity import Sensitivity
+    from radarsim.app.solve import Answer
     from radarsim.engine.run import Signals, Stop
     from radarsim.report.drawing import Figure
 

@@ -17,9 +17,9 @@ import numpy as np
 from radarsim.app import configs, quantities
 from radarsim.app.configs import CaseWork
 from radarsim.app.quantities import UNPAIRED, Asked
-from radarsim.app.question import Cases, Config, without_one
 from radarsim.app.run import case_result
 from radarsim.app.shown import Shown
+from radarsim.app.solve import Cases, Config, without_one
 from radarsim.config import fields
 from radarsim.config.check import Label, label
 from radarsim.config.experiment import Case

@@ -18,14 +18,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from radarsim.app import configs, quantities, question
+from radarsim.app import configs, quantities, solve
 from radarsim.app.configs import Config, load
 from radarsim.app.quantities import Asked, Range, Wanted
-from radarsim.app.question import Curve
 from radarsim.app.run import merged
 from radarsim.app.sensitivity import interval
 from radarsim.app.shown import Shown
-from radarsim.app.solve import timed
+from radarsim.app.solve import Curve, timed
 from radarsim.config import fields
 from radarsim.config.check import label
 from radarsim.config.document import did_you_mean
@@ -240,7 +239,7 @@ def natural(searched: Sequence[Searched], place: Place, plain: Mapping[str, Any]
             ratios |= {(top[0], i, *top[2:]): share / most} if share > 0 else {}
         ratios |= {one.path: x for one, x in zip(searched, place, strict=True) if one.of == top}
         found |= {path: ratio / sum(ratios.values()) for path, ratio in ratios.items()}
-    return {path: question.rounded(value) for path, value in found.items()}
+    return {path: solve.rounded(value) for path, value in found.items()}
 
 
 def at_path(plain: Any, path: Path) -> Any:
@@ -335,8 +334,8 @@ def _searched(
         raise ConfigError(f"{key.path}: has no value to begin from: {argument('overrides', '--set')} it")
     free = argument("free", "--free")
     ranged = argument('free={"KEY": (LOW, HIGH)}', f"{free} KEY=LOW:HIGH")
-    with instead({question.ends(): ranged, argument("between"): free}):
-        over = question.range_of([key], key.path, between, FACTOR)
+    with instead({solve.ends(): ranged, argument("between"): free}):
+        over = solve.range_of([key], key.path, between, FACTOR)
     if not key.whole and (key.low, key.high) == (0, 1) and between is None:
         rest = min(LEAST_SHARE, *(x / 10 for x in (key.value, 1 - key.value) if x > 0))
         over = Share(rest, 1 - rest, False)
@@ -489,7 +488,7 @@ def parted(case: Case, asked: Sequence[Asked], count: int) -> np.ndarray:
     def values(result: CaseResult) -> list[float]:
         return [float(quantities.sampled(one, result)[0].value) for one in asked]
 
-    whole, but_one, _ = question.without_one(case, values, count)
+    whole, but_one, _ = solve.without_one(case, values, count)
     return np.array([whole, *but_one])
 
 
@@ -503,7 +502,7 @@ def _predict(notify: Callable[[str], None], of: Objective, each: float) -> None:
         curve.expected = scans + full
     keys = plural("{count} key", "{count} keys", len(grids))
     what = tr("searches {keys}, about {count} places", keys=keys, count=scans + full)
-    question.predict(notify, what, each * (scans * (1.0 if of.exact else 1 / PILOT_SHARE) + full))
+    solve.predict(notify, what, each * (scans * (1.0 if of.exact else 1 / PILOT_SHARE) + full))
 
 
 def judged(of: Objective, names: Sequence[str], pairs: Sequence[np.ndarray]) -> list[Judged]:
@@ -604,7 +603,7 @@ def tune(
         text = ", ".join(".".join(map(str, path)) for path in apart)
         raise ConfigError(f"{text}: differs between the cases: choose with {argument('case', '--case')}")
     searched, count = each[0], configs.whole(realisations) or every[0].realisations
-    count = question.BATCHES * max(2, count // question.BATCHES)
+    count = solve.BATCHES * max(2, count // solve.BATCHES)
     variants = [Variants(other, chosen, searched, kind.of.paired) for other in every]
     curves = []
     for one in variants:

@@ -121,7 +121,7 @@ def solve(
       radarsim solve sonar_clutter sensor.detection_probability --loss nearest --equals 5 --between 0.6 1 \\
           --case "sonar_clutter sensor.false_plots_per_km2=1" -n 2000
     """
-    from radarsim.app import documents, python
+    from radarsim.app import python, shown
     from radarsim.cli import console, outcomes
     from radarsim.errors import TargetUnmet
 
@@ -132,7 +132,7 @@ def solve(
         said = None if as_json else console.say_aside
         answer = python.solve(config, key, equals=equals, progress=progress.update, notify=said, **asked)
     if as_json:
-        click.echo(documents.text(documents.answer(answer)))
+        click.echo(shown.text(shown.answer(answer)))
     elif answer.value is not None:
         outcomes.print_answer(answer)
     if answer.value is None:
@@ -186,7 +186,7 @@ def tune(
       radarsim tune rls2_manoeuvres --filter r+Vr --for "sigma r" --free manoeuvre_variance --free initial_scans=2:7
       radarsim tune multimodel --filter MMA2-11 --for "sigma y at 60 s" --free models -n 500
     """
-    from radarsim.app import configs, documents
+    from radarsim.app import configs, shown
     from radarsim.app import tune as tuning
     from radarsim.cli import console, outcomes
     from radarsim.errors import ConfigError
@@ -201,7 +201,7 @@ def tune(
         asked |= {"filter": filter_name, "threads": threads, "progress": progress.update, "notify": said}
         found = tuning.tune(config, wanted, **asked)
     if as_json:
-        click.echo(documents.text(documents.tuned(found)))
+        click.echo(shown.text(shown.tuned(found)))
     else:
         outcomes.print_tuned(found)
     if write:
@@ -230,13 +230,13 @@ def chart(
       radarsim chart                              the first paper's five radars
       radarsim chart rls2 --set radar.sigma_velocity_mps=5
     """
-    from radarsim.app import documents, python
+    from radarsim.app import python, shown
     from radarsim.cli import console, outcomes
 
     with console.Progress("chart", quiet=as_json, what="figures") as progress:
         drawn = python.chart(*configs, overrides=overrides, out=out, progress=progress.update, **drawing.arguments)
     if as_json:
-        click.echo(documents.text(documents.drawn(drawn)))
+        click.echo(shown.text(shown.drawn(drawn)))
     else:
         outcomes.print_drawn(drawn)
 
@@ -282,7 +282,7 @@ def sensitivity(
       radarsim sensitivity rls2 --at 60 --component Vr
       radarsim sensitivity discriminator --of lock -n 2000
     """
-    from radarsim.app import documents, python
+    from radarsim.app import python, shown
     from radarsim.cli import console, outcomes
 
     asked: dict[str, Any] = {"at_s": at_s, "at_k": at_k, "of": of, "component": component, "case": case}
@@ -290,6 +290,6 @@ def sensitivity(
     with console.Progress(config, quiet=as_json, what="keys") as progress:
         found = python.sensitivity(config, out=out, progress=progress.update, **asked, **drawing.arguments)
     if as_json:
-        click.echo(documents.text(documents.sensitivity(found)))
+        click.echo(shown.text(shown.sensitivity(found)))
     else:
         outcomes.print_sensitivity(found)

@@ -150,8 +150,8 @@ def _compute_each(
     Raises DisagreementError at the end for differences beyond chance, else MeasureError where the measure of a claim
     failed, else TargetUnmet for targets that were not reached.
     """
-    from radarsim.app import documents
     from radarsim.app import run as simulation
+    from radarsim.app import shown
     from radarsim.app.outlook import lacking
     from radarsim.cli import console, outcomes
 
@@ -172,22 +172,22 @@ def _compute_each(
             continue
         except DisagreementError as error:  # all is written, and the other experiments stand by themselves
             wrong += [line if line.startswith(f"{one.stem}: ") else f"{one.stem}: {line}" for line in error.lines]
-            made.append(documents.result(cast("Result", error.result)))
+            made.append(shown.result(cast("Result", error.result)))
             continue
         except MeasureError as error:  # all is written
             unmeasured += error.lines
             done = cast("Result", error.result)
         unmet += [f"{one.stem}: {reason}" for reason in done.unmet]
         if isinstance(done, simulation.Shares):
-            made.append(documents.share_record(done))
+            made.append(shown.share_record(done))
             if not (quiet or as_json):
                 outcomes.print_share(done, out)
         else:
-            made.append(documents.result(done))
+            made.append(shown.result(done))
             if not (quiet or as_json):
                 outcomes.print_result(done)
     if as_json:
-        click.echo(documents.text(made))
+        click.echo(shown.text(made))
     if wrong:
         raise DisagreementError(*wrong)
     if unmeasured:
@@ -317,7 +317,7 @@ def check(
     """
     _refuse_together(shard, precision, None, None)
     _refuse_of_nothing(of, precision)
-    from radarsim.app import documents, python
+    from radarsim.app import python, shown
     from radarsim.app import run as simulation
     from radarsim.cli import console, outcomes
 
@@ -328,11 +328,11 @@ def check(
     for one in loaded:
         with console.Progress(one.stem, quiet=as_json, what="cases") as bar:
             outlook = python.check(one, progress=bar.update, **asked)
-        made.append(documents.outlook(one, outlook))
+        made.append(shown.outlook(one, outlook))
         if not as_json:
             outcomes.print_outlook(one, outlook)
     if as_json:
-        click.echo(documents.text(made))
+        click.echo(shown.text(made))
 
 
 @group.main.command()
@@ -404,7 +404,7 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
       radarsim claims --json
       radarsim claims --figure claims.svg
     """
-    from radarsim.app import documents, python
+    from radarsim.app import python, shown
     from radarsim.app import run as simulation
     from radarsim.cli import outcomes
 
@@ -413,7 +413,7 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
     if figure is not None:
         found.draw(figure)
     if as_json:
-        click.echo(documents.text(rows))
+        click.echo(shown.text(rows))
     elif markdown:
         from radarsim.report.claims import page
 
@@ -441,14 +441,14 @@ def compare(sources: tuple[str, ...], out: str, drawing: group.Drawing, as_json:
       radarsim compare rls2.yaml mine.yaml --json
       radarsim compare results/rls2 results-before/rls2
     """
-    from radarsim.app import documents, python
+    from radarsim.app import python, shown
     from radarsim.cli import outcomes
 
     if len(sources) < 2:
         raise click.UsageError(f"compare takes two results or more, got {len(sources)}")
     compared = python.compare(*sources, out=out, **drawing.arguments)
     if as_json:
-        click.echo(documents.text(documents.compared(compared)))
+        click.echo(shown.text(shown.compared(compared)))
     else:
         outcomes.print_comparison(compared)
 
@@ -501,7 +501,7 @@ def readings(
 
     limit = run.TimeLimit(time_limit) if time_limit else None
     with run.Signals() as stop:
-        from radarsim.app import documents, python
+        from radarsim.app import python, shown
         from radarsim.app import readings as app
         from radarsim.cli import console, outcomes
 
@@ -510,7 +510,7 @@ def readings(
         with console.Progress("readings", quiet=quiet or as_json or markdown) as progress:
             done = python.readings(*names, progress=progress.update, **asked)
         if as_json:
-            click.echo(documents.text(app.documents(done)))
+            click.echo(shown.text(app.documents(done)))
         elif markdown:
             click.echo(app.pages(done), nl=False)
         elif not quiet:

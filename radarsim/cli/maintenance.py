@@ -32,9 +32,9 @@ def list_(words: tuple[str, ...], as_json: bool) -> None:
 
     found = selected(inventory(), words)
     if as_json:
-        from radarsim.app import documents
+        from radarsim.app import shown
 
-        click.echo(documents.text(documents.inventory(found)))
+        click.echo(shown.text(shown.inventory(found)))
         return
     from radarsim.cli import outcomes
 
@@ -69,7 +69,7 @@ def compile_(configs: tuple[str, ...], as_json: bool) -> None:
       radarsim compile
       radarsim compile sonar_clutter
     """
-    from radarsim.app import documents
+    from radarsim.app import shown
     from radarsim.app.doctor import compiled
 
     done = []
@@ -78,7 +78,7 @@ def compile_(configs: tuple[str, ...], as_json: bool) -> None:
         if not as_json:
             click.echo(f"{one.config}  {one.seconds:.1f} s")
     if as_json:
-        click.echo(documents.text(done))
+        click.echo(shown.text(done))
 
 
 @main.command()
@@ -100,25 +100,25 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
     """
     if recompute and result is None:
         raise click.UsageError("--recompute needs a RESULT: a folder such as results/rls2")
-    from radarsim.app import doctor, documents
+    from radarsim.app import doctor, shown
     from radarsim.cli import console, outcomes
 
     if result is None:
-        from radarsim.app import selftest
+        from radarsim.app import doctor
 
         facts = doctor.machine()
         if not as_json:
             console.print_facts(facts)
-        verdicts = selftest.verdicts()
+        verdicts = doctor.verdicts()
         if as_json:
-            click.echo(documents.text({**facts, "self-test": [documents.fields(verdict) for verdict in verdicts]}))
+            click.echo(shown.text({**facts, "self-test": [shown.fields(verdict) for verdict in verdicts]}))
         else:
             console.print_facts({f"self-test {verdict.study}": verdict.words for verdict in verdicts})
         bad = [f"self-test: {verdict.study}: {verdict.words}" for verdict in verdicts if not verdict.good]
     else:
         found = doctor.inspected(result, recompute)
         if as_json:
-            click.echo(documents.text(documents.fields(found)))
+            click.echo(shown.text(shown.fields(found)))
         else:
             outcomes.print_inspection(found)
         bad = found.faults
@@ -146,7 +146,7 @@ def clean(
       radarsim clean --dry-run
       radarsim clean rls2 --out results
     """
-    from radarsim.app import documents, run, stored
+    from radarsim.app import run, shown, stored
     from radarsim.cli import outcomes
 
     if not configs and (overrides or seed is not None):
@@ -154,6 +154,6 @@ def clean(
     chosen = run.load_all(configs, run.merged(overrides, None, seed)) if configs else None
     cleaned = stored.clean(out, chosen, dry_run)
     if as_json:
-        click.echo(documents.text(documents.fields(cleaned) | {"dry_run": dry_run}))
+        click.echo(shown.text(shown.fields(cleaned) | {"dry_run": dry_run}))
     else:
         outcomes.print_cleaned(cleaned, dry_run)

@@ -23,18 +23,17 @@ if TYPE_CHECKING:
     from radarsim.app.configs import Inventory
     from radarsim.app.doctor import Inspection
     from radarsim.app.outlook import CaseOutlook, Need, Outlook
-    from radarsim.app.question import Answer
     from radarsim.app.readings import Readings
     from radarsim.app.result import Result
     from radarsim.app.run import Shares
     from radarsim.app.sensitivity import Sensitivity
+    from radarsim.app.solve import Answer
     from radarsim.app.stored import Cleaned
     from radarsim.app.tune import Tuned
     from radarsim.config.experiment import Experiment
-    from radarsim.recorded.advice import Advice
-    from radarsim.recorded.figures import Judged
-    from radarsim.recorded.fit import Fit, Fitted
+    from radarsim.recorded.fit import Advice, Fit, Fitted
     from radarsim.recorded.follow import Followed
+    from radarsim.recorded.page import Judged
     from radarsim.recorded.register import Registration
     from radarsim.report.quantities import Quantity
 

@@ -98,14 +98,14 @@ def simulate(
     """
     from radarsim.app import run
     from radarsim.cli import console
-    from radarsim.recorded import bulk, follow
+    from radarsim.recorded import follow
     from radarsim.recorded import plots as files
 
     if None not in (realisation, realisations):
         raise click.UsageError("--realisation and --realisations do not go together: give one of them")
     (loaded,) = run.load_all([config], overrides)
     number = realisation or 0
-    if realisations is None and Path(output).suffix.lower() not in bulk.FORMATS:
+    if realisations is None and Path(output).suffix.lower() not in follow.FORMATS:
         columns = follow.simulated(loaded, number)
         files.write_columns(columns, output, loaded.path)
         rows = plural("{count} row", "{count} rows", len(columns["t_s"]))
@@ -113,7 +113,7 @@ def simulate(
     else:
         first, stop = realisations or (number, number + 1)
         with console.Counter("writing", "realisations") as counter:
-            one = bulk.write(loaded, stop - first, first, output, counter.update)
+            one = follow.write_many(loaded, stop - first, first, output, counter.update)
         many = plural("{count:,} realisation", "{count:,} realisations", stop - first)
         scans = plural("{count} scan", "{count} scans", len(one.t_s))
         told = {"realisations": many, "scans": scans, "names": ", ".join(one.columns)}
@@ -272,8 +272,8 @@ def track(
 
     from radarsim.app import run
     from radarsim.cli import console, outcomes
-    from radarsim.recorded import advice, follow, page
-    from radarsim.recorded import figures as accuracy
+    from radarsim.recorded import fit, follow, page
+    from radarsim.recorded import page as accuracy
     from radarsim.recorded import plots as files
     from radarsim.report import wording
     from radarsim.report.files import Writer
@@ -299,7 +299,7 @@ def track(
     if folder or not quiet:
         with console.Counter("judging", "likelihoods") as counter:
             judged = accuracy.judged(followed)
-            advised = advice.advised(followed, counter.update)
+            advised = fit.advised(followed, counter.update)
     if not quiet:
         outcomes.report(followed, judged, advised, stderr=output is None)
     if output:
@@ -345,7 +345,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
       radarsim fit rls2 plots.csv
       radarsim fit rls2 plots.csv --write mine.yaml
     """
-    from radarsim.app import configs, documents, run
+    from radarsim.app import configs, run, shown
     from radarsim.cli import console, outcomes
     from radarsim.recorded import fit as fitting
     from radarsim.report import wording
@@ -359,7 +359,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     with console.Counter("fitting", "likelihoods") as counter:
         found = fitting.fit(loaded, plots, options["filter_name"], allowing, counter.update)
     if options["as_json"]:
-        click.echo(documents.text(fitting.as_rows(found)))
+        click.echo(shown.text(fitting.as_rows(found)))
     else:
         outcomes.report_fit(found)
     if options["write"]:
@@ -388,12 +388,12 @@ def register(radar: str, other: str, as_json: bool) -> None:
       radarsim import adsb.csv --at 52.30,4.76,12 -o positions.csv
       radarsim register radar.csv positions.csv
     """
-    from radarsim.app import documents
+    from radarsim.app import shown
     from radarsim.cli import outcomes
     from radarsim.recorded import register as registering
 
     found = registering.register(radar, other)
     if as_json:
-        click.echo(documents.text(registering.as_json(found)))
+        click.echo(shown.text(registering.as_json(found)))
     else:
         outcomes.report_registration(found, other)

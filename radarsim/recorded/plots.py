@@ -52,7 +52,7 @@ def in_plane(places: Mapping[str, np.ndarray]) -> np.ndarray | None:
 
 
 @dataclass
-class Path:
+class Places:
     """Times (n,) and places (n, 3) of a track's plots, north, east and range in m, thinned to at most MOST."""
 
     t_s: np.ndarray = field(default_factory=lambda: np.zeros(0))

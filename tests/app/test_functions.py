@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 import radarsim
-from radarsim.app import documents
 from radarsim.app import readings as reading
+from radarsim.app import shown as documents
 from radarsim.cli import main
 from tests.cli.test_every_study import CONFIGS, SOLVED
 

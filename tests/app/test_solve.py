@@ -11,8 +11,7 @@ from click.testing import CliRunner
 import radarsim
 from radarsim.app import quantities
 from radarsim.app.quantities import Wanted, checked
-from radarsim.app.question import Cases, Curve
-from radarsim.app.solve import solve
+from radarsim.app.solve import Cases, Curve, solve
 from radarsim.cli import main
 from radarsim.errors import ConfigError
 from radarsim.report.statistics import Estimate
@@ -420,7 +419,7 @@ def test_where_the_quantity_jumps_over_the_target_it_is_said():
 
 
 def test_what_takes_long_is_foretold_with_its_time_and_what_it_is(monkeypatch):
-    from radarsim.app import question
+    from radarsim.app import solve as solving
     from radarsim.studies.range_doppler import patterns
 
     monkeypatch.setattr(patterns, "WHOLE", 1 << 15)
@@ -431,7 +430,7 @@ def test_what_takes_long_is_foretold_with_its_time_and_what_it_is(monkeypatch):
     words = "averaged over detection patterns, similar ones merged; accurate to about 1e-4"
     assert found.notes == (f"σ is {words}",)
     assert found.attained == pytest.approx(15, abs=1e-6)  # first looked for roughly, then of the exact quantity
-    monkeypatch.setattr(question, "LONG_S", 0.0)
+    monkeypatch.setattr(solving, "LONG_S", 0.0)
     solve("rls2", "radar.sigma_velocity_mps", Wanted("gain", None, "r", at_k=11), 15, **late)
     solve("rls2", "radar.sigma_velocity_mps", GAIN, 30, sampled=True, realisations=400, notify=said.append)
     assert said[-2].startswith(

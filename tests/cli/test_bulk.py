@@ -7,7 +7,7 @@ import pytest
 
 import radarsim
 from radarsim.app import run
-from radarsim.recorded import bulk
+from radarsim.recorded import follow
 from tests.program import command
 
 CLUTTER = "sweep.sensor.false_plots_per_km2=[0.03]"
@@ -16,7 +16,7 @@ CLUTTER = "sweep.sensor.false_plots_per_km2=[0.03]"
 @pytest.fixture
 def small(monkeypatch):
     """Batches of eight, so that a few realisations are several."""
-    monkeypatch.setattr(bulk, "NUMBERS", 1)
+    monkeypatch.setattr(follow, "NUMBERS", 1)
 
 
 @pytest.mark.parametrize(("config", "overrides"), [("rls2", ()), ("sonar_clutter", (CLUTTER,))])
@@ -71,7 +71,7 @@ def test_what_is_stopped_leaves_what_was_there(tmp_path, small, name):
 
     (loaded,) = run.load_all(["rls2"], ())
     with pytest.raises(KeyboardInterrupt):
-        bulk.write(loaded, 40, 0, tmp_path / name, stopped)
+        follow.write_many(loaded, 40, 0, tmp_path / name, stopped)
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "mine")]
 
 

@@ -10,7 +10,7 @@ import shutil
 import numpy as np
 import pytest
 
-from radarsim.app import doctor, selftest
+from radarsim.app import doctor
 from tests.engine.test_audit import damage
 from tests.engine.test_damage import reforged
 from tests.program import command, csv_bytes, record
@@ -184,8 +184,8 @@ def altered(tables, column, change):
 
 
 def test_the_self_test_says_so_where_numbers_differ(monkeypatch):
-    made = {name: (selftest.KNOWN / f"discriminator.{name}.csv").read_bytes() for name in selftest.TABLES}
-    assert selftest.verdict("discriminator", made, True).words == "the known bytes"
+    made = {name: (doctor.KNOWN / f"discriminator.{name}.csv").read_bytes() for name in doctor.TABLES}
+    assert doctor.verdict("discriminator", made, True).words == "the known bytes"
     # Rounding is forgiven as far as its conditioning allows.
     for column, factor, sound in (
         ("sigma", 1 + 1e-10, True),
@@ -198,12 +198,12 @@ def test_the_self_test_says_so_where_numbers_differ(monkeypatch):
     ):
         changed = altered(made, column, lambda value, factor=factor: value * factor)
         for same_platform in (True, False):
-            assert selftest.verdict("discriminator", changed, same_platform).good is sound, (column, factor)
+            assert doctor.verdict("discriminator", changed, same_platform).good is sound, (column, factor)
         if sound:
-            assert "not the known bytes" in selftest.verdict("discriminator", changed, True).words
+            assert "not the known bytes" in doctor.verdict("discriminator", changed, True).words
     for spoiled in (made["curves"].replace(b"cured", b"cursed"), made["curves"][: len(made["curves"]) // 2]):
-        assert not selftest.verdict("discriminator", made | {"curves": spoiled}, False).good
-    monkeypatch.setattr(selftest, "verdicts", lambda: [selftest.Verdict("sonar", False, "differs")])
+        assert not doctor.verdict("discriminator", made | {"curves": spoiled}, False).good
+    monkeypatch.setattr(doctor, "verdicts", lambda: [doctor.Verdict("sonar", False, "differs")])
     assert "self-test: sonar: differs" in command("doctor", code=4).stderr
 
 
@@ -213,19 +213,17 @@ def test_the_tolerances_are_what_conditioning_allows():
     from radarsim.bursts.estimators import fisher
     from radarsim.studies.discriminator.study import burst_of
 
-    burst = burst_of(load(selftest.KNOWN / "discriminator.yaml").cases[0].spec)
+    burst = burst_of(load(doctor.KNOWN / "discriminator.yaml").cases[0].spec)
     information = fisher(burst, 5, burst.duration_s)
     scale = np.sqrt(np.diag(information))
     rounding = np.linalg.cond(information / np.outer(scale, scale)) * np.finfo(float).eps / 2
-    assert rounding < selftest.TOLERANCES["discriminator"].exact < 10 * rounding
+    assert rounding < doctor.TOLERANCES["discriminator"].exact < 10 * rounding
 
 
 def test_doctor_names_the_machine_and_passes_its_self_test():
     told = json.loads(command("doctor", "--json").stdout)
     assert {"machine", "instructions", "threads", "cache", "versions", "cluster"} <= told.keys()
-    assert [(one["study"], one["good"]) for one in told["self-test"]] == [
-        (study, True) for study in selftest.TOLERANCES
-    ]
+    assert [(one["study"], one["good"]) for one in told["self-test"]] == [(study, True) for study in doctor.TOLERANCES]
 
 
 def test_clean_drops_blocks_and_nothing_else(out):

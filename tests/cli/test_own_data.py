@@ -18,8 +18,8 @@ from radarsim.cli import group, main
 from radarsim.config import document
 from radarsim.config.experiment import canonical
 from radarsim.errors import ConfigError
-from radarsim.recorded import figures as accuracy
 from radarsim.recorded import follow, plots
+from radarsim.recorded import page as accuracy
 from radarsim.studies.range_doppler import track as range_doppler_plots
 from tests.program import command
 from tests.recorded import whole

@@ -15,7 +15,7 @@ import pytest
 from numba import njit
 from numba.core.registry import cpu_target
 
-from radarsim.app import selftest
+from radarsim.app import doctor
 from radarsim.kernels import compile
 from radarsim.kernels.compile import COMMON
 
@@ -178,7 +178,7 @@ def test_the_command_goes_on_and_says_so_in_one_line(tmp_path):
     """A run whose cache cannot be used at all: the same bytes, one line on stderr, and the same in run.json."""
     place = tmp_path / "cache"
     options = ["--no-figures", "--out", str(tmp_path)]
-    program = [sys.executable, "-m", "radarsim", "run", str(selftest.KNOWN / "range_doppler.yaml"), *options]
+    program = [sys.executable, "-m", "radarsim", "run", str(doctor.KNOWN / "range_doppler.yaml"), *options]
     prepared = "from radarsim.kernels.linear import add_block as one; print(one._cache.cache_path)"
     environment = os.environ | {"RADARSIM_CACHE_DIR": str(place)}
     found = subprocess.run(
@@ -190,7 +190,7 @@ def test_the_command_goes_on_and_says_so_in_one_line(tmp_path):
     lines = [line for line in done.stderr.splitlines() if "kernel cache" in line]
     assert len(lines) == len(done.stderr.splitlines()) == 1, done.stderr
     assert (tmp_path / "range_doppler" / "run.json").read_text().count("kernel cache: ") == 1
-    assert (tmp_path / "range_doppler" / "curves.csv").read_bytes() == selftest.tables("range_doppler")["curves"]
+    assert (tmp_path / "range_doppler" / "curves.csv").read_bytes() == doctor.tables("range_doppler")["curves"]
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import re
 import pytest
 from making import messages
 
-from radarsim.app import configs, question, readings
+from radarsim.app import configs, readings, solve
 from radarsim.app.compare import chart, described
 from radarsim.app.configs import load
 from radarsim.app.quantities import Asked
@@ -144,7 +144,7 @@ def test_units_that_count_have_the_form_of_their_number():
 def test_what_solve_announces():
     said = []
     with speaking("ru"):
-        question.predict(
+        solve.predict(
             said.append,
             tr("computes the {quantity} at about {count} values of {key}", quantity="q", count=7, key="k"),
             12.3,

@@ -9,8 +9,8 @@ import pytest
 from radarsim.app.run import load_all
 from radarsim.cli.outcomes import report
 from radarsim.recorded import follow, plots
-from radarsim.recorded.figures import DOUBT, FITS, LOST, judged
 from radarsim.recorded.fit import folding, said
+from radarsim.recorded.page import DOUBT, FITS, LOST, judged
 from tests.program import Terminal, command
 
 SPAN = 60.0  # m/s: 0.1 m at 1.2 kHz

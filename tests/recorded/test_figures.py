@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from radarsim.app.run import load_all
-from radarsim.recorded import figures, follow
-from radarsim.recorded.plots import MOST, Path, in_plane
+from radarsim.recorded import follow, page
+from radarsim.recorded.plots import MOST, Places, in_plane
 from radarsim.report.drawing import Line, Note
 from tests.program import command
 from tests.recorded import whole
@@ -51,7 +51,7 @@ def test_plan_view_has_equal_units_and_shows_radar_start_and_end():
     places = np.stack([5e4 * np.cos(angle), 5e4 * np.sin(angle), np.full(40, 5e4)], axis=1)
     one = loaded("rls2", "scans=40")
     track = follow.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(follow.simulated(one))
-    view, over_time = figures.plan(track, {"": Path(t, places)}).panels
+    view, over_time = page.plan(track, {"": Places(t, places)}).panels
     assert (view.equal, view.x.label, view.y.label) == (True, "east, km", "north, km")
     lines = {mark.name: mark for mark in view.marks if isinstance(mark, Line)}
     np.testing.assert_allclose(lines["plots"].x, places[:, 1] / 1e3)
@@ -73,7 +73,7 @@ def test_places_of_plots():
 
 
 def test_places_are_thinned():
-    path = Path()
+    path = Places()
     for k in range(0, 10 * MOST, 500):
         t = np.arange(k, k + 500.0)
         path.add(t, {"range_m": t, "bearing_rad": t * 0})

@@ -9,7 +9,7 @@ import pytest
 from radarsim.app.run import load_all
 from radarsim.errors import ConfigError
 from radarsim.physics import transition
-from radarsim.recorded import advice, fit, follow, page, plots
+from radarsim.recorded import fit, follow, page, plots
 from radarsim.recorded.fit import silent
 from radarsim.studies.interface import BIAS, CORRELATION, EXPLANATIONS, OUTLIERS
 from radarsim.studies.range_doppler.track import PlotLikelihood
@@ -153,7 +153,7 @@ def test_a_key_at_zero_is_raised_where_that_makes_the_plots_likelier():
 def test_what_is_advised_is_the_top(options):
     """Found to a part in 2000, by a parabola through the neighbours: three digits are printed, on every processor."""
     one = likelihood(recording(np.random.default_rng(3), **options))
-    values = {found.what: found.value for found in advice.findings(one)}
+    values = {found.what: found.value for found in fit.findings(one)}
     assert values
 
     def at(what, factor):
@@ -267,7 +267,7 @@ def advised(tmp_path, columns, config=None):
     path = tmp_path / "advised.csv"
     plots.write_columns(columns, path)
     followed = follow.follow(config or loaded(), path, threads=1)
-    return advice.advised(followed), followed
+    return fit.advised(followed), followed
 
 
 def named_first(found):
@@ -396,7 +396,7 @@ def test_advice_of_part_of_the_rows_says_of_which(tmp_path, monkeypatch):
     (tmp_path / "several.csv").write_text("\n".join(rows))
     followed = follow.follow(loaded(), tmp_path / "several.csv", threads=1)
     monkeypatch.setattr(type(follow.recorded_of(loaded().cases[0])), "rows_asked", 120)
-    assert said.format(120, 180, 3) in page.likely(followed, advice.advised(followed))[-1]
+    assert said.format(120, 180, 3) in page.likely(followed, fit.advised(followed))[-1]
 
 
 def test_what_is_asked_is_spread_over_all_tracks_and_their_whole_time():
@@ -431,7 +431,7 @@ def test_the_best_filter_of_a_target_that_turns_late_is_that_of_the_turn(tmp_pat
     """The first rows alone, which are straight, are likeliest under the filter that allows for no manoeuvre."""
     config = loaded("filters=[{name: calm, observes: [range], manoeuvre_variance: 1e-8},"
                     "{name: agile, observes: [range], manoeuvre_variance: 1}]")  # fmt: skip
-    monkeypatch.setattr(advice, "findings", lambda *given: [])
+    monkeypatch.setattr(fit, "findings", lambda *given: [])
     rng, t = np.random.default_rng(8), T * np.arange(8000.0)
     r = 1e9 + 250 * t + np.where(t > 6e4, 5e4 * np.cos(2 * np.pi * (t - 6e4) / 600) - 5e4, 0.0)
     columns = {"t_s": t, "range_m": r + 250 * rng.normal(size=t.size), "velocity_mps": np.full(t.size, np.nan)}
@@ -530,7 +530,7 @@ def test_a_turning_target_needs_another_manoeuvre_variance_not_another_sigma():
     config = loaded("target=turn", "scans=40", "radar.sigma_range_m=60", "radar.sigma_velocity_mps=2")
     columns = follow.simulated(config)
     measured = {name: columns[name] for name in ("t_s", "range_m", "velocity_mps")}
-    found = advice.findings(likelihood(measured, config=config))
+    found = fit.findings(likelihood(measured, config=config))
     assert found[0].what == "manoeuvre_variance"
     assert found[0].value > 1e-2
 
@@ -540,7 +540,7 @@ def test_the_best_filter_is_that_which_foretells_best():
                     "{name: right, observes: [range], manoeuvre_variance: 0.1},"
                     "{name: both, observes: [range, velocity], manoeuvre_variance: 0.1}]")  # fmt: skip
     track = recording(np.random.default_rng(6), {"manoeuvre_variance": 100})
-    found = advice.compared([PlotLikelihood(config.cases[0], name, [track]) for name in ("calm", "right", "both")])
+    found = fit.compared([PlotLikelihood(config.cases[0], name, [track]) for name in ("calm", "right", "both")])
     assert found.best == "both"
     assert found.behind["both"] == 0
     assert 0 < found.behind["right"] < found.behind["calm"]
@@ -686,4 +686,4 @@ def test_recordings_that_tell_nothing_end_in_an_answer_or_a_line(tmp_path, confi
         with contextlib.suppress(ConfigError):
             fit.fit(experiment, tmp_path / "plots.csv")
         with contextlib.suppress(ConfigError):
-            advice.advised(follow.follow(experiment, tmp_path / "plots.csv", threads=0))
+            fit.advised(follow.follow(experiment, tmp_path / "plots.csv", threads=0))

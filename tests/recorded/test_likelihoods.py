@@ -9,7 +9,7 @@ from radarsim import physics
 from radarsim.app.run import load_all
 from radarsim.kernels.hypotheses import FACTOR, lasting, log_likelihood
 from radarsim.physics import manoeuvre_covariance, transition
-from radarsim.recorded import advice, fit, follow
+from radarsim.recorded import fit, follow
 from radarsim.recorded.follow import recorded_of
 from radarsim.studies.multimodel.world import start_weights
 from radarsim.studies.sonar import world
@@ -217,7 +217,7 @@ def test_a_wrong_error_of_the_sonar_is_named_and_fitted(key, true):
     wrong = [f"{key}={true}"] if key else []
     columns = recording("sonar_smoothing", "frame=cartesian", "scans=80", *wrong)
     one = likelihood(case, "growing", columns)
-    found = advice.findings(one)
+    found = fit.findings(one)
     assert [finding.what for finding in found] == ([key] if key else [])
     if key:
         (fitted,) = (each for each in fit.fitted(one).keys if each.key == key)
@@ -325,7 +325,7 @@ def test_the_multimodel_likelihood_is_best_of_the_filter_that_fits_and_at_the_tr
     """The case that misled: the advice named the second best filter."""
     case, columns = loaded("multimodel_1hz"), recording("multimodel_1hz", "sensor.sigma_azimuth_deg=0.3")
     known = [likelihood(case, member.name, columns) for member in case.spec.filters]
-    assert advice.compared(known).best == "MMA2-122"
+    assert fit.compared(known).best == "MMA2-122"
     best, gains = known[0], {}
     for i, key in enumerate(best.keys):
         for factor in (1 / 3, 3.0):
@@ -412,11 +412,11 @@ def test_the_likeliest_hypotheses_are_kept_in_their_order():
 
 
 def test_a_wrong_velocity_error_is_named_though_velocities_fold(monkeypatch):
-    monkeypatch.setattr(advice, "MOST_FOUND", 1)
+    monkeypatch.setattr(fit, "MOST_FOUND", 1)
     case = loaded("ambiguous_rls4", "filters=[{name: memory, doppler: folded, manoeuvre_variance: 1.0e-7}]")
     wrong = recording("ambiguous_rls4", "radar.sigma_velocity_mps=4")
-    assert advice.findings(likelihood(case, None, wrong))[0].what == "radar.sigma_velocity_mps"
-    assert advice.findings(likelihood(case, None, recording("ambiguous_rls4"))) == []
+    assert fit.findings(likelihood(case, None, wrong))[0].what == "radar.sigma_velocity_mps"
+    assert fit.findings(likelihood(case, None, recording("ambiguous_rls4"))) == []
 
 
 def test_innovations_of_a_right_filter_over_folded_velocities():

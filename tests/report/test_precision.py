@@ -10,7 +10,7 @@ import pytest
 import radarsim
 from radarsim.app import result
 from radarsim.app.configs import load
-from radarsim.app.selftest import KNOWN
+from radarsim.app.doctor import KNOWN
 from radarsim.config.schema import LARGEST_REALISATIONS
 from radarsim.report import precision
 from radarsim.report.precision import FIRST, gaussian, grown, looks, needed, worst

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from radarsim.app.configs import load
-from radarsim.app.selftest import KNOWN
+from radarsim.app.doctor import KNOWN
 from radarsim.config.experiment import Experiment
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.app.selftest import KNOWN
+from radarsim.app.doctor import KNOWN
 from tests.kernels.test_compile import USE, house  # noqa: F401
 
 ROOT = Path(__file__).parents[2]

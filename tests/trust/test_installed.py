@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.app import selftest
+from radarsim.app import doctor
 
 ROOT = Path(__file__).parents[2]
 CONSTRAINTS = ["-c", str(ROOT / "constraints.txt")]
@@ -65,7 +65,7 @@ def proved(python, place):
     """The self-test, and the commands that a user meets first."""
     place.mkdir()
     report = json.loads(told(python, place, "radarsim", "doctor", "--json"))
-    assert {one["study"] for one in report["self-test"] if "known" in one["words"]} >= set(selftest.TOLERANCES)
+    assert {one["study"] for one in report["self-test"] if "known" in one["words"]} >= set(doctor.TOLERANCES)
     told(python, place, "radarsim", "run", "rls2", "-n", 10_000, "--out", "results")
     told(python, place, "radarsim", "run", "rls2", "-n", 20_000, "--out", "results", "--workers", 1, "--no-figures")
     assert "all intact" in told(python, place, "radarsim", "doctor", "results/rls2", "--recompute", 1)

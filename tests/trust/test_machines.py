@@ -11,7 +11,7 @@ import sys
 import numpy as np
 import pytest
 
-from radarsim.app import selftest
+from radarsim.app.doctor import TOLERANCES
 from radarsim.bursts.kernels.scoring import triangular_root
 from radarsim.engine.store import _flags
 
@@ -38,7 +38,7 @@ def doctor(**environment):
 def passes(**environment):
     done = doctor(**environment)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout.count("the known") == len(selftest.TOLERANCES)
+    assert done.stdout.count("the known") == len(TOLERANCES)
 
 
 def test_another_blas_gives_the_same_answers():

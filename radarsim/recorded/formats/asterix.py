@@ -16,9 +16,9 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from radarsim.errors import ConfigError
-from radarsim.recorded.formats import captures, layout, sites
+from radarsim.recorded.formats import layout, sites
 from radarsim.recorded.formats.layout import Damaged, Profile
-from radarsim.recorded.formats.numbering import Tracks
+from radarsim.recorded.identity import Tracks
 
 NAUTICAL_MILE_M, FOOT_M = 1852.0, 0.3048
 FLIGHT_LEVEL_M = 100 * FOOT_M
@@ -285,7 +285,7 @@ class _Records:
 
 
 class Asterix:
-    """A file of ASTERIX, as captures.blocks reads it."""
+    """A file of ASTERIX, as layout.blocks reads it."""
 
     of_day = True
 
@@ -320,7 +320,7 @@ class Asterix:
     def batches(self) -> Iterator[sites.Batch]:
         """The records in batches; raises ConfigError where a block or record violates the specification."""
         try:
-            for category, begin, data in captures.blocks(self.path, self.file, self.skipped):
+            for category, begin, data in layout.blocks(self.path, self.file, self.skipped):
                 if category == 34:  # which `surveyed` reads
                     continue
                 held = self.held.get(category)
@@ -468,7 +468,7 @@ def surveyed(path: str) -> Survey:
     place = [layout.field(services[34].spec, "120", name) for name in ("LAT", "LON", "HGT")]
     try:
         with open(path, "rb") as file:
-            for category, _, data in islice(captures.blocks(path, file, Counter()), SURVEYED):
+            for category, _, data in islice(layout.blocks(path, file, Counter()), SURVEYED):
                 survey.categories.add(category)
                 at = 3
                 while category in services and at < len(data):
@@ -495,4 +495,4 @@ def _number(field: layout.Field, data: bytes, at: int) -> float:
 def looks_like(head: bytes) -> bool:
     """Whether a file with this beginning may be ASTERIX: at least one data block, of a category that radars send."""
     whole = len(head) >= 4 and head[0] in (*READ, 8, 20) and int.from_bytes(head[1:3], "big") >= 4
-    return whole or captures.is_capture(head) or captures.is_final(head)
+    return whole or layout.is_capture(head) or layout.is_final(head)

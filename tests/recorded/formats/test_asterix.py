@@ -7,10 +7,10 @@ import struct
 import numpy as np
 import pytest
 
-from radarsim.recorded.formats import captures
+from radarsim.recorded.formats import layout
 from radarsim.recorded.formats.importing import Options
-from radarsim.recorded.formats.numbering import Tracks
 from radarsim.recorded.formats.sites import Site
+from radarsim.recorded.identity import Tracks
 from tests.program import command
 from tests.recorded.formats.made import (
     SITE,
@@ -496,9 +496,9 @@ def test_an_old_edition_is_refused_by_name(tmp_path):
 
 
 def test_a_datagram_that_only_begins_like_asterix_is_none():
-    assert captures.content(BLOCKS[0] + bytes(17)) == ([], 0)
-    assert captures.content(b"\x30\x00\x03") == ([], 0)
-    assert captures.content(bytes([250]) + BLOCKS[0][1:]) == ([], 0)
+    assert layout.content(BLOCKS[0] + bytes(17)) == ([], 0)
+    assert layout.content(b"\x30\x00\x03") == ([], 0)
+    assert layout.content(bytes([250]) + BLOCKS[0][1:]) == ([], 0)
 
 
 def sound():
