@@ -75,7 +75,8 @@ def sources(name: str, outside: tuple[str, ...] = ()) -> str:
         own_places = [] if spec is None else spec.submodule_search_locations or [spec.origin or ""]
         places += [(Path(own), files(Path(own))) for own in own_places]
     if outside:
-        found.update(repr(sorted({(one.name, one.version) for one in distributions()})).encode())
+        metadata = (one.metadata for one in distributions())  # read once; a name and a version would read it twice
+        found.update(repr(sorted({(one["Name"], one["Version"]) for one in metadata})).encode())
     for place, every in places:
         for path in sorted(every):
             found.update(f"{os.path.relpath(path, place)} ".encode() + hashlib.sha256(path.read_bytes()).digest())

@@ -2,10 +2,7 @@
 
 import ast
 import json
-import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -36,9 +33,9 @@ CARRY = {"app", "errors.py", "failures.py", "language", "report"}
 
 
 @pytest.mark.parametrize("study", registry.SHIPPED)
-def test_every_file_that_computes_is_hashed(study):
+def test_every_file_that_computes_is_hashed(study, libraries):
     """The files that are loaded by the time that blocks are made, but for those that carry a case."""
-    done = subprocess.run([sys.executable, "-c", COMPUTED, *CONFIGS[study]], capture_output=True, text=True, check=True)
+    done = libraries.run(*CONFIGS[study], code=COMPUTED)
     loaded = [Path(one).relative_to(identity.PACKAGE) for one in json.loads(done.stdout)]
     inside = {path for path in loaded if path.parts[0] not in CARRY and path.name != "__init__.py"}
     own = Path(*registry.module(study).split(".")[1:])
@@ -49,18 +46,18 @@ def test_every_file_that_computes_is_hashed(study):
     assert not [path for path in studies if path.stem in identity.SHOW]
 
 
-@pytest.fixture
-def edited(tmp_path):
-    """Runs rls2 with an edited copy of the package: how much it computed, and the line on other sources."""
+@pytest.fixture(scope="module")
+def edited(tmp_path_factory, libraries):
+    """Runs rls2 again with an edited copy of the package: how much it computed, and the line on other sources."""
+    tmp_path = tmp_path_factory.mktemp("edited")
     shutil.copytree(ROOT / "radarsim", tmp_path / "radarsim", ignore=shutil.ignore_patterns("__pycache__"))
 
     def run(path="errors.py", change=lambda text: text):
         file = tmp_path / "radarsim" / path
         text = file.read_text()
         file.write_text(change(text))
-        command = [sys.executable, "-m", "radarsim", "run", "rls2", "-n", "9000", "--no-figures", "--out", "out"]
-        environment = os.environ | {"PYTHONPATH": str(tmp_path)}
-        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+        words = ("run", "rls2", "-n", 9000, "--no-figures", "--out", "out")
+        done = libraries.run(*words, path=[tmp_path], cwd=tmp_path)
         file.write_text(text)
         assert done.returncode == 0, done.stderr
         record = json.loads((tmp_path / "out/rls2/run.json").read_text())
@@ -69,6 +66,7 @@ def edited(tmp_path):
         assert said in [*record["warnings"], ""]
         return record["realisations_computed"], said
 
+    assert run() == (9000, "")
     return run
 
 
@@ -86,7 +84,6 @@ def renamed(text):
 
 
 def test_what_moves_no_digit_keeps_all_blocks_and_is_said_once(edited):
-    assert edited() == (9000, "")
     assert edited("report/tables.py", renamed) == (0, "")  # only shows
     computed, line = edited("kernels/linear.py", renamed)
     assert computed == 0
@@ -105,7 +102,6 @@ def simulate(plan, first, count):
 
 @pytest.mark.slow
 def test_a_last_digit_of_few_realisations_begins_anew_and_says_so(edited):
-    edited()
     computed, line = edited("studies/range_doppler/study.py", lambda text: f"{text}\nimport numpy as np\n{MOVED}")
     assert computed == 9000
     assert line.startswith("stored blocks of rls2 were made by other sources that give other bytes, and are not used")
@@ -113,7 +109,6 @@ def test_a_last_digit_of_few_realisations_begins_anew_and_says_so(edited):
 
 
 def test_a_study_that_raises_its_model_begins_anew_and_compares_nothing(edited):
-    edited()
     model = "\nobject.__setattr__(STUDY, 'model', STUDY.model + 1)\n"
     assert edited("studies/range_doppler/__init__.py", lambda text: text + model) == (9000, "")
 

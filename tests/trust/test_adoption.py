@@ -1,9 +1,6 @@
 """What a wrong program does with the right one's blocks: where a number moves, it takes none of them over."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -35,12 +32,9 @@ print(json.dumps([made.count, made.values.tobytes().hex()]))
 """
 
 
-def program(store, config, realisations, fault, tree=ROOT, cache=None):
+def program(start, store, config, realisations, fault, tree=ROOT, **environment):
     """What a program prints: whether it takes the store over, then the count and bytes that it makes itself."""
-    command = [sys.executable, "-c", TRIED, config, str(realisations), str(store), fault]
-    own = {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
-    own |= {"RADARSIM_CACHE_DIR": str(cache)} if cache else {}
-    done = subprocess.run(command, cwd=tree, env=os.environ | own, capture_output=True, text=True, check=False)
+    done = start.run(config, realisations, store, fault, code=TRIED, path=[tree], cwd=tree, **environment)
     assert fault or done.returncode == 0, done.stderr
     return [json.loads(line) for line in done.stdout.splitlines()]
 
@@ -52,10 +46,11 @@ def came(right, said):
 
 
 @pytest.fixture(scope="module")
-def rls2(tmp_path_factory):
-    """A store of the right program, and what it gave."""
+def rls2(tmp_path_factory, libraries):
+    """What came of a fault in a program beside a store that the right one left."""
     store = tmp_path_factory.mktemp("right")
-    return store, program(store, "rls2", 9000, "")
+    right = program(libraries, store, "rls2", 9000, "")
+    return lambda fault: came(right, program(libraries, store, "rls2", 9000, fault))
 
 
 @pytest.mark.parametrize(
@@ -69,14 +64,12 @@ def rls2(tmp_path_factory):
     ],
 )
 def test_a_fault_that_moves_a_number_takes_nothing_over(rls2, fault, expected):
-    store, right = rls2
-    assert came(right, program(store, "rls2", 9000, fault)) == expected
+    assert rls2(fault) == expected
 
 
 @pytest.mark.slow
 def test_no_fault_of_meaning_that_moves_a_number_takes_blocks_over(rls2):
-    store, right = rls2
-    found = {fault: came(right, program(store, "rls2", 9000, fault)) for fault in FAULTS}
+    found = {fault: rls2(fault) for fault in FAULTS}
     assert [fault for fault, what in found.items() if what == "moved, adopted"] == []
     assert len([fault for fault, what in found.items() if what == "moved, anew"]) >= 6
     assert len([fault for fault, what in found.items() if what == "same, adopted"]) >= 15
@@ -95,17 +88,17 @@ TRIALS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("part", TRIALS)
-def test_no_wrong_formula_that_moves_a_number_takes_blocks_over(tmp_path, part):
-    config, realisations = TRIALS[part]
-    tree, cache, store = mutate.copied(ROOT, tmp_path / "tree"), tmp_path / "cache", tmp_path / "right"
-    right = program(store, config, realisations, "", tree, cache)
+def test_no_wrong_formula_that_moves_a_number_takes_blocks_over(libraries, tmp_path, part):
+    tree, given = mutate.copied(ROOT, tmp_path / "tree"), (tmp_path / "right", *TRIALS[part])
+    own = {"tree": tree, "RADARSIM_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+    right = program(libraries, *given, "", **own)
     sites = mutate.sites(ROOT, [path for path in mutate.modules() if path.startswith(part)])
     found = []
     for site in mutate.sample(sites, 10, seed=32):
         file = tree / site.path
         text = file.read_text(encoding="utf-8")
         file.write_text(mutate.mutant(text, site.number).text, encoding="utf-8")
-        found.append((came(right, program(store, config, realisations, str(site), tree, cache)), site))
+        found.append((came(right, program(libraries, *given, str(site), **own)), site))
         file.write_text(text, encoding="utf-8")
     assert [site for what, site in found if what == "moved, adopted"] == []
     assert [site for what, site in found if what == "moved, anew"]

@@ -1,9 +1,5 @@
 """Where no thread can be started, `--threads 0` does all, to the same bytes; without it a line says so."""
 
-import os
-import subprocess
-import sys
-
 import pytest
 
 import radarsim
@@ -23,15 +19,18 @@ BUSY = "from radarsim.engine import store; store.PERIOD_S = 0; "  # it writes af
 NATIVE = "print(*(line.split()[1] for line in open('/proc/self/status') if line.startswith('Threads:')))"
 
 
-def barred(program, *arguments):
-    """What a program prints to both streams in an interpreter that starts no thread, and its exit code."""
-    words = [sys.executable, "-c", f"{BARRED}{program}", *map(str, arguments)]
-    one = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(words, capture_output=True, text=True, check=False, env=one)
-    return done.stdout + done.stderr, done.returncode
+@pytest.fixture
+def barred(libraries):
+    """What a program prints to both streams in a process that starts no thread, and its exit code."""
+
+    def ended(program, *arguments):
+        done = libraries.run(*arguments, code=f"{BARRED}{program}")
+        return done.stdout + done.stderr, done.returncode
+
+    return ended
 
 
-def test_run_and_track_without_a_thread_give_the_same_bytes(tmp_path):
+def test_run_and_track_without_a_thread_give_the_same_bytes(barred, tmp_path):
     few = ("-n", 3000, "--no-figures", "--threads", 0)
     told, code = barred(BUSY + COMMAND, "run", "rls2", *few, "--out", tmp_path / "none")
     assert (code, "Traceback" in told) == (0, False), told
@@ -48,7 +47,7 @@ def test_run_and_track_without_a_thread_give_the_same_bytes(tmp_path):
     assert tracks[0].read_bytes() == tracks[1].read_bytes()
 
 
-def test_python_runs_without_a_thread_where_updates_are_timed_and_readings_known_exactly():
+def test_python_runs_without_a_thread_where_updates_are_timed_and_readings_known_exactly(barred):
     """`multimodel` measures an update's cost, and P1's readings take a radar each, in threads where they may."""
     ran = (
         "import radarsim; radarsim.run('multimodel', realisations=20, threads=0); radarsim.readings('P1.4', threads=0)"
@@ -58,7 +57,7 @@ def test_python_runs_without_a_thread_where_updates_are_timed_and_readings_known
     assert (code, told.split()[-1]) == (0, before.strip()), told
 
 
-def test_a_command_that_lacks_its_threads_says_what_does_without():
+def test_a_command_that_lacks_its_threads_says_what_does_without(barred):
     told, code = barred(COMMAND, "solve", "rls2", "radar.sigma_velocity_mps", "--gain", "r", "--at-k", 3, "--equals", 9)
     assert code == 0, told  # in closed form: no thread is asked for
     told, code = barred(COMMAND, "run", "rls2", "-n", 10)

@@ -178,7 +178,11 @@ class PaperReadings(ABC):
 
     def of_claim(self, claim: str) -> list[Reading]:
         """The declared readings that differ for a claim: choices that do not affect it stay at their default."""
-        return list(dict.fromkeys(self.bearing(one, claim) for one in self._declared))
+        bears = [choice.bears_on(claim) for choice in self.choices]
+        firsts: dict[tuple[tuple[str, str], ...], Reading] = {}
+        for one in self._declared:
+            firsts.setdefault(tuple(itertools.compress(one.taken, bears)), one)
+        return [self.bearing(one, claim) for one in firsts.values()]
 
     @cached_property
     def _declared(self) -> Sequence[Reading]:

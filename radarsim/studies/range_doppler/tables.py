@@ -5,6 +5,7 @@ which both filters have one; `exact_sigma` is the mean over all patterns of plot
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -97,13 +98,14 @@ def steady_sigma(axes: RangeDopplerAxes, f: int) -> np.ndarray | None:
     """Exact σ (3,) that a filter comes to where every scan has its plot; None of a package's that comes to none."""
     period = axes.scan_period_s
     if noise := axes.process_noise[f]:
-        variance = float(axes.manoeuvre_variance[f])
-        true = filters.steady_state(int(axes.observes[f]), variance, axes.sigma, period, noise)[1]
-    elif (found := given.steady_state(axes.settled_gain[f], axes.sigma, period)) is not None:
-        true = found
-    else:
-        return None
-    return np.sqrt(np.diag(true))
+        return _settled(int(axes.observes[f]), float(axes.manoeuvre_variance[f]), tuple(axes.sigma), period, noise)
+    true = given.steady_state(axes.settled_gain[f], axes.sigma, period)
+    return None if true is None else np.sqrt(np.diag(true))
+
+
+@lru_cache(1024)  # three tables and the answer ask for it
+def _settled(observes: int, variance: float, sigma: tuple[float, ...], period: float, noise: str) -> np.ndarray:
+    return np.sqrt(np.diag(filters.steady_state(observes, variance, np.array(sigma), period, noise)[1]))
 
 
 def _steady(result: Result) -> list[tuple]:
