@@ -15,8 +15,7 @@ Recorded flights: positions from a CSV file, and the motion that a smoothing spl
 Range, radial velocity and radial acceleration of a target of targets that fit a polynomial or break it.
 
 All functions take times t (K,) in seconds from the first plot and give (K, 3): range in m, radial velocity in m/s,
-radial acceleration in m/s².
-"""
+radial acceleration in m/s²."""
 
 import csv
 import math
@@ -40,21 +39,17 @@ def transition(dt: float, size: int = 3) -> np.ndarray:
 
 
 def white_jerk_covariance(variance: float, dt: float) -> np.ndarray:
-    """Covariance (3, 3) that white jerk of spectral density variance · dt, in (m/s³)² s, adds over a scan.
-
-    A jerk that white noise gives has, averaged over a scan, the variance `variance`, (m/s³)². (Bar-Shalom, Li &
-    Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, eq. 6.2.3-7.)
-    """
+    """Covariance (3, 3) that white jerk of spectral density variance · dt, in (m/s³)² s, adds over a scan. A jerk that
+    white noise gives has, averaged over a scan, the variance `variance`, (m/s³)². (Bar-Shalom, Li & Kirubarajan,
+    Estimation with Applications to Tracking and Navigation, 2001, eq. 6.2.3-7.)"""
     g = [[dt**4 / 20, dt**3 / 8, dt**2 / 6], [dt**3 / 8, dt**2 / 3, dt / 2], [dt**2 / 6, dt / 2, 1.0]]
     return variance * dt**2 * np.array(g)
 
 
 def acceleration_step_covariance(variance: float, dt: float) -> np.ndarray:
     """Covariance (3, 3) that a step of the acceleration at the beginning of a scan, of variance · dt², adds by its end.
-
     The piecewise constant Wiener acceleration (Bar-Shalom, Li & Kirubarajan 2001, eq. 6.3.3-4), with the acceleration
-    gaining in a scan what a jerk of this variance, (m/s³)², gives it.
-    """
+    gaining in a scan what a jerk of this variance, (m/s³)², gives it."""
     g = np.array([dt**2 / 2, dt, 1.0])
     return variance * dt**2 * np.outer(g, g)
 
@@ -71,9 +66,7 @@ def process_noise(kind: str, variance: float, dt: float) -> np.ndarray:
 
 def manoeuvre_covariance(variance: float, dt: float, size: int = 3) -> np.ndarray:
     """Covariance (size, size) that a random derivative of order `size`, constant over the scan, adds (P1 eq. 6, its M).
-
-    For size 3 the variance is that of a random jerk, (m/s³)²; for size 2 of a random acceleration, (m/s²)².
-    """
+    For size 3 the variance is that of a random jerk, (m/s³)²; for size 2 of a random acceleration, (m/s²)²."""
     g = transition(dt, size + 1)[:-1, -1]
     return variance * np.outer(g, g)
 
@@ -111,10 +104,8 @@ def to_local(antenna: np.ndarray, R: np.ndarray, height: float) -> np.ndarray:
 
 
 def normal_cosine(biconical: np.ndarray) -> np.ndarray:
-    """Cosine (…) of the angle from the antenna's normal of biconical (…, 3), sqrt(1 - sin² e - sin² a).
-
-    Raises OutsideSector where it is not > 0.
-    """
+    """Cosine (…) of the angle from the antenna's normal of biconical (…, 3), sqrt(1 - sin² e - sin² a). Raises
+    OutsideSector where it is not > 0."""
     square = 1.0 - np.sin(biconical[..., 1]) ** 2 - np.sin(biconical[..., 2]) ** 2
     # |e| + |a| >= 90° is no direction in front of the antenna.
     if not np.all((square > 0) & (np.abs(biconical[..., 1:]).sum(axis=-1) < math.pi / 2)):
@@ -155,8 +146,7 @@ def unbiased_from_biconical(biconical: np.ndarray, sigma: np.ndarray) -> np.ndar
     sigma.
 
     sin of a noisy angle has the mean exp(-sigma²/2) sin; for x_A half the trace of the Hessian times the variances is
-    taken off.
-    """
+    taken off."""
     antenna, (_, ve, va) = from_biconical(biconical), np.asarray(sigma) ** 2
     r, u = biconical[..., 0], normal_cosine(biconical)
     bend = 0.0
@@ -214,8 +204,7 @@ def smoothed(times: np.ndarray, positions: np.ndarray, t: np.ndarray) -> np.ndar
     """States (K, 9) as (x, vx, ax, y, vy, ay, z, vz, az) at times t (K,) from the first point of a recorded flight.
 
     times (n,) are at least 5 and increase, positions (n, 3). A cubic smoothing spline for each axis, its strength
-    chosen by generalised cross-validation; its derivatives are taken as the true velocity and acceleration.
-    """
+    chosen by generalised cross-validation; its derivatives are taken as the true velocity and acceleration."""
     from scipy.interpolate import make_smoothing_spline
 
     since = times - times[0]
@@ -228,10 +217,8 @@ def smoothed(times: np.ndarray, positions: np.ndarray, t: np.ndarray) -> np.ndar
 
 
 def radial(states: np.ndarray) -> np.ndarray:
-    """Range, radial velocity and acceleration (K, 3), as seen from the origin, of states (K, 9) as above.
-
-    V = x·v / r, and a = (|v|² + x·a − V²) / r.
-    """
+    """Range, radial velocity and acceleration (K, 3), as seen from the origin, of states (K, 9) as above. V = x·v / r,
+    and a = (|v|² + x·a − V²) / r."""
     x, v, a = states[:, 0::3], states[:, 1::3], states[:, 2::3]
     r = np.sqrt((x**2).sum(axis=1))
     radial_velocity = (x * v).sum(axis=1) / r
@@ -278,8 +265,7 @@ def turn(
 
     range_0 (m) at t = 0; speed (m/s); aspect (rad) of the velocity from the direction away from the radar (pi: straight
     in); acceleration_g the lateral acceleration in standard gravities, positive to the left; start and duration in s.
-    Gives range, radial velocity and acceleration (K, 3) at times t (K,).
-    """
+    Gives range, radial velocity and acceleration (K, 3) at times t (K,)."""
     position, velocity, acceleration = _turning(range_0, speed, aspect, acceleration_g, start, duration, t)
     r = np.hypot(position[:, 0], position[:, 1])
     radial_velocity = np.sum(position * velocity, axis=1) / r
@@ -323,8 +309,7 @@ def fly_by(distance: float, speed: float, start_range: float, t: np.ndarray) -> 
     """Radial motion of a target in straight flight past the radar, (K, 3) at times t (K,).
 
     distance (m) of closest approach, speed (m/s), start_range (m) at t = 0, inbound. r² = d² + x², V = v x / r,
-    a = v² d² / r³ with x = v t − √(r₀² − d²) along the path.
-    """
+    a = v² d² / r³ with x = v t − √(r₀² − d²) along the path."""
     along = speed * t - math.sqrt((start_range - distance) * (start_range + distance))
     r = np.hypot(along, distance)
     return np.stack([r, speed * along / r, speed**2 * distance**2 / r**3], axis=1)

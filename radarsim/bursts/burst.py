@@ -10,8 +10,7 @@ Which windows a sequence of discriminators uses (Uss, Baryshev, Djavad 2010, equ
 
 A window of length T catches a start with error covariance R_Δ when Z = Δθᵀ H Δθ, H = (Φ + R_pr⁻¹)/2μ, stays below
 the main-lobe threshold c with probability P_Δ. Z is a sum of χ²₁ with the eigenvalues of R_Δ H as weights; the paper
-takes the Gaussian of the same two moments (14), `tail_probability` the sum itself.
-"""
+takes the Gaussian of the same two moments (14), `tail_probability` the sum itself."""
 
 import itertools
 import math
@@ -122,9 +121,8 @@ def balanced_inverse(information: np.ndarray) -> np.ndarray:
 # ---- blocks ----------------------------------------------------------------------------------------------------------
 def block_edges(windows: list[int], per_window: int, whole: int = 1) -> np.ndarray:
     """Pulses (B + 1,) where B blocks begin and end: every window ends one, none longer than its time over per_window.
-
-    Long ones are multiples of `whole`: with 8, demodulation fills its registers, at the price of a third more blocks.
-    """
+    Long ones are multiples of `whole`: with 8, demodulation fills its registers, at the price of a third more
+    blocks."""
     edges = [0]
     for end in sorted(set(windows)):
         begin = edges[-1]
@@ -138,10 +136,8 @@ def block_edges(windows: list[int], per_window: int, whole: int = 1) -> np.ndarr
 
 
 def merged(edges: np.ndarray, pulses: int, per_window: int) -> list[int]:
-    """Indices in edges (B + 1,) where a window's blocks end: as few as may be, none longer than it over per_window.
-
-    A block that was drawn longer stays alone.
-    """
+    """Indices in edges (B + 1,) where a window's blocks end: as few as may be, none longer than it over per_window. A
+    block that was drawn longer stays alone."""
     last = int(np.searchsorted(edges, pulses))
     ends, begin = [], 0
     for i in range(1, last + 1):
@@ -154,8 +150,7 @@ def merged(edges: np.ndarray, pulses: int, per_window: int) -> list[int]:
 def moments(sums: np.ndarray, row: int, shift: np.ndarray, starts: np.ndarray) -> np.ndarray:
     """Sums of a quantity times 1, s, s² over joined blocks (3, joined), from those over the blocks drawn.
 
-    s is now counted from a centre `shift` before theirs; joined blocks begin at starts.
-    """
+    s is now counted from a centre `shift` before theirs; joined blocks begin at starts."""
     z0, z1, z2 = (sums[row + 2 * n] + 1j * sums[row + 2 * n + 1] for n in range(3))
     return np.add.reduceat([z0, z1 + shift * z0, z2 + 2.0 * shift * z1 + shift**2 * z0], starts, axis=1)
 
@@ -233,21 +228,17 @@ class Condition:
 
 
 def spread_factor(probability: float) -> float:
-    """Standard deviations that (14) asks for at P_Δ: the normal quantile in the proportion that makes it 3 at 0.99.
-
-    The paper pairs 0.99 with 3, where a one-sided normal quantile would be 2.33.
-    """
+    """Standard deviations that (14) asks for at P_Δ: the normal quantile in the proportion that makes it 3 at 0.99. The
+    paper pairs 0.99 with 3, where a one-sided normal quantile would be 2.33."""
     from scipy.special import ndtri
 
     return float(PAPER_FACTOR * ndtri(probability) / ndtri(PAPER_PROBABILITY))
 
 
 def tail_probability(weights: np.ndarray, threshold: float) -> float:
-    """P(Σ wᵢ χ²₁ > c) for weights (n,) ≥ 0, to about 10⁻¹².
-
-    Laplace inversion of the moment generating function Π(1 − 2wᵢs)^(−½) along a parabola that starts between the pole
-    at 0 and the first branch point and bends around the cut, where exp(−sc) makes the integrand vanish like a Gaussian.
-    """
+    """P(Σ wᵢ χ²₁ > c) for weights (n,) ≥ 0, to about 10⁻¹². Laplace inversion of the moment generating function Π(1 −
+    2wᵢs)^(−½) along a parabola that starts between the pole at 0 and the first branch point and bends around the cut,
+    where exp(−sc) makes the integrand vanish like a Gaussian."""
     weights = np.asarray(weights, dtype=float)
     weights = weights[weights > 1e-14 * weights.max()]
     edge = 0.5 / weights.max()
@@ -334,10 +325,8 @@ class Designer:
         return self.burst.pulses_in(root)
 
     def windows(self) -> list[int]:
-        """Window lengths in pulses from T₀ (15) over (16) to the whole burst.
-
-        None is shorter than there are parameters. Raises NoSchedule where over 200 are needed.
-        """
+        """Window lengths in pulses from T₀ (15) over (16) to the whole burst. None is shorter than there are
+        parameters. Raises NoSchedule where over 200 are needed."""
         period, fewest = self.burst.pulse_period_s, len(self.sigma)
         sequence = [max(self.longest(self.first_excess, fewest * period), fewest)]
         while sequence[-1] < self.burst.pulses:
@@ -358,10 +347,8 @@ def denser(windows: list[int], density: int) -> list[int]:
 
 
 def handover_directions(designer: Designer, windows: list[int]) -> np.ndarray:
-    """Directions (windows, size) in θ to search along before each window: the leading one of R_Δ at the hand-over.
-
-    One direction is as long as an error of one radian rms over the window; the first window has none.
-    """
+    """Directions (windows, size) in θ to search along before each window: the leading one of R_Δ at the hand-over. One
+    direction is as long as an error of one radian rms over the window; the first window has none."""
     period = designer.burst.pulse_period_s
     directions = np.zeros((len(windows), len(designer.sigma)))
     for k in range(1, len(windows)):

@@ -3,8 +3,7 @@
 Uss, Baryshev, Djavad 2010: the Fisher matrix below (6), the potential accuracy after (7), T_min (17). Matrices are in
 the units of θ = (φ₀, f₀, …), rad, Hz, Hz/s, ….
 
-Arrays for the estimator's kernels: the burst cut into blocks, each estimator's windows and step matrices.
-"""
+Arrays for the estimator's kernels: the burst cut into blocks, each estimator's windows and step matrices."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -53,9 +52,7 @@ def fisher(burst: Burst, size: int, duration_s: float) -> np.ndarray:
 
 def fisher_sums(burst: Burst, size: int, windows: list[int], theta: np.ndarray | None = None) -> list[np.ndarray]:
     """Fisher matrices (size, size) of the samples up to each window (in pulses), from running sums of powers of time.
-
-    With the true θ the sums are exact; without, sin² of the phase is replaced by its mean ½, as in the closed form.
-    """
+    With the true θ the sums are exact; without, sin² of the phase is replaced by its mean ½, as in the closed form."""
     t = sample_times(burst, max(windows))
     x = t / burst.duration_s
     weight = np.full(t.shape, 1.0 if burst.complex_samples else 0.5)
@@ -71,8 +68,7 @@ def fisher_sums(burst: Burst, size: int, windows: list[int], theta: np.ndarray |
 def running_moments(weight: np.ndarray, x: np.ndarray, windows: list[int], count: int) -> np.ndarray:
     """Sums (count, K) of weight · x^j, j = 0 … count − 1, over the samples up to each window (in pulses).
 
-    weight and x are (samples per pulse, pulses).
-    """
+    weight and x are (samples per pulse, pulses)."""
     ends, moments = np.array(windows) - 1, []
     for _ in range(count):
         moments.append(np.cumsum(weight.sum(axis=0))[ends])
@@ -86,8 +82,7 @@ def image_bias(burst: Burst, sigma: np.ndarray, windows: list[int], turns: np.nd
     That is √(gᵀ (Φ_θ + R_pr⁻¹)⁻¹ g), no less than the bias of any component over its spread with the prior. At the
     truth the image in Re Σ u e^{-jψ} has the gradient g = (A²/2σ²) Σ sin 2ψ k, which the second sum of (5) takes away.
     It is the same in every burst, so estimates without that sum are biased, by the more of their spreads the larger
-    A/σ is. sigma (size,) is the prior's, turns (samples per pulse, pulses) the true phase.
-    """
+    A/σ is. sigma (size,) is the prior's, turns (samples per pulse, pulses) the true phase."""
     x, size = sample_times(burst, max(windows)) / burst.duration_s, len(sigma)
     turns = turns[:, : max(windows)]
     sums = running_moments(np.sin(4.0 * math.pi * (turns - np.rint(turns))), x, windows, size)
@@ -119,8 +114,7 @@ def spreads(information: np.ndarray) -> np.ndarray:
 def derivative_spread(covariance: np.ndarray, order: int, t_s: float) -> float:
     """Spread of the frequency's derivative of this order at time t within the burst, from the covariance (n, n) of θ.
 
-    The beginning of the burst, where θ is defined, is the worst place: in the middle it is known many times better.
-    """
+    The beginning of the burst, where θ is defined, is the worst place: in the middle it is known many times better."""
     size = len(covariance)
     row = np.array([t_s ** (j - 1 - order) / math.factorial(j - 1 - order) if j > order else 0.0 for j in range(size)])
     return float(np.sqrt(row @ covariance @ row))
@@ -168,9 +162,7 @@ class World:
 
 def has_image(burst: Burst, sigma: np.ndarray, windows: list[int], truth_turns: np.ndarray) -> bool:
     """Whether the sum at twice the frequency counts in any window, of forecasts of standard deviations sigma (size,).
-
-    Phases (samples per pulse, pulses) are in turns.
-    """
+    Phases (samples per pulse, pulses) are in turns."""
     if burst.complex_samples:
         return False
     ends = np.array(windows)
@@ -203,9 +195,7 @@ def world(
 
 def step_root(data: np.ndarray, precision: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rows v (size, size) with Σ v vᵀ = (Φ + P)⁻¹ and vᵀ Φ v = share (size,): Φ the data's, P the prior's information.
-
-    Then (ρΦ + P)⁻¹ = Σ v vᵀ / (1 − (1 − ρ) share) for any coherence ρ.
-    """
+    Then (ρΦ + P)⁻¹ = Σ v vᵀ / (1 − (1 − ρ) share) for any coherence ρ."""
     information = data + np.diag(precision)
     scale = 1.0 / np.sqrt(np.diag(information))
     lower = np.linalg.cholesky(information * np.outer(scale, scale))
@@ -225,8 +215,7 @@ def estimators(
     """Records of the windows (F, K) and options (F,) of a case's estimators.
 
     blocks gives a window's place in the table of blocks, in that of weights, and its number of blocks, see `Tables`;
-    information is Φ_θ by window in the units of θ, sigma (size,) is the prior. Unused windows stay zero.
-    """
+    information is Φ_θ by window in the units of θ, sigma (size,) is the prior. Unused windows stay zero."""
     size, whole = len(sigma), turns_per_parameter(len(sigma), burst.duration_s)
     windows = np.zeros((len(designs), max(len(d.windows) for d in designs)), WINDOW)
     options = np.zeros(len(designs), OPTIONS)

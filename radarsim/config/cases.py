@@ -58,10 +58,8 @@ def place(document: Document, model: type[Study], setting: Setting, read: Read, 
 
 
 def key_paths(document: Document, model: type[Study], key: str, missing_ok: bool = False) -> list[KeyPath]:
-    """The places of a key of `sweep` or `--set`: one, or for a bare filter key one in every filter that has it.
-
-    Raises NoSuchKey, or returns none with missing_ok.
-    """
+    """The places of a key of `sweep` or `--set`: one, or for a bare filter key one in every filter that has it. Raises
+    NoSuchKey, or returns none with missing_ok."""
     try:
         if "." in key or key in allowed_keys(model):
             return [_dotted(document, key)]
@@ -131,11 +129,9 @@ def _with_twins(paths: Iterable[KeyPath], model: type[Study]) -> Iterator[KeyPat
 
 
 def overlaid(document: Document, model: type[Study], over: Document, read: Read, faults: Faults) -> Document:
-    """The document of an included config with the keys beside `include` laid over it.
-
-    Mappings are changed key by key, scenarios by their content; all else is replaced: lists, values, a scenario's stem,
-    and a mapping of another kind.
-    """
+    """The document of an included config with the keys beside `include` laid over it. Mappings are changed key by key,
+    scenarios by their content; all else is replaced: lists, values, a scenario's stem, and a mapping of another
+    kind."""
     stems = [key for key, value in over.data.items() if isinstance(value, str)]
     over = scenarios_inlined(over, model, read, faults)
     for key, value in over.data.items():
@@ -270,8 +266,7 @@ def _renamed(drafts: list[Draft], stem: str) -> list[Draft]:
 def no_such_config(name: str, studies: Studies, known: bool = False) -> str:
     """The fault that no config has this name: from the package that would have it, or with the nearest name.
 
-    known: the names to list where none is near.
-    """
+    known: the names to list where none is near."""
     if faults := studies.lacking(name):
         return f"no such config: {'; '.join(faults)}"
     there = stems("configs")
@@ -280,10 +275,8 @@ def no_such_config(name: str, studies: Studies, known: bool = False) -> str:
 
 
 class Expander:
-    """Expands configs into drafts, each config once.
-
-    `read(file, faults)` returns the document in a file, or notes a fault and returns None.
-    """
+    """Expands configs into drafts, each config once. `read(file, faults)` returns the document in a file, or notes a
+    fault and returns None."""
 
     def __init__(self, read: Read, settings: Iterable[Setting], faults: Faults, studies: Studies):
         cached: Read = cache(read)
@@ -444,8 +437,7 @@ class Expander:
     def _may_be_swept(self, document: Document, before: list[str], key: str, drafts: list[Draft], over: Over) -> bool:
         """Whether a swept key is set by this sweep alone: by no other sweep, override or key laid over it.
 
-        before: the earlier keys of the same sweep.
-        """
+        before: the earlier keys of the same sweep."""
         origin = document.key_origin(("sweep", key))
         if key.split(".")[0] in COMMON_KEYS:
             self.faults.add(origin, ("sweep", key), "cannot be swept")

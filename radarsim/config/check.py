@@ -2,8 +2,7 @@
 
 Names of keys: one text, symbol and unit for each, from the schema of its study: `key("scan period", "time between two
 plots, s", symbol="Δt")`. The unit is the one at the end of the key's name; a key without such an ending, or with an
-unusual one, gives it beside the symbol, as `unit`.
-"""
+unusual one, gives it beside the symbol, as `unit`."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator
@@ -53,10 +52,8 @@ WITHOUT_VALUE = ("missing", "extra_forbidden", "unique", "union_tag_not_found")
 
 
 def check(model: type[M], document: Document, faults: Faults, also: Iterable[str] = ()) -> M | None:
-    """The document as a checked object; None, with faults noted, if it is invalid.
-
-    `also` are top-level keys that are checked elsewhere and are listed among the allowed ones.
-    """
+    """The document as a checked object; None, with faults noted, if it is invalid. `also` are top-level keys that are
+    checked elsewhere and are listed among the allowed ones."""
     refuse_both_units(document, faults)
     try:
         return model.model_validate(document.data)
@@ -103,8 +100,7 @@ class _Found:
 class _Partial:
     """A document with faults: its valid part, for the cross-checks that need no more.
 
-    Where a mapping has an unknown key, its optional keys that are not given count as unread: one may be misspelt.
-    """
+    Where a mapping has an unknown key, its optional keys that are not given count as unread: one may be misspelt."""
 
     def __init__(self, model: type[Model], document: Document, found: list[_Found], faults: Faults):
         self.model, self.document, self.faults = model, document, faults
@@ -331,10 +327,8 @@ class Words(str):
 
 
 class Label(NamedTuple):
-    """A key in words: "scan period", its symbol in the papers ("Δt", "σ_r": a subscript after _) and its unit.
-
-    Symbol and unit are empty where there is none.
-    """
+    """A key in words: "scan period", its symbol in the papers ("Δt", "σ_r": a subscript after _) and its unit. Symbol
+    and unit are empty where there is none."""
 
     text: str
     symbol: str
@@ -373,8 +367,7 @@ def label(keys: Study | type[Study] | None, key: str) -> Label:
 def _field(keys: Model | type[Model], steps: list[str]) -> tuple[type[Model], FieldInfo] | None:
     """The field at dotted steps, from the top or, for a bare key, from the members of the study's list.
 
-    With it the schema that names it: a base class, where the field is inherited.
-    """
+    With it the schema that names it: a base class, where the field is inherited."""
     model = keys if isinstance(keys, type) else type(keys)
     if steps and _named(steps[0]).isdisjoint(model.model_fields) and issubclass(model, Study):
         steps = [model.bare_keys, *steps]

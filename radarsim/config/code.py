@@ -1,7 +1,6 @@
 """Filters of the user's own code among those of a study: `{name: mine, python: my_filter.py:MyFilter, hidden: 8}`.
 
-Read here is how a config names them; `radarsim.studies.code` finds their sources, and runs them.
-"""
+Read here is how a config names them; `radarsim.studies.code` finds their sources, and runs them."""
 
 from collections.abc import Callable
 from functools import cache
@@ -30,8 +29,7 @@ Coded = Callable[[OwnCode, str, bool, Path], Any]
 def parted(document: Document, model: type[Study], coded: Coded, faults: Faults) -> tuple[Document, tuple[Any, ...]]:
     """The document with the study's own filters and baselines alone, and the filters of the user's code.
 
-    coded: what makes such a filter of its keys, its place, whether it is a baseline, and the folder of its config.
-    """
+    coded: what makes such a filter of its keys, its place, whether it is a baseline, and the folder of its config."""
     members = document.data.get(model.bare_keys)
     if not isinstance(members, list) or not any(map(is_code, members)):
         return document, ()

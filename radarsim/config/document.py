@@ -2,8 +2,7 @@
 
 Faults of a config: place, fault, allowed values; collected, so that the user sees all of them at once.
 
-Where configs and scenarios are found by their stem, and suggestions when they are not.
-"""
+Where configs and scenarios are found by their stem, and suggestions when they are not."""
 
 import difflib
 import re
@@ -27,8 +26,7 @@ class Origin(NamedTuple):
     """Where a value was written: a file with line and column from 1, an argument, or `config`: a dictionary.
 
     prefix counts the leading keys of a path that are not in that file: a scenario's own keys begin below `target`. key:
-    the key that an argument such as `--set KEY` names itself, possibly a bare filter key.
-    """
+    the key that an argument such as `--set KEY` names itself, possibly a bare filter key."""
 
     source: str
     line: int = 0
@@ -174,10 +172,8 @@ def config_file(name: str, beside: Path | None = None) -> Path | None:
 
 
 def scenario_file(name: str, config: Path | None) -> Path | None:
-    """The file of a scenario: beside the config, in scenarios/ next to its folder or here, among the shipped.
-
-    A config of that name beside the config is not a scenario.
-    """
+    """The file of a scenario: beside the config, in scenarios/ next to its folder or here, among the shipped. A config
+    of that name beside the config is not a scenario."""
     folders = [] if config is None else [config.parent, next_to(config.parent) / "scenarios"]
     found = _first(name, [*folders, Path("scenarios"), SHIPPED / "scenarios"], refused=_is_config)
     return found or _first(name, _further("scenarios"), refused=_is_config)
@@ -244,8 +240,7 @@ class Document:
     """Plain data, and the origins of values and keys by key path.
 
     data of a config or a scenario is a mapping, of an override any value. source is the file as the user named it; file
-    is where it lies (None for a dictionary).
-    """
+    is where it lies (None for a dictionary)."""
 
     data: Any
     source: str

@@ -1,7 +1,6 @@
 """A checked config: an experiment of cases.
 
-The part of a checked config that changes its numbers, as plain JSON-able data.
-"""
+The part of a checked config that changes its numbers, as plain JSON-able data."""
 
 import hashlib
 import json
@@ -62,10 +61,8 @@ def _at_its_default(model: BaseModel, name: str, info: FieldInfo) -> bool:
 
 
 def _without_names(model: BaseModel, name: str, info: FieldInfo) -> object:
-    """The value of a field, without the names in it.
-
-    A name of a list's member is replaced by its place, 0 where none is named; a file of data by its content's hash.
-    """
+    """The value of a field, without the names in it. A name of a list's member is replaced by its place, 0 where none
+    is named; a file of data by its content's hash."""
     value = getattr(model, name)
     for mark in info.metadata:
         if isinstance(mark, NameIn):
@@ -87,8 +84,7 @@ class Case:
     companion, the same case but for that key, computed on the same noise.
     asked_from_k: exact σ and gains are asked for from this scan on, counted from 1; 0: every exact value. roughly: what
     is long to compute may be off by a thousandth, as where a search only looks about.
-    outside: filters of somebody else beside the study's own, see `radarsim.studies.outside`.
-    """
+    outside: filters of somebody else beside the study's own, see `radarsim.studies.outside`."""
 
     name: str
     stem: str
@@ -136,8 +132,7 @@ class Case:
 class Experiment:
     """The experiment of a config; figures holds, for each figure to draw, names or patterns of its cases.
 
-    changes_included: keys of the study stand beside `include`, so that a case differs from the config of its stem.
-    """
+    changes_included: keys of the study stand beside `include`, so that a case differs from the config of its stem."""
 
     stem: str
     study: str

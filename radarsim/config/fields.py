@@ -11,8 +11,7 @@ The numeric keys of a checked config: where each stands, its value, and what it 
 
 Keys that studies of range and radial velocity share: a radar's accuracies, and targets in range.
 
-Keys of rare events that several studies share: realisations drawn where an event is frequent, weighted back.
-"""
+Keys of rare events that several studies share: realisations drawn where an event is frequent, weighted back."""
 
 import math
 import re
@@ -111,10 +110,8 @@ class Design:
 
 
 class Added:
-    """Mark of a key that earlier versions lacked, behaving as its default.
-
-    At its default it is excluded from a case's identity and from its noise's key, so that the noise stays the same.
-    """
+    """Mark of a key that earlier versions lacked, behaving as its default. At its default it is excluded from a case's
+    identity and from its noise's key, so that the noise stays the same."""
 
 
 class ColumnsOfOne:
@@ -129,10 +126,8 @@ class NameIn:
 
 
 class DataFile:
-    """Mark of a text field that names a file of data, relative to the folder of its YAML file.
-
-    The checked object holds a readable path; a case's identity has the file's content instead.
-    """
+    """Mark of a text field that names a file of data, relative to the folder of its YAML file. The checked object holds
+    a readable path; a case's identity has the file's content instead."""
 
 
 class Scenario:
@@ -147,8 +142,7 @@ class Scenario:
 class Only:
     """Mark of a key that belongs to some values of keys beside it, such as a kind: {"kind": ("adaptive", "imm")}.
 
-    default: its value there, if it is not given; needed: it is required. Elsewhere it must be left out.
-    """
+    default: its value there, if it is not given; needed: it is required. Elsewhere it must be left out."""
 
     where: Mapping[str, tuple[str, ...]]
     default: Any = None
@@ -178,8 +172,7 @@ def cross_check(method: Check) -> Check:
     """Mark of a model's method that yields faults of incompatible fields.
 
     All cross-checks of a model are run, in order. Where some fields have faults of their own they run as well, on the
-    valid fields: one that touches an invalid field ends at once, so that independent checks are separate methods.
-    """
+    valid fields: one that touches an invalid field ends at once, so that independent checks are separate methods."""
     _CROSS_CHECKS.add(method)
     return method
 
@@ -433,8 +426,7 @@ def key(
     """A key: its name, its description with unit, its default (none: it is required), and its letter.
 
     unit: of the value, where the key does not end in it. only: values of keys beside it that it belongs to, and for
-    which its default holds; the key may then be None. limits: further arguments of `pydantic.Field`.
-    """
+    which its default holds; the key may then be None. limits: further arguments of `pydantic.Field`."""
     extra: Any = {name: text for name, text in (("symbol", symbol), ("unit", unit)) if text is not None}
     given = default if only is None else None
     field = Field(given, title=title, description=about, json_schema_extra=extra or None, **limits)
@@ -507,8 +499,7 @@ def widened(
     """The keys of a study whose members may have further kinds; an absent kind means the study's own.
 
     why_not: for unusable kinds the reason. again: a function and arguments that return these keys again, by which a
-    config travels between processes.
-    """
+    config travels between processes."""
     info = keys.model_fields[keys.bare_keys]
     (own, _) = get_args(info.annotation)
     kinds = dict.fromkeys(kinds_of(own), own) | dict(further)
@@ -575,10 +566,8 @@ class Member(Model):
 def keys_of(
     name: str, module: str, parts: Mapping[str, type[Model]], filters: type[Member], most_scans: int
 ) -> type[Study]:
-    """The keys of a study with these parts, by name, and `filters`, `baseline` and `scans` with their marks.
-
-    The class has this name, and is found in this module.
-    """
+    """The keys of a study with these parts, by name, and `filters`, `baseline` and `scans` with their marks. The class
+    has this name, and is found in this module."""
     about = {name: (one.__doc__ or name).strip().partition("\n")[0].rstrip(".") for name, one in parts.items()}
     own: Any = {name: (one, key(name.replace("_", " "), about[name])) for name, one in parts.items()}
     own |= {
@@ -606,8 +595,7 @@ class NumericKey:
     """A key that holds a number, as `--set` names it.
 
     value is None where the key is optional and not given. low and high bound what the schema alone allows (infinite
-    where it does not), in the key's unit; whole: only whole numbers are.
-    """
+    where it does not), in the key's unit; whole: only whole numbers are."""
 
     path: str
     value: float | None
@@ -677,10 +665,8 @@ def _limits(part: Any, *names: str) -> list[float]:
 
 
 def find(spec: Study, name: str) -> tuple[NumericKey, ...]:
-    """The numeric keys that a name means: one by its full path; of a bare filter key one in every filter that has it.
-
-    A `_deg` name means its `_rad` twin, value and bounds in degrees. Raises ConfigError, with the nearest known name.
-    """
+    """The numeric keys that a name means: one by its full path; of a bare filter key one in every filter that has it. A
+    `_deg` name means its `_rad` twin, value and bounds in degrees. Raises ConfigError, with the nearest known name."""
     known = keys(spec)
     path, _, last = name.rpartition(".")
     twin = in_radians(last)

@@ -1,7 +1,6 @@
 """YAML to checked experiments. The only file that imports yaml: it reads text, with line and column of every value.
 
-`radarsim new`: a user's own config, from a known one, each key with its description beside it.
-"""
+`radarsim new`: a user's own config, from a known one, each key with its description beside it."""
 
 import copy
 import json
@@ -47,8 +46,7 @@ def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Override
     """The experiment that a config describes, fully checked.
 
     source is a path, the stem of a config (here, in ./configs, or shipped), or a mapping like the YAML; for overrides
-    see `texts`. Raises ConfigError, one line for each fault.
-    """
+    see `texts`. Raises ConfigError, one line for each fault."""
     faults = Faults()
     settings = [setting for text in texts(overrides) if (setting := _setting(text, faults))]
     document: Document | None = None
@@ -333,9 +331,7 @@ DEGREES = {"rad": "degrees", "rad/s": "degrees per second"}
 
 def starter(data: Mapping[str, Any], study_keys: type[Model], name: str, like: str) -> str:
     """YAML of a config's data (as read, keys as written) under a new name, each key with the schema's description.
-
-    Missing optional keys follow, commented out, with their defaults.
-    """
+    Missing optional keys follow, commented out, with their defaults."""
     lines = [
         f"# {name}.yaml — like {like}: change the numbers, then `radarsim run {name}.yaml`",
         "# Units stand in the keys: _m, _s, _mps (m/s), _mps2 (m/s²), _hz, _rad; _deg is taken wherever _rad is.",
@@ -458,8 +454,7 @@ def new(
     """The name of the file of a new config, NAME with or without suffix given, and its text, from a known config.
 
     values by dotted key replace those of the known config; a bare key means that key in every filter. Raises
-    ConfigError for an impossible name.
-    """
+    ConfigError for an impossible name."""
     name = name.removesuffix(".yaml")
     if is_reserved(name):
         raise ConfigError(f"{name}: {RESERVED}")

@@ -1,7 +1,6 @@
 """The YAML keys common to all configs, and the interface to the studies: their names and their keys.
 
-The schema of the YAML as JSON Schema, for editors and for `radarsim schema`.
-"""
+The schema of the YAML as JSON Schema, for editors and for `radarsim schema`."""
 
 import json
 from pathlib import Path

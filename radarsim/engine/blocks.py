@@ -4,8 +4,7 @@ Block b holds the realisations [b·size, (b+1)·size); the last one of a run may
 2^level blocks, and its sums are always those of its two halves added. The total of N realisations is the sum of the
 largest nodes that fill the full blocks, from left to right, and of the cut block at the end. So the bytes of a total
 depend on N and on the block alone: not on threads, on the order in which work was finished, or on where a run was
-interrupted.
-"""
+interrupted."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -21,10 +20,8 @@ QUESTION = 32  # digits of an identity for the request; the further ones are for
 
 class Work(Protocol):
     """A work to simulate. `identity` (hex digits) names all that changes a number, `block` is the number of
-    realisations in a block, `size` the length of the vector of sums.
-
-    A work may also have `explain(first, count)`, which gives lines on the origin of numbers that are not finite.
-    """
+    realisations in a block, `size` the length of the vector of sums. A work may also have `explain(first, count)`,
+    which gives lines on the origin of numbers that are not finite."""
 
     @property
     def identity(self) -> str: ...

@@ -4,8 +4,7 @@ A task travels as the pickled work (a case: a few kilobytes) and the piece; the 
 it. Workers may come and go: Dask hands the tasks of a dead one to another. They must have the same sources, which the
 identity of the work shows.
 
-A key and its certificate for the processes of one run, by the package `cryptography`.
-"""
+A key and its certificate for the processes of one run, by the package `cryptography`."""
 
 import contextlib
 import ipaddress
@@ -40,10 +39,8 @@ NAME = "radarsim"
 
 
 def self_signed() -> tuple[str, str]:
-    """A new private key and a certificate for it that is its own authority, both as PEM text.
-
-    Raises ImportError without `cryptography`.
-    """
+    """A new private key and a certificate for it that is its own authority, both as PEM text. Raises ImportError
+    without `cryptography`."""
     from cryptography import x509
     from cryptography.hazmat.primitives import hashes, serialization
     from cryptography.hazmat.primitives.asymmetric import ec
@@ -103,11 +100,9 @@ def _dask() -> ModuleType:
 
 
 def steady_clock() -> None:
-    """Let messages of this process wait by a clock that nobody sets; to be called before any loop begins.
-
-    Dask delays outgoing messages until a deadline by the time of day, as Tornado's loops count it: a clock set back by
-    an hour between two messages delayed the second for that hour, and the run waited for it. Neither has a setting.
-    """
+    """Let messages of this process wait by a clock that nobody sets; to be called before any loop begins. Dask delays
+    outgoing messages until a deadline by the time of day, as Tornado's loops count it: a clock set back by an hour
+    between two messages delayed the second for that hour, and the run waited for it. Neither has a setting."""
     from distributed import batched
     from tornado.ioloop import IOLoop
 
@@ -142,10 +137,8 @@ def _is_loopback(host: str) -> bool:
 
 
 def _security(distributed: ModuleType) -> "Security | None":
-    """Keys and certificates of one run, made for it; None without the package `cryptography`, which makes them.
-
-    Those of `Security.temporary` are valid from now for a year: a clock set back locks workers out.
-    """
+    """Keys and certificates of one run, made for it; None without the package `cryptography`, which makes them. Those
+    of `Security.temporary` are valid from now for a year: a clock set back locks workers out."""
     try:
         key, certificate = self_signed()
     except ImportError:
@@ -191,10 +184,8 @@ class Cluster:
     longest_s = 0.5
 
     def __init__(self, workers: int | None = None, scheduler: str | None = None):
-        """So many worker processes on this machine, or the workers of the scheduler at an address.
-
-        Raises ConfigError where Dask is missing, the address is wrong, or no worker appears within half a minute.
-        """
+        """So many worker processes on this machine, or the workers of the scheduler at an address. Raises ConfigError
+        where Dask is missing, the address is wrong, or no worker appears within half a minute."""
         distributed = _dask()
         steady_clock()
         import dask
@@ -269,10 +260,8 @@ class Cluster:
         future.add_done_callback(self._done.put)
 
     def finished(self, timeout_s: float) -> list[Outcome]:
-        """Outcomes since the last call, waiting at most timeout_s for the first.
-
-        Raises ClusterError when the scheduler or all workers are gone, or a task cannot run there at all.
-        """
+        """Outcomes since the last call, waiting at most timeout_s for the first. Raises ClusterError when the scheduler
+        or all workers are gone, or a task cannot run there at all."""
         outcomes: list[Outcome] = []
         with contextlib.suppress(Empty):
             outcomes += self._collected(self._done.get(timeout=timeout_s))
@@ -310,10 +299,8 @@ class Cluster:
         raise ClusterError(f"{self._place}: a worker cannot run the blocks: {type(error).__name__}: {error}")
 
     def _sums(self, future: "Future") -> Outcome:
-        """The result of a task. Raises TimeoutError after RESULT_S.
-
-        If all its holders have died, others compute it again; on this machine these have to be started.
-        """
+        """The result of a task. Raises TimeoutError after RESULT_S. If all its holders have died, others compute it
+        again; on this machine these have to be started."""
         end = time.monotonic() + RESULT_S
         while self._own is not None:
             try:
@@ -400,11 +387,9 @@ def _for_workers(security: Any) -> str:  # whose fields Dask makes at run time
 
 
 class _Processes:
-    """Worker processes on this machine, in sessions of their own: Ctrl-C in a terminal reaches only the run.
-
-    They are new processes, not forks of a process with live threads. One that dies is replaced; all end when the
-    scheduler, and so this process, is gone.
-    """
+    """Worker processes on this machine, in sessions of their own: Ctrl-C in a terminal reaches only the run. They are
+    new processes, not forks of a process with live threads. One that dies is replaced; all end when the scheduler, and
+    so this process, is gone."""
 
     def __init__(self, workers: int, address: str, security: "Security | None" = None):
         options = ["--no-nanny", "--nthreads", "1", "--memory-limit", "0", "--death-timeout", "10"]

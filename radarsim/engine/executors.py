@@ -24,10 +24,7 @@ class Outcome:
 
 class Executor(Protocol):
     """`workers` tasks run at once, `depth` are worth submitting in advance, and one should last from `shortest_s` to
-    `longest_s`.
-
-    Tasks must start in the order of submit, so that a stopped run has finished its leftmost ones.
-    """
+    `longest_s`. Tasks must start in the order of submit, so that a stopped run has finished its leftmost ones."""
 
     workers: int
     depth: int
@@ -67,8 +64,7 @@ class Threads:
     """Pool threads of this process; kernels release the interpreter's lock.
 
     Even one thread is a pool thread: on the main thread the time of a kernel depends on the address of its stack. They
-    are daemons, so that a task that overruns its time at a stop does not keep the process alive.
-    """
+    are daemons, so that a task that overruns its time at a stop does not keep the process alive."""
 
     shortest_s = 3e-3
     longest_s = 0.1

@@ -1,7 +1,6 @@
 """The result of a block of realisations: a count and a vector of sums. Sums add; the engine needs no more.
 
-The result of a finished case, for the report: its sums, and the axes that label them.
-"""
+The result of a finished case, for the report: its sums, and the axes that label them."""
 
 import math
 from collections.abc import Mapping
@@ -61,8 +60,7 @@ class Axes:
 
     k (K,) counts scans from 1, t_s (K,) is the time from the first plot. available (F, K, C): where a filter has an
     estimate. baseline: the filter that gains refer to. exact_sigma and exact_bias (F, K, C) are NaN where no exact
-    value is known. A study's subclass adds what its tables need.
-    """
+    value is known. A study's subclass adds what its tables need."""
 
     filters: tuple[str, ...]
     components: tuple[tuple[str, str], ...]
@@ -83,9 +81,7 @@ class Axes:
     @property
     def exact_gains(self) -> np.ndarray:
         """Exact gains (F, K, C) against the baseline, per cent, in the realisations in which both have an estimate.
-
-        Here each has one wherever it is available.
-        """
+        Here each has one wherever it is available."""
         sigma = np.asarray(self.exact_sigma, dtype=float)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(100 * (1 - sigma / sigma[self.baseline]))
@@ -104,8 +100,7 @@ class CaseResult(Generic[A_co]):
     somebody else, with theirs.
 
     `error` (F, K, C, 4) holds the sums of e, e², e³, e⁴; `paired` (F, K, C) those of e²·e² with the baseline's error; a
-    study adds its own.
-    """
+    study adds its own."""
 
     name: str
     study: str
@@ -142,8 +137,7 @@ class Track:
     freedom.
 
     Where filters find several tracks, a filter is listed once for each: numbers (F,) identify them, score (F, n) is the
-    logarithm of the likelihood ratio that the track is a target's.
-    """
+    logarithm of the likelihood ratio that the track is a target's."""
 
     filters: tuple[str, ...]
     components: tuple[tuple[str, str], ...]

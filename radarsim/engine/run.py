@@ -2,8 +2,7 @@
 
 One run: stored and missing blocks, tasks dispatched, outcomes collected, and the resulting sums.
 
-Reasons to stop a run: a stop condition is called between tasks and gives None or the reason as text.
-"""
+Reasons to stop a run: a stop condition is called between tasks and gives None or the reason as text."""
 
 import math
 import os
@@ -71,8 +70,7 @@ class Signals:
 
     Python runs handlers between two bytecodes of the main thread, which may be in compiled code for long. So handlers
     do nothing here, and a separate thread waits for the numbers that the interpreter writes to a pipe. Where threads
-    are forbidden the handlers do it, with an alarm for the 1.5 s: delayed by compiled code.
-    """
+    are forbidden the handlers do it, with an alarm for the 1.5 s: delayed by compiled code."""
 
     grace_s = 1.0
     limit_s = 1.5
@@ -173,8 +171,7 @@ PROGRESS_S = 0.1
 class Progress:
     """How realisations were obtained: those asked for, those read, those simulated in this call.
 
-    kernel_seconds is the time inside tasks, summed over the workers; stopped says why there are less than asked.
-    """
+    kernel_seconds is the time inside tasks, summed over the workers; stopped says why there are less than asked."""
 
     asked: int
     from_store: int
@@ -433,8 +430,7 @@ def collect(
     without a gap.
 
     However a run ends, its finished blocks are stored. NonFiniteError names the first realisations whose sums are not
-    finite, which are not stored; StoreError the file that cannot be written.
-    """
+    finite, which are not stored; StoreError the file that cannot be written."""
     with limited(threads):
         run = Run(work, realisations, store, progress)
         return run.finished(None if run.restored() else _computed(run, threads, stop, executor))
@@ -454,8 +450,7 @@ def share(
     """Compute a part of the blocks of N realisations into the store, and nothing else: (2, 3) is the second of three.
 
     Shares are runs of blocks, as equal as blocks permit; the last has the partial block. Stores with all shares are
-    united by copying: `collect` then finds every block. The other arguments are those of `collect`.
-    """
+    united by copying: `collect` then finds every block. The other arguments are those of `collect`."""
     with limited(threads):
         run = Share(work, realisations, part, store, progress)
         return run.finished(None if run.restored() else _computed(run, threads, stop, executor))
@@ -479,8 +474,6 @@ def _computed(run: Dispatch, threads: int | None, stop: Stop | None, executor: E
 
 def stored(work: Work, realisations: int, store: str | os.PathLike) -> Collected | None:
     """The result of collect, if all of it is stored; else None. Computes and writes nothing, but sets damage aside.
-
-    Every N that collect has returned, however it ended, can be read, also after larger runs.
-    """
+    Every N that collect has returned, however it ended, can be read, also after larger runs."""
     run = Run(work, realisations, store, None)
     return run.result(None) if run.restored() else None

@@ -27,8 +27,7 @@ Finished sums are put into the store about once a second, in a thread of its own
 The stored part of a run or a share, by the names of files alone; only results of other sources are recomputed.
 
 An audit of stored blocks, without the work that made them: does each file match its name, do all the blocks of a total
-exist, do they add up to it? Nothing is changed.
-"""
+exist, do they add up to it? Nothing is changed."""
 
 import functools
 import hashlib
@@ -76,11 +75,9 @@ _DECIDING = ("avx512f", "avx2", "fma", "avx", "sse4_2", "asimd")
 
 @functools.cache
 def instruction_set() -> str:
-    """The instruction set, like `x86_64 avx512f avx2 fma`; with equal ones sums are equal to the last bit.
-
-    If the compiler targets another processor (NUMBA_CPU_NAME), that is named, since it decides instead; so are features
-    disabled for NumPy (NPY_DISABLE_CPU_FEATURES).
-    """
+    """The instruction set, like `x86_64 avx512f avx2 fma`; with equal ones sums are equal to the last bit. If the
+    compiler targets another processor (NUMBA_CPU_NAME), that is named, since it decides instead; so are features
+    disabled for NumPy (NPY_DISABLE_CPU_FEATURES)."""
     aimed_at, disabled = os.environ.get("NUMBA_CPU_NAME"), os.environ.get("NPY_DISABLE_CPU_FEATURES")
     found = set(_flags())
     parts = [system.machine(), *(flag for flag in _DECIDING if flag in found)]
@@ -128,10 +125,8 @@ def described() -> dict[str, object]:
 
 @functools.cache
 def linear_algebra() -> str:
-    """The BLAS library that NumPy has loaded, and the processor of its kernels, like `openblas SkylakeX`.
-
-    The processor, or OPENBLAS_CORETYPE, selects the kernels; the order of sums differs between them.
-    """
+    """The BLAS library that NumPy has loaded, and the processor of its kernels, like `openblas SkylakeX`. The
+    processor, or OPENBLAS_CORETYPE, selects the kernels; the order of sums differs between them."""
     from threadpoolctl import threadpool_info
 
     found = {
@@ -191,10 +186,8 @@ def piece_named(name: str) -> Piece | None:
 
 
 class Store:
-    """The pieces of one work under a results directory. Makes no directory before the first write.
-
-    `warnings` collects damage; `platforms` and `marks` those of all sums read or computed so far.
-    """
+    """The pieces of one work under a results directory. Makes no directory before the first write. `warnings` collects
+    damage; `platforms` and `marks` those of all sums read or computed so far."""
 
     def __init__(self, directory: str | os.PathLike, work: Work):
         if not re.fullmatch(r"[0-9a-f]{2,128}", work.identity):
@@ -217,10 +210,8 @@ class Store:
         return {piece for name in names if (piece := piece_named(name)) is not None}
 
     def read(self, piece: Piece) -> Sums | None:
-        """The sums of a piece, checked; None if it is absent or damaged.
-
-        A damaged file is renamed to `<name>.damaged` and named in warnings.
-        """
+        """The sums of a piece, checked; None if it is absent or damaged. A damaged file is renamed to `<name>.damaged`
+        and named in warnings."""
         path = self.path / (piece.name + SUFFIX)
         try:
             header, values = decoded(content(path))
@@ -476,10 +467,8 @@ def encoded(header: Mapping, values: np.ndarray) -> bytes:
 
 
 def is_directory(path: Path) -> bool:
-    """Whether a directory exists; raises OSError where access is denied.
-
-    Path.is_dir raises that only up to Python 3.13: later it returns False without access.
-    """
+    """Whether a directory exists; raises OSError where access is denied. Path.is_dir raises that only up to Python
+    3.13: later it returns False without access."""
     try:
         return stat.S_ISDIR(path.stat().st_mode)
     except (FileNotFoundError, NotADirectoryError):
@@ -539,8 +528,7 @@ class Keeper:
         """Start to write the new nodes, if a second has passed. Raises the error of the writing before.
 
         A node of less than 1/64 of the largest new one is left out: it will soon be part of another, and would cost as
-        much to write. All of them together are a thirtieth of what a kill would lose anyway.
-        """
+        much to write. All of them together are a thirtieth of what a kill would lose anyway."""
         if time.monotonic() < self._due or (self._thread is not None and self._thread.is_alive()):
             return
         self._raise()
@@ -594,8 +582,7 @@ class Stock:
 
     missing: runs (first, last) of missing realisations. loose: whether there are blocks beyond a gap, or blocks that no
     run reported, as from shares or a killed run; shares then says which shares of how many are missing, as far as the
-    ends show.
-    """
+    ends show."""
 
     asked: int
     stored: int
@@ -627,8 +614,7 @@ def as_shares(missing: Collection[tuple[int, int]], blocks: int) -> tuple[tuple[
     """Which shares of how many the missing runs (first, stop) of `blocks` blocks are, as ((2,), 3); None for none.
 
     The fewest shares that fit, unless that is likely by chance: each inner end lies by chance on one of the n − 1
-    bounds of n shares.
-    """
+    bounds of n shares."""
     ends = [end for run in missing for end in run if 0 < end < blocks]
     chance, of = 0.0, 1
     while ends and chance <= BY_CHANCE and of < blocks:

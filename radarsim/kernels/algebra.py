@@ -6,8 +6,7 @@ aa). Packing keeps a covariance symmetric by construction: `P - K S K'` on full 
 A transition is F = (f01, f02, f11, f12, f22) of [[1, f01, f02], [0, f11, f12], [0, 0, f22]]. Differences are written
 term by term, `p - g0*h0 - g1*h1 - g2*h2`: each is one fused instruction; `p - dot(g, h)` is not.
 
-The book is Bar-Shalom, Li & Kirubarajan, Estimation with Applications to Tracking and Navigation (2001), ch. 5.
-"""
+The book is Bar-Shalom, Li & Kirubarajan, Estimation with Applications to Tracking and Navigation (2001), ch. 5."""
 
 import numpy as np
 
@@ -76,10 +75,8 @@ def predicted_cross(c, F):
 
 @inline
 def predicted_information(Y, dt):
-    """F⁻ᵀ Y F⁻¹ of a packed information Y over a time dt of constant second rate, without noise.
-
-    With the order of the states reversed F⁻ᵀ is F of the time -dt.
-    """
+    """F⁻ᵀ Y F⁻¹ of a packed information Y over a time dt of constant second rate, without noise. With the order of the
+    states reversed F⁻ᵀ is F of the time -dt."""
     F = constant_acceleration(-dt)
     y5, y4, y2, y3, y1, y0 = predicted_covariance((Y[5], Y[4], Y[2], Y[3], Y[1], Y[0]), F, NO_NOISE)
     return y0, y1, y2, y3, y4, y5
@@ -91,8 +88,7 @@ def take_value(P, R, taken):
     """Covariance after a measured value of variance R, its gain (3), and the innovation's variance S.
 
     taken is 1, or 0 where there is none: then P stays as it is and the gain is zero. R/S multiplies what a difference
-    of large numbers would leave: P - P₀ P₀ᵀ/S has P₀₀ R/S in its first row.
-    """
+    of large numbers would leave: P - P₀ P₀ᵀ/S has P₀₀ R/S in its first row."""
     S = P[0] + R
     use = taken / S
     left = 1.0 - taken + R * use
@@ -206,10 +202,8 @@ def times(P, x):
 # ---- factors and inverse --------
 @inline
 def inverse(P):
-    """The inverse of a positive packed matrix, by its factors L D L'.
-
-    Scaled rows and columns give the same digits, so that units do not matter.
-    """
+    """The inverse of a positive packed matrix, by its factors L D L'. Scaled rows and columns give the same digits, so
+    that units do not matter."""
     l10, l20 = P[1] / P[0], P[2] / P[0]
     d1 = P[3] - l10 * P[1]
     m = P[4] - l10 * P[2]
@@ -231,8 +225,7 @@ def factored(s):
     """L D L' of a positive packed matrix: (l10, l20, l21), 1 / D, determinant. With one division: they are slow.
 
     Updates of nine states go by whitened rows and not by the inverse: its rounding, of the size of the condition number
-    (3·10⁶ for angles of one degree at 200 km), made covariances negative after some 600 scans.
-    """
+    (3·10⁶ for angles of one degree at 200 km), made covariances negative after some 600 scans."""
     minor = s[0] * s[3] - s[1] * s[1]
     m = s[0] * s[4] - s[1] * s[2]
     whole = minor * (s[0] * s[5] - s[2] * s[2]) - m * m  # the determinant times s00

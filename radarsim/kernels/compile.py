@@ -28,8 +28,7 @@ Numba optimises every function together with all that it calls and makes machine
 the fifth level is translated five times. What kernels call (`inline`, `part`) has no compiled entry from Python and is
 kept untranslated until the kernel is compiled: the nine-state filters take two thirds of the time, and run at the same
 speed. A kernel that another calls is compiled for it apart, without an entry and without machine code. Python calls an
-`inline` function as the plain function that it is, see `radarsim.kernels.formula`; a `part` it cannot call.
-"""
+`inline` function as the plain function that it is, see `radarsim.kernels.formula`; a `part` it cannot call."""
 
 import contextlib
 import ctypes
@@ -234,8 +233,7 @@ def file_hash(module: str) -> str:
 def cache_root() -> Path:
     """The first writable of $RADARSIM_CACHE_DIR, $XDG_CACHE_HOME/radarsim, ~/.cache/radarsim, temporary directory.
 
-    Where none of them can be written, the first of them: nothing is kept then, which `troubles` says.
-    """
+    Where none of them can be written, the first of them: nothing is kept then, which `troubles` says."""
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     candidates = list(filter(None, [os.environ.get("RADARSIM_CACHE_DIR"), os.path.join(home, "radarsim")]))
     for candidate in candidates:
@@ -347,8 +345,7 @@ class SelfContained(JITCodeLibrary):
     Numba leaves the functions of a kernel weak: where another kernel has a function of that name in memory, its code is
     run instead. Which there are depends on what this process has compiled, and what it has read from the cache; they
     differ in the order of their sums, as each is optimised with its callers. So the last bits were others in the
-    process that compiled.
-    """
+    process that compiled."""
 
     def _finalize_final_module(self):
         for function in self._final_module.functions:
@@ -368,10 +365,8 @@ def holds_arrays(kind: types.Type) -> bool:
 
 
 def borrowed(lower: Lower, kind: types.Type, value):
-    """An argument whose arrays are not counted: whoever called the kernel keeps them until it returns.
-
-    Numba counts references to an array wherever it is passed on or cut, with locked instructions.
-    """
+    """An argument whose arrays are not counted: whoever called the kernel keeps them until it returns. Numba counts
+    references to an array wherever it is passed on or cut, with locked instructions."""
     if isinstance(kind, types.Array):
         array = make_array(kind)(lower.context, lower.builder, value)
         array.meminfo = cgutils.get_null_value(array.meminfo.type)

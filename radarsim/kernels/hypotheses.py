@@ -40,8 +40,7 @@ def log_likelihood(x, P, F, Q, H, z, variance, there, manoeuvre, share, white, s
     x (d,) and P (d, d) are what is known at the first row, and are overwritten; F, Q (n, d, d): transition to each row
     and what the manoeuvre of unit variance adds; H (n, m, d), z, variance (n, m): the numbers, where `there`;
     manoeuvre: its variance; share: of outliers; white: 1, or 0 where the errors are states. Out: score (n, m), the
-    logarithm of each number's density given those before it, zero where it is not there.
-    """
+    logarithm of each number's density given those before it, zero where it is not there."""
     room, p = np.zeros_like(P), np.zeros_like(x)
     for k in range(z.shape[0]):
         if k > 0:
@@ -69,10 +68,8 @@ def innovation(x, P, h, z, p):
 
 @kernel
 def extrapolate(x, P, room, moved, F, Q, manoeuvre):
-    """x = F x and P = F P F' + manoeuvre Q, in place; room (d, d) and moved (d,) are for the sums.
-
-    P stays symmetric to the last digit, here and in `take`: what its halves differ by grows from row to row.
-    """
+    """x = F x and P = F P F' + manoeuvre Q, in place; room (d, d) and moved (d,) are for the sums. P stays symmetric to
+    the last digit, here and in `take`: what its halves differ by grows from row to row."""
     d = x.size
     for a in range(d):
         moved[a] = 0.0
@@ -167,11 +164,9 @@ def greatest(x):
 
 @part
 def least_kept(weights, count, copy, most):
-    """The `most`-th greatest of `count` weights; most < count.
-
-    By halves as in Hoare's selection, on a copy. What is kept of it moves to its front without a branch: as good as
-    random, half of the branches would be foretold wrongly.
-    """
+    """The `most`-th greatest of `count` weights; most < count. By halves as in Hoare's selection, on a copy. What is
+    kept of it moves to its front without a branch: as good as random, half of the branches would be foretold
+    wrongly."""
     for i in range(count):
         copy[i] = weights[i]
     while count > 1:

@@ -6,8 +6,7 @@ vectoriser (which refuses run-time alias checks in loops of fewer than 16 passes
 scalar, four times slower).
 
 Small matrices are tuples of lanes, passed through functions that are inlined. What lives between steps lies in a flat
-float64 array: row r holds the eight lanes of one quantity, at r * WIDTH … r * WIDTH + 7; `rows` makes such an array.
-"""
+float64 array: row r holds the eight lanes of one quantity, at r * WIDTH … r * WIDTH + 7; `rows` makes such an array."""
 
 import functools
 import operator
@@ -196,8 +195,7 @@ def total(typingctx, x):
 def add_totals(typingctx, pointer, number, a, b, c, d):
     """Add the totals of four to four neighbouring plain numbers, from `number` on; each is summed as by `total`.
 
-    A third of the instructions of four totals: halves are added of two at a time.
-    """
+    A third of the instructions of four totals: halves are added of two at a time."""
 
     def generate(context, builder, sig, args):
         def paired(one, other, low, high):
@@ -222,8 +220,7 @@ def address(typingctx, array):
     """Where a contiguous array begins, for `get`, `put` and plain indexing: the array must outlive every use.
 
     Passed on to functions instead of the array: Numba counts references to arrays, with locked instructions, at every
-    call; that alone took a third of a filter step.
-    """
+    call; that alone took a third of a filter step."""
 
     def generate(context, builder, sig, args):
         return make_array(sig.args[0])(context, builder, args[0]).data
@@ -271,10 +268,8 @@ def put(typingctx, pointer, row, value):
 
 @inline
 def exponential(x):
-    """exp x for x from -700 to 700, to 2 units in the last place; below -700 as at -700.
-
-    2**n times the Taylor series of exp on |r| <= ln 2 / 2, with ln 2 in two parts (Cody and Waite).
-    """
+    """exp x for x from -700 to 700, to 2 units in the last place; below -700 as at -700. 2**n times the Taylor series
+    of exp on |r| <= ln 2 / 2, with ln 2 in two parts (Cody and Waite)."""
     x = where_greater(x, full(-700.0), x, full(-700.0))
     n = nearest(x * 1.4426950408889634)
     r = x - n * 0.693147180369123816 - n * 1.90821492927058770e-10

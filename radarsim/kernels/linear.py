@@ -7,8 +7,7 @@ third gains and weights are zero, and a further coordinate is a further call.
 
 Before a filter's start its estimates are the plots themselves, of what it observes.
 
-The work array x (F + 1, 3, n) holds the filters' states and, last, the plots (its third row stays zero).
-"""
+The work array x (F + 1, 3, n) holds the filters' states and, last, the plots (its third row stays zero)."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -62,8 +61,7 @@ def fill_plots(key, first, scan, mean, sigma, next_word, z, w):
 
     mean (>= 2,) holds the true ones, sigma (2,) their standard deviations. The first normal of pair `scan` goes to the
     value, the second to the rate, whether or not any filter observes it. Words come two at a time: those of the scan
-    after an even one are kept in next_word (n,) uint64, so scans are taken in their order.
-    """
+    after an even one are kept in next_word (n,) uint64, so scans are taken in their order."""
     mean_z, mean_w, sigma_z, sigma_w = mean[0], mean[1], sigma[0], sigma[1]
     word = z.view(np.uint64)
     if scan % 2 == 0:
@@ -130,8 +128,7 @@ def source(x, f, k, observes, start):
 def moments(x, f, n, truth):
     """Sums over the first n realisations of the errors r, v, a = x[f] - truth (3,) and of their products, in one pass.
 
-    Returns r, r², r³, r⁴, the same of v and of a, then r v, r a, v a: fifteen numbers.
-    """
+    Returns r, r², r³, r⁴, the same of v and of a, then r v, r a, v a: fifteen numbers."""
     r0, v0, a0 = truth[0], truth[1], truth[2]
     r1 = r2 = r3 = r4 = v1 = v2 = v3 = v4 = a1 = a2 = a3 = a4 = rv = ra = va = 0.0
     for i in range(n):
@@ -227,9 +224,7 @@ def fill_estimates(x, problem, plots, estimates):
 
 def plain(array, *shape, dtype=np.float64):
     """The array as the kernels take it: of one type, contiguous, writable, broadcast to a shape; itself where it is so.
-
-    Numba counts a read-only array as another type and would compile everything again.
-    """
+    Numba counts a read-only array as another type and would compile everything again."""
     alike = type(array) is np.ndarray and array.shape == shape and array.dtype == dtype
     if alike and array.flags.c_contiguous and array.flags.writeable:
         return array
@@ -253,11 +248,9 @@ def as_taken(problem: Any, **shapes: tuple[int, ...]) -> Any:
 
 
 def simulate_block(problem: Problem, first: int, count: int, sums: Sums) -> None:
-    """Simulate realisations first … first + count - 1 (any count > 0) and add all filters' errors to the sums.
-
-    The arrays of sums are float64 and contiguous. Realisation i has the same plots and estimates in any block. Memory
-    does not grow with count or scans.
-    """
+    """Simulate realisations first … first + count - 1 (any count > 0) and add all filters' errors to the sums. The
+    arrays of sums are float64 and contiguous. Realisation i has the same plots and estimates in any block. Memory does
+    not grow with count or scans."""
     problem = problem.plain()
     add_block(aligned_zeros(len(problem.gains) + 1, 3, CHUNK), int(first), int(count), problem, sums)
 
@@ -277,9 +270,7 @@ def errors(problem: Problem, first: int, count: int) -> np.ndarray:
 
 def estimate(problem: Problem, plots: np.ndarray) -> np.ndarray:
     """Estimates (n, F, K, 3) of a problem's filters over plots (n, K, 2) of n tracks; NaN where a filter has none yet.
-
-    By the same instructions as `simulate_block`. For a missing plot give any finite number, with zero gains.
-    """
+    By the same instructions as `simulate_block`. For a missing plot give any finite number, with zero gains."""
     problem = problem.plain()
     filters, scans = problem.gains.shape[:2]
     x, estimates = aligned_zeros(filters + 1, 3, CHUNK), np.full((len(plots), filters, scans, 3), np.nan)

@@ -4,8 +4,7 @@ Threefry2x64-13 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy a
 transform with polynomials for log, sin and cos, because nothing vectorises the library's. The key is (seed, hash of the
 stream's name), the counter (realisation, call). Call c gives the words 2c and 2c + 1, of 64 bits. Pair p of normals is
 made of word p alone, pair p of uniform numbers of words 2p and 2p + 1.
-LAYOUT is the version of that layout: results carry it, and a change of it starts new results.
-"""
+LAYOUT is the version of that layout: results carry it, and a change of it starts new results."""
 
 import hashlib
 import math
@@ -75,8 +74,7 @@ def log_series(m, e):
     """Natural logarithm of m 2^e with m from √½ to √2.
 
     log m = 2 atanh s = s (2 + q p(q)) with s = (m - 1) / (m + 1), q = s². p is the polynomial of least greatest error
-    (Remez's algorithm in 50 digits): 1.2e-18 of the logarithm.
-    """
+    (Remez's algorithm in 50 digits): 1.2e-18 of the logarithm."""
     s = (m - 1.0) / (m + 1.0)
     q = s * s
     p = q * 0.1479594981044202 + 0.15314050542046614
@@ -90,11 +88,8 @@ def log_series(m, e):
 
 @inline
 def sine_cosine_polynomial(x):
-    """sin x and cos x for |x| <= pi/4, to 1.5 units in the last place.
-
-    The polynomials in q = x² of least greatest error (Remez's algorithm in 50 digits), 4e-18 and 9e-17, for
-    (sin x / x - 1) / q and (cos x - 1 + q/2) / q².
-    """
+    """sin x and cos x for |x| <= pi/4, to 1.5 units in the last place. The polynomials in q = x² of least greatest
+    error (Remez's algorithm in 50 digits), 4e-18 and 9e-17, for (sin x / x - 1) / q and (cos x - 1 + q/2) / q²."""
     q = x * x
     s = q * 1.589623019235577e-10 - 2.505074776349835e-08
     s = s * q + 2.7557313621390157e-06
@@ -120,8 +115,7 @@ def normal_pair(word):
 
     The word over 2**64 gives the radius, GOLDEN times it the angle. The 2**64 points of the two are the most even
     lattice of the unit square: what happens with probability p, such as a tail, has some p 2**64 of them. The largest
-    radius is 9.5. A rounding up to 1 is the radius 0.
-    """
+    radius is 9.5. A rounding up to 1 is the radius 0."""
     radius = math.sqrt(-2.0 * log_polynomial(np.float64(word) * 2.0**-64 + 2.0**-65))
     # y as a signed number is the angle from -pi/4 to pi/4; its two lowest bits choose the quadrant.
     y = word * GOLDEN
@@ -191,10 +185,8 @@ def words_to_normals(a, b):
 @kernel
 def fill_normal_strip(key, first, pair, a, b):
     """Unit normals of LANES realisations over several pairs, into flat a and b of pairs × LANES numbers; even `pair`.
-
     Element j * LANES + l belongs to realisation first + l and pair `pair` + j. Loops over the whole strip (16 pairs are
-    enough) vectorise; a loop over eight lanes alone does not.
-    """
+    enough) vectorise; a loop over eight lanes alone does not."""
     k0, k1, start, call = key[0], key[1], U(first), U(pair) >> U(1)
     x, y = a.view(np.uint64), b.view(np.uint64)
     for i in range((a.size + LANES) >> (LANE_BITS + 1) << LANE_BITS):

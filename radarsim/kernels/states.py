@@ -47,8 +47,7 @@ class Problem(NamedTuple):
     adapts  (F,)             1: gains are made of the plots that are there, by P (F, n, n) first, Q (F, n, n) and
                              R (F, K, D), as the filter believes
     probability              that there is a plot; all its numbers are missed together
-    baseline                 the filter that others are compared with
-    """
+    baseline                 the filter that others are compared with"""
 
     key: np.ndarray
     detections: np.ndarray
@@ -120,8 +119,7 @@ def world(problem: Problem) -> list[tuple[Program, np.ndarray]]:
 def of_filters(problem: Problem, some: np.ndarray, adapts: bool) -> tuple[Program, np.ndarray]:
     """The program of a scan of some filters (F,), of all the same, and their tables (F, K, width).
 
-    At the first scan the estimates stay as they are before its plot: there F is the unit matrix, and Q zero.
-    """
+    At the first scan the estimates stay as they are before its plot: there F is the unit matrix, and Q zero."""
     trace, n, scans = Trace(), problem.x.shape[1], problem.H.shape[1]
     F, Q = (np.repeat(one[some][:, None], scans, axis=1) for one in (problem.F, problem.Q))
     F[:, 0], Q[:, 0] = np.eye(n), 0.0
@@ -167,8 +165,7 @@ class Work(NamedTuple):
     u, v (GROUPS, …)    uniform numbers in the same way
     truth, plots, there, counted    n, G D, 1 and 1 rows an eight; there: 1 where there is a plot, else 0; counted: 0
                                     beyond the block's last realisation
-    states (F, …)       what a filter keeps
-    """
+    states (F, …)       what a filter keeps"""
 
     a: np.ndarray
     b: np.ndarray
@@ -339,8 +336,7 @@ class Simulator:
         """Simulate realisations first … first + count - 1 and add all filters' errors to the sums.
 
         error (F, K, C, 4) takes e, e², e³, e⁴ of the first C states, paired (F, K, C) e² times the baseline's e².
-        Realisation i has the same plots and estimates in any block.
-        """
+        Realisation i has the same plots and estimates in any block."""
         sums = self._simulated(first, count, 0)[0].reshape(*error.shape[:3], POWERS)
         error += sums[..., :4]
         paired += sums[..., 4]
@@ -372,11 +368,9 @@ class Simulator:
 # ---- recorded plots --------------------------------------------------------------------------------------------------
 @kernel
 def follow(x, P, F, Q, H, R, gains, adapts, z, there, out):
-    """One filter over rows of recorded plots; x (n,) and P (n, n), as before the first row, are overwritten.
-
-    F, Q (m, n, n) to each row, H, gains (m, D, n), R (m, D), numbers z (m, D) where `there`. out (m, 2 n + D) takes
-    estimates, standard deviations, and squared innovations over their variances where there is a number.
-    """
+    """One filter over rows of recorded plots; x (n,) and P (n, n), as before the first row, are overwritten. F, Q (m,
+    n, n) to each row, H, gains (m, D, n), R (m, D), numbers z (m, D) where `there`. out (m, 2 n + D) takes estimates,
+    standard deviations, and squared innovations over their variances where there is a number."""
     n, D = x.size, z.shape[1]
     room, p = np.empty((n, n)), np.empty(n)
     for k in range(z.shape[0]):

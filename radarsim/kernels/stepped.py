@@ -9,8 +9,7 @@ arrays are flat; rows are eights of realisations. Of `groups` eights and K scans
     errors    (groups · K · C) rows      errors of the components; zero beyond the block's last realisation
 
 Layout of the noise: the normals 2 j and 2 j + 1 of scan k are those of pair `pairs` · k + j of the stream of plots;
-whether there is one, the uniform number k of the stream of detections.
-"""
+whether there is one, the uniform number k of the stream of detections."""
 
 import numpy as np
 
@@ -59,8 +58,7 @@ def follower(first: Program, following: Program, rows: int, components: int, tes
     """The kernel that runs a filter over plots of `rows` rows a scan, and adds up its errors.
 
     error (K, C, 4) takes the sums of e … e⁴, paired (K, C) those of e² times the baseline's e²; where tested, believed
-    (K, C) takes those of the variances that the filter believes, nees (K, 2) those of e' P⁻¹ e and its square.
-    """
+    (K, C) takes those of the variances that the filter believes, nees (K, 2) those of e' P⁻¹ e and its square."""
     begin, step = emitted(first), emitted(following)
 
     @kernel

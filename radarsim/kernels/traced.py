@@ -6,8 +6,7 @@ translates these into instructions on eight realisations at once. So whatever Py
 used: helper functions, loops over tuples, named records. What depends on a number of a realisation may not: it has
 eight values. An `if` on one raises `OneForAll`, and the innermost line of the traceback is the author's.
 
-This module loads no compiler.
-"""
+This module loads no compiler."""
 
 import functools
 import hashlib
@@ -108,8 +107,7 @@ class Program:
 
     ("number", x), ("row", array, r) and ("plain", array, r) begin: a constant, row r of lanes of an array, and its
     plain number r in all lanes. outputs are (array, row, number of the operation); sums are the operations whose
-    results are added up over all eights.
-    """
+    results are added up over all eights."""
 
     ops: tuple[tuple, ...]
     outputs: tuple[tuple[int, int, int], ...]
@@ -187,8 +185,7 @@ class Trace:
     def plain(self, array: int, like: Any, stated: bool = False) -> Any:
         """A structure like another, whose numbers stand in an array, the same for all realisations.
 
-        stated: those of the other are the numbers of this case.
-        """
+        stated: those of the other are the numbers of this case."""
         places = iter(range(count(like)))
 
         def lane(number: Any) -> Lane:

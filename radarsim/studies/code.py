@@ -4,8 +4,7 @@
 found there, or is installed. What its numbers depend on is known before any of it runs: the syntax trees, without
 comments and docstrings, of the module and of all modules from its folder that it imports (of an installed package from
 that package), and the content of each file that a text in them names from there, or a key of the filter from the
-folder of the config: `weights: net.npz` is given to the class as a path that can be opened.
-"""
+folder of the config: `weights: net.npz` is given to the class as a path that can be opened."""
 
 import ast
 import contextlib
@@ -142,8 +141,7 @@ class Coded(Outside):
     """A class or function of the user's own, which is imported where it is first asked for estimates.
 
     place: where the config names it; folder, module, made: what is imported from where; given: what it is called with;
-    sources: SHA-256 of what the module depends on.
-    """
+    sources: SHA-256 of what the module depends on."""
 
     name: str
     identity: str

@@ -44,8 +44,7 @@ class Bound(NamedTuple):
 
     waited (LAGS, K, C): so many scans later; smoothed (K, C): after the last scan; both not-a-number where plots may be
     missed. patterns (K,): how missed plots count, of ENUMERATION, REDUCTION and nothing. reached: whether there is an
-    estimator that attains it.
-    """
+    estimator that attains it."""
 
     sigma: np.ndarray
     waited: np.ndarray
@@ -130,8 +129,7 @@ def missed(
     """As `static`, of the realisations with an estimate, where scan k gives its plots with the probability chance (K,).
 
     counts (K, C): whether they count for a component, which has an estimate from so many `needed` plots (C,) on, and
-    where `alone` (C,) at any scan with a plot. Scans that count for all determine all parameters, `settles` of them.
-    """
+    where `alone` (C,) at any scan with a plot. Scans that count for all determine all parameters, `settles` of them."""
     shape, needs = maps.shape[:2], np.array(needed)
     lone = np.array(alone or [False] * shape[1])
     sigma, kinds = np.full(shape, np.nan), []

@@ -30,8 +30,7 @@ A study that follows this declares an object and writes no class:
 | `floor`, if offered | the function of `floor` |
 | `shipped`, if offered | the folder `shipped` |
 
-A file is imported when a part of it is first asked for, so that `radarsim list` loads no kernels.
-"""
+A file is imported when a part of it is first asked for, so that `radarsim list` loads no kernels."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -67,9 +66,7 @@ class _Part:
 
 def part(file: str, name: str = "") -> Any:
     """A method that a file of the folder has, under its own name or another one; the default where it is not offered.
-
-    It is what `radarsim.studies.interface` says of the method, without self.
-    """
+    It is what `radarsim.studies.interface` says of the method, without self."""
     return _Part(file, name)
 
 

@@ -7,8 +7,7 @@ Its second half is a hash of files, which any edit changes, also of comments: fo
 study, of the packages that it uses and of the engine, except files that only show numbers; for a study from another
 package all its files, and the versions of installed packages; likewise for filters from another package. It is only a
 quick answer: where it differs, stored blocks are recomputed in part and kept if their bytes are equal; see
-radarsim.engine.store.
-"""
+radarsim.engine.store."""
 
 import hashlib
 import os

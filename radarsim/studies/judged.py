@@ -2,8 +2,7 @@
 
 A claim says `of: [{radar.scan_period_s: 2}]`: the case with these keys, or properties, by their dotted names; `of:
 [{}]` is the first one. The functions here whose first argument is `seen` may be its `measure`; `at` is a scan, by
-default the last one.
-"""
+default the last one."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -143,8 +142,7 @@ def faults(
 ) -> Iterator[str]:
     """Names in claims and choices that do not exist, a line each with its place: known without a run.
 
-    components: of the study; configs: the stems that its package ships.
-    """
+    components: of the study; configs: the stems that its package ships."""
     for claim in every:
         if (cases := shipped(claim.config)) is None:
             there = ", ".join(configs) or "none"

@@ -32,8 +32,7 @@ keys, `sets: {radar.scan_period_s: 2}`.
 A base for a kind of model derives from `OneFile` and gives `prepare`, with `axes` and `sums` from here, `simulate`, and
 if it can `limits`, `drawing`, `tracker` and `likelihood`. `radarsim.studies.linear` is one.
 
-Whatever a class lacks, or has of the wrong kind, is one line of a ConfigError when its keys are first asked for.
-"""
+Whatever a class lacks, or has of the wrong kind, is one line of a ConfigError when its keys are first asked for."""
 
 import inspect
 import math

@@ -12,8 +12,7 @@ from radarsim.errors import ConfigError
 def truth(target: Any, t: np.ndarray) -> np.ndarray:
     """Range, radial velocity and acceleration (K, 3) of a configured target at times t (K,), in m, m/s, m/s².
 
-    For a target with random coefficients: with the means. Raises ValueError for an impossible target.
-    """
+    For a target with random coefficients: with the means. Raises ValueError for an impossible target."""
     match target.kind:
         case "polynomial":
             return physics.polynomial(target.coefficients, t)

@@ -5,8 +5,7 @@ its target the declared object, see `radarsim.studies.interface.Study`. An unusa
 study is requested: lists of all studies leave it out, and `unusable` gives the reason.
 
 A package adds a filter to a study that allows this by an entry point of the group `radarsim.filters`: its name is the
-value of `kind:` of a filter in YAML, its target a class of keys, derived from that of `Study.own_filters`.
-"""
+value of `kind:` of a filter in YAML, its target a class of keys, derived from that of `Study.own_filters`."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import cache
@@ -100,10 +99,8 @@ def module(name: str) -> str:
 
 
 def part(name: str, take: Callable[[Study], Part]) -> Part:
-    """The result of `take` for the study of a name.
-
-    Raises ConfigError with the package's name where the study of a package fails.
-    """
+    """The result of `take` for the study of a name. Raises ConfigError with the package's name where the study of a
+    package fails."""
     one = study(name)
     if name in SHIPPED:
         return take(one)
@@ -190,10 +187,8 @@ def usable() -> tuple[str, ...]:
 
 
 def quantity(name: str, case: Case) -> Quantity:
-    """The quantity of a name that a case measures, also in the spelling of its option (`above-oracle`).
-
-    Raises ConfigError for an unknown one.
-    """
+    """The quantity of a name that a case measures, also in the spelling of its option (`above-oracle`). Raises
+    ConfigError for an unknown one."""
     measured = {one.name: one for one in quantities(case.study, case.spec)}
     spelt = name if name in measured else name.removeprefix("--").replace("-", "_")
     if spelt not in measured:

@@ -2,8 +2,7 @@
 
 The true phase is the reference, so an estimate is its deviation from the truth. A window has blocks of its own, each of
 a whole number of those drawn. Of a block all but its sums Z₀ and Z₁ is the same for all bursts and tabled, times s from
-its centre in units of their own rms: then the phase difference is d + D s, with d = Σ b_j M_j and D = 2π Σ b_j S_j.
-"""
+its centre in units of their own rms: then the phase difference is d + D s, with d = Σ b_j M_j and D = 2π Σ b_j S_j."""
 
 import math
 
@@ -46,8 +45,7 @@ def sine_cosine(turns):
 def expanded(c, s, slope, z, z2):
     """Σ u e^{-j(d + Ds)} and its derivatives by d and D, up to the factor −j: real and imaginary part, slope's part.
 
-    z holds the real and imaginary parts of Z₀ and Z₁, z2 those of Z₂.
-    """
+    z holds the real and imaginary parts of Z₀ and Z₁, z2 those of Z₂."""
     zr, zi, z1r, z1i = z
     z2r, z2i = z2
     zr, zi = zr + slope * (z1i - 0.5 * slope * z2r), zi - slope * (z1r + 0.5 * slope * z2i)

@@ -15,8 +15,7 @@ Without the terms in D 32 blocks to a window are off by 0.11 potential σ; with 
 the centre and not as the mean, information is lost and σ 0.3 % high. D is cut where the phase turns by one radian rms
 within a block: beyond it the expansion is void, and unbounded it drives lost estimates away.
 
-A burst as drawn: its samples, its samples demodulated into block sums, or block sums from their own exact law.
-"""
+A burst as drawn: its samples, its samples demodulated into block sums, or block sums from their own exact law."""
 
 import math
 
@@ -236,10 +235,8 @@ def add_signal(sigma, clean, row):
 
 @kernel
 def draw_samples(physics, key, realisation, clean, samples):
-    """Samples (1 or 2, n) of a burst: clean (1 or 2, n) and noise; row 1 is the imaginary part, with later draws.
-
-    The columns are all pulses' first samples, then all second ones, …; each chunk of them has draws of its own.
-    """
+    """Samples (1 or 2, n) of a burst: clean (1 or 2, n) and noise; row 1 is the imaginary part, with later draws. The
+    columns are all pulses' first samples, then all second ones, …; each chunk of them has draws of its own."""
     n = samples.shape[1]
     for r in range(samples.shape[0]):
         for start in range(0, n, CHUNK):
@@ -253,8 +250,7 @@ def draw_samples(physics, key, realisation, clean, samples):
 def demodulate(physics, edges, samples, x, first, last, sums):
     """Block sums of blocks first … last − 1 from the samples, about the phase of x (6,), turns over the burst.
 
-    edges (blocks + 1,) are the pulses where blocks begin and end.
-    """
+    edges (blocks + 1,) are the pulses where blocks begin and end."""
     for i in range(first, last):
         centre = sums[CENTRE, i]
         for row in range(Z0, ROWS):
@@ -275,9 +271,7 @@ def demodulate(physics, edges, samples, x, first, last, sums):
 
 def _demodulated(source):
     """The loop that adds samples times e^{-jψ_ref} sⁱ, i = 0, 1, 2, to block i; source: real, complex, or the image's.
-
-    The image's samples are all one, at twice the phase, and go to W₀, W₁, W₂ in place of Z₀, Z₁, Z₂.
-    """
+    The image's samples are all one, at twice the phase, and go to W₀, W₁, W₂ in place of Z₀, Z₁, Z₂."""
     turns, first = (2.0, W0) if source == "image" else (1.0, Z0)
     real, image = source == "real", source == "image"
     sign = 1.0 if source == "complex" else -1.0
@@ -325,8 +319,7 @@ def block_table(
 
     reference (samples per pulse, pulses) in turns; clean alike, the noise-free samples. Z₂ is put at its mean: its
     noise meets only the square of a small slope. The root holds the lower triangle by rows for Re and Im of Z₀ and Z₁,
-    see `triangular_root`.
-    """
+    see `triangular_root`."""
     blocks = len(edges) - 1
     padded = -(-blocks // 8) * 8  # so that loops over blocks have no remainder
     mean, factor = np.zeros((ROWS, padded)), np.zeros((blocks, 10))
@@ -359,8 +352,7 @@ def triangular_root(covariance: np.ndarray) -> np.ndarray:
 
     Such a root is unique when a column without a pivot is zero. Roots from eigenvectors or QR are not: LAPACK chooses
     their signs, and chooses otherwise on other processors, so that the same words gave other noise. A block of fewer
-    than four samples has a singular covariance; a pivot within rounding of zero then stands for zero.
-    """
+    than four samples has a singular covariance; a pivot within rounding of zero then stands for zero."""
     n = len(covariance)
     root = np.zeros((n, n))
     for j in range(n):

@@ -270,8 +270,7 @@ def estimate_block(physics, edges, clean, blank, windows, options, keys, first, 
     """Bursts first, first + 1, …: errors (n, F, K, 6) in turns over the burst and passes (n, F) are written.
 
     windows (F, K) and options (F,) are the estimators; blank (ROWS, blocks padded) has the times of the blocks, see
-    `block_table`; keys (2, 2) those of noise and prior; truth and prior_sigma (6,) in turns over the burst.
-    """
+    `block_table`; keys (2, 2) those of noise and prior; truth and prior_sigma (6,) in turns over the burst."""
     samples, sums = np.empty(clean.shape), blank.copy()
     state = np.zeros(1, STATE)[0]
     for j in range(SIZE):

@@ -1,8 +1,7 @@
 """The sequence of discriminators over block sums, eight bursts side by side: `sequence`, for the fast engine.
 
 A window goes on until all eight bursts are done with it; those that are done earlier stay where they are, so that no
-burst's estimate depends on its neighbours.
-"""
+burst's estimate depends on its neighbours."""
 
 import numpy as np
 
@@ -30,8 +29,7 @@ follow = following(evaluate, scoring(evaluate))
 def take_window(physics, drawn, tables, window, options, first, work, sums):
     """One window of an estimator on eight bursts, the first or a later one: the estimate in work moves.
 
-    drawn are rows of the blocks' sums, tables the addresses of those of `burst.Tables`: of the blocks, and weights.
-    """
+    drawn are rows of the blocks' sums, tables the addresses of those of `burst.Tables`: of the blocks, and weights."""
     table, weights = tables
     merge(drawn, table, weights, window.table, window.weights, window.blocks, sums)
     follow(physics, physics.amplitude, work, sums, table, 0, window, options, first)
@@ -41,8 +39,7 @@ def take_window(physics, drawn, tables, window, options, first, work, sums):
 def run_strip(physics, drawn, tables, windows, options, work, sums, errors):
     """All windows (K,) of an estimator on eight bursts; writes errors (up to 8, K, 6), in turns over the burst.
 
-    drawn are rows of the blocks' sums, tables those of `burst.Tables`. Passes are left in work.
-    """
+    drawn are rows of the blocks' sums, tables those of `burst.Tables`. Passes are left in work."""
     table, weights = address(tables[0]), address(tables[1])
     work, sums, drawn = address(work), address(sums), address(drawn)
     for j in range(SIZE):
@@ -112,7 +109,6 @@ def estimate_strips(physics, law, tables, windows, options, noise, first, out) -
     """As `sequence.estimate_block`, with block sums: errors (n, F, K, 6) and passes (n, F) are written.
 
     law is of the sums drawn: mean (blocks, 4) and factor (blocks, 10); noise the keys (2, 2), and sigma (6,) of the
-    forecast's errors; tables those of `burst.Tables`; out = (errors, passes). All is relative to the truth.
-    """
+    forecast's errors; tables those of `burst.Tables`; out = (errors, passes). All is relative to the truth."""
     (mean, factor), (keys, sigma) = law, noise
     run_strips(physics, mean, factor, tables, windows, options, keys, first, sigma, room_for(len(mean)), *out)

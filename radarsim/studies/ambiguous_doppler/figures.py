@@ -1,7 +1,6 @@
 """The hypotheses of one realisation, scan by scan, for the figure that shows them.
 
-The study's figures: σ and gains between their brackets, right folds, lost tracks, hypotheses as a fan, orders.
-"""
+The study's figures: σ and gains between their brackets, right folds, lost tracks, hypotheses as a fan, orders."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -30,10 +29,8 @@ LANE = WIDTH - 1  # the realisation of a group whose list the kernel leaves behi
 
 @dataclass(frozen=True)
 class Fan:
-    """Of one realisation and filter: times t (K,), true velocities (K,), and by scan the list of hypotheses.
-
-    Each list is (velocity (n,) m/s, acceleration (n,) m/s², probability (n,)), the most probable first.
-    """
+    """Of one realisation and filter: times t (K,), true velocities (K,), and by scan the list of hypotheses. Each list
+    is (velocity (n,) m/s, acceleration (n,) m/s², probability (n,)), the most probable first."""
 
     t_s: np.ndarray
     truth: np.ndarray
@@ -103,8 +100,7 @@ def share_figure(
 ) -> Figure | None:
     """A share of realisations against time: a panel for each config, a line for each filter and swept value.
 
-    of is a value of SHARES: the column of the table, the axis, the caption.
-    """
+    of is a value of SHARES: the column of the table, the axis, the caption."""
     rows = tables.groups(table, "case", "filter")
     drawn = [_share_panel(title, members, rows, of[:2]) for title, members in panels.by_panel(results).items()]
     drawn = [panel for panel in drawn if panel.marks]

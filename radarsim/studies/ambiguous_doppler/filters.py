@@ -10,8 +10,7 @@ What is observed, without the plots' noise: a mean motion, and the motions that 
 
 From a filter's options to the arrays that the kernels read: designs, which give gains, and banks, which unfold.
 
-What is known without sampling: errors of the filters that fold nothing, and how often the nearest fold is right.
-"""
+What is known without sampling: errors of the filters that fold nothing, and how often the nearest fold is right."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -55,9 +54,7 @@ class TooMany(ValueError):
 
 def reduced(A: np.ndarray, T: np.ndarray) -> np.ndarray:
     """A basis (n, n) of whole numbers of the lattice of A (m, n), its vectors A T short; T (n, n) is one to begin with.
-
-    A has full column rank.
-    """
+    A has full column rank."""
     T = T.copy()
     n, k = T.shape[1], 1
     while k < n:
@@ -76,10 +73,8 @@ def reduced(A: np.ndarray, T: np.ndarray) -> np.ndarray:
 
 
 def within(A: np.ndarray, T: np.ndarray, radius: float, most: int) -> np.ndarray:
-    """All m (M, n) of whole numbers, but zero, with |A m| up to a radius; T is a reduced basis.
-
-    Raises TooMany where more than `most` have to be looked at.
-    """
+    """All m (M, n) of whole numbers, but zero, with |A m| up to a radius; T is a reduced basis. Raises TooMany where
+    more than `most` have to be looked at."""
     R = np.linalg.qr(A @ T)[1]
     n = R.shape[1]
     x, left = np.zeros((1, n)), np.full(1, radius**2)
@@ -102,9 +97,7 @@ def within(A: np.ndarray, T: np.ndarray, radius: float, most: int) -> np.ndarray
 # ---- world -----------------------------------------------------------------------------------------------------------
 def truth(target: Any, t: np.ndarray, case: str) -> np.ndarray:
     """Mean range, radial velocity and acceleration (K, 3) of a configured target at times t (K,), in m, m/s, m/s².
-
-    Raises ConfigError, with the name of the case, for a target that cannot be.
-    """
+    Raises ConfigError, with the name of the case, for a target that cannot be."""
     if target.kind == "random_polynomial":
         return physics.polynomial((target.range_m,), t)
     return radial.checked_truth(target, t, case)
@@ -142,9 +135,7 @@ class Member(NamedTuple):
 
 def members(one: Any) -> tuple[Member, ...]:
     """The Kalman filters of a filter's options: of each order; combined but by likelihood, also without the velocity.
-
-    Likelihoods can be compared of the same plots alone.
-    """
+    Likelihoods can be compared of the same plots alone."""
     pairs = list(zip(one.orders, one.variances, strict=True))
     ways = [one.doppler]
     if one.combine in COMBINATIONS and one.doppler != "none":
@@ -162,8 +153,7 @@ def model(order: int, variance: float, dt: float) -> tuple[np.ndarray, np.ndarra
 
     Order 2 has a random jerk, order 1 a random acceleration, constant over the scan, of that variance (P1 eqs. 3, 6).
     Order 0 has a random velocity, drawn at each scan with that variance: measured, it moves the range; unmeasured, it
-    is a random walk's step.
-    """
+    is a random walk's step."""
     F, Q = np.zeros((3, 3)), np.zeros((3, 3))
     if order == 0:
         F[0, :2], Q[1, 1] = (1.0, dt), variance
@@ -343,8 +333,7 @@ def errors(of: Sequence[Gains], motions: np.ndarray, sigma: np.ndarray) -> tuple
 
     Errors (M, I, K, 3) without noise, and covariances (K, I, 3, I, 3) of the errors by noise, between the filters too.
     The error is linear in all of these: e⁺ = (I − h eᵥᵀ)(I − g eᵣᵀ)(F e + F x − x⁺) + noise runs for each motion, and
-    for the noise's covariance with all filters' states one below the other.
-    """
+    for the noise's covariance with all filters' states one below the other."""
     count, scans = len(of), motions.shape[1]
     bias, noise = np.zeros((len(motions), count, scans, 3)), np.zeros((scans, 3 * count, 3 * count))
     for k in range(scans):
@@ -372,8 +361,7 @@ def advanced(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Errors of I filters a scan later: without noise (M, I, 3), and the noise's covariance (3 I, 3 I).
 
-    before, now (M, 3) are the motions at the scan before and at this; sigma (2,) of the plots.
-    """
+    before, now (M, 3) are the motions at the scan before and at this; sigma (2,) of the plots."""
     count = len(steps)
     A, of_range, of_velocity = np.zeros((3 * count, 3 * count)), np.zeros(3 * count), np.zeros(3 * count)
     moved = np.empty_like(bias)
@@ -391,8 +379,7 @@ def widths(bias: np.ndarray, noise: np.ndarray, of: Sequence[Member], prior: Any
     """Half widths (K, I, 3) of intervals of INTERVAL_SIGMAS; zero of what a filter does not estimate.
 
     bias (2, I, K, 3) of a drawn velocity and acceleration of one, noise (K, I, 3, I, 3). What is drawn from the prior
-    is no manoeuvre: a velocity, and an acceleration to a model that has one.
-    """
+    is no manoeuvre: a velocity, and an acceleration to a model that has one."""
     models = np.array([one.order > 1 for one in of])[:, None, None]
     known = np.array([one.components for one in of])
     variance = np.einsum("kixix->ikx", noise) + bias[0] ** 2 * prior.sigma_velocity_mps**2
@@ -403,16 +390,13 @@ def widths(bias: np.ndarray, noise: np.ndarray, of: Sequence[Member], prior: Any
 def joint(bias: np.ndarray, noise: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """The joint second moments E_ij = b_i b_j + C_ij of the errors of I filters by scan and component (K, 3, I, I).
 
-    bias (M, I, K, 3) of M motions whose squares are weighted by weight (M,); noise (K, I, 3, I, 3).
-    """
+    bias (M, I, K, 3) of M motions whose squares are weighted by weight (M,); noise (K, I, 3, I, 3)."""
     return np.einsum("mikx,mjkx,m->kxij", bias, bias, weight) + np.einsum("kixjx->kxij", noise)
 
 
 def best_shares(E: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Shares (K, I, 3), of sum one, of the linear combination of least error: E⁻¹1/(1ᵀE⁻¹1); they may be negative.
-
-    E (K, 3, I, I); known (I, 3) says which filter estimates which component; all zero where none does.
-    """
+    """Shares (K, I, 3), of sum one, of the linear combination of least error: E⁻¹1/(1ᵀE⁻¹1); they may be negative. E
+    (K, 3, I, I); known (I, 3) says which filter estimates which component; all zero where none does."""
     shares = np.zeros((E.shape[0], E.shape[2], 3))
     for c in range(3):
         own = np.flatnonzero(known[:, c])
@@ -448,8 +432,7 @@ def remainders_right(
     measured velocity; spans D (K,); joint (K,) span L of a scan and the one before, m/s, zero: they have none.
     Right is what lies in ± L/2 and whose difference δ from the velocity before, folded by that one's span, is the
     least of all that the two spans leave, which lie d = D D′/L apart: |δ − i D′| < d/2 for a whole i. Of both the
-    joint normal law is known, on any target.
-    """
+    joint normal law is known, on any target."""
     right = np.zeros(len(t))
     normal = np.vectorize(NormalDist().cdf, otypes=[float])
     for k in range(1, len(t)):
@@ -479,8 +462,7 @@ def all_right(of: Gains, spans: np.ndarray) -> np.ndarray:
     """Probability (K,) that the nearest folds are right up to each scan: ∏ [2Φ(D/2√S) − 1], spans D (K,).
 
     Exact where the filter's model and prior are the truth's: its innovations are then independent, N(0, S). (Integer
-    bootstrapping: Teunissen, Journal of Geodesy 72, 1998, 606-612.)
-    """
+    bootstrapping: Teunissen, Journal of Geodesy 72, 1998, 606-612.)"""
     normal = NormalDist()
     each = [2 * normal.cdf(D / 2 / S**0.5) - 1 for D, S in zip(spans, of.variance, strict=True)]
     return np.cumprod(each)

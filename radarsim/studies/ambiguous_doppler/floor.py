@@ -1,7 +1,6 @@
 """The floor under σ with velocities that fold: of a drawn polynomial, and of one that is the same in all realisations.
 
-A folded velocity tells no more than one with its fold, so that the bound of range and velocity holds for it too.
-"""
+A folded velocity tells no more than one with its fold, so that the bound of range and velocity holds for it too."""
 
 from typing import Any
 

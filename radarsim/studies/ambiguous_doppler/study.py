@@ -12,8 +12,7 @@ probable by the factor 1/prune_below, which moves the half-space away by a known
 distances s of the nearest half-spaces are the mixture's, and shares go with Φ(−s). (Integer least squares and its
 pull-in regions: Teunissen, Journal of Geodesy 73, 1999, 587.)
 
-Folded Doppler: the plan of a case, and the sums of a block of realisations.
-"""
+Folded Doppler: the plan of a case, and the sums of a block of realisations."""
 
 import math
 from collections.abc import Sequence
@@ -99,8 +98,7 @@ def linear(world: records.World, spec: Any, one: Any) -> Linear:
 def of_sequences(parts: tuple[np.ndarray, np.ndarray, np.ndarray], m: np.ndarray, depth: float) -> HalfSpaces:
     """The half-spaces in which sequences m (M, k) are more probable than the right one by a factor exp(depth).
 
-    parts are b, L and A of k scans.
-    """
+    parts are b, L and A of k scans."""
     b, L, A = parts
     apart = m @ A.T
     normal = -apart @ L
@@ -132,8 +130,7 @@ def sequences(of: Linear, known: Sequence[np.ndarray], depth: float, farthest: f
     """All half-spaces up to a distance: of the sequences at the last scan, and of those that drop the right one before.
 
     known are the bases; depth is the logarithm of the factor by which a hypothesis must be more probable to have
-    another dropped. Raises lattice.TooMany.
-    """
+    another dropped. Raises lattice.TooMany."""
     found = []
     for k, T in enumerate(known, 1):
         own = 0.0 if k == len(of.constant) else depth
@@ -150,9 +147,7 @@ def sequences(of: Linear, known: Sequence[np.ndarray], depth: float, farthest: f
 
 def half_spaces(of: Linear, one: Any) -> HalfSpaces:
     """Those of a filter that matter, at most MOST: near the nearest, and probable beside it. Raises NotFound.
-
-    Hypotheses that are dropped because more than `hypotheses` are more probable have none.
-    """
+    Hypotheses that are dropped because more than `hypotheses` are more probable have none."""
     if one.hypotheses == 1:
         return probable(nearest_folds(of))
     depth = -math.log(one.prune_below) if one.prune_below > 0 else filters.BOTTOMLESS
@@ -190,8 +185,7 @@ def chances(of: HalfSpaces) -> np.ndarray:
 def mixture_for(world: records.World, spec: Any, key: np.ndarray) -> sums.Mixture:
     """The mixture for the wrong folds of a case's sought filter, with its share of plain realisations.
 
-    key (2,) is that of its random numbers. Raises NotFound.
-    """
+    key (2,) is that of its random numbers. Raises NotFound."""
     one = next(one for one in spec.filters if one.name == spec.rare.filter)
     found = half_spaces(linear(world, spec, one), one)
     plain, shares = PLAIN_SHARE, chances(found)
@@ -310,8 +304,7 @@ def exact_values(spec: Any, one: Any, observed: records.World, held: np.ndarray)
     """What is known of a filter without sampling, each (K, 3), by the name in `axes`; held (K, MEMBERS, 3) its shares.
 
     σ and bias of a linear filter, with all folds right (oracle_sigma) of one that folds. Of one that combines its
-    members, with all folds right: the least error of a single one, and of a linear combination, at each scan.
-    """
+    members, with all folds right: the least error of a single one, and of a linear combination, at each scan."""
     members = filters.members(one)
     of = [filters.gains(member, spec.prior, observed.sigma, spec.radar.scan_period_s, spec.scans) for member in members]
     motions = np.concatenate([observed.truth[None], filters.drawn_motions(observed.t)])

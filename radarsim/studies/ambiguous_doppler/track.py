@@ -1,8 +1,7 @@
 """Filters over recorded plots, row by row at any times: one order with its hypotheses, and combinations of orders.
 
 Plots of the study: those of one realisation, as a run draws them; its filters over recorded ones, and how likely
-these are under a filter.
-"""
+these are under a filter."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -104,10 +103,8 @@ class Folds:
         return e - self.span * np.rint(e / self.span)
 
     def near(self, S: np.ndarray | float, count: int) -> int:
-        """How many folds to either side of the nearest may matter, of `count` innovations of variances S (...).
-
-        Raises PlotFault where these are too many, or the variances are only rounding errors.
-        """
+        """How many folds to either side of the nearest may matter, of `count` innovations of variances S (...). Raises
+        PlotFault where these are too many, or the variances are only rounding errors."""
         most = float(np.max(S))
         if not most > 0:
             raise PlotFault("velocity_mps: a filter's numbers are lost in rounding: split the file here")
@@ -137,10 +134,8 @@ class Folds:
 
 class Single:
     """One filter: states (3, n) of its hypotheses, logarithms of their weights (n,), the common covariance, packed.
-
     `sure` is the covariance of right folds, which only merging widens; `last_step` what the filter does at the last row
-    with such, None before the first range.
-    """
+    with such, None before the first range."""
 
     def __init__(self, member: filters.Member, options: Any, spec: Any):
         self.member, self.options, self.radar = member, options, spec.radar
@@ -225,8 +220,7 @@ class Interacting:
 
     Of n hypotheses the states (3, n, M), covariances (6, n, M) and probabilities (n, M) of M orders, and logarithms
     of weights (n,). Over a gap the orders pass into each other as often as there were scans. Innovations are those of
-    the most probable hypothesis, mean and variance over its orders.
-    """
+    the most probable hypothesis, mean and variance over its orders."""
 
     def __init__(self, options: Any, spec: Any):
         self.members, self.options, self.radar = filters.members(options), options, spec.radar
@@ -345,11 +339,9 @@ class Interacting:
 
 
 class Combined:
-    """Orders combined by their expected error, or by intersecting intervals: the members, and their joint errors.
-
-    The errors are those of right folds, by the recursion of `exact`, with the gains that each row had. A manoeuvre may
-    begin at each of the last `scans` rows. A combination predicts nothing, so that there are no innovations.
-    """
+    """Orders combined by their expected error, or by intersecting intervals: the members, and their joint errors. The
+    errors are those of right folds, by the recursion of `exact`, with the gains that each row had. A manoeuvre may
+    begin at each of the last `scans` rows. A combination predicts nothing, so that there are no innovations."""
 
     def __init__(self, options: Any, spec: Any):
         self.options, self.spec = options, spec
@@ -447,8 +439,7 @@ class Tracker:
     A recorded velocity counts as folded. A filter that says `unfolded` has no estimate: it needs the true folds, which
     a recording lacks; only where no filter unfolds does it take the velocity as it stands. The span is that which
     stands beside the velocity, else the config's; with several repetition rates the scan that a row is of follows from
-    its time. Innovations of the velocity are tested where the fold is certain.
-    """
+    its time. Innovations of the velocity are tested where the fold is certain."""
 
     most_rows: int | None = None
     several: bool = False
@@ -462,10 +453,8 @@ class Tracker:
         self.drawn = np.array([[-1.0, 1.0 if one.doppler == "none" else -1.0] for one in own])
 
     def feed(self, columns: Mapping[str, np.ndarray]) -> Track:
-        """The estimates over the next rows: columns (n,), not-a-number where a value is missing.
-
-        Raises PlotFault for a row that leaves too many folds, or is beyond a filter's digits.
-        """
+        """The estimates over the next rows: columns (n,), not-a-number where a value is missing. Raises PlotFault for a
+        row that leaves too many folds, or is beyond a filter's digits."""
         rows = rows_of(columns)
         made = [stepped(one, rows) for one in self.filters]
         gathered = {name: np.array([[getattr(row, name) for row in own] for own in made]) for name in Row._fields}

@@ -54,8 +54,7 @@ def answer(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> lis
     """For each case: from which scan on folded velocity is as good as unfolded, within 5 %; how often it is right.
 
     Of filters of several orders: the largest error of each over the scans, beside that of the best single order.
-    First, of all cases: the filter of the least error, or in how many folded velocity is as good.
-    """
+    First, of all cases: the filter of the least error, or in how many folded velocity is as good."""
     shown, others = panels.reported(results, 6)
     sentences = [sentence for result in shown for sentence in _sentences(result, made)]
     first = [*_least_of_all(results, made), *_of_all(results, made)]
@@ -76,9 +75,7 @@ def _sigma_m(row: Mapping) -> str:
 
 def _least_of_all(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> list[str]:
     """The filter whose largest σ of range in any case is least, and the best of the other kind: one order, or several.
-
-    None where no filter combines orders, or none had a plot.
-    """
+    None where no filter combines orders, or none had a plot."""
     combining = [result for result in results if result.axes.combines.any()]
     several = {one.name for result in combining for one in result.spec.filters if one.combine is not None}
     worst: dict[str, tuple[Any, Result]] = {}
@@ -174,10 +171,8 @@ def _told_of(result: Result) -> list[str]:
 
 
 def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
-    """The largest σ of range over the scans of every filter, and what is left to gain; the first plot is common.
-
-    None where no realisation had a plot.
-    """
+    """The largest σ of range over the scans of every filter, and what is left to gain; the first plot is common. None
+    where no realisation had a plot."""
     worst = _largest(result, made)
     if not len(worst):
         return []
@@ -266,8 +261,7 @@ def _since(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> int
 def cures(spec: Any, name: str, swept: Iterable[str] = ()) -> Iterator[tuple[str, float]]:
     """The remedies that help a filter, as settings of the config, and the share of realisations it then loses.
 
-    swept: keys that the config sweeps, which no setting may change beside it.
-    """
+    swept: keys that the config sweeps, which no setting may change beside it."""
     number, one = next((i, one) for i, one in enumerate(spec.filters) if one.name == name)
     key = f"filters.{number}"
     (variance, *_), rates = one.variances, spec.radar.rates_hz

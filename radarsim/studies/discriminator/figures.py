@@ -1,7 +1,6 @@
 """One burst through the windows of an estimator, for the figure that shows it: the paper's figure 2 is of one.
 
-P4's figures: residuals against the window (figure 2), locks, accuracy, and the maps of where the sequence locks.
-"""
+P4's figures: residuals against the window (figure 2), locks, accuracy, and the maps of where the sequence locks."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -27,10 +26,8 @@ BURST = 0  # the realisation that is shown
 
 
 def one_burst(case: Case, number: int) -> np.ndarray:
-    """Absolute errors (K, C) of an estimator at each of its K windows, in the units of the components (rad, Hz, …).
-
-    The burst is the first realisation of the run itself, whether it locks or not.
-    """
+    """Absolute errors (K, C) of an estimator at each of its K windows, in the units of the components (rad, Hz, …). The
+    burst is the first realisation of the run itself, whether it locks or not."""
     plan = prepare(case)
     errors, _ = estimate(plan, BURST, 1)
     windows, size = len(plan.axes.pulses[number]), len(plan.axes.components)

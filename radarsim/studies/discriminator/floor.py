@@ -8,11 +8,9 @@ from radarsim.studies.floor import CRB, LAGS, Bound, Floor
 
 
 def floor(spec: Keys, axes: DiscriminatorAxes) -> Floor | None:
-    """What the samples of a window and the forecast tell together, taken as measurements.
-
-    Of a profile, which is no polynomial, none is defined; nor where forecasts err by less than is assumed, or an
-    estimator starts at the truth.
-    """
+    """What the samples of a window and the forecast tell together, taken as measurements. Of a profile, which is no
+    polynomial, none is defined; nor where forecasts err by less than is assumed, or an estimator starts at the
+    truth."""
     if spec.truth.doppler_derivatives is None or spec.prior.error_scale < 1:
         return None
     none = np.full(axes.posterior_sigma.shape[1:], np.nan)

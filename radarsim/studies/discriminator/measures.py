@@ -2,8 +2,7 @@
 
 The paper's numbers do not belong together: its potential spreads follow from a noise variance of 2.25, a quarter of the
 one it states, and then its threshold c is the 1 of (14); its first window follows from the stated 9, and then c is the
-0.5 of (11). Both readings are judged: "computed" and "printed".
-"""
+0.5 of (11). Both readings are judged: "computed" and "printed"."""
 
 import math
 from functools import partial
@@ -95,8 +94,7 @@ class Evidence(claims.Evidence):
     def as_far(self, key: Key, amplitude: float, power: int = 1) -> float:
         """Share of bursts whose (7), the square of the amplitude, lies as far from its mean as a printed one's power.
 
-        The sum of so many squares is Gaussian: of N samples with noise σ² it has a variance N (2σ⁴ + 2σ²A²).
-        """
+        The sum of so many squares is Gaussian: of N samples with noise σ² it has a variance N (2σ⁴ + 2σ²A²)."""
         burst = self.case(key).spec.burst
         samples, noise = burst.pulses * round(burst.pulse_length_s / burst.sampling_period_s), burst.noise_variance
         square = burst.amplitude**2
@@ -104,11 +102,9 @@ class Evidence(claims.Evidence):
         return math.erfc(abs(amplitude**power - square) / spread / math.sqrt(2))
 
     def span(self, key: Key) -> Estimate:
-        """How far ln L of the signal falls from its maximum to the mean level of its side lobes, over 2μ.
-
-        Without noise it falls by Σ(s − s')²/2σ²; a side lobe's s' is as strong, and of any phase: its mean square is
-        A²/2 a sample and its mean product with s nil. Σs² is that of the true phase.
-        """
+        """How far ln L of the signal falls from its maximum to the mean level of its side lobes, over 2μ. Without noise
+        it falls by Σ(s − s')²/2σ²; a side lobe's s' is as strong, and of any phase: its mean square is A²/2 a sample
+        and its mean product with s nil. Σs² is that of the true phase."""
         burst = study.burst_of(self.case(key).spec)
         samples = burst.pulses * burst.samples_per_pulse
         level = burst.amplitude**2 / burst.noise_variance
@@ -154,9 +150,7 @@ class Evidence(claims.Evidence):
 
     def phase_lost(self, key: str, at: Literal["first", "later"]) -> float:
         """Probability that the starting phase is over a quarter turn off the best: at first, or largest afterwards.
-
-        Over the phase alone the likelihood is a cosine, so that from nearer scoring finds its maximum.
-        """
+        Over the phase alone the likelihood is a cosine, so that from nearer scoring finds its maximum."""
         first, *later = (math.erfc(math.pi / 2 / sigma / math.sqrt(2)) for sigma in self.phase_offsets(key))
         return first if at == "first" else max(later)
 

@@ -23,8 +23,7 @@ The normal is a gradient. Of two bursts on either side of the boundary, close to
 window. After a few steps of scoring in it they are still close, but what led across the boundary has grown by each
 step, and nothing else has: how far an estimate has gone along their difference is a smooth function of z, and its
 gradient the normal. If no window tells them apart, a component of the last one has passed its bounds, and is that
-function itself.
-"""
+function itself."""
 
 import math
 from collections.abc import Iterator
@@ -119,8 +118,7 @@ def always_within(
     """Share of bursts of which every error stays under `factor` posterior σ at every window, these long in pulses.
 
     prior_sigma (size,) in the units of θ. louder: σ of the true noise over that of the burst, which the estimator
-    believes. Standard error under 10⁻³.
-    """
+    believes. Standard error under 10⁻³."""
     random = np.random.Generator(np.random.Philox(SEED))
     root = np.diag(1.0 / np.asarray(prior_sigma, dtype=float))
     information = root**2
@@ -136,10 +134,8 @@ def always_within(
 
 
 def _root(burst: Burst, first: int, last: int, size: int) -> np.ndarray:
-    """The upper triangle R (size, size), RᵀR the information of pulses first … last − 1, with a positive diagonal.
-
-    Of the samples themselves and not of their sums, which are too ill conditioned for a root.
-    """
+    """The upper triangle R (size, size), RᵀR the information of pulses first … last − 1, with a positive diagonal. Of
+    the samples themselves and not of their sums, which are too ill conditioned for a root."""
     t = sample_times(burst, last)[:, first:]
     rows = sensitivities(size, burst.duration_s) * (t.ravel()[:, None] / burst.duration_s) ** np.arange(size)
     level = burst.amplitude**2 / burst.noise_variance * (1.0 if burst.complex_samples else 0.5)
@@ -188,8 +184,7 @@ class Plan(Protocol):
 class Loss(NamedTuple):
     """A unit vector (6 + 4B,) and how many σ along it a burst without other noise is shifted where it loses its lock.
 
-    Its elements: those of the forecast, then of each block four.
-    """
+    Its elements: those of the forecast, then of each block four."""
 
     unit: np.ndarray
     distance: float
@@ -226,9 +221,7 @@ class Room:
 
     def errors(self, f: int, z: np.ndarray, options: np.void | None = None) -> np.ndarray:
         """Errors (n, K, 6) of estimator f with the normals z (n, 6 + 4B), n at most eight; see `Loss` for their order.
-
-        In turns over the burst; zero at windows that the options leave out.
-        """
+        In turns over the burst; zero at windows that the options leave out."""
         z = np.concatenate([z, np.repeat(z[-1:], WIDTH - len(z), axis=0)])
         for j in range(SIZE):
             self.row(PRIOR + j)[:] = self.plan.prior_sigma[j] * z[:, j]
@@ -247,10 +240,8 @@ class Room:
 
 
 def either_side(room: Room, f: int, unit: np.ndarray) -> Iterator[Loss]:
-    """The nearest losses of estimator f on both sides of a unit vector (6 + 4B,), those within `FARTHEST`.
-
-    What is found on one side is where to begin on the other, and to end if it is nearly as near there.
-    """
+    """The nearest losses of estimator f on both sides of a unit vector (6 + 4B,), those within `FARTHEST`. What is
+    found on one side is where to begin on the other, and to end if it is nearly as near there."""
     ahead = nearest(room, f, unit)
     if ahead is None:
         behind = nearest(room, f, -unit)
@@ -264,18 +255,14 @@ def either_side(room: Room, f: int, unit: np.ndarray) -> Iterator[Loss]:
 
 
 def mirrored(unit: np.ndarray) -> np.ndarray:
-    """A unit vector (6 + 4B,) with which errors have the other sign, but for the image: that of the conjugate burst.
-
-    Of the normals of a block's Z₀ and Z₁ those of the imaginary parts turn, those of the real ones do not.
-    """
+    """A unit vector (6 + 4B,) with which errors have the other sign, but for the image: that of the conjugate burst. Of
+    the normals of a block's Z₀ and Z₁ those of the imaginary parts turn, those of the real ones do not."""
     return unit * np.r_[-np.ones(SIZE), np.tile((1.0, -1.0), (len(unit) - SIZE) // 2)]
 
 
 def nearest(room: Room, f: int, *starts: np.ndarray, enough: float = 0.0) -> Loss | None:
     """The nearest loss of estimator f that is found from the nearest of unit vectors (6 + 4B,); None if it has none.
-
-    The search ends where one is near `enough`.
-    """
+    The search ends where one is near `enough`."""
     begun = [(crossing(room, f, one, BEGIN, END_OF_SEARCH), one) for one in map(rounded, starts)]
     found = [(at, one) for at, one in begun if at is not None]
     if not found:
@@ -324,10 +311,8 @@ class Watched(NamedTuple):
 
 
 def normal(room: Room, f: int, unit: np.ndarray, at: float) -> np.ndarray | None:
-    """The boundary's unit normal (6 + 4B,), outwards, where estimator f loses its lock: at σ along a unit vector.
-
-    None where the two sides do not part in small steps.
-    """
+    """The boundary's unit normal (6 + 4B,), outwards, where estimator f loses its lock: at σ along a unit vector. None
+    where the two sides do not part in small steps."""
     plan, options = room.plan, room.plan.options[f].copy()
     sides = np.array([at - STEP / WIDTH**2, at])[:, None] * unit
     size, last, middle = plan.layout.shapes["error"][2], int(options["windows"]) - 1, sides.mean(axis=0)
@@ -355,9 +340,7 @@ def from_turn(errors: np.ndarray) -> np.ndarray:
 
 def gradient(room: Room, f: int, z: np.ndarray, along: np.ndarray, of: Watched) -> np.ndarray | None:
     """The unit vector (6 + 4B,) in which alongᵀ(error) of a window grows fastest at z, along (size,), by differences.
-
-    None where nothing changes it.
-    """
+    None where nothing changes it."""
     plan, window = room.plan, room.plan.windows[f, of.window]
     ends = plan.tables[0].reshape(-1, COLUMNS)[int(window["table"]) + int(window["blocks"]) - 1, END]
     used = SIZE + 4 * int(ends)  # what is drawn later is not in the estimate

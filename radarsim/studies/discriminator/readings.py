@@ -1,8 +1,7 @@
 """What P4 leaves open, and its claims under each reading.
 
 Spreads and windows are exact. Locks and accuracies are small runs of the shipped configs whose noise, forecast and
-windows are those of the reading.
-"""
+windows are those of the reading."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -64,10 +63,8 @@ class Readings(PaperReadings):
         return [_counted(part, reading) for part in asserted if not both or part.cases[0] != PRINTED]
 
     def changed(self, claim: Claim, case: Case, reading: Reading) -> Case | None:
-        """The case with the noise and forecast of a reading, and its windows in place of those of its estimators.
-
-        One of the two shipped readings takes the place of any; of the sweeps, those that a part asks for.
-        """
+        """The case with the noise and forecast of a reading, and its windows in place of those of its estimators. One
+        of the two shipped readings takes the place of any; of the sweeps, those that a part asks for."""
         keys = {key for part in claim.parts for key in part.cases if isinstance(key, tuple)}
         noise = case.spec.burst.noise_variance
         wanted = any(_is_swept(case, *key) for key in keys) if case.swept else noise == SHIPPED_NOISE
@@ -101,8 +98,7 @@ def _is_swept(case: Case, key: str, value: float) -> bool:
 def _changed(estimator: Any, own: Version) -> Any:
     """An estimator as a reading has it: its threshold, and the windows that no key of a config asks for.
 
-    Those of which no claim speaks are cut to one window: they are not looked at.
-    """
+    Those of which no claim speaks are cut to one window: they are not looked at."""
     kind = measures.kind_of(estimator, measures.READINGS[COMPUTED][1])
     if kind == "other":
         return estimator.model_copy(update={"first_windows": 1, "phases": 0, "steps": 5, "density": 1})

@@ -5,8 +5,7 @@ hands over, Δ = e_k − e_{k+1}, is caught when Z = Δᵀ H Δ is small (P4, (1
 that the leading singular vector of its root names. So locks are lost where |uᵀz| is large for one of the hand-overs,
 on either side; and where, with all hand-overs safe, a component of the last window's own error passes five bounds.
 
-P4 (Uss, Baryshev & Djavad 2010): Doppler frequency and its derivatives from one burst, and how often they lock.
-"""
+P4 (Uss, Baryshev & Djavad 2010): Doppler frequency and its derivatives from one burst, and how often they lock."""
 
 import math
 from dataclasses import dataclass, replace
@@ -53,8 +52,7 @@ class NoLoss(ValueError):
 class Linear:
     """Errors at each window of an estimator as maps (K, size, 6 + 4B) of unit normals to turns over the burst.
 
-    Columns: those of the forecast, then of each block four.
-    """
+    Columns: those of the forecast, then of each block four."""
 
     forecast: np.ndarray
     errors: np.ndarray
@@ -91,9 +89,7 @@ def linear(plan: RarePlan, f: int) -> Linear:
 
 def directions(plan: RarePlan, f: int) -> np.ndarray:
     """Unit vectors (M, 6 + 4B) along which estimator f loses lock: its hand-overs', then its last window's components.
-
-    Of the first window the start is the forecast, of which the phase is not used.
-    """
+    Of the first window the start is the forecast, of which the phase is not used."""
     maps, found = linear(plan, f), []
     before = [maps.forecast, *maps.errors[:-1]]
     for k, window in enumerate(plan.windows[f, : len(maps.errors)]):
@@ -119,11 +115,9 @@ def leading(matrix: np.ndarray) -> np.ndarray:
 
 
 def mixture(plan: RarePlan, f: int, plain: float) -> sums_of.Mixture:
-    """The mixture for the losses of estimator f at its last window, with a share of plain bursts.
-
-    From each direction the nearest losses on both sides are looked for; each is shifted to, and has a share by the
-    probability of what lies beyond it. Raises NoLoss where there is none.
-    """
+    """The mixture for the losses of estimator f at its last window, with a share of plain bursts. From each direction
+    the nearest losses on both sides are looked for; each is shifted to, and has a share by the probability of what lies
+    beyond it. Raises NoLoss where there is none."""
     room = nearest.Room(plan)
     found = [loss for unit in directions(plan, f) for loss in nearest.either_side(room, f, unit)]
     if not found:
@@ -187,8 +181,7 @@ SEARCH_MARGIN = 2.0
 @dataclass(frozen=True, kw_only=True)
 class DiscriminatorAxes(Axes):
     """Labels of P4's sums, and what its tables need beside them: F estimators, K windows, C components of θ in their
-    units.
-    """
+    units."""
 
     duration_s: np.ndarray  #: (F, K) length of a window; not-a-number where an estimator has none
     pulses: tuple[tuple[int, ...], ...]  #: the same in pulses

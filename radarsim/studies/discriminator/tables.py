@@ -1,8 +1,7 @@
 """Tables of a burst's Doppler frequency and its derivatives (P4).
 
 Here `k` is the window and `t_s` its length. A burst is locked where all components are within five potential σ of that
-window.
-"""
+window."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING

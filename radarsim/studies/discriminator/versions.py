@@ -1,8 +1,7 @@
 """The windows of many readings of the paper at once: (14)–(16) for arrays of noise, threshold, prior and the rest.
 
 `bursts/burst.py` does it for one burst, in every option of a config; this does it for real samples, one a pulse, in the
-options that the paper leaves open. The tests hold the one against the other.
-"""
+options that the paper leaves open. The tests hold the one against the other."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -27,8 +26,7 @@ class Version(NamedTuple):
     """One reading of the burst and of (14)–(16).
 
     sigma: the forecast's spreads, (size,), rad, Hz, …; None: `multiples` of the potential ones. curvature: which window
-    H of (16) belongs to. The phase is that of the first window's problem (15).
-    """
+    H of (16) belongs to. The phase is that of the first window's problem (15)."""
 
     noise_variance: float
     threshold: float
@@ -87,10 +85,8 @@ def designed(burst: Burst, versions: Sequence[Version]) -> Windows:
 
 
 def handovers(burst: Burst, version: Version, windows: Sequence[int]) -> list[np.ndarray]:
-    """The weights (size,) of Z, a sum of χ²₁, at each hand-over from one of these windows, in pulses, to the next.
-
-    H is that of the window that is handed to, as the paper defines it, whichever (16) was solved with.
-    """
+    """The weights (size,) of Z, a sum of χ²₁, at each hand-over from one of these windows, in pulses, to the next. H is
+    that of the window that is handed to, as the paper defines it, whichever (16) was solved with."""
     of = _Problem(burst, [version])
     information, H = of.posterior(np.zeros(len(windows), dtype=int), np.array(windows, dtype=float))
     covariance = _inverse(information)
@@ -102,8 +98,7 @@ def handovers(burst: Burst, version: Version, windows: Sequence[int]) -> list[np
 def phase_offsets(burst: Burst, version: Version, windows: Sequence[int]) -> np.ndarray:
     """How far the best phase lies from the start's, rad, one σ (K,): from the forecast, then at hand-overs.
 
-    windows (K,) in pulses. Of all parameters but the phase the start's stay: what a search over it alone would find.
-    """
+    windows (K,) in pulses. Of all parameters but the phase the start's stay: what a search over it alone would find."""
     of = _Problem(burst, [version])
     information, _ = of.posterior(np.zeros(len(windows), dtype=int), np.array(windows, dtype=float))
     covariance = _inverse(information)
@@ -227,10 +222,8 @@ class _Problem:
 
 
 def _roots(excess: Excess, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Roots (m,) of functions that rise through zero between low and high; excess(which, at) gives their values.
-
-    Regula falsi in the logarithm of the length; the value at the kept end is halved, so that both ends move (Illinois).
-    """
+    """Roots (m,) of functions that rise through zero between low and high; excess(which, at) gives their values. Regula
+    falsi in the logarithm of the length; the value at the kept end is halved, so that both ends move (Illinois)."""
     at = np.arange(len(low))
     a, b = np.log(low), np.log(high)
     fa, fb = excess(at, low), excess(at, high)

@@ -24,8 +24,7 @@ MOST_SCANS, PASSES = 4096, 5  # of the measurement by the clock
 def blocks(family: str, transition: np.ndarray, merged_first: bool = True) -> tuple[np.ndarray, np.ndarray]:
     """Extrapolations and updates (M,) of each model in a scan, by the changes that transition (M, M) allows.
 
-    merged_first: of family imm hypotheses are merged before a model extrapolates them, and not after.
-    """
+    merged_first: of family imm hypotheses are merged before a model extrapolates them, and not after."""
     sources, once = np.count_nonzero(transition, axis=1), np.ones(len(transition), dtype=int)
     if family == "gpb2":
         return sources, sources
@@ -38,8 +37,7 @@ def operations(
     """Arithmetic operations of one scan: fixed ones, and those of each merged hypothesis and of each merge.
 
     transition (M, M); accelerates (M,): whether each model has an acceleration. A merge of a single hypothesis is a
-    copy and costs nothing.
-    """
+    copy and costs nothing."""
     size, (extrapolated, updated) = len(transition), blocks(family, transition, merged_first)
     every = zip(extrapolated, updated, accelerates, strict=True)
     advanced = sum(m * PREDICT[bool(a)] + n * UPDATE[bool(a)] for m, n, a in every)
@@ -55,11 +53,9 @@ def operations_of(options: Filter, merged_first: bool = True) -> tuple[float, fl
 
 
 def seconds_per_update(plan: Plan) -> dict[str, float]:
-    """CPU seconds of one update of one realisation by filter, outputs included, noise, plots and sums not.
-
-    The least of some passes over the first scans of the flight, in a thread of a pool, as kernels run, or in this one
-    where threads are forbidden.
-    """
+    """CPU seconds of one update of one realisation by filter, outputs included, noise, plots and sums not. The least of
+    some passes over the first scans of the flight, in a thread of a pool, as kernels run, or in this one where threads
+    are forbidden."""
     from radarsim.kernels.lanes import WIDTH, rows
     from radarsim.studies.multimodel.kernels import strip
 

@@ -2,8 +2,7 @@
 stages.
 
 Cases are found by target, scan period and what their filters are, whatever their names; filters by family, merging rule
-and bank.
-"""
+and bank."""
 
 from collections.abc import Sequence
 from typing import Any, Literal
@@ -105,8 +104,7 @@ class Evidence(claims.Evidence):
 
 def growth_of_change(seen: Evidence, key: tuple) -> float:
     """The probability to leave a model, the largest of a filter's, within 20 intervals over that within one; the least
-    of a case's filters of several models.
-    """
+    of a case's filters of several models."""
     growths = []
     for options in seen.case(key).spec.filters:
         T = world.transition_matrix(options.transition)
@@ -128,10 +126,8 @@ def largest_fault_of_powers(seen: Evidence, key: tuple, tenfold: bool) -> float:
 
 
 def merged_early(seen: Evidence, key: tuple, wanted: tuple) -> float:
-    """The largest relative difference of merging hypotheses before a model extrapolates them and after, on an axis.
-
-    The hypotheses are drawn at random; weights are those of (7), merged by moments (4).
-    """
+    """The largest relative difference of merging hypotheses before a model extrapolates them and after, on an axis. The
+    hypotheses are drawn at random; weights are those of (7), merged by moments (4)."""
     options = seen.case(key).spec.filters[seen.filter(key, wanted)]
     T = world.transition_matrix(options.transition)
     dt = float(seen.case(key).spec.sensor.scan_period_s)
@@ -181,10 +177,8 @@ def blocks_over(
 
 
 def bend(range_m: float, sigma_range_m: np.ndarray, sigma_angle_rad: np.ndarray) -> np.ndarray:
-    """What linearisation leaves out of a plot's mean squared error along the line of sight, over what it has.
-
-    A plot converted to rectangular coordinates falls short by r(α² + β²)/2, whose mean square is 2r²σ⁴.
-    """
+    """What linearisation leaves out of a plot's mean squared error along the line of sight, over what it has. A plot
+    converted to rectangular coordinates falls short by r(α² + β²)/2, whose mean square is 2r²σ⁴."""
     return 2 * (range_m * sigma_angle_rad**2 / sigma_range_m) ** 2
 
 

@@ -1,6 +1,5 @@
 """What P2 leaves open, and its claims under each reading: small runs of the shipped configs with another flight, σ_A,
-output, start or bank.
-"""
+output, start or bank."""
 
 from dataclasses import replace
 from pathlib import Path

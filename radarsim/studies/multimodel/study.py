@@ -144,10 +144,7 @@ def _simulated(plan: Plan, first: int, count: int, kept: int) -> tuple[np.ndarra
 
 def measured(plan: Plan, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Plots of the realisations first … first + 7: positions (K, 3, 8) in m, covariances (K, 6, 8) in m², and detected
-    (K, 8) as 0 or 1.
-
-    The covariances are packed (xx, xy, xz, yy, yz, zz).
-    """
+    (K, 8) as 0 or 1. The covariances are packed (xx, xy, xz, yy, yz, zz)."""
     world, count = plan.world, len(plan.world.truth)
     found = rows(count * records.PLOT)
     strip.fill_plots(world.keys, world.frame, world.plot_truth, records.START, first, rows(strip.RANDOM), found)

@@ -1,7 +1,6 @@
 """Tables of filters with several models of motion (P2).
 
-stage: name of a stage of the flight
-"""
+stage: name of a stage of the flight"""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -152,8 +151,7 @@ tables = table.made
 def cost(made: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":
     """Operations counted and nanoseconds measured of one update, with σ of the height by stage; None if not measured.
 
-    run: the facts of the run, with `seconds_per_update`.
-    """
+    run: the facts of the run, with `seconds_per_update`."""
     measured = run.get("seconds_per_update")
     if not measured:
         return None

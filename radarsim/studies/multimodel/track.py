@@ -72,11 +72,9 @@ class _State(NamedTuple):
 
 
 class Tracker:
-    """The filters of a case over recorded plots, chunk by chunk in flat memory.
-
-    A plot counts where it is whole and in front of the antenna; the first three that count start the track. At the
-    times of the others the estimate is the extrapolated one.
-    """
+    """The filters of a case over recorded plots, chunk by chunk in flat memory. A plot counts where it is whole and in
+    front of the antenna; the first three that count start the track. At the times of the others the estimate is the
+    extrapolated one."""
 
     most_rows: int | None = None
     several: bool = False
@@ -195,8 +193,7 @@ class PlotLikelihood:
     plots start the track. Its keys are the sensor's σ and the acceleration of the hardest manoeuvring model.
 
     As a function of the keys, hypotheses are merged by moments: under the other rules, which choose between hypotheses,
-    it leaps.
-    """
+    it leaps."""
 
     def __init__(self, case: Case, number: int, tracks: Sequence[Mapping[str, np.ndarray]]):
         self.spec: Keys = case.spec

@@ -38,10 +38,8 @@ def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
 
 
 def _closest_to_the_best(results: Sequence[CaseResult], stages: "pd.DataFrame") -> list[str]:
-    """The filter whose σ of the height is nowhere far above the least of a stage, that stage, and the next filter.
-
-    Of filters that all cases have; nothing where there are not two.
-    """
+    """The filter whose σ of the height is nowhere far above the least of a stage, that stage, and the next filter. Of
+    filters that all cases have; nothing where there are not two."""
     rows = stages[(stages["component"] == "y") & (stages["sigma"] > 0)]
     rows = rows[rows.groupby("filter")["case"].transform("nunique") == len(results)]
     if rows["filter"].nunique() < 2:

@@ -20,8 +20,7 @@ of a track.
     Q (M, M)    rates of the Markov process, T(t) = expm(t Q)
     p (M,)      probabilities of the models
 
-The world of P2: the true flight, the times of the scans, the sensor, plots in the antenna's coordinates.
-"""
+The world of P2: the true flight, the times of the scans, the sensor, plots in the antenna's coordinates."""
 
 import math
 from collections.abc import Sequence
@@ -50,11 +49,8 @@ TOLERANCE = 1e-10
 @dataclass(frozen=True)
 class Phase:
     """Commanded accelerations (m/s²) from start_s on: to the right, up (normal to the velocity), and along the
-    velocity.
-
-    With period_s > 0 they follow a sine of that period from the phase's start. trimmed: lift and thrust also balance
-    gravity and drag, as in an aeroplane's steady flight.
-    """
+    velocity. With period_s > 0 they follow a sine of that period from the phase's start. trimmed: lift and thrust also
+    balance gravity and drag, as in an aeroplane's steady flight."""
 
     start_s: float
     lateral: float = 0.0
@@ -99,8 +95,7 @@ def fly(
     """States (K, 9) as (x, vx, ax, y, vy, ay, z, vz, az) at times t (K,) in s, increasing from 0.
 
     position (m), velocity (m/s) at t = 0; coefficient (kg/m²); lag (s) of the commands. Raises Unflyable where the
-    flight hits the ground or exceeds the speed of an orbit.
-    """
+    flight hits the ground or exceeds the speed of an orbit."""
     from scipy.integrate import solve_ivp
 
     bounds = [phase.start_s for phase in phases[1:]] + [float(t[-1])]
@@ -142,10 +137,8 @@ def _check(track: np.ndarray, t: np.ndarray) -> None:
 
 
 def recorded(times: np.ndarray, positions: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """States (K, 9) at times t of a recorded flight: times (n,), at least 5 and increasing, positions (n, 3).
-
-    As `physics.smoothed`; raises Unflyable as `fly`.
-    """
+    """States (K, 9) at times t of a recorded flight: times (n,), at least 5 and increasing, positions (n, 3). As
+    `physics.smoothed`; raises Unflyable as `fly`."""
     track = smoothed(times, positions, t)
     _check(track, t)
     return track
@@ -254,10 +247,8 @@ def bank(motions: Sequence[str], sigmas: Sequence[float]) -> np.ndarray:
 
 
 def stationary(transition: np.ndarray) -> np.ndarray:
-    """The stationary probabilities p = T p (M,) of a column-stochastic matrix (M, M).
-
-    Where there are several (a reducible matrix), the one that equal probabilities tend to.
-    """
+    """The stationary probabilities p = T p (M,) of a column-stochastic matrix (M, M). Where there are several (a
+    reducible matrix), the one that equal probabilities tend to."""
     size = len(transition)
     mixing = (transition + np.eye(size)) / 2  # has the same stationary probabilities, and no periodic chains
     for _ in range(40):
@@ -270,9 +261,7 @@ def stationary(transition: np.ndarray) -> np.ndarray:
 
 def generator(transition: np.ndarray) -> np.ndarray:
     """Rates Q (M, M) of the Markov process nearest to log T: off-diagonal ones not negative, columns summing to zero.
-
-    The paper's three-model matrix has no exact one: its zeros make T**0.9 slightly negative (-4e-7).
-    """
+    The paper's three-model matrix has no exact one: its zeros make T**0.9 slightly negative (-4e-7)."""
     from scipy.linalg import logm
 
     Q = np.real(logm(transition))
@@ -283,8 +272,7 @@ def generator(transition: np.ndarray) -> np.ndarray:
 def transition_powers(transition: np.ndarray, exponents: np.ndarray) -> np.ndarray:
     """T(m Δt) = T(Δt)**m, eq. (8), for exponents m (n,): (n, M, M), column-stochastic.
 
-    Whole m: the power; the part under one: expm(m Q) with the generator above, so that no probability is negative.
-    """
+    Whole m: the power; the part under one: expm(m Q) with the generator above, so that no probability is negative."""
     exponents = np.minimum(np.asarray(exponents, dtype=float), MOST_STEPS)
     # The whole part exactly, the rest by the generator: continuous in m and never negative.
     whole = np.floor(exponents + 1e-9).astype(np.int64)
@@ -313,8 +301,7 @@ def start_weights(t: np.ndarray, acceleration_spread: float) -> np.ndarray:
 
     The estimate at the third plot is x = Σ aₖ zₖ, v = Σ bₖ zₖ, acceleration 0. An acceleration w of the target makes
     errors (Σ aₖ τₖ²/2, Σ bₖ τₖ²/2, -1) w, τₖ = tₖ - t₃; with w of the stated spread (m/s²) they enter the covariance:
-    g is this vector.
-    """
+    g is this vector."""
     tau = np.asarray(t, dtype=float) - t[2]
     a, b = np.linalg.pinv(np.stack([np.ones(3), tau / -tau[0]], axis=1))
     b = b / -tau[0]
@@ -377,10 +364,8 @@ def _flown(
 
 
 def plot_truth(case: Case, t: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """What plots are made of (K, 8): range, sine and cosine of elevation and azimuth, x, y, z.
-
-    Raises ConfigError where the target leaves the antenna's sector.
-    """
+    """What plots are made of (K, 8): range, sine and cosine of elevation and azimuth, x, y, z. Raises ConfigError where
+    the target leaves the antenna's sector."""
     sensor = case.spec.sensor
     position = x[:, 0::3]
     if sensor.sigma_range_m is None:
@@ -417,10 +402,8 @@ def intervals(t: np.ndarray, tolerance: float = 1e-9) -> tuple[np.ndarray, np.nd
 
 
 def local_plots(sensor: Sensor, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Recorded plots (n, 3) in the local frame: positions (n, 3), covariances (n, 6), and which are whole (n,).
-
-    A plot counts where all three values are there and, of biconical ones, where it lies in front of the antenna.
-    """
+    """Recorded plots (n, 3) in the local frame: positions (n, 3), covariances (n, 6), and which are whole (n,). A plot
+    counts where all three values are there and, of biconical ones, where it lies in front of the antenna."""
     whole, sigma = np.isfinite(measured).all(axis=1), np.array(sensor.sigma)
     z, R = np.zeros((len(measured), 3)), np.tile(np.eye(3), (len(measured), 1, 1))
     if sensor.sigma_range_m is None:

@@ -11,8 +11,7 @@ A sequence whose forecast is the track's takes its windows from a menu: they are
 velocity and acceleration in geometric progression, and each scan of each realisation takes the least that is no less
 than its own. The menu begins with what the ranges alone leave open and ends where the whole burst is the first window.
 
-What is known without sampling: the errors of range alone, and of every idealisation.
-"""
+What is known without sampling: the errors of range alone, and of every idealisation."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -51,19 +50,15 @@ class PulsesAxes(Axes):
 
 # ---- world -----------------------------------------------------------------------------------------------------------
 def truth(target: Any, t: np.ndarray, case: str) -> np.ndarray:
-    """Range, radial velocity and acceleration (K, 3) of a configured target at times t (K,), in m, m/s, m/s².
-
-    Raises ConfigError, with the name of the case, for a target that cannot be.
-    """
+    """Range, radial velocity and acceleration (K, 3) of a configured target at times t (K,), in m, m/s, m/s². Raises
+    ConfigError, with the name of the case, for a target that cannot be."""
     return radial.checked_truth(target, t, case)
 
 
 def bursts(spec: Any, truth: np.ndarray) -> list[Burst]:
-    """The burst of every scan; truth (K, 3) gives its range, on which the echo's power hangs, and its velocity.
-
-    The amplitude is one, the noise has half the power over the ratio in each part of a complex sample. Ratios are taken
-    to a hundredth of a decibel, so that scans share designs.
-    """
+    """The burst of every scan; truth (K, 3) gives its range, on which the echo's power hangs, and its velocity. The
+    amplitude is one, the noise has half the power over the ratio in each part of a complex sample. Ratios are taken to
+    a hundredth of a decibel, so that scans share designs."""
     given, wavelength = spec.burst, spec.radar.wavelength_m
     doppler = 2.0 * truth[:, 1] / wavelength
     power_db = given.snr_db + 20.0 * np.log10(np.abs(np.sinc(given.pulse_length_s * doppler)))
@@ -99,8 +94,7 @@ def at_centre(burst: Burst, size: int, order: int) -> np.ndarray:
 def bounds(burst: Burst, size: int) -> tuple[float, float]:
     """The Fisher bound of a burst's velocity and acceleration at its middle, m/s and m/s²; infinite if not estimated.
 
-    size is the number of parameters: phase, frequency, its derivatives.
-    """
+    size is the number of parameters: phase, frequency, its derivatives."""
     (information,) = fisher_sums(burst, size, [burst.pulses])
     scale = 1.0 / np.sqrt(np.diag(information))
     inverse = np.linalg.inv(information * np.outer(scale, scale)) * np.outer(scale, scale)
@@ -135,8 +129,7 @@ SEARCH: dict[str, Any] = {"coherent": True, "search": 2, "margin": 2.0, "toleran
 class Menu:
     """Standard deviations (m/s, m/s²) that windows are designed for, and the windows in pulses of each pair.
 
-    spreads are the largest of either; levels how many of either, the next one RATIOS times less.
-    """
+    spreads are the largest of either; levels how many of either, the next one RATIOS times less."""
 
     top: tuple[float, float]
     levels: tuple[int, int]
@@ -196,8 +189,7 @@ def widest(spec: Any, one: Any) -> tuple[float, float]:
     """The largest standard deviations of velocity and acceleration that a forecast of the track may have.
 
     Those of range alone: a burst only adds to what is known. Of a velocity no more is left open than where in the span
-    it lies.
-    """
+    it lies."""
     dt = spec.radar.scan_period_s
     F, Q = transition(dt), process_noise(one.process_noise, one.manoeuvre_variance, dt)
     P = np.diag([0.0, spec.prior.sigma_velocity_mps**2, spec.prior.sigma_acceleration_mps2**2])
@@ -242,10 +234,8 @@ class Designed:
 
 
 def designed(spec: Any, bursts: list[Burst]) -> Designed:
-    """All filters of a case: their menus, and of every scan and entry the records of its windows.
-
-    Windows are designed for the weakest of the bursts, and weighed with the noise of each.
-    """
+    """All filters of a case: their menus, and of every scan and entry the records of its windows. Windows are designed
+    for the weakest of the bursts, and weighed with the noise of each."""
     weakest = max(bursts, key=lambda one: one.noise_variance)
     menus = tuple(None if one.estimator in KINDS else menu(weakest, one, widest(spec, one)) for one in spec.filters)
     every = sorted({spec.pulses} | {w for one in menus if one for own in one.windows for w in own})
@@ -347,8 +337,7 @@ def errors(spec: Any, one: Any, sigma: np.ndarray, missed: np.ndarray) -> tuple[
     """Mean and covariance (K, 3), (K, 3, 3) of the errors of a filter whose estimates always lock.
 
     sigma (K, 2) of velocity and acceleration; missed (K, 3) what the model misses, see `defects`. The filter's
-    covariance P gives the gains; that of the errors, S, has no manoeuvre noise.
-    """
+    covariance P gives the gains; that of the errors, S, has no manoeuvre noise."""
     F, S, mean = algebra.constant_acceleration(spec.radar.scan_period_s), designation(spec), (0.0, 0.0, 0.0)
     means, covariances = np.zeros((len(missed), 3)), np.zeros((len(missed), 6))
     for k, taken in enumerate(gains(spec, one, sigma)):
@@ -388,8 +377,7 @@ def of_losses(spec: Any, one: Any, sigma: np.ndarray) -> np.ndarray:
 
     It is the mean square of the answer to a burst, summed over those up to a scan. A lost estimate is uniform over the
     span (the acceleration over what sweeps the rate), and taken as measured; one that the next forecast rests on
-    confirms itself from scan to scan. A gate, a mixture or hypotheses answer less.
-    """
+    confirms itself from scan to scan. A gate, a mixture or hypotheses answer less."""
     F, scans = algebra.constant_acceleration(spec.radar.scan_period_s), len(sigma)
     size = np.array([spec.span_mps, spec.span_mps / spec.burst_s]) / math.sqrt(12.0)
     answers, found = np.zeros((3, scans, 2)), np.zeros((scans, 3))  # of the bursts so far to errors of one
@@ -409,8 +397,7 @@ def most_lost(bursts: Sequence[Burst], one: Any) -> float:
 
     A line of noise is higher than the signal's with a probability of exp(−E/2)/2, E the energy over the noise's density
     (Rife & Boorstyn 1974), for two lines that are orthogonal. Of lines at half their distance the signal's is down to
-    sinc²(1/4) at worst, and a side lobe of it, 0.217 of its height, helps the other one.
-    """
+    sinc²(1/4) at worst, and a side lobe of it, 0.217 of its height, helps the other one."""
     if one.estimator != "spectrum":
         return 1.0
     least = min(energy_ratio(burst, burst.duration_s) for burst in dict.fromkeys(bursts))

@@ -2,8 +2,7 @@
 
 `exact_sigma` of `curves.csv` is filled for range alone and for idealisations (`estimator: fisher_bound`). A `note`
 *bursts lost more rarely than seen here may decide* stands where the bursts that the sample leaves possible to be lost
-(95 %) beyond those it saw would add more to σ² than half its interval; docs/trust.md has why.
-"""
+(95 %) beyond those it saw would add more to σ² than half its interval; docs/trust.md has why."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING

@@ -37,8 +37,7 @@ class Place:
     """Where a case lies: its numbers, its steady gains (3,) exactly and as the period shrinks, its course over time.
 
     inputs are σ_r (m), σ_V (m/s), Δt (s), D_M ((m/s³)²). t_s (n,) and gain (n, 3), per cent, are of the scans at which
-    both filters have all estimates.
-    """
+    both filters have all estimates."""
 
     name: str
     inputs: tuple[float, float, float, float]
@@ -178,10 +177,8 @@ def table(places: Sequence[Place]) -> "pd.DataFrame":
 
 # ---- figures ---------------------------------------------------------------------------------------------------------
 def limit_course(c: float) -> tuple[np.ndarray, np.ndarray]:
-    """t/τ₁ (n,) and gains (n, 3) by the recursion with scans so dense that the period no longer matters.
-
-    After SETTLED memories the steady values stand.
-    """
+    """t/τ₁ (n,) and gains (n, 3) by the recursion with scans so dense that the period no longer matters. After SETTLED
+    memories the steady values stand."""
     tau_2 = 1 / np.sqrt(c)  # τ₁ = 1, σ_r = 1
     dt = min(1.0, tau_2) / FINE
     scans = int(min(SETTLED * max(tau_2, 1.0), LATEST) / dt) + 2

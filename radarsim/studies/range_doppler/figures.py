@@ -147,9 +147,7 @@ def _settling_panel(title: str, result: Result, rows: "pd.DataFrame", up: tuple[
 
 def _labels(points: Sequence[tuple[float, float, str]], limit: float, x: Scale, y: Scale) -> list[Note]:
     """Labels of points (x, y, words), at their right or their left: as few as possible meet a label, curve or limit.
-
-    Points at one place share a label.
-    """
+    Points at one place share a label."""
     joined: list[tuple[float, float, str]] = []
     for t, sigma, words in sorted(points):
         if joined and math.dist(*((x.place(at[0]), y.place(at[1])) for at in ((t, sigma), joined[-1]))) < TOUCHING:

@@ -2,8 +2,7 @@
 
 A package derives a class from `GivenGains` and names it by an entry point of the group `radarsim.filters`. The class
 holds the keys of its `kind` and makes its gains; the start by least squares, the covariance that the filter believes,
-its exact errors, the kernel and recorded plots are as for the study's own filters.
-"""
+its exact errors, the kernel and recorded plots are as for the study's own filters."""
 
 from abc import abstractmethod
 from collections.abc import Callable
@@ -25,8 +24,7 @@ class Scans(NamedTuple):
 
     t_s (K,) are their times, s; there (K, 2) says of which range and velocity come and are observed; sigma (2,) are the
     standard deviations of these, m and m/s. start is the scan, from 1, at which the least-squares start ends, and
-    covariance (3, 3) that of its range, velocity and acceleration, m, m/s, m/s².
-    """
+    covariance (3, 3) that of its range, velocity and acceleration, m, m/s, m/s²."""
 
     t_s: np.ndarray
     there: np.ndarray
@@ -189,8 +187,7 @@ def followed(
     """Estimates, standard deviations (n, 3), and normalised innovations squared (n, 2) over the rows after the start.
 
     x (3,) is the state at the start, z (K, 2) are the plots. The velocity's innovation is what the range's leaves of
-    it. Last, the variances (n, 2) of what the plots differ by from the estimates.
-    """
+    it. Last, the variances (n, 2) of what the plots differ by from the estimates."""
     made = checked(one, scans)
     noise = noise_of(one)
     P, R = scans.errors(made, noise), np.diag(scans.sigma**2)

@@ -1,7 +1,6 @@
 """How P1's claims are measured: which case is which of the paper's radars, and the numbers taken from the tables.
 
-Radars are keyed by their number, and found by their accuracies and period, whatever their names.
-"""
+Radars are keyed by their number, and found by their accuracies and period, whatever their names."""
 
 import math
 from collections.abc import Collection
@@ -65,10 +64,8 @@ class Evidence(claims.Evidence):
         return next(f.name for f in self.case(key).spec.filters if f.observes == observes)
 
     def k_gain(self, radar: Key, component: str) -> Series:
-        """The relative gain K (eq. 17), from the scan at which the filter with velocity has filtered, k ≥ 2.
-
-        At k = 1 both filters give the same measured range, and no gain is spoken of.
-        """
+        """The relative gain K (eq. 17), from the scan at which the filter with velocity has filtered, k ≥ 2. At k = 1
+        both filters give the same measured range, and no gain is spoken of."""
         gain = self.marked(self.gain(radar, self.filter(radar, RV), component), radar)
         return _as_long_as_the_papers(gain.since(2))
 
@@ -150,8 +147,7 @@ def gain_raised(seen: Evidence, slow: int, fast: int) -> Estimate:
 def extrema_apart(seen: Evidence, slow: int, fast: int) -> Estimate:
     """Time from one radar's largest range gain to the other's, s; each is all times within a point of the largest.
 
-    Or within as much as the evidence takes for one: 0 for the largest value alone.
-    """
+    Or within as much as the evidence takes for one: 0 for the largest value alone."""
     return apart_in_time(*(_extremum(seen.k_gain(radar, "r"), seen.extremum) for radar in (fast, slow)))
 
 
@@ -206,8 +202,7 @@ def gain_by_variance(seen: Evidence, radar: int) -> Estimate:
 
 def ineffective_from(seen: Evidence, radar: int, asked_s: float) -> Estimate:
     """The first time at which the acceleration gain is gone (zero or a loss); missing where the run is over before
-    the time that is asked about.
-    """
+    the time that is asked about."""
     found = seen.k_gain(radar, "ar")
     found.last()
     if found.t[-1] < asked_s and found.value.min() > 0:
@@ -279,8 +274,7 @@ def final_share(seen: Evidence, radar: int) -> Estimate:
 def range_difference(seen: Evidence, radar: int) -> Series:
     """Δσ_r(k) = σ_r(r) − σ_r(r,V_r), from k = 2.
 
-    Taken as independent: the common noise makes the two errors alike, so the interval is too wide, never too narrow.
-    """
+    Taken as independent: the common noise makes the two errors alike, so the interval is too wide, never too narrow."""
     return minus(seen.sigma(radar, R, "r").since(2), seen.sigma(radar, RV, "r").since(2))
 
 
@@ -323,10 +317,8 @@ def c_theta(seen: Evidence, radar: int) -> Estimate:
 
 
 def closed_forms(seen: Evidence, radar: int) -> Estimate:
-    """The largest relative difference of (8) and (12), as printed, from the matrices of (5) and (9).
-
-    Of covariances R̄_k drawn at random; an element of (8) counts against the root of the two variances it is between.
-    """
+    """The largest relative difference of (8) and (12), as printed, from the matrices of (5) and (9). Of covariances
+    R̄_k drawn at random; an element of (8) counts against the root of the two variances it is between."""
     axes = seen.case(radar).axes
     dt, theta = axes.scan_period_s, axes.C_theta
     C_M = VARIANCE / RADARS[radar][0] ** 2

@@ -12,8 +12,7 @@ predictions and updates never moving two covariances apart by a greater factor i
 fraction, not of second.
 
 Exact means of filters that miss plots, over the patterns of plots. Imported where plots are missed: it loads the
-compiler.
-"""
+compiler."""
 
 import math
 from collections.abc import Sequence
@@ -80,8 +79,7 @@ def mixture(
     """Means over all patterns of plots, of a filter on the truth (K, 3) at scans dt (s) apart; beside it others.
 
     drawn: of a truth that is drawn, as `filters.defects` takes it. from_k: nothing is known before this scan,
-    counted from 1. whole: beyond `most` patterns none are merged.
-    """
+    counted from 1. whole: beyond `most` patterns none are merged."""
     defect = defects(truth, dt, plots, drawn)
     scans, _, columns = defect.shape
     others = [(one.observes, one.start) for one in beside]
@@ -119,8 +117,7 @@ def most_waiting(start: int, scans: int, detection: float) -> int:
 def settled(fine: Mixture, coarse: Mixture, from_k: int = 0) -> bool:
     """Whether every mean that there is changes by little when merged to a quarter as many patterns.
 
-    from_k: of e² alone, from this scan on, counted from 1; 0: of e² and NEES, at every scan.
-    """
+    from_k: of e² alone, from this scan on, counted from 1; 0: of e² and NEES, at every scan."""
     late = slice(max(from_k - 1, 0), None)
     pairs = [(fine.moment[late], coarse.moment[late]), (fine.beside[:, late], coarse.beside[:, late])]
     if from_k == 0:

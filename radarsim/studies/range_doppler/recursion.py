@@ -2,8 +2,7 @@
 
 A version is a form and size of the manoeuvre covariance and a way to start; B of them run side by side. Packed
 covariances are the paper's b, c, e, d, f, g. The two measurements of a scan are taken one after the other, which for
-independent errors is the same as both at once.
-"""
+independent errors is the same as both at once."""
 
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple, get_args
@@ -30,8 +29,7 @@ def covariance_of(form: Form, variance: float, sigma_range_m: float, dt: float) 
 
     random_jerk: eq. (6), the variance of a jerk that is constant over the scan, (m/s³)². white_jerk: the spectral
     density of a white jerk, m²/s⁵. white_jerk_rate: D_M Δt in place of that density. acceleration_step: the variance of
-    a step of acceleration, (m/s²)². normalised: C_M of eq. (5), so that D_M is the number times σ_r².
-    """
+    a step of acceleration, (m/s²)². normalised: C_M of eq. (5), so that D_M is the number times σ_r²."""
     if form == "random_jerk":
         return manoeuvre_covariance(variance, dt)
     if form == "normalised":
@@ -45,8 +43,7 @@ def started(start: Start, observes: int, sigma: np.ndarray, dt: float, Q: np.nda
     """Covariances (B, 3, 3) of B starts, believed and true, at the last of the scans that make them.
 
     observes is 1 (range) or 2 (and velocity); sigma (2,); Q (B, 3, 3) of a scan, which only `process_noise` uses: the
-    others believe what is true of a target that does not manoeuvre while they start.
-    """
+    others believe what is true of a target that does not manoeuvre while they start."""
     scans = first_scan(start, observes)
     if start == "process_noise":
         weights, believed = _start_with_process_noise(observes, scans, sigma, dt, Q)
@@ -82,10 +79,8 @@ def _first_differences(observes: int, dt: float) -> np.ndarray:
 def _start_with_process_noise(
     observes: int, scans: int, sigma: np.ndarray, dt: float, Q: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Generalised least squares on a state that the noise Q (B, 3, 3) moves: weights (B, 3, 2, scans), covariances.
-
-    The state at scan n − j is F⁻ʲ x less what the j last steps added, carried back.
-    """
+    """Generalised least squares on a state that the noise Q (B, 3, 3) moves: weights (B, 3, 2, scans), covariances. The
+    state at scan n − j is F⁻ʲ x less what the j last steps added, carried back."""
     unit = np.array([1.0, 1.0 / dt, 1.0 / dt**2])  # one size for all columns
     H, back = observation(observes), np.linalg.inv(transition(dt))
     powers = [H @ np.linalg.matrix_power(back, j) for j in range(scans)]
@@ -104,11 +99,9 @@ def _start_with_process_noise(
 
 
 class Errors(NamedTuple):
-    """σ of B versions over K scans, (B, K, 3): the true one on a quadratic truth, and the believed one.
-
-    Not-a-number where there is no estimate. The believed one is the true one on a truth that moves as the filter
-    believes, once it has started.
-    """
+    """σ of B versions over K scans, (B, K, 3): the true one on a quadratic truth, and the believed one. Not-a-number
+    where there is no estimate. The believed one is the true one on a truth that moves as the filter believes, once it
+    has started."""
 
     true: np.ndarray
     believed: np.ndarray
@@ -119,8 +112,7 @@ def errors(
 ) -> Errors:
     """σ of B versions by the exact recursion, of filters that observe the range (1) or range and velocity (2).
 
-    sigma (2,); Q (B, 3, 3) as `covariances` gives it, where it is at hand.
-    """
+    sigma (2,); Q (B, 3, 3) as `covariances` gives it, where it is at hand."""
     Q = covariances(versions, sigma[0], dt) if Q is None else Q
     names = [start for _, _, start in versions]
     first = np.array([first_scan(name, observes) for name in names])

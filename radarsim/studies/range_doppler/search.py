@@ -2,8 +2,7 @@
 
 A version is a form of the manoeuvre covariance, a D_M and a start (recursion.py); each is looked at with its true
 errors on a quadratic and those on a truth that moves as the filter believes, after 10 to 40 scans of the slow radars,
-and with as long a run of the fast ones or as many scans.
-"""
+and with as long a run of the fast ones or as many scans."""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -103,8 +102,7 @@ PRINTED = (
 class _Chunk(NamedTuple):
     """What the numbers of some versions are made of, under one truth: gains by radar (B, K, 3), σ_r of RLS 2 (B, K).
 
-    settled is the steady σ_r of RLS 2, range only (B,).
-    """
+    settled is the steady σ_r of RLS 2, range only (B,)."""
 
     gains: dict[int, np.ndarray]
     sigma: np.ndarray

@@ -49,8 +49,7 @@ class Plan:
     """All that a block needs. What the kernels take of it is made when a block is first asked for: till then the
     compiler, which takes half a second to load, is not.
 
-    gaussian: whether the errors are, with the exact bias and σ of the axes, and in sums of the common kind.
-    """
+    gaussian: whether the errors are, with the exact bias and σ of the axes, and in sums of the common kind."""
 
     case: Case
     made: Designed

@@ -1,8 +1,7 @@
 """Tables of filters that measure range and radial velocity (P1).
 
 With missed plots `n` of `curves.csv` is how many realisations have an estimate at that scan, and a gain is of those in
-which both filters have one; `exact_sigma` is the mean over all patterns of plots, empty where these are too many.
-"""
+which both filters have one; `exact_sigma` is the mean over all patterns of plots, empty where these are too many."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -182,8 +181,7 @@ def nees(result: Result) -> statistics.Estimate:
     """Mean of eᵀP⁻¹e per estimated component (F, K), P the believed covariance, with its interval.
 
     From Σe and the Σ of products of two components. The errors of this study are Gaussian, so that these give the
-    spread too: of mean m and second moment M = E eeᵀ, var eᵀP⁻¹e = 2 tr (P⁻¹M)² - 2 (mᵀP⁻¹m)².
-    """
+    spread too: of mean m and second moment M = E eeᵀ, var eᵀP⁻¹e = 2 tr (P⁻¹M)² - 2 (mᵀP⁻¹m)²."""
     from radarsim.kernels.linear import CROSSED  # loads the compiler
 
     axes, P, n = result.axes, result.axes.believed, result.count

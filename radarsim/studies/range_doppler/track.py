@@ -69,8 +69,7 @@ class Tracker:
     these determine range, velocity and acceleration; before, its estimates are the plots. Then the Kalman filter of the
     study goes from row to row, its gains computed for the interval and for what the row holds. Where the config leaves
     the manoeuvre variance to be looked for, it is the best one on the config's target. A filter of a package makes its
-    gains for the times of the whole recording and for what each row holds.
-    """
+    gains for the times of the whole recording and for what each row holds."""
 
     several = False
 

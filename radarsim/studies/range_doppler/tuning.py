@@ -4,8 +4,7 @@ Many variances run through the exact recursion side by side. D_M is looked for i
 longer than the run to none at all, first ten to a decade, then ever closer about the best; it is given to four digits,
 which lie within the flat bottom of the curve and are the same on every machine.
 
-The filters of a case, designed, and what they see; NumPy alone.
-"""
+The filters of a case, designed, and what they see; NumPy alone."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -130,8 +129,7 @@ class Designed:
     """A case's filters and what they see: truth x (K, 3) at times t (K,), plots, D_M (F,), gains of full detection.
 
     drawn (K, 3, 1 + C): how the truth of realisations leaves the model beyond x, as `filters.drawn_defects` has it.
-    asked_from_k, roughly: as of the case.
-    """
+    asked_from_k, roughly: as of the case."""
 
     spec: Keys
     t: np.ndarray

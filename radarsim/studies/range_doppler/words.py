@@ -34,8 +34,7 @@ def answer(results: Sequence[Result], made: Made) -> list[str]:
 
     Of cases that nothing is swept in, where there are such; the greatest loss of any case at any scan is given with
     them. Further: the best D_M where several are tried, first where nothing but D_M is asked for, and the worst error
-    where a target breaks the model; the D_M that was looked for; and how the radar's velocities are taken.
-    """
+    where a target breaks the model; the D_M that was looked for; and how the radar's velocities are taken."""
     gains = _gain_sentences(results, made)
     best = [*_best_sentences(results, made), *_best_of_broken(results, made)]
     sentences = [*best, *gains] if _asks_for_variance(results) else [*gains, *best]
@@ -87,8 +86,7 @@ def _gain_sentence(
 ) -> str:
     """The gain of one quantity at the last scan, or at the last common time.
 
-    rows: its gains in the cases told of; every: in all cases, among which the greatest loss is looked for.
-    """
+    rows: its gains in the cases told of; every: in all cases, among which the greatest loss is looked for."""
     last, when = _compared(rows)
     several = rows["filter"].nunique() > 1
     said: dict[str, Any] = {"quantity": _capital(quantity), "when": when, "base": _baseline(results)}
@@ -126,10 +124,8 @@ def _not_settled(later: str) -> list[str]:
 
 
 def _later(results: Sequence[Result], row: "pd.Series[Any]") -> str:
-    """What a gain comes to in the long run, exact, in words; nothing where it has settled or that is not known.
-
-    Where plots may be missed it is of the same radar with every plot, now and in the long run.
-    """
+    """What a gain comes to in the long run, exact, in words; nothing where it has settled or that is not known. Where
+    plots may be missed it is of the same radar with every plot, now and in the long run."""
     result = next(one for one in results if one.name == row["case"])
     axes, spec = result.axes, result.spec
     whole = spec.radar.model_copy(update={"detection_probability": 1.0})

@@ -2,8 +2,7 @@
 
 Its three parts are the paper's three questions. The files of this folder answer the first, smoothing, and hold what all
 parts have; the folders `manoeuvre` and `clutter` have files of the same names as those of
-`radarsim.studies.folder`, for cases that ask their questions. A table may have no rows, a figure be None.
-"""
+`radarsim.studies.folder`, for cases that ask their questions. A table may have no rows, a figure be None."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial

@@ -1,8 +1,7 @@
 """Keys of the sonar study (P3): the sonar, the target, the filters, and what its three parts ask in addition.
 
 Smoothing is what all cases have. In addition there are detectors of manoeuvres, filters that respond to them and uses
-of a track; and trackers, which have to find their plots among false ones in a surveyed sector.
-"""
+of a track; and trackers, which have to find their plots among false ones in a surveyed sector."""
 
 import math
 from collections.abc import Iterator

@@ -2,8 +2,7 @@
 
 Everything is for one coordinate; its state (value, rate, acceleration) has `size` 2 or 3 components, for degree 1 or 2.
 
-Exact values of P3's experiments: the true errors of every linear filter, averaged over all patterns of misses.
-"""
+Exact values of P3's experiments: the true errors of every linear filter, averaged over all patterns of misses."""
 
 from collections.abc import Sequence
 
@@ -26,8 +25,7 @@ def generalised_least_squares(t: np.ndarray, C: np.ndarray, size: int) -> tuple[
     """Optimal weights (size, n) for the state at the last plot, and their covariance (AᵀC⁻¹A)⁻¹ (size, size).
 
     t (n,) in s; C (n, n) the covariance of the errors of the plots. Solved by a triangular factor of C and a QR
-    factorisation in unit time, so that no digits are lost for ρ = 0.99 or long tracks.
-    """
+    factorisation in unit time, so that no digits are lost for ρ = 0.99 or long tracks."""
     span = max(t[-1] - t[0], 1e-300)
     scale = np.array([1.0, 1.0 / span, 1.0 / span**2])[:size]
     factor = np.linalg.cholesky(C)
@@ -41,8 +39,7 @@ def generalised_least_squares(t: np.ndarray, C: np.ndarray, size: int) -> tuple[
 def optimal_sigma(t: np.ndarray, sigma: np.ndarray, rho: float, period: float, size: int) -> np.ndarray:
     """The smallest possible σ (size,) of the state at the last time.
 
-    sigma (n,) are the standard deviations of the plots, infinite where they are missed.
-    """
+    sigma (n,) are the standard deviations of the plots, infinite where they are missed."""
     detected = np.isfinite(sigma)
     C = error_covariance(sigma[detected], rho, t[detected], period)
     _, P = generalised_least_squares(t[detected], C, size)
@@ -87,8 +84,7 @@ def recursive_errors(
     assumes from scan to scan; truth (K, 3); steps (K,) the true correlation of neighbouring errors; sigma (K,) of the
     plots; walk the standard deviation of a random acceleration, constant over each interval. The error of the estimate
     (3), the carried error and the true error of the plot are propagated jointly: the linear recursion reads nothing
-    else.
-    """
+    else."""
     patterns, scans = gain.shape[:2]
     mean, S = np.zeros((patterns, 5)), np.zeros((patterns, 5, 5))
     mean[:, :3] = -truth[0]
@@ -122,8 +118,7 @@ def weighted_errors(
 
     The estimate is of the state at the last of these scans. C (n, n) is the covariance of the plots; a random
     acceleration `walk`, if any, acts from scan `origin` on (earlier effects cancel once the estimate reproduces
-    straight lines).
-    """
+    straight lines)."""
     n = weights.shape[2]
     last = first + n - 1
     bias = weights @ truth[first : last + 1, 0] - truth[last]
@@ -139,10 +134,8 @@ def weighted_errors(
 
 
 def consistency(believed: np.ndarray, bias: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Expected normalised squared error tr(P⁻¹(S + m mᵀ)) (…,).
-
-    It is the size of the state for a consistent filter and larger for an optimistic one.
-    """
+    """Expected normalised squared error tr(P⁻¹(S + m mᵀ)) (…,). It is the size of the state for a consistent filter and
+    larger for an optimistic one."""
     moment = covariance + bias[..., :, None] * bias[..., None, :]
     return np.trace(np.linalg.solve(believed, moment), axis1=-2, axis2=-1)
 
@@ -172,8 +165,7 @@ def exact_values(
 
     designs are those of each filter in each coordinate, for M patterns of plots in the first scans, and probability
     (M,) is that of each pattern: the values are means over the patterns. Nothing is known of a filter without designs,
-    and the NEES only for a single pattern.
-    """
+    and the NEES only for a single pattern."""
     F, K, C = len(designs), len(scene.t), scene.truth.shape[1]
     values = {name: np.full((F, K, C, size), np.nan) for name in ("sigma", "bias")}
     values |= {name: np.full((F, K, C), np.nan) for name in ("ahead", "nees")}

@@ -1,7 +1,6 @@
 """P3's figures: σ of each component against time, lines from rows of tables; and what is asked of smoothing.
 
-Of filters that know their plots: gain of each plot, gains, believed and true σ, misses, conversion.
-"""
+Of filters that know their plots: gain of each plot, gains, believed and true σ, misses, conversion."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any

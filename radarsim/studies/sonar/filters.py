@@ -11,8 +11,7 @@ A design is therefore its gains (M, K, 4), for M patterns of missed plots at onc
 Internally times are in periods T₀ and weights relative to the nominal plot, as in the paper; gains and covariances are
 returned in m, s (or rad, s).
 
-Sonar filters as arrays for the kernels: the specification of a filter, its design, and banks of filters.
-"""
+Sonar filters as arrays for the kernels: the specification of a filter, its design, and banks of filters."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -59,8 +58,7 @@ def detector_arrays(
 ) -> Detectors:
     """The measured detectors, then those that adaptive filters need in addition; phase (K,) of the manoeuvre.
 
-    needed holds plots, and scans from one test to the next.
-    """
+    needed holds plots, and scans from one test to the next."""
     tests, none = list(measured), np.zeros((coordinates + 1, 0))
     for plots, every in needed:
         if (plots, every) not in [test[:2] for test in tests]:
@@ -130,8 +128,7 @@ def recursive(
     starts so, on the first plots (`size`, or `start` if that is more), and goes on as a Kalman-Bucy filter (11) of the
     state and, for ρ other than 0, of the plot's error, the plot then being exact (`steps.kalman`); with `fixed` gains
     (3,), in periods, if any are given. manoeuvre_variance is that of a random derivative of order `size`, constant
-    between scans: (m/s²)² for size 2.
-    """
+    between scans: (m/s²)² for size 2."""
     patterns, scans = plots.weight.shape
     gain, P = np.zeros((patterns, scans, 4)), np.zeros((patterns, scans, 3, 3))
     carry, times = step_correlations(rho, plots.t, plots.period), plots.moments()
@@ -163,11 +160,8 @@ def settled_gain(period: float, sigma: float, size: int, manoeuvre_variance: flo
 
 
 def window_weights(plots: Plots, k: int, length: int, size: int) -> tuple[int, np.ndarray, np.ndarray]:
-    """Least squares on the last `length` plots up to scan k, extrapolated to k where k itself is missed.
-
-    Returns the first scan of the window, the weights (M, 3, n) of the plots from there on, and the covariance
-    (M, 3, 3).
-    """
+    """Least squares on the last `length` plots up to scan k, extrapolated to k where k itself is missed. Returns the
+    first scan of the window, the weights (M, 3, n) of the plots from there on, and the covariance (M, 3, 3)."""
     seen = plots.weight[:, : k + 1] > 0
     count = np.cumsum(seen, axis=1)
     inside = seen & (count > count[:, -1:] - length)

@@ -45,9 +45,7 @@ def floor(spec: Keys, axes: GivenPlotsAxes) -> Floor | None:
 
 def products(row: np.ndarray, sigma: np.ndarray, rho: float, t: np.ndarray, period: float) -> np.ndarray:
     """Information (K, p, p) of the plots of one coordinate with derivatives (K, p); sigma infinite where there is none.
-
-    Of correlated errors a plot adds what it differs by from the one before.
-    """
+    Of correlated errors a plot adds what it differs by from the one before."""
     found = np.zeros((*row.shape, row.shape[1]))
     there = np.flatnonzero(np.isfinite(sigma))
     steps = step_correlations(rho, t[there], period)

@@ -181,8 +181,7 @@ def over_formula(seen: Evidence, key: Key, what: What, n: int) -> Estimate:
 
 def bought(seen: Evidence, key: Key, more: int, few: int, what: What = "smoothed") -> Estimate:
     """Smoothed or extrapolated σ of growing memory after more plots over that after few; of the same realisations,
-    taken as independent.
-    """
+    taken as independent."""
     name = seen.case(key).name
     rows = [seen.row("plots", case=name, component="r", what=what, plots=n, degree=1) for n in (more, few)]
     return ratio(_read(rows[0], "ratio"), _read(rows[1], "ratio"))
@@ -267,8 +266,7 @@ def printed_sum(seen: Evidence, key: Key, n: int) -> float:
 
 def at_a_miss(seen: Evidence, key: Key, kind: str) -> float:
     """σ of the range at the first missed scan over σ extrapolated to it from the scan before: of the same
-    realisations.
-    """
+    realisations."""
     case, f = seen.case(key), seen.index(key, seen.filter(key, kind))
     k = case.spec.sensor.missed_scans[0] - 1
     here, before = case.sums["error"][f, k, 0, 1], case.sums["ahead"][f, k - 1, 0, 1]

@@ -3,8 +3,7 @@
 Sums of F filters over K scans and components (for each coordinate: value, rate and, where a filter has it,
 acceleration): `error`, `paired`, `estimates` as in every study; `believed` Σ of the variances that the filter believes.
 For each of C coordinates: `joint` Σq, Σq², Σp, Σp² of q = eᵀP⁻¹e and of p, the product of the errors in value and rate;
-and `ahead` Σe … Σe⁴ of the value extrapolated by one scan, in the row of the scan that it is extrapolated from.
-"""
+and `ahead` Σe … Σe⁴ of the value extrapolated by one scan, in the row of the scan that it is extrapolated from."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -61,10 +60,8 @@ def conversion(case: Case, scene: Scene) -> pattern_kernels.Conversion:
 def designs(
     specs: Sequence[filters.FilterSpec], scene: Scene, detected: np.ndarray
 ) -> list[list[filters.FilterDesign]]:
-    """The designs of each filter in each coordinate, for patterns detected (M, K') of plots.
-
-    A filter that responds to manoeuvres has none, because its gains depend on the plots.
-    """
+    """The designs of each filter in each coordinate, for patterns detected (M, K') of plots. A filter that responds to
+    manoeuvres has none, because its gains depend on the plots."""
     return [
         [filters.design_filter(spec, c, scene.plots(c, detected)) for c in range(len(scene.nominal))]
         if spec.response is None
@@ -78,10 +75,7 @@ def drawn_plots(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Plots of realisations first … first + count - 1 (C, count, K), or their errors (what = 1), not-a-number where a
     scan gives none; and the deviation of the target's value and rate (C, 2, count, K), or (C, 2, 1, 1) where none moves
-    at random.
-
-    C is the world's padded number of coordinates.
-    """
+    at random. C is the world's padded number of coordinates."""
     K, C = world.fresh.shape
     plots, deviation = np.empty((C, K, count)), np.zeros((C, 2, K, count) if world.walk.any() else (C, 2, 1, 1))
     pattern_kernels.fill_plots(world, detections, first, what, plots, deviation)
@@ -234,10 +228,8 @@ class RealisationPlan:
 def realisation_plan(
     case: Case, scene: Scene, specs: Sequence[filters.FilterSpec], detectors: detector.Detectors
 ) -> RealisationPlan:
-    """The plan of a case whose gains differ between realisations, with exact values by patterns of plots.
-
-    None are known in the cartesian frames, where weights depend on the plots.
-    """
+    """The plan of a case whose gains differ between realisations, with exact values by patterns of plots. None are
+    known in the cartesian frames, where weights depend on the plots."""
     spec, (K, C), size = case.spec, scene.sigma.shape, max(one.size for one in specs)
     if spec.frame == "polar":
         detected, probability = scene.patterns()

@@ -22,9 +22,7 @@ table = common.Tables()
 # ---- parts of tables ----------------------------------------------------------------------------------------------
 def of_coordinates(result: CaseResult[SonarAxes], mask: np.ndarray) -> tuple[Index, dict[str, np.ndarray]]:
     """Where mask (F, K, C) is true: indices (filter, scan, coordinate), each (n,), and the first columns of these rows.
-
-    Rows are ordered by filter, coordinate, scan.
-    """
+    Rows are ordered by filter, coordinate, scan."""
     f, c, k = np.nonzero(np.moveaxis(mask, 1, 2))
     names, units = zip(*result.axes.coordinates, strict=True)
     return (f, k, c), leading(result, f, k, component=common.names(names, c), unit=common.names(units, c))

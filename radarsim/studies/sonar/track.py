@@ -96,8 +96,7 @@ class Tracker:
     def derived(self, t: np.ndarray, x: np.ndarray, P: np.ndarray, known: np.ndarray) -> Derived:
         """Quantities derived from the tracks; here none.
 
-        t (n,) from the first plot; x (F, n, C, 3), P (F, n, C, 3, 3) and known (F, n, C, 3).
-        """
+        t (n,) from the first plot; x (F, n, C, 3), P (F, n, C, 3, 3) and known (F, n, C, 3)."""
         none = np.zeros((*x.shape[:2], 0))
         return Derived((), none, none)
 
@@ -182,8 +181,7 @@ def estimate_recorded(
 
     From plots z (C, n) of weights (C, n), zero where missing, by the kernels of the simulation: they process a chunk of
     realisations, here all the same track. t (n,) in s; sigma (C,) of a plot of weight one. A detector that tests every
-    so many scans counts the rows.
-    """
+    so many scans counts the rows."""
     F, C, n = len(specs), len(z), len(t)
     detectors = filters.detector_arrays([], filters.needed_tests(specs), np.zeros(n, dtype=np.int64), C)
     bank = filters.per_realisation_bank(specs, t, period, sigma, detectors)
@@ -378,8 +376,7 @@ def likelihood(
 class Recorded(RecordedPlots):
     """Recorded plots of all parts, for `radarsim track` and `radarsim simulate`.
 
-    file: of keys, the `track` of their part.
-    """
+    file: of keys, the `track` of their part."""
 
     rows_asked = 3000
     columns, sigmas, likelihood = staticmethod(columns), staticmethod(sigmas), staticmethod(likelihood)

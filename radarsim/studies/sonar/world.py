@@ -3,8 +3,7 @@
 The sonar's world (P3): correlated errors of plots, targets in polar and cartesian coordinates, and conversions.
 
 Bearings are counted from the x axis (north) towards the y axis (east): x = r cos b, y = r sin b. A state of one
-coordinate is (value, rate, acceleration). Times in s, ranges in m, angles in rad.
-"""
+coordinate is (value, rate, acceleration). Times in s, ranges in m, angles in rad."""
 
 import math
 from collections.abc import Sequence
@@ -51,10 +50,8 @@ Values = float | np.ndarray
 
 # ---- errors of plots -------------------------------------------------------------------------------------------------
 def correlation(rho: float, lags: np.ndarray) -> np.ndarray:
-    """ρ to the power of the lags, in periods, an array of any shape (P3 eq. 15).
-
-    A negative ρ has a meaning at whole periods only, so its lags are rounded.
-    """
+    """ρ to the power of the lags, in periods, an array of any shape (P3 eq. 15). A negative ρ has a meaning at whole
+    periods only, so its lags are rounded."""
     if rho < 0:
         lags = np.rint(lags)
         return np.where(lags % 2 == 1, -1.0, 1.0) * np.abs(rho) ** lags
@@ -79,8 +76,7 @@ def turning(
     """States (K, 3) in x and y of a target on straight legs and arcs, at constant speed (m/s).
 
     turns holds (start, end, rate) in s, s and rad/s, positive to starboard (the course increases), in order and
-    without overlap. At the very start of a turn the acceleration is already that of the turn.
-    """
+    without overlap. At the very start of a turn the acceleration is already that of the turn."""
     states = np.zeros((2, len(t), 3))
     legs, clock = [], 0.0
     for start, end, rate in turns:
@@ -98,10 +94,8 @@ def turning(
 
 
 def _arc(position: np.ndarray, speed: float, course: float, rate: float, elapsed: np.ndarray) -> np.ndarray:
-    """States (2, n, 3) after `elapsed` seconds of a turn.
-
-    The chord of an arc of angle a has length speed · elapsed · sinc(a / 2).
-    """
+    """States (2, n, 3) after `elapsed` seconds of a turn. The chord of an arc of angle a has length speed · elapsed ·
+    sinc(a / 2)."""
     half = rate * elapsed / 2
     chord = speed * elapsed * np.sinc(half / np.pi)
     heading = course + 2 * half
@@ -113,10 +107,8 @@ def _arc(position: np.ndarray, speed: float, course: float, rate: float, elapsed
 def accelerating(
     x: float, y: float, speed: float, course: float, acceleration: float, start: float, end: float, t: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """States (K, 3) in x and y of a target on a straight course, accelerated along it from start to end (s, m/s²).
-
-    The acceleration acts from the very start, and no longer at the end.
-    """
+    """States (K, 3) in x and y of a target on a straight course, accelerated along it from start to end (s, m/s²). The
+    acceleration acts from the very start, and no longer at the end."""
     on, off = np.maximum(t - start, 0.0), np.maximum(t - end, 0.0)
     distance = speed * t + acceleration * (on**2 - off**2) / 2
     rate = speed + acceleration * (on - off)
@@ -156,10 +148,8 @@ def polynomials(coefficients: Sequence[Sequence[float]], t: np.ndarray) -> tuple
 def converted(
     r: np.ndarray, b: np.ndarray, sigma_r: Values, sigma_b: Values
 ) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Plain conversion: x, y and the linearised covariance (xx, xy, yy) of plots r, b; broadcasts.
-
-    The mean of x and y is exp(-σ_b²/2) times the true value: see `conversion_bias`.
-    """
+    """Plain conversion: x, y and the linearised covariance (xx, xy, yy) of plots r, b; broadcasts. The mean of x and y
+    is exp(-σ_b²/2) times the true value: see `conversion_bias`."""
     c, s = np.cos(b), np.sin(b)
     along, across = sigma_r**2 + 0 * r, (r * sigma_b) ** 2
     return r * c, r * s, (along * c**2 + across * s**2, (along - across) * c * s, along * s**2 + across * c**2)
@@ -172,8 +162,7 @@ def converted_unbiased(
 
     For independent Gaussian errors E cos(b + e) = exp(-σ²/2) cos b and E cos 2(b + e) = exp(-2σ²) cos 2b, which makes
     the factor exact and gives the second moments. Longbin, Xiaoquan, Yiyu, Kang and Bar-Shalom (1998) use the same
-    identities.
-    """
+    identities."""
     c, s = np.cos(b), np.sin(b)
     grow, shrink = np.exp(sigma_b**2), np.exp(-2 * sigma_b**2)
     power = grow * (r**2 + sigma_r**2) / 2
@@ -187,8 +176,7 @@ def places(r: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Each is the running mean of up to `PLACED` earlier plots; for the first plot it is the plot itself. At the plot's
     own position the weight would be correlated with the error of the plot, and weighted estimates would be biased
-    again. The mean of a few plots reduces this bias, the more plots the better.
-    """
+    again. The mean of a few plots reduces this bias, the more plots the better."""
     out, mean, count = np.empty((2, len(r))), np.array([r[0], b[0]]), 0
     for k, plot in enumerate(np.stack([r, b], axis=1)):
         out[:, k] = mean if count else plot

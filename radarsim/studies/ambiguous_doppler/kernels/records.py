@@ -1,7 +1,6 @@
 """The arrays that the kernels read and fill, and what their rows hold: eight realisations a row (`kernels.lanes`).
 
-Letters: K scans, D designs (what gains depend on), B banks (a design and what is done about folds), F filters.
-"""
+Letters: K scans, D designs (what gains depend on), B banks (a design and what is done about folds), F filters."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -74,8 +73,7 @@ class Banks(NamedTuple):
 
 class Memory(NamedTuple):
     """Work arrays for a group of eight realisations; those from `listed` on: see `kernels.hypotheses.Lists` and
-    `together`.
-    """
+    `together`."""
 
     normals: np.ndarray  #: 2 + 2 K rows
     plots: np.ndarray  #: K × PLOT

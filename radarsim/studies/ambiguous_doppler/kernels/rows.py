@@ -1,8 +1,7 @@
 """A filter of one order over recorded plots, with its hypotheses on the folds: one row after the other.
 
 Letters as in the book: x (3, n) states of n hypotheses, w (n,) logarithms of their weights, P (6,) their common
-covariance, packed as in `kernels.algebra`; e innovations, S their variance, D span of velocity.
-"""
+covariance, packed as in `kernels.algebra`; e innovations, S their variance, D span of velocity."""
 
 import math
 
@@ -82,8 +81,7 @@ def take_velocity(x, w, P, R, v, D, far, merge, most, least):
     logarithm of its density over all hypotheses and folds.
 
     far: folds to either side of the nearest that are looked at; -1: none, v is as measured. merge: hypotheses into one;
-    else at most `most` are kept, of at least `least` times the weight of the best.
-    """
+    else at most `most` are kept, of at least `least` times the weight of the best."""
     of, gain, S = take_rate((P[0], P[1], P[2], P[3], P[4], P[5]), R, 1.0)
     n, folds = w.size, 2 * max(far, 0) + 1
     e, weight = np.empty((n, folds)), np.empty((n, folds))
@@ -121,8 +119,7 @@ def log_likelihood(F, Q, rows, there, prior, variances, manoeuvre, reach, merge,
     F (n, 5), Q (n, 6): motion to each row, of unit variance; rows (n, 3): range, velocity and its span; there (n, 2):
     which of the first two count (a kernel knows no not-a-number); prior (6,): covariance before the first plot;
     variances (2,) of range and velocity; manoeuvre: variance; reach: 0: velocities as measured, 1: with the nearest
-    fold, 2: with all that matter; merge, most, least as in `take_velocity`. Out: score (n, 2), zero where none is.
-    """
+    fold, 2: with all that matter; merge, most, least as in `take_velocity`. Out: score (n, 2), zero where none is."""
     x, w, P, started = np.zeros((3, 1)), np.zeros(1), prior.copy(), False
     for k in range(len(rows)):
         z, v, D = rows[k, 0], rows[k, 1], rows[k, 2]

@@ -108,9 +108,7 @@ def put_single(to, x, right):
 @part
 def run_single(kind, design, spans, plots, gains, out):
     """A bank with one hypothesis over all scans: of range alone, with the true folds, the nearest, or remainders.
-
-    `right` of a remainder is that of its scan alone: it rests on two plots, and not on what was before.
-    """
+    `right` of a remainder is that of its scan alone: it rests on two plots, and not on what was before."""
     F, _ = motion(design)
     zero = full(0.0)
     x, right = (zero, zero, zero), full(1.0)
@@ -132,10 +130,8 @@ def run_single(kind, design, spans, plots, gains, out):
 
 @inline
 def folds_merged(e, S, D):
-    """Mean and variance of the innovation e + n D over all whole n, with weights exp(-(e + n D)²/2S); |e| <= D/2.
-
-    And the sum of the weights over that of e.
-    """
+    """Mean and variance of the innovation e + n D over all whole n, with weights exp(-(e + n D)²/2S); |e| <= D/2. And
+    the sum of the weights over that of e."""
     total, mean, square = full(1.0), e, e * e
     limit, scale = lanes.root(S * FARTHEST), -0.5 / S
     n = 1.0
@@ -209,10 +205,8 @@ def solve_remainders(world, plots):
 @part
 def fill_normals(world, first, normals):
     """Unit normals of realisations first … first + 7: rows of what a target draws (2), of ranges (K), velocities (K).
-
     The first normal of draw pair k goes to the range of scan k, the second to its velocity, whether or not there is a
-    plot.
-    """
+    plot."""
     size = WIDTH * world.truth.shape[0]
     ranges, velocities = normals[2 * WIDTH : 2 * WIDTH + size], normals[2 * WIDTH + size :]
     fill_normal_strip(world.keys[2], first, 0, normals[:WIDTH], normals[WIDTH : 2 * WIDTH])
@@ -221,10 +215,8 @@ def fill_normals(world, first, normals):
 
 @part
 def put_plots(world, first, normals, plots):
-    """Plots and truth from normals, which are written over, into rows PLOT a scan.
-
-    The first uniform of draw pair k says whether there is a plot at scan k.
-    """
+    """Plots and truth from normals, which are written over, into rows PLOT a scan. The first uniform of draw pair k
+    says whether there is a plot at scan k."""
     scans = world.truth.shape[0]
     zero, one = full(0.0), full(1.0)
     to, drawn = address(plots), address(normals)

@@ -7,8 +7,7 @@ of the law that they should have to the one that they have is
 
     w(z) = 1 / (α₀ + Σ α_m exp(s_m u_mᵀ z − s_m²/2)),
 
-at most 1/α₀ (Owen & Zhou, Journal of the American Statistical Association 95, 2000, 135).
-"""
+at most 1/α₀ (Owen & Zhou, Journal of the American Statistical Association 95, 2000, 135)."""
 
 from typing import NamedTuple
 
@@ -87,9 +86,7 @@ def errors(estimate, plot, counted, c):
 @part
 def add_scan(plot, estimated, counted, half_span, sums):
     """Add a scan of a filter: estimated are its rows, the baseline's and the oracle's; counted (lanes); sums addresses.
-
-    Gives the number of lanes whose velocity is off by over half a span.
-    """
+    Gives the number of lanes whose velocity is off by over half a span."""
     beyond, (own, base, oracle), (error, (paired, against), estimates) = full(0.0), estimated, sums
     for c in range(3):
         e = errors(own, plot, counted, c)
@@ -273,8 +270,7 @@ def weigh(mixture, normals, weights):
 def fill_shifted(world, mixture, first, normals, chosen, weights):
     """Normals of realisations first … first + 7, each shifted by the part that it is drawn from; chosen, weights (8,).
 
-    chosen is the number of the part, 0 the plain law.
-    """
+    chosen is the number of the part, 0 the plain law."""
     fill_normals(world, first, normals)
     for n in range(WIDTH):
         chosen[n] = m = part_of(mixture.key, mixture.cumulative, first + n)

@@ -80,10 +80,8 @@ def mixed(old, new, size, stay):
 
 @part
 def taken(own, design, sigma, plot, D, unfolding, moves):
-    """Predict one order over a scan and take its plot, in place; PROBABILITY becomes a factor of the likelihood.
-
-    That is exp(-DISTANCE/2) times this factor, apart from constants.
-    """
+    """Predict one order over a scan and take its plot, in place; PROBABILITY becomes a factor of the likelihood. That
+    is exp(-DISTANCE/2) times this factor, apart from constants."""
     F, Q = motion(design)
     zero, one = full(0.0), full(1.0)
     x, P = get3(own, STATE), lanes.get6(own, COVARIANCE)
@@ -117,10 +115,8 @@ def taken(own, design, sigma, plot, D, unfolding, moves):
 
 @part
 def weighed(new, size):
-    """Probabilities of the orders after a plot, from those before it and the likelihoods.
-
-    Gives the least distance and the plot's likelihood over exp(-least/2), apart from constants.
-    """
+    """Probabilities of the orders after a plot, from those before it and the likelihoods. Gives the least distance and
+    the plot's likelihood over exp(-least/2), apart from constants."""
     least, total = get(new, DISTANCE), full(0.0)
     for i in range(1, size):
         distance = get(row(new, i * ROWS), DISTANCE)
@@ -343,8 +339,7 @@ def window(c, v, S, z, D, least, floor, size):
 def branched(size, velocity, limits, count, new, plot, lists):
     """Branch `count` hypotheses over their folds: weights and velocities u of the branches; how many, and the best.
 
-    velocity is the plot's variance, z and D; limits are the least share of the best weight and how many are kept.
-    """
+    velocity is the plot's variance, z and D; limits are the least share of the best weight and how many are kept."""
     (variance, z, D), (prune, most) = velocity, limits
     weights = column(lists, 0, 0)
     branch, found = lists.children, row(lists.children, lists.most // WIDTH)
@@ -472,8 +467,7 @@ def run_together(bank, limits, sigma, spans, plots, out, room):
     """Orders that interact within remembered hypotheses, over all scans of one realisation.
 
     plots, out are addresses of its lane; room: for two lists of groups, for BROAD rows of a plot, and the lists.
-    limits as in `branched`.
-    """
+    limits as in `branched`."""
     (memory, plot, lists), size, variance = room, bank.size, sigma[1] * sigma[1]
     old, new = row(memory, 0), row(memory, (lists.room // WIDTH) * GROUP)
     begun(bank.designs, bank.parts, size, lists, old)

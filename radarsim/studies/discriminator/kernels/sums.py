@@ -7,8 +7,7 @@ of the law that they should have to the one that they have is
 
     w(z) = 1 / (α₀ + Σ α_m e^{s_m u_mᵀ z − s_m²/2}),
 
-at most 1/α₀ (Owen & Zhou, Journal of the American Statistical Association 95, 2000, 135).
-"""
+at most 1/α₀ (Owen & Zhou, Journal of the American Statistical Association 95, 2000, 135)."""
 
 import math
 from typing import NamedTuple
@@ -70,8 +69,7 @@ def add_component(e, within, potential, posterior, error, error_all, residuals):
 def judge(errors, potential, posterior, windows, met):
     """Which of LOCKS hold, 1 or 0, into met (n, K, 6), of errors (n, K, 6) of an estimator of so many windows.
 
-    potential and posterior (K, C) are the bounds without and with the prior, of the C components that count.
-    """
+    potential and posterior (K, C) are the bounds without and with the prior, of the C components that count."""
     for i in range(errors.shape[0]):
         always = always_posterior = 1.0
         for k in range(windows):
@@ -95,8 +93,7 @@ def accumulate(errors, options, potential, posterior, sums):
     """Sums over errors (n, F, K, 6), in turns over the burst, of locked and of all realisations.
 
     potential and posterior (F, K, 6) are the bounds without and with the prior, in the same unit; sums is a `Sums`, of
-    which `passes` stays as it is.
-    """
+    which `passes` stays as it is."""
     n, size = errors.shape[0], sums.error.shape[2]
     e, within, met = np.empty(n), np.empty(n), np.empty((n, errors.shape[2], len(LOCKS)))
     for f in range(options.size):
@@ -120,8 +117,7 @@ def accumulate_losses(errors, options, potential, posterior, weights, losses):
     """Adds to losses (F, K, 6, 4), of what LOCKS counts, the bursts that fail it: Σw, Σw², their number, Σw⁴.
 
     errors (n, F, K, 6), potential and posterior as for `accumulate`; weights (n,) of the bursts. Components that
-    are not used have no error.
-    """
+    are not used have no error."""
     n = errors.shape[0]
     met = np.empty((n, errors.shape[2], len(LOCKS)))
     for f in range(options.size):
@@ -151,10 +147,8 @@ class Mixture(NamedTuple):
 
 @kernel
 def choose(key, first, cumulative, chosen):
-    """Which part of the mixture each of realisations first, first + 1, … is drawn from, into chosen (n,).
-
-    0 is the plain law, m the shift along direction m − 1.
-    """
+    """Which part of the mixture each of realisations first, first + 1, … is drawn from, into chosen (n,). 0 is the
+    plain law, m the shift along direction m − 1."""
     for i in range(chosen.size):
         chosen[i] = part_of(key, cumulative, first + i)
 

@@ -33,8 +33,7 @@ Letters, each of eight lanes but for the numbers i, j of models:
     likelihood  density of the innovation, exp(-q / 2) / sqrt(det S), up to a common factor
 
 `work` is the address of the filter's rows, `listed` that of MOST whole numbers; `old` and `new` are the first rows of
-the banks before and after the plot.
-"""
+the banks before and after the plot."""
 
 import numpy as np
 
@@ -166,8 +165,7 @@ def advance(work, listed, count, target, model, result, plot, noise):
 
     target, plot, noise: addresses of a hypothesis, of the plot (PLOT rows) and of R (6 rows). Rows result and
     result + 1 receive the normalised innovation squared v' S⁻¹ v and the determinant of S (0, 1 where the plot is
-    missed).
-    """
+    missed)."""
     F = get(work, model), get(work, model + 1), get(work, model + 2), get(work, model + 3), get(work, model + 4)
     Q, mixture, zero = get6(work, model + rec.MODEL_Q), mixed(work, listed, count), full(0.0)
     if any_greater(F[4], zero):
@@ -233,10 +231,8 @@ def is_number(x, number):
 @part
 def shares_by_rule(work, listed, first, size, c, main, rule):
     """Map the weights of a group to shares by a rule; list the hypotheses whose share is not zero in all lanes.
-
-    Hypothesis j lies at row first + j * HYPOTHESIS; `main` (lanes) is the number of the main one. A group whose
-    weights are all zero is its main hypothesis. The rows SHARE … belong to `listed`, in order; returns their number.
-    """
+    Hypothesis j lies at row first + j * HYPOTHESIS; `main` (lanes) is the number of the main one. A group whose weights
+    are all zero is its main hypothesis. The rows SHARE … belong to `listed`, in order; returns their number."""
     zero, one, least = full(0.0), full(1.0), full(1e-300)
     if any_greater(least, c):
         for j in range(size):
@@ -264,8 +260,7 @@ def keep_by_rule(work, size, main, rule):
     """Set to zero the weights that a rule other than `moment` leaves out, and return the sum of the rest.
 
     best: the largest weight. combined: the main hypothesis where it outweighs all others together, else all.
-    modified: the main one where it does, else the main one and the best. Ties go to the lower number.
-    """
+    modified: the main one where it does, else the main one and the best. Ties go to the lower number."""
     zero = full(0.0)
     top, best, of_main, others = get(work, rec.WEIGHT), zero, zero, zero
     for j in range(size):
@@ -309,12 +304,9 @@ def minimum(x, y):
 
 @inline
 def likelihood(work, least, result):
-    """Density of the innovation of rows result, result + 1, relative to exp(-least / 2) (eq. 9).
-
-    `least` is the smallest q of what had more than a probability of CREDIBLE; what had less may be relatively
-    likelier, up to exp 200. So the sum of all weights can neither vanish nor overflow, however far a plot lies from
-    every hypothesis.
-    """
+    """Density of the innovation of rows result, result + 1, relative to exp(-least / 2) (eq. 9). `least` is the
+    smallest q of what had more than a probability of CREDIBLE; what had less may be relatively likelier, up to exp 200.
+    So the sum of all weights can neither vanish nor overflow, however far a plot lies from every hypothesis."""
     x, most = 0.5 * (least - get(work, result)), full(200.0)
     return exponential(minimum(x, most)) / lanes.root(get(work, result + 1))
 
@@ -325,8 +317,7 @@ def step(work, listed, old, new, rules, plot, noise):
 
     IMM: for each model merge the bank, predict and update once; with one model a Kalman filter. GPB1: predict and
     update the one merged hypothesis, the first of the old bank, with each model. GPB2: predict and update every pair
-    of models, then merge those that end in the same model.
-    """
+    of models, then merge those that end in the same model."""
     size, family, rule = rules.size, rules.family, rules.merge
     zero, overall, top, surprise = full(0.0), full(1e300), full(-1.0), full(0.0)
     source = rec.SPARE if family == rec.GPB2 else old

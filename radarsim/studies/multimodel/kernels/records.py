@@ -5,8 +5,7 @@ record are counted from its first row; the names below are these counts, and the
 (HYPOTHESIS, PLOT, OUTPUT, STAGE) is its length in rows.
 
 Sizes: F filters, M models of a filter, S stages, K scans, K' reported scans, U different intervals between scans.
-States: x, vx, ax, y, vy, ay, z, vz, az (m, m/s, m/s²); an axis is a coordinate with its velocity and acceleration.
-"""
+States: x, vx, ax, y, vy, ay, z, vz, az (m, m/s, m/s²); an axis is a coordinate with its velocity and acceleration."""
 
 from typing import NamedTuple
 

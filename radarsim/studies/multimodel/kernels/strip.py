@@ -43,8 +43,7 @@ The logarithm of the likelihood of recorded plots under a filter: the density th
 
 The filter is that of the simulation, run scan by scan. Its eight lanes are eight realisations there; here lane 0 takes
 the plots as they are stated, lane 1 as outliers, with FACTOR times their σ. Where outliers are allowed for, what the
-two leave of each model is merged by moments after every plot.
-"""
+two leave of each model is merged by moments after every plot."""
 
 from typing import NamedTuple
 
@@ -73,8 +72,7 @@ def frame(rotation, height: float, sigma, form: int, unbiased: bool, detection: 
 
     rotation (3, 3) from the antenna's axes to the local ones; height of the phase centre, m; sigma (3,) of range (m),
     elevation and azimuth (rad), or of x, y, z (m) where form is CARTESIAN; unbiased: with the unbiased conversion;
-    detection: probability of detection.
-    """
+    detection: probability of detection."""
     return np.concatenate([np.ravel(rotation), sigma, [height, form, unbiased, detection, 0.0, 0.0]]).astype(float)
 
 
@@ -82,8 +80,7 @@ def frame(rotation, height: float, sigma, form: int, unbiased: bool, detection: 
 def draw_strip(keys, first, strip, random):
     """Random numbers of strip `strip` for the realisations first … first + 7, into `random` (RANDOM rows).
 
-    keys (2, 2): streams of the noise and of the detections.
-    """
+    keys (2, 2): streams of the noise and of the detections."""
     size = NORMALS // 2 * WIDTH
     fill_normal_strip(keys[0], first, strip * (NORMALS // 2), random[:size], random[size : 2 * size])
     k0, k1 = keys[1, 0], keys[1, 1]
@@ -158,8 +155,7 @@ def make_plots(random, frame, truth, scan, scans, certain, plots):
     """Plots of the scans `scan` … of a strip from their random rows.
 
     truth: PLOT_TRUTH plain numbers a scan of the whole track. The first `certain` plots of a track are always
-    detected.
-    """
+    detected."""
     one, zero = full(1.0), full(0.0)
     for n in range(scans):
         t, at, normal = rec.PLOT_TRUTH * (scan + n), rec.PLOT_TRUTH * (scan + n) + rec.COORDINATES, 3 * n
@@ -183,10 +179,8 @@ def make_plots(random, frame, truth, scan, scans, certain, plots):
 @part
 def noise_at_prediction(frame, mean, wait, at_plot, noise):
     """Covariance (6 rows at `noise`) of a plot at the place that the estimate `mean` (9 rows) is extrapolated to over
-    `wait` s, eq. (10).
-
-    Where this place is outside the sector, or nearly so, the covariance at the plot (6 rows at `at_plot`) is taken.
-    """
+    `wait` s, eq. (10). Where this place is outside the sector, or nearly so, the covariance at the plot (6 rows at
+    `at_plot`) is taken."""
     half = 0.5 * wait * wait
     a = get(mean, 0) + wait * get(mean, 1) + half * get(mean, 2)
     b = get(mean, 3) + wait * get(mean, 4) + half * get(mean, 5) - frame[rec.HEIGHT]
@@ -247,8 +241,7 @@ class Scans(NamedTuple):
 def prepare_model(work, at, moves, accelerates, sigma, dt):
     """F and Q = G sigma² G' over dt into the rows at `at` (eq. 11), G = (dt² / 2, moves dt, accelerates)'.
 
-    moves, accelerates (0 or 1): whether the model has a velocity, an acceleration; sigma of it per step, m/s².
-    """
+    moves, accelerates (0 or 1): whether the model has a velocity, an acceleration; sigma of it per step, m/s²."""
     half, variance = 0.5 * dt * dt, sigma * sigma
     g0, g1 = half, moves * dt
     put3(work, at, (g1, accelerates * half, full(moves)))
@@ -264,8 +257,7 @@ def prepare_step(work, size, models, transitions, interval, dt, settled):
     """Models and transition probabilities over the time since each lane's last plot.
 
     interval is the number of the interval dt since the last scan; where plots were missed since then (not settled),
-    T(a + b) = T(a) T(b), eq. (8).
-    """
+    T(a + b) = T(a) T(b), eq. (8)."""
     first = interval * size * size
     wait = full(dt)
     if not settled:
@@ -302,11 +294,8 @@ def keep_missed(work, old, new, size, detected):
 
 @part
 def output(work, listed, bank, rules, reported, out):
-    """Merge a bank by the output rule into the rows at `out`, see OUTPUT.
-
-    Variances, covariances and probabilities only where `reported`; the rows from MERGING on are written at the end of
-    the scan.
-    """
+    """Merge a bank by the output rule into the rows at `out`, see OUTPUT. Variances, covariances and probabilities only
+    where `reported`; the rows from MERGING on are written at the end of the scan."""
     size = rules.size
     for j in range(size):
         put(work, rec.WEIGHT + j, get(work, bank + j * rec.HYPOTHESIS + rec.PROBABILITY))
@@ -332,8 +321,7 @@ def start(work, numbers, size, plots, weights, probabilities):
 
     weights (9,): a (3) and b (3), by which the coordinate and the velocity at the third plot are made of the three
     coordinates; g (3), the errors that an acceleration of one standard deviation makes in the three states.
-    probabilities (size,): of the models at the start.
-    """
+    probabilities (size,): of the models at the start."""
     for e in range(6):
         start_block(work, e, plots, weights)
     for axis in range(3):
@@ -379,8 +367,7 @@ def run_strip(work, numbers, listed, rules, models, transitions, scans, plots, f
     work: rows (WORK,); numbers: CURRENT … SETTLED; listed: room for MOST whole numbers; models (size * 3,): moves,
     accelerates (0 or 1), sigma of the acceleration per step in m/s²; transitions (U * size * size,): T over each
     different interval between scans, row by row; plots: PLOT rows a scan; frame: of the sensor, for the covariance at
-    the prediction; out: OUTPUT rows a scan.
-    """
+    the prediction; out: OUTPUT rows a scan."""
     for k in range(scans.first, scans.stop):
         plot, interval, to = row(plots, k * rec.PLOT), scans.intervals[k], row(out, k * rec.OUTPUT)
         noise, detected = row(plot, rec.COVARIANCE), get(plot, rec.DETECTED)
@@ -490,8 +477,7 @@ def add_scan(out, base, truth, counted, size, sums):
     """Add a reported scan of eight realisations to the sums of that filter and scan.
 
     sums: addresses of error, paired, probability, believed; out, base: outputs of the filter and of the baseline;
-    truth (9,); size: number of models.
-    """
+    truth (9,); size: number of models."""
     error, paired, probability, believed = sums
     for c in range(rec.STATES):
         e, e0 = counted * (get(out, c) - truth[c]), get(base, c) - truth[c]
@@ -530,8 +516,7 @@ def close_stages(stages, filters, count, lengths, counted, sums, pairs):
     """Add each realisation's means over each stage to the sums, and the products of all pairs of filters.
 
     stages: rows of all filters, STAGE for each of `count` stages; lengths (count, 2): scans of a stage, and the
-    reported ones; sums (F, S, MEANS, 2); pairs (F, F, S, 9).
-    """
+    reported ones; sums (F, S, MEANS, 2); pairs (F, F, S, 9)."""
     for s in range(count):
         for f in range(filters):
             own = row(stages, (f * count + s) * rec.STAGE)
@@ -634,8 +619,7 @@ def log_likelihood(work, numbers, plots, models, transitions, intervals, times, 
 
     work, numbers: a filter's memory, started; plots (n · PLOT rows), of which lane 1 gets FACTOR times the σ; models,
     transitions, intervals (n,), times, rules, frame as in `strip.filter_strip`; share of outliers. Out: score (n,), the
-    logarithm of each plot's density given those before it, zero where there is none.
-    """
+    logarithm of each plot's density given those before it, zero where there is none."""
     n, own = score.size, rules_of(rules, models.size // rec.MODEL_NUMBERS)
     out, reported = np.empty(n * rec.OUTPUT * WIDTH), np.zeros(n, dtype=np.int64)
     for k in range(n):
@@ -663,8 +647,7 @@ def density(work, old, new, rules, lane):
     """The logarithm of the density that the old bank gave the plot of a lane: Σ c N(innovation; 0, S) over the models.
 
     c is the predicted probability of a model. Of pairs of models (GPB2) the memory still has those that end in the last
-    one: their sum is its part of the whole, of which its new probability is the share.
-    """
+    one: their sum is its part of the whole, of which its new probability is the share."""
     size, total, least = rules.size, 0.0, 1e300
     last, at = size - 1, rec.RESULT if rules.family == rec.GPB2 else rec.RESULT_GROUP
     for i in range(size):

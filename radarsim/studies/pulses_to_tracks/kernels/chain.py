@@ -19,8 +19,7 @@ The acceleration is taken before the velocity, so that it weighs a hypothesis an
 The chain over all scans of a block: range, forecast, burst, estimate, update; and the sums over realisations.
 
 A filter runs over the realisations of a block scan by scan, so that bursts of one entry of its menu are estimated eight
-side by side. States are errors: estimate less truth.
-"""
+side by side. States are errors: estimate less truth."""
 
 import math
 
@@ -45,8 +44,7 @@ from radarsim.studies.pulses_to_tracks.kernels.records import Work, hypotheses
 def loaded(drawn, pulses, offset, order, work, re, im):
     """The pulses' sums in the transform's order, padded with zeros, turned back by the acceleration in work.
 
-    offset is that of the true frequency from the lines, in lines, so that it lies between them as it would.
-    """
+    offset is that of the true frequency from the lines, in lines, so that it lies between them as it would."""
     bend, zero = get(work, X + 2), full(0.0)
     step, lines = 1.0 / pulses, 1.0 / order.size
     for i in range(order.size):
@@ -146,8 +144,7 @@ def folded(x, span):
 def scored(sigma, takes, v, a, i, ages, locks, of_measured):
     """Count a burst of realisation i whose estimates err by v and a: whether it locked, and the errors' powers.
 
-    sigma (2,) are the Fisher bounds; ages (n,) scans since a burst was lost.
-    """
+    sigma (2,) are the Fisher bounds; ages (n,) scans since a burst was lost."""
     worst = abs(v) / sigma[0]
     if takes == 2:
         worst = max(worst, abs(a) / sigma[1])
@@ -167,8 +164,7 @@ def scored(sigma, takes, v, a, i, ages, locks, of_measured):
 def lock_weight(distance, determinant, takes, lock, density):
     """Probability that an estimate has locked, by its squared distance in variances from the prediction.
 
-    determinant is that of its innovation's covariance, lock the probability before, density that of one not locked.
-    """
+    determinant is that of its innovation's covariance, lock the probability before, density that of one not locked."""
     near = lock * math.exp(-0.5 * distance) / math.sqrt((2.0 * math.pi) ** takes * determinant)
     return near / (near + (1.0 - lock) * density)
 
@@ -187,10 +183,8 @@ AT_ONCE = 64  # blocks whose normals are drawn before their sums are made: 32 Ki
 
 @part
 def draw_pairs(k0, k1, who, pair, a, b):
-    """Unit normals of the realisations who (8,) over pairs `pair`, `pair` + 1, …, both even, into flat a and b.
-
-    As `fill_normal_strip`. Who is read so that all but the first loop run in vector registers: five times faster.
-    """
+    """Unit normals of the realisations who (8,) over pairs `pair`, `pair` + 1, …, both even, into flat a and b. As
+    `fill_normal_strip`. Who is read so that all but the first loop run in vector registers: five times faster."""
     x, y = a.view(np.uint64), b.view(np.uint64)
     for i in range(a.size // 2):
         x[i] = U(who[i & (WIDTH - 1)])
@@ -241,11 +235,9 @@ def ideal(world, k, window, work, sums, drawn):
 
 @kernel
 def estimate(world, filters, f, k, entry, who, forecast, room, found):
-    """Velocity and acceleration at the middle of the bursts of scan k, less the true ones, into found (8, 2).
-
-    By the estimator of filter f with windows of an entry of its menu, of the realisations who (8,), whose forecasts err
-    by forecast (8, 2). Returns the passes over a window's data of each as the sum over the first eight lanes of work.
-    """
+    """Velocity and acceleration at the middle of the bursts of scan k, less the true ones, into found (8, 2). By the
+    estimator of filter f with windows of an entry of its menu, of the realisations who (8,), whose forecasts err by
+    forecast (8, 2). Returns the passes over a window's data of each as the sum over the first eight lanes of work."""
     work_, sums_, drawn_, a, b, re, im = room
     draw_sums(world, k, who, a, b, drawn_)
     work, sums, drawn = address(work_), address(sums_), address(drawn_)
@@ -323,10 +315,8 @@ def ranges_to_hypotheses(world, own, k, first, work):
 
 @part
 def branches(own, sigma, measured, span, held, i, lists):
-    """Branch the hypotheses of realisation i over the folds of a measured velocity and acceleration: how many.
-
-    A parent below zero, -1 - h, is that of a branch in which the burst did not lock.
-    """
+    """Branch the hypotheses of realisation i over the folds of a measured velocity and acceleration: how many. A parent
+    below zero, -1 - h, is that of a branch in which the burst did not lock."""
     v, a, best = measured[0], measured[1], NOTHING
     w, e = column(lists, 0, WEIGHT_COLUMN), column(lists, 2, INNOVATION)
     near, c = column(lists, 2, NEAR), column(lists, 2, FALL)
@@ -361,10 +351,8 @@ def branches(own, sigma, measured, span, held, i, lists):
 
 @part
 def inherited(own, sigma, measured, span, held, i, made, lists):
-    """Put `made` branches in the place of realisation i's hypotheses.
-
-    Gives the weights of those that took the velocity, of those that took it in a wrong fold, and of all.
-    """
+    """Put `made` branches in the place of realisation i's hypotheses. Gives the weights of those that took the
+    velocity, of those that took it in a wrong fold, and of all."""
     weights, found = lists.children, row(lists.children, lists.most // WIDTH)
     best = weights[heaviest(weights, made)]
     states, taken, wrong, whole = held.states[i], 0.0, 0.0, 0.0
@@ -452,10 +440,8 @@ def level(own, c, sigma):
 
 @part
 def make_forecasts(world, own, k, first, work):
-    """Errors (n, 2) of the forecasts of velocity and acceleration, and entries (n,) of the menu.
-
-    A burst knows of a velocity what is left of whole spans.
-    """
+    """Errors (n, 2) of the forecasts of velocity and acceleration, and entries (n,) of the menu. A burst knows of a
+    velocity what is left of whole spans."""
     tracks, forecasts, entries = work.tracks, work.forecasts, work.entries
     for i in range(tracks.shape[0]):
         if own.track:
@@ -471,8 +457,7 @@ def make_forecasts(world, own, k, first, work):
 def in_order(entries):
     """The places of the entries (n,) in rising order, equal ones as they come.
 
-    A counting sort, since entries are few: Numba's own takes a second to compile.
-    """
+    A counting sort, since entries are few: Numba's own takes a second to compile."""
     count, most = entries.size, 0
     for i in range(count):
         most = max(most, entries[i])

@@ -1,7 +1,6 @@
 """The arrays that the kernels read and fill.
 
-Letters: K scans, F filters, S laws of the noise (bursts of another signal-to-noise ratio), W windows of all designs.
-"""
+Letters: K scans, F filters, S laws of the noise (bursts of another signal-to-noise ratio), W windows of all designs."""
 
 from typing import NamedTuple
 

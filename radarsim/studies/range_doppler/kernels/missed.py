@@ -2,8 +2,7 @@
 
 Realisations lie in chunks that stay in cache, scans outermost; eight of them go through a formula at once. Where a plot
 is missed a filter extrapolates. It starts with as many plots as its least-squares start takes; before, its estimates
-are the plots that come, of what it observes, and at a scan without one it has none.
-"""
+are the plots that come, of what it observes, and at a scan without one it has none."""
 
 from typing import NamedTuple
 
@@ -181,10 +180,8 @@ def add_found(found: np.ndarray, baseline: int, sums: Sums) -> None:
 
 
 def simulate_block(problem: Problem, first: int, count: int, sums: Sums) -> None:
-    """Simulate realisations first … first + count - 1 (any count > 0) and add all filters' errors to the sums.
-
-    The arrays of sums are float64 and contiguous. Realisation i has the same plots and estimates in any block.
-    """
+    """Simulate realisations first … first + count - 1 (any count > 0) and add all filters' errors to the sums. The
+    arrays of sums are float64 and contiguous. Realisation i has the same plots and estimates in any block."""
     found, _ = simulated(problem, first, count, 0)
     add_found(found, int(problem.baseline), sums)
 

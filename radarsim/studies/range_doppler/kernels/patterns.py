@@ -4,8 +4,7 @@ Means over the patterns of plots that came and that did not: P, S and E of `filt
 
 Patterns lie in blocks of eight. A block holds the rows of its patterns one after the other, each of eight numbers:
 P (6) and S (6) packed, E (3 C), their probability, plots so far, and whether the last scan had one. What is beyond the
-last pattern has no probability. Patterns in which the filter has not started are few; they lie one by one.
-"""
+last pattern has no probability. Patterns in which the filter has not started are few; they lie one by one."""
 
 from typing import NamedTuple
 
@@ -168,10 +167,8 @@ def weigh(rows, n, columns, towards):
 
 @part
 def merge(room, rows, spare, n, columns, most, alike):
-    """Patterns that are alike made one, in `spare`, so that there are at most `most`; how many, and how alike.
-
-    A group has the mean of its members' P and the first two moments of their errors. alike: where to begin.
-    """
+    """Patterns that are alike made one, in `spare`, so that there are at most `most`; how many, and how alike. A group
+    has the mean of its members' P and the first two moments of their errors. alike: where to begin."""
     high = height(columns)
     locate(room, rows, n, high)
     made = grouped(room, rows, n, high, alike)
@@ -320,10 +317,8 @@ def begin(rows, n, L, columns):
 
 @part
 def wait(room, rows, n, held, world, defect):
-    """The patterns that have not started, `held` of them, through a scan: those with their plots begin.
-
-    How many have started then, and how many wait.
-    """
+    """The patterns that have not started, `held` of them, through a scan: those with their plots begin. How many have
+    started then, and how many wait."""
     columns, kept = defect.shape[1], 0
     last = 6 + 3 * columns
     for b in range(held):
@@ -375,11 +370,9 @@ def second_moment(p, columns):
 
 @part
 def note_started(rows, n, columns, world, found):
-    """Add to the means of a scan, found (OWN + G BESIDE,): those of the patterns in which the filter has started.
-
-    Their probability, NEES, bias (3), e² (3), believed variance (3), each times the probability; of each filter beside
-    it the probability (3) that it has an estimate too, and e² there (3).
-    """
+    """Add to the means of a scan, found (OWN + G BESIDE,): those of the patterns in which the filter has started. Their
+    probability, NEES, bias (3), e² (3), believed variance (3), each times the probability; of each filter beside it the
+    probability (3) that it has an estimate too, and e² there (3)."""
     high, none = height(columns), full(0.0)
     last = high - FURTHER
     w0 = q0 = b0 = b1 = b2 = m0 = m1 = m2 = v0 = v1 = v2 = none
@@ -436,10 +429,9 @@ def note_waiting(waiting, held, columns, world, found):
 
 @part
 def follow(room, rows, n, k, world, found):
-    """All patterns that n started ones become after scan k, to the last scan, their sums added to found as below.
-
-    A piece of at most PIECE patterns goes on until it is larger; then its later half waits, above it, until it is done.
-    """
+    """All patterns that n started ones become after scan k, to the last scan, their sums added to found as below. A
+    piece of at most PIECE patterns goes on until it is larger; then its later half waits, above it, until it is
+    done."""
     columns, scans = world.defect.shape[2], len(world.defect)
     high = height(columns)
     length, room_of_piece = WIDTH * high, 2 * PIECE * high

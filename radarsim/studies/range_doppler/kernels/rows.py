@@ -1,7 +1,6 @@
 """A linear filter over one recorded track at uneven times with missing values: one row after the other.
 
-Value and rate are measured independently, so a plot is taken in one number after the other, which needs no inverse.
-"""
+Value and rate are measured independently, so a plot is taken in one number after the other, which needs no inverse."""
 
 from radarsim.kernels import algebra
 from radarsim.kernels.algebra import add_scaled, constant_acceleration, predicted, predicted_covariance, take_rate
@@ -30,8 +29,7 @@ def filter_rows(x, P, dt, z, detected, variance, noise, estimate, spread, nis):
 
     dt (n,) s since the row before; z (n, 2) value and rate, detected (n, 2) 1 where the filter takes it, else 0;
     variance (2,) of the plots; noise (2, 6) as in `noise_over`. Out: estimate (n, 3), spread (n, 3) the believed
-    standard deviations, nis (n, 2) the squared innovation over its variance, where the number came.
-    """
+    standard deviations, nis (n, 2) the squared innovation over its variance, where the number came."""
     state, of = (x[0], x[1], x[2]), (P[0], P[1], P[2], P[3], P[4], P[5])
     for k in range(dt.size):
         F = constant_acceleration(dt[k])

@@ -9,8 +9,7 @@ counted from the realisation's first plot, so that they are well conditioned how
 
 What is drawn of a scan: which realisations have their plot, its noise, biases, and a target's own motion.
 
-Errors of filters with a covariance to each realisation, and their sums over a chunk.
-"""
+Errors of filters with a covariance to each realisation, and their sums over a chunk."""
 
 import math
 from typing import NamedTuple
@@ -108,8 +107,7 @@ def gathered(sums, right, u, weights, plots):
 
     The unknowns are range, velocity dt and acceleration dt² at the realisation's first plot; weights are the inverse
     variances of the range and of the velocity times dt, zero where there is none; plots the range and velocity times
-    dt.
-    """
+    dt."""
     of_range, of_velocity = (1.0, u, 0.5 * u * u), (0.0, 1.0, u)
     sums = algebra.add_outer(algebra.add_outer(sums, weights[0], of_range), weights[1], of_velocity)
     right = algebra.add_scaled(right, weights[0] * plots[0], of_range)
@@ -181,8 +179,7 @@ def advance_given(at, f, dt, gain, believed):
 def count_plots(at, k, detection, n):
     """Which of the first n realisations have a plot at scan k, by uniform numbers, counted.
 
-    Two scans share a pair of numbers: those of an even scan lie in `detected`, those of the next in `other`.
-    """
+    Two scans share a pair of numbers: those of an even scan lie in `detected`, those of the next in `other`."""
     detected, one, none = at.detected, full(1.0), full(0.0)
     if detection == 1.0:
         for i in range(EIGHTS):
@@ -247,8 +244,7 @@ def score(at, f, start, observes, truth, R, found):
 
     e, e², e³, e⁴ of each component; the three products of two; how many have started, q = eᵀP⁻¹e / 3, q²; how many
     have each component; the three believed variances. By the factors L D Lᵀ of P, with one division:
-    D = (p₀, m/p₀, w/(p₀m)), m and w the leading minors, w times p₀. All by addresses; truth (3,), R (2,) are arrays.
-    """
+    D = (p₀, m/p₀, w/(p₀m)), m and w the leading minors, w times p₀. All by addresses; truth (3,), R (2,) are arrays."""
     x, p, e, has = of_filter(at.x, f, 3), of_filter(at.p, f, 6), of_filter(at.e, f, 3), of_filter(at.has, f, 3)
     last, one, none = full(start - 0.5), full(1.0), full(0.0)
     of_velocity = 1.0 if observes == 2 else 0.0

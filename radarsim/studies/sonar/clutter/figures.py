@@ -57,8 +57,7 @@ def middle(results: Results) -> CaseResult[ClutterAxes]:
 
 def axis_over(result: CaseResult[ClutterAxes], column: str, table: "pd.DataFrame") -> "tuple[Axis, pd.DataFrame]":
     """An axis of the swept values of a column of KEYS, logarithmic if they span more than a factor of twenty, and the
-    rows with their places on it: zero stands left of the least one.
-    """
+    rows with their places on it: zero stands left of the least one."""
     label, values = panels.axis_of(result, KEYS[column]), np.unique(table[column].to_numpy(float))
     above = values[values > 0]
     if not len(above) or above[-1] / above[0] <= panels.WIDE:
@@ -80,8 +79,7 @@ def swept_column(tracking: "pd.DataFrame") -> str | None:
 def by_line(tracking: "pd.DataFrame", column: str, result: CaseResult[ClutterAxes]) -> "pd.DataFrame":
     """The rows with the name of their line, over column, in place of the filter: the tracker and what else is swept.
 
-    result is one of the cases.
-    """
+    result is one of the cases."""
     others = [other for other in KEYS if other != column and tracking[other].nunique() > 1]
     names = tracking["filter"].map(panels.literal).astype(object)
     for other in others:
@@ -200,9 +198,7 @@ def _lines(table: "pd.DataFrame", x: str, value: str, ends: str) -> list[Line]:
 
 def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
     """False tracks per hour over what is swept, on a logarithmic axis; of none that occurred, how many there may be.
-
-    Without false plots there are no false tracks, and no point.
-    """
+    Without false plots there are no false tracks, and no point."""
     column, rate = swept_column(tracking), "false_tracks_per_hour"
     rows = tracking[tracking["false_plots_per_km2"] > 0]
     if column is None or not (rows[rate] > 0).any():

@@ -1,8 +1,7 @@
 """Labels and exact laws of the sums of trackers among false plots.
 
 P3's trackers and the field of false plots as arrays for the kernels. Exact laws of track initiation: m of n without
-false plots; pairs of false plots by quadrature.
-"""
+false plots; pairs of false plots by quadrature."""
 
 import math
 from collections.abc import Sequence
@@ -60,8 +59,7 @@ class TrackerSpec:
 
 class Conditions(NamedTuple):
     """What trackers know of the plots: period in s, sigma (2,) in m and rad, detection probability, and the density of
-    false plots per m².
-    """
+    false plots per m²."""
 
     period: float
     sigma: np.ndarray
@@ -112,11 +110,8 @@ def poisson_share(mean: float) -> np.ndarray:
 
 
 def field(key: np.ndarray, sector: Sector, given: Conditions) -> Field:
-    """The field of false plots of a sector; key (2,) of its noise.
-
-    Cells have the size of the plots' σ at the mean range of the sector, times CELL, and contain fewer false plots than
-    MOST_IN_CELL in the mean.
-    """
+    """The field of false plots of a sector; key (2,) of its noise. Cells have the size of the plots' σ at the mean
+    range of the sector, times CELL, and contain fewer false plots than MOST_IN_CELL in the mean."""
     near, far = sector.range_m
     b0, b1 = sector.bearing_rad
     q0, q1 = near**2 / 2, far**2 / 2
@@ -157,8 +152,7 @@ def confirmed_by(probability: np.ndarray, m: int, n: int) -> np.ndarray:
 
     probability (K,) of a plot at each scan. The law is that of a Markov chain over the age of the track and its plots
     so far: a plot begins a track where there is none; the track is confirmed with its m-th plot, and given up once m
-    plots in its first n scans cannot be reached.
-    """
+    plots in its first n scans cannot be reached."""
     idle, tracks, confirmed, out = 1.0, np.zeros((n + 1, m + 1)), 0.0, np.zeros(len(probability))
     for k, p in enumerate(probability):
         next_tracks = np.zeros_like(tracks)
@@ -184,8 +178,7 @@ def false_pairs(sector: Sector, given: Conditions, tracker: TrackerSpec, scans: 
 
     Before its second plot the predicted position of a track is its first plot, and its gate is an ellipse in range and
     bearing of known size: the number of false plots in the part of it within the sector is a Poisson number. The
-    quadrature runs over the position of the first plot, uniform in area, and over the ellipse.
-    """
+    quadrature runs over the position of the first plot, uniform in area, and over the ellipse."""
     (near, far), (b0, b1) = sector.range_m, sector.bearing_rad
     u, w = np.polynomial.legendre.leggauss(nodes)
     u, w = (u + 1) / 2, w / 2

@@ -21,8 +21,7 @@ The errors in the sums of `sonar.study` are those of the tracks kept, which are 
 `counts`, `begun`, `ratios` and `scores` are described in `kernels.tracker`. Where false tracks are sought (`rare`),
 `held` and `drawn` of `kernels.rare` are in place of `begun`, and the scores of false tracks are those of the plain
 ones. Where ends of the target's track are sought, they are those of further realisations: `ended` and `ended_drawn`
-of `kernels.ends`.
-"""
+of `kernels.ends`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -77,8 +76,7 @@ def lengths(misses: int) -> np.ndarray:
 def chances(miss: np.ndarray, length: int) -> np.ndarray:
     """Probability (length + 1, K + 1) that a run of so many misses comes from scan k on, with i in a row before it.
 
-    miss (K,): the probability of a miss at each scan.
-    """
+    miss (K,): the probability of a miss at each scan."""
     out = np.zeros((length + 1, len(miss) + 1))
     out[length] = 1.0
     for k in range(len(miss) - 1, -1, -1):
@@ -91,8 +89,7 @@ def undetected(probability: np.ndarray, inside: float, length: int) -> np.ndarra
 
     probability (K,) of detection as it is; inside: that the gate contains a plot. A miss is drawn with h if this is
     drawn with 1 - (1 - h) / inside, since plots outside the gate are misses too. Where detection is certain, or not
-    possible, nothing is shifted.
-    """
+    possible, nothing is shifted."""
     p = 1.0 - probability * inside
     to_come = chances(p, length)
     missed, hit = p * to_come[1:, 1:], (1.0 - p) * to_come[0, 1:]
@@ -108,8 +105,7 @@ def directions(t: np.ndarray, least: int) -> np.ndarray:
     Of the track after `least` and more plots, a line fitted to them by least squares, as a track without manoeuvres
     begins. The innovations of the next OUT plots are rows A of the errors, each with its own variance S = |A|²; all of
     them are √S at the errors Aᵀ(A Aᵀ)⁻¹√S, the shortest with which they are, in units of the root of a gate. Zero where
-    there are too few plots.
-    """
+    there are too few plots."""
     out = np.zeros((1 + FURTHER, len(t)))
     for row, j in zip(out, range(least, len(t) - OUT + 1), strict=False):
         A = np.zeros((OUT, len(t)))
@@ -263,8 +259,7 @@ def initiation_laws(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Probabilities (F, K) that a track of the target was confirmed by each scan, and one begun by a false plot at it.
 
-    NaN where no law is known: the first needs open gates and no false plots, the second a rule 2 of n.
-    """
+    NaN where no law is known: the first needs open gates and no false plots, the second a rule 2 of n."""
     probability = np.where(detections.certain < 0, detections.probability, detections.certain)
     confirmed, begun = np.full((2, len(specs), len(probability)), np.nan)
     for f, one in enumerate(specs):

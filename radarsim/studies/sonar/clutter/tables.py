@@ -1,7 +1,6 @@
 """Tables of trackers among false plots (P3).
 
-docs/sonar_clutter.md says what confirmed, tentative, kept, lost and dropped mean.
-"""
+docs/sonar_clutter.md says what confirmed, tentative, kept, lost and dropped mean."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -55,9 +54,7 @@ def drawn(result: CaseResult[ClutterAxes], f: int | np.ndarray) -> rare.Drawn:
 
 def false_tracks(result: CaseResult[ClutterAxes], f: int) -> tuple[Estimate, np.ndarray, np.ndarray]:
     """The probability that a track begun by a false plot is confirmed; scans with a confirmed one, and confirmed ones.
-
-    The last two count all realisations; where false tracks are rare, by their weights.
-    """
+    The last two count all realisations; where false tracks are rare, by their weights."""
     if "held" not in result.sums:
         begun = result.sums["begun"][f]
         alive, found = begun[:, at.FALSE_KEPT].sum(), begun[:, at.FALSE_FOUND].sum()
@@ -77,11 +74,9 @@ def poisson(count: Values, exposure: Values) -> Estimate:
 
 
 def ratio(sums: np.ndarray, n: int) -> Estimate:
-    """Σa/Σb with its 95 % interval from sums (5,) Σa, Σa², Σb, Σb², Σab over n realisations.
-
-    The interval is that of the logarithm, from the spread of a − R b over realisations (the delta method). Without any
-    event it is that of a Poisson number; without exposure it is NaN.
-    """
+    """Σa/Σb with its 95 % interval from sums (5,) Σa, Σa², Σb, Σb², Σab over n realisations. The interval is that of
+    the logarithm, from the spread of a − R b over realisations (the delta method). Without any event it is that of a
+    Poisson number; without exposure it is NaN."""
     a, aa, b, bb, ab = (float(part) for part in sums)
     if b <= 0:
         return Estimate(np.nan, np.nan, np.nan)
@@ -305,8 +300,7 @@ def ends_note(
     Runs of misses have equal weights, and many; the few tracks that end by far plots, or by false ones beside the
     target's, have large ones, which the whole does not show while they are few. A part matters where it may be over a
     share of PART, by its interval; the last one does anyhow, since it is small where those are missing. among_false:
-    whether there are false plots.
-    """
+    whether there are false plots."""
     whole = rare.Counted(*ended[:, list(kinds)].sum(axis=1).T)
     said, rate = [whole], rare.rate(whole, drawn).value
     parts = [(own, PART) for own in HOW.values() if len(own) < len(kinds)]

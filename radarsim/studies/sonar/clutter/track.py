@@ -3,8 +3,7 @@
 The steps are those of the kernels, with a track in each lane. In addition tracks compete for plots: a plot goes to the
 nearest track, confirmed tracks before tentative ones, and plots that no track takes begin new tracks.
 
-Plots of cases among false ones: those of one realisation, and the trackers over recorded ones.
-"""
+Plots of cases among false ones: those of one realisation, and the trackers over recorded ones."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -34,8 +33,7 @@ class TrackHistory:
     """One track: its lane (chunk, index), its state under the rules, and the estimates at each of its scans.
 
     scans holds the numbers of the scans; states (n, 4) r, vr, b, vb with variances (n, 4), NaN for rates not yet known;
-    scores (n,); gates (n, 5) the predicted position and the covariance of its innovation.
-    """
+    scores (n,); gates (n, 5) the predicted position and the covariance of its innovation."""
 
     lane: tuple[int, int]
     state: int = kernels.TENTATIVE
@@ -114,10 +112,8 @@ class MultiTracker:
         return np.stack([nu_r, nu_b]), (bb * nu_r**2 - 2 * rb * nu_r * nu_b + rr * nu_b**2) / (rr * bb - rb**2)
 
     def _owners(self, distance: np.ndarray) -> np.ndarray:
-        """The track (n,) that each plot goes to, -1 for none: the nearest one, but confirmed tracks first.
-
-        Only probabilistic association takes more than one plot, and only for a track of two plots or more.
-        """
+        """The track (n,) that each plot goes to, -1 for none: the nearest one, but confirmed tracks first. Only
+        probabilistic association takes more than one plot, and only for a track of two plots or more."""
         owner = np.full(distance.shape[1], -1)
         several = np.array([self.rule.association == kernels.PDA and self._settled(track) for track in self.alive])
         confirmed = np.array([track.state == kernels.CONFIRMED for track in self.alive])
@@ -226,8 +222,7 @@ def false_plots(field: kernels.Field, realisation: int, scan: int) -> np.ndarray
 def drawing(case: Case) -> Draw:
     """All plots in the sector of realisations of a case, those of a scan in order of bearing.
 
-    true_target is 1 for the target's plots and 0 for false ones; true_range_m and true_bearing_rad are the target's.
-    """
+    true_target is 1 for the target's plots and 0 for false ones; true_range_m and true_bearing_rad are the target's."""
     spec, scene = case.spec, build_scene(case)
     field = filters.field(noise_key(case, "false"), spec.sensor.sector, filters.conditions(spec))
     world, detections = base.world(case, scene), detected_plots(case, scene)
@@ -247,8 +242,7 @@ class Tracker:
 
     Every confirmed track is returned, from its first plot on. A row without range or bearing is not a plot, but its
     time is that of a scan. Filters with association `known` are left out; raises ConfigError where there are no others.
-    How tracks share plots stands above.
-    """
+    How tracks share plots stands above."""
 
     most_rows = MOST_ROWS
     several = True

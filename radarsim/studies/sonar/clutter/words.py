@@ -27,8 +27,7 @@ def question(specs: Sequence[Keys]) -> str:
 def answer(results: Sequence[CaseResult[ClutterAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
     """Of the case in which tracks end most often: the tracker that keeps them longest, the others, what is rare.
 
-    Of each: the time to a confirmed track, track life, false tracks per hour.
-    """
+    Of each: the time to a confirmed track, track life, false tracks per hour."""
     tracking, events = made["tracking"], made.get("rare")
     ends = tracking["ends_per_hour"].fillna(np.inf)
     if events is not None:

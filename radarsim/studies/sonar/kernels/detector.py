@@ -20,8 +20,7 @@ Both have the same state and differ in their manoeuvre variance. Letters as in `
     c                  probability of the model before it (Blom and Bar-Shalom's c bar)
     nis                normalised innovation squared; S: variance of the innovation, 1 where the plot is missed
 
-and p_ij, the probability of a transition from model i to model j from scan to scan.
-"""
+and p_ij, the probability of a transition from model i to model j from scan to scan."""
 
 from typing import NamedTuple
 
@@ -70,10 +69,8 @@ class Alarms(NamedTuple):
 # ---- tests --------------------------------------------------------------------------------------------------------
 @inline
 def parabola(recent, length, longest, i):
-    """Normal equations of a parabola: Y (6), b (3) relative to the newest plot, and the newest plot.
-
-    Without the newest plot's value the sums lose no digits.
-    """
+    """Normal equations of a parabola: Y (6), b (3) relative to the newest plot, and the newest plot. Without the newest
+    plot's value the sums lose no digits."""
     newest = get(recent, i)
     Y, b = steps.normal_equations(recent, length, longest, i, newest, 0.5)
     return Y, b, newest
@@ -171,11 +168,9 @@ def next_mode(T, threshold, mode, quiet, patience):
 
 @inline
 def adapt(filters, plots, f, c, rules, size, length, dt, period):
-    """Update an adaptive filter with one scan, in place; further rows MODE, QUIET, PLOTS.
-
-    It is growing memory of degree size - 1, restarted with the last `length` plots at every change of mode. An alarm
-    sets the mode, and `quiet` successive tests without one reset it; see AdaptiveRules.
-    """
+    """Update an adaptive filter with one scan, in place; further rows MODE, QUIET, PLOTS. It is growing memory of
+    degree size - 1, restarted with the last `length` plots at every change of mode. An alarm sets the mode, and `quiet`
+    successive tests without one reset it; see AdaptiveRules."""
     ax, ay, am, ap, az, aw, an = memory_of(filters, plots, f, c)
     T, recent, raises = plots.T[rules.detector[f], rules.group[f, c]], plots.recent[c], rules.raises[f]
     at, ar, longest = address(T), address(recent), recent.shape[1]
@@ -242,8 +237,7 @@ def mixed(c, from_first, first, second):
     """State and covariance of a model before the scan, mixed from (x, P) of both models.
 
     c is the model's probability and from_first the part of it that comes from the first model. A model without any
-    probability takes the state of the second model.
-    """
+    probability takes the state of the second model."""
     zero, one = full(0.0), full(1.0)
     mu = from_first / where_greater(c, zero, c, one)
     return merged(mu, first[0], first[1], one - mu, second[0], second[1])
@@ -264,8 +258,7 @@ def imm_step(first, second, mu, chain, tau, Q, z, w):
     """Mix, predict and update: both models' (x, P), and the probability of the first.
 
     first, second, mu (2) are the models' (x, P) and probabilities after the previous scan; chain (p11, p12, p21, p22);
-    Q (2) of each model; z in units of the nominal σ.
-    """
+    Q (2) of each model; z in units of the nominal σ."""
     (mu1, mu2), (p11, p12, p21, p22), one, zero = mu, chain, full(1.0), full(0.0)
     c1, c2 = p11 * mu1 + p21 * mu2, p12 * mu1 + p22 * mu2
     x1, P1 = mixed(c1, p11 * mu1, first, second)
@@ -280,11 +273,8 @@ def imm_step(first, second, mu, chain, tau, Q, z, w):
 
 @inline
 def interact(filters, plots, f, c, pairs, size, dt, period, sigma):
-    """Update an IMM with one scan, in place; further rows STATE, COVARIANCE and PROBABILITY.
-
-    Both models start by least squares on the first `size` plots, with the stationary probabilities of their Markov
-    chain.
-    """
+    """Update an IMM with one scan, in place; further rows STATE, COVARIANCE and PROBABILITY. Both models start by least
+    squares on the first `size` plots, with the stationary probabilities of their Markov chain."""
     ax, ay, am, ap, az, aw, an = memory_of(filters, plots, f, c)
     tau, per, unit, one, zero = dt / period, 1.0 / period, 1.0 / sigma, full(1.0), full(0.0)
     first_scans, half, F = full(size - 0.5), full(0.5), algebra.constant_acceleration(dt)
@@ -324,8 +314,7 @@ def interact(filters, plots, f, c, pairs, size, dt, period, sigma):
 def mode_sums(further, row, row_plots, used, out):
     """Write Σp and Σp² of the probability in one of a filter's further rows, and Σ of its plots in memory, to out (3,).
 
-    row_plots is the row with the number of plots, negative where there is none.
-    """
+    row_plots is the row with the number of plots, negative where there is none."""
     a, au, zero = address(further), address(used), full(0.0)
     s1, s2, s3 = zero, zero, zero
     for i in range(GROUPS):

@@ -3,8 +3,7 @@
 These are the filters of `shared_gains`, but what the module `filters` computes once for all realisations is computed
 here for each of them, in chunks. All filters but the windows start by least squares in information form. Growing memory
 and the differenced filter continue so; the Kalman filters and those of fixed gain switch to covariances. The steps and
-the letters are those of `steps`; F filters, C coordinates, K scans.
-"""
+the letters are those of `steps`; F filters, C coordinates, K scans."""
 
 from typing import NamedTuple
 
@@ -24,8 +23,7 @@ PLACED = 8.0  # as world.PLACED
 
 class Detections(NamedTuple):
     """Which scans give a plot: key (2,) of the noise stream; certain (K,) is 1 where a scan always gives one, 0 where
-    it never does, else -1, which means with this probability.
-    """
+    it never does, else -1, which means with this probability."""
 
     key: np.ndarray
     certain: np.ndarray
@@ -112,8 +110,7 @@ def convert(conversion, sigma, k, plots, detected, place, z, weight):
     sigma (C,) of a nominal plot; place (3, n) holds mean range and bearing of the last plots, and their number. The
     plain conversion computes weights at the plot itself, the unbiased one at earlier plots: a weight that is correlated
     with the error of its own plot would cause a bias again. Bordonaro, Willett and Bar-Shalom (2014) decorrelate it
-    likewise, by the predicted position. See `world.places`.
-    """
+    likewise, by the predicted position. See `world.places`."""
     for c in range(z.shape[0]):
         w = conversion.weight[k, c]
         for i in range(detected.size):
@@ -189,8 +186,7 @@ def add_modes(kind, further, used, out, modes):
 @part
 def keep(x, P, n, size, units, first, count, kept):
     """Store the estimate of a coordinate and its believed covariance, of `count` realisations, in kept (6, total) from
-    `first` on; n (CHUNK,) plots so far, units (σ, period).
-    """
+    `first` on; n (CHUNK,) plots so far, units (σ, period)."""
     sigma, period = units
     for i in range(count):
         kept[0, first + i], kept[1, first + i] = x[0, i], x[1, i]
@@ -213,8 +209,7 @@ def keep_errors(x, course, c, n, first, count, each):
 # ---- a block ------------------------------------------------------------------------------------------------------
 class Chunk(NamedTuple):
     """A chunk of a block at a scan: `count` realisations from number `first` of the block on, scan k, and dt since the
-    scan before; used (CHUNK,) is 1 for these realisations; the course of the targets in all coordinates.
-    """
+    scan before; used (CHUNK,) is 1 for these realisations; the course of the targets in all coordinates."""
 
     first: int
     count: int
@@ -248,9 +243,7 @@ def step_filters(bank, baseline, chunk, filters, plots, out, sums):
 @kernel
 def simulate_block(world, detections, conversion, bank, detectors, first, total, baseline, sums):
     """Add the sums of realisations first … first + total - 1 to sums, a BlockSums; gains refer to filter `baseline`.
-
-    The last chunk is always computed in full, and only the realisations asked for are summed.
-    """
+    The last chunk is always computed in full, and only the realisations asked for are summed."""
     F, K, C = bank.carry.shape
     rows = detector.ROWS if (bank.kind == IMM).any() else 10
     x, Y, further = np.empty((F, C, 4, CHUNK)), np.empty((F, C, 8, CHUNK)), np.empty((F, C, rows, CHUNK))

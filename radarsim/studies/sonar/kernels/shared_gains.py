@@ -3,8 +3,7 @@
 As in `linear`, chunks stay in cache, scans are outermost, and each formula is one plain loop. A state has four rows:
 value, rate, acceleration and the carried error of the last plot. Coordinates (range, bearing, depth) are filtered
 separately, each with its own schedule of gains. A window applies weights to a ring of the last plots. Where the pattern
-of plots differs between realisations, the filters of `patterns` are used instead.
-"""
+of plots differs between realisations, the filters of `patterns` are used instead."""
 
 from typing import NamedTuple
 
@@ -72,11 +71,9 @@ def push(key, first, pair, dt, walk, one, two):
 
 @part
 def measure(key, first, pair, step, fresh, mean, one, two):
-    """Plots of two coordinates, rows 0 of one and two (3, n), from their errors, rows 1, and the deviations, rows 2.
-
-    An error becomes step · error + fresh · normal (P3 eq. 15), stationary from the first plot on; step, fresh and mean
-    (2,).
-    """
+    """Plots of two coordinates, rows 0 of one and two (3, n), from their errors, rows 1, and the deviations, rows 2. An
+    error becomes step · error + fresh · normal (P3 eq. 15), stationary from the first plot on; step, fresh and mean
+    (2,)."""
     k0, k1, start = key[0], key[1], U(first)
     step_one, step_two, fresh_one, fresh_two = step[0], step[1], fresh[0], fresh[1]
     mean_one, mean_two = mean[0], mean[1]
@@ -90,10 +87,8 @@ def measure(key, first, pair, step, fresh, mean, one, two):
 
 @kernel
 def move_and_measure(world, first, k, plots):
-    """Compute scan k of all coordinates in place: plots (C, 4, n) holds plot, error, and deviation of value and rate.
-
-    C is even.
-    """
+    """Compute scan k of all coordinates in place: plots (C, 4, n) holds plot, error, and deviation of value and rate. C
+    is even."""
     pairs = plots.shape[0] // 2
     for p in range(pairs):
         one, two = plots[2 * p], plots[2 * p + 1]
@@ -144,8 +139,7 @@ def window(x, ring, weights):
 def advance(bank, x, ring, plots, k, dt):
     """Update all filters in all coordinates with scan k, in place.
 
-    x (F, C, 4, n), zero before scan 0; ring (C, L, n), plots (C, 4, n).
-    """
+    x (F, C, 4, n), zero before scan 0; ring (C, L, n), plots (C, 4, n)."""
     for c in range(x.shape[1]):
         if bank.slot[k, c] >= 0 and ring.shape[1] > 0:
             copy_row(plots[c, 0], ring[c, bank.slot[k, c]])
@@ -173,8 +167,7 @@ def error_sums(x, y, shift, truth, inverse, n):
 
     For value, rate and acceleration: e, e², e³, e⁴, and e² f² with the error f of filter y; then q, q², p, p² of
     q = eᵀ P⁻¹ e, with the inverse (6,) packed by rows, and of p, the product of the errors in value and rate. shift
-    (2, n) is the deviation of value and rate from the truth (3,).
-    """
+    (2, n) is the deviation of value and rate from the truth (3,)."""
     t0, t1, t2 = truth[0], truth[1], truth[2]
     y00, y01, y02, y11, y12, y22 = inverse[0], inverse[1], inverse[2], inverse[3], inverse[4], inverse[5]
     a1 = a2 = a3 = a4 = b1 = b2 = b3 = b4 = c1 = c2 = c3 = c4 = 0.0
@@ -248,11 +241,9 @@ def keep_errors(x, plots, truth, each):
 
 @kernel
 def simulate_block(world, bank, first, count, baseline, sums, each):
-    """Add the sums of realisations first … first + count - 1; gains refer to filter `baseline`. each (F, K, C, S,
-    count or 0) takes the errors of all of them.
-
-    The last chunk is always computed in full, and only the realisations asked for are summed.
-    """
+    """Add the sums of realisations first … first + count - 1; gains refer to filter `baseline`. each (F, K, C, S, count
+    or 0) takes the errors of all of them. The last chunk is always computed in full, and only the realisations asked
+    for are summed."""
     filters, scans, coordinates = bank.gain.shape[:3]
     x = np.empty((filters, coordinates, 4, CHUNK))
     ring = np.empty((coordinates, bank.weights.shape[4], CHUNK))

@@ -18,8 +18,7 @@ Python designs a filter an array over patterns of plots):
     q          manoeuvre variance: of the derivative of order `size`, constant over an interval
 
 P, J, Y, R, S and q are in units of a nominal plot's σ and of the period; x is in m or rad, and s. An array contains one
-chunk of realisations: `get(address(a), j * GROUPS + i)` is group i of row j.
-"""
+chunk of realisations: `get(address(a), j * GROUPS + i)` is group i of row j."""
 
 from typing import NamedTuple
 
@@ -96,8 +95,7 @@ def normal_equations(recent, length, longest, i, origin, half):
     """Normal equations Y x = b of a polynomial through the last `length` plots of group i, at present: Y (6), b (3).
 
     recent is the address of the recent plots, of which `longest` are kept; they are taken relative to origin. half is
-    0.5 for a parabola and 0 for a straight line.
-    """
+    0.5 for a parabola and 0 for a straight line."""
     zero = full(0.0)
     Y, b = (zero, zero, zero, zero, zero, zero), (zero, zero, zero)
     for j in range(length):
@@ -132,8 +130,7 @@ def least_squares(Y, n, w, tau, c, size):
     The observation is the plot less c times the last one (after P3 eq. 15), c to the power of their distance, with the
     row H = H₀ - c H₀ F(-age) and R = 1 - c²; with c = 0 it is the plot itself. With fewer plots than unknowns a
     polynomial of lower degree is determined. A plot at the very time of the last one contains nothing new of an error
-    that is correlated.
-    """
+    that is correlated."""
     one, zero = full(1.0), full(0.0)
     age, c_last = Y[6] + tau, Y[7] * c
     new = 1.0 - c_last * c_last
@@ -165,8 +162,7 @@ def joint_gain(J, w, fixed):
     """Gain K (4), J Hᵀ (4) and S of an exact observation of value plus error, H = (1, 0, 0, 1); K is zero where missed.
 
     fixed (3) is the gain of a filter of fixed gain, or KALMAN_GAIN. Where value plus error is known already, a plot
-    contains nothing new.
-    """
+    contains nothing new."""
     zero, one = full(0.0), full(1.0)
     h = (J[0] + J[6], J[1] + J[7], J[2] + J[8], J[6] + J[9])
     S = h[0] + h[3]
@@ -192,8 +188,7 @@ def kalman(J, start, n, w, tau, model):
 
     start (K (4), P (6)) are those of least squares, which apply up to the model's start. Just after a plot its value
     plus error is known exactly, so the covariances of the error are those of the state with opposite sign. The paper's
-    step 4 lacks a plus.
-    """
+    step 4 lacks a plus."""
     zero, first, carried = full(0.0), full(float(model.start)), 1.0 if model.c != 0.0 else 0.0
     K_start, P_start = start
     J = predicted_joint(J, w, tau, model)
@@ -219,9 +214,7 @@ def updated_state(x, z, K, dt, period, c):
 @inline
 def memory_of(filters, plots, f, c):
     """Addresses of a filter's x, Y, further rows and P, then of its coordinate's z, weight and n; they must outlive it.
-
-    Numba would count a reference to each array wherever it is passed on.
-    """
+    Numba would count a reference to each array wherever it is passed on."""
     x, Y, further, P = filters.x[f, c], filters.Y[f, c], filters.further[f, c], filters.P
     z, w, n = plots.z[c], plots.weight[c], plots.n[c]
     return address(x), address(Y), address(further), address(P), address(z), address(w), address(n)
@@ -244,8 +237,7 @@ def put_information(a, i, Y):
 def recur(filters, plots, f, c, by_covariance, model, dt, period):
     """Update the memory of a recursive filter with one scan, in place.
 
-    by_covariance: after the model's start the filter switches from information to the joint covariance.
-    """
+    by_covariance: after the model's start the filter switches from information to the joint covariance."""
     ax, ay, aj, ap, az, aw, an = memory_of(filters, plots, f, c)
     tau = dt / period
     for i in range(GROUPS):

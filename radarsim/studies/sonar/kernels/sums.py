@@ -7,8 +7,7 @@ Letters as in `steps`, and
     n    number of plots up to this scan
     s…   sums over realisations, in lanes until `total` adds the lanes, always in the same order
 
-Arrays hold a chunk, as in `steps`.
-"""
+Arrays hold a chunk, as in `steps`."""
 
 from typing import NamedTuple
 
@@ -48,8 +47,7 @@ def rows_of(x, course, c, n, used):
 def component_sums(j, rows, base, out):
     """Write the number of estimates, Σe, Σe², Σe³, Σe⁴ and Σe²f² of component j to out (6,).
 
-    base is the address of the baseline's estimate, out that of an array.
-    """
+    base is the address of the baseline's estimate, out that of an array."""
     zero, truth = full(0.0), rows.truth[j]
     need, s0, s1, s2, s3, s4, s5 = full(j + 0.5), zero, zero, zero, zero, zero, zero
     for i in range(GROUPS):
@@ -78,8 +76,7 @@ def joint_sums(rows, P, size, units, out):
     """Write Σ of the diagonal of P, where estimated, and Σq, Σq², Σp, Σp², where the state is complete, to out (7,).
 
     q = eᵀ P⁻¹ e and p is the product of the errors in value and rate. P (6, CHUNK) and the first three sums are in
-    nominal units; units (σ, period). P and out are addresses.
-    """
+    nominal units; units (σ, period). P and out are addresses."""
     sigma, period = units
     zero, one, two, three = full(0.0), full(0.5), full(1.5), full(2.5)
     need, most = full(size - 0.5), full(float(size))
@@ -115,11 +112,8 @@ def ahead_sums(rows, size, dt, out):
 
 @part
 def add_sums(rows, P, size, x_base, size_base, units, at, out, sums):
-    """Add the errors of one filter in one coordinate; units (σ, period), at (f, k, c), out (7,) scratch.
-
-    P (6, CHUNK) is its covariance, x_base (4, CHUNK) the baseline's estimate and size_base its size, 0 where no gain is
-    needed.
-    """
+    """Add the errors of one filter in one coordinate; units (σ, period), at (f, k, c), out (7,) scratch. P (6, CHUNK)
+    is its covariance, x_base (4, CHUNK) the baseline's estimate and size_base its size, 0 where no gain is needed."""
     (sigma, period), (f, k, c), base, of = units, at, address(x_base), address(out)
     error, paired, joint = address(sums.error[f, k, c]), address(sums.paired[f, k, c]), address(sums.joint[f, k, c])
     believed, estimates = address(sums.believed[f, k, c]), address(sums.estimates[f, k, c])

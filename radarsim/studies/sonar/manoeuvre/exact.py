@@ -17,8 +17,7 @@ Exact laws of P3's manoeuvre detector: false alarms, detection, and delay where 
 The statistic is â²/σ_a² (P3 eq. 3, with the estimate that the paper leaves out), where â is the acceleration of a
 parabola through n plots. â is linear in the plots, so it is Gaussian where their errors are. The statistic of one
 coordinate is χ² with one degree of freedom, noncentral by (mean of â / σ_a)² in a manoeuvre; the sum over C coordinates
-is χ² with C degrees of freedom. This holds for any deterministic course.
-"""
+is χ² with C degrees of freedom. This holds for any deterministic course."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -63,11 +62,9 @@ class Switched(NamedTuple):
 def switched_window(
     course: np.ndarray, sigma: float, dt: float, memory: int, plots: int, threshold_k: float
 ) -> Switched:
-    """σ at every scan from the `memory`-th on: course (K,) are the true values, plots those of the detector.
-
-    An alarm is a squared acceleration of over k times its own variance; with it the parabola is taken, without it the
-    straight line.
-    """
+    """σ at every scan from the `memory`-th on: course (K,) are the true values, plots those of the detector. An alarm
+    is a squared acceleration of over k times its own variance; with it the parabola is taken, without it the straight
+    line."""
     line, parabola = (_last_value(memory, degree, dt) for degree in (1, 2))
     acceleration = np.zeros(memory)
     acceleration[memory - plots :] = _acceleration(plots, dt)
@@ -116,8 +113,7 @@ QUANTITIES = (("course", "rad"), ("speed", "m/s"), ("x_ahead", "m"), ("y_ahead",
 
 def last(parts: list[np.ndarray]) -> np.ndarray:
     """Stack arrays of one shape (…,) along a last axis; each stays contiguous in memory, which saves a quarter of the
-    time.
-    """
+    time."""
     return np.moveaxis(np.stack(parts), 0, -1)
 
 
@@ -134,8 +130,7 @@ def uses(track: np.ndarray, own: np.ndarray, horizon: float) -> np.ndarray:
     """The QUANTITIES (…, 6) of x, y and their rates (…, 4).
 
     own (…, 4) are those of the vessel that the closest approach refers to; horizon in s. t_cpa is counted from now, and
-    negative where the closest approach has passed.
-    """
+    negative where the closest approach has passed."""
     x, y, vx, vy = np.moveaxis(track, -1, 0)
     px, py, wx, wy = np.moveaxis(track - own, -1, 0)
     square = wx**2 + wy**2
@@ -150,8 +145,7 @@ def gradients(track: np.ndarray, own: np.ndarray, horizon: float) -> np.ndarray:
 
     Let u be the unit vector from the own ship to the target at the closest approach, which is normal to the relative
     velocity; then d cpa = u · (dp + t_cpa dv). At a distance of zero u is one of the two normals and the first order
-    fails, because a distance cannot be negative.
-    """
+    fails, because a distance cannot be negative."""
     vx, vy = track[..., 2], track[..., 3]
     px, py, wx, wy = np.moveaxis(track - own, -1, 0)
     zero, one, ahead = np.zeros_like(vx), np.ones_like(vx), np.full_like(vx, horizon)
@@ -214,10 +208,8 @@ def false_alarm(k: Values, coordinates: int | np.ndarray = 1) -> Any:
 
 
 def detection(k: Values, shift: Values, coordinates: int = 1) -> Any:
-    """Probability of an alarm in a test where the mean of â is `shift` σ_a from zero; broadcasts.
-
-    For several coordinates the shift is the root of the sum of squares.
-    """
+    """Probability of an alarm in a test where the mean of â is `shift` σ_a from zero; broadcasts. For several
+    coordinates the shift is the root of the sum of squares."""
     from scipy import special, stats  # here, because they take a second to load
 
     if coordinates == 1:
@@ -228,10 +220,8 @@ def detection(k: Values, shift: Values, coordinates: int = 1) -> Any:
 
 
 def shift_for(probability: float, k: float) -> float:
-    """Acceleration, in units of σ_a, that a test of one coordinate at threshold k detects with this probability.
-
-    Zero if false alarms alone reach the probability. At k = 1 and 0.683 it is 1.456.
-    """
+    """Acceleration, in units of σ_a, that a test of one coordinate at threshold k detects with this probability. Zero
+    if false alarms alone reach the probability. At k = 1 and 0.683 it is 1.456."""
     from scipy.optimize import brentq
 
     if detection(k, 0.0) >= probability:
@@ -245,17 +235,13 @@ def acceleration_law(
     """Mean and variance (M,) of an acceleration with weights (M, n) of the plots.
 
     course (n,) holds the true values, C (n, n) is the covariance of the errors, and pushes (n, m) holds what m
-    independent unit accelerations add to the values.
-    """
+    independent unit accelerations add to the values."""
     moved = weights @ pushes
     return weights @ course, np.einsum("mi,ij,mj->m", weights, C, weights) + (moved**2).sum(axis=1)
 
 
 def by_then(p: np.ndarray) -> np.ndarray:
-    """Probability (…, n) that a first event has come by each of n independent tests of probabilities p (…, n).
-
-    Tests of overlapping windows are not independent; their law is multivariate normal and has no closed form. For them
-    this is an upper bound if the target does not manoeuvre and errors are white (Šidák 1967), because alarms come in
-    runs.
-    """
+    """Probability (…, n) that a first event has come by each of n independent tests of probabilities p (…, n). Tests of
+    overlapping windows are not independent; their law is multivariate normal and has no closed form. For them this is
+    an upper bound if the target does not manoeuvre and errors are white (Šidák 1967), because alarms come in runs."""
     return 1 - np.cumprod(1 - p, axis=-1)

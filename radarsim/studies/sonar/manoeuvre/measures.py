@@ -121,9 +121,7 @@ def delays_ratio(seen: Evidence, key: Key, more: int, few: int, until: Until, ra
 
 def further(seen: Evidence, key: Key, enough: Sequence[int], until: Until, rate: float) -> Estimate:
     """Least mean delay of detectors of more plots than `enough`, over the least of these, less 1, in %; as independent.
-
-    Negative where more plots see it sooner.
-    """
+    Negative where more plots see it sooner."""
     of = _delays(seen, key, until, rate)
     more = [one for n, one in of.items() if n > max(enough)]
     few = [one for n, one in of.items() if n in enough]

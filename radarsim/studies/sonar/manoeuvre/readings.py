@@ -1,8 +1,7 @@
 """What P3 leaves open about manoeuvres, and its claims on them under each reading.
 
 Times to see a manoeuvre are runs of the shipped config. Switching the degree of a window of a few plots is exact, and
-so is a single test. What P3 says of smoothing is formulas, which leave nothing open but what a high accuracy is.
-"""
+so is a single test. What P3 says of smoothing is formulas, which leave nothing open but what a high accuracy is."""
 
 from collections.abc import Sequence
 from dataclasses import replace

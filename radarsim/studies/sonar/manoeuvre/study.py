@@ -2,8 +2,7 @@
 
 Sums for D detectors, G groups (each coordinate, then all jointly), T thresholds and K scans: `tested`, `alarms`,
 `first` as in kernels.detector.Alarms; `modes` (F, K, C, 3) as in kernels.patterns.BlockSums; and for A times `uses`
-(F, A, U, 5): n, Σe, Σe², Σe⁴ and Σ of the first-order variance.
-"""
+(F, A, U, 5): n, Σe, Σe², Σe⁴ and Σ of the first-order variance."""
 
 import math
 from collections.abc import Sequence
@@ -130,11 +129,9 @@ def shift_laws(scene: Scene, c: int, detected: np.ndarray, plots: int, k: int) -
 
 
 def exact_alarms(spec: Keys, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Probability (D, G, T, K) of an alarm at a test, and shift (D, G, K) of its mean; NaN where not known.
-
-    Both are means over the patterns of plots in which there is a test. In the cartesian frames weights depend on the
-    plots, and nothing is known.
-    """
+    """Probability (D, G, T, K) of an alarm at a test, and shift (D, G, K) of its mean; NaN where not known. Both are
+    means over the patterns of plots in which there is a test. In the cartesian frames weights depend on the plots, and
+    nothing is known."""
     K, C = scene.truth.shape[:2]
     most = max((len(detector.levels()) for detector in spec.detectors), default=0)
     alarms = np.full((len(spec.detectors), C + 1, most, K), np.nan)
@@ -216,8 +213,7 @@ def estimated_uses(
     """Uses of tracks and their first-order σ (F, n, 6), NaN where a state is not complete.
 
     t (n,) from the first plot; x (F, n, C, 3), P (F, n, C, 3, 3) and known (F, n, C, 3), of which the first two
-    coordinates are used.
-    """
+    coordinates are used."""
     state, polar, own = x[:, :, :2, :2], frame == "polar", own_ship(uses, t)
     spread = np.stack([P[:, :, :2, 0, 0], P[:, :, :2, 0, 1], P[:, :, :2, 1, 1]], axis=-1)
     complete = np.all(known[:, :, :2, :2], axis=(2, 3), keepdims=True)[..., 0]

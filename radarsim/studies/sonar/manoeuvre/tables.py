@@ -4,8 +4,7 @@ The `filter` of a detector's row is the detector; `component` may be `joint`, to
 
 plots: number of plots in the detector's window
 threshold_k: its threshold k
-false_alarm_probability: of the threshold, by the χ² law
-"""
+false_alarm_probability: of the threshold, by the χ² law"""
 
 import numpy as np
 
@@ -53,8 +52,7 @@ def _of_thresholds(
 ) -> dict[str, np.ndarray]:
     """The first columns of thresholds t of detectors d in groups g, each (n,); `filter` is the detector.
 
-    false_alarm_probability is that of the exact law; labels are further columns after the component.
-    """
+    false_alarm_probability is that of the exact law; labels are further columns after the component."""
     chosen = result.axes.thresholds
     k = np.array([chosen[i][j, m] for i, j, m in zip(d, g, t, strict=True)])
     freedom = np.where(g == len(groups(result)) - 1, len(groups(result)) - 1, 1)
@@ -250,9 +248,8 @@ def _uses(result: CaseResult[ManoeuvreAxes]) -> Columns:
 
 def _distance(sums: np.ndarray, true: np.ndarray, closing: np.ndarray) -> np.ndarray:
     """Distance from zero (F, U, A), in believed σ, of the value that each quantity depends on; infinite for positions.
-
-    The closest approach depends on its distance and on the relative speed `closing` (A,), whose σ is that of the speed.
-    """
+    The closest approach depends on its distance and on the relative speed `closing` (A,), whose σ is that of the
+    speed."""
     with np.errstate(invalid="ignore", divide="ignore"):
         believed = np.sqrt(sums[..., 4] / sums[..., 0])
         speed, relative = true[:, 1] / believed[..., 1], closing / believed[..., 1]

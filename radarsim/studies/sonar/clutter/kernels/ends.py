@@ -97,8 +97,7 @@ def outside(off, S, threshold, sigma):
 
     off and sigma (r, b), in m and rad: the plot's errors in range and bearing are independent. The integral over the
     range of the density there times the share between both ends of the gate in bearing; with the sine of an angle for
-    the range it is smooth and periodic, so that the midpoint rule converges exponentially.
-    """
+    the range it is smooth and periodic, so that the midpoint rule converges exponentially."""
     (off_r, off_b), (sigma_r, sigma_b) = off, sigma
     if threshold >= tracker.OPEN:
         return 0.0
@@ -223,10 +222,8 @@ def look(field, laws, scan, tracks, status, predicted, own):
 
 @inline
 def sooner(laws, age):
-    """The probability of what has not come yet to come at this scan of a young track, as drawn: rather sooner.
-
-    With L scans left it is L times as likely now as at the last of them.
-    """
+    """The probability of what has not come yet to come at this scan of a young track, as drawn: rather sooner. With L
+    scans left it is L times as likely now as at the last of them."""
     return 2.0 / (laws.young_age - age + 1.0)
 
 
@@ -253,8 +250,7 @@ def detect_drawn(detections, laws, scan, status, predicted, target, course, sigm
     """Set target.detected as each realisation's law has it, and bring the ratios of runs in own up to date.
 
     Before association: predicted (5, CHUNK) is of this scan; plots lie about course with σ (2,) in m and rad. A
-    realisation whose track has ended has no more plots.
-    """
+    realisation whose track has ended has no more plots."""
     k, certain, detection = scan.k, detections.certain[scan.k], detections.probability
     detected, z, most, free = target.detected, target.z, laws.length.max(), k > laws.young.max()
     for i in range(scan.count):
@@ -290,11 +286,9 @@ def detect_drawn(detections, laws, scan, status, predicted, target, course, sigm
 
 @inline
 def drawn_false(laws, k, certain, missed, detected, status, own, i):
-    """How a false plot is drawn about the young track of realisation i.
-
-    The probability h of the law of false plots, that of the law that the realisation is drawn from, and η, zero where
-    it is not shifted. missed: the probability that the target is not detected; detected: whether it is.
-    """
+    """How a false plot is drawn about the young track of realisation i. The probability h of the law of false plots,
+    that of the law that the realisation is drawn from, and η, zero where it is not shifted. missed: the probability
+    that the target is not detected; detected: whether it is."""
     age, law, last = status[tracker.AGE, i], int(own[LAW, i]), laws.shares.size - 1
     needed = sooner(laws, age) if own[CAME, i] == 0.0 else 0.0
     eta = seduction(laws, age, missed, own[BOX, i]) if may_be_seduced(laws, k, certain, own, i) else 0.0
@@ -306,10 +300,8 @@ def drawn_false(laws, k, certain, missed, detected, status, own, i):
 
 @part
 def associate_young(field, detections, keys, laws, scan, tracks, status, target, work, own, counts):
-    """Associate a scan's plots with every track, as `tracker.associate`; about young tracks false plots are drawn.
-
-    The ratios of the laws of false plots, the last two, are brought up to date; keys are of those plots.
-    """
+    """Associate a scan's plots with every track, as `tracker.associate`; about young tracks false plots are drawn. The
+    ratios of the laws of false plots, the last two, are brought up to date; keys are of those plots."""
     draws, out, rule, tally = tracker.draws_of(field), work.association, laws.rule, address(counts)
     predicted, detected, z, lives = work.predicted, target.detected, target.z, address(status)
     last, missed = own.shape[0] - 1, 1.0 - detections.probability
@@ -352,8 +344,7 @@ def weight_of(shares, own, i):
 def add_ended(limits, n, tracks, status, course, laws, own, ended):
     """Count the n realisations whose first confirmed track ends at this scan by their weights, in ended (KINDS, 4).
 
-    limits: misses in a row that drop a track, and the error (r, b), in m and rad, with which it has lost its target.
-    """
+    limits: misses in a row that drop a track, and the error (r, b), in m and rad, with which it has lost its target."""
     misses, beyond = limits
     for i in range(n):
         if status[tracker.ENDS, i] > 0.0 and own[ENDED, i] == 0.0:
@@ -367,10 +358,8 @@ def add_ended(limits, n, tracks, status, course, laws, own, ended):
 # ---- a block --------------------------------------------------------------------------------------------------------
 @kernel
 def simulate_ends(world, detections, field, trackers, ends, work, first, total, sums):
-    """Add the weighted ends of the target's first confirmed tracks to sums, an EndSums.
-
-    Arguments as those of `tracker.simulate_block`.
-    """
+    """Add the weighted ends of the target's first confirmed tracks to sums, an EndSums. Arguments as those of
+    `tracker.simulate_block`."""
     F, K = trackers.gate.size, world.dt.size
     plots, shift = np.empty((2, 4, CHUNK)), np.zeros((2, 3, CHUNK))
     measured, z, detected = np.empty((2, CHUNK)), np.empty((2, CHUNK)), np.empty(CHUNK)

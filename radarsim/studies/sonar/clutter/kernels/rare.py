@@ -41,8 +41,7 @@ class Shift(NamedTuple):
     """How tracks that false plots begin are drawn.
 
     choice (2,) is the key of the stream that chooses the law of each; plots (2,) that of the plots in boxes. shares
-    (3,) of the laws: as they are, so that they are confirmed, and so that they are held on; the sum is one.
-    """
+    (3,) of the laws: as they are, so that they are confirmed, and so that they are held on; the sum is one."""
 
     choice: np.ndarray
     plots: np.ndarray
@@ -53,8 +52,7 @@ class WeightedSums(NamedTuple):
     """Sums of a block by weights w, for F trackers.
 
     held (F, K, 4): Σw, Σw², number and Σw⁴ of tracks held for at least 1 … K scans from their confirmation on;
-    drawn (F, 3): number of plain ones, Σw and Σw² of all.
-    """
+    drawn (F, 3): number of plain ones, Σw and Σw² of all."""
 
     held: np.ndarray
     drawn: np.ndarray
@@ -119,8 +117,7 @@ def associate_drawn(keys, rule, place, gate, plot, box, needed, drawn):
     """The Association of one track with plots drawn in its box, and the factor of the ratio of the law that shifts it.
 
     Then whether there are any in the box. place: realisation and scan. plot as in `associate_track`: of the target.
-    needed: the probability h of that law; drawn: of the law that the track is drawn from; each if it is not under p.
-    """
+    needed: the probability h of that law; drawn: of the law that the track is drawn from; each if it is not under p."""
     p = -math.expm1(-box.mean)
     h = max(needed, p)
     gated, some = with_drawn_plots(keys, place[0], place[1], gate, rule.gate, box, p, max(drawn, p))
@@ -133,10 +130,8 @@ def associate_drawn(keys, rule, place, gate, plot, box, needed, drawn):
 
 @part
 def associate_false(field, shift, trackers, f, scan, work, own, counts):
-    """Associate a scan's false plots with every track of a chunk: those drawn in boxes, or those of the field.
-
-    The results go to work.association (6, CHUNK), as those of `tracker.associate`; own (ROWS, CHUNK) has the ratios.
-    """
+    """Associate a scan's false plots with every track of a chunk: those drawn in boxes, or those of the field. The
+    results go to work.association (6, CHUNK), as those of `tracker.associate`; own (ROWS, CHUNK) has the ratios."""
     draws, out, tally, status = tracker.draws_of(field), work.association, address(counts), work.status[f]
     predicted, plots, rule = work.predicted, work.plots[f], tracker.rule_of(trackers, f)
     lives, taken, m, n = address(status), address(out), trackers.m[f], trackers.n[f]
@@ -204,9 +199,7 @@ def scan_false(field, shift, trackers, f, scan, work, own, counts):
 @kernel
 def simulate_false(seeds, field, shift, trackers, work, dt, first, total, scores, sums):
     """Add the weighted sums of tracks that false plots begin at scan 0 to sums, and scores of the plain ones to scores.
-
-    Arguments as those of `tracker.simulate_false`; scores (F, T + 1).
-    """
+    Arguments as those of `tracker.simulate_false`; scores (F, T + 1)."""
     z, detected, counts, own = np.empty((2, CHUNK)), np.ones(CHUNK), np.zeros(tracker.COUNTS), np.zeros((ROWS, CHUNK))
     for done in range(0, total, CHUNK):
         tracker.reset(work)

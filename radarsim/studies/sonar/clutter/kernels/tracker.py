@@ -59,8 +59,7 @@ Blocks of realisations of trackers among false plots: the target's track, and tr
 Every plot that no track takes begins a track. The target's plots do so one at a time. Of the false plots one begins a
 track in each realisation, at a position drawn uniformly over the sector. By the theorem of Slivnyak and Mecke the plots
 about it are again those of the field, and the expected number of false tracks is their density times the share that is
-confirmed. Letters as in `tracker`.
-"""
+confirmed. Letters as in `tracker`."""
 
 import math
 from typing import TYPE_CHECKING, NamedTuple
@@ -148,8 +147,7 @@ class Gate(NamedTuple):
 class Gated(NamedTuple):
     """Plots in a gate so far: their number, that of false ones; d and innovation of the nearest, 1 if it is false.
 
-    Then, weighted with the likelihoods e: Σe, Σe of false plots, mean innovation and scatter (rr, rb, bb) about it.
-    """
+    Then, weighted with the likelihoods e: Σe, Σe of false plots, mean innovation and scatter (rr, rb, bb) about it."""
 
     count: float
     false_count: float
@@ -203,8 +201,7 @@ def distance_squared(nu_r, nu_b, S_inverse):
 def with_plot(gated, nu_r, nu_b, false, S_inverse, threshold):
     """The plots in a gate with one more of innovation (nu_r, nu_b), if its d is at most the threshold; false 1 or 0.
 
-    The weighted mean and scatter are updated plot by plot (West 1979): the scatter of a single plot is exactly zero.
-    """
+    The weighted mean and scatter are updated plot by plot (West 1979): the scatter of a single plot is exactly zero."""
     count, false_count, least, r, b, nearest_false, weight, false_weight, mean_r, mean_b, rr, rb, bb = gated
     d = distance_squared(nu_r, nu_b, S_inverse)
     if d > threshold:
@@ -230,8 +227,7 @@ def associated(gated, rule, r, S, settled):
     plot is the target's with probability β₀ = b / (b + Σe), and the covariance exceeds that after a certain plot by
     K (β₀ S + scatter) Kᵀ. λ is the density in range and bearing: the density per m² times the range. The score is the
     logarithm of the likelihood ratio of all plots in the gate, with a target against without. A track of one plot (not
-    settled) takes the nearest.
-    """
+    settled) takes the nearest."""
     r = max(r, CLOSEST)
     density, root = rule.density * r, 2.0 * math.pi * math.sqrt(S[0] * S[2] - S[1] * S[1])
     missed = 1.0 - rule.detection * rule.inside
@@ -348,8 +344,7 @@ def predicted_between(C, tau):
 def predict(tracks, dt, period, sigma, manoeuvre, forecast):
     """Write positions and innovation covariances after dt to forecast (5, CHUNK): r, b, S (rr, rb, bb); in m, rad.
 
-    sigma (2,) of a nominal plot; manoeuvre (2,) variances q of the lines.
-    """
+    sigma (2,) of a nominal plot; manoeuvre (2,) variances q of the lines."""
     ar, ab, pr, pb = address(tracks.x[0]), address(tracks.x[1]), address(tracks.P[0]), address(tracks.P[1])
     ac, an, out, tau = address(tracks.C), address(tracks.plots), address(forecast), dt / period
     rr, rb, bb, F = sigma[0] * sigma[0], sigma[0] * sigma[1], sigma[1] * sigma[1], constant_acceleration(dt)
@@ -382,10 +377,8 @@ def transposed(C):
 
 @inline
 def updated_pair(P, P_other, C, start, n, w):
-    """Both lines after a plot of one: gains K and K_other (2), covariances P and P_other (6), and C (4) between them.
-
-    P is of the line that has the plot, start (K, P) its least squares; C is that line by the other.
-    """
+    """Both lines after a plot of one: gains K and K_other (2), covariances P and P_other (6), and C (4) between them. P
+    is of the line that has the plot, start (K, P) its least squares; C is that line by the other."""
     h = (C[0], C[1])  # covariance of the measured value with the other line
     scale = w / (P[0] + 1.0)
     K, P = updated_line(P, start, n, w)
@@ -423,8 +416,7 @@ def jointly_updated(P, C, starts, n, w, V):
     """Both lines after a plot that may not be the target's: gains (K_rr, K_br, K_rb, K_bb), P (P_r, P_b), and C.
 
     The range of the plot is processed first, then its bearing: K_rb and K_bb are gains for the part of the innovation
-    in bearing that the innovation in range does not explain. starts are the least squares (K, P) of both lines.
-    """
+    in bearing that the innovation in range does not explain. starts are the least squares (K, P) of both lines."""
     K_rr, K_br, P_r, P_b, C = updated_pair(P[0], P[1], C, starts[0], n, w)
     K_bb, K_rb, P_b, P_r, C = updated_pair(P_b, P_r, transposed(C), starts[1], n, w)
     # Gains for the two innovations, both processed at once.
@@ -439,8 +431,7 @@ def update(tracks, dt, period, sigma, manoeuvre, joint, association):
     """Update all tracks with one scan, in place; association (6, CHUNK) is what `tracker.associate` writes.
 
     Its rows: 1 if a plot is taken, else 0; innovations in range and bearing; V (rr, rb, bb), in m and rad. joint: V may
-    differ from zero.
-    """
+    differ from zero."""
     ar, ab, pr, pb = address(tracks.x[0]), address(tracks.x[1]), address(tracks.P[0]), address(tracks.P[1])
     yr, yb, ac, an = address(tracks.Y[0]), address(tracks.Y[1]), address(tracks.C), address(tracks.plots)
     at, tau, per, F = address(association), dt / period, 1.0 / period, constant_acceleration(dt)
@@ -523,8 +514,7 @@ def judge(trackers, f, n, tracks, status, course, kept, counts):
     """Apply the rules to the target's track in n realisations after a scan; kept (CHUNK,) is 2 where there is one.
 
     A confirmed track ends when it is dropped, either for misses or because its position has become too uncertain, or
-    when it is lost: too far from the target.
-    """
+    when it is lost: too far from the target."""
     limit, m, of, misses = trackers.lost[f], trackers.m[f], trackers.n[f], trackers.misses[f]
     P, beyond = tracks.P, (limit * trackers.sigma[0], limit * trackers.sigma[1])
     for i in range(n):
@@ -607,10 +597,8 @@ class Field(NamedTuple):
 
 
 class Draws(NamedTuple):
-    """A field without its arrays, references to which would be counted at each call.
-
-    The two words of the key, the address of the distribution function, and the cells.
-    """
+    """A field without its arrays, references to which would be counted at each call. The two words of the key, the
+    address of the distribution function, and the cells."""
 
     k0: int
     k1: int
@@ -628,8 +616,7 @@ def draws_of(field):
 def number_in(share, u):
     """Number of plots in a cell: the first index at which the distribution function exceeds the uniform number u.
 
-    share is the address of the distribution function, whose last value is 1.
-    """
+    share is the address of the distribution function, whose last value is 1."""
     n = 0
     while u >= share[n]:
         n += 1
@@ -638,19 +625,15 @@ def number_in(share, u):
 
 @inline
 def cell_words(k0, k1, realisation, cell, draw):
-    """Two random words of a cell; cells are numbered through all scans.
-
-    The first word of draw 0 gives the number of plots, and each further word the position of one of them.
-    """
+    """Two random words of a cell; cells are numbered through all scans. The first word of draw 0 gives the number of
+    plots, and each further word the position of one of them."""
     return threefry(U(realisation), (U(cell) << U(DRAW_BITS)) + U(draw), k0, k1)
 
 
 @inline
 def place_in(k0, k1, realisation, cell, n, spare):
     """Position of plot n in a cell, each coordinate from 0 to 1, by the halves of a word; and the spare word after it.
-
-    Words come two at a time; the first spare one is that beside the word of the number of plots.
-    """
+    Words come two at a time; the first spare one is that beside the word of the number of plots."""
     word = spare
     if n % 2 == 1:
         word, spare = cell_words(k0, k1, realisation, cell, (n + 1) // 2)
@@ -659,10 +642,8 @@ def place_in(k0, k1, realisation, cell, n, spare):
 
 @inline
 def touched(low, high, least, step, count):
-    """First and last cell that the interval low … high touches, of `count` cells of size step from `least` on.
-
-    Floors stay floating-point numbers, because an open gate reaches further than an integer can.
-    """
+    """First and last cell that the interval low … high touches, of `count` cells of size step from `least` on. Floors
+    stay floating-point numbers, because an open gate reaches further than an integer can."""
     first = min(max(np.floor((low - least) / step), 0.0), count - 1.0)
     last = min(max(np.floor((high - least) / step), -1.0), count - 1.0)
     return int(first), int(last)
@@ -703,11 +684,9 @@ def with_false_plots(gated, draws, realisation, scan, gate, threshold):
 
 @part
 def area_within(gate, det, threshold, cells):
-    """Area in m² of a gate's part within the sector; det is |S|.
-
-    A gate that reaches over an edge is integrated as the unit disc u² + v² ≤ 1, with r = r₀ + s u, b = b₀ + c u + h v:
-    over u between the edges in range, the weight is r, and v runs from the arc or an edge in bearing to the other.
-    """
+    """Area in m² of a gate's part within the sector; det is |S|. A gate that reaches over an edge is integrated as the
+    unit disc u² + v² ≤ 1, with r = r₀ + s u, b = b₀ + c u + h v: over u between the edges in range, the weight is r,
+    and v runs from the arc or an edge in bearing to the other."""
     s, high = math.sqrt(threshold * gate.S[0]), math.sqrt(threshold * gate.S[2])
     least, most = math.sqrt(2.0 * cells.q0), math.sqrt(2.0 * (cells.q0 + cells.dq * cells.nq))
     half, off = 0.5 * cells.nb * cells.db, 0.0  # the gate's middle from that of the sector, less whole turns
@@ -788,8 +767,7 @@ def fill_scans(field, first, scan, own, there, plots):
     """All plots of n realisations from `first` on and K scans from `scan` on, into plots (n, K, 3, M): range, bearing
     and 1 of the target's, 0 of others, in order of bearing; the rest is not-a-number.
 
-    own (2, n, K) the target's, where `there` (n, K). Returns the most plots of a scan, even if more than fit.
-    """
+    own (2, n, K) the target's, where `there` (n, K). Returns the most plots of a scan, even if more than fit."""
     k0, k1, share, most = field.key[0], field.key[1], address(field.share), 0
     q0, dq, nq, b0, db, nb, _, density = field.cells
     for i in range(there.shape[0]):
@@ -831,8 +809,7 @@ class Trackers(NamedTuple):
 
 class Workspace(NamedTuple):
     """Work arrays of a chunk for F trackers: the fields of `Tracks` and the status (F, ROWS, CHUNK) of each, and for
-    one tracker at a time the predictions (5, CHUNK) and associations (6, CHUNK), as in `tracks`.
-    """
+    one tracker at a time the predictions (5, CHUNK) and associations (6, CHUNK), as in `tracks`."""
 
     x: np.ndarray
     Y: np.ndarray
@@ -894,8 +871,7 @@ def rule_of(trackers, f):
 def associate_track(draws, rule, realisation, k, plot, gate, counts):
     """The Association of one track at scan k; counts is the address of the scan's counts.
 
-    plot is 1 if there is a plot of the target, else 0, with its range and bearing.
-    """
+    plot is 1 if there is a plot of the target, else 0, with its range and bearing."""
     gated, known = empty_gate(), rule.association == KNOWN
     nu_r, nu_b = plot[1] - gate.r, plot[2] - gate.b
     irr, irb, ibb, det = inverse_two(gate.S[0], gate.S[1], gate.S[2])
@@ -940,8 +916,7 @@ def gate_of(place, S, settled, reach):
 def settle(status, i, found, out):
     """Write the Association of track i to the rows of out (6, CHUNK), and count it in the track's status (ROWS, CHUNK).
 
-    Both are addresses: Numba may count references to arrays for every track.
-    """
+    Both are addresses: Numba may count references to arrays for every track."""
     rows = (found.taken, found.nu_r, found.nu_b, found.rr, found.rb, found.bb)
     for j in range(6):
         out[j * CHUNK + i] = rows[j]
@@ -966,8 +941,7 @@ def associate(field, rule, scan, tracks, status, target, work, counts):
     """Associate a scan's plots with every track of a chunk; the results go to work.association (6, CHUNK).
 
     Its rows: 1 if a plot is taken, else 0; innovations (r, b) and their additional covariance V (rr, rb, bb). A track
-    that begins here has the plot itself in place of the innovations.
-    """
+    that begins here has the plot itself in place of the innovations."""
     # Arrays are taken out of their records once, because every access counts a reference.
     draws, out, tally, plots = draws_of(field), work.association, address(counts), tracks.plots
     detected, z, predicted, lives, taken = target.detected, target.z, work.predicted, address(status), address(out)
@@ -998,9 +972,7 @@ def step(trackers, f, field, scan, tracks, target, work, counts):
 @part
 def measure_target(world, first, k, plots, z, shift):
     """Write the target's plots at scan k to z (2, CHUNK), and where it has moved off its course to shift (2, 3, CHUNK).
-
-    In realisations from number `first` on; plots (2, 4, CHUNK) as in `move_and_measure`.
-    """
+    In realisations from number `first` on; plots (2, 4, CHUNK) as in `move_and_measure`."""
     move_and_measure(world, first, k, plots)
     for c in range(2):
         copy_row(plots[c, 0], z[c])
@@ -1048,8 +1020,7 @@ def simulate_block(world, detections, field, trackers, work, first, total, sums)
 def simulate_false(key, field, trackers, work, dt, first, total, sums):
     """Add the sums of tracks that false plots begin at scan 0: one plot a realisation, uniform over the sector.
 
-    key (2,) of the stream of their positions; dt (K,) intervals before each scan.
-    """
+    key (2,) of the stream of their positions; dt (K,) intervals before each scan."""
     z, detected, counts, nothing = np.empty((2, CHUNK)), np.ones(CHUNK), np.zeros(COUNTS), np.zeros(CHUNK)
     for done in range(0, total, CHUNK):
         reset(work)
