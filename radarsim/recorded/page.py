@@ -10,6 +10,7 @@ import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -323,6 +324,7 @@ def _of_folds(case: Case, one: Judged, every: Sequence[Judged]) -> str:
 
 
 # ---- words -----------------------------------------------------------------------------------------------------------
+DOUBTLESS = 6  # power of ten from which a ratio of likelihoods says no more than that one model is wrong
 CLEAR = 3.0  # of the log-likelihood, twenty times: from there on one filter is clearly the best
 
 
@@ -453,8 +455,11 @@ def likely(followed: Followed, advised: Advice) -> list[str]:
     """The filter that predicts the plots best, and errors in the numbers of the one that takes most columns."""
     compared, lines = advised.compared, []
     if len(compared.behind) > 1 and advised.folding is None:
-        behind = sorted((name, gap) for name, gap in compared.behind.items() if name != compared.best)
-        others = ", ".join(tr("{times} times under {name}", times=times(gap), name=name) for name, gap in behind)
+        behind = sorted(((n, gap) for n, gap in compared.behind.items() if n != compared.best), key=itemgetter(1))
+        alike: dict[str, list[str]] = {}
+        for name, gap in behind:
+            alike.setdefault(times(gap), []).append(name)
+        others = ", ".join(tr("{times} times under {name}", times=so, name=listed(own)) for so, own in alike.items())
         best = compared.best
         if min(gap for _, gap in behind) <= CLEAR:
             best = tr("{name} (not clearly)", name=best)
@@ -491,13 +496,13 @@ def _partly(followed: Followed, asked: Asked) -> list[str]:
 
 
 def times(gain: float) -> str:
-    """A likelihood ratio from the difference of the logarithms: 12, 10¹⁶."""
-    power = round(gain / math.log(10))
-    return (
-        significant_digits(math.exp(gain), "#.2g" if gain < math.log(99) else ".0f")
-        if power < 4
-        else power_of_ten(power)
-    )
+    """A likelihood ratio from the difference of the logarithms: 12, 10⁵; beyond doubt, over 10⁶."""
+    power = gain / math.log(10)
+    if power > DOUBTLESS:
+        return tr("over {number}", number=power_of_ten(DOUBTLESS))
+    if round(power) >= 4:
+        return power_of_ten(round(power))
+    return significant_digits(math.exp(gain), "#.2g" if gain < math.log(99) else ".0f")
 
 
 def explained(one: Finding, filter_name: str) -> str:
@@ -558,16 +563,16 @@ def write(
     from radarsim.report import html
     from radarsim.report.figures import save
 
-    made = drawn(followed)
+    made, name = drawn(followed), os.path.basename(os.fspath(source))
     page = html.followed(
         experiment.stem,
-        os.path.basename(os.fspath(source)),
-        _said(verdict(followed, judged, advised)) or ["Too few plots to judge the filters by."],
+        name,
+        _said(verdict(followed, judged, advised)) or [tr("Too few plots to judge the filters by.")],
         _said(rows(followed)),
         list(made.values()),
-        {tr(ERRORS): errors(followed), tr(TESTS): tests(judged), "Tracks": _tracks(followed)},
+        {tr(ERRORS): errors(followed), tr(TESTS): tests(judged), tr("Tracks"): _tracks(followed)},
         html.yaml_of(experiment.resolved),
-        f"radarsim track {experiment.path or experiment.stem} {os.fspath(source)}",
+        f"radarsim track {experiment.path or experiment.stem} {name}",
     )
     contents = {NAME: page.encode()}
     for name, one in made.items():
@@ -577,9 +582,17 @@ def write(
 
 
 def _said(lines: Sequence[str]) -> list[str]:
-    """Lines of the terminal as sentences: the word before each with a colon."""
-    parted = (line.split(maxsplit=1) for line in lines)
-    return [f"{head.capitalize()}: {rest}." for head, rest in parted]
+    """Lines of the terminal as sentences: the label of each with a colon, a line without one after that before it."""
+    made: list[str] = []
+    for line in lines:
+        label, _, rest = line.partition("  ")
+        if label:
+            made.append(f"{label[:1].upper()}{label[1:]}: {rest.strip()}")
+        elif made:
+            made[-1] += f", {rest.strip()}"
+        else:
+            made.append(rest.strip())
+    return [f"{sentence}." for sentence in made]
 
 
 def _tracks(followed: Followed) -> list[dict[str, object]]:

@@ -36,7 +36,7 @@ from radarsim.report import chart
 from radarsim.report.chart import Scale, contrast, tick_text
 from radarsim.report.drawing import GREY, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.drawing import Axis as Ends
-from radarsim.report.wording import number, spoken
+from radarsim.report.wording import formulas, number, spoken
 
 # ---- legends ---------------------------------------------------------------------------------------------------------
 LONGEST_AT_END = 28  # letters of a name at a line's end
@@ -289,7 +289,7 @@ def _laid_out(figure: Figure) -> Canvas:
     if common is not None and not inside and not plan.beside:
         height += common.height_mm(figure.width_mm)
     height += rows * max([one.height_mm(figure.width_mm / columns) for one in plan.own if one is not None], default=0.0)
-    headline = wrapped(figure.headline, HEADLINE_LETTERS_PER_MM * figure.width_mm, " ").replace("$", r"\$")
+    headline = wrapped(formulas(figure.headline), HEADLINE_LETTERS_PER_MM * figure.width_mm, " ")
     height += HEADLINE_MM * (headline.count("\n") + 1) if headline else 0.0
     layout = ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.05)
     canvas = Canvas(figsize=(figure.width_mm * MM, height * MM), dpi=PNG_DPI, layout=layout)

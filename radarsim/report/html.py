@@ -365,7 +365,7 @@ def _template(name: str) -> "Template":
         "unit": lambda name: tr(wording.unit(name)),
         "expected": claims_page.expected,
         "css": _css,
-        "kept": wording.unbroken,  # numbers stay with their units, and with ± before them
+        "kept": _sentence,
         "reason": rule.said,
         "measured": _measured,
         "bounds": _bounds,
@@ -373,6 +373,11 @@ def _template(name: str) -> "Template":
     environment.filters.update(own)
     environment.globals.update(tr=tr, plural=plural)
     return environment.get_template(name)
+
+
+def _sentence(words: str) -> "Markup":
+    """A sentence in which numbers stay with their units, and with ± before them; letters with an index as formulas."""
+    return chart.html(wording.formulas(wording.unbroken(words)))
 
 
 def _measured(part: Mapping[str, Any]) -> str:
@@ -432,7 +437,7 @@ def table_in_words(name: str, table: "pd.DataFrame") -> dict[str, Any]:
     """A table of the page alone, in words; a table with a file of its own is shown as in the file."""
     made = _table(name, table)
     for column in made["columns"]:
-        column["name"] = head(column["name"])
+        column["name"] = _sentence(head(column["name"]))
     said = {"unit": lambda name: tr(wording.unit(name)), "filter": called, "radar": called}
     for place, column in enumerate(table.columns):
         for row in made["rows"] if column in said else ():

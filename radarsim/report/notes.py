@@ -536,9 +536,9 @@ def rests(results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", ans
     else:
         words = plural(
             "{count} interval of the answer may be too narrow because rare realisations decide it and few or "
-            "none occurred ({filters}): raise -n",
+            "none occurred ({filters}): run with a larger -n",
             "{count} intervals of the answer may be too narrow because rare realisations decide them and few "
-            "or none occurred ({filters}): raise -n",
+            "or none occurred ({filters}): run with a larger -n",
             count,
             filters=names,
         )

@@ -138,7 +138,7 @@ def test_page_is_whole_and_leads_nowhere(written):
     assert len(ids) == len(set(ids))
     assert text.count('class="chart"') == 7  # a panel each
     assert str(escape(written.answer[0])) in text.replace("\u00a0", " ")
-    assert "C_θ" in text[text.index('id="asked"') : text.index('class="rest"')]
+    assert "<i>C</i><sub>θ</sub>" in text[text.index('id="asked"') : text.index('class="rest"')]
     assert "(1 rows)" not in text
     assert re.search(r">sigma</th><th[^>]*>exact_sigma<", text)
     assert "watch out" in text

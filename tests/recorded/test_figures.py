@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 
 from radarsim.app.run import load_all
+from radarsim.language import speaking
 from radarsim.recorded import follow, page
 from radarsim.recorded.plots import MOST, Places, in_plane
+from radarsim.report import html
 from radarsim.report.drawing import Line, Note
+from radarsim.report.wording import labelled
 from tests.program import command
 from tests.recorded import whole
 
@@ -85,15 +88,31 @@ def test_the_report_shows_what_the_terminal_says(tmp_path):
     one = loaded("sonar_smoothing")
     source = written(tmp_path / "plots <b>.csv", follow.simulated(one), track=["7"] * 40)
     result = command("track", "sonar_smoothing", source, "-o", tmp_path / "track.csv", "--report", tmp_path / "out")
-    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
-    assert "What do the filters of sonar_smoothing make of plots &lt;b&gt;.csv?" in page
-    assert "Best: " in page
-    assert re.search(r"Advice: the stated values of \w+.* agree with 40 rows\.", page)
+    text = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert "What do the filters of sonar_smoothing make of plots &lt;b&gt;.csv?" in text
+    assert "Best: " in text
+    assert re.search(r"Advice: the stated values of \w+.* agree with 40 rows\.", text)
     for name in ("plan", "track", "residuals", "nis"):
-        assert f'id="figure-{name}"' in page
+        assert f'id="figure-{name}"' in text
         assert (tmp_path / f"out/figures/{name}.png").stat().st_size > 1000
-    assert "Errors against the truth" in page
+    assert "Errors against the truth" in text
     assert f"report   {tmp_path / 'out/report.html'}" in result.stdout
+
+
+def test_a_ratio_beyond_doubt_is_no_number_and_a_line_without_label_goes_on():
+    assert [page.times(gain * np.log(10)) for gain in (0.3, 1.5, 5.2, 6.1, 3336)] == [
+        *("2.0", "32", "10⁵", "over 10⁶", "over 10⁶")
+    ]
+    lines = [labelled("no rows", "a: no estimate"), labelled("advice", "--set a=1"), labelled("", "from 5 rows")]
+    assert page._said(lines) == ["No rows: a: no estimate.", "Advice: --set a=1, from 5 rows."]
+    assert page._said([labelled("", "MMA: consistent")]) == ["MMA: consistent."]
+
+
+def test_the_page_is_in_one_language():
+    with speaking("ru"):
+        page_text = html.followed("rls2", "plots.csv", [], [], [], {}, "", "")
+    assert "Что дают фильтры конфигурации rls2 по отметкам plots.csv?" in page_text
+    assert not {"Plots", "Figures", "Config", "Contents", "Answer"} & set(re.findall(r'[>"](\w+)[<"]', page_text))
 
 
 def test_nothing_is_drawn_over_the_plots(tmp_path):
