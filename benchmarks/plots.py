@@ -26,7 +26,7 @@ from radarsim.studies import registry
 from radarsim.studies.ambiguous_doppler.kernels import records as folds
 from radarsim.studies.ambiguous_doppler.kernels.steps import fill_normals, put_plots
 from radarsim.studies.multimodel.kernels import records, strip
-from radarsim.studies.range_doppler.kernels import missed, steps
+from radarsim.studies.range_doppler.kernels import missed
 from radarsim.studies.sonar import study as sonar
 from radarsim.studies.sonar.kernels.patterns import detect
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK, move_and_measure
@@ -53,14 +53,14 @@ def draw_plain(x, count, key, truth, sigma):
 @kernel
 def draw_missed(made, count, problem):
     keys, truth, sigma, detection = problem.keys, problem.truth, problem.sigma, problem.detection
-    at, next_word = steps.places(made), np.empty(steps.CHUNK, np.uint64)
-    for first in range(0, count, steps.CHUNK):
+    at, next_word = missed.places(made), np.empty(missed.CHUNK, np.uint64)
+    for first in range(0, count, missed.CHUNK):
         missed.begin_chunk(keys, first, made, problem.bias, problem.sigma_bias, problem.sigma_flight)
         for k in range(truth.shape[0]):
             missed.fill_plots(keys[0], first, k, truth[k], sigma, next_word, made.plots[0], made.plots[1])
             if k % 2 == 0:
                 missed.fill_uniform_pairs(keys[1], first, k // 2, made.detected, made.other)
-            steps.count_plots(at, k, detection, steps.CHUNK)
+            missed.count_plots(at, k, detection, missed.CHUNK)
 
 
 @kernel
@@ -97,7 +97,7 @@ def drawing_alone(name: str, case: object, count: int) -> Callable[[], object] |
         return lambda: draw_folded(normals, plots, count, plan.world)
     problem = plan.problem.plain()
     if isinstance(problem, missed.Problem):
-        made = steps.work(1)
+        made = missed.work(1)
         return lambda: draw_missed(made, count, problem)
     x = aligned_zeros(2, linear.CHUNK)
     return lambda: draw_plain(x, count, problem.key, problem.truth, problem.sigma)

@@ -272,7 +272,7 @@ PLANTED = [
     ("kernels.linear", "radarsim.physics"),
     ("report.panels", "radarsim.studies.sonar.study"),
     ("recorded.follow", "radarsim.cli.console"),
-    ("studies.range_doppler.kernels.rows", "radarsim.studies.range_doppler.filters"),
+    ("studies.range_doppler.kernels.missed", "radarsim.studies.range_doppler.filters"),
     ("kernels.traced", "radarsim.failures"),
     ("studies.range_doppler.config", "radarsim.studies.range_doppler.filters"),
     ("studies.range_doppler.filters", "radarsim.report.tables"),

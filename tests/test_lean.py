@@ -64,7 +64,7 @@ def test_no_kernel_is_imported_above_the_functions_that_run_it(module):
     assert not [name for name in loaded_with(module) - NO_CODE if name in HEAVY or "kernels." in name]
 
 
-NO_CODE = {"kernels.formula", "kernels.algebra", "kernels.traced"}  # plain Python until a kernel calls them
+NO_CODE = {"kernels.algebra", "kernels.traced"}  # plain Python until a kernel calls them
 
 
 def test_a_planted_import_is_seen():

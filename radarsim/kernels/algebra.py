@@ -1,4 +1,8 @@
-"""The algebra of Kalman filters with three states a coordinate, on whatever adds and multiplies (`kernels.formula`).
+"""The algebra of Kalman filters with three states a coordinate, on whatever adds and multiplies.
+
+Python calls functions marked `inline` as they are, and kernels have them copied into them: written once, for plain
+numbers, arrays of NumPy, and in kernels the lanes of `radarsim.kernels.lanes`. This module loads no compiler;
+`radarsim.kernels.compile` says how kernels take them.
 
 A coordinate's state is the triple (value, rate, second rate), x, v, a. Its covariance is packed symmetric,
 P = (xx, xv, xa, vv, va, aa); a block between two coordinates is full, row by row: c = (xx, xv, xa, vx, vv, va, ax, av,
@@ -8,13 +12,30 @@ term by term, `p - g0*h0 - g1*h1 - g2*h2`: each is one fused instruction; `p - d
 
 The book is Bar-Shalom, Li & Kirubarajan, Estimation with Applications to Tracking and Navigation (2001), ch. 5."""
 
-import numpy as np
+import functools
+from collections.abc import Callable
 
-from radarsim.kernels.formula import inline
+import numpy as np
 
 ROWS, COLUMNS = (0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2)  # of the elements of a packed matrix
 COLUMN = ((0, 1, 2), (1, 3, 4), (2, 4, 5))  # where a packed matrix has its columns
 NO_NOISE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Formula:
+    """A function of Python, to which `radarsim.kernels.compile` gives a compiled twin where a kernel calls it.
+
+    compiled: the type of the twin, as Numba knows it, where that is no translation of the function."""
+
+    def __init__(self, function: Callable, compiled=None):
+        functools.update_wrapper(self, function)
+        self.function, self.compiled = function, compiled
+
+    def __call__(self, *arguments):
+        return self.function(*arguments)
+
+
+inline = Formula
 
 
 # ---- from matrices of NumPy and back --------

@@ -28,7 +28,7 @@ Numba optimises every function together with all that it calls and makes machine
 the fifth level is translated five times. What kernels call (`inline`, `part`) has no compiled entry from Python and is
 kept untranslated until the kernel is compiled: the nine-state filters take two thirds of the time, and run at the same
 speed. A kernel that another calls is compiled for it apart, without an entry and without machine code. Python calls an
-`inline` function as the plain function that it is, see `radarsim.kernels.formula`; a `part` it cannot call."""
+`inline` function as the plain function that it is, see `radarsim.kernels.algebra`; a `part` it cannot call."""
 
 import contextlib
 import ctypes
@@ -66,7 +66,7 @@ from numba.core.typing import Context
 from numba.extending import typeof_impl
 from numba.np.arrayobj import make_array
 
-from radarsim.kernels.formula import Formula
+from radarsim.kernels.algebra import Formula
 
 # ---- cache -----------------------------------------------------------------------------------------------------------
 SUFFIX = ".kernel"

@@ -20,8 +20,8 @@ from numba.extending import intrinsic, lower_builtin, models, register_model
 from numba.np.arrayobj import make_array
 
 from radarsim.kernels import traced
+from radarsim.kernels.algebra import Formula
 from radarsim.kernels.compile import inline
-from radarsim.kernels.formula import Formula
 
 WIDTH = 8
 ROOT_HALF = 0x3FE6A09E667F3BCD  # √½ as its bits: a number is m 2**e with m from there to √2

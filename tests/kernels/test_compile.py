@@ -40,7 +40,7 @@ def house(tmp_path):
     """A package with copies of compile.py and what it needs, a helper file, a kernel that uses it, and a cache."""
     kernels = tmp_path / "copied" / "kernels"
     kernels.mkdir(parents=True)
-    for name in ("compile.py", "formula.py"):
+    for name in ("compile.py", "algebra.py"):
         (kernels / name).write_text((SOURCES / name).read_text().replace("radarsim.kernels", "copied.kernels"))
     begin = "from copied.kernels"
     (kernels / "helper.py").write_text(f"{begin}.compile import inline\n@inline\ndef grown(x):\n    return x + 1.0\n")

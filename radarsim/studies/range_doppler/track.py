@@ -20,7 +20,7 @@ from radarsim.studies.range_doppler import config
 from radarsim.studies.range_doppler.config import FOLDED, MOST_SCANS, Filter, FilterKeys, Keys, Turn, can_fold
 from radarsim.studies.range_doppler.filters import least_squares, noise_by_time, observation
 from radarsim.studies.range_doppler.given import GivenGains, Scans, followed
-from radarsim.studies.range_doppler.kernels import missed, rows
+from radarsim.studies.range_doppler.kernels import missed
 from radarsim.studies.range_doppler.study import COMPONENTS, prepare
 from radarsim.studies.range_doppler.tuning import designed
 
@@ -169,7 +169,7 @@ class _One(_Starting):
         n = len(dt)
         made = np.empty((n, 3)), np.empty((n, 3)), np.full((n, 2), np.nan)
         given = self.x, self.P, dt, np.where(taken, z, 0.0)[k:], taken[k:].astype(float), self.sigma**2, self.noise
-        rows.filter_rows(*given, *made)
+        missed.filter_rows(*given, *made)
         return made
 
 
@@ -258,7 +258,7 @@ class PlotLikelihood:
         z = np.stack([columns["range_m"], columns["velocity_mps"]], axis=1)[first:, : self.observes]
         there = np.isfinite(z)
         there[0, 0] = False  # it starts the track
-        F, Q = np.stack([transition(step) for step in dt]), unpack(rows.noise_over(self.noise, dt))
+        F, Q = np.stack([transition(step) for step in dt]), unpack(missed.noise_over(self.noise, dt))
         H = np.tile(observation(self.observes), (len(t), 1, 1))
         settled = int(np.searchsorted(np.cumsum(ranged[first:]), STARTING, side="right"))
         return _Problem(F, Q, H, np.where(np.isfinite(z), z, 0.0), there, settled, dt / self.usual_s)
