@@ -21,6 +21,7 @@ import unicodedata
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -395,6 +396,7 @@ def to_json(value: object) -> bytes:
     return (json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
+@cache  # a tenth of a small run's time, asked for several times
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that affect numbers or figures."""
     found = {"python": platform.python_version()}

@@ -528,7 +528,7 @@ def held(plots):
     [
         ("rls2", {"radar.detection_probability": 0.8}),
         ("sonar_smoothing", {}),
-        ("sonar_manoeuvre", {"sweep": {"target.acceleration_mps2": [1]}}),
+        ("sonar_manoeuvre", {"sweep": {"target.acceleration_mps2": [1]}, "scans": 60, "uses.at_s": [295]}),
         ("ambiguous_rls2", {}),
     ],
 )

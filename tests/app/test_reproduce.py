@@ -14,32 +14,30 @@ from radarsim.app import doctor, reproduce
 SMALL = ["realisations=100"]
 
 
-def test_a_line_each_and_a_summary(tmp_path):
+def test_a_line_each_a_fault_told_and_a_summary(tmp_path):
+    (tmp_path / "rls3").write_text("a file where a folder should be")
     told = []
-    done = reproduce.reproduce(["rls2", "rls4"], str(tmp_path), told.append, overrides=SMALL, figures=False)
-    assert [line[:7] for line in told] == ["[ 1/2] ", "[ 2/2] "]
-    assert {line.split()[2] for line in told} == {"rls2", "rls4"}
+    done = reproduce.reproduce(["rls2", "rls3", "rls4"], str(tmp_path), told.append, overrides=SMALL, figures=False)
+    assert [line[:7] for line in told] == ["[ 1/3] ", "[ 2/3] ", "[ 3/3] "]
+    assert {line.split()[2] for line in told} == {"rls2", "rls3", "rls4"}
+    assert any("rls3" in line and "FAILED: " in line for line in told)
+    assert {one.stem: (bool(one.faults), one.code) for one in done} == {
+        **{"rls2": (False, 0), "rls3": (True, 4), "rls4": (False, 0)}
+    }
     assert any("rls2" in line and "claims: " in line for line in told)
     summary = reproduce.summary(done, str(tmp_path), 1.0)
     assert any(line.startswith("claims   ") and "not run" in line for line in summary)
-    assert any(line.startswith("time     0:00:01") and "2 configs" in line for line in summary)
+    assert any(line.startswith("time     0:00:01") and "3 configs" in line for line in summary)
     (parts,) = [line for line in summary if "statistics" in line]
+    whole = [one for one in done if not one.faults]  # the one that failed has no part in where the time went
     seconds = [float(part.split()[1]) for part in parts.split(":")[0].split(",")]
-    assert sum(seconds) == pytest.approx(sum(one.seconds for one in done), abs=2)  # four numbers rounded to seconds
-    assert all(one.stages["simulation"] > 0 and one.stages["writing"] > 0 for one in done)
+    assert sum(seconds) == pytest.approx(sum(one.seconds for one in whole), abs=2)  # four numbers rounded to seconds
+    assert all(one.stages["simulation"] > 0 and one.stages["writing"] > 0 for one in whole)
+    assert [one.stem for one in done if not one.stages] == ["rls3"]
+    assert "failed   rls3" in summary
     index = (tmp_path / "index.html").read_text()
     assert "rls2/report.html" in index
     assert "rls4/report.html" in index
-
-
-def test_a_fault_is_told_and_the_rest_runs(tmp_path):
-    (tmp_path / "rls2").write_text("a file where a folder should be")
-    told = []
-    done = reproduce.reproduce(["rls2", "rls4"], str(tmp_path), told.append, overrides=SMALL, figures=False)
-    assert any("rls2" in line and "FAILED: " in line for line in told)
-    assert {one.stem: (bool(one.faults), one.code) for one in done} == {"rls2": (True, 4), "rls4": (False, 0)}
-    assert not done[0].stages or not done[1].stages  # the one that failed has no part in where the time went
-    assert "failed   rls2" in reproduce.summary(done, str(tmp_path), 1.0)
 
 
 def test_the_processes_start_from_both_ends(tmp_path, monkeypatch):

@@ -188,7 +188,7 @@ def test_whole_numbers_alone_have_no_interval():
 def test_columns_of_a_matrix_sum_to_one_and_zeros_stay():
     given = {"transition": None, "models.2.sigma_acceleration_mps2": (3, 300)}
     shorter = ["filters.0.models.0.sigma_acceleration_mps2=1", "scans=30"]
-    found = tune("multimodel", "sigma y", filter="MMA2-122", free=given, overrides=shorter, realisations=40)
+    found = tune("multimodel", "sigma y", filter="MMA2-122", free=given, overrides=shorter, realisations=20)
     values = {one.key: one.tuned for one in found.keys}
     for j in range(3):
         column = [value for key, value in values.items() if key.endswith(f".{j}")]

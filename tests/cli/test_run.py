@@ -129,12 +129,12 @@ def test_help_teaches_with_an_example(name):
     assert re.search(rf"Examples?\n( +radarsim .*\n)*? +radarsim {name}\b", command(name, "--help").stdout)
 
 
-def test_runs_from_anywhere_as_a_module(tmp_path):
-    command = [sys.executable, "-m", "radarsim", "run", "rls2", "-n", "100", "--no-figures"]
-    finished = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert finished.returncode == 0, finished.stderr
+def test_runs_from_anywhere_as_a_module_and_to_streams_that_know_no_greek(tmp_path):
+    words = ("run", "rls2", "-n", "1000", "--no-figures")
+    finished = process(*words, cwd=tmp_path, env=os.environ | {"PYTHONIOENCODING": "latin-1"})
+    assert (finished.returncode, finished.stderr) == (0, b"")
     assert (tmp_path / "results" / "rls2" / "curves.csv").exists()
-    assert "\x1b" not in finished.stdout
+    assert b"\x1b" not in finished.stdout
 
 
 def test_help_needs_no_heavy_import():
@@ -226,13 +226,6 @@ def test_output_that_cannot_be_written_and_output_that_nobody_reads():
 def test_errors_that_cannot_be_written_leave_the_exit_code():
     done = subprocess.run(f"{sys.executable} -m radarsim check nope 2> /dev/full", shell=True, check=False)
     assert done.returncode == 2
-
-
-def test_streams_that_know_no_greek(tmp_path):
-    environment = {**os.environ, "PYTHONIOENCODING": "latin-1"}
-    arguments = ("run", "rls2", "-n", "1000", "--no-figures", "--out", str(tmp_path))
-    finished = process(*arguments, env=environment)
-    assert (finished.returncode, finished.stderr) == (0, b"")
 
 
 def test_a_path_that_is_no_text(tmp_path):

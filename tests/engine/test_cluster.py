@@ -18,7 +18,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from radarsim.engine import cluster
+from radarsim.engine import cluster, store
 from radarsim.engine.blocks import Node
 from radarsim.engine.cluster import Cluster
 from radarsim.engine.run import collect
@@ -176,12 +176,13 @@ LOST = """
 """
 
 
-def test_a_scheduler_that_goes_away_is_told_and_what_was_done_is_stored(tmp_path):
+def test_a_scheduler_that_goes_away_is_told_and_what_was_done_is_stored(tmp_path, monkeypatch):
+    monkeypatch.setattr(store, "PERIOD_S", 0.1)
     program = [sys.executable, "-c", textwrap.dedent(LOST)]
     with subprocess.Popen(program, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as there:
         address = there.stdout.readline().strip()
         with Cluster(scheduler=address) as workers:
-            threading.Timer(2.5, there.kill).start()
+            threading.Timer(1.0, there.kill).start()
             with pytest.raises(ClusterError, match="went away"):
                 collect(Fake(pause_s=1e-2), 16 * 10_000, executor=workers, store=tmp_path)
     resumed = collect(WORK, N, store=tmp_path)
@@ -199,7 +200,7 @@ def test_a_run_has_certificates_of_its_own(two):
     for stranger in (f"tcp://127.0.0.1:{port}", address):
         security = distributed.Security.temporary() if stranger.startswith("tls") else None
         with pytest.raises(OSError, match=r"imed out|handshake|CERTIFICATE|certificate|reset"):
-            distributed.Client(stranger, timeout=2, set_as_default=False, security=security)
+            distributed.Client(stranger, timeout=0.5, set_as_default=False, security=security)
 
 
 def test_without_cryptography_the_run_goes_on_over_loopback(monkeypatch):
@@ -306,7 +307,7 @@ def test_a_scheduler_with_certificates_of_ones_own(tmp_path, monkeypatch):
         assert address.startswith("tls://127.0.0.1:")
         with dask.config.set(settings(*ours)), Cluster(scheduler=address) as workers:
             assert same(collect(WORK, N, executor=workers))
-        monkeypatch.setattr(cluster, "CONNECT_S", 2)
-        monkeypatch.setitem(cluster.SETTINGS, "distributed.comm.timeouts.connect", "2s")
+        monkeypatch.setattr(cluster, "CONNECT_S", 1)
+        monkeypatch.setitem(cluster.SETTINGS, "distributed.comm.timeouts.connect", "1s")
         with dask.config.set(settings(*theirs)), pytest.raises(ConfigError, match="no Dask scheduler answers"):
             Cluster(scheduler=address)

@@ -174,18 +174,13 @@ def test_a_function_of_no_file_is_not_kept():
         del sys.modules[module.__name__]
 
 
-def test_the_command_goes_on_and_says_so_in_one_line(tmp_path):
+def test_the_command_goes_on_and_says_so_in_one_line(tmp_path, libraries):
     """A run whose cache cannot be used at all: the same bytes, one line on stderr, and the same in run.json."""
-    place = tmp_path / "cache"
-    options = ["--no-figures", "--out", str(tmp_path)]
-    program = [sys.executable, "-m", "radarsim", "run", str(doctor.KNOWN / "range_doppler.yaml"), *options]
+    place = {"RADARSIM_CACHE_DIR": str(tmp_path / "cache")}
     prepared = "from radarsim.kernels.linear import add_block as one; print(one._cache.cache_path)"
-    environment = os.environ | {"RADARSIM_CACHE_DIR": str(place)}
-    found = subprocess.run(
-        [sys.executable, "-c", prepared], env=environment, capture_output=True, text=True, check=True
-    )
-    Path(found.stdout.strip()).write_text("no directory")
-    done = subprocess.run(program, env=environment, capture_output=True, text=True, check=False)
+    Path(libraries.run(code=prepared, **place).stdout.strip()).write_text("no directory")
+    config = doctor.KNOWN / "range_doppler.yaml"
+    done = libraries.run("run", config, "--no-figures", "--out", tmp_path, **place)
     assert done.returncode == 0
     lines = [line for line in done.stderr.splitlines() if "kernel cache" in line]
     assert len(lines) == len(done.stderr.splitlines()) == 1, done.stderr

@@ -95,8 +95,9 @@ from radarsim.app.configs import CaseWork
 for stem in sys.argv[1:]:
     print(CaseWork(load(stem).cases[0]).simulate(0, 72).tobytes().hex())
 """
-OTHER_STUDIES = [
+STUDIES = [
     "rls2",
+    "sonar_smoothing",
     "multimodel_families",
     "sonar_manoeuvre",
     "sonar_clutter",
@@ -105,11 +106,11 @@ OTHER_STUDIES = [
 ]
 
 
-@pytest.mark.parametrize("stems", [["sonar_smoothing"], pytest.param(OTHER_STUDIES, marks=pytest.mark.slow)], ids=len)
-def test_a_process_that_compiles_gives_the_bytes_of_one_that_reads_the_cache(tmp_path, stems):
+@pytest.mark.slow
+def test_a_process_that_compiles_gives_the_bytes_of_one_that_reads_the_cache(tmp_path):
     """Each kernel runs its own copies of what it calls, whatever else is in memory; see `compile.SelfContained`."""
     environment = os.environ | {"RADARSIM_CACHE_DIR": str(tmp_path)}
-    command = [sys.executable, "-c", SUMS, *stems]
+    command = [sys.executable, "-c", SUMS, *STUDIES]
     cold, warm = (subprocess.run(command, env=environment, capture_output=True, check=True).stdout for _ in range(2))
     assert cold == warm
-    assert len(cold.split()) == len(stems)
+    assert len(cold.split()) == len(STUDIES)

@@ -80,11 +80,18 @@ def judged(
         for claim in of.claims:
             rows += _rows(claim, of.paper, papers, own=of.holds(claim, stem))
     table = tables.frame({name: [row[name] for row in rows] for name in CLAIMED})
-    table.attrs[LOOKED] = [row[LOOKED] for row in rows]
+    table.attrs[LOOKED] = Looked(row[LOOKED] for row in rows)
     return table
 
 
 LOOKED = "looked"  # beside the rows of claims.csv, not in them: the tables, with components, behind a part
+
+
+class Looked(list[Any]):
+    """What stands under LOOKED: pandas copies it deeply with every part of the table, which nobody needs."""
+
+    def __deepcopy__(self, memo: object) -> "Looked":
+        return self
 
 
 class _Papers:

@@ -26,7 +26,7 @@ def test_trimmed_flight_is_straight():
 
 
 def test_a_steady_turn_to_the_right_is_a_circle():
-    x = fly((0, 1e4, 0), (200, 0, 0), 1e4, 1e-3, [Phase(0, lateral=20, trimmed=True)], T)
+    x = fly((0, 1e4, 0), (200, 0, 0), 1e4, 5e-3, [Phase(0, lateral=20, trimmed=True)], T)
     radius = 200**2 / 20
     centre = np.array([0, radius])  # to the right of north is east
     assert np.allclose(np.hypot(x[:, 0] - centre[0], x[:, 6] - centre[1]), radius, rtol=1e-3)
