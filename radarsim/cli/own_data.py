@@ -273,7 +273,6 @@ def track(
     from radarsim.app import run
     from radarsim.cli import console, outcomes
     from radarsim.recorded import fit, follow, page
-    from radarsim.recorded import page as accuracy
     from radarsim.recorded import plots as files
     from radarsim.report import wording
     from radarsim.report.files import Writer
@@ -298,7 +297,7 @@ def track(
     folder = further["report"]
     if folder or not quiet:
         with console.Counter("judging", "likelihoods") as counter:
-            judged = accuracy.judged(followed)
+            judged = page.judged(followed)
             advised = fit.advised(followed, counter.update)
     if not quiet:
         outcomes.report(followed, judged, advised, stderr=output is None)

@@ -20,7 +20,6 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.results import Track
 from radarsim.language import listed, plural, power_of_ten, term, tr
 from radarsim.recorded import fit
-from radarsim.recorded import page as accuracy
 from radarsim.recorded.fit import Advice, Asked, Finding
 from radarsim.recorded.follow import Followed, Tally, drawn, put, recorded_of
 from radarsim.recorded.plots import Places
@@ -328,7 +327,7 @@ DOUBTLESS = 6  # power of ten from which a ratio of likelihoods says no more tha
 CLEAR = 3.0  # of the log-likelihood, twenty times: from there on one filter is clearly the best
 
 
-def verdict(followed: Followed, judged: Sequence[accuracy.Judged], advised: Advice | None) -> list[str]:
+def verdict(followed: Followed, judged: Sequence[Judged], advised: Advice | None) -> list[str]:
     """The best filter and the changes advised, by the likelihood; where that is not known, the consistent filters."""
     return consistent(judged) if advised is None else likely(followed, advised)
 
@@ -401,18 +400,14 @@ def errors(followed: Followed) -> list[dict[str, Any]]:
 
 ERRORS, TESTS = (term("Errors against the truth"), term("Innovations (NIS of a consistent filter: 1)"))
 FINDINGS = {
-    accuracy.SMALL: term(
-        "the plots are less accurate than stated, or the target manoeuvres harder than the filter allows for"
-    ),
-    accuracy.LARGE: term(
-        "the plots are more accurate than stated, or the filter allows for harder manoeuvres than occur"
-    ),
-    accuracy.LOST: term("the velocity is unfolded by a wrong number of spans; other filters fit the same plots"),
-    accuracy.DOUBT: term("a wrong fold, plots less accurate than stated, or harder manoeuvres than allowed for"),
+    SMALL: term("the plots are less accurate than stated, or the target manoeuvres harder than the filter allows for"),
+    LARGE: term("the plots are more accurate than stated, or the filter allows for harder manoeuvres than occur"),
+    LOST: term("the velocity is unfolded by a wrong number of spans; other filters fit the same plots"),
+    DOUBT: term("a wrong fold, plots less accurate than stated, or harder manoeuvres than allowed for"),
 }
 
 
-def tests(judged: Sequence[accuracy.Judged]) -> list[dict[str, Any]]:
+def tests(judged: Sequence[Judged]) -> list[dict[str, Any]]:
     """The tests of the innovations: a row each, by column."""
     return [
         {
@@ -435,18 +430,18 @@ NUMBERS = {  # columns of these, and how they are printed
 }
 
 
-def findings(judged: Sequence[accuracy.Judged]) -> list[str]:
+def findings(judged: Sequence[Judged]) -> list[str]:
     """The meaning of the verdicts that occur."""
     there = {one.verdict for one in judged if one.tests}
     return [f"{tr(verdict)}: {tr(words)}" for verdict, words in FINDINGS.items() if verdict in there]
 
 
-def consistent(judged: Sequence[accuracy.Judged]) -> list[str]:
+def consistent(judged: Sequence[Judged]) -> list[str]:
     """The filters that are consistent in all their tests, unless all are."""
     verdicts: dict[str, set[str]] = {}
     for one in judged:
         verdicts.setdefault(one.filter, set()).add(one.verdict)
-    fitting = [name for name, found in verdicts.items() if found == {accuracy.FITS}]
+    fitting = [name for name, found in verdicts.items() if found == {FITS}]
     words = tr("{names}: consistent in all tests", names=", ".join(fitting))
     return [labelled("", words)] if 0 < len(fitting) < len(verdicts) else []
 
@@ -554,7 +549,7 @@ def write(
     followed: Followed,
     experiment: Experiment,
     source: str | os.PathLike,
-    judged: Sequence[accuracy.Judged],
+    judged: Sequence[Judged],
     advised: Advice | None,
     folder: str | os.PathLike,
     sources: Iterable[str | os.PathLike] = (),
