@@ -17,11 +17,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from radarsim.app.compare import chart, compare
     from radarsim.app.judge import judge
+    from radarsim.app.outlook import check
     from radarsim.app.own_data import fit, plots, read_plots, register, simulate, track
-    from radarsim.app.python import chart, check, claims, compare, load, readings, sensitivity, solve
+    from radarsim.app.readings import readings
     from radarsim.app.result import Result
-    from radarsim.app.run import run
+    from radarsim.app.run import claims, run
+    from radarsim.app.run import stored_result as load
+    from radarsim.app.sensitivity import sensitivity
+    from radarsim.app.solve import solve
     from radarsim.app.tune import tune
     from radarsim.errors import ConfigError, RadarsimError
 
@@ -53,8 +58,9 @@ __all__ = [
 _HOMES = {
     **{"judge": "app.judge:judge", "tune": "app.tune:tune", "run": "app.run:run", "Result": "app.result:Result"},
     **{name: f"app.own_data:{name}" for name in ("fit", "plots", "read_plots", "register", "simulate", "track")},
-    **{name: f"app.python:{name}" for name in ("chart", "check", "claims", "compare")},
-    **{name: f"app.python:{name}" for name in ("load", "readings", "sensitivity", "solve")},
+    **{"chart": "app.compare:chart", "check": "app.outlook:check", "claims": "app.run:claims"},
+    **{"compare": "app.compare:compare", "load": "app.run:stored_result", "readings": "app.readings:readings"},
+    **{"sensitivity": "app.sensitivity:sensitivity", "solve": "app.solve:solve"},
     **{"ConfigError": "errors:ConfigError", "RadarsimError": "errors:RadarsimError"},
 }
 

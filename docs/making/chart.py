@@ -8,4 +8,4 @@ from radarsim.app.compare import chart
 def drawn(app, exception) -> None:
     """docs/chart/ beside the page, when it is built as HTML."""
     if exception is None and app.builder.format == "html":
-        chart([], Path(app.outdir, "docs"), formats=())
+        chart(out=Path(app.outdir, "docs"), figures=False)

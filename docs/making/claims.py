@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from radarsim.app import python, readings, run, stored
+from radarsim.app import readings, run, stored
 from radarsim.errors import StoreError
 from radarsim.report.claims import NUMBERS, judge, page
 
@@ -46,7 +46,7 @@ def kept() -> list[dict]:
 def rows(results: Path = RESULTS) -> tuple[list[dict], bool]:
     """Rows of all claims, and whether they are those of a full reproduction, with every part of each."""
     with suppress(StoreError):  # of another version, or damaged: no full reproduction
-        full = run.claims((), results)
+        full = run.claims(out=results).rows
         if all(row["class"] != judge.NOT_RUN for row in full):
             return full, True
     return kept(), False
@@ -71,7 +71,7 @@ def _asked(row: dict, asks: dict[tuple[str, str], str]) -> Iterator[str]:
 def drawn(app, exception) -> None:
     """The figure of claims beside the page, when it is built as HTML."""
     if exception is None and app.builder.format == "html":
-        python.Claims(rows()[0]).draw(Path(app.outdir, "docs", FIGURE))
+        run.Claims(rows()[0]).draw(Path(app.outdir, "docs", FIGURE))
 
 
 def main(results: str) -> None:

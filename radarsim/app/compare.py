@@ -10,13 +10,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from radarsim.app import stored
-from radarsim.app.configs import RESULTS, Config, Overrides, command, directory, load
+from radarsim.app import configs, stored
+from radarsim.app.configs import RESULTS, Config, Overrides, command, load
 from radarsim.app.result import Result, captions, names_in, recorded_case
 from radarsim.app.run import namesakes
 from radarsim.app.shown import Shown
 from radarsim.config.experiment import Case, Experiment, canonical, digest, world
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, argument
 from radarsim.language import called
 from radarsim.report import compare as sides
 from radarsim.report import files
@@ -82,32 +82,38 @@ Source = str | os.PathLike[str] | Result
 
 
 def compare(
-    sources: Sequence[Source] | Mapping[str, Source],
-    out: str | os.PathLike[str] | None = RESULTS,
-    *,
-    formats: Sequence[str] = ("svg", "png"),
+    *sources: Source | Mapping[str, Source],
+    out: str | os.PathLike[str] | None = None,
+    figures: bool | str | Sequence[str] = True,
     width_mm: float | None = None,
 ) -> Comparison:
-    """Compare results: tables, figures and one page in `out`/compare; nothing is simulated.
+    """Compare results with the first one: differences with 95 % intervals, on common axes.
 
-    A source is a result, the folder of one, or a config (path, or name of a shipped one), whose result is looked up
-    under `out`; a mapping gives each a name. The others are compared with the first. Without `out`, results are read
-    from results/, and nothing is written. width_mm overrides the width of the figures' files. Raises ConfigError where
-    a result is missing, with the command that computes it, or where results have nothing in common; StoreError where a
-    stored table is damaged.
+    Each source is a result of `run` or `load`, a config with a stored result in results/ or `out`, or the folder of a
+    result; a single mapping gives them by name. out: directory for table, page and figures. If two results use the same
+    measurements and the same baseline filter, the difference is paired.
+
+    `table` is comparison.csv: a row for each quantity, filter, component and common time. Raises ConfigError where
+    results are missing or have nothing in common, StoreError where a stored one is damaged.
+
+    >>> import radarsim
+    >>> mine = radarsim.run("rls2", realisations=2000, overrides={"radar.sigma_velocity_mps": 4})
+    >>> compare({"paper": radarsim.run("rls2", realisations=2000), "mine": mine}).table["label"].unique().tolist()
+    ['mine']
     """
-    if out is not None:
-        directory(out)
-    if len(sources) < 2:
-        raise ConfigError(f"compare: takes two results or more, got {len(sources)}")
-    given = list(sources.values()) if isinstance(sources, Mapping) else sources
+    configs.check(out=out, figures=figures, width_mm=width_mm)
+    formats, mapping = configs.formats(figures), next(iter(sources), None) if len(sources) == 1 else None
+    names = list(mapping) if isinstance(mapping, Mapping) else None
+    given: Sequence[Any] = list(mapping.values()) if isinstance(mapping, Mapping) else sources
+    if len(given) < 2:
+        raise ConfigError(f"compare: takes two results or more, got {len(given)}")
     if wrong := [one for one in given if not isinstance(one, Result | str | os.PathLike)]:
         raise ConfigError(
             *(f"compare: must be a result, a config or the folder of a result, got {one!r}" for one in wrong)
         )
     runs = _found(given, Path(RESULTS if out is None else out))
-    if isinstance(sources, Mapping):
-        runs = [replace(run, label=str(name)) for run, name in zip(runs, sources, strict=True)]
+    if names:
+        runs = [replace(run, label=str(name)) for run, name in zip(runs, names, strict=True)]
     runs = _named(runs)
     every = [_sides(run) for run in runs]
     pairs, alone = sides.pairs(_labelled(every))
@@ -326,23 +332,26 @@ class DopplerChart(Shown):
 
 
 def chart(
-    configs: Sequence[Config],
-    out: str | os.PathLike[str] | None = RESULTS,
-    *,
+    *given: Config,
     overrides: Overrides = (),
-    formats: Sequence[str] = ("svg", "png"),
+    out: str | os.PathLike[str] | None = None,
+    figures: bool | str | Sequence[str] = True,
     width_mm: float | None = None,
     progress: Callable[[int, int, int], None] | None = None,
 ) -> DopplerChart:
-    """Draw the chart of the configs' study, with their cases marked, into `out`/chart; nothing is simulated.
+    """Chart the gain by Doppler for all radars, with the configs' radars marked; simulates nothing.
 
-    Without configs: the study that has a chart, with its paper's own radars. A config given twice counts once. Without
-    `out` nothing is written. width_mm overrides the width of the figures' files. progress is called for each figure.
-    Raises ConfigError where the study has no chart, the configs belong to several studies, or two have one name.
+    Without configs, shows the five radars of the first paper. `table` is chart.csv: a row for each case and filter,
+    with the gains in the long run, per cent. out: directory for table, figures and the page with sliders. Raises
+    ConfigError if the configs' study has no chart.
+
+    >>> chart("rls2").figures[0]
+    'gain_against_time'
     """
-    if out is not None:
-        directory(out)
-    once = [config for n, config in enumerate(configs) if config not in configs[:n]]
+    checked, formats = configs.check(overrides, out=out, figures=figures, width_mm=width_mm), configs.formats(figures)
+    if checked and not given:
+        raise ConfigError(f"{argument('overrides', '--set')}: without a config there is nothing to change")
+    once = [config for n, config in enumerate(given) if config not in given[:n]]
     experiments = [load(config, overrides) for config in once]
     if faults := namesakes(experiments):
         raise ConfigError(*faults)

@@ -322,6 +322,11 @@ def _is_number(value: object) -> TypeGuard[SupportsFloat]:
     return isinstance(value, SupportsFloat) and not isinstance(value, bool) and not getattr(value, "ndim", 0)
 
 
+def is_pair(given: object, kind: Any = SupportsFloat) -> bool:
+    """Whether an argument is two numbers."""
+    return isinstance(given, Iterable) and len(two := list(given)) == 2 and all(isinstance(one, kind) for one in two)
+
+
 def _number(name: str, value: object, most: float, unit: str = "") -> list[str]:
     number = float(value) if _is_number(value) else math.nan
     if value is None or (0 < number <= most and math.isfinite(number)):

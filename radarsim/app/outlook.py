@@ -5,12 +5,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsIndex
 
 import numpy as np
 
-from radarsim.app.configs import CaseWork
-from radarsim.app.run import case_result, check_precision, table_of, tailed, unknown
+from radarsim.app import configs
+from radarsim.app.configs import CaseWork, Config, Overrides
+from radarsim.app.run import case_result, check_precision, merged, table_of, tailed, unknown
 from radarsim.app.shown import Shown
 from radarsim.config.experiment import Experiment
 from radarsim.engine.blocks import Total
@@ -117,21 +118,35 @@ def about(seconds: float) -> str:
     return tr("under a second") if seconds < 1 else tr("about {time}", time=clock(seconds))
 
 
-def outlook(
-    experiment: Experiment,
-    threads: int | None = None,
+def check(
+    config: Config,
+    *,
+    overrides: Overrides = (),
+    realisations: float | None = None,
+    seed: int | None = None,
     precision: float | None = None,
-    progress: Callable[[int, int, int], None] | None = None,
     of: str = "sigma",
-    out: str | os.PathLike[str] | None = None,
     share: tuple[int, int] | None = None,
+    threads: int | None = None,
+    out: str | os.PathLike[str] | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
 ) -> Outlook:
-    """Prepare every case and predict the cost of the whole, or of a share; less what is stored in `out`.
+    """Forecast a run: cases, filters, realisations, seconds on one thread, memory in MB.
 
-    A few realisations are timed after compilation, unless the study knows that all are short; then the compiler is not
-    loaded. With a precision, in per cent, for a kind of quantity, a case ends when that is reached, or at its N.
-    progress(done, total, 0) is called after each case.
+    The arguments are those of `run`. share: the share of one of several machines, such as (2, 3) for the second of
+    three. out: a directory whose stored blocks are not counted. With a precision a case ends when that is reached, or
+    at its N. A few realisations are timed after compilation, unless the study knows that all are short; then the
+    compiler is not loaded. progress(done, total, 0) is called after each case. Raises ConfigError for a wrong config or
+    argument.
+
+    >>> outlook = check("range_doppler", realisations=1e4)
+    >>> outlook.table.columns.tolist()[:4]
+    ['case', 'filters', 'scans', 'realisations']
     """
+    overrides = configs.check(overrides, threads=threads, precision=precision, out=out)
+    if share is not None and not (configs.is_pair(share, SupportsIndex) and 1 <= share[0] <= share[1]):
+        raise ConfigError(f"share: must be two whole numbers i, n with 1 ≤ i ≤ n, got {share!r}")
+    experiment = configs.load(config, merged(overrides, realisations, seed))
     threads = available_cores() if threads is None else max(threads, 1)
     if precision is not None:
         check_precision([experiment], precision, of)

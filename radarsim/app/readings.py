@@ -9,6 +9,7 @@ at a border.
 
 import csv
 import io
+import os
 import tempfile
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import ExitStack, suppress
@@ -22,7 +23,7 @@ from radarsim.app.run import Progress, RunOptions, SimulatedCases
 from radarsim.app.shown import Shown
 from radarsim.app.stored import CLASSES, PLACE, stored_classes, stored_readings
 from radarsim.config.experiment import Case, Experiment
-from radarsim.engine.run import Signals
+from radarsim.engine.run import Either, Signals, Stop, TimeLimit
 from radarsim.errors import ConfigError, StoreError, TargetUnmet, argument
 from radarsim.language import tr
 from radarsim.report import files
@@ -48,6 +49,7 @@ from radarsim.report.drawing import Figure
 from radarsim.report.precision import looks
 from radarsim.report.tables import read_rows
 from radarsim.studies import registry
+from radarsim.threads import limited
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -404,7 +406,7 @@ def _unknown(name: str, every: Mapping[str, Paper], owner: Mapping[str, str]) ->
     return f"readings: no paper or claim {name!r}; {allowed}"
 
 
-def readings(
+def judged(
     wanted: Sequence[Asked],
     *,
     out: str | Path,
@@ -441,6 +443,40 @@ def readings(
         made.files = _write(made, figures, progress)
         made.outdated = _outdated(made)
     return made
+
+
+def readings(
+    *names: str,
+    realisations: float | None = None,
+    decide: bool = False,
+    threads: int | None = None,
+    time_limit: float | Stop | None = None,
+    out: str | os.PathLike[str] | None = None,
+    figures: bool = True,
+    progress: Progress | None = None,
+    stop: Signals | None = None,
+) -> Readings:
+    """Judge claims (P1.4) or whole papers (P1) under every reading that the papers allow; default: all.
+
+    Readings are judged exactly where possible, otherwise by runs of `realisations`, by default the number that the
+    paper's readings declare. decide: extend the runs, up to `realisations`, until each claim is decided. time_limit is
+    in seconds. out: directory for readings.csv, a figure for each claim, and the stored runs.
+
+    `table` is readings.csv: a row for each claim, reading and part. Raises ConfigError for unknown names, TargetUnmet
+    if the time did not suffice.
+
+    >>> readings("P1.4")
+    P1.4 depends on: holds in 4 of 6 readings; depends on: start
+    """
+    configs.check(threads=threads, time_limit=time_limit, out=out, figures=figures)
+    configs.texts(names)
+    wanted = asked(names)
+    limit = time_limit if time_limit is None or callable(time_limit) else TimeLimit(time_limit)
+    options: dict[str, Any] = {"realisations": configs.whole(realisations), "decide": decide}
+    options |= {"progress": progress, "figures": figures, "stop": stop, "write": out is not None}
+    with tempfile.TemporaryDirectory(prefix="radarsim-") as folder, limited(threads):
+        means = RunOptions(None, threads, Either(stop, limit))
+        return judged(wanted, out=Path(folder if out is None else out), options=means, **options)
 
 
 def _first(of: PaperReadings, realisations: int | None, decide: bool) -> int:

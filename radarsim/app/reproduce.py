@@ -224,7 +224,7 @@ def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
     from radarsim.report.claims import page
 
     html.write(Path(out))  # two processes may have written it at once, one without the other's run
-    rows = experiment.claims((), out)
+    rows = experiment.claims(out=out).rows
     classes, _ = page.counts(rows)
     longest = max(done, key=lambda one: one.seconds)
     failed = [one.stem for one in done if one.faults]

@@ -12,7 +12,7 @@ import sys
 import tempfile
 import time
 import unicodedata
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from radarsim.app import configs
 from radarsim.app.configs import CaseWork, Config, Overrides, command, load, repeated, shipped
+from radarsim.app.shown import Shown
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine import run as stopping
 from radarsim.engine.executors import Executor
@@ -28,6 +29,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.engine.run import Collected, Shared, Signals, Stop, collect, share, stored
 from radarsim.engine.store import Stock, available_cores, stock
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
+from radarsim.language import tr
 from radarsim.report import files
 from radarsim.report.quantities import GAIN, SIGMA, Quantity
 from radarsim.studies import registry
@@ -35,8 +37,11 @@ from radarsim.studies.registry import study
 from radarsim.threads import limited
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from radarsim.app.result import Result
     from radarsim.report.claims import PaperClaims
+    from radarsim.report.drawing import Figure
     from radarsim.report.precision import Cell, Table
 
 
@@ -518,10 +523,25 @@ def merged(overrides: Overrides, realisations: float | None = None, seed: int | 
     return (*configs.reading.texts(overrides), *(f"{key}={value}" for key, value in given.items() if value is not None))
 
 
-def from_store(experiment: Experiment, out: str | os.PathLike[str], overrides: Sequence[str]) -> "Result":
-    """The result from stored blocks; with as many realisations as the last run, unless overrides say otherwise."""
+def stored_result(
+    config: Config, *, out: str | os.PathLike[str] = configs.RESULTS, overrides: Overrides = ()
+) -> "Result":
+    """Load the stored result of an experiment from `out`; computes and writes nothing.
+
+    config and overrides as for `run`; of as many realisations as the last run reported, unless overrides say. `write`
+    of the result makes tables, figures and report, as `radarsim report` does. Raises ConfigError, with the command to
+    run, if something is missing.
+
+    >>> import radarsim, tempfile
+    >>> with tempfile.TemporaryDirectory() as out:
+    ...     ran = radarsim.run("rls2", realisations=2000, out=out, figures=False)
+    ...     loaded = radarsim.load("rls2", out=out)
+    >>> loaded.curves.equals(ran.curves)
+    True
+    """
     configs.directory(out)
-    asked = experiment
+    overrides = merged(overrides)
+    experiment = asked = load(config, overrides)
     if not any(override.split("=")[0].strip() == "realisations" for override in overrides):
         experiment = as_last_run(experiment, Path(out))
     held, missing = SimulatedCases(), []
@@ -672,18 +692,66 @@ def _keys(ids: Iterable[str]) -> list[str]:
     return sorted({claim.partition(".")[0] for claim in ids})
 
 
-def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, Any]]:
-    """Rows of the claims, as stored under `out` or as not run; with names: of these configs, papers (P1) and claims
-    (P1.4).
+class Claims(Shown):
+    """Claims of papers and their verdicts; one row for each measured part of a claim."""
 
-    For a config that judges none: those of its study's paper, with the reason why it does not judge each. Each row has
-    the columns of claims.csv and `config`. Raises ConfigError for unknown names.
+    def __init__(self, rows: Sequence[dict[str, Any]]):
+        self.rows = tuple(rows)
+
+    @property
+    def table(self) -> "pd.DataFrame":
+        """The columns of claims.csv, and `config`, which judges the claim."""
+        from radarsim.report.tables import read_rows
+
+        return read_rows(self.rows, self.rows[0] if self.rows else ())
+
+    @property
+    def _described(self) -> "Mapping[str, Figure]":
+        from radarsim.report.claims import page
+
+        drawn = page.figure(self.rows)
+        return {} if drawn is None else {"claims": drawn}
+
+    def _said(self) -> list[str]:
+        from radarsim.report.claims import page
+
+        lines = [page.counted(self.rows)] if self.rows else []
+        for parts in page.grouped(self.rows):
+            verdict = page.verdict_of(parts).replace("*", "")
+            lines.append(f"{parts[0]['claim']} {verdict}: {tr(parts[0]['statement'])}")
+        return lines
+
+    def draw(self, path: str | os.PathLike[str]) -> None:
+        """Write the figure to a file. Raises ConfigError if the name has no known format or no claim is judged."""
+        from radarsim.report.figures import save
+
+        kind, drawn = Path(path).suffix[1:].lower(), self._described
+        if kind not in configs.FORMATS:
+            raise ConfigError(f"{path}: must end in {', '.join(f'.{one}' for one in configs.FORMATS)}")
+        if not drawn:
+            raise ConfigError(f"{path}: no claim is judged here, so there is nothing to draw")
+        files.replace_all(Path(path).parent, {Path(path).name: save(drawn["claims"], (kind,))[kind]})
+
+
+def claims(*names: str, out: str | os.PathLike[str] = configs.RESULTS) -> Claims:
+    """List the papers' claims with verdicts from the results stored in `out`; computes nothing.
+
+    names are claims (P1.3), papers (P1) or configs; default: all claims of all papers. `table` has a row for each
+    measured part of a claim: measured value, 95 % interval, expected value, verdict. Claims without stored results are
+    listed as not run; for a config that judges none, those of its study's paper, with the reason why it does not judge
+    each. Raises ConfigError for unknown names.
+
+    >>> found = claims("P1.3", out="/nowhere")
+    >>> found.table["verdict"].tolist()
+    ['not run']
     """
     from radarsim.app import readings
     from radarsim.app import stored as kept
     from radarsim.report.claims.judge import listed, unstored
     from radarsim.report.claims.page import with_classes
 
+    configs.check(out=out)
+    configs.texts(names)
     wanted = [name for name in names if _meant_as_a_claim(name)]
     known = [claim.id for paper in papers(_keys(wanted)) for claim in paper.claims] if wanted else []
     if _unknown_claims(wanted, known):  # with the list of all claims
@@ -706,4 +774,4 @@ def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, 
     own = [row for row in listed(every, held) if row["claim"] in shown]
     rows += [row for row in own if (row["claim"], row["config"]) not in there]
     open_ = [(paper.readings, paper.claims) for paper in readings.papers(keys).values()]
-    return with_classes(rows, kept.classes_of(open_, Path(out)))
+    return Claims(with_classes(rows, kept.classes_of(open_, Path(out))))

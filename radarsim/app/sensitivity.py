@@ -17,9 +17,9 @@ import numpy as np
 from radarsim.app import configs, quantities
 from radarsim.app.configs import CaseWork
 from radarsim.app.quantities import UNPAIRED, Asked
-from radarsim.app.run import case_result
+from radarsim.app.run import case_result, merged
 from radarsim.app.shown import Shown
-from radarsim.app.solve import Cases, Config, without_one
+from radarsim.app.solve import Cases, Config, place, without_one
 from radarsim.config import fields
 from radarsim.config.check import Label, label
 from radarsim.config.experiment import Case
@@ -114,21 +114,33 @@ class Sensitivity(Shown):
 def sensitivity(
     config: Config,
     *,
-    overrides: configs.Overrides = (),
     at_s: float | None = None,
     at_k: int | None = None,
     of: str | None = None,
     component: str | None = None,
     case: str | None = None,
+    overrides: configs.Overrides = (),
     realisations: float | None = None,
+    seed: int | None = None,
+    out: str | os.PathLike[str] | None = None,
+    figures: bool | str | Sequence[str] = True,
+    width_mm: float | None = None,
     progress: Callable[[int, int, int], None] | None = None,
 ) -> Sensitivity:
-    """The changes of a quantity, or of σ and gain, at a time, at a scan, or at the time of the last scan, for +10 % of
-    each numeric key, for −10 % where the config refuses more.
+    """Show what +10 % of each key changes in σ and gain, or in another quantity `of`; largest effect first.
 
-    Whole numbers change by at least one. component: sorts the rows; by default the first. Raises ConfigError.
+    Taken at time at_s, s, or at scan at_k, counted from 1; default: the last scan. Rows are sorted by `component`, by
+    default the first. `table` has a row for each key, filter and component: the value, in the component's unit or per
+    cent, and its change, in per cent or points, with a 95 % interval if simulated. out: directory for table and figure.
+    Raises ConfigError.
+
+    >>> found = sensitivity("rls2", at_s=60)
+    >>> first = found.table.iloc[0]
+    >>> print(first["key"], first["filter"], first["component"], f"{first['sigma_change_percent']:.2f}")
+    radar.detection_probability r r 34.40
     """
-    cases = Cases(config, configs.reading.texts(overrides), case)
+    checked = configs.check(overrides, out=out, figures=figures, width_mm=width_mm, **place(at_s, at_k))
+    cases, count = Cases(config, merged(checked, None, seed), case), configs.whole(realisations)
     study = registry.study(cases.base.study)
     every = registry.quantities(cases.base.study, cases.base.spec)
     kinds = tuple(one for one in every if quantities.planned(one)) or every[:1]
@@ -142,7 +154,7 @@ def sensitivity(
     axes = study.prepare(cases.base).axes
     timed = study.exact_errors and at_s is None and at_k is None and quantities.planned(kinds[0])
     asked = Asked(kinds[0], at_s=float(axes.t_s[-1]) if timed else at_s, at_k=at_k)
-    look = Look(asked, kinds, axes, parts, int(realisations or cases.base.realisations))
+    look = Look(asked, kinds, axes, parts, count or cases.base.realisations)
     base = look.of(cases.base)
     if not np.isfinite(base.whole[0]).any():
         raise ConfigError("there is no estimate there")
@@ -164,19 +176,9 @@ def sensitivity(
     shown.sort(key=lambda row: effect[row["key"]], reverse=True)
     labels = {str(row["key"]): named(cases.base.spec, str(row["key"])) for row in shown}
     silent = [name for name, own in zip(axes.filters, base.whole[0], strict=True) if not np.isfinite(own).any()]
-    return Sensitivity(
-        *(
-            cases.stem,
-            kinds,
-            leading,
-            when(asked) if scans else "",
-            tuple(shown),
-            tuple(idle),
-            tuple(silent),
-            tuple(apart),
-        ),
-        *(left_out, labels),
-    )
+    which = cases.stem, kinds, leading, when(asked) if scans else ""
+    found = Sensitivity(*which, tuple(shown), tuple(idle), tuple(silent), tuple(apart), left_out, labels)
+    return found if out is None else write(found, out, configs.formats(figures), width_mm)
 
 
 def _parts(of: Quantity, case: Case) -> tuple[bool, tuple[tuple[str, str], ...]]:

@@ -13,12 +13,12 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, SupportsFloat, TypeVar
 
-from radarsim.app import quantities
+from radarsim.app import configs, quantities
 from radarsim.app.configs import CaseWork, Config, load
 from radarsim.app.quantities import UNKNOWN, UNPAIRED, Asked, Wanted
-from radarsim.app.run import case_result
+from radarsim.app.run import case_result, merged
 from radarsim.app.shown import Shown
 from radarsim.config import fields
 from radarsim.config.check import label
@@ -672,42 +672,72 @@ ROUGHLY = 1e-4  # relative width to which a rough root is closed
 DOUBT = 0.01  # of the quantity: a rough one that comes this near the target without a root is not trusted
 
 
+def place(at_s: float | None, at_k: int | None) -> dict[str, object]:
+    """The time or scan, where given. Raises ConfigError for both at once."""
+    if at_s is not None and at_k is not None:
+        both = f"{argument('at_s', '--at')} and {argument('at_k', '--at-k')}"
+        raise ConfigError(f"{both} do not go together: a time or a scan")
+    if isinstance(at_k, SupportsFloat) and not float(at_k).is_integer():
+        raise ConfigError(f"{argument('at_k', '--at-k')}: must be a whole number, that of a scan, got {at_k:g}")
+    return {name: value for name, value in (("at_s", at_s), ("at_k", at_k)) if value is not None}
+
+
 def solve(
     config: Config,
     key: str,
-    wanted: Wanted,
-    equals: float,
     *,
-    overrides: Sequence[str] = (),
+    equals: float,
+    filter: str | None = None,
+    at_s: float | None = None,
+    at_k: int | None = None,
     between: tuple[float, float] | None = None,
     case: str | None = None,
-    realisations: int | None = None,
+    overrides: configs.Overrides = (),
+    realisations: float | None = None,
+    seed: int | None = None,
     threads: int | None = None,
     sampled: bool = False,
     progress: Callable[[int, int, int], None] | None = None,
     notify: Callable[[str], None] | None = None,
+    **quantity: str | None,
 ) -> Answer:
-    """The value of a key at which a quantity equals `equals`, in the quantity's unit (gains and rates in per cent).
+    """Find the value of a key at which a quantity equals `equals`, in its unit; gains and rates in per cent.
 
-    between: the search range; by default the bounds of the key, or a thousandth to a thousand times its value if it has
-    no two bounds. realisations: for each sampled value, by default the config's. sampled: simulate even if the exact
-    value is known. notify is called with a line on a search that will take some seconds.
+    The quantity is given as an argument named after an option of `radarsim solve`: `gain="r"` or `sigma="Vr"` of a
+    component, for the `filter`; or a rate of a filter, `lock="sequence"`, `loss="nearest"`, … It is taken at time at_s,
+    s, or at scan at_k, counted from 1; default: the last scan. between: the range of the key to search. case: the case,
+    if the config has several. realisations: the number for each simulated value, if nothing exact is known; sampled:
+    simulate even if it is. notify is called with a line on what a search of some seconds will do.
 
-    Raises ConfigError for a wrong config, key, filter or component, and for a key without effect.
+    `value` lies between `lo` and `hi` (95 %; equal where `exact`). If the target cannot be attained, value is None, and
+    limit, at limit_at, is the nearest attainable value. Raises ConfigError for a wrong config, key, filter or quantity.
+
+    >>> answer = solve("rls2", "radar.sigma_velocity_mps", gain="r", filter="r+Vr", at_s=60, equals=30)
+    >>> print(f"{answer.value:.4f} {answer.unit}", answer.exact)
+    13.7212 m/s True
     """
+    named = {name: value for name, value in quantity.items() if value is not None}
+    if len(named) != 1:
+        given = ", ".join(named) or "none"
+        examples = f"{argument('sigma=…', '--sigma')}, {argument('gain=…', '--gain')}"
+        raise ConfigError(f"name one quantity, as `radarsim solve --help` lists them: {examples}, …; got {given}")
+    texts = merged(configs.check(overrides, threads=threads, equals=equals, **place(at_s, at_k)), None, seed)
+    if not isinstance(key, str):
+        raise ConfigError(f"key: must be text, got {key!r}")
+    if between is not None and not configs.is_pair(between):
+        raise ConfigError(f"between: must be two rising numbers, got {between!r}")
     if not math.isfinite(equals):
         raise ConfigError(f"{argument('equals')}: must be a finite number, got {equals:g}")
-    cases = Cases(config, tuple(overrides), case)
+    ((name, component),) = named.items()
+    cases, count = Cases(config, texts, case), configs.whole(realisations)
     found = fields.find(cases.base.spec, key)
-    quantity = quantities.checked(wanted, cases.base)
-    axes = quantities.labels(quantity, cases.base)
-    quantity = quantities.resolved(quantity, axes)
+    wanted = quantities.checked(Wanted(name, filter, component, at_s, at_k), cases.base)
+    axes = quantities.labels(wanted, cases.base)
+    wanted = quantities.resolved(wanted, axes)
     over = range_of(found, key, between)
-    curve = Curve(cases, key, quantity, threads, progress, realisations or cases.base.realisations)
+    curve = Curve(cases, key, wanted, threads, progress, count or cases.base.realisations)
     now = found[0].value if len({one.value for one in found}) == 1 else None
-    asked = Question(
-        cases, key, quantity, equals, over, now, quantities.unit(quantity, axes), tuple(overrides), realisations
-    )
+    asked = Question(cases, key, wanted, equals, over, now, quantities.unit(wanted, axes), texts, count)
     work = _exactly if not sampled and curve.exact(axes) else by_sampling
     return work(asked, curve, notify or (lambda line: None))
 

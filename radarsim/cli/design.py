@@ -121,7 +121,8 @@ def solve(
       radarsim solve sonar_clutter sensor.detection_probability --loss nearest --equals 5 --between 0.6 1 \\
           --case "sonar_clutter sensor.false_plots_per_km2=1" -n 2000
     """
-    from radarsim.app import python, shown
+    from radarsim.app import shown
+    from radarsim.app.solve import solve as solving
     from radarsim.cli import console, outcomes
     from radarsim.errors import TargetUnmet
 
@@ -130,7 +131,7 @@ def solve(
     asked |= {"overrides": overrides, "realisations": realisations, "seed": seed, "threads": threads}
     with console.Progress(key, quiet=as_json, what="values") as progress:
         said = None if as_json else console.say_aside
-        answer = python.solve(config, key, equals=equals, progress=progress.update, notify=said, **asked)
+        answer = solving(config, key, equals=equals, progress=progress.update, notify=said, **asked)
     if as_json:
         click.echo(shown.text(shown.answer(answer)))
     elif answer.value is not None:
@@ -230,11 +231,11 @@ def chart(
       radarsim chart                              the first paper's five radars
       radarsim chart rls2 --set radar.sigma_velocity_mps=5
     """
-    from radarsim.app import python, shown
+    from radarsim.app import compare, shown
     from radarsim.cli import console, outcomes
 
     with console.Progress("chart", quiet=as_json, what="figures") as progress:
-        drawn = python.chart(*configs, overrides=overrides, out=out, progress=progress.update, **drawing.arguments)
+        drawn = compare.chart(*configs, overrides=overrides, out=out, progress=progress.update, **drawing.arguments)
     if as_json:
         click.echo(shown.text(shown.drawn(drawn)))
     else:
@@ -282,13 +283,14 @@ def sensitivity(
       radarsim sensitivity rls2 --at 60 --component Vr
       radarsim sensitivity discriminator --of lock -n 2000
     """
-    from radarsim.app import python, shown
+    from radarsim.app import sensitivity as finding
+    from radarsim.app import shown
     from radarsim.cli import console, outcomes
 
     asked: dict[str, Any] = {"at_s": at_s, "at_k": at_k, "of": of, "component": component, "case": case}
     asked |= {"overrides": overrides, "realisations": realisations, "seed": seed}
     with console.Progress(config, quiet=as_json, what="keys") as progress:
-        found = python.sensitivity(config, out=out, progress=progress.update, **asked, **drawing.arguments)
+        found = finding.sensitivity(config, out=out, progress=progress.update, **asked, **drawing.arguments)
     if as_json:
         click.echo(shown.text(shown.sensitivity(found)))
     else:

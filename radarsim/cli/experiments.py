@@ -317,8 +317,9 @@ def check(
     """
     _refuse_together(shard, precision, None, None)
     _refuse_of_nothing(of, precision)
-    from radarsim.app import python, shown
+    from radarsim.app import outlook as overview
     from radarsim.app import run as simulation
+    from radarsim.app import shown
     from radarsim.cli import console, outcomes
 
     asked: dict[str, Any] = {"precision": precision, "of": of, "share": shard, "out": out}
@@ -327,7 +328,7 @@ def check(
     _say_code(loaded, as_json)
     for one in loaded:
         with console.Progress(one.stem, quiet=as_json, what="cases") as bar:
-            outlook = python.check(one, progress=bar.update, **asked)
+            outlook = overview.check(one, progress=bar.update, **asked)
         made.append(shown.outlook(one, outlook))
         if not as_json:
             outcomes.print_outlook(one, outlook)
@@ -361,13 +362,12 @@ def report(
       radarsim report rls2
       radarsim report rls2 --json --no-figures
     """
-    from radarsim.app import python
     from radarsim.app import run as simulation
 
     overrides = simulation.merged(overrides, realisations, seed)
 
     def written(one: "Experiment", progress: object) -> "Result":
-        result = python.load(one, out=out, overrides=overrides)
+        result = simulation.stored_result(one, out=out, overrides=overrides)
         result.write(out, **drawing.arguments)
         return result
 
@@ -404,11 +404,11 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
       radarsim claims --json
       radarsim claims --figure claims.svg
     """
-    from radarsim.app import python, shown
     from radarsim.app import run as simulation
+    from radarsim.app import shown
     from radarsim.cli import outcomes
 
-    found = python.claims(*names, out=out)
+    found = simulation.claims(*names, out=out)
     rows = found.rows
     if figure is not None:
         found.draw(figure)
@@ -441,12 +441,13 @@ def compare(sources: tuple[str, ...], out: str, drawing: group.Drawing, as_json:
       radarsim compare rls2.yaml mine.yaml --json
       radarsim compare results/rls2 results-before/rls2
     """
-    from radarsim.app import python, shown
+    from radarsim.app import compare as comparing
+    from radarsim.app import shown
     from radarsim.cli import outcomes
 
     if len(sources) < 2:
         raise click.UsageError(f"compare takes two results or more, got {len(sources)}")
-    compared = python.compare(*sources, out=out, **drawing.arguments)
+    compared = comparing.compare(*sources, out=out, **drawing.arguments)
     if as_json:
         click.echo(shown.text(shown.compared(compared)))
     else:
@@ -501,14 +502,14 @@ def readings(
 
     limit = run.TimeLimit(time_limit) if time_limit else None
     with run.Signals() as stop:
-        from radarsim.app import python, shown
         from radarsim.app import readings as app
+        from radarsim.app import shown
         from radarsim.cli import console, outcomes
 
         asked: dict[str, Any] = {"realisations": realisations, "decide": decide, "threads": threads}
         asked |= {"time_limit": limit, "out": out, "figures": not no_figures, "stop": stop}
         with console.Progress("readings", quiet=quiet or as_json or markdown) as progress:
-            done = python.readings(*names, progress=progress.update, **asked)
+            done = app.readings(*names, progress=progress.update, **asked)
         if as_json:
             click.echo(shown.text(app.documents(done)))
         elif markdown:

@@ -10,7 +10,7 @@ import unicodedata
 import pytest
 
 import radarsim
-from radarsim.app import configs, doctor, python, run
+from radarsim.app import configs, doctor, run
 from radarsim.app.configs import load, new
 from radarsim.config.document import SHIPPED
 from radarsim.errors import ConfigError, StoreError
@@ -92,7 +92,7 @@ def test_the_command_of_a_result_repeats_it(tmp_path, monkeypatch, options, endi
 
 def test_the_command_of_a_report_is_of_what_is_reported(tmp_path):
     radarsim.run("rls2", realisations=2000, out=tmp_path, figures=False)
-    python.load("rls2", out=tmp_path).write(tmp_path, figures=False)
+    run.stored_result("rls2", out=tmp_path).write(tmp_path, figures=False)
     assert record(tmp_path / "rls2")["command"] == "radarsim run rls2 -n 2000"
 
 

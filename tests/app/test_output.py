@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 from markupsafe import escape
 
-from radarsim.app import python, run
 from radarsim.app import result as output
+from radarsim.app import run
 from radarsim.app.configs import load
 from radarsim.app.result import unnamed
 from radarsim.report import files, html
@@ -211,14 +211,14 @@ def test_figures_have_the_width_asked_for_their_captions_and_what_they_were_made
     assert f"rls2, config {record['resolved_sha256']}" in svg
     assert "Root-mean-square error of the range" in svg
     for width in (85, 175):
-        result = python.load(first.experiment, out=tmp_path)
+        result = run.stored_result(first.experiment, out=tmp_path)
         result.write(tmp_path, ("svg",), width)
         svg = (folder / "figures" / "sigma_r.svg").read_text()
         points = float(re.search(r'<svg[^>]* width="([\d.]+)pt"', svg)[1])
         assert points / 72 * 25.4 == pytest.approx(width, abs=0.05)
         assert "7.5px" in svg  # as large as at any other width
     assert result.written.removed == ()
-    kept = python.load(first.experiment, out=tmp_path).write(tmp_path, ("pdf",))
+    kept = run.stored_result(first.experiment, out=tmp_path).write(tmp_path, ("pdf",))
     assert "figures/sigma_r.svg" in kept.removed
     assert not (folder / "figures" / "sigma_r.svg").exists()
 

@@ -32,7 +32,7 @@ def table(out):
 def first(tmp_path_factory):
     """The first paper under all its readings."""
     out = tmp_path_factory.mktemp("results")
-    return out, app.readings(app.asked(["P1"]), out=out, figures=False)
+    return out, app.judged(app.asked(["P1"]), out=out, figures=False)
 
 
 def test_the_table_has_a_column_a_choice_and_a_row_a_part(first):
@@ -160,7 +160,7 @@ def test_the_readings_agree_with_the_stored_run_of_the_shipped_config(first, tmp
 def test_other_claims_keep_their_rows(first):
     out, _ = first
     before = table(out)
-    app.readings(app.asked(["P1.4"]), out=out, figures=False)
+    app.judged(app.asked(["P1.4"]), out=out, figures=False)
     assert table(out) == before
 
 
@@ -175,14 +175,14 @@ def test_unknown_names_say_what_is_allowed():
 
 def test_no_realisations_are_refused(tmp_path):
     with pytest.raises(ConfigError, match=r"^realisations: must be >= 1, got 0"):
-        app.readings(app.asked(["P3.8"]), out=tmp_path, realisations=0, figures=False)
+        app.judged(app.asked(["P3.8"]), out=tmp_path, realisations=0, figures=False)
 
 
 def test_a_damaged_table_is_reported(tmp_path):
     (tmp_path / "readings").mkdir()
     (tmp_path / "readings/readings.csv").write_text("a,b\n1,2\n")
     with pytest.raises(StoreError, match="is no table of readings"):
-        app.readings(app.asked(["P1.4"]), out=tmp_path, figures=False)
+        app.judged(app.asked(["P1.4"]), out=tmp_path, figures=False)
 
 
 def test_the_command(tmp_path):
@@ -236,7 +236,7 @@ def ran():
 
 def test_readings_that_are_run(ran, tmp_path):
     seen = []
-    done = app.readings([ran], out=tmp_path, figures=False, progress=lambda *of: seen.append(of))
+    done = app.judged([ran], out=tmp_path, figures=False, progress=lambda *of: seen.append(of))
     (over,) = done.read[0].over
     by_name = {one.reading["sigma_velocity"]: one for one in over.under}
     assert by_name["shipped"].outcome.kind == rule.CONFIRMED
@@ -252,7 +252,7 @@ def test_readings_that_are_run(ran, tmp_path):
     computed = [of for of in seen if of[1] == total][-1]
     assert computed[0] == computed[1]  # all that was predicted is done
     again = []
-    app.readings([ran], out=tmp_path, progress=lambda *of: again.append(of))
+    app.judged([ran], out=tmp_path, progress=lambda *of: again.append(of))
     assert [of for of in again if of[1] == total][-1][2] == total  # all of it from the store
     verdicts, figures = len(over.under), 1
     assert again[-2:] == [(verdicts, verdicts, verdicts), (figures, figures, figures)]
@@ -271,7 +271,7 @@ def test_a_run_is_judged_and_let_go(ran, tmp_path, monkeypatch):
 
     monkeypatch.setattr(Plan, "_run", counted)
     wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, readings=Margins()))
-    app.readings([wanted], out=tmp_path, realisations=4000, decide=True, figures=False)
+    app.judged([wanted], out=tmp_path, realisations=4000, decide=True, figures=False)
     assert len(alive) > 2
     assert max(alive) == 0
     assert all(one() is None for one in seen)
@@ -282,7 +282,7 @@ def test_a_reading_as_shipped_measures_what_a_run_of_the_config_does(ran, tmp_pa
 
     result = radarsim.run("range_doppler", realisations=2000, out=tmp_path, figures=False)
     stored = result.tables["claims"].set_index(["claim", "what", "case"])[["measured", "exact"]]
-    done = app.readings([ran], out=tmp_path, figures=False)
+    done = app.judged([ran], out=tmp_path, figures=False)
     for part, judged in done.read[0].over[0].under[0].parts:
         assert (judged.measured, judged.exact) == tuple(stored.loc["P1.8", part.what, f"rls{part.cases[0]}"])
 
@@ -290,7 +290,7 @@ def test_a_reading_as_shipped_measures_what_a_run_of_the_config_does(ran, tmp_pa
 def test_exact_values_decide_under_a_reading_as_in_a_run(ran, tmp_path):
     """Of 60 realisations: what a run knows exactly is undecided neither in the shipped reading nor in a changed one."""
     wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, readings=Near()))
-    (over,) = app.readings([wanted], out=tmp_path, realisations=60, figures=False).read[0].over
+    (over,) = app.judged([wanted], out=tmp_path, realisations=60, figures=False).read[0].over
     assert all(judged.known and judged.n == 60 for one in over.under for _, judged in one.parts)
     assert over.outcome.kind != rule.UNDECIDED
     measured = {judged.exact for one in over.under for _, judged in one.parts}
@@ -327,15 +327,15 @@ class Margins(Near):
 
 def test_what_is_undecided_runs_on_until_it_is_decided(ran, tmp_path):
     wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, readings=Margins()))
-    few = app.readings([wanted], out=tmp_path, figures=False)
+    few = app.judged([wanted], out=tmp_path, figures=False)
     before = few.read[0].over[0]
     assert before.outcome.kind == rule.UNDECIDED
     assert before.undecided
     assert not few.left
-    little = app.readings([wanted], out=tmp_path, realisations=60, decide=True, figures=False)
+    little = app.judged([wanted], out=tmp_path, realisations=60, decide=True, figures=False)
     assert little.read[0].over[0].outcome == before.outcome  # the most is what it began with
     assert f"P1.8 not yet decided under {len(before.undecided)} readings at 60 realisations; " in little.left[0]
-    decided = app.readings([wanted], out=tmp_path, realisations=64_000, decide=True, figures=False)
+    decided = app.judged([wanted], out=tmp_path, realisations=64_000, decide=True, figures=False)
     (over,) = decided.read[0].over
     assert over.outcome.kind != rule.UNDECIDED
     assert not decided.left
@@ -357,4 +357,4 @@ def test_what_is_left_undecided_is_exit_code_3(tmp_path):
 
 def test_a_time_limit_stops_cleanly(ran, tmp_path):
     with pytest.raises(TargetUnmet, match="the same command continues"):
-        app.readings([ran], out=tmp_path, options=RunOptions(stop=lambda: "time limit reached"), figures=False)
+        app.judged([ran], out=tmp_path, options=RunOptions(stop=lambda: "time limit reached"), figures=False)

@@ -11,11 +11,19 @@ from click.testing import CliRunner
 import radarsim
 from radarsim.app import quantities
 from radarsim.app.quantities import Wanted, checked
-from radarsim.app.solve import Cases, Curve, solve
+from radarsim.app.solve import Cases, Curve
 from radarsim.cli import main
 from radarsim.errors import ConfigError
 from radarsim.report.statistics import Estimate
 from tests.studies.range_doppler import impulse
+
+
+def solve(config, key, wanted, equals, **given):
+    """`radarsim.solve` for a quantity in one piece."""
+    name, chosen, component, at_s, at_k = wanted
+    own = {"filter": chosen, name: component} if component else {name: chosen}
+    return radarsim.solve(config, key, equals=equals, at_s=at_s, at_k=at_k, **own, **given)
+
 
 GAIN = Wanted("gain", "r+Vr", "r", 60.0)
 RLS2 = {"variance": 1e-3, "sigma": (250.0, 15.0), "dt": 10.0}

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from radarsim.app import python, run, stored
+from radarsim.app import run, stored
 from radarsim.errors import StoreError
 from tests.program import command
 
@@ -21,27 +21,27 @@ def out(tmp_path, monkeypatch):
 
 def test_an_altered_verdict_is_refused_and_report_mends_it(out):
     table = out / "rls2" / "claims.csv"
-    rows = run.claims(["rls2"], out)
+    rows = run.claims("rls2", out=out).rows
     assert rows
     whole = table.read_text()
     for altered in (whole.replace(rows[0]["verdict"], "as we like it"), whole.replace(rows[0]["claim"], "P9.99"), ""):
         assert altered != whole
         table.write_text(altered)
         with pytest.raises(StoreError, match=r"rls2/claims\.csv: altered since it was written; `radarsim report`"):
-            run.claims(["rls2"], out)
-    python.load("rls2", out=out).write(out, figures=False)
-    assert run.claims(["rls2"], out) == rows
+            run.claims("rls2", out=out)
+    run.stored_result("rls2", out=out).write(out, figures=False)
+    assert run.claims("rls2", out=out).rows == rows
 
 
 def test_without_a_record_the_table_is_taken_as_it_is(out):
-    rows = run.claims(["rls2"], out)
+    rows = run.claims("rls2", out=out).rows
     (out / "rls2" / "run.json").unlink()
-    assert run.claims(["rls2"], out) == rows
+    assert run.claims("rls2", out=out).rows == rows
 
 
 def test_a_table_and_its_record_that_are_just_being_written_are_waited_for(out, monkeypatch):
     table, record = out / "rls2" / "claims.csv", out / "rls2" / "run.json"
-    rows, facts = run.claims(["rls2"], out), json.loads(record.read_text())
+    rows, facts = run.claims("rls2", out=out).rows, json.loads(record.read_text())
     table.write_text(table.read_text().replace(rows[0]["verdict"], "refuted"))
 
     def written(seconds):
@@ -49,14 +49,14 @@ def test_a_table_and_its_record_that_are_just_being_written_are_waited_for(out, 
         record.write_text(json.dumps(facts))
 
     monkeypatch.setattr(stored.time, "sleep", written)
-    assert run.claims(["rls2"], out)[0]["verdict"] == "refuted"
+    assert run.claims("rls2", out=out).rows[0]["verdict"] == "refuted"
 
 
 @pytest.mark.parametrize("text", ["[", "[]", "{}", '{"outputs": 5}'])
 def test_a_record_that_is_none_is_told(out, text):
     (out / "rls2" / "run.json").write_text(text)
     with pytest.raises(StoreError, match=r"rls2/run\.json: is no record of a run"):
-        run.claims(["rls2"], out)
+        run.claims("rls2", out=out)
 
 
 @pytest.mark.parametrize("name", ["claims.csv", "run.json"])
@@ -65,7 +65,7 @@ def test_a_file_that_cannot_be_read_is_told_in_words(out, name):
     file.unlink()
     os.symlink(name, file)
     with pytest.raises(StoreError) as caught:
-        run.claims(["rls2"], out)
+        run.claims("rls2", out=out)
     assert caught.value.lines == (f"{file}: cannot be read: Too many levels of symbolic links",)
 
 
@@ -87,7 +87,7 @@ def test_an_experiment_that_is_not_the_papers_names_the_claims_that_it_cannot_ju
     (of,) = [one for one in run.papers() if one.claims[0].id == "P1.1"]
     for key, said in (("radar.detection_probability", "0.9"), ("radar.bias_range_m", "30")):
         config.write_text(FOREIGN.replace("name: RLS 2", f"name: RLS 2, {key.partition('.')[2]}: {said}"))
-        rows = run.claims([str(config)], tmp_path)
+        rows = run.claims(str(config), out=tmp_path).rows
         assert [row["claim"] for row in rows] == [claim.id for claim in of.claims]
         assert {(row["class"], row["verdict"], row["config"]) for row in rows} == {
             ("not judged here",) * 2 + ("foreign",)
@@ -100,10 +100,10 @@ def test_an_experiment_that_is_not_the_papers_names_the_claims_that_it_cannot_ju
 
 
 def test_an_experiment_of_the_papers_that_is_not_run_says_so_and_what_it_does_not_hold(tmp_path):
-    rows = run.claims(["rls2"], tmp_path)
+    rows = run.claims("rls2", out=tmp_path).rows
     assert {row["class"] for row in rows} == {"not run"}
     run.run("rls2", realisations=2000, out=tmp_path, figures=False)
-    assert {row["claim"] for row in rows} == {row["claim"] for row in run.claims(["rls2"], tmp_path)}
+    assert {row["claim"] for row in rows} == {row["claim"] for row in run.claims("rls2", out=tmp_path).rows}
 
 
 def test_claims_that_cannot_be_judged_stand_in_one_line_a_reason(tmp_path):

@@ -17,7 +17,7 @@ KEYS = ("r", "v", "dt", "dm")
 @pytest.fixture(scope="module")
 def live(tmp_path_factory):
     """The page's file: the paper's five radars to begin from."""
-    return chart([], tmp_path_factory.mktemp("chart"), formats=[]).folder / "chart.html"
+    return chart(out=tmp_path_factory.mktemp("chart"), figures=False).folder / "chart.html"
 
 
 def sigmas(observes, start, r, v, dt, dm, k):

@@ -54,7 +54,8 @@ def test_what_is_kept_is_a_part_of_its_claim():
 
 def test_a_full_reproduction_is_shown_with_every_part(tmp_path, text, monkeypatch):
     rows = claims.kept()
-    monkeypatch.setattr(claims.run, "claims", lambda names, out: [*rows, rows[0] | {"what": "another part"}])
+    found = claims.run.Claims([*rows, rows[0] | {"what": "another part"}])
+    monkeypatch.setattr(claims.run, "claims", lambda out: found)
     full = claims.markdown(tmp_path)
     assert "| P1.1 | another part |" in full
     assert "another part" not in text

@@ -58,9 +58,9 @@ def test_the_live_page_is_russian_in_its_body_and_in_what_its_script_says(drawn)
 
 
 def test_the_chart_table_is_the_same(tmp_path):
-    english = chart(["rls2"], tmp_path / "en", formats=[])
+    english = chart("rls2", out=tmp_path / "en", figures=False)
     with speaking("ru"):
-        russian = chart(["rls2"], tmp_path / "ru", formats=[])
+        russian = chart("rls2", out=tmp_path / "ru", figures=False)
     assert (english.folder / "chart.csv").read_bytes() == (russian.folder / "chart.csv").read_bytes()
 
 
@@ -81,7 +81,7 @@ def test_the_list_says_what_things_are_and_leaves_their_names():
 @pytest.mark.parametrize("claim", ["P1.4", "P1.5"])
 def test_readings_of_a_claim_and_their_curve(claim, tmp_path):
     with speaking("ru"):
-        done = readings.readings(readings.asked([claim]), out=tmp_path, figures=False)
+        done = readings.judged(readings.asked([claim]), out=tmp_path, figures=False)
         page = readings.pages(done)
         of, over = done.read[0].paper.readings, done.read[0].over[0]
         texts = [CHOICE.sub("", text) for text in shown(curve.specification(of, over))]

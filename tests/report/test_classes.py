@@ -51,7 +51,7 @@ def agree(out):
     rows = {parts[0]["claim"]: parts[0] for parts in page.grouped(every)}
     lines = {line.split()[0]: line for line in printed("claims", "--out", out).splitlines() if line[:1] == "P"}
     made = printed("claims", "--markdown", "--out", out)
-    marks = drawn(run.claims((), out))
+    marks = drawn(run.claims(out=out).rows)
     stands = dict(re.findall(r"^\| (P\d\.\w+) \| .* \| ([^|]*) \| `\w+` \|$", made, re.MULTILINE))
     assert rows.keys() == lines.keys() == stands.keys() == PAPERS.keys()
     for claim, row in rows.items():
@@ -104,7 +104,7 @@ def test_every_claim_has_one_class_wherever_it_is_said(tmp_path, own):
     shipped = {one.claim: one.kind for one in shipped_classes()}
     assert kinds == {claim: shipped.get(claim, own) for claim in PAPERS}
     assert len(shipped) > 50
-    assert len(drawn(run.claims((), tmp_path))) == len(PAPERS)
+    assert len(drawn(run.claims(out=tmp_path).rows)) == len(PAPERS)
 
 
 def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
@@ -121,7 +121,7 @@ def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
     assert f"P1.18  {phrase}: RLS 2" in printed("claims", "rls2", "--parts", "--out", tmp_path)
     html.write(tmp_path)
     assert "1 confirmed, 2 depend on what the paper leaves open" in (tmp_path / "index.html").read_text()
-    rows = run.claims(("rls2",), tmp_path)
+    rows = run.claims("rls2", out=tmp_path).rows
     assert drawn(rows)["P1.18"] == rule.DEPENDS
     assert "1 confirmed, 2 depend on what the paper leaves open" in page.figure(rows).caption
 
@@ -196,7 +196,7 @@ def test_readings_tell_of_runs_that_were_written_with_other_classes(tmp_path):
 @pytest.mark.slow
 def test_shipped_classes_are_what_readings_give(tmp_path):
     """All of P1, P3 and P4, and what of P2 takes under a minute; what few realisations leave open may be decided."""
-    done = readings.readings(readings.asked(["P1", "P3", "P4", "P2.4"]), out=tmp_path, figures=False)
+    done = readings.judged(readings.asked(["P1", "P3", "P4", "P2.4"]), out=tmp_path, figures=False)
     shipped, own = ({one.claim: one for one in every} for every in (shipped_classes(), stored_classes(tmp_path)))
     for over in (over for read in done.read for over in read.over):
         claim = over.claim.id

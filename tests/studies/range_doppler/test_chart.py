@@ -21,7 +21,7 @@ from tests.studies.range_doppler import impulse
 def made(tmp_path_factory):
     """The chart of a radar of one's own, with the paper's five beside it."""
     out = tmp_path_factory.mktemp("chart")
-    return chart(["rls2"], out, overrides=["radar.sigma_velocity_mps=5"], formats=["svg"])
+    return chart("rls2", out=out, overrides=["radar.sigma_velocity_mps=5"], figures="svg")
 
 
 def random_radars(count, most, seed, decades=2):
@@ -97,7 +97,7 @@ def test_the_lines_over_time_are_those_of_the_textbook_and_end_in_the_closed_for
 
 
 def test_the_papers_radars_lie_where_the_paper_has_them(tmp_path):
-    five = chart([], tmp_path, formats=[])
+    five = chart(out=tmp_path, figures=False)
     rows = pd.read_csv(tmp_path / "chart" / "chart.csv").set_index(["case", "component"])
     assert rows["C_theta"].groupby("case", sort=False).first().round(2).tolist() == [0.25, 2.78, 11.11, 25.0, 100.0]
     assert rows.loc["rls2", "r"]["c"] == pytest.approx(rows.loc["rls3", "r"]["c"], rel=1e-12)
@@ -151,11 +151,14 @@ def test_a_name_cannot_break_out_of_the_page():
 
 def test_what_has_no_place_on_it(tmp_path):
     with pytest.raises(ConfigError, match="has no chart"):
-        chart(["sonar_missed"], tmp_path)
+        chart("sonar_missed", out=tmp_path)
     with pytest.raises(ConfigError, match="one study a chart"):
-        chart(["rls2", "sonar_missed"], tmp_path)
+        chart("rls2", "sonar_missed", out=tmp_path)
     alone = chart(
-        ["rls2"], tmp_path, overrides=["filters=[{name: r, observes: [range], manoeuvre_variance: 1e-3}]"], formats=[]
+        "rls2",
+        out=tmp_path,
+        overrides=["filters=[{name: r, observes: [range], manoeuvre_variance: 1e-3}]"],
+        figures=False,
     )
     assert "not on the chart" in alone.sentences[0]
 
@@ -165,7 +168,7 @@ def test_what_has_no_place_on_it(tmp_path):
     [("radar.detection_probability=0.9", "missed plots and biases"), ("target=turn", "the target's manoeuvre")],
 )
 def test_what_the_chart_leaves_out_of_account_is_named(tmp_path, setting, words):
-    (sentence,) = chart(["rls2"], tmp_path, overrides=[setting], formats=[]).sentences
+    (sentence,) = chart("rls2", out=tmp_path, overrides=[setting], figures=False).sentences
     assert sentence.endswith(f"Not included in the long-run values: {words}.")
 
 
@@ -191,7 +194,7 @@ def test_two_configs_of_one_name_could_not_be_told_apart(tmp_path):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "mine.yaml").write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match="rename one, or run them apart"):
-        chart([tmp_path / "one" / "mine.yaml", tmp_path / "other" / "mine.yaml"], tmp_path, formats=[])
+        chart(tmp_path / "one" / "mine.yaml", tmp_path / "other" / "mine.yaml", out=tmp_path, figures=False)
 
 
 def test_a_file_in_the_place_of_the_folder_is_named_and_not_what_is_written_beside_it(tmp_path):
@@ -203,7 +206,7 @@ def test_a_file_in_the_place_of_the_folder_is_named_and_not_what_is_written_besi
 
 def test_a_config_given_twice_counts_once_and_figures_are_told(tmp_path):
     said = []
-    drawn = chart(["rls4", "rls4"], tmp_path, formats=["svg"], progress=lambda *done: said.append(done))
+    drawn = chart("rls4", "rls4", out=tmp_path, figures="svg", progress=lambda *done: said.append(done))
     assert len(drawn.sentences) == 1
     assert said == [(1, 3, 0), (2, 3, 0), (3, 3, 0)]
 
@@ -214,7 +217,7 @@ def test_a_config_given_twice_counts_once_and_figures_are_told(tmp_path):
 )
 def test_a_radar_beyond_the_closed_forms_promise_is_told(sigma_velocity_mps, period, said, tmp_path):
     settings = [f"radar.sigma_velocity_mps={sigma_velocity_mps}", f"radar.scan_period_s={period}"]
-    found = chart(["rls2"], tmp_path, overrides=settings, formats=[])
+    found = chart("rls2", out=tmp_path, overrides=settings, figures=False)
     assert (filters.groups(250, sigma_velocity_mps, period, 1e-3).c > filters.LARGEST) == bool(said)
     assert ("may be inaccurate" in found.sentences[0]) == bool(said)
     assert said in found.sentences[0]

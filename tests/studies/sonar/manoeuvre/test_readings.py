@@ -75,12 +75,13 @@ def test_a_part_on_delays_asks_for_the_readings_rate():
     assert {part.statement for part in parts} == {"threshold", "time", "not worth while"}
 
 
-def test_more_plots_can_be_worth_while_under_a_reading(tmp_path):
+def test_more_plots_can_be_worth_while_under_a_reading(tmp_path, monkeypatch):
     """At 0.01 false alarms eight plots see the weakest manoeuvre sooner than four or five; in %, as the words want."""
     from radarsim.app import readings
 
-    wanted = readings.asked(["P3.8"], ["false_alarms=0.01", "manoeuvre=80 s", "seen=beginning", "tests=sliding"])
-    done = readings.readings(wanted, out=tmp_path, realisations=200, figures=False)
+    taken = OF.reading(false_alarms="0.01", manoeuvre="80 s", seen="beginning", tests="sliding")
+    monkeypatch.setattr(type(OF), "of_claim", lambda self, claim: [self.reading(), taken])
+    done = readings.judged(readings.asked(["P3.8"]), out=tmp_path, realisations=200, figures=False)
     shipped, other = done.read[0].over[0].under
     weak = [one.parts[4][1] for one in (shipped, other)]
     assert all(one.parts[4][0].unit == "%" for one in (shipped, other))
@@ -92,7 +93,7 @@ def test_the_joint_search_names_numbers_as_shipped_in_the_order_of_the_claims(tm
     from radarsim.app import readings
     from radarsim.report.claims.over import joint
 
-    done = readings.readings(readings.asked(["P3.3", "P3.9"]), out=tmp_path, figures=False)
+    done = readings.judged(readings.asked(["P3.3", "P3.9"]), out=tmp_path, figures=False)
     numbers = joint(OF, done.read[0].over).numbers.values()
     shipped = [part.what for claim in ("P3.3", "P3.9") for part in CLAIMS[claim].parts]
     assert [number.what for number in numbers] == shipped
