@@ -57,7 +57,8 @@ def test_it_is_the_nearest_that_solve_attains():
     """Nothing attains σ of nothing: what solve says is nearest is the least."""
     overrides = ["target=turn"]
     nearest = solve(
-        "rls2", "manoeuvre_variance", Wanted("sigma", "r+Vr", "r", 60.0), 0.0, overrides=overrides, between=(1e-3, 100)
+        *("rls2", "manoeuvre_variance"),
+        **{"sigma": "r", "filter": "r+Vr", "at_s": 60.0, "equals": 0.0, "overrides": overrides, "between": (1e-3, 100)},
     )
     found = tune("rls2", **R, overrides=overrides)
     assert found.all.tuned == pytest.approx(nearest.limit, rel=1e-11)

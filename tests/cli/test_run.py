@@ -169,8 +169,8 @@ def test_what_is_written_like_a_claim_and_is_none_is_told_which_there_are(name, 
     from radarsim.errors import ConfigError
 
     with pytest.raises(ConfigError) as caught:
-        claims([name], "nowhere")
-    every = [row["claim"] for row in claims([name.partition(".")[0]], "nowhere")] if "{all}" in said else []
+        claims(name, out="nowhere")
+    every = [row["claim"] for row in claims(name.partition(".")[0], out="nowhere").rows] if "{all}" in said else []
     assert list(caught.value.lines) == [said.format(all=", ".join(every))]
 
 
@@ -178,7 +178,7 @@ def test_claims_are_shown_by_name_by_paper_and_beside_those_of_a_config(tmp_path
     from radarsim.app.run import claims
 
     def named(*names):
-        return [row["claim"] for row in claims(names, tmp_path)]
+        return [row["claim"] for row in claims(*names, out=tmp_path).rows]
 
     everything = named()
     assert named("P1.3") == ["P1.3"]
@@ -187,9 +187,9 @@ def test_claims_are_shown_by_name_by_paper_and_beside_those_of_a_config(tmp_path
     assert named("P1.3", "range_doppler") == named("range_doppler")
     assert named("rls2", "P4.2") == [*named("rls2"), "P4.2"]
     command("run", "discriminator_paper", "-n", 64, "--no-figures", "--out", tmp_path)
-    own = claims(["P4.2"], tmp_path)
+    own = claims("P4.2", out=tmp_path).rows
     assert own
-    assert own == [row for row in claims(["discriminator_paper"], tmp_path) if row["claim"] == "P4.2"]
+    assert list(own) == [row for row in claims("discriminator_paper", out=tmp_path).rows if row["claim"] == "P4.2"]
     assert "P4.2" in command("claims", "P4.2", "--out", tmp_path).stdout
 
 

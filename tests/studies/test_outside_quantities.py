@@ -8,7 +8,6 @@ import click
 import pandas as pd
 import pytest
 
-from radarsim.app.quantities import Wanted
 from radarsim.app.solve import solve
 from radarsim.cli import design, main
 from radarsim.errors import ConfigError
@@ -104,7 +103,7 @@ def test_help_lists_them_with_their_units(radarsim):
 def test_solve_finds_the_root_of_an_exact_one(radarsim):
     """The square of σ is 10⁴ m² where σ is 100 m; the latter by the shipped study."""
     found = solved(radarsim, "--area", "r", "--filter", "r+Vr", "--at-k", 9, "--equals", 1e4)
-    known = solve("rls2", KEY, Wanted("sigma", "r+Vr", "r", at_k=9), 100.0, overrides=["scans=9"])
+    known = solve("rls2", KEY, sigma="r", filter="r+Vr", at_k=9, equals=100.0, overrides=["scans=9"])
     assert found["exact"]
     assert found["value"] == pytest.approx(known.value, rel=1e-9)
     assert (found["quantity"], found["quantity_unit"]) == ("mean square error of r+Vr in r at k = 9", "m²")
@@ -113,7 +112,7 @@ def test_solve_finds_the_root_of_an_exact_one(radarsim):
 def test_solve_takes_one_from_a_table_of_exact_values_alone(radarsim):
     """A limit over all scans: no interval, and no scan to be asked at."""
     least = solved(radarsim, "--limit", "r+Vr", "--equals", 100)
-    known = solve("rls2", KEY, Wanted("sigma", "r+Vr", "r"), 100.0, overrides=["scans=9"])
+    known = solve("rls2", KEY, sigma="r", filter="r+Vr", equals=100.0, overrides=["scans=9"])
     assert least["exact"]
     assert least["value"] == pytest.approx(known.value, rel=1e-9)
     for option, value in (("--at", 3), ("--at-k", 2)):

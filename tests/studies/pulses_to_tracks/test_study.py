@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from radarsim.app.configs import load
-from radarsim.app.quantities import Wanted
 from radarsim.app.solve import solve
 from radarsim.bursts.burst import LIGHT_MPS, Burst
 from radarsim.studies import registry
@@ -161,8 +160,8 @@ def test_the_signal_to_noise_ratio_for_a_gain_is_solved_for():
     pair = ["{name: r, observes: [range], manoeuvre_variance: 1e-3}"]
     pair.append("{name: ideal, observes: [range, velocity], manoeuvre_variance: 1e-3, estimator: fisher_bound}")
     filters_ = f"filters=[{', '.join(pair)}]"
-    asked = Wanted("gain", "ideal", "r", 60.0)
-    found = solve("pulses", "burst.snr_db", asked, 30.0, overrides=[filters_], between=(-10.0, 10.0))
+    asked = {"gain": "r", "filter": "ideal", "at_s": 60.0, "equals": 30.0}
+    found = solve("pulses", "burst.snr_db", **asked, overrides=[filters_], between=(-10.0, 10.0))
     assert found.exact
     assert found.value == pytest.approx(-3.775, abs=0.02)  # powers are of a hundredth of a decibel
     axes = study.prepare(load("pulses", [filters_, f"burst.snr_db={found.value}"]).cases[0]).axes

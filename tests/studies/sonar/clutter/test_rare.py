@@ -8,7 +8,6 @@ import pytest
 
 import radarsim
 from radarsim.app.configs import load
-from radarsim.app.quantities import Wanted
 from radarsim.app.solve import solve
 from radarsim.errors import ConfigError
 from radarsim.kernels import random
@@ -255,9 +254,8 @@ def test_tables_tell_the_rate_and_how_well_it_is_known():
 def test_solve_takes_the_weighted_rate():
     """The gate at which 4 of 6 has half as many, from 1500 false plots, of which plainly hardly one is confirmed."""
     keys = config([FOUR_OF_SIX], 0.03, 0.9, 8) | {"rare": RARE, "realisations": 1500}
-    quantity = Wanted("false_tracks", "four of six")
     at = radarsim.run(keys).tables["tracking"]["false_tracks_per_hour"][0]
-    found = solve(keys, "gate_probability", quantity, 0.5 * at, between=(0.9, 0.999))
+    found = solve(keys, "gate_probability", false_tracks="four of six", equals=0.5 * at, between=(0.9, 0.999))
     assert found.lo < found.value < found.hi < 0.99
     assert found.hi - found.lo < 0.02
     again = radarsim.run(keys, overrides=[f"gate_probability={found.value}"])
