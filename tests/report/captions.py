@@ -33,6 +33,7 @@ EXTREMES = (
     "{quantity}: highest {high} ({name}), lowest {low} ({other}).",
     "{quantity}: from {low} to {high} ({name}).",
 )
+NEVER = "Zero throughout, so not drawn: {names}."
 SHOWN = "Shown: {count} of {all}; only in the tables: {names}."
 
 
@@ -67,7 +68,7 @@ def table_of(figure, study):
 def found(template, caption):
     """The places of the first sentence of a template in a caption, by name; None where there is none."""
     parts = re.split(r"\{(\w+)(?::[^}]*)?\}", tr(template))
-    places = {"t_s": "[^, ]+"}
+    places = {"t_s": "[^, ]+", "low": "[^()]+?", "high": "[^()]+?"}  # names may hold brackets
     words = "".join(
         f"(?P<{part}>{places.get(part, '.+?')})" if n % 2 else re.escape(part) for n, part in enumerate(parts)
     )
@@ -223,10 +224,11 @@ def rates(result, figure, caption):
         last = groups.tail(1)
         alike = last["lock_lo"].max() <= last["lock_hi"].min()
         return [] if alike else [f"{figure}: not within each other's intervals"]
+    never = {name for name, y in some.items() if np.all(y == 1)} if (unlost := found(NEVER, spoke)) else set()
     wrong = []
     for turn in (lambda y: 1 - y, lambda y: y):
-        wrong.append([])
-        values = {name: turn(y) for name, y in some.items()}
+        wrong.append([f"{figure}: {name} is never lost" for name in never if called(name) not in unlost["names"]])
+        values = {name: turn(y) for name, y in some.items() if name not in never}
         if claim := next(filter(None, (found(one, spoke) for one in ENDS[:2])), None):
             ends = {name: y[-1] for name, y in values.items()}
             pairs = (("low", "lowest", min(ends.values())), ("high", "highest", max(ends.values())))
