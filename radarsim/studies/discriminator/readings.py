@@ -19,16 +19,13 @@ from radarsim.report.claims.declared import Claim, PaperClaims, Part
 from radarsim.report.claims.over import PaperReadings, Reading, Search, Seen, Unreadable, choices_in
 from radarsim.report.claims.rule import AGAINST
 from radarsim.report.statistics import Estimate
-from radarsim.studies.discriminator import measures, versions
+from radarsim.studies.discriminator import measures, search
 from radarsim.studies.discriminator.measures import COMPONENTS, COMPUTED, PRINTED
-from radarsim.studies.discriminator.versions import Burst, Version
+from radarsim.studies.discriminator.search import BURST, LEAST_RATIO, PRINTED_PRIOR, Version
 
-BURST = Burst(1e-5, (100.0, 150.0, 500.0, 1000.0, 2000.0))
-PRINTED_PRIOR = (6.1, 67.5, 6.1e3, 183.38e3, 2.426e6)  # rad, Hz, Hz/s, Hz/s², Hz/s³
 SHIPPED_NOISE = measures.READINGS[COMPUTED][0]
 OTHER_THRESHOLD = {0.5: 1.0, 1.0: 0.5}
 ITERATIONS = "12"  # the number of the part that counts windows
-LEAST_RATIO = 5.0  # μ_min
 EXACT = ("P4.1", "P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13", "P4.20")
 WINDOWS = ("P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13", "P4.20")
 NO_ROOT = "(15) has no root: with the phase in it, its left side exceeds c at every length"
@@ -85,8 +82,6 @@ class Readings(PaperReadings):
         return super().evidence(claim, reading, seen, of)
 
     def search(self) -> Search:
-        from radarsim.studies.discriminator import search
-
         return search.search()
 
 
@@ -125,11 +120,11 @@ def version(reading: Reading) -> Version:
         float(reading["threshold"]),
         float(reading["factor"]),
         PRINTED_PRIOR if reading["forecast"] == "numbers" else None,
-        cast(versions.Phase, reading["first_phase"]),
-        cast(versions.Rounding, reading["rounding"]),
-        cast(versions.Curvature, reading["curvature"]),
+        cast(search.Phase, reading["first_phase"]),
+        cast(search.Rounding, reading["rounding"]),
+        cast(search.Curvature, reading["curvature"]),
         int(reading["pulses"]),
-        cast(versions.Sum, reading["sum"]),
+        cast(search.Sum, reading["sum"]),
     )
 
 
@@ -141,7 +136,7 @@ def _designed() -> Mapping[Version, tuple[np.ndarray, list[int] | None]]:
     """Spreads and windows of every version that a declared reading asks for, all at once."""
     of = Readings()
     plain = {version(one) for claim in ("P4.1", *WINDOWS) for one in of.of_claim(claim)}
-    found = versions.designed(BURST, every := list(plain))
+    found = search.designed(BURST, every := list(plain))
     return {one: (spreads, own) for one, spreads, own in zip(every, found.spreads, found.windows, strict=True)}
 
 
@@ -154,14 +149,14 @@ def _scaled() -> Mapping[tuple[Version, float], int | None]:
     for one, scale in every:
         sigma = one.sigma or tuple(np.array(BURST.multiples) * _designed()[one][0])
         asked.append(one._replace(sigma=tuple(scale * float(value) for value in sigma)))
-    first = versions.first_windows(BURST, asked)
+    first = search.first_windows(BURST, asked)
     return {key: int(n) or None for key, n in zip(every, first, strict=True)}
 
 
 def windows(own: Version) -> list[int]:
     """The windows of a version in pulses; raises Unreadable where there are none."""
     known = _designed()
-    found = known[own][1] if own in known else versions.designed(BURST, [own]).windows[0]
+    found = known[own][1] if own in known else search.designed(BURST, [own]).windows[0]
     if found is None:
         raise Unreadable(NO_ROOT)
     return found
@@ -190,11 +185,11 @@ class ExactEvidence(measures.Evidence):
 
     def worst_handover(self, key: Any) -> Estimate:
         """The largest probability over the hand-overs that Z passes c, by its own law; the last one is cut short."""
-        weights = versions.handovers(BURST, self._version, windows(self._version)[:-1])
+        weights = search.handovers(BURST, self._version, windows(self._version)[:-1])
         return certain(max(burst.tail_probability(one, self._lobe) for one in weights))
 
     def phase_offsets(self, key: Any) -> np.ndarray:
-        return versions.phase_offsets(BURST, self._version, windows(self._version))
+        return search.phase_offsets(BURST, self._version, windows(self._version))
 
     def shortest_window(self, key: Any, amplitude: float) -> Estimate:
         """T_min (17), ms: one sample a pulse."""

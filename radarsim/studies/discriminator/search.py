@@ -1,24 +1,276 @@
-"""Which choices give most of the numbers that P4 prints: spreads and windows of thousands of readings, exactly."""
+"""Which choices give most of the numbers that P4 prints: spreads and windows of thousands of readings, exactly.
+
+The windows of many readings of the paper at once: (14)–(16) for arrays of noise, threshold, prior and the rest.
+
+`bursts/burst.py` does it for one burst, in every option of a config; this does it for real samples, one a pulse, in the
+options that the paper leaves open. The tests hold the one against the other."""
 
 import itertools
-from typing import Any, get_args
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from radarsim.bursts.burst import MOST_WINDOWS
 from radarsim.report.claims.over import Printed, Search
-from radarsim.studies.discriminator import versions
 from radarsim.studies.discriminator.measures import ESTIMATE, SPREADS
-from radarsim.studies.discriminator.readings import BURST, LEAST_RATIO, PRINTED_PRIOR
-from radarsim.studies.discriminator.versions import Version
 
+# ---- versions --------------------------------------------------------------------------------------------------------
+Phase = Literal["left out of the form", "left out of the problem", "kept"]
+Curvature = Literal["next", "as printed", "before"]
+Rounding = Literal["nearest", "up", "down"]
+Sum = Literal["closed form", "pulse by pulse"]
+BERNOULLI = {2: 1 / 6, 4: -1 / 30, 6: 1 / 42, 8: -1 / 30}
+Excess = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of which versions, at lengths in pulses
+STEPS = 60  # of the search for a root, at most
+CLOSE = 1e-7  # pulses
+
+
+class Version(NamedTuple):
+    """One reading of the burst and of (14)–(16).
+
+    sigma: the forecast's spreads, (size,), rad, Hz, …; None: `multiples` of the potential ones. curvature: which window
+    H of (16) belongs to. The phase is that of the first window's problem (15)."""
+
+    noise_variance: float
+    threshold: float
+    factor: float
+    sigma: tuple[float, ...] | None
+    phase: Phase
+    rounding: Rounding
+    curvature: Curvature
+    pulses: int
+    sum: Sum
+
+
+@dataclass(frozen=True)
+class Burst:
+    """What all versions share: pulse period, s, and the multiples of the potential spreads of the forecast, (size,)."""
+
+    period_s: float
+    multiples: tuple[float, ...]
+    amplitude: float = 1.0
+
+    @property
+    def size(self) -> int:
+        return len(self.multiples)
+
+
+def first_windows(burst: Burst, versions: Sequence[Version]) -> np.ndarray:
+    """The first windows of versions in pulses, (B,); 0 where (15) has no root."""
+    return _Problem(burst, versions).first()
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Of B versions: the potential spreads (B, size), and the window lengths in pulses, none where there is no root."""
+
+    spreads: np.ndarray
+    windows: list[list[int] | None]
+
+
+def designed(burst: Burst, versions: Sequence[Version]) -> Windows:
+    """Potential spreads and windows of versions."""
+    of = _Problem(burst, versions)
+    first = of.first()
+    sequence = [[int(n)] if n else None for n in first]
+    active = np.flatnonzero(first)
+    now = first.copy()
+    for _ in range(MOST_WINDOWS):
+        active = active[now[active] < of.pulses[active]]
+        if not active.size:
+            break
+        now[active] = of.following(active, now[active])
+        for i in active:
+            own = sequence[i]
+            assert own is not None  # only versions with a first window are active
+            own.append(int(now[i]))
+    return Windows(of.spreads(), sequence)
+
+
+def handovers(burst: Burst, version: Version, windows: Sequence[int]) -> list[np.ndarray]:
+    """The weights (size,) of Z, a sum of χ²₁, at each hand-over from one of these windows, in pulses, to the next. H is
+    that of the window that is handed to, as the paper defines it, whichever (16) was solved with."""
+    of = _Problem(burst, [version])
+    information, H = of.posterior(np.zeros(len(windows), dtype=int), np.array(windows, dtype=float))
+    covariance = _inverse(information)
+    roots = np.linalg.cholesky(H[1:])
+    error = covariance[:-1] - covariance[1:]
+    return list(np.maximum(np.linalg.eigvalsh(roots.transpose(0, 2, 1) @ error @ roots), 0.0))
+
+
+def phase_offsets(burst: Burst, version: Version, windows: Sequence[int]) -> np.ndarray:
+    """How far the best phase lies from the start's, rad, one σ (K,): from the forecast, then at hand-overs.
+
+    windows (K,) in pulses. Of all parameters but the phase the start's stay: what a search over it alone would find."""
+    of = _Problem(burst, [version])
+    information, _ = of.posterior(np.zeros(len(windows), dtype=int), np.array(windows, dtype=float))
+    covariance = _inverse(information)
+    error = np.concatenate([np.diag(1 / of.prior[0])[None], covariance[:-1]]) - covariance
+    row = information[:, 0] / information[:, :1, 0]
+    return np.sqrt(np.einsum("wi,wij,wj->w", row, error, row))
+
+
+class _Problem:
+    """Information matrices of B versions in units in which all are of one size: parameters over the whole burst."""
+
+    def __init__(self, burst: Burst, versions: Sequence[Version]):
+        self.size, order = burst.size, np.arange(burst.size)
+        self.pulses = np.array([one.pulses for one in versions])
+        self._level = burst.amplitude**2 / (2 * np.array([one.noise_variance for one in versions]))
+        self._exact = np.array([one.sum == "pulse by pulse" for one in versions])
+        duration = self.pulses * burst.period_s
+        factorial = np.array([math.factorial(j) for j in order], dtype=float)
+        self._unit = 2 * np.pi * duration[:, None] ** order / factorial
+        self._unit[:, 0] = 1.0
+        given = np.array([one.sigma or (np.nan,) * self.size for one in versions])
+        multiples = np.array(burst.multiples) * self.spreads()
+        self.prior = (np.where(np.isfinite(given), given, multiples) * self._unit) ** -2.0  # of R_pr⁻¹, its diagonal
+        self._threshold = np.array([one.threshold for one in versions])
+        self._factor = np.array([one.factor for one in versions])
+        self._phase = np.array([one.phase for one in versions])
+        self._curvature = np.array([one.curvature for one in versions])
+        self._rounding = np.array([one.rounding for one in versions])
+
+    def spreads(self) -> np.ndarray:
+        """Potential spreads (B, size) of the whole burst."""
+        every = np.arange(len(self.pulses))
+        variance = np.diagonal(_inverse(self._fisher(every, self.pulses.astype(float))), axis1=1, axis2=2)
+        return np.sqrt(variance) / self._unit
+
+    def _fisher(self, of: np.ndarray, n: np.ndarray) -> np.ndarray:
+        """Φ (len(of), size, size) of the first n pulses, any real number of them: Σ l^(i+j) for l = 0 … n − 1."""
+        x = n / self.pulses[of]
+        moments = []
+        for p in range(2 * self.size - 1):
+            total = x ** (p + 1) / (p + 1)
+            if p:  # Faulhaber: what the sum has beyond the integral
+                beyond = -(x**p) / (2 * self.pulses[of])
+                falling = float(p)
+                for k, number in BERNOULLI.items():
+                    if k > p:
+                        break
+                    beyond += number / math.factorial(k) * falling * x ** (p + 1 - k) / self.pulses[of] ** k
+                    falling *= (p - k + 1) * (p - k)
+                total = total + np.where(self._exact[of], beyond, 0.0)
+            moments.append(total * self.pulses[of])
+        order = np.arange(self.size)
+        return self._level[of, None, None] * np.array(moments)[order[:, None] + order].transpose(2, 0, 1)
+
+    def posterior(self, of: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Φ + R_pr⁻¹ and H = (Φ + R_pr⁻¹)/2μ, of which Φ's first element is 2μ."""
+        fisher = self._fisher(of, n)
+        information = fisher + self.prior[of, None, :] * np.eye(self.size)
+        return information, information / fisher[:, :1, :1]
+
+    def _excess(self, of: np.ndarray, R: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """The left side of (14) less c, with H of the first and of the second term."""
+        spread = np.einsum("bij,bji->b", second @ R, second @ R)
+        trace = np.einsum("bij,bji->b", R, first)
+        return trace + self._factor[of] * np.sqrt(2 * np.maximum(spread, 0)) - self._threshold[of]
+
+    def _first_excess(self, of: np.ndarray, n: np.ndarray) -> np.ndarray:
+        """(15) of each version, with the phase as it says."""
+        information, H = self.posterior(of, n)
+        prior = 1 / self.prior[of, None, :] * np.eye(self.size)
+        found = np.empty(len(of))
+        for phase in np.unique(self._phase[of]):
+            own = self._phase[of] == phase
+            A, h, R = information[own], H[own], prior[own]
+            if phase == "left out of the problem":
+                A = A[:, 1:, 1:]
+            inverse = _inverse(A)
+            if phase == "left out of the form":
+                inverse = inverse[:, 1:, 1:]
+            if phase != "kept":
+                h, R = h[:, 1:, 1:], R[:, 1:, 1:]
+            found[own] = self._excess(of[own], R - inverse, h, h)
+        return found
+
+    def first(self) -> np.ndarray:
+        """The first window in pulses (B,); 0 where (15) has no root."""
+        every = np.arange(len(self.pulses))
+        fewest = np.full(len(every), float(self.size))
+        safe = self._first_excess(every, fewest) <= 0
+        found = np.zeros(len(every), dtype=int)
+        found[safe] = self._longest(every[safe], fewest[safe], self._first_excess)
+        return found
+
+    def following(self, of: np.ndarray, before: np.ndarray) -> np.ndarray:
+        """The windows after those of these lengths, in pulses."""
+        information, H_before = self.posterior(of, before.astype(float))
+        covariance = _inverse(information)
+        place = {int(i): k for k, i in enumerate(of)}
+
+        def excess(some: np.ndarray, n: np.ndarray) -> np.ndarray:
+            own = [place[int(i)] for i in some]
+            after, H = self.posterior(some, n)
+            old = self._curvature[some, None, None]
+            first = np.where(old == "next", H, H_before[own])
+            second = np.where(old == "before", H_before[own], H)
+            return self._excess(some, covariance[own] - _inverse(after), first, second)
+
+        return np.maximum(self._longest(of, before * (1 + 1e-9), excess), before + 1)
+
+    def _longest(self, of: np.ndarray, low: np.ndarray, excess: Excess) -> np.ndarray:
+        """Pulses of the longest windows with no excess: their roots, rounded as each version says."""
+        whole = self.pulses[of].astype(float)
+        found = whole.copy()
+        left = np.flatnonzero(excess(of, whole) > 0)
+        found[left] = _roots(lambda some, n: excess(of[left][some], n), low[left].copy(), whole[left])
+        rounding = self._rounding[of]
+        rounded = np.where(
+            rounding == "up", np.ceil(found), np.where(rounding == "down", np.floor(found), np.rint(found))
+        )
+        return np.minimum(np.maximum(rounded, self.size), self.pulses[of]).astype(int)
+
+
+def _roots(excess: Excess, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Roots (m,) of functions that rise through zero between low and high; excess(which, at) gives their values. Regula
+    falsi in the logarithm of the length; the value at the kept end is halved, so that both ends move (Illinois)."""
+    at = np.arange(len(low))
+    a, b = np.log(low), np.log(high)
+    fa, fb = excess(at, low), excess(at, high)
+    root = np.where(fa >= 0, low, high)
+    live = np.flatnonzero((fa < 0) & (fb > 0))
+    for _ in range(STEPS):
+        if not live.size:
+            break
+        m = (a[live] * fb[live] - b[live] * fa[live]) / (fb[live] - fa[live])
+        value = excess(at[live], np.exp(m))
+        over = value > 0
+        up, down = live[over], live[~over]
+        fa[up] /= 2
+        fb[down] /= 2
+        b[up], fb[up] = m[over], value[over]
+        a[down], fa[down] = m[~over], value[~over]
+        root[live] = np.exp(m)
+        done = (np.exp(b[live]) - np.exp(a[live]) < CLOSE) | (abs(value) < 1e-13)
+        live = live[~done]
+    return root
+
+
+def _inverse(A: np.ndarray) -> np.ndarray:
+    """Inverses (B, n, n) of positive definite matrices, balanced."""
+    scale = 1 / np.sqrt(np.diagonal(A, axis1=1, axis2=2))
+    balance = scale[:, :, None] * scale[:, None, :]
+    return np.linalg.inv(A * balance) * balance
+
+
+# ---- search ----------------------------------------------------------------------------------------------------------
+BURST = Burst(1e-5, (100.0, 150.0, 500.0, 1000.0, 2000.0))
+PRINTED_PRIOR = (6.1, 67.5, 6.1e3, 183.38e3, 2.426e6)  # rad, Hz, Hz/s, Hz/s², Hz/s³
+LEAST_RATIO = 5.0  # μ_min
 NOISES, THRESHOLDS, FACTORS = ("9", "2.25"), ("0.5", "1"), ("3", "2.326")
 FORECASTS = {"numbers": PRINTED_PRIOR, "multiples": None}
 AMPLITUDES = {"1.17": ESTIMATE, "1": 1.0}
 COUNTED = ("after the first", "in all")
 AXES: dict[str, tuple[str, ...]] = {
     **{"noise_variance": NOISES, "threshold": THRESHOLDS, "factor": FACTORS, "forecast": tuple(FORECASTS)},
-    **{"first_phase": get_args(versions.Phase), "rounding": get_args(versions.Rounding)},
-    **{"curvature": get_args(versions.Curvature), "pulses": ("30000", "29999"), "sum": get_args(versions.Sum)},
+    **{"first_phase": get_args(Phase), "rounding": get_args(Rounding)},
+    **{"curvature": get_args(Curvature), "pulses": ("30000", "29999"), "sum": get_args(Sum)},
 }
 FURTHER = {"counted": COUNTED, "amplitude": tuple(AMPLITUDES)}
 SHARE = 0.01  # of a number, under the granular rule
@@ -42,7 +294,7 @@ PRINTED = (
 def search() -> Search:
     """The eight printed numbers under every combination of the choices."""
     every = [_version(*names) for names in itertools.product(*AXES.values())]
-    found = versions.designed(BURST, every)
+    found = designed(BURST, every)
     first = np.array([own[0] if own else np.nan for own in found.windows])
     count = np.array([len(own) if own else np.nan for own in found.windows])
     noise = np.array([one.noise_variance for one in every])

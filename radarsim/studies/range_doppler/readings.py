@@ -13,8 +13,9 @@ from radarsim.report.claims import Series, same
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
 from radarsim.report.claims.over import PaperReadings, Reading, Search, Seen, choices_in, of_other_cases
 from radarsim.report.statistics import Estimate
-from radarsim.studies.range_doppler import measures, recursion
+from radarsim.studies.range_doppler import measures, search
 from radarsim.studies.range_doppler.measures import RADARS
+from radarsim.studies.range_doppler.search import Form, Start, Version
 from radarsim.threads import mapping
 
 ENDS = "P1.5"
@@ -56,15 +57,13 @@ class Readings(PaperReadings):
         return _evidence(reading)
 
     def search(self) -> Search:
-        from radarsim.studies.range_doppler import search
-
         return search.search()
 
-    def versions(self) -> list[recursion.Version]:
+    def versions(self) -> list[Version]:
         """Every version of the filters that a declared reading asks for, with the D_M of the shipped sweep."""
-        found: dict[recursion.Version, None] = {}
+        found: dict[Version, None] = {}
         for one in self.declared():
-            form, start = cast(recursion.Form, one["process_noise"]), cast(recursion.Start, one["start"])
+            form, start = cast(Form, one["process_noise"]), cast(Start, one["start"])
             for variance in (float(one["manoeuvre_variance"]), *SWEPT):
                 found[form, variance, start] = None
         return list(found)
@@ -82,12 +81,12 @@ def _evidence(reading: Reading) -> "ExactEvidence":
 
 
 @cache
-def _table() -> Mapping[int, Mapping[recursion.Version, "_Sigmas"]]:
+def _table() -> Mapping[int, Mapping[Version, "_Sigmas"]]:
     """σ over LONG scans by radar and version, all by one recursion a radar."""
     versions = Readings().versions()
 
-    def of_radar(number: int) -> dict[recursion.Version, _Sigmas]:
-        found = recursion.both(RADARS[number], versions, LONG)
+    def of_radar(number: int) -> dict[Version, _Sigmas]:
+        found = search.both(RADARS[number], versions, LONG)
         return {
             one: _Sigmas(*(tuple(e.true[i] for e in found), tuple(e.believed[i] for e in found)))
             for i, one in enumerate(versions)
@@ -153,8 +152,8 @@ class ExactEvidence(measures.Evidence):
         """Relative gain of the filter with velocity, %, from the scan at which it has filtered."""
         place = key, "", component
         if place not in self._curves:
-            gain = recursion.gain(*self._sigma(key, component))
-            gain[: recursion.first_scan(self._start, 2) - 1] = np.nan
+            gain = search.gain(*self._sigma(key, component))
+            gain[: search.first_scan(self._start, 2) - 1] = np.nan
             self._curves[place] = self._cut(key, gain)
         return self._curves[place]
 
@@ -173,13 +172,13 @@ class ExactEvidence(measures.Evidence):
         return list(SWEPT)
 
     @property
-    def _start(self) -> recursion.Start:
-        return cast(recursion.Start, self._reading["start"])
+    def _start(self) -> Start:
+        return cast(Start, self._reading["start"])
 
     def _sigma(self, key: Any, component: str) -> tuple[np.ndarray, np.ndarray]:
         """σ (LONG,) of the two filters."""
         radar = self.case(key)
-        version = cast(recursion.Form, self._reading["process_noise"]), radar.variance, self._start
+        version = cast(Form, self._reading["process_noise"]), radar.variance, self._start
         of = _table()[radar.number][version]
         alone, both = of.believed if self._reading["truth"] == "as believed" else of.true
         c = tuple(measures.COMPONENTS).index(component)

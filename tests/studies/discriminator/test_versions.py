@@ -8,9 +8,9 @@ import pytest
 from radarsim.bursts import burst as model
 from radarsim.bursts import estimators
 from radarsim.bursts.burst import Condition, Designer
-from radarsim.studies.discriminator import versions
+from radarsim.studies.discriminator import search
 from radarsim.studies.discriminator.readings import BURST, PRINTED_PRIOR
-from radarsim.studies.discriminator.versions import Version
+from radarsim.studies.discriminator.search import Version
 
 SHIPPED = Version(*(9.0, 0.5, 3.0, PRINTED_PRIOR, "left out of the form", "nearest", "next", 30000, "closed form"))
 COMPUTED = SHIPPED._replace(noise_variance=2.25, threshold=1.0, sigma=None)
@@ -32,21 +32,21 @@ def one_at_a_time(version, pulses=30000):
     ids=["as printed", "computed", "c = 1", "little noise"],
 )
 def test_windows_are_those_of_the_designer(version):
-    (found,) = versions.designed(BURST, [version]).windows
+    (found,) = search.designed(BURST, [version]).windows
     assert found == one_at_a_time(version)
 
 
 def test_versions_do_not_disturb_one_another():
     every = [SHIPPED, COMPUTED, SHIPPED._replace(phase="kept"), COMPUTED._replace(rounding="up")]
-    together = versions.designed(BURST, every)
+    together = search.designed(BURST, every)
     for i, one in enumerate(every):
-        alone = versions.designed(BURST, [one])
+        alone = search.designed(BURST, [one])
         assert alone.windows[0] == together.windows[i]
         np.testing.assert_allclose(alone.spreads[0], together.spreads[i], rtol=1e-12)
 
 
 def test_the_sum_pulse_by_pulse_is_the_sum():
-    found = versions.designed(BURST, [COMPUTED._replace(pulses=n, sum="pulse by pulse") for n in (29999, 777)])
+    found = search.designed(BURST, [COMPUTED._replace(pulses=n, sum="pulse by pulse") for n in (29999, 777)])
     for n, spreads in zip((29999, 777), found.spreads, strict=True):
         t = 1e-5 * np.arange(n)
         rows = np.stack([np.ones(n), *(2 * np.pi * t**j / math.factorial(j) for j in range(1, 5))])
@@ -55,20 +55,20 @@ def test_the_sum_pulse_by_pulse_is_the_sum():
 
 
 def test_with_the_phase_in_it_the_first_problem_has_no_root():
-    assert versions.designed(BURST, [SHIPPED._replace(phase="kept")]).windows == [None]
-    assert versions.first_windows(BURST, [SHIPPED._replace(phase="kept"), SHIPPED]).tolist() == [0, 179]
+    assert search.designed(BURST, [SHIPPED._replace(phase="kept")]).windows == [None]
+    assert search.first_windows(BURST, [SHIPPED._replace(phase="kept"), SHIPPED]).tolist() == [0, 179]
 
 
 def test_rounding_up_and_down_are_one_pulse_apart():
-    up, down = versions.first_windows(BURST, [COMPUTED._replace(rounding=name) for name in ("up", "down")])
-    nearest = versions.first_windows(BURST, [COMPUTED])[0]
+    up, down = search.first_windows(BURST, [COMPUTED._replace(rounding=name) for name in ("up", "down")])
+    nearest = search.first_windows(BURST, [COMPUTED])[0]
     assert up == down + 1
     assert nearest in (up, down)
 
 
 def test_one_reading_gives_spreads_first_window_and_twelve():
     joint = Version(2.25, 1.0, 3.0, PRINTED_PRIOR, "left out of the problem", "up", "next", 29999, "pulse by pulse")
-    found = versions.designed(BURST, [joint, joint._replace(curvature="as printed")])
+    found = search.designed(BURST, [joint, joint._replace(curvature="as printed")])
     printed = ("0.061", "0.45", "12.2", "183.38", "1213.04")
     for text, value in zip(printed, found.spreads[0], strict=True):
         assert f"{value:.{len(text.partition('.')[2])}f}" == text
@@ -80,9 +80,7 @@ def test_one_reading_gives_spreads_first_window_and_twelve():
 
 @pytest.mark.slow
 def test_the_search_says_so():
-    from radarsim.studies.discriminator.search import search
-
-    found = search()
+    found = search.search()
     assert found.readings > 500
     assert found.count(granular=False)[found.place] == 2
     best = found.best(granular=False)

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from radarsim.studies.range_doppler import filters, recursion
+from radarsim.studies.range_doppler import filters, search
 from radarsim.studies.range_doppler.measures import RADARS
 
 VERSION = [("random_jerk", 1e-3, "weighted")]
 
 
 def gains(radar, variance, scans=15):
-    base, own = recursion.both(radar, [("random_jerk", variance, "weighted")], scans)
-    return recursion.gain(base.true[0], own.true[0])[2:]
+    base, own = search.both(radar, [("random_jerk", variance, "weighted")], scans)
+    return search.gain(base.true[0], own.true[0])[2:]
 
 
 def test_gains_depend_on_the_scan_and_the_two_groups_alone():
@@ -76,7 +76,7 @@ def test_the_limit_is_that_of_the_recursion_for_fast_scans(c):
     for share in (0.02, 0.01):
         both = [filters.steady_state(observes, variance, sigma, share * memory)[1] for observes in (1, 2)]
         base, own = (np.sqrt(np.diag(S)) for S in both)
-        away.append(recursion.gain(base, own) - filters.steady_gains(c))
+        away.append(search.gain(base, own) - filters.steady_gains(c))
     np.testing.assert_allclose(2 * away[1] - away[0], 0, atol=0.02)  # of first order in Δt: extrapolated, per cent
     assert np.all(abs(away[1]) < 0.03 * 100)
     unit = sigma_r**2 * share * memory**1 / memory * np.array([1, memory**-2, memory**-4])
@@ -93,11 +93,11 @@ def test_a_target_that_moves_as_believed_never_loses_by_the_velocity():
     variances = (1e-4, 1e-3, 1e-2)
     for radar in RADARS.values():
         for start, from_scan in (("process_noise", 0), ("weighted", 40)):
-            base, own = recursion.both(radar, [("random_jerk", v, start) for v in variances], 120)
-            assert np.nanmin(recursion.gain(base.believed, own.believed)[:, from_scan:]) > -1e-6
+            base, own = search.both(radar, [("random_jerk", v, start) for v in variances], 120)
+            assert np.nanmin(search.gain(base.believed, own.believed)[:, from_scan:]) > -1e-6
     # Two that ignore the manoeuvre while they start, one over two scans and one over three, are not comparable.
-    base, own = recursion.both(RADARS[1], [("random_jerk", 1e-2, "weighted")], 60)
-    assert np.nanmin(recursion.gain(base.believed, own.believed)) < -1
+    base, own = search.both(RADARS[1], [("random_jerk", 1e-2, "weighted")], 60)
+    assert np.nanmin(search.gain(base.believed, own.believed)) < -1
     # And the same filters lose on a truth that does not manoeuvre, where c is small.
-    base, own = recursion.both(RADARS[1], VERSION, 60)
-    assert np.nanmin(recursion.gain(base.true, own.true)[:, 40:]) < -1
+    base, own = search.both(RADARS[1], VERSION, 60)
+    assert np.nanmin(search.gain(base.true, own.true)[:, 40:]) < -1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from radarsim.physics import manoeuvre_covariance, transition
-from radarsim.studies.range_doppler import filters, recursion
+from radarsim.studies.range_doppler import filters, search
 from radarsim.studies.range_doppler.filters import Plots, design
 from radarsim.studies.range_doppler.measures import RADARS
 
@@ -15,7 +15,7 @@ VARIANCES = (1e-5, 1e-3, 1e-1)
 @pytest.mark.parametrize(("start", "scans"), [("weighted", (3, 2)), ("four_and_four", (4, 4))])
 def test_the_papers_filter_is_the_one_of_one_filter_at_a_time(radar, start, scans):
     sigma, dt = np.array(radar[:2], dtype=float), radar[2]
-    found = recursion.both(radar, [("random_jerk", v, start) for v in VARIANCES], 29)
+    found = search.both(radar, [("random_jerk", v, start) for v in VARIANCES], 29)
     for observes, of in zip((1, 2), found, strict=True):
         for i, variance in enumerate(VARIANCES):
             one = design(observes, scans[observes - 1], variance, sigma, dt, 29)
@@ -32,7 +32,7 @@ def test_the_papers_filter_is_the_one_of_one_filter_at_a_time(radar, start, scan
 def test_a_start_with_process_noise_is_a_kalman_filter_without_a_prior(observes):
     sigma, dt = np.array([25.0, 5.0]), 10.0
     Q = manoeuvre_covariance(1e-2, dt)
-    believed, _ = recursion.started("process_noise", observes, sigma, dt, Q[None])
+    believed, _ = search.started("process_noise", observes, sigma, dt, Q[None])
     # The information form of the filter, from nothing: plot, step, plot, …
     H, R = np.eye(3)[:observes], np.diag(sigma[:observes] ** 2)
     F = transition(dt)
@@ -48,8 +48,8 @@ def test_a_start_with_process_noise_is_a_kalman_filter_without_a_prior(observes)
 def test_the_true_error_of_a_start_with_process_noise_is_that_of_its_weights():
     sigma, dt = np.array([25.0, 5.0]), 10.0
     Q = manoeuvre_covariance(1e-1, dt)[None]
-    believed, true = recursion.started("process_noise", 2, sigma, dt, Q)
-    least, _ = recursion.started("weighted", 2, sigma, dt, Q)
+    believed, true = search.started("process_noise", 2, sigma, dt, Q)
+    least, _ = search.started("weighted", 2, sigma, dt, Q)
     gap = np.linalg.eigvalsh(true[0] - least[0])
     assert gap.min() > -1e-9 * np.trace(true[0])
     assert gap.max() > 0
@@ -58,13 +58,13 @@ def test_the_true_error_of_a_start_with_process_noise_is_that_of_its_weights():
 
 def test_first_differences_and_unweighted_starts_by_hand():
     sigma, dt, Q = np.array([30.0, 4.0]), 5.0, np.zeros((1, 3, 3))
-    _, true = recursion.started("first_differences", 2, sigma, dt, Q)
+    _, true = search.started("first_differences", 2, sigma, dt, Q)
     assert np.allclose(np.diag(true[0]), [30.0**2, 4.0**2, 2 * 4.0**2 / dt**2])
-    _, three = recursion.started("first_differences", 1, sigma, dt, Q)
+    _, three = search.started("first_differences", 1, sigma, dt, Q)
     assert np.allclose(np.diag(three[0]), [30.0**2, 2 * 30.0**2 / dt**2, 6 * 30.0**2 / dt**4])
     rows = np.concatenate([np.eye(3)[:2] @ transition(-dt), np.eye(3)[:2]])  # both scans, plain least squares
     weights = np.linalg.inv(rows.T @ rows) @ rows.T
-    _, plain = recursion.started("unweighted", 2, sigma, dt, Q)
+    _, plain = search.started("unweighted", 2, sigma, dt, Q)
     exact_form = weights @ np.diag(np.tile(sigma**2, 2)) @ weights.T
     np.testing.assert_allclose(plain[0], exact_form, atol=1e-10 * np.trace(exact_form))
 
@@ -76,10 +76,10 @@ def test_forms_of_the_manoeuvre_covariance():
     for _ in range(steps):  # a white jerk of density 1 is many small independent steps of acceleration
         g = np.array([0.0, 0.0, 1.0])
         Q = small @ Q @ small.T + dt / steps * np.outer(g, g)
-    white = recursion.covariance_of("white_jerk", 1.0, 1.0, dt)
+    white = search.covariance_of("white_jerk", 1.0, 1.0, dt)
     np.testing.assert_allclose(white, Q, rtol=2e-3)
-    np.testing.assert_allclose(recursion.covariance_of("white_jerk_rate", 1.0, 1.0, dt), dt * white)
-    step = recursion.covariance_of("acceleration_step", 2.0, 1.0, dt)
+    np.testing.assert_allclose(search.covariance_of("white_jerk_rate", 1.0, 1.0, dt), dt * white)
+    step = search.covariance_of("acceleration_step", 2.0, 1.0, dt)
     np.testing.assert_allclose(step, 2.0 * np.outer([8.0, 4.0, 1.0], [8.0, 4.0, 1.0]))
-    normalised = recursion.covariance_of("normalised", 1e-3, 25.0, dt)
+    normalised = search.covariance_of("normalised", 1e-3, 25.0, dt)
     np.testing.assert_allclose(normalised, manoeuvre_covariance(1e-3 * 625, dt))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarsim.studies.range_doppler import recursion, search
+from radarsim.studies.range_doppler import search
 from radarsim.studies.range_doppler.measures import RADARS
 
 
@@ -30,10 +30,10 @@ def plainly(taken):
     gain, time = {}, {}
     for n, radar in RADARS.items():
         count = scans if radar[2] == 10 or taken["span"] == "same scans" else 2 * scans - 1
-        base, own = recursion.both(radar, [version], count)
+        base, own = search.both(radar, [version], count)
         which = "true" if taken["truth"] == "quadratic" else "believed"
-        rows = recursion.gain(getattr(base, which)[0], getattr(own, which)[0])
-        first = recursion.first_scan(taken["start"], 2) - 1
+        rows = search.gain(getattr(base, which)[0], getattr(own, which)[0])
+        first = search.first_scan(taken["start"], 2) - 1
         gain[n] = {c: {k: rows[k, c] for k in range(first, count) if np.isfinite(rows[k, c])} for c in range(3)}
         time[n] = max(gain[n][0], key=gain[n][0].get) * radar[2]
     gone = [k for k, value in gain[2][2].items() if value <= 0]
