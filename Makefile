@@ -19,7 +19,8 @@ run: $(VENV)/installed
 	@# Once after an installation, in the background: no later first run has to compile.
 	@test $(VENV)/compiled -nt $(VENV)/installed || { touch $(VENV)/compiled; nohup nice $(RADARSIM) compile > /dev/null 2>&1 & }
 
-# A process for each processor, at most eight; what measures memory or sends signals runs after them, alone. JOBS=0: one after another.
+# A process for each processor, at most eight; what measures memory or sends signals in a moment runs
+# after them, two at once, as it mostly waits. JOBS=0: one after another.
 JOBS ?= logical
 ORDINARY := not slow and not machines
 # The files with tests of a mark: to read all the others takes longer than some of these tests.
@@ -27,7 +28,7 @@ marked = $$(grep -rl --include='test_*.py' 'mark\.$(1)\b' tests)
 
 test: $(VENV)/tested
 	$(BIN)/python -m pytest -n $(JOBS) --maxprocesses 8 --dist loadgroup --no-loadscope-reorder -m '$(ORDINARY) and not alone'
-	$(BIN)/python -m pytest -m '$(ORDINARY) and alone' $(call marked,alone)
+	$(BIN)/python -m pytest -n $(JOBS) --maxprocesses 2 -m '$(ORDINARY) and alone' $(call marked,alone)
 
 slow: $(VENV)/tested
 	$(BIN)/python -m pytest -m slow

@@ -52,7 +52,7 @@ def some(every, *ordinary):
     return [one if one in ordinary else pytest.param(one, marks=pytest.mark.slow) for one in every]
 
 
-@pytest.mark.parametrize("study", some(SOLVED, "range_doppler", "clutter"))
+@pytest.mark.parametrize("study", some(SOLVED, "range_doppler"))
 def test_solve(study):
     config, *case = CONFIGS[study]
     key, *words = SOLVED[study].split()

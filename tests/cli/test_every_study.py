@@ -45,7 +45,8 @@ def words(study, count):
     return ["solve", config, *SOLVED[study].split(), *case, "-n", str(count)]
 
 
-LONG = ("smoothing", "manoeuvre", "discriminator")  # a value of the key takes a second or more of them
+# A value of the key takes a second or more of them.
+LONG = ("smoothing", "manoeuvre", "discriminator", "ambiguous_doppler", "pulses_to_tracks")
 
 
 @pytest.mark.parametrize("study", [pytest.param(one, marks=pytest.mark.slow) if one in LONG else one for one in SOLVED])

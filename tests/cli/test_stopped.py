@@ -69,7 +69,7 @@ def ended_by(number, options, folder, after_s):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("name", LONG)
 def test_a_signal_ends_it_with_one_line_and_no_file(name, number, tmp_path):
-    ended_by(number, LONG[name], tmp_path, after_s=1)
+    ended_by(number, LONG[name], tmp_path, after_s=0.5)
 
 
 def test_an_exception_that_a_library_makes_of_the_signal_is_still_the_signal():
