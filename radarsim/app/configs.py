@@ -102,13 +102,16 @@ def new(
     like: str | os.PathLike[str],
     folder: str | os.PathLike[str] = ".",
     values: Mapping[str, float] = MappingProxyType({}),
+    overrides: Overrides = (),
 ) -> Path:
     """Write folder/NAME.yaml, with or without suffix given, from a known config with some values changed; its path.
+
+    The config is taken with its overrides, which it can have if it has one case.
 
     Where the folder holds a schema.json, the first line points editors to it. Raises ConfigError where the config
     exists already, StoreError where it cannot be written.
     """
-    name, text = reading.new(name, like, registry, values)
+    name, text = reading.new(name, like, registry, values, overrides)
     path = Path(folder) / name
     if path.with_name(SCHEMA).is_file():
         text = f"{EDITORS}{SCHEMA}\n{text}"
@@ -122,8 +125,9 @@ def new(
 TAKEN = "{path}: already exists and is never overwritten; choose another name"
 
 
-def writable(path: str) -> None:
-    """Check, before a long search, that a config can be written there. Raises ConfigError."""
+def writable(path: str, like: str | os.PathLike[str], overrides: Overrides) -> None:
+    """Check, before a long search, that a config with these overrides can be written there. Raises ConfigError."""
+    reading.new(os.path.basename(path), like, registry, {}, overrides)
     if os.path.lexists(path):
         raise ConfigError(TAKEN.format(path=path))
     if not os.path.isdir(os.path.dirname(path) or "."):

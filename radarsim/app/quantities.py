@@ -84,8 +84,11 @@ class Series(NamedTuple):
     values: Estimate
 
 
-def checked(wanted: Wanted, case: Case) -> Asked:
-    """The request, checked before anything is prepared. ConfigError for an unknown quantity or filter."""
+def checked(wanted: Wanted, case: Case, outside: Sequence[str] = ()) -> Asked:
+    """The request, checked before anything is prepared. ConfigError for an unknown quantity or filter.
+
+    outside: names of the config's filters of Python, which the case is without.
+    """
     name, chosen, component, at_s, at_k = wanted
     of = registry.quantity(name, case)
     if not of.per:
@@ -93,9 +96,11 @@ def checked(wanted: Wanted, case: Case) -> Asked:
             raise ConfigError(f"{argument(of.name, of.option)} names the filter itself: leave {argument('filter')} out")
         chosen, component = component if chosen is None else chosen, None
     if chosen is not None:
-        if chosen in [one.name for one in case.outside]:
-            raise ConfigError(f"{chosen} is a filter of your own code: only those of the study are asked here")
-        named(chosen, [member.name for member in case.spec.members])
+        names = [member.name for member in case.spec.members]
+        if chosen in outside:
+            raise ConfigError(f"filter {chosen!r} is written in Python: radarsim does not know its keys, only those of "
+                              f"{', '.join(names)}")  # fmt: skip
+        named(chosen, names)
     return Asked(of, chosen, component, at_s, at_k)
 
 

@@ -186,11 +186,13 @@ class Cases:
     overrides: tuple[str, ...]
     name: str | None = None
     base: Case = field(init=False)
+    outside: tuple[str, ...] = field(init=False)  # filters of Python, which the cases are without
     stem: str = field(init=False)  # the config's, of one case; else that of the case's own config
 
     def __post_init__(self) -> None:
         experiment = load(self.config, self.overrides)
         self.base = self._chosen(experiment)
+        self.outside = tuple(one.name for case in experiment.cases for one in case.outside)
         self.stem = experiment.stem if len(experiment.cases) == 1 else self.base.stem
 
     def _chosen(self, experiment: Experiment) -> Case:
@@ -731,7 +733,7 @@ def solve(
     ((name, component),) = named.items()
     cases, count = Cases(config, texts, case), configs.whole(realisations)
     found = fields.find(cases.base.spec, key)
-    wanted = quantities.checked(Wanted(name, filter, component, at_s, at_k), cases.base)
+    wanted = quantities.checked(Wanted(name, filter, component, at_s, at_k), cases.base, cases.outside)
     axes = quantities.labels(wanted, cases.base)
     wanted = quantities.resolved(wanted, axes)
     over = range_of(found, key, between)

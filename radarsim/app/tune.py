@@ -33,7 +33,7 @@ from radarsim.config.fields import NumericKey
 from radarsim.config.load import flow, given
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError, argument
-from radarsim.language import few, plural, tr
+from radarsim.language import few, listed, plural, tr
 from radarsim.report import tables
 from radarsim.report.outside import TUNED
 from radarsim.report.wording import shown, with_unit
@@ -53,6 +53,7 @@ STEP = 0.25  # on the scale of the search, of derivatives of sampled values
 CLOSE, ALIKE, TRIED = {True: 1e-7, False: 1e-2}, {True: 1e-12, False: 1e-6}, {True: 200, False: 50}
 SIMPLEX = 0.5, 0.1  # first steps, one simplex after the other
 POINTS, PILOT_SHARE, PILOT_LEAST = 13, 8, 200  # of the scan of sampled values: values, and realisations of all
+SAME = 1e-9  # of the quantity: it changes no more where a key has no effect
 NO_GAIN = 1e-3  # per cent or points of an exact gain that are called nothing
 NEAR_END = 0.01  # on the scale of the search, or of a linear one
 DIGITS = 6  # of a tuned value: there the quantity hardly changes with it
@@ -118,6 +119,7 @@ class Tuned(Shown):
 
     training and judged are numbers of realisations a case, none where exact; minimised says what is least, or largest.
     settings are the tuned values by key; command is a run with them, of the noise with which the gain is measured.
+    inert: the keys without effect on the quantity.
     """
 
     stem: str
@@ -134,6 +136,7 @@ class Tuned(Shown):
     settings: Mapping[str, float]
     command: str
     notes: tuple[str, ...] = ()
+    inert: tuple[str, ...] = ()
 
     @property
     def table(self) -> "pd.DataFrame":
@@ -156,6 +159,14 @@ class Tuned(Shown):
         """What tuning gains, in a sentence."""
         one, of = self.all, {"quantity": self.quantity.said}
         if self.exact:
+            if len(self.inert) == len(self.keys):
+                return plural(
+                    "There is nothing to tune: {keys} has no effect on {quantity}.",
+                    "There is nothing to tune: {keys} have no effect on {quantity}.",
+                    len(self.inert),
+                    keys=listed(self.inert),
+                    **of,
+                )
             if abs(one.gain) < NO_GAIN:
                 return tr("Tuning gains nothing: {quantity} is at its best as stated (exact).", **of)
             words = tr("exact")
@@ -429,6 +440,13 @@ def flat(of: Objective, best: Place, i: int) -> tuple[float, float]:
     return ends[0], ends[1]
 
 
+def inert(of: Objective, best: Place, i: int) -> bool:
+    """Whether a key changes nothing from end to end of what is searched."""
+    over = of.searched[i].over
+    ends = (of((*best[:i], x, *best[i + 1 :])) for x in (over.low, over.high))
+    return all(math.isclose(value, of(best), rel_tol=SAME) for value in ends)
+
+
 def spread(of: Objective, best: Place) -> dict[Path, tuple[float, float]]:
     """The 95 % intervals of the best values, of real numbers: by how much they move without each of the batches.
 
@@ -518,8 +536,14 @@ def judged(of: Objective, names: Sequence[str], pairs: Sequence[np.ndarray]) -> 
     return found
 
 
-def family(config: Config, settings: Sequence[str], members: Sequence[str], names: Sequence[str]) -> list[Case]:
-    """The cases over which a filter is tuned; members: settings of each. Raises ConfigError."""
+def family(
+    config: Config, settings: Sequence[str], members: Sequence[str], names: Sequence[str]
+) -> tuple[list[Case], list[str]]:
+    """The cases over which a filter is tuned, and the names of filters of Python, which they are without.
+
+    members: settings of each. Raises ConfigError.
+    """
+    outside: list[str] = []
     cases, set_too = [], {one.partition("=")[0].strip() for one in settings}
     for member in members:
         key = member.partition("=")[0].strip()
@@ -527,12 +551,13 @@ def family(config: Config, settings: Sequence[str], members: Sequence[str], name
             raise ConfigError(f"{argument('over', '--over')}: {key} is given by {given(key)} too")
         with instead({str(given(key)): argument("over", "--over")}):
             experiment = load(config, [*settings, *([member] if member else [])])
+        outside += [one.name for case in experiment.cases for one in case.outside]
         cases += [
             replace(case, name=f"{case.name} {member}".strip(), against=(), outside=()) for case in experiment.cases
         ]
     for name in names:
         quantities.named(name, [case.name for case in cases], "case")
-    return [case for case in cases if not names or case.name in names]
+    return [case for case in cases if not names or case.name in names], outside
 
 
 def _ranged(given: Any) -> tuple[str, tuple[float, float] | None]:
@@ -590,10 +615,10 @@ def tune(
     if len(ranges) < len(asked_for):
         raise ConfigError(f"{argument('free', '--free')}: a key is given twice")
     members = [*dict.fromkeys(one if "=" in one else f"target={one}" for one in over)] or [""]
-    every = family(config, settings, members, [case] if isinstance(case, str) else case)
+    every, outside = family(config, settings, members, [case] if isinstance(case, str) else case)
     asked_at = dict.fromkeys((argument("at_k", "--at-k"), argument("at_s", "--at")), argument("wanted", "--for"))
     with instead(asked_at):
-        kind = quantities.checked(parsed(wanted, filter), every[0])
+        kind = quantities.checked(parsed(wanted, filter), every[0], outside)
     chosen = quantities.resolved(kind, quantities.labels(kind, every[0])).filter
     assert chosen is not None  # resolved
     for other in every:
@@ -675,6 +700,10 @@ def _told(
         for told in [{"key": ".".join(map(str, one.path)), "value": shown(x)}]
         if at_end(one, x)
     ]
+    dead = tuple(
+        above + ".".join(map(str, one.path)) for i, one in enumerate(searched) if one.of is None and inert(of, best, i)
+    )
+    notes += [tr("{key} has no effect on {quantity}", key=key, quantity=quantity.said) for key in dead[: len(keys) - 1]]
     if not of.exact and any(path not in ranges and path not in held for path in found):
         notes.append(tr("no intervals of the values: the quantity is flat there, or too noisy to tell its curvature"))
     return Tuned(
@@ -692,6 +721,7 @@ def _told(
         settings={one.key: one.tuned for one in keys},
         command=shlex.join(words),
         notes=tuple(notes),
+        inert=dead,
     )
 
 

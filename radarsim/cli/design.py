@@ -190,13 +190,10 @@ def tune(
     from radarsim.app import configs, shown
     from radarsim.app import tune as tuning
     from radarsim.cli import console, outcomes
-    from radarsim.errors import ConfigError
     from radarsim.report import wording
 
     if write:
-        configs.writable(write)
-    if write and asked["overrides"]:
-        raise ConfigError("--write: writes CONFIG with the tuned values, without --set: put those into a config")
+        configs.writable(write, config, asked["overrides"])
     with console.Progress(config, quiet=as_json, what="values") as progress:
         said = None if as_json else console.say_aside
         asked |= {"filter": filter_name, "threads": threads, "progress": progress.update, "notify": said}
@@ -207,7 +204,7 @@ def tune(
         outcomes.print_tuned(found)
     if write:
         path = pathlib.Path(write)
-        made = configs.new(path.name, config, path.parent, found.settings)
+        made = configs.new(path.name, config, path.parent, found.settings, asked["overrides"])
         click.echo(wording.labelled("config", str(made)), err=as_json)
 
 

@@ -355,6 +355,8 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     if asked and options["plain"]:
         raise click.UsageError("--plain goes with neither --robust nor --correlated")
     allowing = asked if asked or options["plain"] else None
+    if options["write"]:
+        configs.writable(options["write"], loaded.path or config, overrides)
     with console.Counter("fitting", "likelihoods") as counter:
         found = fitting.fit(loaded, plots, options["filter_name"], allowing, counter.update)
     if options["as_json"]:
@@ -363,7 +365,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
         outcomes.report_fit(found)
     if options["write"]:
         path = Path(options["write"])
-        made = configs.new(path.name, loaded.path or config, path.parent, fitting.settings(found))
+        made = configs.new(path.name, loaded.path or config, path.parent, fitting.settings(found), overrides)
         click.echo(wording.labelled("config", str(made)), err=options["as_json"])
 
 

@@ -449,12 +449,16 @@ def flow(value: object) -> str:
 
 # ---- own -------------------------------------------------------------------------------------------------------------
 def new(
-    name: str, like: str | os.PathLike[str], studies: Studies, values: Mapping[str, float] = MappingProxyType({})
+    name: str,
+    like: str | os.PathLike[str],
+    studies: Studies,
+    values: Mapping[str, float] = MappingProxyType({}),
+    overrides: Overrides = (),
 ) -> tuple[str, str]:
     """The name of the file of a new config, NAME with or without suffix given, and its text, from a known config.
 
-    values by dotted key replace those of the known config; a bare key means that key in every filter. Raises
-    ConfigError for an impossible name."""
+    values by dotted key replace those of the known config, with its overrides; a bare key means that key in every
+    filter. Raises ConfigError for an impossible name, and for overrides of several cases."""
     name = name.removesuffix(".yaml")
     if is_reserved(name):
         raise ConfigError(f"{name}: {RESERVED}")
@@ -463,7 +467,12 @@ def new(
             f"{one_line(name)}: must be a plain name of letters, digits and _ + = - . without folder or suffix, that "
             "begins with a letter, a digit or _"
         )
-    experiment = load(like, (), studies)
+    experiment = load(like, overrides, studies)
+    if overrides and len(experiment.cases) > 1:
+        where = argument("overrides", "--set")
+        raise ConfigError(
+            f"{where}: a config of {len(experiment.cases)} cases is written without: put it into the config"
+        )
     faults = Faults()
     document = read(Path(experiment.path or like), faults)
     faults.raise_if_any()
@@ -471,7 +480,8 @@ def new(
     data = copy.deepcopy(dict(document.data))
     file = Path(experiment.path or like)
     lost = any(_place(name) != _place(name, file) for name in data.get("include", ()))  # what lies beside it alone
-    if (values or lost) and "include" in data and len(experiment.cases) == 1:  # values have their places in the whole
+    inherits = "include" in data and (values or lost)  # values have their places in the whole
+    if (overrides or inherits) and len(experiment.cases) == 1:
         (case,) = experiment.cases
         data = {"study": case.study, **case.keys, "realisations": case.realisations, "seed": case.seed}
     elif "include" in data:

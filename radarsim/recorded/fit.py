@@ -400,7 +400,9 @@ def likelihood_of(
     of = recorded_of(case)
     names = [member.name for member in case.spec.members]
     if filter_name is not None and filter_name not in names:
-        raise ConfigError(f"filter: must be one of {', '.join(names)}; got {filter_name}")
+        own = [one.name for one in case.outside]
+        why = ": it is written in Python, and radarsim does not know its keys" if filter_name in own else ""
+        raise ConfigError(f"filter: must be one of {', '.join(names)}; got {filter_name}{why}")
     tracks, doubles = _tracks(source, of.columns(case.spec), of.from_any_origin)
     long = [columns for columns in tracks if len(columns["t_s"]) >= LEAST_ROWS]
     if not long:

@@ -20,12 +20,13 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from radarsim.errors import ConfigError
-from radarsim.language import plural, tr
+from radarsim.language import plural, speaking, tr
 from radarsim.recorded import plots as files
 from radarsim.recorded.formats.sites import BIASES, DAY_S, Site
 from radarsim.recorded.identity import KINDS, Paths, apart, are_far, offsets
@@ -233,23 +234,21 @@ def register(radar: str, other: str) -> Registration:
     b = plots.columns.get("bearing_rad", np.full(len(r), np.nan))
     found = paths.find(t, r, b, plots.identity)
     missed, own, names = offsets(found.states, r, b), found.path >= 0, paths.names()
-    told = {"of": plural("{count} plot", "{count} plots", int((~own).sum())), "file": other}
-    left = [tr("{of} that no aircraft in {file} has at that time", **told)] if not own.all() else []
+    strange, others = int((~own).sum()), []
     bent = np.zeros(len(t))
     for number, rows in grouped(found.path.tolist()).items():
         if number < 0:
             continue
         if are_far(missed[rows], r[rows]):
-            told = {"name": names[number], "away": distance(*apart(missed[rows]))}
-            left.append(tr("the plots of {name}, which lie {away} away: it is another", **told))
+            others.append((names[number], apart(missed[rows])))
             own[rows] = False
         bent[rows] = paths.bent(number, t[rows])
-    if wide := int((own & (bent > MOST_BENT_M)).sum()):
-        of = plural("{count} plot", "{count} plots", wide)
-        left.append(tr("{of} in turns, where positions are too far apart to {most:g} m", of=of, most=MOST_BENT_M))
-        own &= bent <= MOST_BENT_M
+    wide = int((own & (bent > MOST_BENT_M)).sum())
+    own &= bent <= MOST_BENT_M
+    left = partial(_left_out, strange, other, others, wide)
     if own.sum() < LEAST_PLOTS:
-        why = "".join("; " + tr("left out: {what}", what=one) for one in left)
+        with speaking("en"):  # as all faults
+            why = "".join(f"; left out: {what}" for what in left())
         raise ConfigError(f"{radar}: {own.sum()} of {len(t)} plots have a position of their aircraft in {other}, by "
                           f"address, callsign or Mode 3/A code and time; needs {LEAST_PLOTS}{why}")  # fmt: skip
     adjusted = adjust(Pairs(t[own], r[own], b[own], found.path[own], paths.at))
@@ -260,8 +259,23 @@ def register(radar: str, other: str) -> Registration:
     by = Counter(KINDS[k] for k in found.kind[own].tolist())
     return Registration(
         *(adjusted, tuple(aircraft), len(t), int(own.sum()), dict(by)),
-        *(apart(missed[own]), tuple(left), float(np.quantile(bent[own], 0.95))),
+        *(apart(missed[own]), tuple(left()), float(np.quantile(bent[own], 0.95))),
     )
+
+
+def _left_out(strange: int, file: str, others: Sequence[tuple[str, tuple[float, float]]], wide: int) -> list[str]:
+    """The plots that are not used, and why: of no aircraft in the file, of others than named, in turns."""
+    left = [
+        tr("the plots of {name}, which lie {away} away: it is another", name=name, away=distance(*far))
+        for name, far in others
+    ]
+    if strange:
+        of = plural("{count} plot", "{count} plots", strange)
+        left.insert(0, tr("{of} that no aircraft in {file} has at that time", of=of, file=file))
+    if wide:
+        of = plural("{count} plot", "{count} plots", wide)
+        left.append(tr("{of} in turns, where positions are too far apart to {most:g} m", of=of, most=MOST_BENT_M))
+    return left
 
 
 def read(path: str, choices: Sequence[Sequence[str]]) -> Recording:

@@ -334,15 +334,51 @@ def test_what_is_wanted_is_read_from_text(text, asked):
         (["--for", "sigma r at 1e9 s"], "--for: must be from 0 to 140 s, the last scan's time"),
         (["--for", "sigma r at k 99"], "--for: must be from 1 to 15, the last scan, got 99"),
         (["--for", "sigma r", "--write", "no/mine.yaml"], "no/mine.yaml: cannot be written: there is no such folder"),
-        (["--for", "sigma r", "--write", "mine.yaml", "--set", "target=turn"], "--write: writes CONFIG"),
+        (
+            ["--for", "sigma r", "--write", "mine.yaml", "--set", "sweep.radar.sigma_range_m=[1, 2]"],
+            "--set: a config of 2 cases is written without: put it into the config",
+        ),
     ],
 )
 def test_what_is_refused(words, said):
     assert said in command("tune", "rls2", "--filter", "r+Vr", *words, code=2).stderr
 
 
+def test_a_key_without_effect_is_called_so():
+    """D_M has no part in the first estimate of the range, nor in the second without a measured velocity."""
+    found = tune("rls2", "sigma r at k 1", filter="r")
+    key = "filters.0.manoeuvre_variance"
+    assert found.inert == (key,)
+    assert found.answer == f"There is nothing to tune: {key} has no effect on σ of r in r at k = 1."
+    assert tune("rls2", "sigma r", filter="r").inert == ()
+    some = tune("rls2", "sigma Vr at k 2", filter="r+Vr", free=["manoeuvre_variance", "initial_scans=2:4"])
+    assert some.inert == ("filters.1.manoeuvre_variance",)
+    assert f"{some.inert[0]} has no effect on {some.quantity.said}" in some.notes
+    sampled = tune("rls2", "sigma r at k 1", filter="r", sampled=True, realisations=64)
+    assert sampled.inert == (key,)
+
+
+def test_the_keys_of_a_filter_in_python_are_not_known(tmp_path):
+    (tmp_path / "mine.py").write_text("def mine(plots, world):\n    return None\n")
+    path = tmp_path / "mine.yaml"
+    path.write_text("include: [rls2]\nfilters:\n  - {name: r, observes: [range], manoeuvre_variance: 1e-3}\n"
+                    "  - {name: mine, python: 'mine.py:mine'}\n")  # fmt: skip
+    said = "filter 'mine' is written in Python: radarsim does not know its keys, only those of r"
+    assert command("tune", path, "--filter", "mine", "--for", "sigma r", code=2).stderr.strip() == said
+    words = ("solve", path, "radar.sigma_range_m", "--sigma", "r", "--filter", "mine", "--equals", "100")
+    assert command(*words, code=2).stderr.strip() == said
+
+
 def test_what_is_given_twice_counts_once():
     assert tune("rls2", **R, over=["turn", "turn"]).cases == tune("rls2", **R, over=["turn"]).cases
+
+
+def test_settings_are_kept_in_what_is_written(tmp_path):
+    words = ("tune", "rls2", "--filter", "r+Vr", "--for", "sigma r", "--set", "scans=9", "--set", "target=turn")
+    record = json.loads(command(*words, "--write", tmp_path / "mine.yaml", "--json").stdout)
+    (case,) = load(tmp_path / "mine.yaml").cases
+    assert (case.spec.scans, case.spec.filters[1].manoeuvre_variance) == (9, record["keys"][0]["tuned"])
+    assert case.spec.target == load("rls2", ["target=turn"]).cases[0].spec.target
 
 
 def test_of_an_included_config_the_tuned_filters_are_written(tmp_path):

@@ -570,8 +570,9 @@ def test_the_command_prints_intervals_and_json(source):
 
 def test_the_fitted_config_can_be_run(source, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    command("fit", "rls2", source, "--write", "mine.yaml")
+    command("fit", "rls2", source, "--write", "mine.yaml", "--set", "scans=9")
     (mine,) = load_all(["mine.yaml"], ())
+    assert mine.cases[0].spec.scans == 9
     found = fit.fit(loaded(), source)
     assert mine.cases[0].spec.radar.sigma_range_m == pytest.approx(found.keys[0].value, rel=1e-3)
     for one in mine.cases[0].spec.filters:
