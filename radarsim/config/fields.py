@@ -555,6 +555,14 @@ def unique_names(members: tuple[N, ...]) -> tuple[N, ...]:
 # Of most studies: the list of what is compared, and the name of the one that gains are against; its own name.
 Members = Annotated[tuple[N, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()]
 Baseline = Annotated[Name | None, Design(), NameIn("filters")]
+BASELINE = key(
+    "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
+)
+# Of `Lasting` studies: how long a run is.
+SCANS = key("number of scans", "number of scans; or give duration_s", None)
+DURATION = key(
+    "duration", "time from the first scan to the last, s, in place of scans: to the last scan within it", None
+)
 
 
 class Member(Model):
@@ -572,14 +580,7 @@ def keys_of(
     own: Any = {name: (one, key(name.replace("_", " "), about[name])) for name, one in parts.items()}
     own |= {
         "filters": (Members[filters], key("filters", "the filters; all see the same world")),  # type: ignore[valid-type]
-        "baseline": (
-            Baseline,
-            key(
-                "baseline filter",
-                "filter against which gains are computed, or a list of several; default: the first",
-                None,
-            ),
-        ),
+        "baseline": (Baseline, BASELINE),
         "scans": (Annotated[int, Whole(2, most_scans), Design()], key("number of scans", "number of plots")),
     }
     made: type[Study] = pydantic.create_model(name, __base__=Study, __module__=module, **own)

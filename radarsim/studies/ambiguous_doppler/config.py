@@ -273,15 +273,9 @@ class Keys(fields.Lasting):
         "prior", "what the filters know before the first plot", Prior.model_validate({})
     )
     filters: fields.Members[Filter] = key("filters", "the filters; all see the same plots")
-    baseline: fields.Baseline = key(
-        "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
-    )
-    scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = key(
-        "number of scans", "number of scans; or give duration_s", None
-    )
-    duration_s: Annotated[Positive | None, Design(), fields.Added()] = key(
-        "duration", "time from the first scan to the last, s, in place of scans: to the last scan within it", None
-    )
+    baseline: fields.Baseline = fields.BASELINE
+    scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = fields.SCANS
+    duration_s: Annotated[Positive | None, Design(), fields.Added()] = fields.DURATION
     rare: Annotated[RareFolds | None, Design(), fields.Added()] = key(
         "rare wrong folds",
         "importance sampling of wrong folds, for filters that are almost always right: rare.csv",

@@ -243,9 +243,7 @@ class Keys(fields.Study):
     filters: Annotated[
         tuple[Filter, ...], Field(min_length=1, max_length=32), AfterValidator(fields.unique_names), Design()
     ] = key("filters", "the filters; all see the same plots")
-    baseline: fields.Baseline = key(
-        "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
-    )
+    baseline: fields.Baseline = fields.BASELINE
     start_acceleration_mps2: Annotated[NonNegative, Design()] = key(
         "σ of the acceleration at the start of a track",
         "spread of the acceleration that the start of a track allows for, m/s²",

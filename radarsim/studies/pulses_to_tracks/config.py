@@ -250,15 +250,9 @@ class Keys(Lasting):
     target: Annotated[Target, fields.Scenario()] = key("target", "the target: a scenario's stem, or inline")
     prior: Prior = key("designation", "what is known when the track begins")
     filters: fields.Members[Filter] = key("filters", "the filters; all see the same ranges and bursts")
-    baseline: fields.Baseline = key(
-        "baseline", "filter against which gains are computed, or a list of several; default: the first", None
-    )
-    scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = key(
-        "scans", "number of scans; or give duration_s", None
-    )
-    duration_s: Annotated[Positive | None, Design()] = key(
-        "duration", "time from the first scan to the last, s, in place of scans: to the last scan within it", None
-    )
+    baseline: fields.Baseline = fields.BASELINE
+    scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = fields.SCANS
+    duration_s: Annotated[Positive | None, Design()] = fields.DURATION
 
     @property
     def pulses(self) -> int:

@@ -181,15 +181,9 @@ class Keys(fields.Lasting):
     radar: Radar = key("radar", "the radar")
     target: Annotated[Target, fields.Scenario()] = key("target", "the target: a scenario's stem, or inline")
     filters: fields.Members[Filter] = key("filters", "the filters; all see the same plots")
-    baseline: fields.Baseline = key(
-        "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
-    )
-    scans: Annotated[Annotated[int, fields.Whole(2, MOST_SCANS)] | None, fields.Design()] = key(
-        "number of scans", "number of scans; or give duration_s", None
-    )
-    duration_s: Annotated[Positive | None, fields.Design(), Added()] = key(
-        "duration", "time from the first scan to the last, s, in place of scans: to the last scan within it", None
-    )
+    baseline: fields.Baseline = fields.BASELINE
+    scans: Annotated[Annotated[int, fields.Whole(2, MOST_SCANS)] | None, fields.Design()] = fields.SCANS
+    duration_s: Annotated[Positive | None, fields.Design(), Added()] = fields.DURATION
 
     @model_validator(mode="after")
     def _completed(self) -> Self:

@@ -549,9 +549,7 @@ class Keys(fields.Study):
         "polar",
     )
     filters: fields.Members[Filter] = key("filters", "the filters; all of them process the same plots")
-    baseline: fields.Baseline = key(
-        "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
-    )
+    baseline: fields.Baseline = fields.BASELINE
     scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = key("number of scans", "number of scans of the first sonar")
     detectors: Annotated[tuple[Detector, ...], Field(max_length=8), AfterValidator(fields.unique_names), Design()] = (
         key("detectors", "manoeuvre detectors that are evaluated on the plots", ())
