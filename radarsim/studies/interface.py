@@ -7,8 +7,7 @@ kernels.
 The numbers come from two of them: `prepare` makes a plan of a case, once; `simulate` makes the sums of one block of
 realisations. Everything else derives from these sums.
 
-A study whose files have the usual names need not write the class: see `radarsim.studies.folder`.
-"""
+A study whose files have the usual names need not write the class: see `radarsim.studies.folder`."""
 
 import re
 from abc import ABC, abstractmethod
@@ -43,8 +42,7 @@ class Plan(Protocol):
 
     block: realisations in a block, from the study alone, never from N, threads or the machine. layout: names and shapes
     of the arrays of sums. axes: the quantities that are summed. gaussian: whether all errors are Gaussian, with
-    the exact bias and σ of the axes.
-    """
+    the exact bias and σ of the axes."""
 
     @property
     def block(self) -> int: ...
@@ -60,17 +58,14 @@ class Tracker(Protocol):
     """The filters of a case over recorded plots, chunk by chunk.
 
     most_rows: how many rows it takes, all at once; None: any number, chunk by chunk in constant memory. several:
-    whether rows may have the time of the row before, as plots of one scan do.
-    """
+    whether rows may have the time of the row before, as plots of one scan do."""
 
     most_rows: int | None
     several: bool
 
     def feed(self, columns: Mapping[str, "np.ndarray"]) -> "Track":
-        """The estimates over the next rows: columns (n,), NaN where a value is missing.
-
-        Raises PlotFault for a row that a filter cannot take.
-        """
+        """The estimates over the next rows: columns (n,), NaN where a value is missing. Raises PlotFault for a row that
+        a filter cannot take."""
 
 
 TRUE = "true_"  # what the names of columns that hold the truth begin with
@@ -91,8 +86,7 @@ class Drawn:
                     several plots: these come first, the rest is not-a-number, and M is as large as needed
     truth (n, K, C) the true state, its components by name and unit; beside: further columns, true_…, of either shape
 
-    Arrays may be views that cannot be written.
-    """
+    Arrays may be views that cannot be written."""
 
     t_s: "np.ndarray"
     columns: "Mapping[str, np.ndarray]"
@@ -129,11 +123,9 @@ class Drawn:
         return {**self.columns, **self.beside, **state}
 
     def table(self) -> "dict[str, np.ndarray]":
-        """All realisations one after the other as columns (rows,): `realisation`, `t_s`, what is measured, the truth.
-
-        A row a scan; where a scan may have several plots a row a plot, and one without values where it has none; of the
-        truth these have what stands beside it alone.
-        """
+        """All realisations one after the other as columns (rows,): `realisation`, `t_s`, what is measured, the truth. A
+        row a scan; where a scan may have several plots a row a plot, and one without values where it has none; of the
+        truth these have what stands beside it alone."""
         import numpy as np
 
         n, K = self.truth.shape[:2]
@@ -178,8 +170,7 @@ class Likelihood(Protocol):
 
     filter: its name; tracks and rows: numbers of them; keys: dotted names; stated (n,): their values in the config;
     least (n,): values of them that count as zero; explains: other explanations of plots that it can include, of
-    EXPLANATIONS; usual_s: the usual interval between plots.
-    """
+    EXPLANATIONS; usual_s: the usual interval between plots."""
 
     filter: str
     tracks: int
@@ -196,8 +187,7 @@ class Likelihood(Protocol):
         """The log-likelihood of values (n,) of the keys. Only explanations in `explains` may be given.
 
         outliers: the share of plots with ten times their σ; bias: a constant error of a number that can show one, in
-        its σ; correlation: of the errors of neighbouring plots, at the recording's usual interval.
-        """
+        its σ; correlation: of the errors of neighbouring plots, at the recording's usual interval."""
 
     def by_number(self, values: "np.ndarray") -> Mapping[str, float]:
         """The same for the keys alone, summed for each number of a plot, by its column; NaN where it is unknown."""
@@ -228,8 +218,7 @@ class RecordedPlots(ABC):
 
     rows_asked: number of rows for the likelihood behind the advice of `radarsim track`, so that it takes some seconds.
     from_any_origin: whether ranges count from any point, so that they may be negative. of_any_keys: whether it uses
-    only methods of the study, so that it cannot ignore keys.
-    """
+    only methods of the study, so that it cannot ignore keys."""
 
     rows_asked: int = 3000
     from_any_origin: bool = False
@@ -262,15 +251,13 @@ class RecordedPlots(ABC):
     def drawing(self, case: "Case") -> Draw:
         """The case prepared once: plots of realisations first … first + count - 1, by these two numbers.
 
-        Default: one after the other by `simulated`.
-        """
+        Default: one after the other by `simulated`."""
         return lambda first, count: _one_by_one(self, case, first, count)
 
     def simulated(self, case: "Case", realisation: int) -> Mapping[str, "np.ndarray"]:
         """The plots of one realisation, as a run draws them, and the truth in columns true_…; columns (n,).
 
-        Default: by `drawing`.
-        """
+        Default: by `drawing`."""
         return self.drawn(case, realisation, 1).rows(0)
 
     def drawn(self, case: "Case", first: int, count: int) -> Drawn:
@@ -292,8 +279,7 @@ class RecordedPlots(ABC):
         """The likelihood of tracks, columns (n,) each, under a filter; where None, the one that takes most columns of a
         plot.
 
-        Default: not known; `radarsim fit` refuses its configs.
-        """
+        Default: not known; `radarsim fit` refuses its configs."""
         return None
 
     def span_mps(self, spec: Any) -> float | None:
@@ -372,8 +358,7 @@ class Study(ABC):
     def own_filters(self) -> "type[Model] | None":
         """The base class for keys of filters from other packages, see `radarsim.studies.registry.filters`.
 
-        Default: none, the study takes no such filters.
-        """
+        Default: none, the study takes no such filters."""
         return None
 
     # ---- numbers -------------------------------------------------------------------------------------------------
@@ -389,10 +374,8 @@ class Study(ABC):
         """
 
     def errors(self, plan: Any, first: int, count: int) -> "np.ndarray":
-        """The errors (F, count, K, C) of the same realisations' estimates, not-a-number where a filter has none.
-
-        What is not available by the axes may hold anything. Default: the sums of each realisation alone.
-        """
+        """The errors (F, count, K, C) of the same realisations' estimates, not-a-number where a filter has none. What
+        is not available by the axes may hold anything. Default: the sums of each realisation alone."""
         import numpy as np
 
         found = np.empty((count, *np.shape(plan.axes.available)))
@@ -404,25 +387,21 @@ class Study(ABC):
         return np.moveaxis(found, 0, 1)
 
     def shortened(self, case: "Case", at_s: float | None, at_k: int | None) -> "Case":
-        """A case with the same exact errors at a time (s) or scan, cheaper to prepare. Default: the case itself.
-
-        Raises ConfigError where the whole case is impossible.
-        """
+        """A case with the same exact errors at a time (s) or scan, cheaper to prepare. Default: the case itself. Raises
+        ConfigError where the whole case is impossible."""
         return case
 
     def exact_but_for(self, case: "Case") -> str:
         """A qualification of the exact values of a case, in words, where they are approximate to less than the digits
         printed.
 
-        Default: nothing, they are exact.
-        """
+        Default: nothing, they are exact."""
         return ""
 
     def floor(self, spec: Any, axes: "Axes") -> "Floor | None":
         """What no estimator of a case can do better than, with its keys and the axes of its plan; see `studies.floor`.
 
-        Default: none is known.
-        """
+        Default: none is known."""
         return None
 
     def costly(self, case: "Case") -> bool:
@@ -445,10 +424,8 @@ class Study(ABC):
 
     def seconds_at_most(self, plan: Any) -> float | None:
         """An upper bound on CPU seconds for one realisation on any processor, from operation counts: nothing is
-        simulated.
-
-        `radarsim check` times a few realisations, unless this shows that all of them are short. Default: not known.
-        """
+        simulated. `radarsim check` times a few realisations, unless this shows that all of them are short. Default: not
+        known."""
         return None
 
     # ---- what is shown -------------------------------------------------------------------------------------------
@@ -491,10 +468,8 @@ class Study(ABC):
         return ()
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
-        """The tables behind figures, by the beginning of the figure's name. Default: none named.
-
-        Not needed for a figure with the name of its table, nor where the name begins with sigma, gain or sweep.
-        """
+        """The tables behind figures, by the beginning of the figure's name. Default: none named. Not needed for a
+        figure with the name of its table, nor where the name begins with sigma, gain or sweep."""
         return {}
 
     @abstractmethod

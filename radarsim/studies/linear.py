@@ -8,8 +8,7 @@ estimates, real numbers.
 Derived are the Kalman gains, exact σ and bias of every filter, also one with a wrong model, the limit of its σ, the
 compiled kernel, plots of one realisation, filters over recorded plots, and their likelihood. A plot's numbers have
 independent errors. Where plots may be missed, the gains of a Kalman filter depend on which were: its exact values and
-limits are then unknown; those of a filter with gains of its own are known.
-"""
+limits are then unknown; those of a filter with gains of its own are known."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -55,8 +54,7 @@ class Matrices:
     """A filter of n states and D numbers over K scans, as the kernels take it.
 
     F, Q, P (n, n), x (n,), H (K, D, n), R (K, D): its model, R variances; see (K, D, n), sigma (K, D): of its plots;
-    gains (K, D, n): its own, or the Kalman gains. own: whether it has its own.
-    """
+    gains (K, D, n): its own, or the Kalman gains. own: whether it has its own."""
 
     F: np.ndarray
     Q: np.ndarray
@@ -86,8 +84,7 @@ class LinearStudy(OneFile):
 
     motion(spec): how the truth moves; its first components are those of the study. plot(spec, one, k): the plot of
     filter `one` at scan k, from 0: the rows H (D, n), and the standard deviations (D,) of its numbers; a single number
-    may be given as (n,) and a float.
-    """
+    may be given as (n,) and a float."""
 
     motion: Callable[[Any], Motion]
     plot: Callable[[Any, Any, int], tuple[Any, Any]]
@@ -131,10 +128,8 @@ class LinearStudy(OneFile):
         return self.plot(spec, one, k)
 
     def own_gains(self, spec: Any, one: Any) -> Any:
-        """The gains (K, D, n) of a filter that has its own, such as `steady_gains`; None: a Kalman filter.
-
-        A plot's numbers are processed one after the other, each with its gains.
-        """
+        """The gains (K, D, n) of a filter that has its own, such as `steady_gains`; None: a Kalman filter. A plot's
+        numbers are processed one after the other, each with its gains."""
         return None
 
     def steady_gains(self, spec: Any, one: Any) -> np.ndarray:
@@ -355,11 +350,9 @@ def period(*arrays: np.ndarray) -> int:
 
 @np.errstate(all="ignore")  # growth without end has no limit
 def steady(of: Matrices) -> tuple[np.ndarray, np.ndarray]:
-    """The limit over a period of p scans of a Kalman filter's gains (p, D, n), and its P before the first of them.
-
-    P goes from scan to scan as A (P⁻¹ + J)⁻¹ A' + C with A = F, C = Q, J = H'R⁻¹H. Two such steps are one of the same
-    form, so 2^m periods take m of them (structured doubling: Chu, Fan & Lin 2005).
-    """
+    """The limit over a period of p scans of a Kalman filter's gains (p, D, n), and its P before the first of them. P
+    goes from scan to scan as A (P⁻¹ + J)⁻¹ A' + C with A = F, C = Q, J = H'R⁻¹H. Two such steps are one of the same
+    form, so 2^m periods take m of them (structured doubling: Chu, Fan & Lin 2005)."""
     eye, phases = np.eye(of.x.size), range(period(of.H, of.R))
     try:
         A, C, J = reduce(_after, ((of.F, of.Q, (of.H[k].T / of.R[k]) @ of.H[k]) for k in phases))
@@ -396,10 +389,8 @@ def _after(first: Step, second: Step) -> Step:
 # ---- exact values ----------------------------------------------------------------------------------------------------
 @np.errstate(all="ignore")  # of a filter that diverges
 def exact(truth: tuple[np.ndarray, ...], of: Matrices, probability: float) -> tuple[np.ndarray, np.ndarray]:
-    """σ and bias (K, n) of a filter's errors e, from the mean and covariance of (e, truth), whatever its model.
-
-    A missed plot makes a mixture of two; then σ is exact still, though the error is not Gaussian.
-    """
+    """σ and bias (K, n) of a filter's errors e, from the mean and covariance of (e, truth), whatever its model. A
+    missed plot makes a mixture of two; then σ is exact still, though the error is not Gaussian."""
     F, Q, mean, P = truth
     n = mean.size
     eye, none = np.eye(n), np.zeros((n, n))
@@ -428,8 +419,7 @@ def limit(truth: tuple[np.ndarray, ...], of: Matrices, probability: float) -> np
     where it depends on the truth: by a wrong F or H.
 
     Of a filter's own gains the last ones are kept. The covariance of the errors goes over a period as S → T S + W, with
-    S as a vector, and stays at (1 - T)⁻¹ W.
-    """
+    S as a vector, and stays at (1 - T)⁻¹ W."""
     F, Q, mean, _ = truth
     n = mean.size
     p = period(of.H, of.R, of.see, of.sigma)
@@ -543,8 +533,7 @@ class Following:
     """The filters of a case over recorded plots, chunk by chunk in constant memory.
 
     The first row is the first scan: there the state is as in the config. A filter none of whose columns are in the file
-    has no estimates.
-    """
+    has no estimates."""
 
     most_rows: int | None = None
     several = False
@@ -593,10 +582,8 @@ class Following:
 
 
 class PlotLikelihood:
-    """The likelihood of tracks under a filter's model, by the keys that the study names as `fitted`.
-
-    The state at the first plot is as in the config.
-    """
+    """The likelihood of tracks under a filter's model, by the keys that the study names as `fitted`. The state at the
+    first plot is as in the config."""
 
     explains: tuple[str, ...] = (OUTLIERS, CORRELATION)
 

@@ -15,8 +15,7 @@ paired with every one of them, in every study that draws plots, and the sums of 
 
 A realisation fails where not-a-number follows an estimate, where an estimate is infinite, where there is none although
 a filter of the config has one, and where an error is more than a hundred times the largest error of the config's
-filters in it. Its errors enter no sum, so that σ and gains count the others; how many failed is counted.
-"""
+filters in it. Its errors enter no sum, so that σ and gains count the others; how many failed is counted."""
 
 import itertools
 import threading
@@ -51,8 +50,7 @@ class World:
 
     t_s (K,) times of the scans, s; columns: what is measured, units in the names; sigma: its standard deviations, where
     the config states them; components: names and units of the state; keys: the config, as YAML has it;
-    case: what the case is called.
-    """
+    case: what the case is called."""
 
     t_s: np.ndarray
     columns: tuple[str, ...]
@@ -64,10 +62,8 @@ class World:
 
 @dataclass(frozen=True)
 class Plots:
-    """Plots of n realisations from number `first` on, not-a-number where missing: `plots["range_m"]`, (n, K).
-
-    Of one scan these are (n,), and t_s is its time; of one realisation (K,).
-    """
+    """Plots of n realisations from number `first` on, not-a-number where missing: `plots["range_m"]`, (n, K). Of one
+    scan these are (n,), and t_s is its time; of one realisation (K,)."""
 
     t_s: Any
     columns: Mapping[str, np.ndarray]
@@ -100,8 +96,7 @@ class Outside(ABC):
 class Called(Outside):
     """An object, class or function that is called with plots, by one thread at a time.
 
-    alone: it is a function of one realisation.
-    """
+    alone: it is a function of one realisation."""
 
     name: str
     target: Any
@@ -238,8 +233,7 @@ class Chunks(Outside):
 def checked(name: str, given: Any, n: int, K: int, components: Sequence[str], own: Sequence[str]) -> Estimates:
     """Estimates (n, K, d) and their covariances, float64; raises ConfigError where they have another shape or type.
 
-    own: the components that the filter names, in the order of its last axis.
-    """
+    own: the components that the filter names, in the order of its last axis."""
     x, P = parts(given)
     x = plain(x)
     x = x[..., None] if x.ndim == 2 else x

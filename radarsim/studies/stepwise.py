@@ -349,8 +349,7 @@ class StepStudy(OneFile):
     def _free_of_error(self, plan: Plan) -> np.ndarray:
         """Where (F, K, C) estimates equal the truth in plain Python too, in realisation 0.
 
-        Compiled code assumes finite numbers: a NaN error may be stored as zero.
-        """
+        Compiled code assumes finite numbers: a NaN error may be stored as zero."""
         if "free" not in plan.checked:
             plots = self._drawing(plan)(0, 1)
             columns, truth = {name: column[0] for name, column in plots.columns.items()}, plots.truth[0]

@@ -26,8 +26,7 @@ Exact steady gains of many radars at once: the map of the chart, with the scan p
 Exact errors of a linear filter: its gains applied to the true plots' covariance, not to the one it believes.
 
 When truth and model agree there is no manoeuvre, so the error covariance runs through the filter's own gains without
-process noise; where the truth leaves the model, the mean error (dynamic error, bias) runs beside it.
-"""
+process noise; where the truth leaves the model, the mean error (dynamic error, bias) runs beside it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -79,8 +78,7 @@ class Errors(NamedTuple):
 def defects(x: np.ndarray, dt: float, plots: Plots, drawn: np.ndarray | None = None) -> np.ndarray:
     """F x − x⁺ of the truth x (K, 3) at every scan from the one before, for the columns of E: (K, 3, C).
 
-    drawn (K, 3, 1 + of_truth): beside x, the mean and the columns of a truth that is drawn; None: it is not.
-    """
+    drawn (K, 3, 1 + of_truth): beside x, the mean and the columns of a truth that is drawn; None: it is not."""
     made = np.zeros((len(x), 3, plots.inputs.shape[1]))
     made[1:, :, 0] = np.array(algebra.predicted(x[:-1].T, algebra.constant_acceleration(dt))).T - x[1:]
     if drawn is not None:
@@ -92,8 +90,7 @@ def defects(x: np.ndarray, dt: float, plots: Plots, drawn: np.ndarray | None = N
 def started(weights: np.ndarray, believed: np.ndarray, plots: Plots, defect: np.ndarray, dt: float) -> Errors:
     """Errors of a start that weighs plots, (3, 2, n), at the last of the n scans; defect as `defects` has it.
 
-    believed (3, 3) is the covariance that the filter takes them to have.
-    """
+    believed (3, 3) is the covariance that the filter takes them to have."""
     S = np.einsum("ijk,j,ljk->il", weights, plots.sigma**2, weights)
     truth = np.zeros((weights.shape[2], 3, defect.shape[2]))
     for k in range(1, len(truth)):  # from zero, as the start forgets what a filter of the model can follow
@@ -143,10 +140,8 @@ def scan_times(spec: Keys) -> np.ndarray:
 
 
 def sigma_flight(target: Target) -> np.ndarray:
-    """Standard deviations (6,) with which x, y, z (m) and vx, vy, vz (m/s) at the first plot are drawn.
-
-    Of a flight in a plane through the radar, within the plane.
-    """
+    """Standard deviations (6,) with which x, y, z (m) and vx, vy, vz (m/s) at the first plot are drawn. Of a flight in
+    a plane through the radar, within the plane."""
     if not isinstance(target, Flying):
         return np.zeros(6)
     axes = np.array([1.0, 1.0, 1.0 if isinstance(target, Recorded) else 0.0])
@@ -174,10 +169,8 @@ def flight(target: Target, t: np.ndarray) -> np.ndarray:
 
 
 def true_motion(case: Case) -> tuple[np.ndarray, np.ndarray]:
-    """Times (K,) of the scans and the truth (K, 3) of a case, of a drawn one that of the middle.
-
-    Raises ConfigError for a target that cannot be.
-    """
+    """Times (K,) of the scans and the truth (K, 3) of a case, of a drawn one that of the middle. Raises ConfigError for
+    a target that cannot be."""
     target, t = case.spec.target, scan_times(case.spec)
     x = checked_truth(target, t, case.name)
     spread = sigma_flight(target)
@@ -194,8 +187,7 @@ def drawn_defects(target: Target, t: np.ndarray, x: np.ndarray) -> np.ndarray:
 
     At every scan F x − x⁺ from the scan before, whose first two moments are these: column 0 its mean, the others its
     covariance as the sum of their products. Not-a-number where the run is too long for it. One column of zeros where
-    nothing is drawn that matters.
-    """
+    nothing is drawn that matters."""
     spread, path = sigma_flight(target), flight(target, t)
     scans = len(t)
     if not len(path):
@@ -226,9 +218,7 @@ def left(x: np.ndarray, dt: float) -> np.ndarray:
 
 def displacements(spread: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """Weights (M,) and displacements (M, 6) whose weighted means are those over what is drawn, some at a time.
-
-    Gauss–Hermite quadrature in each number that is drawn; spread (6,) are their standard deviations.
-    """
+    Gauss–Hermite quadrature in each number that is drawn; spread (6,) are their standard deviations."""
     drawn = np.flatnonzero(spread)
     nodes, weights = np.polynomial.hermite_e.hermegauss(NODES[len(drawn)])
     places = np.stack(np.meshgrid(*[nodes] * len(drawn), indexing="ij"), axis=-1).reshape(-1, len(drawn))
@@ -275,8 +265,7 @@ def least_squares(times: np.ndarray, there: np.ndarray, sigma: np.ndarray) -> tu
 
     there (n, 2) says which numbers there are; sigma (2,) holds the standard deviations of range (m) and radial velocity
     (m/s). None where they do not determine a state. Solved in scaled units (state per interval, rows per sigma) so that
-    periods of milliseconds and of hours are equally well conditioned.
-    """
+    periods of milliseconds and of hours are equally well conditioned."""
     unit = max(float(np.ptp(times)), 1e-9) / max(len(times) - 1, 1)
     scale = np.array([1.0, 1.0 / unit, 1.0 / unit**2])
     A = np.concatenate([transition(t)[:2] * scale / sigma[:, None] for t in times])[there.ravel()]
@@ -299,10 +288,8 @@ def least_squares_start(observes: int, start: int, sigma: np.ndarray, dt: float)
 
 def noise_by_time(noise: str, manoeuvre_variance: float, period: float) -> np.ndarray:
     """Process noise over any time t, (2, 6) packed: Q_ij = a_ij t^(5 − i − j) + b_ij t^(6 − i − j), i and j from 0.
-
-    What `physics.process_noise` adds over a scan period (s), for plots at uneven times: the jerk stays constant
-    between two plots; white jerk keeps its density; of the acceleration's steps there are as many as periods.
-    """
+    What `physics.process_noise` adds over a scan period (s), for plots at uneven times: the jerk stays constant between
+    two plots; white jerk keeps its density; of the acceleration's steps there are as many as periods."""
     made = np.zeros((2, 6))
     of_a_second = np.array(algebra.pack(process_noise(noise, manoeuvre_variance, 1.0)))
     made[int(noise == "random_jerk")] = of_a_second * (1.0 if noise == "random_jerk" else period)
@@ -321,8 +308,7 @@ def design(
     """The paper's filter: least squares on `start` scans, then eqs. (5), (9), (13) with M of eq. (6); sigma (2,).
 
     Before the start the estimates are the plots themselves: the range, and the velocity where it is observed. `noise`
-    is the form of the process noise, see `physics.process_noise`.
-    """
+    is the form of the process noise, see `physics.process_noise`."""
     F, Q = (
         algebra.constant_acceleration(dt),
         tuple(map(float, algebra.pack(process_noise(noise, manoeuvre_variance, dt)))),
@@ -397,19 +383,15 @@ def damping(c: np.ndarray | float) -> np.ndarray:
 
 
 def error_polynomial(c: float) -> np.ndarray:
-    """Coefficients (4,), highest power first, of the limit filter's error in units of τ₂: s³ + As² + (A²/2)s + 1.
-
-    Of range and velocity, c > 0, A is `damping`; of the range alone c = 0 and A = 2.
-    """
+    """Coefficients (4,), highest power first, of the limit filter's error in units of τ₂: s³ + As² + (A²/2)s + 1. Of
+    range and velocity, c > 0, A is `damping`; of the range alone c = 0 and A = 2."""
     A = float(damping(c))
     return np.array([1.0, A, A**2 / 2, 1.0])
 
 
 def believed(c: np.ndarray | float) -> np.ndarray:
-    """Steady covariance (3, 3, …) that the limit filter believes, over σ_r² Δt/τ₂ and powers of τ₂: rational in A.
-
-    The solution of the algebraic Riccati equation; derived in docs/chart.md.
-    """
+    """Steady covariance (3, 3, …) that the limit filter believes, over σ_r² Δt/τ₂ and powers of τ₂: rational in A. The
+    solution of the algebraic Riccati equation; derived in docs/chart.md."""
     A = damping(c)
     X = A**3
     W = X**2 - 8 * X + 8
@@ -420,18 +402,14 @@ def believed(c: np.ndarray | float) -> np.ndarray:
 
 def steady_gain(c: float) -> np.ndarray:
     """Gain (3, 2) of the limit filter on range and velocity, in units of σ_r and τ₂; c = 0: the second column is zero.
-
-    The error that it leaves has the characteristic polynomial `error_polynomial`.
-    """
+    The error that it leaves has the characteristic polynomial `error_polynomial`."""
     return believed(c)[:, :2] * np.array([1.0, c])
 
 
 def noise_variances(c: np.ndarray | float, step: np.ndarray | float = 0.0) -> np.ndarray:
-    """σ_r², σ_V², σ_a² (3, …) of the limit filter on a quadratic truth, over σ_r² Δt/τ₂ · (1, τ₂⁻², τ₂⁻⁴).
-
-    Of the range alone, c = 0, they are 5/3, 3/2, 1/3. They are what the filter believes, less what the manoeuvre would
-    add that such a truth has not. step is Δt/τ₂, of which the first order is kept: half a scan of extrapolation.
-    """
+    """σ_r², σ_V², σ_a² (3, …) of the limit filter on a quadratic truth, over σ_r² Δt/τ₂ · (1, τ₂⁻², τ₂⁻⁴). Of the range
+    alone, c = 0, they are 5/3, 3/2, 1/3. They are what the filter believes, less what the manoeuvre would add that such
+    a truth has not. step is Δt/τ₂, of which the first order is kept: half a scan of extrapolation."""
     A, P = damping(c), believed(c)
     X, p11 = A**3, P[0, 0]
     b, d = A**2 / 2 - A * (X - 8) / 4 * p11, X - 2
@@ -442,10 +420,8 @@ def noise_variances(c: np.ndarray | float, step: np.ndarray | float = 0.0) -> np
 
 def steady_gains(c: np.ndarray | float, step: np.ndarray | float = 0.0) -> np.ndarray:
     """Relative gains (3, …) of range, velocity, acceleration by the velocity in the limit, %: functions of c alone.
-
     Within LIMIT_POINTS of the recursion up to SMALL and LARGEST; with the first order of the period, step = Δt/τ₂,
-    within ERROR_POINTS.
-    """
+    within ERROR_POINTS."""
     with np.errstate(invalid="ignore"):
         return 100 * (1 - np.sqrt(noise_variances(c, step) / noise_variances(np.zeros_like(c, dtype=float), step)))
 
@@ -469,11 +445,9 @@ def exact_gains(C_theta: np.ndarray, Lambda: np.ndarray) -> np.ndarray:
 
 
 def errors_of_many(C_theta: np.ndarray, Lambda: np.ndarray) -> np.ndarray:
-    """Steady variances (3, n) of the filters of many radars at once, each in units of its own; C_θ = 0: range alone.
-
-    As `steady_state`, by doubling: each round of the Riccati equation's iteration does as many scans as all
-    before (Anderson, Int. J. Control 28, 1978, 295-306), and so does each of the sum of what the noise leaves.
-    """
+    """Steady variances (3, n) of the filters of many radars at once, each in units of its own; C_θ = 0: range alone. As
+    `steady_state`, by doubling: each round of the Riccati equation's iteration does as many scans as all before
+    (Anderson, Int. J. Control 28, 1978, 295-306), and so does each of the sum of what the noise leaves."""
     n, unit = len(Lambda), np.maximum(1.0, Lambda ** (-1 / 3))  # time in memories τ₂, where longer than a scan
     F = np.stack([transition(1 / u) for u in unit])
     Q = np.stack([manoeuvre_covariance(one**2 * u**6, 1 / u) for one, u in zip(Lambda, unit, strict=True)])
@@ -497,8 +471,7 @@ def error_recursion(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Lasting errors E (K, 3, C) and covariance S (K, 3, 3) of what noise makes, at every scan of a truth (K, 3).
 
-    drawn: see `defects`. Before the start the estimates are the plots.
-    """
+    drawn: see `defects`. Before the start the estimates are the plots."""
     defect, observes, begun = defects(truth, dt, plots, drawn), one.observes, one.start - 1
     E, S = np.zeros_like(defect), np.zeros((len(truth), 6))
     E[:begun, :observes], S[:begun, 0] = plots.inputs[:observes], plots.sigma[0] ** 2
@@ -515,11 +488,9 @@ def error_recursion(
 def steady_state(
     observes: int, manoeuvre_variance: float, sigma: np.ndarray, dt: float, noise: str = "random_jerk"
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Steady covariances (3, 3): the one the filter believes, and the true one on a truth without manoeuvre.
-
-    The believed one solves the discrete algebraic Riccati equation; the true one is the fixed point of the error
-    recursion under the steady gain (a Lyapunov equation).
-    """
+    """Steady covariances (3, 3): the one the filter believes, and the true one on a truth without manoeuvre. The
+    believed one solves the discrete algebraic Riccati equation; the true one is the fixed point of the error recursion
+    under the steady gain (a Lyapunov equation)."""
     from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 
     # Time counted in the filter's own memory, (σ_r²/D_M)^(1/6), where longer than a scan: then no state is tiny.
@@ -545,8 +516,7 @@ def normalised_error(
     and where P is singular.
 
     believed (…, 3, 3) is P, bias (…, 3) the mean m of e, moment (…, 3, 3) its second moment M = E eeᵀ, available
-    (…, 3) the components of e that there are. The mean is tr P⁻¹M, the variance 2 tr (P⁻¹M)² - 2 (mᵀP⁻¹m)².
-    """
+    (…, 3) the components of e that there are. The mean is tr P⁻¹M, the variance 2 tr (P⁻¹M)² - 2 (mᵀP⁻¹m)²."""
     spread = np.diagonal(believed, axis1=-2, axis2=-1)
     scale = np.where(spread > 0, spread, np.inf) ** -0.5  # m, m/s and m/s² brought to one size before solving
     unit = scale[..., :, None] * scale[..., None, :]
