@@ -1,32 +1,30 @@
 """`make reproduce-figures`: every shipped config at full size, a line for each, and the verdicts on the papers' claims.
 
 Two processes share the configs, so that one computes while the other draws: drawing keeps a single core busy, and takes
-about as long as computing. They are new processes, which read a line of JSON for each config and answer with one; the
-store is safe with both. One works from the first config on, the other backwards from the last: configs with similar
-names are mostly of one study, and both would compile its kernels at the same time.
+about as long as computing; the store is safe with both. Configs are taken from both ends of the list: those with
+similar names are mostly of one study, and both processes would compile its kernels at the same time.
 
 `radarsim new-study`: a package with a small complete study. It is a copy of radarsim/app/one_file, with the files of
 radarsim/app/one_step in place of its own, or of radarsim/app/template, under another name; these packages work as they
 stand, and are linted and tested. Nothing is overwritten.
 """
 
-import json
 import os
 import re
 import signal
-import subprocess
 import sys
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, field
+from functools import partial
 from importlib.metadata import packages_distributions
+from itertools import zip_longest
 from keyword import iskeyword, issoftkeyword
+from multiprocessing import active_children, get_context
 from pathlib import Path
-from queue import SimpleQueue
 
 from radarsim.app import run as experiment
 from radarsim.app.configs import document as lookup
@@ -56,16 +54,6 @@ class Done:
     stages: Mapping[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Task:
-    """A task for a process: a config by name, the output directory, and options."""
-
-    stem: str
-    out: str
-    overrides: tuple[str, ...] = ()
-    figures: bool = True
-
-
 def reproduce(
     stems: Sequence[str],
     out: str,
@@ -76,118 +64,51 @@ def reproduce(
 ) -> list[Done]:
     """Run every config and report a line as each finishes; a fault of one does not stop the others.
 
-    Raises Interrupted, with all finished work stored, on a signal seen by `stop`.
-    """
+    Raises Interrupted, with all finished work stored, on a signal seen by `stop`."""
     done: list[Done] = []
-    tasks = [Task(stem, str(out), tuple(overrides), figures) for stem in stems]
-    for one in _finished(tasks, stop):
+    for one in _finished(partial(_run, str(out), tuple(overrides), figures), from_both_ends(stems), stop):
         done.append(one)
         say(f"[{len(done):>2}/{len(stems)}] {one.stem:<26} {one.seconds:6.1f} s  {one.summary}")
     return done
 
 
-def _finished(tasks: Sequence[Task], stop: Signals | None) -> Iterator[Done]:
-    """Finished configs as they come, from processes that have ended afterwards."""
-    count = min(PROCESSES, len(tasks))
-    idle: SimpleQueue[_Process] = SimpleQueue()
-    processes = [_Process() for _ in range(count)]
-    for process in processes:
-        idle.put(process)
-    waiting = deque(tasks)
-
-    def run() -> Done:
-        process = idle.get()
-        task = waiting.popleft() if process is processes[0] else waiting.pop()
-        try:
-            return process.done(task)
-        finally:
-            idle.put(process)
-
-    with ThreadPoolExecutor(max(1, count)) as pool:
-        pending: set[Future[Done]] = {pool.submit(run) for _ in tasks}
-        try:
-            while pending:
-                ready, pending = wait(pending, LOOK_S, FIRST_COMPLETED)
-                if stop is not None:
-                    stop.raise_if_received()
-                yield from (future.result() for future in ready)
-        finally:
-            for future in pending:
-                future.cancel()
-            for process in processes:
-                process.stop(at_once=bool(pending))
-            for process in processes:
-                process.wait()
+def from_both_ends(stems: Sequence[str]) -> list[str]:
+    """The first, the last, the second, the last but one, …"""
+    half = (len(stems) + 1) // 2
+    return [one for pair in zip_longest(stems[:half], stems[half:][::-1]) for one in pair if one]
 
 
-class _Process:
-    """A process that runs one config after another; in its own session, so that Ctrl-C reaches only the parent."""
+def _finished(work: Callable[[str], Done], stems: Sequence[str], stop: Signals | None) -> Iterator[Done]:
+    """Finished configs as they come, from processes that have ended afterwards.
 
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._ended = False
-        self._start()
-
-    def _start(self) -> None:
-        environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-        command = [sys.executable, "-c", "from radarsim.app.reproduce import answer; answer()"]
-        self._popen = subprocess.Popen(
-            command, env=environment, start_new_session=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-        assert self._popen.stdin is not None
-        assert self._popen.stdout is not None
-        self._requests, self._answers = self._popen.stdin, self._popen.stdout
-
-    def done(self, task: Task) -> Done:
-        """Run a config in it. If the process dies, that is reported as the config's fault, and a new one is started."""
-        began = time.perf_counter()
-        with suppress(OSError):
-            self._requests.write(json.dumps(asdict(task)) + "\n")
-            self._requests.flush()
-        if line := self._answers.readline():
-            answered = json.loads(line)
-            return Done(**answered | {"faults": tuple(answered["faults"])})
-        code = self._popen.wait()
-        with self._lock:
-            if not self._ended:
-                self._answers.close()
-                self._close_stdin()
-                self._start()
-        fault = f"{task.stem}: its process ended with {code}; run it again, what it finished is stored"
-        return Done(task.stem, time.perf_counter() - began, f"FAILED: {fault}", (fault,), 1)
-
-    def stop(self, at_once: bool) -> None:
-        """End it: at once, storing finished blocks, or else after the current config."""
-        with self._lock:
-            self._ended = True
-            if at_once:
-                self._popen.terminate()
-            self._close_stdin()
-
-    def wait(self) -> None:
-        """Until it has ended."""
-        self._popen.wait()
-        self._answers.close()
-
-    def _close_stdin(self) -> None:
-        with suppress(OSError):  # a config that it never read
-            self._requests.close()
+    If a process dies, a single one does the rest: the config with which that dies too is at fault."""
+    waiting, count = list(stems), PROCESSES
+    while waiting:
+        with ProcessPoolExecutor(min(count, len(waiting)), get_context("spawn"), _begin) as pool:
+            pending = {pool.submit(work, stem) for stem in waiting}
+            try:
+                while pending:
+                    ready, pending = wait(pending, LOOK_S, FIRST_COMPLETED)
+                    if stop is not None:
+                        stop.raise_if_received()
+                    for future in ready:
+                        waiting.remove((one := future.result()).stem)
+                        yield one
+            except BrokenProcessPool:
+                if count == 1:
+                    fault = f"{waiting[0]}: its process ended; run it again, what it finished is stored"
+                    yield Done(waiting.pop(0), 0.0, f"FAILED: {fault}", (fault,), 1)
+                count = 1
+            finally:
+                for child in active_children() if waiting else ():
+                    child.terminate()
+                pool.shutdown(cancel_futures=True)
 
 
-def answer() -> None:
-    """The program of a process: reads a Task from each line of stdin, writes a Done to stdout for each."""
+def _begin() -> None:
+    """In a process, which runs one config after another: in its own session, so that Ctrl-C reaches only the parent."""
+    os.setsid()
     threading.Thread(target=_follow, args=(os.getppid(),), daemon=True).start()
-    with Signals() as stop:
-        try:
-            for line in sys.stdin:
-                asked = json.loads(line)
-                done = _run(Task(**asked | {"overrides": tuple(asked["overrides"])}), stop)
-                sys.stdout.write(json.dumps(asdict(done)) + "\n")
-                sys.stdout.flush()
-        except Interrupted as ended:
-            os._exit(ended.exit_code)  # as the command does: the sender of the signal need not wait for an orderly end
-        except BrokenPipeError:  # the parent is gone
-            os._exit(1)
 
 
 def _follow(parent: int) -> None:
@@ -197,7 +118,7 @@ def _follow(parent: int) -> None:
     os.kill(os.getpid(), signal.SIGTERM)
 
 
-def _run(task: Task, stop: Signals) -> Done:
+def _run(out: str, overrides: Sequence[str], figures: bool, stem: str) -> Done:
     from radarsim.report.claims import page
 
     started = time.perf_counter()
@@ -205,17 +126,18 @@ def _run(task: Task, stop: Signals) -> Done:
     code = 0
     stages: dict[str, float] = {}
     try:
-        result = experiment.run(task.stem, overrides=task.overrides, out=task.out, stop=stop, figures=task.figures)
+        with Signals() as stop:
+            result = experiment.run(stem, overrides=overrides, out=out, stop=stop, figures=figures)
         verdicts = ", ".join(page.of_class(kind, len(names)) for kind, names in result.verdicts().items())
         drawn = sum(name.endswith(".svg") for name in result.written.files) if result.written else 0
-        made = [plural(drawn, "figure")] if task.figures else []
+        made = [plural(drawn, "figure")] if figures else []
         made += [f"claims: {verdicts}"] if verdicts else []
         stages = {"simulation": result.facts["seconds"]} | dict(result.written.seconds if result.written else {})
-    except Interrupted:
-        raise
+    except Interrupted as ended:
+        os._exit(ended.exit_code)  # as the command does: the sender of the signal need not wait for an orderly end
     except RadarsimError as error:
         made, faults, code = [f"FAILED: {error.lines[0]}"], error.lines, error.exit_code
-    return Done(task.stem, time.perf_counter() - started, "; ".join(made), faults, code, stages)
+    return Done(stem, time.perf_counter() - started, "; ".join(made), faults, code, stages)
 
 
 def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:

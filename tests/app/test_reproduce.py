@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 
 import pytest
@@ -40,44 +39,23 @@ def test_a_line_each_a_fault_told_and_a_summary(tmp_path):
     assert "rls4/report.html" in index
 
 
-def test_the_processes_start_from_both_ends(tmp_path, monkeypatch):
+def test_configs_are_taken_from_both_ends():
     """Neighbours share kernels, which two processes side by side would both compile."""
-    both, taken = threading.Barrier(2), []
-
-    class Process:
-        def __init__(self):
-            taken.append([])
-            self.own = taken[-1]
-
-        def done(self, task):
-            both.wait(10)
-            self.own.append(task.stem)
-            return reproduce.Done(task.stem, 0.0, "")
-
-        def stop(self, at_once):
-            pass
-
-        def wait(self):
-            pass
-
-    monkeypatch.setattr(reproduce, "_Process", Process)
-    done = reproduce.reproduce(list("abcdef"), str(tmp_path), lambda line: None)
-    assert sorted(one.stem for one in done) == list("abcdef")
-    assert taken == [["a", "b", "c"], ["f", "e", "d"]]
+    assert reproduce.from_both_ends("abcde") == list("aebdc")
+    assert reproduce.from_both_ends("abcdef") == list("afbecd")
 
 
-def test_a_process_that_dies_is_told_and_replaced(tmp_path):
-    process = reproduce._Process()
-    try:
-        os.kill(process._popen.pid, signal.SIGKILL)
-        lost = process.done(reproduce.Task("rls2", str(tmp_path), tuple(SMALL), figures=False))
-        again = process.done(reproduce.Task("rls2", str(tmp_path), tuple(SMALL), figures=False))
-    finally:
-        process.stop(at_once=False)
-        process.wait()
-    assert "ended with -9" in lost.faults[0]
-    assert not again.faults
-    assert "claims: " in again.summary
+def dies(stem):
+    if stem == "b":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return reproduce.Done(stem, 0.0, "")
+
+
+def test_a_config_with_which_its_process_dies_is_told_and_the_others_are_done():
+    done = {one.stem: one for one in reproduce._finished(dies, list("abcd"), None)}
+    assert "b: its process ended" in done.pop("b").faults[0]
+    assert sorted(done) == list("acd")
+    assert not any(one.faults for one in done.values())
 
 
 @pytest.mark.alone
