@@ -164,7 +164,7 @@ def test_doctor_names_the_package(radarsim):
 def test_its_kernels_are_compiled_once(ran, radarsim, tmp_path):
     def kept() -> dict[Path, int]:
         """When each was compiled; the command runs in this process's environment, so its cache is this one's."""
-        return {file: file.stat().st_mtime_ns for file in ROOT.rglob("fifth.kernels.walk.simulate_block*")}
+        return {file: file.stat().st_mtime_ns for file in ROOT.rglob("fifth.kernels.simulate_block*")}
 
     radarsim("run", "fifth", "-n", 100, "--no-figures", "--out", tmp_path)
     compiled = kept()
@@ -221,7 +221,7 @@ def test_a_wrong_number_in_kernel_or_exact_value_ends_the_run_in_exit_code_4(tmp
     assert "exactly 0.02: " in said
     assert "sigma measured" not in said
     edited("study.py", "exact_bias=np.full(shape, 0.02)", "exact_bias=np.zeros(shape)")
-    edited("kernels/walk.py", "x[i] += step * noise[i]", "x[i] += 1.05 * step * noise[i]")
+    edited("kernels.py", "x[i] += step * noise[i]", "x[i] += 1.05 * step * noise[i]")
     said = command(*run, "longer", code=4).stderr
     assert "curves.csv: wrong, fixed, x, k = " in said
     assert "sigma measured " in said

@@ -5,7 +5,7 @@ import pytest
 import radarsim
 from radarsim.app.configs import load
 
-from random_walk import STUDY, exact
+from random_walk import STUDY, filters
 
 CASE = load("random_walk").cases[0]
 
@@ -40,8 +40,8 @@ def test_a_realisation_is_itself_in_any_block():
 
 
 def test_the_error_tends_to_its_steady_value():
-    variance = exact.error_variance(np.array([1.0, *[0.2] * 200]), 1.0, 0.5)
-    assert variance[-1] == pytest.approx(exact.steady_variance(0.2, 1.0, 0.5), rel=1e-12)
+    variance = filters.error_variance(np.array([1.0, *[0.2] * 200]), 1.0, 0.5)
+    assert variance[-1] == pytest.approx(filters.steady_variance(0.2, 1.0, 0.5), rel=1e-12)
 
 
 def test_the_claim_is_confirmed():

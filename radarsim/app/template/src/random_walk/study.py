@@ -7,8 +7,7 @@ from radarsim.config.experiment import Case
 from radarsim.engine.results import Axes, Layout
 from radarsim.studies.noise import noise_key
 
-from random_walk import exact, filters
-from random_walk.kernels import walk
+from random_walk import filters, kernels
 
 COMPONENTS = (("x", "m"),)  # Yours: names and units of the errors shown
 BLOCK = 4096  # Yours: realisations in a block, fixed for the study; some milliseconds of work
@@ -16,7 +15,7 @@ BLOCK = 4096  # Yours: realisations in a block, fixed for the study; some millis
 
 @dataclass(frozen=True)
 class Plan:
-    """The data of a block, F filters over K scans; see `kernels.walk.simulate_block`."""
+    """The data of a block, F filters over K scans; see `kernels.simulate_block`."""
 
     layout: Layout
     axes: Axes
@@ -34,7 +33,7 @@ def prepare(case: Case) -> Plan:
     sigma, step = spec.sensor.sigma_x_m, spec.target.sigma_step_m
     gains = np.stack([filters.design(one, sigma, step, scans) for one in spec.filters])
     shape = (*gains.shape, 1)
-    exact_sigma = np.sqrt([exact.error_variance(row, sigma, step) for row in gains]).reshape(shape)
+    exact_sigma = np.sqrt([filters.error_variance(row, sigma, step) for row in gains]).reshape(shape)
     names = tuple(one.name for one in spec.filters)
     axes = Axes(
         filters=names,
@@ -54,7 +53,7 @@ def prepare(case: Case) -> Plan:
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     """Sums of realisations first … first + count - 1, in the order of the plan's layout."""
     sums = {name: np.zeros(shape) for name, shape in plan.layout.shapes.items()}
-    walk.simulate_block(
+    kernels.simulate_block(
         plan.key, first, count, plan.sigma, plan.step, plan.gains, plan.axes.baseline, sums["error"], sums["paired"]
     )
     return plan.layout.pack(**sums)

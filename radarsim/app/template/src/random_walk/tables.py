@@ -5,7 +5,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import statistics
 from radarsim.report import tables as common
 
-from random_walk import exact, filters
+from random_walk import filters
 
 table = common.Tables()
 
@@ -26,7 +26,7 @@ def _steady(result: CaseResult) -> common.Columns:
         **common.leading(result, f, **common.components(result, np.zeros_like(f))),
         "last_gain": gains,
         "last_sigma|last": statistics.errors(result.sums["error"][last], common.realisations(result)[last]).sigma,
-        "steady_sigma": np.sqrt([exact.steady_variance(gain, noise, step) for gain in gains]),
+        "steady_sigma": np.sqrt([filters.steady_variance(gain, noise, step) for gain in gains]),
     }
 
 

@@ -8,7 +8,7 @@ from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
 from radarsim.studies.interface import RecordedPlots
 
-from random_walk.kernels import walk
+from random_walk import kernels
 from random_walk.study import COMPONENTS, prepare
 
 
@@ -71,7 +71,7 @@ class Recorded(RecordedPlots):
     def simulated(self, case, realisation):
         plan = prepare(case)
         x, z = np.empty(len(plan.axes.k)), np.empty(len(plan.axes.k))
-        walk.simulate_plots(plan.key, realisation, plan.sigma, plan.step, x, z)
+        kernels.simulate_plots(plan.key, realisation, plan.sigma, plan.step, x, z)
         return {"t_s": plan.axes.t_s, "x_m": z, "true_x_m": x}
 
     def tracker(self, case):
