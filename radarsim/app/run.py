@@ -24,9 +24,8 @@ from radarsim.app.configs import CaseWork, Config, Overrides, command, load, rep
 from radarsim.app.shown import Shown
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine import run as stopping
-from radarsim.engine.executors import Executor
 from radarsim.engine.results import CaseResult
-from radarsim.engine.run import Collected, Shared, Signals, Stop, collect, share, stored
+from radarsim.engine.run import Collected, Executor, Shared, Signals, Stop, collect, share, stored
 from radarsim.engine.store import Stock, available_cores, stock
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.language import tr

@@ -23,7 +23,7 @@ from types import ModuleType, TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from radarsim.engine.blocks import Node, Partial, Work
-from radarsim.engine.executors import Outcome, attempted
+from radarsim.engine.run import Outcome, attempted
 from radarsim.errors import ClusterError, ConfigError, Interrupted, argument
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.engine.executors import Threads
+from radarsim.engine.run import Threads
 
 COUNT, NONE_TOO, ABOVE = (
     "must be a whole number from 1 to 1024, got",

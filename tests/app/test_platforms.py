@@ -6,7 +6,7 @@ import pytest
 
 import radarsim
 from radarsim.app import doctor
-from radarsim.engine import executors
+from radarsim.engine import run as engine_run
 from radarsim.engine.store import LIBRARIES, decoded, linear_algebra, platform_name, processor
 from tests.engine.test_damage import reforged
 
@@ -66,7 +66,7 @@ def test_a_run_says_once_that_its_store_was_begun_elsewhere(out):
 def test_cases_that_were_all_begun_elsewhere_are_reported_in_one_line(tmp_path, monkeypatch):
     config = "rls2_manoeuvre_variance"
     with monkeypatch.context() as patch:
-        patch.setattr(executors, "platform_name", lambda: ELSEWHERE)
+        patch.setattr(engine_run, "platform_name", lambda: ELSEWHERE)
         ran(tmp_path, config, BLOCK)
     warnings = ran(tmp_path, config, 2 * BLOCK).warnings
     assert len([warning for warning in warnings if "platforms" in warning]) == 1

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarsim.engine import executors
+from radarsim.engine import run as engine_run
 from radarsim.engine import store as keeper
 from radarsim.engine.blocks import Node, Partial, Total
 from radarsim.engine.results import Sums
@@ -171,9 +171,9 @@ def test_a_stored_cut_block_counts_only_once_all_before_it_is_done(tmp_path, blo
 def test_instruction_sets_are_recorded_and_mixing_warns(tmp_path, blocks, monkeypatch):
     collect(WORK, N, store=tmp_path)
     header, _ = decoded((blocks / "L08-0.sums").read_bytes())
-    assert header["platforms"] == [executors.platform_name()]
+    assert header["platforms"] == [engine_run.platform_name()]
     assert header["versions"].keys() >= {"python", "numpy"}
-    monkeypatch.setattr(executors, "platform_name", lambda: "abacus")
+    monkeypatch.setattr(engine_run, "platform_name", lambda: "abacus")
     assert collect(WORK, N, store=tmp_path).warnings == ()
     mixed = collect(WORK, 2 * N, store=tmp_path)
     assert len(mixed.warnings) == 1

@@ -428,8 +428,8 @@ class SumsMemory(NamedTuple):
     random: np.ndarray  #: RANDOM rows
     plots: np.ndarray  #: PLOT rows a scan of a strip
     out: np.ndarray  #: OUTPUT rows a filter and scan of a strip
-    stages: np.ndarray  #: STAGE rows a filter and stage  #: STAGE rows a filter and stage
-    counted: np.ndarray  #: one row  #: one row
+    stages: np.ndarray  #: STAGE rows a filter and stage
+    counted: np.ndarray  #: one row
     numbers: np.ndarray  #: (F, 8) whole numbers of each filter, see `run_strip`
     listed: np.ndarray  #: (MOST,) likewise
     each: np.ndarray  #: (F, scans reported, 9, n or 0) errors of all realisations of a block, in whole eights

@@ -34,18 +34,15 @@ class Room(NamedTuple):
 
     rows: np.ndarray  #: (N L,) blocks of patterns
     spare: np.ndarray  #: (N L,) likewise
-    #: (7 N,) where each P lies, in blocks as well, and then the patterns' probabilities
     places: np.ndarray  #: (7 N,) where each P lies, in blocks as well, and then the patterns' probabilities
-    bits: np.ndarray  #: (7 N,) the same memory as whole numbers  #: (7 N,) the same memory as whole numbers
-    group: np.ndarray  #: (N,) of each pattern  #: (N,) of each pattern
-    #: (N,) how much less probable it is than the most probable, in powers of 2 ** LIGHTER
+    bits: np.ndarray  #: (7 N,) the same memory as whole numbers
+    group: np.ndarray  #: (N,) of each pattern
     lighter: np.ndarray  #: (N,) how much less probable it is than the most probable, in powers of 2 ** LIGHTER
     table: np.ndarray  #: (T,) cells, T a power of two
     owner: np.ndarray  #: (T,) their groups
     #: (V, 9 + 3 C) information (6) packed, its products Y (3 C), probability, plots, whether one came
     waiting: np.ndarray
     following: np.ndarray  #: (V, 9 + 3 C) likewise
-    #: (D M,) blocks of the patterns that are followed to the end piece by piece, D pieces
     pieces: np.ndarray  #: (D M,) blocks of the patterns that are followed to the end piece by piece, D pieces
     size: np.ndarray  #: (D,) how many patterns a piece has
     scan: np.ndarray  #: (D,) after which scan

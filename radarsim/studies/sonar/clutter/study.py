@@ -21,7 +21,7 @@ The errors in the sums of `sonar.study` are those of the tracks kept, which are 
 `counts`, `begun`, `ratios` and `scores` are described in `kernels.tracker`. Where false tracks are sought (`rare`),
 `held` and `drawn` of `kernels.rare` are in place of `begun`, and the scores of false tracks are those of the plain
 ones. Where ends of the target's track are sought, they are those of further realisations: `ended` and `ended_drawn`
-of `kernels.ends`."""
+of the same."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.clutter import filters
 from radarsim.studies.sonar.clutter.filters import ClutterAxes, Conditions, TrackerSpec, gate_threshold
 from radarsim.studies.sonar.clutter.kernels import rare, tracker
-from radarsim.studies.sonar.clutter.kernels.ends import KINDS, Ends, EndSums, simulate_ends
+from radarsim.studies.sonar.clutter.kernels.rare import KINDS, Ends, EndSums, simulate_ends
 from radarsim.studies.sonar.clutter.kernels.tracker import Field, Trackers, workspace
 from radarsim.studies.sonar.config import Keys, Sector
 from radarsim.studies.sonar.exact import exact_values

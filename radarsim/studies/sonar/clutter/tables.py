@@ -14,7 +14,7 @@ from radarsim.report.statistics import Z95, Estimate, Values
 from radarsim.report.tables import Columns, leading, of_rows, stacked
 from radarsim.studies.sonar.clutter.filters import ClutterAxes
 from radarsim.studies.sonar.clutter.kernels import tracker as at
-from radarsim.studies.sonar.clutter.kernels.ends import DROPPED, DROPPED_AFTER, KINDS, LOST, LOST_AFTER
+from radarsim.studies.sonar.clutter.kernels.rare import DROPPED, DROPPED_AFTER, KINDS, LOST, LOST_AFTER
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -16,7 +16,7 @@ from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter import filters as design
 from radarsim.studies.sonar.clutter import tables, track
 from radarsim.studies.sonar.clutter.kernels import tracker as places
-from radarsim.studies.sonar.clutter.kernels.ends import outside
+from radarsim.studies.sonar.clutter.kernels.rare import outside
 from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
 from radarsim.studies.sonar.kernels.steps import CHUNK
 from tests.studies.sonar.clutter import naive_ends
