@@ -431,7 +431,7 @@ def case_figures(
     if not own.draws_sweeps:
         from radarsim.report import sweeps
 
-        drawn |= sweeps.figures(results, common.groups(made["curves"], "case", "filter", "component"))
+        drawn |= sweeps.figures(outside.joined(results), common.groups(made["curves"], "case", "filter", "component"))
     names = names_in(results)
     said = {name: reworded(seen.crossed(figure), partial(called, names=names)) for name, figure in drawn.items()}
     return {name: panels.joined(figure) for name, figure in said.items()}
@@ -498,7 +498,8 @@ def write_files(
     own, began = study(experiment.study), time.perf_counter()
     try:
         described = case_figures(results, made, experiment) if draw else {}
-        described = {name: described[name] for name in experiment.drawn(described)}
+        foremost = [*described][:1] if any(result.outside for result in results) else []  # the answer is about it
+        described = {name: described[name] for name in dict.fromkeys([*foremost, *experiment.drawn(described)])}
         answer = answered(results, made)
         for name in [*described][:1]:
             described[name] = replace(described[name], headline=html.headline(answer))

@@ -118,8 +118,9 @@ def distances(
         lacking[value < exact] = np.inf
     room = size * np.where(table["case"].isin(list(nearly)), ALMOST, ROUNDING)
     room = room + np.where(_gaussian(made, table), 0.0, lacking)
-    near = np.abs(exact - value) <= room
-    nearest = np.where(near, value, exact - np.sign(exact - value) * np.where(near, 0.0, room))
+    with np.errstate(invalid="ignore"):  # an infinite gain, against a σ of zero, has no distance from another
+        near = np.abs(exact - value) <= room
+        nearest = np.where(near, value, exact - np.sign(exact - value) * np.where(near, 0.0, room))
     n = table["n"] if "n" in table else table["case"].map(made["curves"].groupby("case")["n"].min())
     enough = (n.to_numpy(dtype=float) >= FEW) & ~np.isnan(exact)
     return np.where(enough, standard_errors(Estimate(value, lo, hi), nearest), np.nan)

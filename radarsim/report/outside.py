@@ -13,7 +13,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.language import few, listed, term, tr
+from radarsim.language import few, listed, numeral, term, tr
 from radarsim.report import notes, panels, statistics, wording
 from radarsim.report import tables as common
 from radarsim.report.drawing import Figure
@@ -226,7 +226,7 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
     tuned = [base for base in own if base.endswith(TUNED)]
     best = min(set(own).difference(tuned), key=lambda base: sigma[base])
     row = last[last["baseline"] == best].iloc[0]
-    told: dict[str, Any] = {"name": name, "best": best, "component": component, "t": f"{row['t_s']:g}"}
+    told: dict[str, Any] = {"name": name, "best": best, "component": component, "t": numeral(f"{row['t_s']:g}")}
     told["gain"] = wording.estimate((row[key] for key in GAIN), "%", ".3g")
     if row["gain_lo"] > 0:
         first = tr("{name} is better than {best}, the config's best in {component} at {t} s: gain {gain}", **told)
@@ -260,7 +260,7 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
         said.append(tr("Further gains of {name} there: against {gains}.", name=name, gains=listed(against)))
     extremes = rows[rows["baseline"] == best].sort_values("gain_percent").iloc[[0, -1]].to_dict("records")
     ends = [tr("{gain} ({component} at {t} s)", gain=wording.estimate((one[key] for key in GAIN), "%", ".3g"),
-               component=one["component"], t=f"{one['t_s']:g}") for one in extremes]  # fmt: skip
+               component=one["component"], t=numeral(f"{one['t_s']:g}")) for one in extremes]  # fmt: skip
     if len(rows) > len(last):
         said.append(tr("Over all components and scans its gain against {best} is from {least} to {most}.",
                        best=best, least=ends[0], most=ends[1]))  # fmt: skip
@@ -322,9 +322,9 @@ def figures(
 ) -> dict[str, Figure]:
     """σ and gain with the filters from outside: in place of the study's figures of these names, at least of the first
     component. shown: the components as the study calls them."""
-    joint = [_joint(result) for result in results if result.outside is not None]
-    if not joint:
+    if not any(result.outside for result in results):
         return {}
+    joint = [one for one, result in zip(joined(results), results, strict=True) if result.outside]
     known = {one.name: one for one in (*RADIAL, *shown)}
     each = [
         known.get(name, Component(name, unit, panels.letter(name), name)) for name, unit in joint[0].axes.components
@@ -335,8 +335,12 @@ def figures(
     return {name: figure for name, figure in found.items() if name in drawn or name in first}
 
 
+def joined(results: Sequence[CaseResult]) -> list[CaseResult]:
+    """The cases with filters from outside among their own, as figures that are drawn from tables alone need it."""
+    return [_joint(result) if result.outside else result for result in results]
+
+
 def _joint(result: CaseResult) -> CaseResult:
-    """All filters of a case, as figures that are drawn from tables alone need it."""
     (of,) = others(result)
     together = {
         name: np.concatenate([getattr(result.axes, name), getattr(of.axes, name)])

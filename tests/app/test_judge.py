@@ -1,6 +1,7 @@
 """A filter from outside beside the config's: what its numbers are, and what is refused or said of it."""
 
 import json
+import re
 import time
 import tracemalloc
 
@@ -15,8 +16,11 @@ from radarsim.app.configs import CaseWork, load
 from radarsim.app.result import case_figures
 from radarsim.cli import main
 from radarsim.errors import ConfigError
+from radarsim.language import speaking, tr
 from radarsim.report import outside
 from radarsim.report import tables as common
+from radarsim.studies import registry
+from radarsim.studies.multimodel import study as flight
 from tests.studies.range_doppler import naive
 
 
@@ -695,3 +699,32 @@ def test_plots_of_a_file_come_back_as_estimates(tmp_path, monkeypatch):
     wanted = radarsim.judge("rls2", lambda plots: plots["range_m"], realisations=200)
     for name in ("back.npz", "back.csv"):
         assert same(radarsim.judge("rls2", name), wanted), name
+
+
+@pytest.mark.slow
+def test_the_first_figure_is_of_the_filter_whatever_the_config_names(tmp_path):
+    result = radarsim.judge("sonar_smoothing", range_alone, components=["r"], realisations=64)
+    written = result.write(tmp_path, figures="svg")
+    headings = re.findall(r"(?m)^## (.+)$", (written.folder / "figures/captions.md").read_text(encoding="utf-8"))
+    assert headings == ["gain_r", "plots", "smoothing_gains", "sigma_r", "claims"]
+
+
+def range_alone(plots):
+    return plots["range_m"][..., None]
+
+
+def test_a_sweep_shows_the_filter_too():
+    result = radarsim.judge(
+        "rls2", range_alone, components=["r"], overrides={"sweep.radar.sigma_range_m": [100, 200]}, realisations=64
+    )
+    drawn = case_figures(result.cases, result.tables, result.experiment)
+    names = [mark.label for mark in drawn["sweep_sigma_range_m"].panels[0].marks]
+    assert names == ["r", "r+Vr", "mine"]
+
+
+def test_axes_of_a_flight_have_their_words():
+    words = {one.name: one.words for one in registry.study("multimodel").shown()}
+    assert (words["x"], words["y"], words["vy"]) == ("distance north", "height", "rate of climb")
+    assert set(words) == {name for name, _ in flight.COMPONENTS}
+    with speaking("ru"):
+        assert tr("σ of the {quantity}", quantity=words["vy"]) == "СКО скорости набора высоты"

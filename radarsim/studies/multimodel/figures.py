@@ -13,12 +13,24 @@ from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
 from radarsim.report import panels, seen, tables, wording
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
+from radarsim.report.quantities import Component
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from radarsim.studies.multimodel.study import FlightAxes
 
+COMPONENTS = (
+    Component("x", "m", "$x$", term("distance north")),
+    Component("vx", "m/s", "$\\dot x$", term("velocity north")),
+    Component("ax", "m/s2", "$a_x$", term("acceleration north")),
+    Component("y", "m", "$y$", term("height")),
+    Component("vy", "m/s", "$\\dot y$", term("rate of climb")),
+    Component("ay", "m/s2", "$a_y$", term("vertical acceleration")),
+    Component("z", "m", "$z$", term("distance east")),
+    Component("vz", "m/s", "$\\dot z$", term("velocity east")),
+    Component("az", "m/s2", "$a_z$", term("acceleration east")),
+)
 SIGMAS = {"y": (term("the height"), "$y$", "m"), "vy": (term("the rate of climb"), "$\\dot y$", "m/s")}
 RULES = ("moment", "best", "combined", "modified_combined")
 FAMILIES = {"gpb1": term("MMA1"), "imm": term("MMA2"), "gpb2": term("MMA3")}

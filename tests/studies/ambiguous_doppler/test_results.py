@@ -311,3 +311,10 @@ def test_plots_as_stated_are_found_so_while_folds_are_undecided(name):
         tested.append(made.nis[made.filters.index(name), 1:, 0])
     tested = np.concatenate(tested)
     assert abs(np.nanmean(tested) - 1) < 5 * np.sqrt(2 / np.isfinite(tested).sum())
+
+
+def test_an_infinite_gain_is_judged_without_a_warning():
+    """At the first scan the known velocity is its own estimate: σ is zero, and any filter's gain −∞."""
+    known = {"target": "random_polynomial", "target.sigma_velocity_mps": 0}
+    gains = radarsim.run("ambiguous_rls2", overrides=known, realisations=200).tables["gains"]
+    assert np.isneginf(gains["exact_percent"]).any()
