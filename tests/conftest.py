@@ -22,6 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does; no mo
 # What Hypothesis tests are laws, which hold on a machine that is busy, too: it looks at no clock.
 settings.register_profile("no clock", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("no clock")
+os.fsync = lambda descriptor: None  # what it is for no test can try: a power cut; it takes 2 ms, thousands of times
 gc.set_threshold(100_000)  # as the command does; of the suite's time 7 % went into looking through objects that stay
 
 

@@ -256,11 +256,7 @@ class Model(BaseModel):
         for name, only in conditions(type(self)).items():
             with suppress(NotRead):
                 yield from self._of_kind(name, only)
-        seen: dict[str, Callable[[Any], Iterator[At]]] = {}
-        for klass in reversed(type(self).__mro__):
-            methods = {name: one for name, one in vars(klass).items() if isinstance(one, FunctionType)}
-            seen |= {name: one for name, one in methods.items() if one in _CROSS_CHECKS}
-        for check in seen.values():
+        for check in cross_checks(type(self)):
             with suppress(NotRead):
                 yield from check(self)
 
@@ -289,6 +285,16 @@ def conditions(model: type[Model]) -> dict[str, Only]:
     """The keys of a model that belong only to some kinds, by name."""
     marks = {name: [m for m in info.metadata if isinstance(m, Only)] for name, info in model.model_fields.items()}
     return {name: own[0] for name, own in marks.items() if own}
+
+
+@cache
+def cross_checks(model: type[Model]) -> tuple[Callable[[Any], Iterator[At]], ...]:
+    """The cross-checks of a model, those of its bases first."""
+    seen: dict[str, Callable[[Any], Iterator[At]]] = {}
+    for klass in reversed(model.__mro__):
+        methods = {name: one for name, one in vars(klass).items() if isinstance(one, FunctionType)}
+        seen |= {name: one for name, one in methods.items() if one in _CROSS_CHECKS}
+    return tuple(seen.values())
 
 
 def _literals(annotation: Any) -> tuple[str, ...]:

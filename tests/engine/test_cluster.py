@@ -298,6 +298,7 @@ def settings(authority, own, key):
     return {f"{comm}.require-encryption": True, **given}
 
 
+@pytest.mark.slow
 def test_a_scheduler_with_certificates_of_ones_own(tmp_path, monkeypatch):
     """The same sums over tls://; a certificate of another authority opens nothing."""
     import dask
