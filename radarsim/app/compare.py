@@ -1,7 +1,6 @@
 """`radarsim compare`: stored results on common axes, with their differences; simulates nothing.
 
-`radarsim chart`: one chart for all radars, with the cases of some configs marked on it.
-"""
+`radarsim chart`: one chart for all radars, with the cases of some configs marked on it."""
 
 import os
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
@@ -38,8 +37,7 @@ FOLDER = "compare"
 class Run:
     """A result: its name, its folder, its run.json and, if known, the config that describes it.
 
-    made: the tables of a result that is not stored.
-    """
+    made: the tables of a result that is not stored."""
 
     label: str
     folder: Path
@@ -52,8 +50,7 @@ class Run:
 class Comparison(Shown):
     """A comparison: sentences, notes and warnings, the rows of comparison.csv; the folder and files, if any.
 
-    last: the rows at the last common time; told: the quantities that the terminal shows, with their wording.
-    """
+    last: the rows at the last common time; told: the quantities that the terminal shows, with their wording."""
 
     folder: Path | None
     files: tuple[str, ...]
@@ -237,8 +234,7 @@ def _noise(run: Run, name: str) -> str | None:
 
 def _labelled(every: Sequence[Sequence[Side]]) -> list[list[Side]]:
     """The sides with distinct names: a single case takes its run's, others the case's, with the run's where two
-    coincide.
-    """
+    coincide."""
     first = [[replace(side, label=side.run if len(run) == 1 else side.case) for side in run] for run in every]
     names = [side.label for run in first for side in run]
     return [

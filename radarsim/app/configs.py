@@ -1,7 +1,6 @@
 """Configs, read with all available studies; cases as the engine sees them; the command that repeats a result.
 
-Arguments of Python functions are refused as the command refuses its options.
-"""
+Arguments of Python functions are refused as the command refuses its options."""
 
 import math
 import operator
@@ -45,8 +44,7 @@ def load(source: Config, overrides: Overrides = ()) -> Experiment:
 
     source is a path, the stem of a config (here, in ./configs, or shipped), a mapping like the YAML, or an experiment
     loaded with these overrides; overrides are as in config.load.texts. Raises ConfigError, one line for each fault,
-    also in the claims of an installed package's study.
-    """
+    also in the claims of an installed package's study."""
     if isinstance(source, Experiment):
         return source
     experiment = reading.load(source, overrides, registry)
@@ -63,10 +61,8 @@ def _claim_faults(name: str) -> Sequence[str]:
 
 @cache
 def shipped(stem: str) -> tuple[Case, ...] | None:
-    """The cases of a shipped config; None where none of that stem is shipped.
-
-    Never of a user's file of that name: claims are judged by the shipped config.
-    """
+    """The cases of a shipped config; None where none of that stem is shipped. Never of a user's file of that name:
+    claims are judged by the shipped config."""
     file = shipped_file(stem)
     return None if file is None else reading.load(file, (), registry).cases
 
@@ -109,8 +105,7 @@ def new(
     The config is taken with its overrides, which it can have if it has one case.
 
     Where the folder holds a schema.json, the first line points editors to it. Raises ConfigError where the config
-    exists already, StoreError where it cannot be written.
-    """
+    exists already, StoreError where it cannot be written."""
     name, text = reading.new(name, like, registry, values, overrides)
     path = Path(folder) / name
     if path.with_name(SCHEMA).is_file():
@@ -205,9 +200,7 @@ def inventory() -> Inventory:
 
 def selected(whole: Inventory, words: Sequence[str]) -> Inventory:
     """The kinds of an inventory that the words name, with the rows that contain all other words; case is ignored.
-
-    Raises ConfigError where nothing is left.
-    """
+    Raises ConfigError where nothing is left."""
     kinds = {title.partition(" ")[0].lower(): title for title, _, _ in whole}
     wanted = {kinds[word.lower()] for word in words if word.lower() in kinds} or set(kinds.values())
     parts = [word.lower() for word in words if word.lower() not in kinds]
@@ -267,10 +260,8 @@ def check(
 
 
 def formats(figures: bool | str | Iterable[str]) -> tuple[str, ...]:
-    """The file formats of the figures: True for svg and png; none for False or None.
-
-    Raises ConfigError for an unknown format.
-    """
+    """The file formats of the figures: True for svg and png; none for False or None. Raises ConfigError for an unknown
+    format."""
     if faults := _formats(figures):
         raise ConfigError(*faults)
     if isinstance(figures, bool) or figures is None:
@@ -435,8 +426,7 @@ def repeated(asked: Experiment, done: Mapping[str, int], overrides: Sequence[str
     """The command that reproduces the tables, or a sentence that says why there is none.
 
     asked is the experiment as config and overrides give it, done the realisations of each case in the tables; precision
-    ended the cases, unless it is None.
-    """
+    ended the cases, unless it is None."""
     if asked.path is None:
         return "none: the config was given in Python, and is printed below"
     wanted = {case.name: case.realisations for case in asked.cases}

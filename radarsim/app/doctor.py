@@ -8,8 +8,7 @@ radarsim/app/known holds for each study (the sonar is three) a config and its ta
 Elsewhere (instruction set, compiler, BLAS, mathematical library) the last bits differ: an ulp here and there, which
 later arithmetic magnifies by its condition number κ. So a number may differ by what κ allows, see `Tolerance`. `make
 known` makes the tables again, after an intended change of numbers. A study of an installed package has its known
-answers in its own tests; here it is only loaded.
-"""
+answers in its own tests; here it is only loaded."""
 
 import csv
 import hashlib
@@ -99,8 +98,7 @@ def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
     """Check a folder of results against its run.json, and all stored blocks of its cases; recompute some of them.
 
     recompute is the number of stored pieces to recompute for each case, the smallest first. Raises ConfigError where
-    the folder holds no results, and where blocks cannot be recomputed because the sources have changed.
-    """
+    the folder holds no results, and where blocks cannot be recomputed because the sources have changed."""
     found = Inspection(Path(folder))
     blocks = _blocks(found.folder)
     record = _settled(found)
@@ -221,8 +219,7 @@ def agree(work: CaseWork, made: Sums, stored: np.ndarray, platforms: set[str]) -
 
     An estimate may differ by the study's `Tolerance` in σ, so a sum of n errors to the power p by about n p σᵖ times
     that; other sums by that part of the largest in their array. σ is the largest of a filter and component over scans:
-    with few realisations that of a single scan may be tiny by chance.
-    """
+    with few realisations that of a single scan may be tiny by chance."""
     if len(platforms) < 2:
         return made.values.tobytes() == stored.tobytes()
     allowed = ROUNDINGS * tolerance(work.case.study).sampled
@@ -247,10 +244,8 @@ class Compiled(NamedTuple):
 
 
 def compiled(configs: Sequence[str]) -> Iterator[Compiled]:
-    """Compile the kernels of configs (default: all shipped ones) and cache their machine code.
-
-    One realisation of each case is simulated and discarded. Raises ConfigError where the machine code cannot be cached.
-    """
+    """Compile the kernels of configs (default: all shipped ones) and cache their machine code. One realisation of each
+    case is simulated and discarded. Raises ConfigError where the machine code cannot be cached."""
     from radarsim.kernels import compile
 
     for name in configs or lookup.stems("configs"):
@@ -273,8 +268,7 @@ class Tolerance:
 
     Spreads, standard errors and half-widths of intervals are compared by their squares, as each is the root of a
     difference of sums: where all realisations err alike, a rounding ε of σ² makes √(2ε) |bias| of the spread. Notes are
-    not compared: each turns at a threshold, that on equal filters at a difference of zero.
-    """
+    not compared: each turns at a threshold, that on equal filters at a difference of zero."""
 
     sampled: float = 1e-12
     exact: float = 1e-12

@@ -416,11 +416,9 @@ def _rearranged(
 
 
 def _follows(case: Case, member: Outside, error: np.ndarray, inner: np.ndarray) -> None:
-    """Raises ConfigError where the errors are no more alike those of any filter of the config than by chance.
-
-    Of all that see the same plots they are correlated. For each realisation the products of the normalised errors, cut
-    at three, are averaged over scans and components; over realisations their mean is tested against nought.
-    """
+    """Raises ConfigError where the errors are no more alike those of any filter of the config than by chance. Of all
+    that see the same plots they are correlated. For each realisation the products of the normalised errors, cut at
+    three, are averaged over scans and components; over realisations their mean is tested against nought."""
     n = len(error)
     if n < FOLLOWS:
         return

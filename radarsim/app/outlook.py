@@ -40,8 +40,7 @@ PILOT_OF_PRECISION_S, LEAST, MOST = 1.0, 256, 16_384  # realisations of the pilo
 @dataclass(frozen=True)
 class Need:
     """What a precision takes: realisations (None if unattainable), from `exact` values or a `pilot` of that many, and
-    the name of the quantity that reaches it last; below: upper bound of its rate if the pilot had no such event.
-    """
+    the name of the quantity that reaches it last; below: upper bound of its rate if the pilot had no such event."""
 
     realisations: int | None
     known_by: str
@@ -83,8 +82,7 @@ class Outlook(Shown):
     @property
     def table(self) -> "pd.DataFrame":
         """A row for each case: filters, scans, realisations, seconds of one thread, stored part, what a precision
-        takes.
-        """
+        takes."""
         return frame(
             {
                 **{"case": [case.name for case in self.cases], "filters": [case.filters for case in self.cases]},
@@ -182,8 +180,7 @@ def check(
 
 def surely_short(work: CaseWork, most_s: float) -> float | None:
     """Upper bound on one thread's seconds for all realisations of a case, where it is surely short and the sums are
-    small beside the interpreter; else None.
-    """
+    small beside the interpreter; else None."""
     if work.plan.axes.available.size > SURELY_SMALL or work.case.outside:
         return None
     each = registry.study(work.case.study).seconds_at_most(work.plan)
@@ -208,10 +205,8 @@ def measured(
 
 
 def needed(work: CaseWork, percent: float, seconds_each: float, of: str) -> Need:
-    """How many realisations a precision takes.
-
-    From exact σ where errors are Gaussian, else from a pilot. Raises ConfigError where the case has no such quantity.
-    """
+    """How many realisations a precision takes. From exact σ where errors are Gaussian, else from a pilot. Raises
+    ConfigError where the case has no such quantity."""
     from radarsim.report import precision
 
     quantity = registry.quantity(of, work.case)
@@ -240,10 +235,8 @@ def ending(need: Need, most: int) -> int:
 
 def seconds_each(work: CaseWork, realisations: int, pilot_s: float) -> float:
     """Seconds of one thread for one realisation, from growing numbers of them, at most a block, in about pilot_s.
-
     Kernels calculate whole chunks: one realisation may take as long as hundreds. So larger numbers are tried as long as
-    they take no longer.
-    """
+    they take no longer."""
     most, count, taken, free = min(work.block, realisations), 1, timed(work, 1), True
     while count < most and (free or LADDER * taken < pilot_s):
         more = min(LADDER * count, most)

@@ -68,8 +68,7 @@ def read_plots(path: str | os.PathLike[str]) -> "pd.DataFrame":
     """Read a file of plots as written by `radarsim import` or `radarsim simulate`: numbers, and text where
     that names something (`track`, `radar`, `address`, `mode_3a`, …).
 
-    Raises ConfigError if it cannot be read.
-    """
+    Raises ConfigError if it cannot be read."""
     import pandas as pd
 
     try:
@@ -143,8 +142,7 @@ class Registered(Shown):
     biases: a row for each of range_m, range_scale, bearing_rad, time_s with value, lo, hi (95 %), identifiable, why (it
     is not). aircraft: a row for each with what the biases leave: range_m, bearing_rad (medians), time_s, sigma_time_s.
     sigma_range_m, sigma_bearing_rad: of a plot, without outliers. plots, matched: their number, and those with a
-    position of their aircraft.
-    """
+    position of their aircraft."""
 
     def __init__(self, found: registering.Registration):
         import pandas as pd

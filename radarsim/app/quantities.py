@@ -5,8 +5,7 @@ that all studies share: any study with a table `locks` has the quantity lock.
 
 Roots of a function of one number on a range, or the place nearest to a root. The function may be undefined (NaN) in
 places where keys of a config exclude each other. Positive ranges of more than a factor of 20 are searched on a
-logarithmic scale.
-"""
+logarithmic scale."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -37,8 +36,7 @@ UNPAIRED = 4  # factor on the realisations where a change moves the scans, so th
 class Wanted(NamedTuple):
     """A quantity by names: its own, that of a filter, and the component.
 
-    For a quantity over scans: at time at_s, linear between two scans, or at scan at_k; neither: at the last.
-    """
+    For a quantity over scans: at time at_s, linear between two scans, or at scan at_k; neither: at the last."""
 
     name: str
     filter: str | None = None
@@ -87,8 +85,7 @@ class Series(NamedTuple):
 def checked(wanted: Wanted, case: Case, outside: Sequence[str] = ()) -> Asked:
     """The request, checked before anything is prepared. ConfigError for an unknown quantity or filter.
 
-    outside: names of the config's filters of Python, which the case is without.
-    """
+    outside: names of the config's filters of Python, which the case is without."""
     name, chosen, component, at_s, at_k = wanted
     of = registry.quantity(name, case)
     if not of.per:
@@ -238,10 +235,8 @@ def scan(quantity: Asked, axes: Axes) -> int:
 
 
 def at(quantity: Asked, series: Series) -> Estimate:
-    """The series at the requested time or scan: NaN where there is no estimate.
-
-    Raises ConfigError for a time or scan beyond the run.
-    """
+    """The series at the requested time or scan: NaN where there is no estimate. Raises ConfigError for a time or scan
+    beyond the run."""
     k, t_s, values = series
     if not len(k):
         return UNKNOWN
@@ -329,11 +324,9 @@ class Undefined(ValueError):
 
 
 def roots_of(function: Function, over: Range, width: float = EXACTLY) -> Found:
-    """All roots that a scan of the range shows: changes of sign, and touching ones where it turns near zero.
-
-    A jump over zero counts as a root, unless the function is undefined between. Brackets are closed to the relative
-    width `width`, by default to rounding. Raises Undefined where the function has no value anywhere on the scan.
-    """
+    """All roots that a scan of the range shows: changes of sign, and touching ones where it turns near zero. A jump
+    over zero counts as a root, unless the function is undefined between. Brackets are closed to the relative width
+    `width`, by default to rounding. Raises Undefined where the function has no value anywhere on the scan."""
     places = [(x, function(x)) for x in over.grid()]
     places = _with_edges(function, over, places)
     places = _with_turns(function, over, places)
@@ -353,8 +346,7 @@ def polished(function: Function, over: Range, root: float, rising: float, near_e
     """The root of a smooth function near that of an approximation, by secants on the scale of the search.
 
     rising is the first slope. To ten digits, or to rounding; for a function that jumps where |function| <= near_enough.
-    None where a step does not bring it nearer.
-    """
+    None where a step does not bring it nearer."""
     u, y = over.inner(root), function(root)
     for _ in range(MOST_POLISHED):
         size = 1.0 if over.logarithmic else abs(u)
@@ -369,10 +361,8 @@ def polished(function: Function, over: Range, root: float, rising: float, near_e
 
 
 def near(function: Function, over: Range, root: float, near_enough: float) -> float | None:
-    """The root of a function near that of an approximation: to 1e-9, or where |function| <= near_enough.
-
-    None where the function keeps its sign within a tenth of the range.
-    """
+    """The root of a function near that of an approximation: to 1e-9, or where |function| <= near_enough. None where the
+    function keeps its sign within a tenth of the range."""
     u, reach = over.inner(root), over.inner(over.high) - over.inner(over.low)
 
     def place(u: float) -> tuple[float, float]:
@@ -405,8 +395,7 @@ def closed(
 
     Ends where near_enough(x, y), at a root, or where the bracket is closed to the relative width `width`, by default to
     rounding; where the function jumps over zero, at the jump. For whole numbers: the one beside the change of sign with
-    the smaller value.
-    """
+    the smaller value."""
     (a, fa), (b, fb) = (over.inner(one[0]), one[1]), (over.inner(other[0]), other[1])
     c, fc, t = a, fa, 0.5
     for _ in range(200):
@@ -458,11 +447,9 @@ def _with_edges(function: Function, over: Range, places: list[tuple[float, float
 
 
 def _with_turns(function: Function, over: Range, places: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The places plus the extremes, by golden sections, where the function turns back before it reaches zero.
-
-    Only where zero may be reached: beyond a turn, the parabola through the three places comes at most that much nearer;
-    and, without any zero, the turn that comes nearest.
-    """
+    """The places plus the extremes, by golden sections, where the function turns back before it reaches zero. Only
+    where zero may be reached: beyond a turn, the parabola through the three places comes at most that much nearer; and,
+    without any zero, the turn that comes nearest."""
     made = list(places)
     if over.whole:
         return made

@@ -4,8 +4,7 @@ exactly or by small stored runs, and their files.
 `radarsim run --decide`: as many realisations as it takes until each claim of the config is decided. It looks at
 declared numbers of realisations only, 2000·2^m, as a precision does, and each verdict accounts for all these looks
 (report.claims.rule.LOOKS): were each look judged at 95 %, chance would refute up to a fifth of the claims that are true
-at a border.
-"""
+at a border."""
 
 import csv
 import io
@@ -75,10 +74,8 @@ class Asked:
 
 
 class Plan:
-    """The runs that a paper's readings need, each once, and the verdicts from them.
-
-    A run is judged as soon as it is done and then dropped: memory is that of one run, however many readings there are.
-    """
+    """The runs that a paper's readings need, each once, and the verdicts from them. A run is judged as soon as it is
+    done and then dropped: memory is that of one run, however many readings there are."""
 
     def __init__(self, wanted: Asked, realisations: int):
         self._wanted, self._paper, self._n = wanted, wanted.paper, realisations
@@ -142,11 +139,9 @@ class Plan:
     def decided(
         self, over: list[Over], most: int, options: RunOptions, progress: Progress | None, stop: Signals | None
     ) -> list[Over]:
-        """The claims again, undecided ones after longer runs of the readings that leave them undecided.
-
-        Looks are at declared numbers only, as in `run --decide`; each claim is judged at its own last look, so that
-        other requests change nothing.
-        """
+        """The claims again, undecided ones after longer runs of the readings that leave them undecided. Looks are at
+        declared numbers only, as in `run --decide`; each claim is judged at its own last look, so that other requests
+        change nothing."""
         for n in (n for n in looks(most) if n > self._n):
             open_ = {
                 (one.claim.id, each.reading)
@@ -322,8 +317,7 @@ class Readings(Shown):
     """Result of `readings`: for each paper, and the files written, by their path under `folder`.
 
     left: a line for each claim that stayed undecided although `decide` was set. outdated: configs whose stored claims
-    have another class.
-    """
+    have another class."""
 
     read: list[Read]
     folder: Path
@@ -365,10 +359,8 @@ def papers(keys: Collection[str] = ()) -> dict[str, Paper]:
 
 
 def asked(names: Sequence[str] = ()) -> list[Asked]:
-    """Requests from names of papers (P1) and claims (P1.4); without names, all papers.
-
-    Raises ConfigError for an unknown paper or claim, with the known ones.
-    """
+    """Requests from names of papers (P1) and claims (P1.4); without names, all papers. Raises ConfigError for an
+    unknown paper or claim, with the known ones."""
     every = papers()
     owner = {claim.id: key for key, paper in every.items() for claim in paper.claims.claims}
     faults = [_unknown(name, every, owner) for name in names if name not in every and name not in owner]
@@ -423,8 +415,7 @@ def judged(
     wanted: of `asked`. realisations of each run, where runs are needed; default: the number declared by the paper's
     readings. decide: runs behind undecided claims are extended, up to 2000·2^m realisations, until each claim is
     decided; `realisations` is then the limit. Runs go through the store of blocks under out, so that a second call
-    continues. Raises TargetUnmet where a time limit left something undone, Interrupted on a signal seen by `stop`.
-    """
+    continues. Raises TargetUnmet where a time limit left something undone, Interrupted on a signal seen by `stop`."""
     if realisations is not None and realisations < 1:
         raise ConfigError(f"{argument('realisations')}: must be >= 1, got {realisations}")
     options = replace(options or RunOptions(), out=out)
@@ -534,10 +525,8 @@ def _classes(done: Readings) -> str:
 
 
 def _outdated(done: Readings) -> tuple[str, ...]:
-    """Configs whose stored claims differ in class from their readings now.
-
-    Except configs that have changed since their run: their stored results make no report.
-    """
+    """Configs whose stored claims differ in class from their readings now. Except configs that have changed since their
+    run: their stored results make no report."""
     new = {over.claim.id: over for over in done.over if over.outcome}
     found = []
     for config in dict.fromkeys(over.claim.config for over in new.values()):

@@ -6,8 +6,7 @@ similar names are mostly of one study, and both processes would compile its kern
 
 `radarsim new-study`: a package with a small complete study. It is a copy of radarsim/app/one_file, with the files of
 radarsim/app/one_step in place of its own, or of radarsim/app/template, under another name; these packages work as they
-stand, and are linted and tested. Nothing is overwritten.
-"""
+stand, and are linted and tested. Nothing is overwritten."""
 
 import os
 import re
@@ -43,8 +42,7 @@ LOOK_S = 0.1  # interval at which signals are checked
 class Done:
     """A finished config: seconds, summary; its faults and their exit code, if any.
 
-    stages: the seconds of simulation, drawing and writing; the rest is statistics.
-    """
+    stages: the seconds of simulation, drawing and writing; the rest is statistics."""
 
     stem: str
     seconds: float
@@ -62,9 +60,8 @@ def reproduce(
     overrides: Sequence[str] = (),
     figures: bool = True,
 ) -> list[Done]:
-    """Run every config and report a line as each finishes; a fault of one does not stop the others.
-
-    Raises Interrupted, with all finished work stored, on a signal seen by `stop`."""
+    """Run every config and report a line as each finishes; a fault of one does not stop the others. Raises Interrupted,
+    with all finished work stored, on a signal seen by `stop`."""
     done: list[Done] = []
     for one in _finished(partial(_run, str(out), tuple(overrides), figures), from_both_ends(stems), stop):
         done.append(one)
@@ -79,9 +76,8 @@ def from_both_ends(stems: Sequence[str]) -> list[str]:
 
 
 def _finished(work: Callable[[str], Done], stems: Sequence[str], stop: Signals | None) -> Iterator[Done]:
-    """Finished configs as they come, from processes that have ended afterwards.
-
-    If a process dies, a single one does the rest: the config with which that dies too is at fault."""
+    """Finished configs as they come, from processes that have ended afterwards. If a process dies, a single one does
+    the rest: the config with which that dies too is at fault."""
     waiting, count = list(stems), PROCESSES
     while waiting:
         with ProcessPoolExecutor(min(count, len(waiting)), get_context("spawn"), _begin) as pool:
@@ -186,8 +182,7 @@ def new_study(name: str, folder: str | os.PathLike = ".", form: str = "linear") 
     """Write the package folder/NAME with a study called NAME, in one of `FORMS`; its path.
 
     Raises ConfigError for a name that cannot be a new module's, and where something of that name exists; StoreError
-    where it cannot be written.
-    """
+    where it cannot be written."""
     if fault := unfit(name):
         raise ConfigError(f"{one_line(name)}: {fault}")
     path = Path(folder) / name

@@ -1,7 +1,6 @@
 """The cases of an earlier run.json as today's program reads them; results of other sources.
 
-The result of a finished experiment: tables, figures, claims, run.json and report.html, in memory and as files.
-"""
+The result of a finished experiment: tables, figures, claims, run.json and report.html, in memory and as files."""
 
 import os
 import re
@@ -56,8 +55,7 @@ def recorded_case(record: Mapping, name: str) -> Case | None:
 def of_other_sources(names: Mapping[str, str]) -> list[str]:
     """A line on blocks of other sources that are kept, one on those that are not; once for each process.
 
-    names: of cases, by identity.
-    """
+    names: of cases, by identity."""
     # The last of an identity counts: earlier ones are of folders that gave other bytes, or of another directory.
     found = {one.identity: one for one in store.settled if one.identity in names}.values()
     store.settled[:] = [one for one in store.settled if one.identity not in names]
@@ -97,8 +95,7 @@ class Result(Shown):
     """A finished experiment: cases, tables (pandas) and figures (Matplotlib). It writes nothing unless `write` is
     called.
 
-    written: the files of the last call of `write`; None before the first.
-    """
+    written: the files of the last call of `write`; None before the first."""
 
     def __init__(self, experiment: Experiment, cases: Sequence[CaseResult], facts: Mapping[str, Any]):
         self.experiment, self.facts = experiment, dict(facts)
@@ -182,8 +179,7 @@ class Result(Shown):
         """The rows of curves at the last scan of each case, filter and component, joined with those of gains.
 
         `note` warns where σ's interval is unreliable, `gain_note` where the gain's is; each column exists only if
-        needed.
-        """
+        needed."""
         keys = ["case", "filter", "component"]
         last = self.curves.groupby(keys, sort=False).tail(1)
         gains = against_first({"gains": self.gains}, self.cases)["gains"]
@@ -201,8 +197,7 @@ class Result(Shown):
         """Write tables, figures, claims, run.json and report.html into out/<stem>/, and update out/index.html.
 
         figures may name the formats of their files: svg, png, pdf; width_mm overrides their width. Returns the files
-        written. Raises DisagreementError, after writing, if there are `faults`.
-        """
+        written. Raises DisagreementError, after writing, if there are `faults`."""
         from radarsim.report import html
 
         configs.check(out=out, figures=figures, width_mm=width_mm)
@@ -242,9 +237,7 @@ class Result(Shown):
 
     def verdicts(self, column: str = "class") -> dict[str, list[str]]:
         """The claims by class over all readings that their papers allow, or `as_shipped`; empty if there are none.
-
-        Extensions are listed separately.
-        """
+        Extensions are listed separately."""
         found: dict[str, list[str]] = {}
         grouped = page.grouped(self._tables["claims"].to_dict("records"))
         for parts in sorted(grouped, key=lambda parts: page.ORDER.index(parts[0][column])):
@@ -286,11 +279,9 @@ class Result(Shown):
 
 # ---- output ----------------------------------------------------------------------------------------------------------
 def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
-    """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims.
-
-    A study whose errors are not of all realisations at common scans makes its own curves and gains. stem is the shipped
-    config's: all its claims are in the table, also those that it can no longer judge.
-    """
+    """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims. A study whose
+    errors are not of all realisations at common scans makes its own curves and gains. stem is the shipped config's: all
+    its claims are in the table, also those that it can no longer judge."""
     of = study(results[0].study)
     made, from_outside = measured(results), outside.measured(results)
     verdicts = claims.judged(of.claims(), results, outside.for_claims(made, from_outside), configs.shipped, stem)
@@ -410,8 +401,7 @@ def case_figures(
 ) -> dict[str, Figure]:
     """All figures of an experiment, described, by the stem of their file: the study's own, and of sweeps.
 
-    The config may select fewer: `Experiment.drawn`.
-    """
+    The config may select fewer: `Experiment.drawn`."""
     own = study(results[0].study)
     banded = _banded(made)
     alone = outside.without(banded, results)
@@ -458,8 +448,7 @@ class Written:
     """Output of `write_files`: the folder, its files by their path in it, the tables, and the sentences of the answer.
 
     removed: files of an earlier run that this one did not write. seconds: of drawing, and of writing with the report.
-    of_intervals: warnings on the intervals in the answer.
-    """
+    of_intervals: warnings on the intervals in the answer."""
 
     folder: Path
     files: tuple[str, ...]
@@ -489,8 +478,7 @@ def write_files(
     run: the facts of the run for run.json, see provenance.record; made: the tables, if at hand; formats: those of the
     figures' files; width_mm overrides their width. Outputs of an earlier run that this one does not write (figures
     without `draw`) are removed, so that nothing stale remains. Where figures or words of a package's study fail, only
-    the tables are written.
-    """
+    the tables are written."""
     from radarsim.report import html
 
     made = case_tables(results, configs.shipped_stem(experiment)) if made is None else made
@@ -542,10 +530,8 @@ def write_files(
 
 
 def unnamed(own: Study, described: Iterable[str]) -> list[str]:
-    """A line on figures that are not among those that the study's keys name, if any.
-
-    A figure drawn several times has a suffix: `gain_r_2`.
-    """
+    """A line on figures that are not among those that the study's keys name, if any. A figure drawn several times has a
+    suffix: `gain_r_2`."""
     known = own.keys().figure_names
     if known is None:
         return []

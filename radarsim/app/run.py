@@ -1,8 +1,7 @@
 """One experiment from config to written results, for the command and Python: its cases are collected one after the
 other, to a number of realisations or to a precision.
 
-The time that tables, figures and report of an experiment take, measured on a few of its realisations.
-"""
+The time that tables, figures and report of an experiment take, measured on a few of its realisations."""
 
 import json
 import math
@@ -52,8 +51,7 @@ Progress = Callable[[int, int, int], None]
 class SimulatedCases:
     """For each case with a finished realisation, in the experiment's order, its work and sums.
 
-    stopped: why not all is done; precision: the target, if any; cells: the widest interval of each case looked at.
-    """
+    stopped: why not all is done; precision: the target, if any; cells: the widest interval of each case looked at."""
 
     cases: list[tuple[Case, CaseWork, Collected]] = field(default_factory=list)
     precision: float | None = None
@@ -105,8 +103,7 @@ class Shares:
 class RunOptions:
     """How an experiment is computed: no option changes a number.
 
-    out is the results directory, None for none; executor replaces the threads; stop is called between tasks.
-    """
+    out is the results directory, None for none; executor replaces the threads; stop is called between tasks."""
 
     out: str | os.PathLike[str] | None = None
     threads: int | None = None
@@ -272,10 +269,8 @@ def check_precision(experiments: Sequence[Experiment], percent: float, of: str =
 def shared(
     experiment: Experiment, part: tuple[int, int], options: RunOptions, *, progress: Progress | None = None
 ) -> Shares:
-    """Put a share of every case, as (2, 3) the second of three, into the store under options.out.
-
-    Stops early on `stop`.
-    """
+    """Put a share of every case, as (2, 3) the second of three, into the store under options.out. Stops early on
+    `stop`."""
     assert options.out is not None  # a share is only what it stores
     total = sum(case.realisations for case in experiment.cases) // part[1]
     made: set[tuple[str, int]] = set()
@@ -326,8 +321,7 @@ SPARE = 1.25  # for the report, for files and for what one case's figure does no
 
 def seconds(experiment: Experiment, figures: bool | str | Sequence[str], width_mm: float | None) -> float:
     """Estimated seconds for writing: the tables of the first case, times the cases, and one figure of each kind, times
-    their number, measured here.
-    """
+    their number, measured here."""
     from radarsim.app import result as output
 
     case = experiment.cases[0]
@@ -377,10 +371,8 @@ def codes(experiments: Sequence[Experiment]) -> list[str]:
 
 
 def namesakes(experiments: Sequence[Experiment]) -> list[str]:
-    """A line for each config whose results would overwrite those of another: folders have the config's name.
-
-    Names that differ in case or in Unicode composition are one name to some file systems.
-    """
+    """A line for each config whose results would overwrite those of another: folders have the config's name. Names that
+    differ in case or in Unicode composition are one name to some file systems."""
     seen: dict[str, str] = {}
     faults = []
     for one in experiments:
@@ -632,10 +624,8 @@ def facts_of(simulated: SimulatedCases, threads: int, seconds: float) -> dict[st
 
 
 def cache_troubles() -> list[str]:
-    """Faults of the cache of compiled kernels in this process, a line for each kind; no result depends on it.
-
-    A kernel that could not be read or kept was compiled, as on a new machine.
-    """
+    """Faults of the cache of compiled kernels in this process, a line for each kind; no result depends on it. A kernel
+    that could not be read or kept was compiled, as on a new machine."""
     cache = sys.modules.get("radarsim.kernels.compile")  # nothing is compiled where it is not loaded
     return list(cache.troubles.values()) if cache else []
 

@@ -1,8 +1,7 @@
 """`radarsim sensitivity`: changes of σ and gains for +10 % of each key, or −10 % where more is refused.
 
 Exact where the case's σ are. Else both cases are simulated with the same noise, in batches, and the interval of a
-change comes from the changes without one batch each.
-"""
+change comes from the changes without one batch each."""
 
 import contextlib
 import math
@@ -64,8 +63,7 @@ class Sensitivity(Shown):
     words, empty without scans; without_effect: keys that change nothing; left_out: keys that can be neither raised nor
     lowered, with the reason. without_estimate: filters without rows, as they have no estimate there. not_paired:
     sampled keys that change the scan times. labels: the name of each key, with its symbol and unit. files: those
-    written, if any.
-    """
+    written, if any."""
 
     stem: str
     of: tuple[Quantity, ...]
@@ -183,8 +181,7 @@ def sensitivity(
 
 def _parts(of: Quantity, case: Case) -> tuple[bool, tuple[tuple[str, str], ...]]:
     """Whether a quantity's table has scans; the components, or the other column that tells values of a filter apart,
-    with their units.
-    """
+    with their units."""
     work = CaseWork(case)
     table = quantities.table_of(of, case_result(case, work, collect(work, 1)))
     if not of.per:
@@ -210,10 +207,8 @@ def named(spec: Study, path: str) -> Label:
 
 
 def other(cases: Cases, key: fields.NumericKey) -> tuple[float, Case]:
-    """A tenth more of a key's value, in size, or less where the config refuses more; and the case with it.
-
-    Whole numbers change by at least one. Raises ConfigError with the reason where there is no more.
-    """
+    """A tenth more of a key's value, in size, or less where the config refuses more; and the case with it. Whole
+    numbers change by at least one. Raises ConfigError with the reason where there is no more."""
     assert key.value is not None
     step = max(1, round(MORE * key.value)) if key.whole else MORE * key.value
     try:
@@ -242,8 +237,7 @@ def size(rows: Sequence[dict[Hashable, Any]], path: str, leading: str, change: s
 class Seen(NamedTuple):
     """Q quantities of F filters and C components at one time: of the whole case (Q, F, C), and of all its realisations
     but one of n batches (Q, n, F, C), n = 1 where exact. NaN where there is no estimate. t_s (K,): times of the scans,
-    s.
-    """
+    s."""
 
     whole: np.ndarray
     but_one: np.ndarray
@@ -270,11 +264,9 @@ class Look:
         return [(f, c) for f in range(len(self.axes.filters)) for c in range(len(self.parts))]
 
     def pair(self, case: Case, base: Seen, changed: Case) -> tuple[Seen, Seen]:
-        """Values of a case, `base` with the usual realisations, and of a changed one. Raises ConfigError.
-
-        More realisations where both are sampled at a time and the scan times differ: the noise at that time is then of
-        different scans, so that the interval of the change is that of two independent runs.
-        """
+        """Values of a case, `base` with the usual realisations, and of a changed one. Raises ConfigError. More
+        realisations where both are sampled at a time and the scan times differ: the noise at that time is then of
+        different scans, so that the interval of the change is that of two independent runs."""
         seen = self.of(changed)
         if base.exact or self.asked.at_s is None or np.array_equal(base.t_s, seen.t_s):
             return base, seen
@@ -346,11 +338,9 @@ def _change(of: Quantity, before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
 
 def interval(but_one: np.ndarray, value: float) -> tuple[float, float, float]:
-    """A value with its 95 % interval from the n values without one batch each (n,); n = 1: it is exact.
-
-    The jackknife over groups (Shao & Tu, The Jackknife and Bootstrap, 1995, sec. 2.3): a batch alone may have no
-    estimate, as where few realisations lock.
-    """
+    """A value with its 95 % interval from the n values without one batch each (n,); n = 1: it is exact. The jackknife
+    over groups (Shao & Tu, The Jackknife and Bootstrap, 1995, sec. 2.3): a batch alone may have no estimate, as where
+    few realisations lock."""
     n = len(but_one)
     if np.all(np.abs(but_one) < ROUNDED) and abs(value) < ROUNDED:
         return 0.0, 0.0, 0.0
@@ -416,8 +406,7 @@ def write(
 ) -> Sensitivity:
     """Add the files: sensitivity.csv and the tornado figure, in `out`/sensitivity/CONFIG.
 
-    width_mm overrides the figure's width.
-    """
+    width_mm overrides the figure's width."""
     configs.directory(out)
     contents = {"sensitivity.csv": common.to_csv(found.table)}
     if formats and found.rows:

@@ -1,7 +1,6 @@
 """How Python and notebooks show an answer: its first sentences, its first figure, its figures by name.
 
-The output of --json: plain data, one document for each command, with the content of the text output.
-"""
+The output of --json: plain data, one document for each command, with the content of the text output."""
 
 import json
 import math

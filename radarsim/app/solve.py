@@ -2,8 +2,7 @@
 
 If the quantity is known exactly, the root of the exact function. Otherwise it is simulated, with the same noise at
 every value; the interval is then the set of values at which the quantity's own 95 % interval holds the target, and
-covers the true value as often as that interval does.
-"""
+covers the true value as often as that interval does."""
 
 import math
 import os
@@ -59,8 +58,7 @@ class Answer(Shown):
     value is None where the target is not attained; then limit is the nearest attainable value, at limit_at. lo and hi
     bound the value at 95 %, and equal it where exact. slope is the change of the quantity for one unit of the key;
     others are further values that attain the target. low and high are the searched range, command the run that
-    confirms.
-    """
+    confirms."""
 
     key: str
     unit: str
@@ -177,10 +175,8 @@ def _rate(percent: float) -> str:
 
 @dataclass
 class Cases:
-    """The cases of a config with other values at a key; `base` as it is.
-
-    The others share the base's noise, whatever their world.
-    """
+    """The cases of a config with other values at a key; `base` as it is. The others share the base's noise, whatever
+    their world."""
 
     config: Config
     overrides: tuple[str, ...]
@@ -283,10 +279,8 @@ def rounded(value: float) -> float:
 def range_of(
     found: Sequence[fields.NumericKey], name: str, between: tuple[float, float] | None, factor: float = FACTOR
 ) -> quantities.Range:
-    """The search range of a key, up to `factor` times its value if it has no bounds.
-
-    Raises ConfigError where it has neither bounds nor a starting value.
-    """
+    """The search range of a key, up to `factor` times its value if it has no bounds. Raises ConfigError where it has
+    neither bounds nor a starting value."""
     key, values = found[0], [one.value for one in found if one.value]
     if between is not None:
         low, high = between
@@ -328,8 +322,7 @@ class Altered(Protocol):
 class Curve:
     """The quantity as a function of the key, or of several, each value computed once.
 
-    progress is called for each; `simulated` counts the simulated ones.
-    """
+    progress is called for each; `simulated` counts the simulated ones."""
 
     def __init__(
         self,
@@ -570,10 +563,8 @@ def by_sampling(asked: Question, curve: Curve, notify: Callable[[str], None]) ->
 
 
 def unpaired(asked: Question, curve: Curve) -> tuple[str, ...]:
-    """A note where the key moves the scans, so that values are not compared with the same noise.
-
-    The quantity at a time is then read at another scan, whose noise is another.
-    """
+    """A note where the key moves the scans, so that values are not compared with the same noise. The quantity at a time
+    is then read at another scan, whose noise is another."""
     if len(curve.scans) < 2:
         return ()
     words = tr(
@@ -594,10 +585,8 @@ def _changes(scanned: Sequence[tuple[float, float]]) -> list[int]:
 def _bracket(
     asked: Question, curve: Curve, grid: Sequence[float], i: int
 ) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """Neighbouring places of the grid between which the quantity crosses the target with all realisations.
-
-    Starts at place i, where the pilot crossed or came nearest; its noise may have moved that by some steps.
-    """
+    """Neighbouring places of the grid between which the quantity crosses the target with all realisations. Starts at
+    place i, where the pilot crossed or came nearest; its noise may have moved that by some steps."""
     for j in sorted(range(i - MOST_STEPS, i + MOST_STEPS + 1), key=lambda j: abs(j - i)):
         if not 0 <= j < len(grid) - 1:
             continue
@@ -640,10 +629,8 @@ def _outside(
     other: tuple[float, float],
     side: int,
 ) -> tuple[float, float]:
-    """A place on one side of a value where the function has the other sign, or the end of the range.
-
-    The first step is a twentieth of the bracket's width on the scale of the search, each further one twice as long.
-    """
+    """A place on one side of a value where the function has the other sign, or the end of the range. The first step is
+    a twentieth of the bracket's width on the scale of the search, each further one twice as long."""
     sign = function(value)
     step = max(abs(over.inner(other[0]) - over.inner(one[0])) / 20, over.whole)
     u = over.inner(value)
@@ -789,10 +776,8 @@ def _exactly(asked: Question, curve: Curve, notify: Callable[[str], None]) -> An
 
 
 def roots(asked: Question, curve: Curve) -> quantities.Found:
-    """Where the exact quantity reaches the target; searched roughly first where that is much cheaper.
-
-    Raises quantities.Undefined where it has no value.
-    """
+    """Where the exact quantity reaches the target; searched roughly first where that is much cheaper. Raises
+    quantities.Undefined where it has no value."""
 
     def missing(x: float) -> float:
         return curve.exactly(x) - asked.equals
@@ -829,9 +814,7 @@ def timed(work: Callable[[], object]) -> float:
 
 def slope(of: Callable[[float], float], value: float, over: quantities.Range) -> float | None:
     """The change of a function for one unit of the key, by a central difference within the range; one-sided at an end.
-
-    Error of the order of 1e-8 of itself; of whole numbers the change to the next.
-    """
+    Error of the order of 1e-8 of itself; of whole numbers the change to the next."""
     step = NEAR * (abs(value) or 1.0)
     low, high = max(value - step, over.low), min(value + step, over.high)
     if over.whole:

@@ -4,8 +4,7 @@ What `radarsim clean` removes: stored blocks, and nothing outside DIR/.blocks.
 
 Stored results of `radarsim readings`: rows of its tables under a directory, and the shipped classes. classes.csv beside
 this module is that of the shipped configs, copied by `make readings-pages`; a claim judged in a directory of results
-takes its class from there.
-"""
+takes its class from there."""
 
 import csv
 import hashlib
@@ -54,8 +53,7 @@ def rows(
     path: Path, text: bytes, needed: Collection[str], made: Callable[[dict[str, Any]], Row], kind: str
 ) -> list[Row]:
     """The result of `made` for each row of a CSV file with the required columns; StoreError, with kind, for any other
-    file.
-    """
+    file."""
     try:
         table = csv.DictReader(io.StringIO(text.decode("utf-8"), newline=""), strict=True)
         read, names = list(table), set(table.fieldnames or ())
@@ -85,10 +83,8 @@ def record(folder: Path) -> dict[str, Any] | None:
 
 
 def table(folder: Path, name: str, outputs: "dict[str, str]") -> "pd.DataFrame | None":
-    """A table of a folder whose run.json records these outputs; None where the run wrote none of this name.
-
-    Raises StoreError where it cannot be read or differs from the record.
-    """
+    """A table of a folder whose run.json records these outputs; None where the run wrote none of this name. Raises
+    StoreError where it cannot be read or differs from the record."""
     path = folder / f"{name}.csv"
     if path.name not in outputs:
         return None
@@ -122,8 +118,7 @@ def clean(
 
     This includes a case's blocks from other sources. Links are not followed; files that no store makes remain, and so
     do their folders. Raises ConfigError if `out` does not exist or its .blocks is a link, StoreError if a file cannot
-    be removed.
-    """
+    be removed."""
     blocks = Path(out) / ".blocks"
     if not is_directory(Path(out)):
         raise ConfigError(f"{out}: no such directory of results")
@@ -156,10 +151,8 @@ LOOKS, PAUSE_S = 5, 0.1  # of a table that fits no record: another run may be wr
 
 
 def stored(path: Path) -> list[dict[str, Any]] | None:
-    """The rows of a stored claims.csv, numbers as such; None if there is none.
-
-    Raises StoreError where it cannot be read, is no such table, or differs from the record in run.json.
-    """
+    """The rows of a stored claims.csv, numbers as such; None if there is none. Raises StoreError where it cannot be
+    read, is no such table, or differs from the record in run.json."""
     from radarsim.report.claims import CLAIMED, NUMBERS
 
     for look in range(LOOKS):
@@ -214,8 +207,7 @@ def classes_of(papers: Iterable[tuple[PaperReadings, PaperClaims]], out: Path | 
     """The class over all readings of each claim that depends on an open choice of its paper; None where it is not
     known.
 
-    A class from other words, numbers or choices than the claim has now does not count.
-    """
+    A class from other words, numbers or choices than the claim has now does not count."""
     found = {(one.claim, one.declared): one for one in (*shipped_classes(), *stored_classes(out))}
     return {
         claim.id: found.get((claim.id, declared(readings, claim)))

@@ -2,8 +2,7 @@
 
 Where the quantity is exact, exact values are searched and compared. Elsewhere every value is simulated with the same
 noise, of a seed of its own; the gain is measured on the realisations of the config's seed, which the search has not
-used, so that the optimism of a least value is in no number. Both filters see the same plots there: it is paired.
-"""
+used, so that the optimism of a least value is in no number. Both filters see the same plots there: it is paired."""
 
 import itertools
 import math
@@ -78,8 +77,7 @@ class Share(Range):
 class Searched:
     """A key that is searched: where it stands in its filter, its stated value, its range.
 
-    of: where it is one of probabilities that sum to one, the largest of these, its ratio to which is searched.
-    """
+    of: where it is one of probabilities that sum to one, the largest of these, its ratio to which is searched."""
 
     path: Path
     stated: float
@@ -119,8 +117,7 @@ class Tuned(Shown):
 
     training and judged are numbers of realisations a case, none where exact; minimised says what is least, or largest.
     settings are the tuned values by key; command is a run with them, of the noise with which the gain is measured.
-    inert: the keys without effect on the quantity.
-    """
+    inert: the keys without effect on the quantity."""
 
     stem: str
     filter: str
@@ -448,11 +445,9 @@ def inert(of: Objective, best: Place, i: int) -> bool:
 
 
 def spread(of: Objective, best: Place) -> dict[Path, tuple[float, float]]:
-    """The 95 % intervals of the best values, of real numbers: by how much they move without each of the batches.
-
-    That is a Newton step from the best place, whose gradient is that of the others; nothing where the quantity has no
-    minimum there on this scale, as where it is flat or jumps, or the search ended.
-    """
+    """The 95 % intervals of the best values, of real numbers: by how much they move without each of the batches. That
+    is a Newton step from the best place, whose gradient is that of the others; nothing where the quantity has no
+    minimum there on this scale, as where it is flat or jumps, or the search ended."""
     searched = [
         replace(one, over=replace(one.over, whole=True)) if at_end(one, x) else one
         for one, x in zip(of.searched, best, strict=True)
@@ -541,8 +536,7 @@ def family(
 ) -> tuple[list[Case], list[str]]:
     """The cases over which a filter is tuned, and the names of filters of Python, which they are without.
 
-    members: settings of each. Raises ConfigError.
-    """
+    members: settings of each. Raises ConfigError."""
     outside: list[str] = []
     cases, set_too = [], {one.partition("=")[0].strip() for one in settings}
     for member in members:
@@ -740,8 +734,7 @@ def beside(experiment: Experiment, wanted: str | None, **asked: Any) -> tuple[Ex
     """The experiment with each of its filters as tuned over all its cases too, and why some are not; raises ConfigError
     where none is.
 
-    wanted: for what, by default σ of the first component at the last scan; asked: as `tune` takes it.
-    """
+    wanted: for what, by default σ of the first component at the last scan; asked: as `tune` takes it."""
     case, found, left_out = experiment.cases[0], list[Tuned](), []
     wanted = wanted or f"sigma {registry.study(case.study).prepare(case).axes.components[0][0]}"
     for one in case.spec.members:

@@ -57,8 +57,7 @@ class Progress:
 
     Until the first report, while kernels are compiled, the bar moves without a number; by a thread, so where threads
     are forbidden it begins with that report. The rate is that of computations since then: neither compilation nor
-    stored results count.
-    """
+    stored results count."""
 
     shares = True  # the share of a whole is known, and shown by a bar
 

@@ -145,11 +145,9 @@ def _compute_each(
     as_json: bool,
     gaps: bool = False,
 ) -> None:
-    """Compute experiments one by one and print the results; gaps: say before what a store with gaps lacks.
-
-    Raises DisagreementError at the end for differences beyond chance, else MeasureError where the measure of a claim
-    failed, else TargetUnmet for targets that were not reached.
-    """
+    """Compute experiments one by one and print the results; gaps: say before what a store with gaps lacks. Raises
+    DisagreementError at the end for differences beyond chance, else MeasureError where the measure of a claim failed,
+    else TargetUnmet for targets that were not reached."""
     from radarsim.app import run as simulation
     from radarsim.app import shown
     from radarsim.app.outlook import lacking

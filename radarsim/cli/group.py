@@ -89,8 +89,7 @@ def stoppable() -> Iterator[None]:
 
     An exception from a handler may be turned into another one on its way, as by an import, or be swallowed, as by the
     finalisers that Python calls at any time; then the process ends at once a little later. Runs, which store their
-    results, handle both signals themselves meanwhile. A signal that is ignored (nohup) stays so.
-    """
+    results, handle both signals themselves meanwhile. A signal that is ignored (nohup) stays so."""
     numbers = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) is not signal.SIG_IGN]
     if threading.current_thread() is not threading.main_thread():
         numbers = []

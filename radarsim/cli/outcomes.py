@@ -73,9 +73,7 @@ def print_result(result: "Result") -> None:
 
 def show_last_scan(result: "Result") -> None:
     """σ with interval, exact σ and gain of each case, filter and component at the last scan, unless there are too many.
-
-    A case is named by its swept values.
-    """
+    A case is named by its swept values."""
     from radarsim.report import panels
 
     if 0 < len(result.last_scan) <= MOST_ROWS:
@@ -553,8 +551,7 @@ def print_claims(
     """A line for each claim: number, class, first words; for detailed ones all of it with measured values. The commands
     it shows are for the directory `out`, and for the requested names.
 
-    For experiments other than the paper's a line for each reason, with the claims that cannot be judged.
-    """
+    For experiments other than the paper's a line for each reason, with the claims that cannot be judged."""
     from radarsim.report.claims import NOT_JUDGED, NOT_RUN, page, rule
 
     stated: list[dict[str, Any]] = []

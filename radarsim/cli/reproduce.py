@@ -1,7 +1,6 @@
 """`make reproduce-figures`: every shipped config at its full size, a line each, and what came of the papers' claims.
 
-python -m radarsim.cli.reproduce [OUT [CONFIG…]] [--set KEY=VALUE] [--no-figures]
-"""
+python -m radarsim.cli.reproduce [OUT [CONFIG…]] [--set KEY=VALUE] [--no-figures]"""
 
 import argparse
 import os

@@ -19,8 +19,7 @@ in one recording of twenty, over all explanations; then the search continues wit
 numbers yields: nothing wrong.
 
 The filter used is the one that takes most columns of a plot. One that takes fewer says nothing about the rest, and may
-predict the ranges best just because the velocities are bad.
-"""
+predict the ranges best just because the velocities are bad."""
 
 import itertools
 import math
@@ -313,8 +312,7 @@ FINER, LEAP = 1e-3, 0.01  # factor on the value that counts as zero where the li
 class Fitted:
     """One key: the best value, its 95 % interval, and whether the plots distinguish it from all other values.
 
-    lo is 0 where the key may be zero, hi infinite where it has no upper end.
-    """
+    lo is 0 where the key may be zero, hi infinite where it has no upper end."""
 
     key: str
     stated: float

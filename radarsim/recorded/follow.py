@@ -7,8 +7,7 @@ rounding altogether. Only the rows after a gap are compared: a multiple-model fi
 any difference by itself.
 
 The plots of many realisations in a file: arrays of NumPy (.npz), or one row a plot as Parquet or CSV. Memory does not
-grow with their number.
-"""
+grow with their number."""
 
 import itertools
 import json
@@ -60,10 +59,8 @@ class Twin:
         self.rows, self.compared, self.gap_s, self.gap_row = 0, 0, 0.0, 0
 
     def lost(self, columns: dict[str, np.ndarray], track: Track) -> bool:
-        """Whether the track (of the first tracker) over the next rows has lost its digits.
-
-        Then `gap_s` is the longest interval so far and `gap_row` the row, from 0, that ends it.
-        """
+        """Whether the track (of the first tracker) over the next rows has lost its digits. Then `gap_s` is the longest
+        interval so far and `gap_row` the row, from 0, that ends it."""
         t, *measured = columns.values()
         if self.origin is None:
             self.origin, self.seen = float(t[0]), [float(t[0])] * len(measured)
@@ -165,8 +162,7 @@ def refuse_borrowed(case: Case, part: Part) -> None:
 def one_case(experiment: Experiment, what: str, command: str) -> Case:
     """The one case of an experiment, of a study with plots; raises ConfigError.
 
-    what (the purpose) and command are for the fault, which lists the choices; {} in the command is the config.
-    """
+    what (the purpose) and command are for the fault, which lists the choices; {} in the command is the config."""
     place = experiment.path or experiment.stem
     if len(experiment.cases) > 1:
         count = len(experiment.cases)
@@ -214,9 +210,7 @@ def listed(names: list[str]) -> str:
 
 def simulated(experiment: Experiment, realisation: int = 0) -> dict[str, np.ndarray]:
     """The plots of one realisation of an experiment's one case, exactly those of a run, and the truth as true_….
-
-    Columns of equal length, NaN where a plot is missed. Raises ConfigError for a realisation outside every run.
-    """
+    Columns of equal length, NaN where a plot is missed. Raises ConfigError for a realisation outside every run."""
     if not 0 <= realisation < LARGEST_REALISATIONS:
         raise ConfigError(f"realisation: must be from 0 to {LARGEST_REALISATIONS - 1}, got {realisation}")
     case = case_with_plots(experiment)
@@ -233,9 +227,7 @@ def case_with_plots(experiment: Experiment) -> Case:
 
 def batches(experiment: Experiment, n: int, first: int = 0, chunk: int | None = None) -> Iterator[Drawn]:
     """The plots of n realisations of an experiment's one case from number `first` on, chunk by chunk, in flat memory.
-
-    Raises ConfigError, at once, for realisations that no run has.
-    """
+    Raises ConfigError, at once, for realisations that no run has."""
     given = {"n": (n, 1), "first": (first, 0), "chunk": (n if chunk is None else chunk, 1)}
     n, first, size = (_whole(name, *one) for name, one in given.items())
     if first + n > LARGEST_REALISATIONS:
@@ -463,8 +455,7 @@ class Follower:
         """The estimates over the next rows of the track; raises ConfigError where they are only rounding errors, or a
         filter cannot take a row.
 
-        The estimates are compared with the truth where its names match the components.
-        """
+        The estimates are compared with the truth where its names match the components."""
         columns = own.columns
         try:
             track = self.tracker.feed(columns)
@@ -505,8 +496,7 @@ def follow(
     in the order of the file. Memory does not grow with a track's rows where the study's filters are recursive; others
     take a limited number of rows. progress is called with the rows done.
 
-    Raises ConfigError for an experiment of several cases, a study without recorded plots, and faults in the file.
-    """
+    Raises ConfigError for an experiment of several cases, a study without recorded plots, and faults in the file."""
     plots_named = shlex.quote(os.fspath(source)).replace("{", "{{").replace("}", "}}")
     case = one_case(experiment, "track with", f"radarsim track {{}} {plots_named}")
     refuse_borrowed(case, "tracker")
@@ -619,8 +609,7 @@ def write_many(
     """Write the plots of n realisations of an experiment's one case from number `first` on, in the format that the
     path's ending names, CSV by default. Returns those of the first ones.
 
-    Raises ConfigError as `batches`, or where a format's package is missing; errors of `Writer`.
-    """
+    Raises ConfigError as `batches`, or where a format's package is missing; errors of `Writer`."""
     to = FORMATS.get(Path(path).suffix.lower(), to_csv)
     one = next(batches(experiment, n, first, chunk=2))
     size = max(8, NUMBERS // sum(array[0].size for array in one.arrays().values()))
@@ -637,9 +626,7 @@ def write_many(
 
 def to_npz(file: Writer, one: Drawn, parts: Parts, n: int) -> None:
     """`realisation` (n,), `t_s` (K,), and each array (n, K) or (n, K, M); (1, K) where all realisations have the same.
-
-    One array after the other, so that the plots are drawn as often as there are arrays.
-    """
+    One array after the other, so that the plots are drawn as often as there are arrays."""
     widest = max(array.shape[2] for part in parts() for array in part.columns.values()) if one.several else 0
     first, alone = {"realisation": np.arange(one.n), **one.arrays()}, {"t_s": one.t_s}
     alone |= {name: array[:1] for name, array in first.items() if array.strides[0] == 0}

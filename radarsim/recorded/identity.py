@@ -6,8 +6,7 @@ the plot. Codes that end in 00 are given to many at once (ICAO Doc 4444, 8.5.2.2
 Which track a record of a sensor belongs to: by its track number, its address or its Mode 3/A code.
 
 A track number is a sensor's own, and is given again when its aircraft has gone. A code is given to several aircraft at
-a time. So both name a track only together with time, and a code with place too.
-"""
+a time. So both name a track only together with time, and a code with place too."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

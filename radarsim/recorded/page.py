@@ -3,8 +3,7 @@ estimates, residuals, innovations, probabilities. Its sentences: rows, gaps, err
 
 Whether the stated accuracies fit is judged by the filters' own innovations. For a consistent filter the squares of the
 innovations, divided by their predicted variance, average 1 for each degree of freedom (NIS). Larger: the plots are
-worse than stated, or the target manoeuvres more than the filter assumes; smaller: they are better.
-"""
+worse than stated, or the target manoeuvres more than the filter assumes; smaller: they are better."""
 
 import math
 import os
@@ -47,8 +46,7 @@ FAR_M = 2e4  # distance from which a plan view uses km
 def figures(track: Track, paths: Mapping[str, Places]) -> dict[str, Figure]:
     """`plan`, `track`, `residuals`, `nis` and `probabilities`, as far as available, described; by name.
 
-    track: the one to draw; paths: the places of every track's plots, that one first.
-    """
+    track: the one to draw; paths: the places of every track's plots, that one first."""
     drawn = {
         "plan": plan(track, paths),
         "track": estimates(track),

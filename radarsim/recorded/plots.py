@@ -4,8 +4,7 @@ A plots file has a header, before which lines beginning with `#` may stand; `t_s
 studies that take several plots at a time, not fall), an empty cell means missing, other columns are ignored.
 
 Places of plots in the plane, for the plan view, as far as the file has them: north and east from the radar, or whatever
-stands at the origin.
-"""
+stands at the origin."""
 
 import csv
 import itertools
@@ -36,10 +35,8 @@ MOST = 2000  # places of a track that are kept; when there are more, every secon
 
 def in_plane(places: Mapping[str, np.ndarray]) -> np.ndarray | None:
     """North, east and range (n, 3), m, from columns (n,) of a file; None where it has none that say where plots are.
-
     From x_m (north) and z_m (east) as `radarsim import` writes them; else from range and bearing, with the slant range
-    in place of the ground range; else the range alone.
-    """
+    in place of the ground range; else the range alone."""
     if {"x_m", "y_m", "z_m"} <= set(places):
         x, y, z = (places[name] for name in ("x_m", "y_m", "z_m"))
         r = places.get("range_m", np.sqrt(x**2 + y**2 + z**2))
@@ -254,8 +251,7 @@ def pieces(
     times may then have any order, and all rows are kept.
 
     After the first fault no more rows come: the rest is checked for faults, and ConfigError raised at the end with all
-    of them, each `file:row's line:column: name: what is wrong`.
-    """
+    of them, each `file:row's line:column: name: what is wrong`."""
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
             reader = _Reader(str(path), csv.reader(file, strict=True), choices, several, any_origin, texts)
@@ -481,8 +477,7 @@ def header_of(track: Track, named: bool = False) -> tuple[str, ...]:
 def rows_of(track: Track, name: str | None = None) -> Iterator[tuple[str, ...]]:
     """Rows of a track: t_s, filter, component, unit, estimate, sigma, the models' probabilities, number and score.
 
-    name: of the recorded track, put first.
-    """
+    name: of the recorded track, put first."""
     recorded = () if name is None else (name,)
     for i, t in enumerate(track.t_s.tolist()):
         for f, filter_name in enumerate(track.filters):

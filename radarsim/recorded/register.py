@@ -207,8 +207,7 @@ def register(radar: str, other: str) -> Registration:
 
     other: `[ID=]FILE`, with the track, address, callsign or code of the plots whose positions are all in the file, of a
     receiver that knows nothing of these. Raises ConfigError where too few plots have a position, or these lie too far
-    apart.
-    """
+    apart."""
     from radarsim.recorded.formats.importing import truth_of
 
     other, whose = str((owned := truth_of(other))[0]), owned[1].lower()

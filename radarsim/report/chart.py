@@ -8,8 +8,7 @@ Every colour has a contrast of 3 : 1 at least with its page (WCAG 2.2, 1.4.11); 
 grey. Panels are separate so that a narrow screen can stack them. Colours come from the page's style sheet in a light
 and a dark form. Text is escaped here; nothing else from outside gets into the markup. The page's script redraws a panel
 of lines when zoomed; the data for that beyond the numbers (limits, which ticks, places of references and notes) are
-kept with them and in attributes.
-"""
+kept with them and in attributes."""
 
 import math
 from collections.abc import Sequence

@@ -7,8 +7,7 @@ baseline (its rows are equal to the last digit), ρ is at least ρ₁ρ₂ − �
 has no negative eigenvalue: with it the interval covers 95 % or more. Where no filter links them, ρ is taken as −1, the
 worst case: the half-widths add. Sides of different noise are independent.
 
-The figures show each quantity of all sides on common axes, and the differences beside it.
-"""
+The figures show each quantity of all sides on common axes, and the differences beside it."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -38,8 +37,7 @@ class Side:
     """One case of one stored result.
 
     label: its name here; noise: a hash of all that its measurements depend on, None where unknown; count: its
-    realisations; tables: its rows of the stored tables, by name; measured: the quantities of its study.
-    """
+    realisations; tables: its rows of the stored tables, by name; measured: the quantities of its study."""
 
     run: str
     case: str
@@ -67,11 +65,9 @@ class Pair(NamedTuple):
 
 
 def pairs(runs: Sequence[Sequence[Side]]) -> tuple[list[Pair], list[str]]:
-    """Each further run's cases against those of the first, and a line for each case without a partner.
-
-    A run of a single case is compared with every case of the other; else cases with the same swept values, or the same
-    name, are partners.
-    """
+    """Each further run's cases against those of the first, and a line for each case without a partner. A run of a
+    single case is compared with every case of the other; else cases with the same swept values, or the same name, are
+    partners."""
     first, found, alone = runs[0], [], []
     for run in runs[1:]:
         own = [Pair(side, other) for side in run for other in first if min(len(run), len(first)) == 1]
@@ -138,10 +134,8 @@ def _part(pair: Pair, of: Quantity) -> dict[str, Any] | None:
 
 
 def _rows(table: "pd.DataFrame", of: Quantity) -> "pd.DataFrame":
-    """Rows of a quantity's table with the columns of `LABELS`, `unit`, `t_s`, `value`, `lo`, `hi` and `exact`.
-
-    The first ones as far as it has them; without times these are not-a-number.
-    """
+    """Rows of a quantity's table with the columns of `LABELS`, `unit`, `t_s`, `value`, `lo`, `hi` and `exact`. The
+    first ones as far as it has them; without times these are not-a-number."""
     values, exact = of.read(table)
     labels = {"filter": "filter", of.per if of.per in LABELS else "component": of.per, "unit": "unit"}
     return tables.frame(
@@ -380,8 +374,7 @@ HEIGHT_MM = 70.0
 def figures(sides: Sequence[Side], made: "pd.DataFrame") -> dict[str, Figure]:
     """A figure for each quantity and component that two sides share: values on the left, differences on the right.
 
-    made is from table.compared. Of more than eight sides the first eight are drawn, and the caption says so.
-    """
+    made is from table.compared. Of more than eight sides the first eight are drawn, and the caption says so."""
     drawn, measured = {}, {one.value: one for one in shared(sides)}
     for (quantity, component, model), rows in made.groupby(["quantity", "component", "model"], sort=False):
         of = measured[str(quantity)]

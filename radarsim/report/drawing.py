@@ -29,8 +29,7 @@ class Style:
     """How a mark is distinguished, in grey too: each number picks from a list of its own.
 
     colour: an int picks a distinct colour, GREY none of these, a float from 0 to 1 a shade of an ordered scale. dash
-    and marker: ints, None for no line or no marker. flat: a line ends where its data end, like a bar, however wide.
-    """
+    and marker: ints, None for no line or no marker. flat: a line ends where its data end, like a bar, however wide."""
 
     colour: int | float = 0
     dash: int | None = 0
@@ -42,11 +41,9 @@ class Style:
 
 @dataclass(frozen=True)
 class Line:
-    """A series y (n,) over x (n,), with its 95 % band lo … hi and its exact values (small crosses) where known.
-
-    The label is written at the line's end where labels fit, else in a legend. dash None leaves markers alone (scatter),
-    with whiskers for lo … hi. name identifies the line where the label leaves that to keys or to another panel.
-    """
+    """A series y (n,) over x (n,), with its 95 % band lo … hi and its exact values (small crosses) where known. The
+    label is written at the line's end where labels fit, else in a legend. dash None leaves markers alone (scatter),
+    with whiskers for lo … hi. name identifies the line where the label leaves that to keys or to another panel."""
 
     x: np.ndarray
     y: np.ndarray
@@ -80,10 +77,8 @@ class Bars:
 
 @dataclass(frozen=True)
 class Heat:
-    """A map of values (len(y), len(x)) over the cells' centres, with its colour bar's label.
-
-    Values are written in if few.
-    """
+    """A map of values (len(y), len(x)) over the cells' centres, with its colour bar's label. Values are written in if
+    few."""
 
     x: np.ndarray
     y: np.ndarray
@@ -96,8 +91,7 @@ class Note:
     """Words near a point of the data: above or below it ("n", "s"), to its right or left ("e", "w").
 
     "on": upon it, which interrupts its line. "e" alone: beside it, and be it outside the panel. "top": along the
-    panel's top, whatever y.
-    """
+    panel's top, whatever y."""
 
     x: float
     y: float
@@ -117,8 +111,7 @@ class Panel:
     "right": beside a single panel; "none": they are named in another panel. line_title: what these names are. A remark
     is above the panel, at its right.
     A panel without marks adds its keys to the legend. crosses: the name of the exact values' crosses; empty: exact.
-    equal: x and y have one scale, as on a map. height_mm: other than the figure's, in a figure of one column.
-    """
+    equal: x and y have one scale, as on a map. height_mm: other than the figure's, in a figure of one column."""
 
     x: Axis
     y: Axis
@@ -139,8 +132,7 @@ class Panel:
 class Figure:
     """A figure of one or more panels in rows of `columns`; the caption describes content and marks.
 
-    headline is the run's answer in a sentence of plain text, above its first figure.
-    """
+    headline is the run's answer in a sentence of plain text, above its first figure."""
 
     name: str
     title: str
@@ -180,8 +172,7 @@ def reworded(figure: Figure, said: Callable[[str], str]) -> Figure:
 class Chart:
     """One chart for all radars of a study: figures by their name, a table, a sentence for each case, a live page.
 
-    page is the text of one self-contained HTML file.
-    """
+    page is the text of one self-contained HTML file."""
 
     figures: Mapping[str, Figure]
     table: "pd.DataFrame"

@@ -3,8 +3,7 @@
 Lines are named at their ends where names fit, else once for each figure, below the panels; a legend never covers
 curves. Panels with different lines of the same style keep their own legends. Legible in grey: colours are steps of
 lightness, and dash and marker carry the same distinction. The bytes of an SVG depend only on the data and on the
-versions of Matplotlib and its fonts.
-"""
+versions of Matplotlib and its fonts."""
 
 import gc
 import io
@@ -226,8 +225,7 @@ def render(figure: Figure) -> Canvas:
 def draw_on(figure: Figure, axes: Any, label: str = "") -> Canvas:
     """Draw the panels of a figure on existing axes, one each, besides what these hold; the figure they belong to.
 
-    label is put before the names of its curves, whose colours and markers follow those of curves already there.
-    """
+    label is put before the names of its curves, whose colours and markers follow those of curves already there."""
     panels = [panel for panel in figure.panels if panel.marks]
     given = [one for one in np.atleast_1d(np.asarray(axes, dtype=object)).ravel() if isinstance(one, Axes)]
     if len(given) != len(panels):
@@ -251,8 +249,7 @@ def draw_on(figure: Figure, axes: Any, label: str = "") -> Canvas:
 def _beside(panel: Panel, after: int, label: str) -> Panel:
     """A panel drawn over so many curves: its curves with the next colours and the label before their names.
 
-    Grey lines are left out: they would be taken for those of the other curves.
-    """
+    Grey lines are left out: they would be taken for those of the other curves."""
     marks: list[Any] = []
     for mark in panel.marks:
         if isinstance(mark, Line) and mark.style.colour == GREY and mark.style.marker is None:
@@ -325,11 +322,9 @@ def _laid_out(figure: Figure) -> Canvas:
 
 @contextmanager
 def _measured_once(canvas: Canvas) -> Iterator[None]:
-    """Ticks are placed, and their numbers measured, once for each place, size and resolution of a panel.
-
-    Matplotlib places them four times for every axis that it lays out and three times for every one that it draws.
-    Caching methods replace its own meanwhile; a version of it without these methods draws the same, only more slowly.
-    """
+    """Ticks are placed, and their numbers measured, once for each place, size and resolution of a panel. Matplotlib
+    places them four times for every axis that it lays out and three times for every one that it draws. Caching methods
+    replace its own meanwhile; a version of it without these methods draws the same, only more slowly."""
     sides = [side for axes in canvas.axes for side in (axes.xaxis, axes.yaxis)]
     for side in sides:
         vars(side).update(_remembering(side))
@@ -398,11 +393,8 @@ def wrapped(text: str, letters: float, mark: str = ", ") -> str:
 def save(
     figure: Figure, formats: Iterable[str] = ("svg", "png"), width_mm: float | None = None, made_by: str = ""
 ) -> dict[str, bytes]:
-    """The bytes of the figure in each format ("svg", "png" at 200 dpi, "pdf"), the same for the same data.
-
-    At another width its letters keep their size. Title, caption and made_by (sources and versions) are in each file's
-    metadata.
-    """
+    """The bytes of the figure in each format ("svg", "png" at 200 dpi, "pdf"), the same for the same data. At another
+    width its letters keep their size. Title, caption and made_by (sources and versions) are in each file's metadata."""
     with _without_collection():
         canvas = render(at_width(figure, width_mm))
         with _measured_once(canvas):
@@ -491,10 +483,8 @@ def _ticks(side: XAxis | YAxis, axis: Ends, placed: bool, scans: Scans | None = 
 
 
 def at_scans(scans: Scans, intervals: int) -> list[tuple[float, str]]:
-    """Ticks at every few scans from zero, about so many intervals, and at the last scan.
-
-    One interval more, or down to half as many, if all intervals are then equally long.
-    """
+    """Ticks at every few scans from zero, about so many intervals, and at the last scan. One interval more, or down to
+    half as many, if all intervals are then equally long."""
     count = round(scans.last / scans.step)
     every = [m * 10**p for p in range(9) for m in (1, 2, 3, 4, 5)]
     whole = [n for n in every if count % n == 0 and intervals / 2 <= count / n <= intervals + 1]
@@ -509,8 +499,7 @@ class Round(Locator):
     """Ticks at round values, as in the page's charts (report/chart.py).
 
     On an axis of x at most as many as leave gaps between their numbers; where its values are scans, at these. words:
-    the numbers of the last ones.
-    """
+    the numbers of the last ones."""
 
     def __init__(self, log: bool, wanted: int, scans: Scans | None = None):
         self.log, self.wanted, self.scans = log, wanted, scans
@@ -742,9 +731,7 @@ def _spread(texts: list[Annotation]) -> None:
 
 def separated(wanted: np.ndarray, step: float, low: float, high: float) -> np.ndarray:
     """Rising positions at least `step` apart, nearest to the wanted ones (rising) in squares, inside low … high.
-
-    Pool-adjacent-violators on positions less their own multiple of the step.
-    """
+    Pool-adjacent-violators on positions less their own multiple of the step."""
     offsets = step * np.arange(len(wanted))
     groups: list[list[float]] = []
     for value in np.clip(wanted, low, high) - offsets:

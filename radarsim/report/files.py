@@ -4,8 +4,7 @@ A regular file is written under a temporary name beside it and renamed, so that 
 leaves half of it. It keeps its mode; a new one gets that of the umask. A link stays, and its target is replaced. A
 stream (a terminal, a pipe, /dev/null) is written directly. Directories and disks are refused.
 
-run.json: the request, the software, and the outcome. Times are here and in the report, never in a CSV.
-"""
+run.json: the request, the software, and the outcome. Times are here and in the report, never in a CSV."""
 
 import csv
 import errno
@@ -61,8 +60,7 @@ def replace_all(
 
     So a full disk leaves the outputs of an earlier run unchanged. Renaming is done under a lock, so that of two writers
     of one folder only the last one's files remain. Paths returned by `stale` below the folder, and not among the
-    contents, are removed. Raises StoreError.
-    """
+    contents, are removed. Raises StoreError."""
     folder = Path(folder)
     _refuse_twins(folder, contents)
     written: dict[Path, Path] = {}
@@ -108,11 +106,9 @@ def create(path: Path, data: bytes) -> None:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Lock a folder for this thread: others, of any process of this machine, wait until it is free.
-
-    The lock leaves no file and ends with its process. Where the file system has none, nobody waits. A thread may lock a
-    folder twice. Raises StoreError where it is not free within WAIT_S.
-    """
+    """Lock a folder for this thread: others, of any process of this machine, wait until it is free. The lock leaves no
+    file and ends with its process. Where the file system has none, nobody waits. A thread may lock a folder twice.
+    Raises StoreError where it is not free within WAIT_S."""
     key = _key(folder)
     held = _held.__dict__.setdefault("keys", set())
     if fcntl is None or key is None or key in held:
@@ -201,8 +197,7 @@ class Writer:
     """A file at a path given by the user, CSV or bytes: written completely or not at all, or a stream, directly.
 
     sources: files that are read, by their names in messages; a path to one of them raises ConfigError, and so does a
-    path to neither a file nor a stream. Disk faults become StoreError.
-    """
+    path to neither a file nor a stream. Disk faults become StoreError."""
 
     def __init__(self, path: str | os.PathLike, sources: Mapping[str, str | os.PathLike | None] = MappingProxyType({})):
         self.path = Path(path)

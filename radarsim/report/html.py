@@ -3,8 +3,7 @@
 Its links: the tables behind a figure, and for a claim its figures and tables. Its request: every key of the cases with
 its value and the schema's description.
 
-results/index.html: all runs of a folder by paper, newest first, each with its answer in one line.
-"""
+results/index.html: all runs of a folder by paper, newest first, each with its answer in one line."""
 
 import base64
 import csv
@@ -193,8 +192,7 @@ def report_page(
     """The page of an experiment: question, answer, request, figures, claims, exact values, tables, provenance.
 
     figures are described ones (none with --no-figures); record is run.json's; inputs, agreement and cost (against
-    accuracy) are tables, or None. drawn_from: of the study, see `Study.drawn_from`.
-    """
+    accuracy) are tables, or None. drawn_from: of the study, see `Study.drawn_from`."""
     figures = [one for one in figures if one.name != "claims"]  # the page has them in a table, a line each
     written = {name for name, table in made.items() if f"{name}.csv" in record["outputs"] and len(table)}
     sources = {one.name: tables_of(one.name, drawn_from, written) for one in figures}
@@ -263,8 +261,7 @@ def comparison(
     """The page of a comparison: sentences, figures, differing keys, the table.
 
     differing: tables of keys by their title, empty where the configs are of several; outputs: the files beside
-    the page.
-    """
+    the page."""
     return whole(
         "compare.html.j2",
         labels=labels,
@@ -403,8 +400,7 @@ def _claims(
 ) -> list[dict[str, Any]]:
     """Claims with their parts, from claims.csv's rows, with the figures and tables behind each.
 
-    sources: the tables of each figure; written: the tables that are files.
-    """
+    sources: the tables of each figure; written: the tables that are files."""
     found = []
     looked = table.attrs.get(LOOKED, [()] * len(table))
     rows = [row | {LOOKED: own} for row, own in zip(table.to_dict("records"), looked, strict=True)]
@@ -539,11 +535,9 @@ def _file(name: str) -> str:
 
 
 def live(title: str, parts: Sequence[str], data: str, words: Sequence[str] = ()) -> str:
-    """A self-contained page that computes: a study's own body, style and script, and its data as JSON.
-
-    The parts are files of the package: the body is a template in which `tr` marks messages, style and script are
-    copied. words: texts of the script. The data cannot end its element.
-    """
+    """A self-contained page that computes: a study's own body, style and script, and its data as JSON. The parts are
+    files of the package: the body is a template in which `tr` marks messages, style and script are copied. words: texts
+    of the script. The data cannot end its element."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
@@ -570,10 +564,8 @@ NAME = "index.html"
 
 
 def write(out: Path) -> None:
-    """Write the index of the runs under out; raises StoreError. Runs whose run.json cannot be read are left out.
-
-    Under a lock from reading to writing: of two runs that end at once, the last one sees both.
-    """
+    """Write the index of the runs under out; raises StoreError. Runs whose run.json cannot be read are left out. Under
+    a lock from reading to writing: of two runs that end at once, the last one sees both."""
     out = Path(out)
     with files.locked(out):
         found = filter(None, map(_run, out.glob("*/run.json")))

@@ -29,8 +29,7 @@ one are seen in another. A gain has a rule more, as both filters may err alike b
 knows more about its rare errors (wrong folds, lost bursts) brings notes of its own.
 
 A row with an exact value has none: that value is the better one, whatever the interval. Measured coverage of marked and
-unmarked rows is in docs/trust.md.
-"""
+unmarked rows is in docs/trust.md."""
 
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -70,8 +69,7 @@ class Beside(NamedTuple):
 def beside(table: "pd.DataFrame") -> Iterator[Beside]:
     """The measured columns of a table that have an exact one.
 
-    exact: the measured value, known without sampling, empty where not; `exact_NAME` of the column NAME or gain_NAME
-    """
+    exact: the measured value, known without sampling, empty where not; `exact_NAME` of the column NAME or gain_NAME"""
     columns = [str(name) for name in table.columns]
     for exact in (name for name in columns if name == "exact" or name.startswith("exact_")):
         own = exact.removeprefix("exact").removeprefix("_")
@@ -99,8 +97,7 @@ def distances(
     """Standard errors (rows,) by which the measured values of a column lie off the exact ones.
 
     made: all tables; nearly: the cases whose exact values are accurate to `ALMOST`. 0 where missing rare events may
-    explain the distance, see above. NaN where no exact value is known, or fewer than `FEW` realisations measured it.
-    """
+    explain the distance, see above. NaN where no exact value is known, or fewer than `FEW` realisations measured it."""
     table = made[name]
     (value, lo, hi), exact = measured(table, of), table[of.exact].to_numpy(dtype=float)
     size, lacking, squares = (
@@ -156,8 +153,7 @@ def faults(
     """A line for each column that is further off its exact values than chance explains: its furthest row.
 
     made, nearly: as for `distances`; bounds: tables without exact values of the measured quantities, whatever their
-    columns; declared: the quantities of the study.
-    """
+    columns; declared: the quantities of the study."""
     found = {
         (name, of): distances(made, name, of, nearly, declared)
         for name, table in made.items()
@@ -220,8 +216,7 @@ def believed(result: CaseResult, sigma: np.ndarray) -> dict[str, np.ndarray]:
 
     Over 1 a filter is *optimistic*, its errors are larger than it believes; under 1 it is *pessimistic*. The interval
     is that of the measured σ alone. Where the believed one hangs on which plots are missed its mean has a chance of its
-    own, which is small beside: rows of a radar that misses plots cover 94 … 95 %. Filters that adapt bring a `note`.
-    """
+    own, which is small beside: rows of a radar that misses plots cover 94 … 95 %. Filters that adapt bring a `note`."""
     at = f, k, c = tables.shown(result)
     n = tables.realisations(result)[at]
     true, claimed = statistics.errors(np.asarray(result.sums["error"])[at], n).sigma, sigma[at]
@@ -236,8 +231,7 @@ def ratio_columns(true: Estimate, claimed: np.ndarray) -> dict[str, np.ndarray]:
     """Columns of estimates (n,) of σ and believed ones (n,).
 
     believed_sigma [unit]: root of the mean variance that the filter believes
-    ratio ±: true over believed
-    """
+    ratio ±: true over believed"""
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = Estimate(*(end / claimed for end in true))
     return {"sigma": true.value, "believed_sigma": claimed, **tables.interval_columns("ratio", ratio)}
@@ -252,8 +246,7 @@ def normalised(
     nees_bound_lo, nees_bound_hi, nis_bound_lo, nis_bound_hi: between them lie all means of a filter that is right about
         itself in 95 % of runs (Bonferroni)
     nees_verdict, nis_verdict: consistent, optimistic or pessimistic, as the exact mean, or where it is not known the
-        measured one, lies by these bounds
-    """
+        measured one, lies by these bounds"""
     known = {} if exact is None else {f"exact_{quantity}": exact}
     decides = mean.value if exact is None else np.where(np.isnan(exact), mean.value, exact)
     ends = dict(zip((f"{quantity}_bound_lo", f"{quantity}_bound_hi"), bounds, strict=True))
@@ -266,11 +259,9 @@ def verdict(mean: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> np.ndarray:
 
 
 def bounds_from_spread(total: Values, square: Values, n: Values, looks: int) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of a mean NEES or NIS of unknown law, from Σq and Σq² over n realisations.
-
-    They are the interval of the mean, widened so that `looks` of them hold at once in 95 % of runs, moved to 1: 1
-    leaves that interval where the mean leaves these bounds.
-    """
+    """Bounds of a mean NEES or NIS of unknown law, from Σq and Σq² over n realisations. They are the interval of the
+    mean, widened so that `looks` of them hold at once in 95 % of runs, moved to 1: 1 leaves that interval where the
+    mean leaves these bounds."""
     mean = statistics.mean_square(total, square, n, looks)
     with np.errstate(divide="ignore", invalid="ignore"):
         return mean.value / mean.hi, mean.value / mean.lo
@@ -315,8 +306,7 @@ def noted(
     values, in place of bounds that the measured ones reach or not (`Study.exact_errors`). declared: what the study
     measures.
 
-    note: why a row rests on too few realisations or events for its interval; only in tables that have such a row
-    """
+    note: why a row rests on too few realisations or events for its interval; only in tables that have such a row"""
     paired = {name: [one for one in declared if one.paired and one.table == name] for name in made}
     return {name: _noted(name, table, made, results, exact, paired[name]) for name, table in made.items()}
 
@@ -360,8 +350,7 @@ Answer = Callable[[Mapping[str, "pd.DataFrame"]], Sequence[str]]  # sentences fr
 def concerned(made: Mapping[str, "pd.DataFrame"], answers: Sequence[Answer]) -> "dict[str, pd.DataFrame]":
     """By table, the marked rows whose intervals the answer gives, or depends on: with wider ones it reads otherwise.
 
-    answers: the parts of the answer, each examined by itself, as most rows concern one of many.
-    """
+    answers: the parts of the answer, each examined by itself, as most rows concern one of many."""
     found: dict[str, set[int]] = {}
     for answer in answers:
         said = list(answer(made))
@@ -424,8 +413,7 @@ def notes_on(n: np.ndarray, fewest: np.ndarray) -> np.ndarray:
     """The notes (rows,) on intervals of n realisations (rows,).
 
     fewest: how many of them count where a few large errors decide, at the scan where they are fewest; NaN where errors
-    have no tails, or nothing is known of them.
-    """
+    have no tails, or nothing is known of them."""
     return np.where(fewest < np.minimum(EFFECTIVE, n / TAIL), HEAVY, "").astype(object)
 
 
@@ -460,11 +448,9 @@ def _alike(gains: "pd.DataFrame", curves: "pd.DataFrame", paired: Sequence[Quant
 def behind(
     table: "pd.DataFrame", made: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How many realisations are behind each row (rows,), and the fewest effective ones there and nearby.
-
-    A row's own, those of σ in the same row of curves, or the case's; NaN where effective ones are unknown. A gain rests
-    on the fewer of both filters.
-    """
+    """How many realisations are behind each row (rows,), and the fewest effective ones there and nearby. A row's own,
+    those of σ in the same row of curves, or the case's; NaN where effective ones are unknown. A gain rests on the fewer
+    of both filters."""
     if "n_eff" in table:
         return table["n"].to_numpy(dtype=float), nearby(table)
     if "n" in table:
@@ -496,8 +482,7 @@ def of_intervals(
 ) -> list[str]:
     """Warnings on the intervals of the answer, at most a line each; and whether weights are wrong.
 
-    answers: the parts of the answer. The number of marked rows in a table is given where it is shown.
-    """
+    answers: the parts of the answer. The number of marked rows in a table is given where it is shown."""
     return [*(few(results) or rests(results, made, answers)), *rare.warnings(made.get("rare"))]
 
 

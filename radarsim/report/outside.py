@@ -1,8 +1,7 @@
 """Tables, answer and figures of filters from outside beside those of a config: `CaseResult.outside`.
 
 The study's own tables stay as they are; rows of these filters stand below. Their gains are against every filter of the
-config, each over the realisations in which both have an estimate.
-"""
+config, each over the realisations in which both have an estimate."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -78,8 +77,7 @@ def failures(result: CaseResult) -> common.Columns:
         with an error over a hundred times the largest of the config's filters in the realisation; no failure, but no
         part of NEES, is `not_positive_definite`, a covariance
     failed: realisations
-    share ±: of all realisations
-    """
+    share ±: of all realisations"""
     rows = []
     for one in others(result):
         given = (np.asarray(one.sums["nees"])[..., 0] > 0).sum(1)

@@ -49,10 +49,8 @@ GAIN = ("t_s", "gain_percent", "gain_lo", "gain_hi", "exact_percent")
 
 
 def number(value: object, powers: bool = False) -> str:
-    """A number for people: 0.001 as 10⁻³ (with powers, 0.1 as 10⁻¹), others at four digits; text unchanged.
-
-    Numbers of a list one after the other.
-    """
+    """A number for people: 0.001 as 10⁻³ (with powers, 0.1 as 10⁻¹), others at four digits; text unchanged. Numbers of
+    a list one after the other."""
     if isinstance(value, list | tuple) and all(isinstance(one, int | float) for one in value):
         return wording.in_a_row(map(number, value))
     if not isinstance(value, int | float) or isinstance(value, bool):
@@ -69,8 +67,7 @@ def number(value: object, powers: bool = False) -> str:
 
 def in_short(result: CaseResult, key: str, value: object, among: Sequence[object]) -> object:
     """A mapping of a swept key by its kind and its differences from others of the kind, as words; any other value
-    unchanged.
-    """
+    unchanged."""
     if not isinstance(value, Mapping) or "kind" not in value:
         return value
     alike = [one for one in among if isinstance(one, Mapping) and one.get("kind") == value["kind"]]
@@ -198,10 +195,8 @@ def label(result: CaseResult) -> str:
 
 
 def line(rows: "pd.DataFrame", columns: Sequence[str], label: str, style: Style | int, name: str = "") -> Line:
-    """A line of x and y from two columns of rows; further columns give the ends of its band, and exact values.
-
-    A numeric style is that of the filter with this number.
-    """
+    """A line of x and y from two columns of rows; further columns give the ends of its band, and exact values. A
+    numeric style is that of the filter with this number."""
     x, y, *more = (rows[column].to_numpy(dtype=float) for column in columns)
     lo, hi = more[:2] or (None, None)
     exact = more[2] if more[2:] and np.isfinite(more[2]).any() else None
@@ -283,8 +278,7 @@ def by_panel(results: Sequence[CaseResult], most: float = MOST_LINES) -> dict[st
     """Cases that share a panel, by its title: those of a config; with several swept keys, those alike in all but the
     last.
 
-    Cases of many filters have a panel each where they would make more than so many lines together.
-    """
+    Cases of many filters have a panel each where they would make more than so many lines together."""
     found: dict[str, list[CaseResult]] = {}
     several = len(families(results)) > 1
     for result in results:
@@ -366,10 +360,8 @@ def shown(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[Cas
 
 
 def shown_families(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
-    """The results of a figure with a panel for each of `by_panel`: at most twelve panels of at most eight cases.
-
-    If more, evenly spaced ones from the first to the last.
-    """
+    """The results of a figure with a panel for each of `by_panel`: at most twelve panels of at most eight cases. If
+    more, evenly spaced ones from the first to the last."""
     wanted = [result for result in results if result.name in set(names)]
     groups = spread_out(list(by_panel(wanted).values()), MOST_PANELS)
     some = [result for members in groups for result in spread_out(members, MOST)]
@@ -404,10 +396,8 @@ def loss_axis(label: str, lines: Sequence[Line]) -> Axis:
 
 
 def joined(figure: Figure) -> Figure:
-    """The figure with lines that coincide in all its panels drawn once, their names joined by "=".
-
-    Lines that are named, by themselves or by a legend of their names, not those told apart by dash and shade.
-    """
+    """The figure with lines that coincide in all its panels drawn once, their names joined by "=". Lines that are
+    named, by themselves or by a legend of their names, not those told apart by dash and shade."""
     every = [{name: one for one in panel.marks if (name := _own_name(one, figure))} for panel in figure.panels]
     alike: dict[str, list[str]] = {}
     for name in dict.fromkeys(name for named in every for name in named):
@@ -447,8 +437,7 @@ def _own_name(mark: Mark, figure: Figure) -> str:
 
 def _coincide(one: str, other: str, every: Sequence[Mapping[str, Mark]], figure: Figure) -> bool:
     """Whether two curves cannot be told apart in any panel where they are drawn: values and bands nearer than half a
-    line's width, and to a per cent.
-    """
+    line's width, and to a per cent."""
     drawn = False
     for named, panel in zip(every, figure.panels, strict=True):
         a, b = named.get(one), named.get(other)
@@ -529,8 +518,7 @@ def _holding(lines: Sequence[Line], y: Axis) -> tuple[float, float]:
 def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: Component) -> Figure:
     """σ(t) of one component: a panel for each config, a line for each filter and swept value.
 
-    curves is tables.groups(table, "case", "filter", "component").
-    """
+    curves is tables.groups(table, "case", "filter", "component")."""
     every = by_panel(results)
     panels = [_sigma_panel(title, members, curves, of) for title, members in every.items()]
     panels = [panel for panel in panels if panel.marks]
@@ -546,10 +534,8 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: 
 
 
 def floored(figure: Figure, floor: "pd.DataFrame | None", component: str, factor: float = 1.0) -> Figure:
-    """A figure of σ of one case, of few lines, with its floor.
-
-    Of filters that have other plots it is that of those with the most.
-    """
+    """A figure of σ of one case, of few lines, with its floor. Of filters that have other plots it is that of those
+    with the most."""
     rows = None if floor is None or not len(floor) else floor[floor["component"] == component]
     if rows is None or not len(rows) or len(figure.panels) != 1 or len(figure.panels[0].marks) > MOST_AT_ENDS:
         return figure
@@ -645,8 +631,7 @@ def nees_figure(drawn: Sequence[Panel], left_out: str) -> Figure:
 def keyed(panel: Panel, members: Sequence[CaseResult], baseline: bool = True) -> Panel:
     """A panel whose legend explains dashes by filter and colours by swept value; few lines are named at their ends.
 
-    baseline: whether to draw the baseline filter.
-    """
+    baseline: whether to draw the baseline filter."""
     if len(members) == 1:
         return panel
     filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
@@ -682,11 +667,8 @@ def look(nth_filter: int, nth_case: int, cases: int) -> Style:
 
 
 def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, of: Component) -> Figure:
-    """Relative gain of one component against time, a line for each case and filter.
-
-    One panel where no config is swept; else one for each of `by_panel`. gains is
-    tables.groups(table, "case", "filter", "component").
-    """
+    """Relative gain of one component against time, a line for each case and filter. One panel where no config is swept;
+    else one for each of `by_panel`. gains is tables.groups(table, "case", "filter", "component")."""
     base = results[0].axes.filters[results[0].axes.baseline]
     caption = tr(
         "Relative gain in σ of the {quantity} against filter {base}, paired on common noise, of {realisations}. "
@@ -765,10 +747,8 @@ def per_component(
 
 
 def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: Component) -> Figure | None:
-    """Dynamic error (bias) and fluctuation error (spread) of one component, a panel for each case that has both.
-
-    None where no case's bias exceeds its spread anywhere: then σ suffices.
-    """
+    """Dynamic error (bias) and fluctuation error (spread) of one component, a panel for each case that has both. None
+    where no case's bias exceeds its spread anywhere: then σ suffices."""
     drawn: list[Panel] = []
     for result in results:
         found = [

@@ -5,8 +5,7 @@ block, it would stop where chance made the intervals narrow, and the place would
 
 An interval of σ is also narrow where rare large errors have not occurred yet. A sample cannot show what it lacks: a
 narrower target, or one more doubling, helps little. So where errors are not known to be Gaussian, no run ends below a
-minimum of realisations: FLOOR, or FLOOR_OF_TAILS after large errors.
-"""
+minimum of realisations: FLOOR, or FLOOR_OF_TAILS after large errors."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -35,8 +34,7 @@ class Cell:
     """The 95 % half-width of a quantity, in its `half_width_unit` (infinite where unknown), and the quantity's place.
 
     component is empty and k zero where the quantity has none. below bounds a rate of events that never occurred.
-    against is the filter that a gain refers to, where the case has several baselines.
-    """
+    against is the filter that a gain refers to, where the case has several baselines."""
 
     percent: float
     case: str
@@ -85,8 +83,7 @@ def least(result: CaseResult, curves: Table | None) -> int:
     """Realisations below which a precision ends no run, unless its N is less; curves None: there are no tails to
     expect.
 
-    Large errors have occurred where the effective realisations of any σ are under a third of all.
-    """
+    Large errors have occurred where the effective realisations of any σ are under a third of all."""
     if curves is None:
         return FIRST
     made = curves([result])
@@ -94,10 +91,8 @@ def least(result: CaseResult, curves: Table | None) -> int:
 
 
 def worst(result: CaseResult, table: Table, of: Quantity = SIGMA) -> Cell | None:
-    """The quantity of a case with the widest interval; None where the case has none.
-
-    Where the case samples rare events of one filter, only its rate of them counts: other events stay rare.
-    """
+    """The quantity of a case with the widest interval; None where the case has none. Where the case samples rare events
+    of one filter, only its rate of them counts: other events stay rare."""
     made = table([result])
     aimed_at = getattr(getattr(result.spec, "rare", None), "aimed_at", None)
     if of.last and aimed_at is not None:
@@ -131,8 +126,7 @@ def needed(
     """The look at which a run of at most `most` likely ends, or the larger number that it would need; None if
     unattainable.
 
-    From the sums of a pilot, scaled to more realisations. curves as of `least`.
-    """
+    From the sums of a pilot, scaled to more realisations. curves as of `least`."""
     cell = worst(result, table, of)
     if cell is None:
         return FIRST
@@ -157,10 +151,8 @@ def grown(result: CaseResult, n: int) -> CaseResult:
 
 
 def gaussian(result: CaseResult) -> CaseResult:
-    """A case with the expected sums of Gaussian errors, of the exact bias and σ, in place of the sampled ones.
-
-    For linear filters under Gaussian noise, where the exact values are σ and bias themselves.
-    """
+    """A case with the expected sums of Gaussian errors, of the exact bias and σ, in place of the sampled ones. For
+    linear filters under Gaussian noise, where the exact values are σ and bias themselves."""
     bias, square = result.axes.exact_bias, result.axes.exact_sigma**2
     spread = square - bias**2
     third = bias**3 + 3 * bias * spread

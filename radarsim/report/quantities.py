@@ -2,8 +2,7 @@
 
 The options of `radarsim solve`, the values of `--of` in `run --precision` and in `sensitivity`, the quantities in
 `compare`, their words, units and axes all follow from a declaration. `Study.quantities` gives those of a study.
-Declared here are those of several studies.
-"""
+Declared here are those of several studies."""
 
 import re
 from collections.abc import Callable
@@ -57,8 +56,7 @@ class Quantity:
 
     last: its precision is that at the last scan or window of each filter. squares: it is made of squared errors, which
     rare large ones dominate. paired: it is a change of σ in per cent of that of another filter, which has none itself.
-    rest: it is 1 minus the column.
-    """
+    rest: it is 1 minus the column."""
 
     name: str
     words: str
@@ -137,10 +135,8 @@ class Quantity:
         return replace(self, name=name, words=words, more_is_better=not self.more_is_better, rest=not self.rest)
 
     def read(self, rows: "pd.DataFrame") -> "tuple[Estimate, np.ndarray]":
-        """Values with their intervals, and exact values (rows,) or NaN, from rows of its table.
-
-        Raises ConfigError where that lacks a column.
-        """
+        """Values with their intervals, and exact values (rows,) or NaN, from rows of its table. Raises ConfigError
+        where that lacks a column."""
         import numpy as np
 
         from radarsim.report.statistics import Estimate

@@ -2,8 +2,7 @@
 
 Realisations are drawn from a law under which the event is frequent, and each counts with its weight w, the ratio of the
 laws: the mean of w over those with the event is its probability, whatever the law (docs/rare.md). A share of them is
-drawn from the original law, so that no weight exceeds one divided by that share.
-"""
+drawn from the original law, so that no weight exceeds one divided by that share."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -70,8 +69,7 @@ def rows(labels: Mapping[str, Any], event: str, sought: np.ndarray, of: Counted,
     events: number of realisations that have it; `n_eff` effective ones
     variance_factor: how many times as many plain realisations give the same precision
     plain: number of the n drawn from the original law
-    mean_weight, mean_weight_se: mean of all weights, which must be one, and its standard error
-    """
+    mean_weight, mean_weight_se: mean of all weights, which must be one, and its standard error"""
     estimate, size = rate(of, drawn), len(sought)
     variance = of.squared / drawn.n - estimate.value**2
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -100,8 +98,7 @@ def note(drawn: Drawn, *events: Counted) -> np.ndarray:
 
     Every row of every table with weighted rates may have one: shifts lead to the last scan alone, so that at other
     scans few weights, of any size, are behind a rate. Where an event is common, realisations without it are counted
-    too.
-    """
+    too."""
     said = np.full(events[0].weight.shape, "", dtype=object)
     for of in events:
         having = statistics.effective_events(of.weight, of.squared)
@@ -114,10 +111,8 @@ def note(drawn: Drawn, *events: Counted) -> np.ndarray:
 
 def _weighing(of: Counted) -> np.ndarray:
     """How many of the events have weights of the size that dominates Σw², by the spread of all weights: n_eff²/number.
-
     For Gaussian logarithms of spread τ, w² has its mass 2τ above the middle: there are e^{−2τ²} of the events, and
-    n_eff/number is e^{−τ²}. A sample that lacks the heavy ones still shows the spread of the others.
-    """
+    n_eff/number is e^{−τ²}. A sample that lacks the heavy ones still shows the spread of the others."""
     with np.errstate(divide="ignore", invalid="ignore"):
         found = statistics.effective_events(of.weight, of.squared) ** 2 / of.number
     return np.where(of.number > 0, found, 0.0)

@@ -1,8 +1,7 @@
 """The first sentence of a figure's caption, from its content; and the meaning of its crosses.
 
 Read from the drawn marks, of every named line and every panel. Lines with overlapping intervals share a sentence; a
-line whose interval has too little behind it is "about".
-"""
+line whose interval has too little behind it is "about"."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -95,11 +94,8 @@ HIGHEST = Way(
 
 
 def at_the_end(figure: Figure, way: Way = LOWEST) -> str:
-    """Which lines end lowest and highest of all; for several panels the lowest of each, or the highest.
-
-    A panel of a single line has nothing to compare: for such panels, and for several quantities, the extremes are
-    given.
-    """
+    """Which lines end lowest and highest of all; for several panels the lowest of each, or the highest. A panel of a
+    single line has nothing to compare: for such panels, and for several quantities, the extremes are given."""
     drawn = [lines for panel in _drawn(figure) if (lines := _lines(panel))]
     if len({panel.y.label for panel in _drawn(figure)}) > 1 or not any(len(lines) > 1 for lines in drawn):
         return extremes(figure)
@@ -263,10 +259,8 @@ def _level(lines: Sequence[Seen]) -> bool:
 
 
 def _foremost(lines: Sequence[Seen], sign: int, ranked: bool = False) -> list[Seen]:
-    """The line that ends lowest (sign 1) or highest (−1), and those whose intervals overlap its own.
-
-    In drawing order, for a stable sentence; by their ends if requested, and where not all will be named.
-    """
+    """The line that ends lowest (sign 1) or highest (−1), and those whose intervals overlap its own. In drawing order,
+    for a stable sentence; by their ends if requested, and where not all will be named."""
     low, high = min(lines, key=lambda line: sign * line.last).ends
     found = [line for line in lines if line.ends[0] <= high and low <= line.ends[1]]
     return sorted(found, key=lambda line: sign * line.last) if ranked or len(found) > MOST_NAMES + 1 else found

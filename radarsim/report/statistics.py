@@ -1,8 +1,7 @@
 """Numbers with their 95 % intervals, from sums alone. NumPy only; every function takes arrays of any shape.
 
 The intervals are those of a mean of independent realisations and assume nothing Gaussian: the spread of e² comes from
-the fourth moment. tests/report and tests/trust simulate the coverage; docs/trust.md gives it.
-"""
+the fourth moment. tests/report and tests/trust simulate the coverage; docs/trust.md gives it."""
 
 from statistics import NormalDist
 from typing import Any, NamedTuple
@@ -37,10 +36,8 @@ class ErrorStatistics(NamedTuple):
 
 
 def student(freedom: Values) -> Values:
-    """The 0.975 quantile of Student's t (Abramowitz & Stegun 26.7.5), to 4·10⁻⁴ from 4 degrees of freedom on.
-
-    Used to widen intervals whose spread is itself estimated; infinite where there is no degree of freedom.
-    """
+    """The 0.975 quantile of Student's t (Abramowitz & Stegun 26.7.5), to 4·10⁻⁴ from 4 degrees of freedom on. Used to
+    widen intervals whose spread is itself estimated; infinite where there is no degree of freedom."""
     z = Z95
     nu = np.asarray(freedom, dtype=float)
     terms = (
@@ -66,8 +63,7 @@ def root_mean_square(square: Values, fourth: Values, n: Values, looks: Values = 
     The mean of e² is taken as a chi-square variable of 2/CV² degrees of freedom, CV² = (m₄/m₂² − 1)/n: exact for
     Gaussian e (n degrees), right to first order for any other, biased errors too. Its quantiles are Wilson and
     Hilferty's, with Student's t for the normal quantile; m₄/m₂² − 1 is freed of its Gaussian bias (n−1)/(n+2).
-    The upper end is infinite where n is too small to bound σ.
-    """
+    The upper end is infinite where n is too small to bound σ."""
     n = np.asarray(n, dtype=float)
     m2, m4 = _per_one(square, n), _per_one(fourth, n)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -91,10 +87,8 @@ def _root(m2: Values, relative: Values, n: Values, looks: Values = 1) -> Estimat
 
 def effective(square: Values, fourth: Values, n: Values) -> Values:
     """How many realisations of n stand behind a σ: n/(κ − 1), κ = m₄/m₂² from Σe² and Σe⁴; half of n for Gaussian e.
-
     Twice the degrees of freedom of the chi-square variable of `root_mean_square`; infinite where all e² are equal
-    within rounding, NaN where there is none.
-    """
+    within rounding, NaN where there is none."""
     m2, m4 = _per_one(square, n), _per_one(fourth, n)
     with np.errstate(divide="ignore", invalid="ignore"):
         excess = m4 / np.square(m2) - 1
@@ -108,8 +102,7 @@ def furthest(looks: Values) -> float:
     """A bound on the largest of so many differences, in standard errors, that correct programs exceed in 0.27 % of
     runs.
 
-    For one difference 3; for several by Bonferroni, however dependent they are.
-    """
+    For one difference 3; for several by Bonferroni, however dependent they are."""
     return NormalDist().inv_cdf(1 - TOGETHER / 2 / max(int(looks), 1))
 
 
@@ -135,11 +128,9 @@ def standard_errors(of: Estimate, exact: Values) -> Values:
 
 
 def errors(moments: Values, n: Values) -> ErrorStatistics:
-    """Statistics of errors from moments (…, 4) = Σe, Σe², Σe³, Σe⁴ over n (…) realisations.
-
-    The spread divides by n, so that sigma² = bias² + spread²; the standard error of the bias by n − 1. Where |bias|
-    is over 10⁷ spreads the difference of squares is rounding; it is cut at zero.
-    """
+    """Statistics of errors from moments (…, 4) = Σe, Σe², Σe³, Σe⁴ over n (…) realisations. The spread divides by n, so
+    that sigma² = bias² + spread²; the standard error of the bias by n − 1. Where |bias| is over 10⁷ spreads the
+    difference of squares is rounding; it is cut at zero."""
     moments = np.asarray(moments, dtype=float)
     n = np.asarray(n, dtype=float)
     bias = _per_one(moments[..., 0], n)
@@ -160,18 +151,15 @@ def mean(total: Values, square: Values, n: Values) -> Estimate:
 
 
 def mean_square(total: Values, square: Values, n: Values, looks: Values = 1) -> Estimate:
-    """Mean of numbers q ≥ 0 that are sums of squares (NEES, NIS), from Σq and Σq² over n realisations.
-
-    The interval of `root_mean_square`, squared: near a chi-square variable it covers better than Student's does.
-    """
+    """Mean of numbers q ≥ 0 that are sums of squares (NEES, NIS), from Σq and Σq² over n realisations. The interval of
+    `root_mean_square`, squared: near a chi-square variable it covers better than Student's does."""
     return Estimate(*(np.square(end) for end in root_mean_square(total, square, n, looks)))
 
 
 def quantile(looks: Values) -> Values:
     """The normal quantile at which all of so many intervals or bounds hold in 95 % of runs, however dependent.
 
-    Bonferroni: the 5 % are shared among them.
-    """
+    Bonferroni: the 5 % are shared among them."""
     return np.vectorize(lambda n: NormalDist().inv_cdf(1 - 0.025 / n), otypes=[float])(np.maximum(looks, 1))
 
 
@@ -179,8 +167,7 @@ def normalised_bounds(freedom: Values, looks: Values = 1) -> tuple[np.ndarray, n
     """Bounds of the mean normalised error squared (NEES, NIS per component) of a consistent filter.
 
     freedom is realisations × components, of which the sum is chi-square; its quantiles are Wilson and Hilferty's. In
-    95 % of runs all of the `looks` at such means lie within.
-    """
+    95 % of runs all of the `looks` at such means lie within."""
     with np.errstate(divide="ignore"):
         ninth = 2 / (9 * np.asarray(freedom, dtype=float))
     step = quantile(looks) * np.sqrt(ninth)
@@ -194,8 +181,7 @@ def gain(
 
     From Σe², Σe⁴ of both and cross = Σ e²·e_base². The interval is that of the logarithm of the ratio of mean
     squares, whose variance holds the covariance of the squares; common noise so makes it narrower. That variance is
-    freed of its Gaussian bias, exact for uncorrelated errors.
-    """
+    freed of its Gaussian bias, exact for uncorrelated errors."""
     n = np.asarray(n, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         a, b = _per_one(square, n), _per_one(base_square, n)
@@ -211,11 +197,9 @@ def gain(
 
 
 def probability(total: Values, square: Values, n: Values) -> Estimate:
-    """Mean of values between 0 and 1 with its interval, from Σp and Σp² over n realisations.
-
-    Wilson's score interval at the number of yes-or-no trials of the same variance, n·p(1−p)/var ≥ n: for zeros and
-    ones it is Wilson's own, and it keeps a width where all values agree.
-    """
+    """Mean of values between 0 and 1 with its interval, from Σp and Σp² over n realisations. Wilson's score interval at
+    the number of yes-or-no trials of the same variance, n·p(1−p)/var ≥ n: for zeros and ones it is Wilson's own, and it
+    keeps a width where all values agree."""
     n = np.asarray(n, dtype=float)
     p = _per_one(total, n)
     variance = np.maximum(_per_one(square, n) - p**2, 0)
@@ -239,8 +223,7 @@ def weighted_rate(total: Values, square: Values, n: Values, plain: Values) -> Es
 
     total and square are Σw and Σw² over those of n in which it happened. Wilson's interval at the number of yes-or-no
     trials with as much information, p(1 − p) over the variance of the mean. `plain` of the n were drawn from the law
-    itself: where nothing happened, only they bound the rate.
-    """
+    itself: where nothing happened, only they bound the rate."""
     n, plain = np.asarray(n, dtype=float), np.asarray(plain, dtype=float)
     p = np.clip(_per_one(total, n), 0, 1)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -262,11 +245,9 @@ def rate(count: Values, n: Values) -> Estimate:
 
 
 def difference(a: Estimate, b: Estimate, correlation: Values = 0.0) -> Estimate:
-    """a − b of estimates: the half-widths add in squares, each end with the ends that make it.
-
-    Less twice their product times the correlation of the two, which is 0 of independent ones. NaN where infinite ones
-    (a filter that never settles) leave it undefined. (Zou, Psychological Methods 12, 2007, 399.)
-    """
+    """a − b of estimates: the half-widths add in squares, each end with the ends that make it. Less twice their product
+    times the correlation of the two, which is 0 of independent ones. NaN where infinite ones (a filter that never
+    settles) leave it undefined. (Zou, Psychological Methods 12, 2007, 399.)"""
 
     def joined(one: Values, other: Values) -> Values:
         shared = np.where(np.equal(correlation, 0), 0.0, correlation * other)  # 0 · ∞ is no number

@@ -20,8 +20,7 @@ BROAD = 12  # letters of a name at an axis, from which it is broken between word
 def figures(results: Sequence[CaseResult], curves: Mapping) -> dict[str, Figure]:
     """A figure for each config that is swept over one key or two.
 
-    curves is tables.groups(table, "case", "filter", "component").
-    """
+    curves is tables.groups(table, "case", "filter", "component")."""
     drawn = {}
     for keys, groups in by_keys(results).items():
         name = "_".join(["sweep", *(key.rpartition(".")[2] for key in keys)])
@@ -61,8 +60,7 @@ def components(result: CaseResult) -> list[tuple[str, str]]:
 def places(result: CaseResult, key: str, values: Sequence) -> tuple[np.ndarray, Axis]:
     """Places of a swept key's values on an axis: numbers themselves, anything else one after the other.
 
-    result is one of the swept cases.
-    """
+    result is one of the swept cases."""
     label = panels.axis_of(result, key)
     if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
         x = panels.axis_factor(result, key) * np.array(values, dtype=float)

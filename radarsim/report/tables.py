@@ -1,8 +1,7 @@
 """Tables with the contract's columns, from finished cases; and their bytes as CSV.
 
 Rows stand in the order case, filter, component, k, and only where the filter has an estimate. pandas is imported
-when the first table is made.
-"""
+when the first table is made."""
 
 import csv
 import io
@@ -40,10 +39,8 @@ def frame(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> "pd.DataFrame":
 
 
 def joined(parts: Iterable[Columns], columns: Sequence[str] = ()) -> "pd.DataFrame":
-    """One DataFrame of cases' columns set one below the other, in the order of the first, or as named by `columns`.
-
-    An `Estimate` makes three columns, see `spread`. Cases without rows do not count where others have some.
-    """
+    """One DataFrame of cases' columns set one below the other, in the order of the first, or as named by `columns`. An
+    `Estimate` makes three columns, see `spread`. Cases without rows do not count where others have some."""
     every = [spread(part) for part in parts]
     filled = [part for part in every if any(map(len, part.values()))] or every[:1]
     if not filled:
@@ -81,8 +78,7 @@ class Tables:
     declared by the functions below and those of `notes` and `rare`. `name: meaning`; `name ± stem: meaning` of an
     estimate, whose ends are `stem_lo` and `stem_hi`, without stem those of the name; several names before one meaning
     are parted by commas, a unit that the name does not end in stands in brackets before the colon, `[unit]` is that of
-    the column `unit`; further lines are indented. `exact_NAME` needs no line.
-    """
+    the column `unit`; further lines are indented. `exact_NAME` needs no line."""
 
     def __init__(self) -> None:
         self.declared: dict[str, tuple[Callable[[Any], Any], Callable[[Any], bool] | None]] = {}
@@ -119,8 +115,7 @@ def names(values: Sequence[str], index: np.ndarray) -> np.ndarray:
 def shown(result: CaseResult, mask: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which rows of a case are written: indices (filter, scan, component), each (n,), ordered filter, component, scan.
 
-    mask (F, K, C) narrows what is available.
-    """
+    mask (F, K, C) narrows what is available."""
     available = result.axes.available if mask is None else result.axes.available & mask
     f, c, k = np.nonzero(np.moveaxis(available, 1, 2))
     return f, k, c
@@ -134,8 +129,7 @@ def leading(
     case: the config's stem, and each swept key with its value
     filter: the filter's name
     k: the scan, from 1
-    t_s: time from the first plot
-    """
+    t_s: time from the first plot"""
     columns = {"case": np.full(f.size, result.name, dtype=object), "filter": names(result.axes.filters, f)}
     columns |= labels
     if k is not None:
@@ -146,8 +140,7 @@ def leading(
 def interval_columns(name: str, of: statistics.Estimate, ends: str | None = None) -> dict[str, Any]:
     """An estimate as columns `name`, `…_lo` and `…_hi`; ends: what stands before `_lo`, by default the name.
 
-    lo, hi: ends of the 95 % interval of the measured column before them; `…_lo`, `…_hi` where a table has several
-    """
+    lo, hi: ends of the 95 % interval of the measured column before them; `…_lo`, `…_hi` where a table has several"""
     prefix = f"{name}_" if ends is None else ends and f"{ends}_"
     return {name: of.value, f"{prefix}lo": of.lo, f"{prefix}hi": of.hi}
 
@@ -156,8 +149,7 @@ def components(result: CaseResult, c: np.ndarray) -> dict[str, np.ndarray]:
     """The labels of components c (n,).
 
     component: what is estimated: `r`, `Vr`, `x`, `f0`, …
-    unit: its unit
-    """
+    unit: its unit"""
     labels, units = zip(*result.axes.components, strict=True)
     return {"component": names(labels, c), "unit": names(units, c)}
 
@@ -171,8 +163,7 @@ def exact_first(rows: "pd.DataFrame", value: str, exact: str) -> np.ndarray:
 def realisations(result: CaseResult) -> np.ndarray:
     """How many realisations stand behind each sum (F, K, C): all, or `estimates` where not all have an estimate.
 
-    n: number of realisations behind the row
-    """
+    n: number of realisations behind the row"""
     counted = result.sums.get("estimates")
     return np.full(result.axes.available.shape, float(result.count)) if counted is None else np.asarray(counted)
 
@@ -184,8 +175,7 @@ def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
     bias, bias_se [unit]: mean error, and its standard error
     spread [unit]: standard deviation of the errors
     n_eff: realisations that stand behind σ where a few large errors decide: n/(κ − 1), κ the fourth moment over the
-        squared second; half of n for Gaussian errors
-    """
+        squared second; half of n for Gaussian errors"""
     return joined(map(_curves, results))
 
 
@@ -215,8 +205,7 @@ def gains(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """Paired gains against the baseline filter, where both have an estimate (P1 eq. 17).
 
     baseline: the filter compared with
-    gain_percent ± gain: by how much σ is less than the baseline's, of the same realisations
-    """
+    gain_percent ± gain: by how much σ is less than the baseline's, of the same realisations"""
     return joined(map(_gains, results), GAINS)
 
 
@@ -256,18 +245,15 @@ def to_csv(table: "pd.DataFrame") -> bytes:
 
     ' ends, an empty cell for NaN.
 
-    Several times faster than DataFrame.to_csv with the same text, and independent of pandas' version.
-    """
+    Several times faster than DataFrame.to_csv with the same text, and independent of pandas' version."""
     columns = [_cells(table[name]) for name in table.columns]
     lines = [",".join(map(_quoted, table.columns)), *map(",".join, zip(*columns, strict=True))]
     return ("\n".join(lines) + "\n").encode()
 
 
 def from_csv(content: bytes) -> "pd.DataFrame":
-    """A table from `to_csv`'s bytes: labels as text, all else as exactly the numbers written.
-
-    Raises ValueError where a row has another length.
-    """
+    """A table from `to_csv`'s bytes: labels as text, all else as exactly the numbers written. Raises ValueError where a
+    row has another length."""
     names, *rows = csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)
     columns = zip(*rows, strict=True) if rows else ([] for _ in names)
     return frame({name: _read(name, column) for name, column in zip(names, columns, strict=True)})

@@ -1,7 +1,6 @@
 r"""Numbers, units and counts in sentences, and text that is safe to print. Loads no NumPy.
 
-Words of figures have a little mathematical text, `$\sigma$ of $D_M$`; here it is parsed, and written plain.
-"""
+Words of figures have a little mathematical text, `$\sigma$ of $D_M$`; here it is parsed, and written plain."""
 
 import math
 import re

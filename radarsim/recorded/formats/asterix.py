@@ -1,8 +1,7 @@
 """ASTERIX: plots of a radar (category 048, 001), tracks of a surveillance centre (062) and ADS-B positions (021).
 
 Category 034 says where a radar stands and how fast it turns; category 002 this too, and the time of day that category
-001 cuts off.
-"""
+001 cuts off."""
 
 import os
 import string

@@ -1,8 +1,7 @@
 """`radarsim import`: a recording into a CSV of plots in our columns, with several tracks in one file.
 
 Records are read, placed and written in batches, so that memory does not grow with the file; only the truth is held, for
-lookup by time. The file is written completely or not at all.
-"""
+lookup by time. The file is written completely or not at all."""
 
 import codecs
 import datetime
@@ -79,8 +78,7 @@ class Options:
     columns: of a CSV, theirs by ours. encoding: of text that is neither UTF-8 nor UTF-16, Windows-1252 where none is
     named. keep_marked: what is of no aircraft (asterix.NO_AIRCRAFT) is in tracks and truth too. whose: the track,
     address, callsign or code of the plots whose truth is the one path of the second recording, for receivers that know
-    nothing of these. biases: of plots, by BIASES, to be subtracted.
-    """
+    nothing of these. biases: of plots, by BIASES, to be subtracted."""
 
     format: Format | None = None
     site: Site | None = None
@@ -158,8 +156,7 @@ def unzipped(path: str | os.PathLike) -> Iterator["io.BufferedReader[Any]"]:
 def opened(path: str, options: Options, truth: bool = False) -> Iterator[tuple[Format, Reader]]:
     """The reader of a recording, by the given format or the one that its first bytes show; raises ConfigError.
 
-    truth: only the positions of an ASTERIX file are needed.
-    """
+    truth: only the positions of an ASTERIX file are needed."""
     encoding = "utf-8-sig"
     try:
         with unzipped(path) as file:
@@ -222,8 +219,7 @@ def import_recording(
 ) -> Imported:
     """Read a recording and write it as plots; raises ConfigError, StoreError, and then leaves no file.
 
-    progress is called from time to time with the number of records read.
-    """
+    progress is called from time to time with the number of records read."""
     path = os.fspath(source)
     with opened(path, options) as (kind, reader):
         options, contradictions = placed(options, reader)

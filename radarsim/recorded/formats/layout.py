@@ -12,8 +12,7 @@ capture.
 A capture is a pcap or a pcapng file. Of its packets those of UDP over IPv4 or IPv6 are read; all others, fragments and
 packets of which the capture kept only the beginning, are counted. A datagram holds blocks, perhaps with a few bytes of
 the network's after them, or frames of a recorder. Sources: the Internet drafts draft-ietf-opsawg-pcap and -pcapng, RFC
-791, 8200 and 768; the frames as CroatiaControlLtd/asterix describes them.
-"""
+791, 8200 and 768; the frames as CroatiaControlLtd/asterix describes them."""
 
 import struct
 from collections import Counter

@@ -234,8 +234,7 @@ def from_nmea(path: str, file: BinaryIO) -> Sheet:
     """Positions by a satellite receiver, NMEA 0183: RMC (place, speed, course, date) and GGA (place, height), of any
     talker, those of one time as one row. Heights are above the ellipsoid where GGA has that of the geoid.
 
-    Where no RMC stands among the first sentences, dates are left alone: times are of the day.
-    """
+    Where no RMC stands among the first sentences, dates are left alone: times are of the day."""
     dated = bool(DATED.search(file.peek(io.DEFAULT_BUFFER_SIZE)))  # type: ignore[attr-defined]
     sheet = Sheet(path, ["time", *FIX.values()], iter(()))
 

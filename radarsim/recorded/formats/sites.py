@@ -6,8 +6,7 @@ plane that is level at the radar; an aircraft far away and low lies below it.
 
 Ships by AIS: NMEA sentences `!AIVDM…`, by pyais. A message gives only the second of its minute. The time is that of the
 tag block (`\c:1577836800*..\!AIVDM…`), of a line `$PGHP,1,…`, of a number or ISO time before the sentence, or of a
-number after it; without these, the seconds are unwrapped from minute to minute.
-"""
+number after it; without these, the seconds are unwrapped from minute to minute."""
 
 import datetime
 import functools
@@ -42,8 +41,7 @@ class Batch(NamedTuple):
     kind is PLOTS (measured by a radar: PLOT_COLUMNS) or POSITIONS (on the earth: POSITION_COLUMNS). track holds the
     track of each record, '' where it has none; address identifies the aircraft or ship everywhere (24 bits in
     hexadecimal, MMSI), '' where unknown; radar identifies the sensor (SAC/SIC), '' where the format does not; columns,
-    arrays (n,), NaN where a record has no value; words: further columns of text, '' where a record has none.
-    """
+    arrays (n,), NaN where a record has no value; words: further columns of text, '' where a record has none."""
 
     kind: str
     track: list[str]
@@ -69,8 +67,7 @@ class Batch(NamedTuple):
 class Reader(Protocol):
     """A reader of one format. Times count from midnight where `of_day`, else from 1970 (UTC), as in the format.
 
-    records: number read so far; skipped: number of them skipped, by reason.
-    """
+    records: number read so far; skipped: number of them skipped, by reason."""
 
     of_day: bool
     records: int
@@ -194,10 +191,8 @@ class Site:
         return np.concatenate([states[..., :3] @ turn + between, states[..., 3:] @ turn], axis=-1)
 
     def seen(self, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Range, bearing, elevation, local position and, where speeds are known, radial velocity of positions (n,).
-
-        An unknown height is taken as 0, sea level.
-        """
+        """Range, bearing, elevation, local position and, where speeds are known, radial velocity of positions (n,). An
+        unknown height is taken as 0, sea level."""
         lat, lon = columns["latitude_deg"], columns["longitude_deg"]
         height = np.nan_to_num(columns["altitude_m"], nan=0.0)
         east, north, up = pymap3d.geodetic2enu(lat, lon, height, *self.place)
@@ -213,10 +208,8 @@ class Site:
         return np.einsum("ni,ni->n", speed, line) / np.linalg.norm(line, axis=-1)
 
     def local(self, range_m: np.ndarray, bearing_rad: np.ndarray, altitude_m: np.ndarray) -> np.ndarray:
-        """Local positions (n, 3) of plots of slant range and bearing at a height (n,), all in m and rad.
-
-        NaN where the height is unknown, or where no point of that range has it.
-        """
+        """Local positions (n, 3) of plots of slant range and bearing at a height (n,), all in m and rad. NaN where the
+        height is unknown, or where no point of that range has it."""
         sine = np.zeros_like(range_m)
         bearing = np.degrees(bearing_rad)
         with np.errstate(invalid="ignore"):

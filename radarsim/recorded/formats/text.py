@@ -12,8 +12,7 @@ What columns of recordings hold: the quantities, the names that files give them,
 A column is found by its name, whatever the case and the spaces; a unit may stand at the end of it (`range_km`,
 `Altitude [ft]`, `Latitude_degrees`). A name without a unit means SI and degrees; but positions with names from aviation
 (`gs`, `alt_baro`, …) are in feet, knots and feet a minute, and speeds of ships in knots, like the exports that use
-them. Ranges and bearings have no such custom: their units must be stated.
-"""
+them. Ranges and bearings have no such custom: their units must be stated."""
 
 import csv
 import itertools
@@ -133,8 +132,7 @@ class Header:
 
     columns: by name of the quantity; identities: the indices of those in
     IDENTITIES; on_earth: whether positions are read, not plots; aviation, maritime: whether
-    names are of their customs.
-    """
+    names are of their customs."""
 
     def __init__(self, path: str, names: list[str], given: Mapping[str, str]):
         self.path, self.names = path, [_printable(name) for name in names]
@@ -268,8 +266,7 @@ class Sheet:
     """A file as a table: the header, then rows, each with its line or number in the file.
 
     decimal_comma: numbers may have one. encoding: of the file. skipped, notes: records that are no rows, by reason, and
-    what was assumed in reading them.
-    """
+    what was assumed in reading them."""
 
     path: str
     header: list[str]

@@ -2,8 +2,7 @@
 
 A claim says what the paper says, where, and how it was read; a part of it says what is measured and the range that the
 paper's words leave to it. The ranges come from the words alone and were written down before anything was measured. The
-rule by which they are judged: docs/verdicts.md and `radarsim.report.claims.rule`.
-"""
+rule by which they are judged: docs/verdicts.md and `radarsim.report.claims.rule`."""
 
 # ruff: noqa: F401  (this is what others take from here)
 from radarsim.report.claims.declared import (

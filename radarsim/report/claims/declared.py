@@ -6,8 +6,7 @@ Whether a case is the paper's own experiment; only such cases may judge its clai
 that holds its experiment. A case is the paper's when its checked keys equal those of a case of that config. These may
 differ: the number of realisations, the seed and the options of a run, which are not keys of a study; display names
 (`config.fields.Display`); and members added to a list that the study declares in `PaperClaims.may_grow`, or filters of
-other code (`python:`) beside the paper's own.
-"""
+other code (`python:`) beside the paper's own."""
 
 import copy
 import math
@@ -28,10 +27,8 @@ from radarsim.report.statistics import Estimate, difference
 
 # ---- evidence --------------------------------------------------------------------------------------------------------
 class Missing(KeyError):
-    """The experiment does not hold what a part of a claim needs; it then does not judge that part.
-
-    A text gives the reason; anything else is the key of an absent case.
-    """
+    """The experiment does not hold what a part of a claim needs; it then does not judge that part. A text gives the
+    reason; anything else is the key of an absent case."""
 
     @property
     def why(self) -> str:
@@ -69,8 +66,7 @@ class Certain(Estimate):
 class Series:
     """A measured curve: scans k, times t, values and the ends of their intervals, arrays of one length.
 
-    short: why it ends before the paper's; values that depend on its end are then missing.
-    """
+    short: why it ends before the paper's; values that depend on its end are then missing."""
 
     k: np.ndarray
     t: np.ndarray
@@ -149,10 +145,8 @@ def minus(a: Series, b: Series) -> Series:
 
 
 def ratio(a: Estimate, b: Estimate, scale: float = 1.0) -> Estimate:
-    """scale · a / b of independent positive estimates: relative half-widths add in squares.
-
-    Its ends are NaN where an estimate is zero, as errors of exactly known values are.
-    """
+    """scale · a / b of independent positive estimates: relative half-widths add in squares. Its ends are NaN where an
+    estimate is zero, as errors of exactly known values are."""
     with np.errstate(divide="ignore", invalid="ignore"):
         value = np.divide(scale * a.value, b.value)
         down = np.hypot(1 - np.divide(a.lo, a.value), np.divide(b.hi, b.value) - 1)
@@ -180,8 +174,7 @@ class _Watched(dict):
 class Evidence:
     """Measured values of an experiment for the claims of its study. Studies define in `case` the meaning of a key.
 
-    results: only the paper's cases; `members` gives the paper's members of their lists that may grow.
-    """
+    results: only the paper's cases; `members` gives the paper's members of their lists that may grow."""
 
     def __init__(self, results: Sequence[CaseResult], made: Mapping, places: Mapping[str, Mapping[str, set[int]]]):
         """places: by case name and list key, the indices of the paper's members."""
@@ -193,10 +186,8 @@ class Evidence:
         self._groups: dict[str, Mapping] = {}
 
     def exactly(self) -> "Evidence":
-        """The same with exact values in place of measured ones; values that are not known exactly are missing.
-
-        Curves and gains are those of their exact columns; other tables, and sums, cannot be read.
-        """
+        """The same with exact values in place of measured ones; values that are not known exactly are missing. Curves
+        and gains are those of their exact columns; other tables, and sums, cannot be read."""
         for name in ("curves", "gains"):
             self._grouped(name)
         other = copy.copy(self)
@@ -264,8 +255,7 @@ class Evidence:
         """σ of a filter over that of another one of the case: paired where one of the two is a baseline of it, or
         is from outside.
 
-        Otherwise as of independent estimates, with an interval wider than under common noise.
-        """
+        Otherwise as of independent estimates, with an interval wider than under common noise."""
         case = self.case(key)
         gains = self._grouped("gains")
         if (case.name, filter_name, component, over) in gains:
@@ -307,8 +297,7 @@ class Described:
     """A case's keys, as plain data: those of its lists that may grow separate from the rest.
 
     named: for each key that names a member of such a list, that member. outside: by the name of a filter of the user's
-    own code what its numbers depend on.
-    """
+    own code what its numbers depend on."""
 
     fixed: dict
     members: dict[str, list]
@@ -340,8 +329,7 @@ def _outside(one: CaseResult | Case) -> dict[str, str]:
 def own_members(mine: Described, shipped: Iterable[Described], may_grow: Sequence[str]) -> dict[str, set[int]] | None:
     """For a paper's case, the indices of the paper's members of its lists; None for any other case.
 
-    shipped: the cases of the claim's config.
-    """
+    shipped: the cases of the claim's config."""
     found: dict[str, set[int]] | None = None
     for papers in shipped:
         same = equal(mine.fixed, papers.fixed) and equal(mine.named, papers.named)
@@ -434,8 +422,7 @@ class Part:
 
     scale gives the quantity that the margin is relative to, such as σ; default: the margin is in the part's own unit.
     exact gives the exact value where `measure` of the exact curves does not; ceiling the score of a perfect estimator.
-    statement, number, variant, against_print and asserted are as in `rule.Judged`.
-    """
+    statement, number, variant, against_print and asserted are as in `rule.Judged`."""
 
     cases: tuple
     what: str
@@ -459,8 +446,7 @@ class Claim:
     original is the sentence in the paper's language. An extension is ours, and not counted. reported: the paper reports
     an assertion of others: judged under every reading, and not counted. unstated: what the paper leaves out and the
     statement cannot be judged without; joint: one variant has to give every number; internal: both sides are printed,
-    so that a disagreement is within the print.
-    """
+    so that a disagreement is within the print."""
 
     id: str
     place: str
@@ -500,8 +486,7 @@ class PaperClaims:
     that only shorten or extend a run: quantities that do not depend on its end are still judged. may_grow: the study's
     lists to which members may be added while it stays the paper's experiment; every other key must be as in the claim's
     config, see `radarsim.report.claims.declared`. held_too: by the stem of a shipped config, the claims of other
-    configs of which it holds every part: if it is changed so that it no longer judges them, it says so.
-    """
+    configs of which it holds every part: if it is changed so that it no longer judges them, it says so."""
 
     claims: Sequence[Claim]
     evidence: type[Evidence]

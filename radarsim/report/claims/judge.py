@@ -72,8 +72,7 @@ def judged(
 
     A claim uses only the paper's cases: those of its config, which `shipped` gives by its stem. Claims of the config
     `stem`, the one that was run, are all listed, with a reason where they cannot be judged; other claims if every part
-    can be judged.
-    """
+    can be judged."""
     rows: list[dict[str, Any]] = []
     if of is not None:
         papers = _Papers(of, results, made, shipped)
@@ -221,10 +220,8 @@ def exact(part: Part, seen: Evidence, measured: Estimate) -> float:
 
 
 def disagreement(part: Part, of: Judged) -> str:
-    """A message where a part has an exact value of its own, further off than chance explains; else nothing.
-
-    All other values follow from tables, which `agreement` compares with their exact columns.
-    """
+    """A message where a part has an exact value of its own, further off than chance explains; else nothing. All other
+    values follow from tables, which `agreement` compares with their exact columns."""
     if part.exact is None or not of.known or of.n < FEW:
         return ""
     slack = max(1e-9 * abs(of.exact), ROUNDING * of.margin)
@@ -295,8 +292,7 @@ def _end(value: float) -> float:
 def listed(papers: Sequence[PaperClaims], stored: Mapping[str, Sequence[Mapping]]) -> list[dict]:
     """Rows of claims with the columns of claims.csv and `config`: as stored, or one row each as not run.
 
-    stored: config stem → the rows of its claims.csv.
-    """
+    stored: config stem → the rows of its claims.csv."""
     rows: list[dict] = []
     for paper, claim in ((of.paper, claim) for of in papers for claim in of.claims):
         own = [dict(row) for row in stored.get(claim.config, ()) if row["claim"] == claim.id]
@@ -312,8 +308,7 @@ def unstored(of: PaperClaims, cases: "Sequence[Case]", shipped: Shipped, stem: s
 
     With the columns of claims.csv. cases: all of the experiment's. Where none is the paper's, the claim is not judged,
     and the row gives the reason; where the shipped config `stem` holds it, it is not run. A claim that a run might
-    judge has no row.
-    """
+    judge has no row."""
     rows: list[dict] = []
     for claim in of.claims:
         papers, state, why = _papers(of, claim.config, shipped), NOT_RUN, claim.unstated

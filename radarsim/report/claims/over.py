@@ -30,8 +30,7 @@ The joint search over declared readings: under which of them most of what a pape
 
 What is counted is every number, limit or comparison that the claims assert, once each: of variants of a number one
 suffices. Under the strict rule it comes out if its interval, or its exact value, lies in the range that the print
-rounds to, under the granular one if it lies within the margin of its words.
-"""
+rounds to, under the granular one if it lies within the margin of its words."""
 
 import inspect
 import itertools
@@ -103,8 +102,7 @@ class Choice:
 
     original is the sentence in the paper's language, english in English; both say "nothing" where it is silent. The
     first alternative is the default. claims: the ids of the claims affected; empty: all of the paper. contradicts: the
-    print has more than one of the alternatives.
-    """
+    print has more than one of the alternatives."""
 
     key: str
     asks: str
@@ -138,11 +136,9 @@ class Reading:
 
 
 class PaperReadings(ABC):
-    """The readings of a paper, and how its claims are measured under one.
-
-    A study with exact numbers gives evidence without a run; any other changes the cases of a claim's config, which are
-    then run, and reads their sums like those of the paper's own.
-    """
+    """The readings of a paper, and how its claims are measured under one. A study with exact numbers gives evidence
+    without a run; any other changes the cases of a claim's config, which are then run, and reads their sums like those
+    of the paper's own."""
 
     paper: str  # P1
     choices: tuple[Choice, ...]
@@ -216,17 +212,14 @@ class PaperReadings(ABC):
         return claim.parts
 
     def changed(self, claim: Claim, case: "Case", reading: Reading) -> "Case | None":
-        """A case of a claim's config changed for a reading; None where the claim does not need it.
-
-        Raises Unreadable where it is impossible to fly or design.
-        """
+        """A case of a claim's config changed for a reading; None where the claim does not need it. Raises Unreadable
+        where it is impossible to fly or design."""
         return None
 
     def evidence(self, claim: Claim, reading: Reading, seen: "Seen | None", of: PaperClaims) -> "Evidence":
         """The evidence for a claim under a reading; seen: the results of its cases, None where all is exact.
 
-        of: the paper's claims. Default: their evidence, over `seen`.
-        """
+        of: the paper's claims. Default: their evidence, over `seen`."""
         assert seen is not None  # a paper with exact values gives its own evidence
         return of.evidence(seen.results, seen.tables, seen.places)
 
@@ -244,8 +237,7 @@ class Seen:
     """Results of the changed cases of a config, under the names and keys of that config.
 
     results (in the order of the config) have the sums and axes of the run and the keys of the paper's own case, by
-    which claims find it; ran has them with the keys of the run. tables and places are as in `claims.Evidence`.
-    """
+    which claims find it; ran has them with the keys of the run. tables and places are as in `claims.Evidence`."""
 
     results: Sequence[CaseResult]
     ran: Sequence[CaseResult]
@@ -284,8 +276,7 @@ class Search:
 
     axes: key of a choice → its values, the shipped one given by `shipped`. strict and granular (n, *lengths of axes):
     whether a number is reproduced; `values`: the numbers. fine: for choices whose values are numbers without steps.
-    read_as: strict and granular in words.
-    """
+    read_as: strict and granular in words."""
 
     paper: str
     printed: Sequence[Printed]
@@ -520,10 +511,8 @@ def claims_in(file: Path, *measures: ModuleType) -> tuple[Claim, ...]:
 
 @cache
 def written_in(text: str, source: str, *measures: ModuleType) -> tuple[tuple[Claim, ...], tuple[Choice, ...]]:
-    """The claims, and the choices if any, of a text like claims.yaml; source: its file, for faults.
-
-    Empty lines before the text align the line numbers of faults with that file.
-    """
+    """The claims, and the choices if any, of a text like claims.yaml; source: its file, for faults. Empty lines before
+    the text align the line numbers of faults with that file."""
     faults = Faults()
     document = parse(text, source, faults)
     claims = _made(document, faults, FileKeys, lambda keys, reader: reader.claims(keys), measures)
@@ -767,8 +756,7 @@ LAST = (
 class Under:
     """A claim under one reading: its parts with their numbers, in the order of the claim, and the verdict.
 
-    why: the reason if it was not judged: impossible to fly or design, or nothing to measure.
-    """
+    why: the reason if it was not judged: impossible to fly or design, or nothing to measure."""
 
     claim: Claim
     reading: Reading
@@ -811,8 +799,7 @@ def _judged(part: Part, seen: Evidence, exact: bool, n: int, shipped: bool) -> J
     """A part with its numbers; the reading gives its variant and whether that is against the print.
 
     exact: whether all evidence is exact. Otherwise the exact value is known where the run knows it; a part's own
-    formula is of the shipped reading.
-    """
+    formula is of the shipped reading."""
     found, nothing = part.measure(seen), Estimate(*(math.nan,) * 3)
     own = replace(part, variant="", against_print=False)
     value = found.value if exact else known(part if shipped else replace(part, exact=None), seen, found)
@@ -916,8 +903,7 @@ def columns(every: Iterable[PaperReadings]) -> tuple[str, ...]:
 def rows(one: Under, names: Sequence[str], over: Outcome | None = None) -> list[dict[str, Any]]:
     """Rows of readings.csv: one for each part; a single one with the reason where it was not judged.
 
-    over: the result over all readings, whose class is in each row.
-    """
+    over: the result over all readings, whose class is in each row."""
     choices = dict(one.reading.taken)
     blank: dict[str, Any] = dict.fromkeys(names, "") | {"claim": one.claim.id, "reading": one.name, "kind": one.kind}
     blank |= {key: value for key, value in choices.items() if key in names}
@@ -948,8 +934,7 @@ def _cell(value: float, never: bool = False) -> float | str:
 def depth(one: Under) -> tuple[float, float, float]:
     """How far the worst part is from the words, in margins, with the ends of its interval.
 
-    Negative inside: the distance to the nearest end.
-    """
+    Negative inside: the distance to the nearest end."""
     found = [_depth(judged) for _, judged in one.parts if judged.asserted and not judged.void]
     return max(found, default=(math.nan,) * 3, key=lambda ends: ends[0])
 
@@ -974,8 +959,7 @@ WITHIN = term("as shipped {count} of {of} numbers are within the margins of the 
 class JointOutcome:
     """A printed number under a reading: its value, and by which rule it is reproduced.
 
-    open: its interval is too wide to tell whether it lies within the margin.
-    """
+    open: its interval is too wide to tell whether it lies within the margin."""
 
     value: float
     strict: bool
@@ -1081,8 +1065,7 @@ def joint(of: PaperReadings, over: Sequence[Over]) -> Joint:
     """The joint search of a paper over its claims' readings, those with most numbers first.
 
     The readings are the declared ones of a claim, and all combinations of E and U under which every claim was judged:
-    with the verdict of the reading restricted to the choices that affect it.
-    """
+    with the verdict of the reading restricted to the choices that affect it."""
     over = [one for one in over if one.claim.counted]
     claims = [{one.reading: _Own(one) for one in claim.under if one.outcome is not None} for claim in over]
     declared = dict.fromkeys(one.reading for claim in over for one in claim.under)

@@ -6,8 +6,7 @@ Specification curves: a claim under every reading, sorted by outcome, and below 
 
 The class of a claim over all readings that its paper allows, beside its class as shipped. It is computed in one place,
 `over.Over.outcome`, when `radarsim readings` judges a claim under each of them, and kept as a row of classes.csv.
-Everything else that shows a class looks it up.
-"""
+Everything else that shows a class looks it up."""
 
 import math
 import re
@@ -151,8 +150,7 @@ ALONE = term("{own} as shipped; other readings not judged")
 class Class:
     """A claim over all its readings: its class, in how many readings it is true, the choices that flip it.
 
-    needed: realisations that would decide it if undecided, else NaN. declared: a mark of its declaration.
-    """
+    needed: realisations that would decide it if undecided, else NaN. declared: a mark of its declaration."""
 
     claim: str
     kind: str
@@ -211,9 +209,7 @@ def of_over(of: PaperReadings, over: Over) -> Class | None:
 
 def with_classes(rows: Sequence[Mapping[str, Any]], known: Known) -> list[dict[str, Any]]:
     """Rows of claims.csv with the class over all readings in place of that as shipped, which moves to `as_shipped`.
-
-    Rows that were not judged stay as they are.
-    """
+    Rows that were not judged stay as they are."""
     return [dict(row) | _over(row, known) for row in rows]
 
 
@@ -246,8 +242,7 @@ def verdict_words(row: Mapping[str, Any]) -> str:
 def words(kind: str, own: str, depends_on: str = "", say: Callable[..., str] = str.format) -> str:
     """The verdict on a claim as a phrase: its class, and the one as shipped if it differs.
 
-    say: puts values into a message, as `language.tr` does; default: in English.
-    """
+    say: puts values into a message, as `language.tr` does; default: in English."""
     over: str = say(DEPENDS_ON, keys=depends_on) if kind == rule.DEPENDS and depends_on else say(kind)
     if own == kind:
         return over
@@ -282,8 +277,7 @@ WORDS = {  # of each class, for the headline
 def page(rows: Sequence[Mapping], pages: Mapping[str, str], parts: bool = True) -> str:
     """The page, from the rows of `claims.listed`; pages holds the stem of a paper's page, by the paper.
 
-    parts: whether a folded table of all measured parts follows.
-    """
+    parts: whether a folded table of all measured parts follows."""
     text = [TITLE, "", HEAD, *headline(rows), ""]
     for paper in dict.fromkeys(row["paper"] for row in rows):
         own = [row for row in rows if row["paper"] == paper]

@@ -6,8 +6,7 @@ the paper's words allow and the margin of these words. `verdict` judges one part
 
 Ranges and margins from a paper's words; these functions see the words alone, never a measurement.
 
-Reasons why a claim is not judged, in the current language: claims.csv and readings.csv have them in English.
-"""
+Reasons why a claim is not judged, in the current language: claims.csv and readings.csv have them in English."""
 
 import math
 import re
@@ -52,8 +51,7 @@ class Judged:
 
     statement names the part's sentence where a claim has several, all of which must be true. Parts of one `number` are
     variants of it: one suffices. variant is this one's name, against_print whether it takes a value that the paper
-    contradicts. A part that the paper does not assert is an extension: shown, not counted.
-    """
+    contradicts. A part that the paper does not assert is an extension: shown, not counted."""
 
     measured: float
     lo: float
@@ -96,8 +94,7 @@ class Judged:
 class Outcome:
     """The outcome of a claim: its class, the words, how many numbers held and failed, and the worst miss in margins.
 
-    needed: realisations that would decide it, if undecided; None: no number would.
-    """
+    needed: realisations that would decide it, if undecided; None: no number would."""
 
     kind: str
     held: int
@@ -126,8 +123,7 @@ def level(parts: int) -> float:
 
     One factor at every look (Pocock, Biometrika 64, 1977, 191-199), by the union bound over looks and parts: whatever
     their correlation, at most 5 % of runs err. For one part the exact recursion over looks gives 4.0 %; a factor for
-    exactly 5 % would save 4 % of the realisations.
-    """
+    exactly 5 % would save 4 % of the realisations."""
     return NormalDist().inv_cdf(1 - 0.025 / LOOKS / max(parts, 1)) / Z95
 
 
@@ -189,8 +185,7 @@ def harmless(part: Judged, parts: int = 1) -> bool:
 def needed(part: Judged, parts: int = 1) -> int | None:
     """How many realisations would likely decide a part: the interval shrinks with 1/√n about the measured value.
 
-    0 where it is decided; None where the value lies on a border, or its interval is unknown.
-    """
+    0 where it is decided; None where the value lies on a border, or its interval is unknown."""
     if verdict(part, parts) != UNDECIDED:
         return 0
     lo, hi = ends(part, parts)
@@ -233,8 +228,7 @@ def claim(parts: Sequence[Judged], *, unstated: bool = False, joint: bool = Fals
 
     unstated: the paper leaves out what the statement is about, so that it cannot be judged. joint: one variant has to
     give every number; where each is reproduced in some variant and no variant gives all, the print contradicts itself.
-    internal: both sides are printed; where they differ, the print contradicts itself.
-    """
+    internal: both sides are printed; where they differ, the print contradicts itself."""
     asserted = [part for part in parts if part.asserted] or list(parts)
     many = sum(part.sampled and not part.void for part in asserted)
     if joint:
@@ -333,8 +327,7 @@ def _joint(parts: Sequence[Judged], many: int) -> Outcome:
 class Reading:
     """A claim under one reading: its kind (E, U or N), its alternatives, and the class of the claim under it.
 
-    outcome is empty where the reading is impossible to fly or design.
-    """
+    outcome is empty where the reading is impossible to fly or design."""
 
     name: str
     kind: str
@@ -343,11 +336,9 @@ class Reading:
 
 
 def over_readings(own: Outcome, readings: Sequence[Reading]) -> Outcome:
-    """The outcome of a claim from that of the default reading and those of all: only E and U count.
-
-    Confirmed only if true in all of them, refuted only if false in all, else it depends on the choices. Some outcomes
-    hold under every reading: a print that contradicts itself, a statement that cannot be judged.
-    """
+    """The outcome of a claim from that of the default reading and those of all: only E and U count. Confirmed only if
+    true in all of them, refuted only if false in all, else it depends on the choices. Some outcomes hold under every
+    reading: a print that contradicts itself, a statement that cannot be judged."""
     counted = [one for one in readings if one.kind in (EQUIVALENT, UNSTATED) and one.outcome]
     if not counted:
         return own
@@ -372,8 +363,7 @@ def flips(readings: Sequence[Reading]) -> tuple[str, ...]:
 
     A choice is one of them if two readings that differ in it alone have different outcomes. Where no two readings
     differ in one choice alone: those by whose values the readings differ most in the share that holds; where none
-    holds, in the share that is refuted.
-    """
+    holds, in the share that is refuted."""
     asked = CONFIRMED if any(one.outcome == CONFIRMED for one in readings) else REFUTED
     choices = list(dict.fromkeys(key for one in readings for key in one.choices))
     found: Counter[str] = Counter()
@@ -492,8 +482,7 @@ def _pattern(message: str) -> re.Pattern[str]:
 class Range(NamedTuple):
     """The range of the words, ends included, the words, their margin, and the kind of rule that gives it.
 
-    strict is the range of the rule of version 0.1, for `old_verdict`.
-    """
+    strict is the range of the rule of version 0.1, for `old_verdict`."""
 
     lo: float
     hi: float
