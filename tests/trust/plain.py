@@ -151,7 +151,8 @@ def uncompiled():
     for name, plain in LANES.items():
         setattr(lanes, name, plain)
     package = Path(compile.__file__).parents[1]
-    for file in sorted(file for file in package.rglob("kernels/[a-z]*.py") if "template" not in file.parts):
+    every = (*package.rglob("kernels/[a-z]*.py"), *package.rglob("kernels.py"))
+    for file in sorted(file for file in every if "template" not in file.parts):
         name = ".".join(file.relative_to(package.parent).with_suffix("").parts)
         module = importlib.import_module(name)
         if hasattr(module, "np"):

@@ -19,7 +19,7 @@ from radarsim.report import claims
 from radarsim.report.claims import Missing, certain
 from radarsim.report.statistics import Estimate, difference, root_mean_square
 from radarsim.studies.discriminator import nearest, study
-from radarsim.studies.discriminator.kernels.sums import LOCKS
+from radarsim.studies.discriminator.kernels import LOCKS
 
 COMPUTED, PRINTED = "computed", "printed"
 READINGS = {COMPUTED: (2.25, 1.0), PRINTED: (9.0, 0.5)}  # noise variance, threshold c

@@ -26,9 +26,9 @@ from radarsim.engine.results import Axes, Layout
 from radarsim.errors import ConfigError
 from radarsim.kernels.lanes import WIDTH
 from radarsim.kernels.random import fill_normal_strip
+from radarsim.studies.discriminator import kernels as sums_of
 from radarsim.studies.discriminator import nearest
 from radarsim.studies.discriminator.config import Estimator, Keys
-from radarsim.studies.discriminator.kernels import sums as sums_of
 from radarsim.studies.noise import noise_key
 
 # ---- rare ------------------------------------------------------------------------------------------------------------

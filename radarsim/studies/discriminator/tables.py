@@ -12,8 +12,8 @@ from radarsim.bursts import estimators
 from radarsim.engine.results import CaseResult
 from radarsim.report import rare, statistics
 from radarsim.report import tables as common
-from radarsim.studies.discriminator.kernels.sums import LOCKS as COUNTED
-from radarsim.studies.discriminator.kernels.sums import bin_edges
+from radarsim.studies.discriminator.kernels import LOCKS as COUNTED
+from radarsim.studies.discriminator.kernels import bin_edges
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,7 +9,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, plural, tr
 from radarsim.report import panels, rare, tables, wording
-from radarsim.studies.discriminator.kernels.sums import LOCKS
+from radarsim.studies.discriminator.kernels import LOCKS
 from radarsim.studies.discriminator.tables import last_locks
 
 if TYPE_CHECKING:

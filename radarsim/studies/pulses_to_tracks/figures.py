@@ -11,7 +11,7 @@ from radarsim.report import panels, seen, sweeps, tables
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.report.quantities import RADIAL
 from radarsim.report.statistics import FEW_EVENTS
-from radarsim.studies.pulses_to_tracks.kernels.records import AGES
+from radarsim.studies.pulses_to_tracks.kernels import AGES
 from radarsim.studies.pulses_to_tracks.tables import Result
 
 if TYPE_CHECKING:

@@ -31,7 +31,7 @@ from radarsim.engine.results import Axes
 from radarsim.kernels import algebra
 from radarsim.physics import process_noise, transition
 from radarsim.studies import radial
-from radarsim.studies.pulses_to_tracks.kernels import records
+from radarsim.studies.pulses_to_tracks import kernels
 
 
 # ---- axes ------------------------------------------------------------------------------------------------------------
@@ -117,10 +117,10 @@ STILL = 0.02  # turns at the ends of the burst, left by an acceleration: below i
 BOTTOMLESS = 10.0**300  # the depth of a list that nothing is dropped from
 BLOCKS_PER_WINDOW = 20  # as the discriminator's
 UNKNOWN_RAD = 2.0 * math.pi  # the phase's spread before a burst
-KINDS = {None: records.NONE, "fisher_bound": records.BOUND, "spectrum": records.SPECTRUM}
-USES = {None: records.AS_MEASURED, "as_measured": records.AS_MEASURED} | {
-    "gated": records.GATED,
-    "mixture": records.MIXTURE,
+KINDS = {None: kernels.NONE, "fisher_bound": kernels.BOUND, "spectrum": kernels.SPECTRUM}
+USES = {None: kernels.AS_MEASURED, "as_measured": kernels.AS_MEASURED} | {
+    "gated": kernels.GATED,
+    "mixture": kernels.MIXTURE,
 }
 SEARCH: dict[str, Any] = {"coherent": True, "search": 2, "margin": 2.0, "tolerance": 0.3}  # P4's cure at a hand-over
 
@@ -227,7 +227,7 @@ class Gathered:
 class Designed:
     """The arrays of the filters, and what they were made from."""
 
-    arrays: records.Filters
+    arrays: kernels.Filters
     tables: Tables
     sums: estimators.World
     menus: tuple[Menu | None, ...]
@@ -248,7 +248,7 @@ def designed(spec: Any, bursts: list[Burst]) -> Designed:
     return Designed(_arrays(spec, bursts, menus, tables), tables, sums, menus)
 
 
-def _arrays(spec: Any, bursts: list[Burst], menus: tuple[Menu | None, ...], tables: Tables) -> records.Filters:
+def _arrays(spec: Any, bursts: list[Burst], menus: tuple[Menu | None, ...], tables: Tables) -> kernels.Filters:
     count, scans = len(spec.filters), len(bursts)
     entries = max((len(one.windows) for one in menus if one), default=1)
     gathered = Gathered()
@@ -274,7 +274,7 @@ def _arrays(spec: Any, bursts: list[Burst], menus: tuple[Menu | None, ...], tabl
     last = options.copy()
     last["search"] = 0
     names = [one.name for one in spec.filters]
-    return records.Filters(
+    return kernels.Filters(
         filters=np.array([_filter(spec, one, own) for one, own in zip(spec.filters, menus, strict=True)]),
         options=options,
         last=last,
@@ -303,8 +303,8 @@ def _records(
 def _filter(spec: Any, one: Any, own: Menu | None) -> np.void:
     """A filter's record."""
     dt = spec.radar.scan_period_s
-    made = np.zeros(1, records.FILTER)[0]
-    made["kind"] = KINDS.get(one.estimator, records.SEQUENCE)
+    made = np.zeros(1, kernels.FILTER)[0]
+    made["kind"] = KINDS.get(one.estimator, kernels.SEQUENCE)
     made["takes"], made["use"], made["start"] = one.takes, USES[one.use], start_scans(one)
     made["track"] = one.forecast == "track"
     made["noise"] = process_noise(one.process_noise, one.manoeuvre_variance, dt)[np.triu_indices(3)]

@@ -15,9 +15,8 @@ from radarsim.errors import ConfigError
 from radarsim.kernels.linear import plain
 from radarsim.physics import transition
 from radarsim.studies.noise import noise_key
-from radarsim.studies.pulses_to_tracks import filters
+from radarsim.studies.pulses_to_tracks import filters, kernels
 from radarsim.studies.pulses_to_tracks.filters import Menu, PulsesAxes
-from radarsim.studies.pulses_to_tracks.kernels import chain, records
 
 COMPONENTS = (("r", "m"), ("Vr", "m/s"), ("ar", "m/s2"))
 BLOCK = 512  # some 0.2 s with six filters and 15 scans
@@ -27,12 +26,12 @@ PADDED = 2  # lines of a spectrum for each pulse, at least
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a block needs; see `kernels.records` for the arrays."""
+    """All that a block needs; see `kernels` for the arrays."""
 
     layout: Layout
     axes: PulsesAxes
-    world: records.World
-    filters: records.Filters
+    world: kernels.World
+    filters: kernels.Filters
     menus: tuple[Menu | None, ...]
     block: int = BLOCK
     gaussian: bool = False  # an estimate that did not lock is no Gaussian error
@@ -50,7 +49,7 @@ def prepare(case: Case) -> Plan:
         raise ConfigError(f"{case.name}: filters: no windows lead from the forecast to the burst: {error}") from None
     missed = filters.defects(truth, spec.radar.scan_period_s)
     return Plan(
-        layout=Layout(**records.shapes(len(spec.filters), spec.scans)),
+        layout=Layout(**kernels.shapes(len(spec.filters), spec.scans)),
         axes=axes(spec, t, bursts, made.arrays, missed),
         world=observed(case, truth, bursts, made, missed),
         filters=made.arrays,
@@ -60,7 +59,7 @@ def prepare(case: Case) -> Plan:
 
 def observed(
     case: Case, truth: np.ndarray, bursts: list[Burst], made: filters.Designed, missed: np.ndarray
-) -> records.World:
+) -> kernels.World:
     """The kernels' arrays of what is observed."""
     spec, burst, dt = case.spec, bursts[0], case.spec.radar.scan_period_s
     laws = {one.noise_variance: i for i, one in enumerate(dict.fromkeys(bursts))}
@@ -74,7 +73,7 @@ def observed(
     for c in range(2):
         row = filters.at_centre(burst, SIZE, c + 1)
         middle[c] = row * [math.factorial(j) / burst.duration_s**j for j in range(SIZE)]
-    return records.World(
+    return kernels.World(
         keys=plain([noise_key(case, what) for what in STREAMS], 4, 2, dtype=np.uint64),
         missed=plain(missed, *missed.shape),
         motion=transition(dt)[np.array([0, 0, 1, 1, 2]), np.array([1, 2, 1, 2, 2])],
@@ -119,7 +118,7 @@ def reversed_order(lines: int) -> np.ndarray:
     return order
 
 
-def axes(spec: Any, t: np.ndarray, bursts: list[Burst], made: records.Filters, missed: np.ndarray) -> PulsesAxes:
+def axes(spec: Any, t: np.ndarray, bursts: list[Burst], made: kernels.Filters, missed: np.ndarray) -> PulsesAxes:
     """Labels, Fisher bounds, and the exact values where all errors are Gaussian."""
     shape = (len(spec.filters), spec.scans, 3)
     sigma, bias, bound = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape[:2], 2), np.nan)
@@ -166,5 +165,5 @@ def idealisation(spec: Any, one: Any) -> int:
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     """Sums of one block, in the order of the plan's layout."""
     values = np.zeros(plan.layout.size)
-    chain.simulate_block(plan.world, plan.filters, records.Sums(**plan.layout.unpack(values)), first, count)
+    kernels.simulate_block(plan.world, plan.filters, kernels.Sums(**plan.layout.unpack(values)), first, count)
     return values

@@ -13,8 +13,8 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import panels, statistics
 from radarsim.report import tables as common
 from radarsim.report.notes import EFFECTIVE, HEAVY
+from radarsim.studies.pulses_to_tracks import kernels as rec
 from radarsim.studies.pulses_to_tracks.filters import PulsesAxes
-from radarsim.studies.pulses_to_tracks.kernels import records as rec
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,7 @@ from radarsim.bursts.kernels import strip as strips
 from radarsim.kernels import lanes
 from radarsim.kernels.compile import aligned_zeros, kernel, part
 from radarsim.kernels.random import stream
-from radarsim.studies.discriminator.kernels import sums as added
+from radarsim.studies.discriminator import kernels as added
 from tests.studies.discriminator import naive as naive
 
 THETA = np.array([0.7, 1e4, 18e4, -75e4, 1e6])

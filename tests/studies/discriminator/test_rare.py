@@ -16,8 +16,8 @@ from radarsim.errors import ConfigError
 from radarsim.kernels.random import fill_normal_strip, stream
 from radarsim.report import rare as report
 from radarsim.report import statistics
+from radarsim.studies.discriminator import kernels as kernels
 from radarsim.studies.discriminator import nearest, study
-from radarsim.studies.discriminator.kernels import sums as kernels
 from radarsim.studies.discriminator.tables import COUNTED
 from tests.studies.discriminator.test_study import BASE, FROM_TRUTH
 

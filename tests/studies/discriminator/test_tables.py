@@ -11,7 +11,7 @@ from radarsim.report.drawing import Line
 from radarsim.studies.discriminator import measures, study, words
 from radarsim.studies.discriminator import tables as report
 from radarsim.studies.discriminator.figures import one_burst
-from radarsim.studies.discriminator.kernels.sums import bin_edges
+from radarsim.studies.discriminator.kernels import bin_edges
 
 
 @pytest.fixture(scope="module")

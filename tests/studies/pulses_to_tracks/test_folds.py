@@ -8,9 +8,9 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.studies import registry
+from radarsim.studies.pulses_to_tracks import kernels as chain
 from radarsim.studies.pulses_to_tracks import study
-from radarsim.studies.pulses_to_tracks.kernels import chain
-from radarsim.studies.pulses_to_tracks.kernels.records import LISTED, NUMBER, RIGHT, TAKEN, WRONG_FOLD, Sums
+from radarsim.studies.pulses_to_tracks.kernels import LISTED, NUMBER, RIGHT, TAKEN, WRONG_FOLD, Sums
 from tests.studies.pulses_to_tracks.conftest import RANGE, SPECTRUM, A, made, summed
 from tests.studies.pulses_to_tracks.test_kernels import SPEC, estimated, normals, samples_of
 

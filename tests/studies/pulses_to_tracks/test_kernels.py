@@ -10,9 +10,8 @@ from radarsim.bursts.kernels import lanes, sequence, strip
 from radarsim.bursts.kernels.scoring import SAMPLES, SIZE, STATE
 from radarsim.kernels.random import fill_normal_pairs
 from radarsim.studies.pulses_to_tracks import filters, study
-from radarsim.studies.pulses_to_tracks.kernels import chain
-from radarsim.studies.pulses_to_tracks.kernels.chain import draw_sums, estimate, room_for
-from radarsim.studies.pulses_to_tracks.kernels.records import Sums
+from radarsim.studies.pulses_to_tracks import kernels as chain
+from radarsim.studies.pulses_to_tracks.kernels import Sums, draw_sums, estimate, room_for
 from tests.studies.pulses_to_tracks import naive
 from tests.studies.pulses_to_tracks.conftest import CURED, IDEAL, RANGE, SEQUENCE, SPECTRUM, A, made
 

@@ -10,7 +10,7 @@ from radarsim.app.solve import solve
 from radarsim.bursts.burst import LIGHT_MPS, Burst
 from radarsim.studies import registry
 from radarsim.studies.pulses_to_tracks import filters, study
-from radarsim.studies.pulses_to_tracks.kernels.records import AGES, LOCKED, TAKEN
+from radarsim.studies.pulses_to_tracks.kernels import AGES, LOCKED, TAKEN
 from tests.studies.pulses_to_tracks.conftest import CURED, IDEAL, RANGE, SEQUENCE, SPECTRUM, A, V, made, summed
 
 N = 4096

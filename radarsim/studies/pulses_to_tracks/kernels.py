@@ -1,4 +1,8 @@
-"""The classical way to a burst's frequency: the highest line of its spectrum, eight bursts side by side.
+"""The arrays that the kernels read and fill.
+
+Letters: K scans, F filters, S laws of the noise (bursts of another signal-to-noise ratio), W windows of all designs.
+
+The classical way to a burst's frequency: the highest line of its spectrum, eight bursts side by side.
 
 A Kalman filter of range, velocity and acceleration, one realisation at a time; plain numbers.
 
@@ -22,6 +26,7 @@ A filter runs over the realisations of a block scan by scan, so that bursts of o
 side by side. States are errors: estimate less truth."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,11 +37,151 @@ from radarsim.bursts.kernels.strip import evaluate, put_drawn, take_window
 from radarsim.kernels import algebra
 from radarsim.kernels.algebra import NO_NOISE, add_scaled, add_spread, take_rate, take_second_rate, take_value
 from radarsim.kernels.compile import inline, kernel, part
-from radarsim.kernels.hypotheses import FALL, INNOVATION, NEAR, NOTHING, Lists, branched, column, keep_greatest
+from radarsim.kernels.hypotheses import COLUMNS, FALL, INNOVATION, NEAR, NOTHING, Lists, branched, column, keep_greatest
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, rows, where_greater
 from radarsim.kernels.random import LANE_BITS, U, normals, threefry, words_to_normals
-from radarsim.studies.pulses_to_tracks.kernels import records as rec
-from radarsim.studies.pulses_to_tracks.kernels.records import Work, hypotheses
+
+# ---- records ---------------------------------------------------------------------------------------------------------
+NONE, BOUND, SEQUENCE, SPECTRUM = 0, 1, 2, 3  # how a filter's bursts are estimated
+AS_MEASURED, GATED, MIXTURE = 0, 1, 2  # what it does with an estimate
+# Counted of the estimates of a scan: within 5 and 3 bounds of the truth; the weight with which they were taken; those
+# taken in a fold that is not the truth's.
+LOCKED, LOCKED_3, TAKEN, WRONG_FOLD, COUNTS = 0, 1, 2, 3, 4
+# Of a filter that keeps hypotheses: realisations whose best one has no wrong fold, whose list holds one that has none,
+# hypotheses.
+RIGHT, LISTED, NUMBER, FOLDS = 0, 1, 2, 3
+AGES = 7  # scans since the last burst that was lost: 0 … 5, then six and more, or none was lost so far
+
+FILTER = np.dtype(
+    [
+        ("kind", np.int64),  # NONE … SPECTRUM
+        ("takes", np.int64),  # numbers of the burst: 0, 1 velocity, 2 acceleration too
+        ("use", np.int64),  # AS_MEASURED … MIXTURE
+        ("track", np.int64),  # whether its forecast is its own prediction
+        ("start", np.int64),  # scans without manoeuvre noise
+        ("gate", np.float64),  # largest squared deviation in variances
+        ("lock", np.float64),  # probability of lock before an estimate is seen
+        ("density", np.float64),  # of an estimate that did not lock
+        ("fixed", np.float64, 2),  # standard deviations of a forecast that is not the track's
+        ("top", np.float64, 2),  # largest standard deviations of the menu: velocity, acceleration
+        ("ratio", np.float64, 2),  # logarithm of the ratio of neighbouring ones
+        ("levels", np.int64, 2),  # how many
+        ("noise", np.float64, 6),  # Q, packed
+        ("kept", np.int64),  # hypotheses kept at most; 1: the nearest fold
+        ("deepest", np.float64),  # logarithm of the ratio to the best weight, below which one is dropped
+        ("averages", np.int64),  # 1: estimates are the mean of all; 0: the best one
+    ],
+    align=True,
+)
+
+
+class World(NamedTuple):
+    """What is observed."""
+
+    keys: np.ndarray  #: (4, 2) of the streams of ranges, bursts, the designation, fixed forecasts
+    missed: np.ndarray  #: (K, 3) see `filters.defects`
+    motion: np.ndarray  #: (5,) F, as `kernels.algebra` has it
+    sigma_r: float  #: of a range, m
+    prior: np.ndarray  #: (2,) standard deviations of the designation
+    span: float  #: of velocity, m/s
+    physics: np.ndarray  #: (K,) bursts, see `bursts.kernels.scoring.PHYSICS`
+    law: np.ndarray  #: (K,) of which law
+    mean: np.ndarray  #: (blocks, 4) of the sums drawn
+    factor: np.ndarray  #: (S, blocks, 10) roots of their covariances
+    tables: tuple[np.ndarray, np.ndarray]  #: two flat arrays, see `bursts.burst.Tables`
+    #: (2, 2) of a forecast's errors of velocity and acceleration b₁ and b₂ in turns over the burst
+    to_turns: np.ndarray
+    measured: np.ndarray  #: (2, 6) of an estimate in turns over the burst velocity and acceleration at its middle
+    offset: np.ndarray  #: (K,) of the true Doppler frequency from the spectrum's lines, in lines
+    twiddle: np.ndarray  #: (M / 2, 2) cosines and sines of the transform of M points
+    reversed: np.ndarray  #: (M,) its order
+
+
+class Filters(NamedTuple):
+    """The filters."""
+
+    filters: np.ndarray  #: (F,) see FILTER
+    options: np.ndarray  #: (F,) of their sequences, see `bursts.kernels.sequence.OPTIONS`
+    last: np.ndarray  #: (F,) of the last step, which is without forecast
+    windows: np.ndarray  #: (W,) of all designs, see `bursts.kernels.sequence.WINDOW`
+    first: np.ndarray  #: (F, K, E) where those of an entry of the menu begin
+    count: np.ndarray  #: (F, K, E) how many there are
+    free: np.ndarray  #: (F, K) the whole burst without forecast
+    sigma: np.ndarray  #: (F, K, 2) Fisher bounds of velocity and acceleration
+    baseline: int  #: the filter that gains are against
+
+
+class Hypotheses(NamedTuple):
+    """Up to H hypotheses of each of n realisations, H a whole number of lanes."""
+
+    states: np.ndarray  #: (n, H, 9) see `chain.state_of`
+    weights: np.ndarray  #: (n, H) logarithms, the best one's 0
+    count: np.ndarray  #: (n,) how many there are
+    right: np.ndarray  #: (n, H) 1 of those that have taken no velocity in a wrong fold, else 0
+    fresh: np.ndarray  #: (H, 10) room for states, and whether they are right
+    #: columns, children, parents: see `kernels.hypotheses.Lists`
+    columns: np.ndarray
+    children: np.ndarray
+    parents: np.ndarray
+
+
+def hypotheses(realisations: int, most: int) -> Hypotheses:
+    """Room for so many of each realisation; for none where only the nearest fold is taken."""
+    room = -(-most // WIDTH) * WIDTH if most > 1 else 0
+    children = 4 * room + 64
+    return Hypotheses(
+        states=np.zeros((realisations, room, 9)),
+        weights=np.zeros((realisations, room)),
+        count=np.zeros(realisations, np.int64),
+        right=np.zeros((realisations, room)),
+        fresh=np.zeros((room, 10)),
+        columns=rows(COLUMNS * room // WIDTH),
+        children=rows(3 * children // WIDTH),
+        parents=np.zeros(children, np.int64),
+    )
+
+
+class Work(NamedTuple):
+    """Work arrays for n realisations."""
+
+    #: (n, 9) states and covariances, see `chain.state_of`; of several hypotheses the best before the burst
+    tracks: np.ndarray
+    forecasts: np.ndarray  #: (n, 2) errors of the forecasts of velocity and acceleration
+    entries: np.ndarray  #: (n,) of the menu
+    measured: np.ndarray  #: (n, 2) the bursts' velocity and acceleration, less the truth
+    ages: np.ndarray  #: (n,) scans since the last burst that was lost
+    passes: np.ndarray  #: (n,) passes over a window's data so far
+    room: tuple[np.ndarray, ...]  #: see `chain.room_for`
+    held: Hypotheses  #: of filters that keep several
+
+
+class Sums(NamedTuple):
+    """Sums over realisations; e = estimate − truth."""
+
+    error: np.ndarray  #: (F, K, 3, 4) e, e², e³, e⁴ of range, velocity, acceleration
+    paired: np.ndarray  #: (F, K, 3) e² times the baseline's
+    #: (F, K, 2, 2, 2) of the burst's velocity and acceleration e², e⁴: of those that locked, of all
+    measured: np.ndarray
+    locks: np.ndarray  #: (F, K, COUNTS) see above
+    ages: np.ndarray  #: (F, K, AGES) realisations by the scans since the last burst that was lost
+    losses: np.ndarray  #: (F, K, AGES, 3, 2) e², e⁴ of these
+    passes: np.ndarray  #: (F, 2) passes over a window's data of all bursts of a realisation, and their squares
+    folds: np.ndarray  #: (F, K, FOLDS) see above
+
+
+def shapes(filters: int, scans: int) -> dict[str, tuple[int, ...]]:
+    """The shapes of `Sums`, by name."""
+    each = (filters, scans)
+    return {
+        "error": (*each, 3, 4),
+        "paired": (*each, 3),
+        "measured": (*each, 2, 2, 2),
+        "locks": (*each, COUNTS),
+        "ages": (*each, AGES),
+        "losses": (*each, AGES, 3, 2),
+        "passes": (filters, 2),
+        "folds": (*each, FOLDS),
+    }
 
 
 # ---- spectrum --------------------------------------------------------------------------------------------------------
@@ -149,9 +294,9 @@ def scored(sigma, takes, v, a, i, ages, locks, of_measured):
     if takes == 2:
         worst = max(worst, abs(a) / sigma[1])
     locked = worst < 5.0
-    ages[i] = min(ages[i] + 1, rec.AGES - 1) if locked else 0
-    locks[rec.LOCKED] += 1.0 if locked else 0.0
-    locks[rec.LOCKED_3] += 1.0 if worst < 3.0 else 0.0
+    ages[i] = min(ages[i] + 1, AGES - 1) if locked else 0
+    locks[LOCKED] += 1.0 if locked else 0.0
+    locks[LOCKED_3] += 1.0 if worst < 3.0 else 0.0
     for c in range(takes):
         square = v * v if c == 0 else a * a
         of_measured[c, 1, 0] += square
@@ -243,12 +388,12 @@ def estimate(world, filters, f, k, entry, who, forecast, room, found):
     work, sums, drawn = address(work_), address(sums_), address(drawn_)
     physics, own, free = world.physics[k], filters.filters[f], filters.windows[filters.free[f, k]]
     put(work, PASSES, full(0.0))
-    if own.kind == rec.BOUND:
+    if own.kind == BOUND:
         ideal(world, k, free, work, sums, drawn)
     else:
         tables = address(world.tables[0]), address(world.tables[1])
         put_forecast(world, forecast, work)
-        if own.kind == rec.SEQUENCE:
+        if own.kind == SEQUENCE:
             first = filters.first[f, k, entry]
             for w in range(filters.count[f, k, entry]):
                 window = filters.windows[first + w]
@@ -259,7 +404,7 @@ def estimate(world, filters, f, k, entry, who, forecast, room, found):
                 *(work, address(re), address(im)),
             )
         # What goes to the filter must not hold the forecast once more: the last step is on the likelihood alone.
-        take_window(physics, drawn, tables, free, filters.last[f], own.kind != rec.SEQUENCE, work, sums)
+        take_window(physics, drawn, tables, free, filters.last[f], own.kind != SEQUENCE, work, sums)
     measured = world.measured
     for n in range(WIDTH):
         for c in range(2):
@@ -320,7 +465,7 @@ def branches(own, sigma, measured, span, held, i, lists):
     v, a, best = measured[0], measured[1], NOTHING
     w, e = column(lists, 0, WEIGHT_COLUMN), column(lists, 2, INNOVATION)
     near, c = column(lists, 2, NEAR), column(lists, 2, FALL)
-    mixture, lock, lost = own.use == rec.MIXTURE, 0.0, NOTHING
+    mixture, lock, lost = own.use == MIXTURE, 0.0, NOTHING
     if mixture:
         lock, lost = math.log(own.lock), math.log((1.0 - own.lock) * own.density)
     states = held.states[i]
@@ -407,11 +552,11 @@ def take_folds(world, filters, f, k, work, sums):
         taken, wrong, whole = inherited(own, sigma, (v, a), span, held, i, made, lists)
         best = heaviest(held.weights[i], made)
         put_estimate(own, held, i, best, whole, work.tracks[i])
-        locks[rec.TAKEN] += taken / whole
-        locks[rec.WRONG_FOLD] += wrong / whole
-        folds[rec.RIGHT] += held.right[i, best]
-        folds[rec.LISTED] += held.right[i, :made].max()
-        folds[rec.NUMBER] += made
+        locks[TAKEN] += taken / whole
+        locks[WRONG_FOLD] += wrong / whole
+        folds[RIGHT] += held.right[i, best]
+        folds[LISTED] += held.right[i, :made].max()
+        folds[NUMBER] += made
 
 
 # ---- chain -----------------------------------------------------------------------------------------------------------
@@ -503,9 +648,9 @@ def take_estimates(world, filters, f, k, work, sums):
     for i in range(tracks.shape[0]):
         x, P = state_of(tracks, i)
         v, a = measured[i, 0], measured[i, 1]
-        e = v - x[1] if own.kind == rec.BOUND else folded(v - x[1], span)
+        e = v - x[1] if own.kind == BOUND else folded(v - x[1], span)
         wrong = 1.0 if abs(e + x[1]) > 0.5 * span else 0.0
-        v = v if own.kind == rec.BOUND else folded(v, span)
+        v = v if own.kind == BOUND else folded(v, span)
         scored(sigma, takes, v, a, i, ages, locks, of_measured)
         R, gain, S = take_rate(P, sigma[0] ** 2, 1.0)
         y = add_scaled(x, e, gain)
@@ -516,17 +661,17 @@ def take_estimates(world, filters, f, k, work, sums):
             y = add_scaled(y, e, gain)
             distance, determinant = distance + e * e / S, determinant * S
         weight = 1.0
-        if own.use == rec.GATED:
+        if own.use == GATED:
             weight = 1.0 if distance <= own.gate else 0.0
-        elif own.use != rec.AS_MEASURED:
+        elif own.use != AS_MEASURED:
             weight = lock_weight(distance, determinant, takes, own.lock, own.density)
         if weight == 1.0:
             x, P = y, R
         elif weight > 0.0:
             x, P = mixed(x, P, y, R, weight)
         put_state(tracks, i, x, P)
-        locks[rec.TAKEN] += weight
-        locks[rec.WRONG_FOLD] += wrong * weight
+        locks[TAKEN] += weight
+        locks[WRONG_FOLD] += wrong * weight
 
 
 @part
@@ -550,7 +695,7 @@ def add_errors(tracks, ages, takes, errors, error, age, loss):
 def run_filter(world, filters, f, first, work, errors, sums):
     """A filter over all scans of realisations first, first + 1, …; errors (K, n, 3) are written."""
     own, tracks, ages = filters.filters[f], work.tracks, work.ages
-    ages[:], work.passes[:] = rec.AGES - 1, 0.0
+    ages[:], work.passes[:] = AGES - 1, 0.0
     for k in range(world.missed.shape[0]):
         if own.kept > 1:
             ranges_to_hypotheses(world, own, k, first, work)

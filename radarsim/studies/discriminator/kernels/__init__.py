@@ -1,1 +1,0 @@
-"""P4's kernels: bursts, scoring, sequences of discriminators."""
