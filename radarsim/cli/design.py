@@ -89,22 +89,7 @@ at_options = (
 @group.seed_option
 @group.threads_option
 @group.json_option
-def solve(
-    config: str,
-    key: str,
-    filter_name: str | None,
-    at_s: float | None,
-    at_k: int | None,
-    equals: float,
-    between: tuple[float, float] | None,
-    case: str | None,
-    overrides: tuple[str, ...],
-    realisations: int | None,
-    seed: int | None,
-    threads: int | None,
-    as_json: bool,
-    **quantities: str | None,
-) -> None:
+def solve(config: str, key: str, filter_name: str | None, as_json: bool, **given: Any) -> None:
     """Find the value of KEY at which a quantity reaches a target.
 
     KEY is any key that holds a number, by its dotted path as for --set; a bare filter key applies to all filters. If
@@ -126,12 +111,10 @@ def solve(
     from radarsim.cli import console, outcomes
     from radarsim.errors import TargetUnmet
 
-    asked: dict[str, Any] = {name.removeprefix(OF): value for name, value in quantities.items()}
-    asked |= {"filter": filter_name, "at_s": at_s, "at_k": at_k, "between": between, "case": case}
-    asked |= {"overrides": overrides, "realisations": realisations, "seed": seed, "threads": threads}
+    asked = {name.removeprefix(OF): value for name, value in given.items()} | {"filter": filter_name}
     with console.Progress(key, quiet=as_json, what="values") as progress:
         said = None if as_json else console.say_aside
-        answer = solving(config, key, equals=equals, progress=progress.update, notify=said, **asked)
+        answer = solving(config, key, progress=progress.update, notify=said, **asked)
     if as_json:
         click.echo(shown.text(shown.answer(answer)))
     elif answer.value is not None:
@@ -165,15 +148,7 @@ def solve(
 @group.threads_option
 @click.option("--write", metavar="FILE.yaml", help="Also write a config with the tuned values.")
 @group.json_option
-def tune(
-    config: str,
-    filter_name: str | None,
-    wanted: str,
-    threads: int | None,
-    write: str | None,
-    as_json: bool,
-    **asked: Any,
-) -> None:
+def tune(config: str, filter_name: str | None, wanted: str, write: str | None, as_json: bool, **asked: Any) -> None:
     """Find the best values of a filter's keys, and what they gain.
 
     The quantity is one of `radarsim solve`. Over several cases the root of the mean of σ², or the mean of a rate, is
@@ -196,7 +171,7 @@ def tune(
         configs.writable(write, config, asked["overrides"])
     with console.Progress(config, quiet=as_json, what="values") as progress:
         said = None if as_json else console.say_aside
-        asked |= {"filter": filter_name, "threads": threads, "progress": progress.update, "notify": said}
+        asked |= {"filter": filter_name, "progress": progress.update, "notify": said}
         found = tuning.tune(config, wanted, **asked)
     if as_json:
         click.echo(shown.text(shown.tuned(found)))
@@ -214,9 +189,7 @@ def tune(
 @group.out_option
 @group.drawing_options
 @group.json_option
-def chart(
-    configs: tuple[str, ...], overrides: tuple[str, ...], out: str, drawing: group.Drawing, as_json: bool
-) -> None:
+def chart(configs: tuple[str, ...], drawing: group.Drawing, as_json: bool, **asked: Any) -> None:
     """Chart the gain by Doppler for all radars, with yours marked.
 
     Simulates nothing. Draws gains over time and in the long run against c = (σ_r/σ_V)² (D_M/σ_r²)^(1/3), the only
@@ -232,7 +205,7 @@ def chart(
     from radarsim.cli import console, outcomes
 
     with console.Progress("chart", quiet=as_json, what="figures") as progress:
-        drawn = compare.chart(*configs, overrides=overrides, out=out, progress=progress.update, **drawing.arguments)
+        drawn = compare.chart(*configs, progress=progress.update, **asked, **drawing.arguments)
     if as_json:
         click.echo(shown.text(shown.drawn(drawn)))
     else:
@@ -252,20 +225,7 @@ def chart(
 @group.out_option
 @group.drawing_options
 @group.json_option
-def sensitivity(
-    config: str,
-    at_s: float | None,
-    at_k: int | None,
-    of: str | None,
-    component: str | None,
-    case: str | None,
-    overrides: tuple[str, ...],
-    realisations: int | None,
-    seed: int | None,
-    out: str,
-    drawing: group.Drawing,
-    as_json: bool,
-) -> None:
+def sensitivity(config: str, drawing: group.Drawing, as_json: bool, **asked: Any) -> None:
     """Show what +10 % of each key changes, largest effect first.
 
     Prints changes of σ and gain, or of another quantity. Every numeric key is raised by a tenth, one at a time; whole
@@ -284,10 +244,8 @@ def sensitivity(
     from radarsim.app import shown
     from radarsim.cli import console, outcomes
 
-    asked: dict[str, Any] = {"at_s": at_s, "at_k": at_k, "of": of, "component": component, "case": case}
-    asked |= {"overrides": overrides, "realisations": realisations, "seed": seed}
     with console.Progress(config, quiet=as_json, what="keys") as progress:
-        found = finding.sensitivity(config, out=out, progress=progress.update, **asked, **drawing.arguments)
+        found = finding.sensitivity(config, progress=progress.update, **asked, **drawing.arguments)
     if as_json:
         click.echo(shown.text(shown.sensitivity(found)))
     else:

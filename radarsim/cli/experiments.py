@@ -281,7 +281,7 @@ def judge(
 @group.set_option
 @group.precision_option
 @group.of_option
-@click.option("--shard", type=group.Share(), metavar="i/n", help="Forecast only this share of the blocks.")
+@click.option("--shard", "share", type=group.Share(), metavar="i/n", help="Forecast only this share of the blocks.")
 @click.option(
     "--out", type=group.Directory(), metavar="DIR", help="Also report what is stored there and what is missing."
 )
@@ -291,11 +291,8 @@ def check(
     realisations: int | None,
     seed: int | None,
     overrides: tuple[str, ...],
-    precision: float | None,
-    of: str,
-    shard: tuple[int, int] | None,
-    out: str | None,
     as_json: bool,
+    **asked: Any,
 ) -> None:
     """Validate configs and estimate the time of a run.
 
@@ -313,14 +310,13 @@ def check(
       radarsim check multimodel -n 1e8 --shard 1/3        how long the first of three machines takes
       radarsim check multimodel -n 1e8 --out results      what is stored there, and what is missing
     """
-    _refuse_together(shard, precision, None, None)
-    _refuse_of_nothing(of, precision)
+    _refuse_together(asked["share"], asked["precision"], None, None)
+    _refuse_of_nothing(asked["of"], asked["precision"])
     from radarsim.app import outlook as overview
     from radarsim.app import run as simulation
     from radarsim.app import shown
     from radarsim.cli import console, outcomes
 
-    asked: dict[str, Any] = {"precision": precision, "of": of, "share": shard, "out": out}
     made = []
     loaded = simulation.load_all(configs, simulation.merged(overrides, realisations, seed))
     _say_code(loaded, as_json)
@@ -469,15 +465,12 @@ def compare(sources: tuple[str, ...], out: str, drawing: group.Drawing, as_json:
 @click.option("--markdown", is_flag=True, help="Print the pages docs/readings_….md of these papers instead of text.")
 def readings(
     names: tuple[str, ...],
-    realisations: int | None,
-    decide: bool,
-    threads: int | None,
     time_limit: float | None,
-    out: str,
     no_figures: bool,
     quiet: bool,
     as_json: bool,
     markdown: bool,
+    **asked: Any,
 ) -> None:
     """Judge claims under every reading that the paper allows.
 
@@ -504,8 +497,7 @@ def readings(
         from radarsim.app import shown
         from radarsim.cli import console, outcomes
 
-        asked: dict[str, Any] = {"realisations": realisations, "decide": decide, "threads": threads}
-        asked |= {"time_limit": limit, "out": out, "figures": not no_figures, "stop": stop}
+        asked |= {"time_limit": limit, "figures": not no_figures, "stop": stop}
         with console.Progress("readings", quiet=quiet or as_json or markdown) as progress:
             done = app.readings(*names, progress=progress.update, **asked)
         if as_json:

@@ -1,7 +1,7 @@
 """Commands for users' own data and radars. Heavy imports are inside the commands."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -10,10 +10,7 @@ from radarsim.cli.group import Count, completed, config_argument, main, set_opti
 from radarsim.language import plural, tr
 
 if TYPE_CHECKING:
-    from typing import Any
-
     from radarsim.engine.results import Track
-    from radarsim.recorded.formats.importing import Format
 
 
 @main.command()
@@ -171,15 +168,7 @@ def simulate(
 @click.option(
     "--keep-marked", is_flag=True, help="Keep test targets, field monitors and coasted records in tracks and truth."
 )
-def import_(
-    recording: str,
-    output: str,
-    kind: "Format | None",
-    places: tuple[str, ...],
-    antenna: str | None,
-    tracks: tuple[str, ...],
-    **further: "Any",
-) -> None:
+def import_(recording: str, output: str, **asked: Any) -> None:
     """Read a recording into plots: ASTERIX, ADS-B, AIS, GPS or a table.
 
     PLOTS.csv has one row per plot and all tracks of the recording, each named in the column `track`; `radarsim track`
@@ -208,23 +197,15 @@ def import_(
     from radarsim.cli import console
     from radarsim.recorded.formats import importing, sites
 
-    truth, whose = importing.truth_of(further["truth"])
-    options = importing.Options(
-        kind,
-        *sites.sites_of(places),
-        sites.antenna_of(antenna) if antenna else None,
-        tracks,
-        importing.zero_of(further["time_from"]),
-        truth,
-        further["doppler_towards"],
-        importing.columns_of(further["columns"]),
-        importing.encoding_named(further["encoding"]),
-        further["keep_marked"],
-        whose,
-        importing.biases_of(further["biases"]),
+    antenna = sites.antenna_of(asked["antenna"]) if asked["antenna"] else None
+    given: Any = (
+        *(asked["kind"], *sites.sites_of(asked["places"]), antenna, asked["tracks"]),
+        *(importing.zero_of(asked["time_from"]), *importing.truth_of(asked["truth"])),
+        *(asked["doppler_towards"], importing.columns_of(asked["columns"])),
+        *(importing.encoding_named(asked["encoding"]), asked["keep_marked"], importing.biases_of(asked["biases"])),
     )
     with console.Counter("reading", "records") as counter:
-        done = importing.import_recording(recording, output, options, counter.update)
+        done = importing.import_recording(recording, output, importing.Options(*given), counter.update)
     count = len([name for name in done.tracks if name])
     rows, of = plural("{count} row", "{count} rows", done.rows), plural("{count} track", "{count} tracks", count)
     told = {"file": output, "rows": rows, "tracks": of, "columns": ", ".join(done.columns)}
@@ -243,9 +224,7 @@ def import_(
 @group.threads_option
 @click.option("-q", "--quiet", is_flag=True, help="Do not report gaps and accuracies.")
 @set_option
-def track(
-    config: str, plots: str, output: str | None, quiet: bool, overrides: tuple[str, ...], **further: "Any"
-) -> None:
+def track(config: str, plots: str, output: str | None, quiet: bool, overrides: tuple[str, ...], **further: Any) -> None:
     """Run the config's filters over recorded measurements.
 
     PLOTS.csv has a header and one row per plot, with increasing times at any spacing. An empty cell is a missing value;
@@ -328,7 +307,7 @@ def track(
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON document instead of text.")
 @set_option
-def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -> None:
+def fit(config: str, plots: str, overrides: tuple[str, ...], **options: Any) -> None:
     """Estimate σ and manoeuvre variance from recorded plots.
 
     The plots are as for `radarsim track`; several tracks in a file are fitted together. The value of each key maximises

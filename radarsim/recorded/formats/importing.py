@@ -87,11 +87,11 @@ class Options:
     tracks: tuple[str, ...] = ()
     zero: str | float = "first"
     truth: str | None = None
+    whose: str = ""
     towards: bool = False
     columns: Mapping[str, str] = field(default_factory=dict)
     encoding: str = ""
     keep_marked: bool = False
-    whose: str = ""
     biases: Mapping[str, float] = field(default_factory=dict)
 
     @property
