@@ -210,7 +210,7 @@ def test_the_self_test_says_so_where_numbers_differ(monkeypatch):
 def test_the_tolerances_are_what_conditioning_allows():
     """κ of the known case's balanced information, times half a rounding, and no more than a few times that."""
     from radarsim.app.configs import load
-    from radarsim.bursts.estimators import fisher
+    from radarsim.bursts.burst import fisher
     from radarsim.studies.discriminator.study import burst_of
 
     burst = burst_of(load(doctor.KNOWN / "discriminator.yaml").cases[0].spec)

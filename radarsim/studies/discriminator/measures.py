@@ -12,7 +12,6 @@ from typing import Any, Literal
 import numpy as np
 
 from radarsim.bursts import burst as model
-from radarsim.bursts import estimators
 from radarsim.bursts.burst import balanced_inverse
 from radarsim.engine.results import CaseResult
 from radarsim.report import claims
@@ -88,7 +87,7 @@ class Evidence(claims.Evidence):
     def potential(self, key: Key, component: str) -> Estimate:
         """Potential spread by the discrete sum over the pulses l = 0 … n − 2, of which the paper's digits are."""
         burst = study.burst_of(self.case(key).spec)
-        found = estimators.spreads(estimators.fisher_sums(burst, len(COMPONENTS), [burst.pulses - 1])[0])
+        found = model.spreads(model.fisher_sums(burst, len(COMPONENTS), [burst.pulses - 1])[0])
         return certain(found[COMPONENTS.index(component)])
 
     def as_far(self, key: Key, amplitude: float, power: int = 1) -> float:
@@ -108,9 +107,9 @@ class Evidence(claims.Evidence):
         burst = study.burst_of(self.case(key).spec)
         samples = burst.pulses * burst.samples_per_pulse
         level = burst.amplitude**2 / burst.noise_variance
-        of_sines = estimators.fisher_sums(burst, 1, [burst.pulses], np.array([0.0, *DOPPLER]))[0][0, 0]
+        of_sines = model.fisher_sums(burst, 1, [burst.pulses], np.array([0.0, *DOPPLER]))[0][0, 0]
         fall = (level * samples - of_sines + level * samples / 2) / 2
-        return certain(fall / (2 * estimators.energy_ratio(burst, burst.duration_s)))
+        return certain(fall / (2 * model.energy_ratio(burst, burst.duration_s)))
 
     def robust(self, key: Key) -> Estimate:
         """Lock of the sequence over what its design allows: 0.99 of each hand-over, the first window's too."""
@@ -134,7 +133,7 @@ class Evidence(claims.Evidence):
         """What designed the sequence, and its windows in s."""
         result, i = self.case(key), self.estimator(key, "sequence")
         burst, condition = study.burst_of(result.spec), model.Condition(threshold=READINGS[key][1])
-        fisher = partial(estimators.fisher, burst, len(COMPONENTS))
+        fisher = partial(model.fisher, burst, len(COMPONENTS))
         times = burst.pulse_period_s * np.array(result.axes.pulses[i])
         return model.Designer(burst, result.axes.prior_sigma, fisher, condition), times
 

@@ -32,8 +32,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from radarsim.bursts.burst import Burst, balanced_inverse, sample_times
-from radarsim.bursts.estimators import World, sensitivities
+from radarsim.bursts.burst import Burst, World, balanced_inverse, sample_times, sensitivities
 from radarsim.bursts.kernels import strip as strips
 from radarsim.bursts.kernels.lanes import COLUMNS, END, PASSES, PRIOR
 from radarsim.bursts.kernels.scoring import SIZE

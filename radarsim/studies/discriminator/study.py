@@ -15,7 +15,6 @@ from typing import Protocol
 import numpy as np
 
 from radarsim.bursts import burst as model
-from radarsim.bursts import estimators
 from radarsim.bursts.kernels import sequence as kernels
 from radarsim.bursts.kernels import strip as strips
 from radarsim.bursts.kernels.lanes import COLUMNS, END, RATIO, SHIFT, WEIGHTS, M, S
@@ -202,7 +201,7 @@ class Plan:
 
     layout: Layout
     axes: DiscriminatorAxes
-    world: estimators.World
+    world: model.World
     tables: tuple[np.ndarray, np.ndarray]
     windows: np.ndarray
     options: np.ndarray
@@ -258,13 +257,13 @@ def forecast(spec: Keys, burst: model.Burst) -> np.ndarray:
     """Standard deviations (size,) of the forecast as the estimators believe them."""
     given = np.array(spec.prior.given) * spec.prior.scale
     if spec.prior.sigma is None:
-        given = given * estimators.spreads(estimators.fisher(burst, len(given), burst.duration_s))
+        given = given * model.spreads(model.fisher(burst, len(given), burst.duration_s))
     return given
 
 
 def designer_of(burst: model.Burst, sigma: np.ndarray, condition: model.Condition) -> model.Designer:
     """The designer of a burst's windows under a forecast sigma (size,)."""
-    return model.Designer(burst, sigma, partial(estimators.fisher, burst, len(sigma)), condition)
+    return model.Designer(burst, sigma, partial(model.fisher, burst, len(sigma)), condition)
 
 
 @lru_cache(maxsize=64)
@@ -315,15 +314,15 @@ def prepared(case: Case) -> Plan:
     designer = designer_of(burst, sigma, model.Condition())  # of forms, which no condition enters
     windows = windows_of(spec, burst, sigma)
     every = sorted({w for own in windows for w in own})
-    image = estimators.has_image(burst, sigma, every, phase.turns)
+    image = model.has_image(burst, sigma, every, phase.turns)
     per_window = (IMAGE_BLOCKS_PER_WINDOW if image else BLOCKS_PER_WINDOW)[mode]
     edges = model.block_edges(every, per_window, 8 if mode == DEMODULATED else 1)
-    world = estimators.world(burst, mode, edges, image, phase.turns, phase.reference)
+    world = model.world(burst, mode, edges, image, phase.turns, phase.reference)
     tables = model.Tables(edges, world.mean, per_window)
     blocks = tables.window if mode == BLOCK_SUMS else tables.drawn
     designs = [design_of(e, w) for e, w in zip(spec.estimators, windows, strict=True)]
-    mean_information = dict(zip(every, estimators.fisher_sums(burst, size, every), strict=True))
-    records, options = estimators.estimators(designs, blocks, burst, sigma, mean_information, designer)
+    mean_information = dict(zip(every, model.fisher_sums(burst, size, every), strict=True))
+    records, options = model.estimators(designs, blocks, burst, sigma, mean_information, designer)
     whole = np.ones(SIZE)
     whole[:size] = model.turns_per_parameter(size, burst.duration_s)
     potential, posterior = bounds(burst, windows, phase.theta, sigma)
@@ -367,9 +366,9 @@ def padded(values: np.ndarray, filling: float = 0.0) -> np.ndarray:
     return np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, missing)], constant_values=filling)
 
 
-def design_of(estimator: Estimator, windows: list[int]) -> estimators.Design:
+def design_of(estimator: Estimator, windows: list[int]) -> model.Design:
     """An estimator as the kernels' options."""
-    return estimators.Design(
+    return model.Design(
         windows=tuple(windows),
         phases=estimator.phases,
         steps=estimator.steps,
@@ -392,10 +391,10 @@ def bounds(
     shape = (len(windows), most, size)
     potential, posterior = np.ones(shape), np.ones(shape)
     every = sorted({w for own in windows for w in own})
-    known = np.diag(estimators.phase_prior(sigma))
+    known = np.diag(model.phase_prior(sigma))
     found = {
-        window: (estimators.spreads(information), estimators.spreads(information + known))
-        for window, information in zip(every, estimators.fisher_sums(burst, size, every, theta), strict=True)
+        window: (model.spreads(information), model.spreads(information + known))
+        for window, information in zip(every, model.fisher_sums(burst, size, every, theta), strict=True)
     }
     for f, own in enumerate(windows):
         for k, window in enumerate(own):
@@ -419,7 +418,7 @@ def axes(
     for f, own in enumerate(windows):
         durations[f, : len(own)] = np.array(own) * burst.pulse_period_s
     available = np.repeat(np.isfinite(durations)[..., None], size, axis=2)
-    whole = estimators.fisher(burst, size, burst.duration_s)
+    whole = model.fisher(burst, size, burst.duration_s)
     return DiscriminatorAxes(
         filters=names,
         components=COMPONENTS[:size],
@@ -433,11 +432,11 @@ def axes(
         pulses=tuple(tuple(own) for own in windows),
         posterior_sigma=np.where(available, posterior, np.nan),
         prior_sigma=sigma,
-        potential_closed_form=estimators.spreads(whole),
+        potential_closed_form=model.spreads(whole),
         potential_covariance=model.balanced_inverse(whole),
-        energy_ratio=estimators.energy_ratio(burst, 1.0) * durations,
+        energy_ratio=model.energy_ratio(burst, 1.0) * durations,
         burst_s=burst.duration_s,
-        shortest_window_s=estimators.shortest_window(burst),
+        shortest_window_s=model.shortest_window(burst),
         model_error_turns=float(np.sqrt(np.mean((phase.turns - phase.reference) ** 2))),
         model_error_hz=doppler_error(burst, phase),
     )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from radarsim.bursts import estimators
+from radarsim.bursts import burst as model
 from radarsim.engine.results import CaseResult
 from radarsim.report import rare, statistics
 from radarsim.report import tables as common
@@ -227,7 +227,7 @@ def _motion(result: CaseResult) -> common.Columns:
     covariance, duration = axes.potential_covariance, axes.burst_s
     for band, wavelength in WAVELENGTHS_M:
         for place, t in (("beginning", 0.0), ("middle", 0.5 * duration)):
-            velocity, acceleration = (0.5 * wavelength * estimators.derivative_spread(covariance, i, t) for i in (0, 1))
+            velocity, acceleration = (0.5 * wavelength * model.derivative_spread(covariance, i, t) for i in (0, 1))
             row = {"case": result.name, "band": band, "wavelength_m": wavelength, "at": place}
             rows.append(row | {"sigma_velocity_mps": velocity, "sigma_acceleration_mps2": acceleration})
     return common.of_rows(rows)

@@ -22,9 +22,7 @@ from typing import Any
 import numpy as np
 
 from radarsim.bursts import burst as model
-from radarsim.bursts import estimators
-from radarsim.bursts.burst import LIGHT_MPS, Burst, Tables, block_edges
-from radarsim.bursts.estimators import energy_ratio, fisher, fisher_sums
+from radarsim.bursts.burst import LIGHT_MPS, Burst, Tables, block_edges, energy_ratio, fisher, fisher_sums
 from radarsim.bursts.kernels.scoring import BLOCK_SUMS
 from radarsim.bursts.kernels.sequence import OPTIONS, WINDOW
 from radarsim.engine.results import Axes
@@ -229,7 +227,7 @@ class Designed:
 
     arrays: kernels.Filters
     tables: Tables
-    sums: estimators.World
+    sums: model.World
     menus: tuple[Menu | None, ...]
 
 
@@ -243,7 +241,7 @@ def designed(spec: Any, bursts: list[Burst]) -> Designed:
         every = list(range(1, spec.pulses + 1))  # a spectrum needs every pulse
     edges = block_edges(every, BLOCKS_PER_WINDOW)
     zero = np.zeros((1, spec.pulses))
-    sums = estimators.world(weakest, BLOCK_SUMS, edges, False, zero, zero)
+    sums = model.world(weakest, BLOCK_SUMS, edges, False, zero, zero)
     tables = Tables(edges, sums.mean, BLOCKS_PER_WINDOW)
     return Designed(_arrays(spec, bursts, menus, tables), tables, sums, menus)
 
@@ -294,9 +292,9 @@ def _records(
     size = parameters(one)
     cure = SEARCH if one.estimator == "cured" and spreads else {}
     of = designer(burst, size, spreads or (1.0, 1.0))
-    design = estimators.Design(own, forecast=spreads is not None, **cure)
+    design = model.Design(own, forecast=spreads is not None, **cure)
     information = dict(zip(own, fisher_sums(burst, size, list(own)), strict=True))
-    made, options = estimators.estimators([design], tables.window, burst, of.sigma, information, of)
+    made, options = model.estimators([design], tables.window, burst, of.sigma, information, of)
     return made[0], options[0]
 
 

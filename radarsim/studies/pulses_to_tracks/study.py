@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from radarsim.bursts.burst import Burst, NoSchedule
-from radarsim.bursts.estimators import energy_ratio
+from radarsim.bursts.burst import Burst, NoSchedule, energy_ratio
 from radarsim.bursts.kernels.scoring import SIZE
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Layout

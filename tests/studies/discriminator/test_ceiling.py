@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from radarsim.bursts import estimators
+from radarsim.bursts import burst as model
 from radarsim.bursts.burst import Burst, balanced_inverse
 from radarsim.studies.discriminator import nearest
 
@@ -15,7 +15,7 @@ SLACK = 5.85 * math.sqrt(2 * 0.02 / nearest.DRAWS)
 
 
 def test_of_one_window():
-    whole = estimators.fisher_sums(BURST, 5, [3000])[0] + np.diag(np.array(SIGMA) ** -2.0)
+    whole = model.fisher_sums(BURST, 5, [3000])[0] + np.diag(np.array(SIGMA) ** -2.0)
     covariance = balanced_inverse(whole)
     scale = np.sqrt(np.diag(covariance))
     root = np.linalg.cholesky(covariance / np.outer(scale, scale))

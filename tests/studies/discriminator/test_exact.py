@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from radarsim.bursts import burst as model
-from radarsim.bursts import estimators
 from tests.studies.discriminator import naive
 
 PAPER = model.Burst(10e9, 1e-5, 1e-6, 1e-6, 30000, 1.0, 2.25)
@@ -14,27 +13,27 @@ THETA = np.array([0.7, 1e4, 18e4, -75e4, 1e6])
 
 
 def test_published_spreads_belong_to_a_quarter_of_the_printed_noise():
-    computed = estimators.spreads(estimators.fisher(PAPER, 5, 0.3))
+    computed = model.spreads(model.fisher(PAPER, 5, 0.3))
     assert computed == pytest.approx([0.06124, 0.4502, 12.20, 183.4, 1213], rel=5e-4)
-    printed_noise = estimators.spreads(estimators.fisher(replace(PAPER, noise_variance=9.0), 5, 0.3))
+    printed_noise = model.spreads(model.fisher(replace(PAPER, noise_variance=9.0), 5, 0.3))
     assert printed_noise == pytest.approx(2 * computed, rel=1e-12)
 
 
 def test_with_one_period_less_all_printed_digits_come_out():
-    assert estimators.spreads(estimators.fisher(PAPER, 5, 0.29999))[3:] == pytest.approx([183.38, 1213.04], abs=0.01)
+    assert model.spreads(model.fisher(PAPER, 5, 0.29999))[3:] == pytest.approx([183.38, 1213.04], abs=0.01)
 
 
 def test_closed_form_is_the_printed_matrix():
-    mu = estimators.energy_ratio(PAPER, 0.3)
+    mu = model.energy_ratio(PAPER, 0.3)
     assert mu == pytest.approx(30000 / 9)
-    assert estimators.fisher(PAPER, 5, 0.3) == pytest.approx(naive.fisher(mu, 0.3, 5), rel=1e-13)
+    assert model.fisher(PAPER, 5, 0.3) == pytest.approx(naive.fisher(mu, 0.3, 5), rel=1e-13)
 
 
 @pytest.mark.parametrize("pulses", [100, 1000, 10000])
 def test_sum_tends_to_the_closed_form(pulses):
     duration = pulses * PAPER.pulse_period_s
-    scale = np.sqrt(np.diag(estimators.fisher(PAPER, 5, duration)))
-    difference = naive.fisher_sum(PAPER, 5, pulses) - estimators.fisher(PAPER, 5, duration)
+    scale = np.sqrt(np.diag(model.fisher(PAPER, 5, duration)))
+    difference = naive.fisher_sum(PAPER, 5, pulses) - model.fisher(PAPER, 5, duration)
     assert np.abs(difference / np.outer(scale, scale)).max() < 6 / pulses
 
 
@@ -62,34 +61,32 @@ def test_exact_sum_is_the_curvature_of_the_likelihood(size, complex_samples):
 
 def test_the_image_matters_where_doppler_is_near_zero():
     slow = np.array([0.7, 100.0, -2000.0, 0, 0])
-    without = estimators.spreads(naive.fisher_sum(PAPER, 5, 199))
-    difference = [np.abs(estimators.spreads(naive.fisher_sum(PAPER, 5, 199, at)) / without - 1) for at in (THETA, slow)]
+    without = model.spreads(naive.fisher_sum(PAPER, 5, 199))
+    difference = [np.abs(model.spreads(naive.fisher_sum(PAPER, 5, 199, at)) / without - 1) for at in (THETA, slow)]
     assert difference[0].max() < 0.05
     assert difference[1].max() > 0.15
 
 
 def test_shortest_window_is_the_printed_one_with_the_printed_estimates():
     printed = replace(PAPER, noise_variance=9.0)
-    assert estimators.shortest_window(printed) == pytest.approx(1.8e-3)
-    assert estimators.shortest_window(replace(printed, amplitude=1.17)) == pytest.approx(1.315e-3, abs=1e-6)
-    assert estimators.energy_ratio(printed, 1.79e-3) == pytest.approx(4.97, abs=0.005)
+    assert model.shortest_window(printed) == pytest.approx(1.8e-3)
+    assert model.shortest_window(replace(printed, amplitude=1.17)) == pytest.approx(1.315e-3, abs=1e-6)
+    assert model.energy_ratio(printed, 1.79e-3) == pytest.approx(4.97, abs=0.005)
 
 
 def test_complex_samples_hold_twice_the_information():
-    assert estimators.fisher(replace(PAPER, complex_samples=True), 5, 0.3) == pytest.approx(
-        2 * estimators.fisher(PAPER, 5, 0.3)
-    )
+    assert model.fisher(replace(PAPER, complex_samples=True), 5, 0.3) == pytest.approx(2 * model.fisher(PAPER, 5, 0.3))
 
 
 @pytest.mark.parametrize("theta", [None, THETA])
 def test_many_windows_at_once_are_as_one_by_one(theta):
     windows = [100, 199, 5000, 30000]
-    for window, information in zip(windows, estimators.fisher_sums(PAPER, 5, windows, theta), strict=True):
+    for window, information in zip(windows, model.fisher_sums(PAPER, 5, windows, theta), strict=True):
         scale = np.sqrt(np.diag(information))
         alone = naive.fisher_sum(PAPER, 5, window, theta)
         assert information / np.outer(scale, scale) == pytest.approx(alone / np.outer(scale, scale), abs=1e-9)
 
 
 def test_what_is_not_determined_has_no_bound():
-    assert np.all(np.isinf(estimators.spreads(np.zeros((3, 3)))))
-    assert np.all(np.isinf(estimators.spreads(np.ones((2, 2)))))
+    assert np.all(np.isinf(model.spreads(np.zeros((3, 3)))))
+    assert np.all(np.isinf(model.spreads(np.ones((2, 2)))))

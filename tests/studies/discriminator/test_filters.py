@@ -9,7 +9,6 @@ import pytest
 from scipy.stats import chi2
 
 from radarsim.bursts import burst as model
-from radarsim.bursts import estimators
 from radarsim.bursts.burst import Burst
 from tests.studies.discriminator import naive as naive
 
@@ -20,8 +19,8 @@ PRINTED_PRIOR = np.array([6.1, 67.5, 6.1e3, 183.38e3, 2.426e6])
 
 
 def designer(burst=COMPUTED, sigma=None, **condition):
-    fisher = partial(estimators.fisher, burst, 5)
-    sigma = estimators.spreads(fisher(burst.duration_s)) * TIMES if sigma is None else sigma
+    fisher = partial(model.fisher, burst, 5)
+    sigma = model.spreads(fisher(burst.duration_s)) * TIMES if sigma is None else sigma
     return model.Designer(burst, sigma, fisher, model.Condition(**condition))
 
 
@@ -145,15 +144,15 @@ def test_step_root_solves_for_any_coherence():
     rng = np.random.default_rng(3)
     a = rng.normal(size=(5, 5))
     data, precision = a @ a.T * 50, np.array([0, 1, 10, 100, 1000.0])
-    root, share = estimators.step_root(data, precision)
+    root, share = model.step_root(data, precision)
     for coherence in (1.0, 0.5, 0.25):
         built = root.T @ np.diag(1 / (1 - (1 - coherence) * share)) @ root
         assert built == pytest.approx(np.linalg.inv(coherence * data + np.diag(precision)), rel=1e-8)
 
 
 def test_a_wide_phase_prior_says_nothing():
-    assert estimators.phase_prior(np.array([6.1, 2.0]))[0] == 0.0
-    assert estimators.phase_prior(np.array([0.5, 2.0])) == pytest.approx([4.0, 0.25])
+    assert model.phase_prior(np.array([6.1, 2.0]))[0] == 0.0
+    assert model.phase_prior(np.array([0.5, 2.0])) == pytest.approx([4.0, 0.25])
 
 
 @pytest.mark.parametrize("per_window", [4, 16, 24])

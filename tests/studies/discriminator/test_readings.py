@@ -8,7 +8,6 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.bursts import burst as model
-from radarsim.bursts import estimators
 from radarsim.engine.results import CaseResult
 from radarsim.report.claims import rule
 from radarsim.report.claims.over import Unreadable, under
@@ -49,7 +48,7 @@ def test_the_probability_of_a_miss_is_that_of_the_prepared_case(cases):
         result = registry.study("discriminator").prepare(cases[noise])
         spec, axes = cases[noise].spec, result.axes
         burst = study.burst_of(spec)
-        fisher = partial(estimators.fisher, burst, 5)
+        fisher = partial(model.fisher, burst, 5)
         condition = model.Condition(threshold=float(taken.get("threshold", "0.5")))
         designer = model.Designer(burst, axes.prior_sigma, fisher, condition)
         times = burst.pulse_period_s * np.array(axes.pulses[0])

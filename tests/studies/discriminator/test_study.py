@@ -7,7 +7,6 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.bursts import burst as model
-from radarsim.bursts import estimators as exact
 from radarsim.bursts.kernels import scoring
 from radarsim.bursts.kernels import sequence as kernels
 from radarsim.bursts.kernels import strip as strips
@@ -208,15 +207,15 @@ def test_a_strong_echo_is_estimated_to_its_bound(variance):
 
 
 def image_biases(plan, spec, n):
-    """Biases of the windows (K,) in standard deviations, as `exact.image_bias` foretells them and as n bursts have."""
+    """Biases of the windows (K,) in standard deviations, as `model.image_bias` foretells them and as n bursts have."""
     burst, phase = study.burst_of(spec), study.phase_of(spec, study.burst_of(spec))
     sigma, windows = study.forecast(spec, burst), [int(one) for one in plan.windows["pulses"][:, 0]]
     size = len(sigma)
     means = study.estimate(plan, 0, n)[0][:, :, 0, :size].mean(axis=0) / model.turns_per_parameter(size, 0.3)
-    known = np.diag(exact.phase_prior(sigma))
-    found = [m @ (data + known) @ m for m, data in zip(means, exact.fisher_sums(burst, size, windows), strict=True)]
+    known = np.diag(model.phase_prior(sigma))
+    found = [m @ (data + known) @ m for m, data in zip(means, model.fisher_sums(burst, size, windows), strict=True)]
     noise = size / n  # of a mean's square
-    return exact.image_bias(burst, sigma, windows, phase.turns), np.sqrt(np.maximum(np.array(found) - noise, 0.0))
+    return model.image_bias(burst, sigma, windows, phase.turns), np.sqrt(np.maximum(np.array(found) - noise, 0.0))
 
 
 def fixed_windows(variance):
@@ -228,7 +227,7 @@ def fixed_windows(variance):
 
 
 def test_the_bias_without_the_image_is_the_one_foretold(monkeypatch):
-    monkeypatch.setattr(exact, "IMAGE_BIAS", np.inf)
+    monkeypatch.setattr(model, "IMAGE_BIAS", np.inf)
     n = 4000
     for variance in (1e-3, 1e-5):
         spec, plan = fixed_windows(variance)
@@ -244,10 +243,10 @@ def test_the_image_is_taken_where_its_bias_would_pass_the_limit():
     at_one = image_biases(plan, spec, 8)[0].max()
     for share, taken in ((0.9, False), (1.1, True)):
         # The forecast is a multiple of the potential spreads, so that all information is by A²/σ².
-        spec, plan = fixed_windows((at_one / (share * exact.IMAGE_BIAS)) ** 2)
+        spec, plan = fixed_windows((at_one / (share * model.IMAGE_BIAS)) ** 2)
         assert bool(plan.world.physics["image"]) is taken
         foretold, found = image_biases(plan, spec, n)
-        assert foretold.max() == pytest.approx(share * exact.IMAGE_BIAS, rel=0.01)
+        assert foretold.max() == pytest.approx(share * model.IMAGE_BIAS, rel=0.01)
         assert found == pytest.approx(0 if taken else foretold, abs=5 / np.sqrt(n))
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from radarsim.bursts import burst as model
-from radarsim.bursts import estimators
 from radarsim.bursts.burst import Condition, Designer
 from radarsim.studies.discriminator import search
 from radarsim.studies.discriminator.readings import BURST, PRINTED_PRIOR
@@ -20,9 +19,9 @@ def one_at_a_time(version, pulses=30000):
     burst = model.Burst(10e9, 1e-5, 1e-6, 1e-6, pulses, 1.0, version.noise_variance)
 
     def fisher(duration):
-        return estimators.fisher(burst, 5, duration)
+        return model.fisher(burst, 5, duration)
 
-    sigma = np.array(version.sigma or estimators.spreads(fisher(burst.duration_s)) * BURST.multiples)
+    sigma = np.array(version.sigma or model.spreads(fisher(burst.duration_s)) * BURST.multiples)
     return Designer(burst, sigma, fisher, Condition(threshold=version.threshold)).windows()
 
 
@@ -51,7 +50,7 @@ def test_the_sum_pulse_by_pulse_is_the_sum():
         t = 1e-5 * np.arange(n)
         rows = np.stack([np.ones(n), *(2 * np.pi * t**j / math.factorial(j) for j in range(1, 5))])
         information = rows @ rows.T / (2 * 2.25)  # A² sin² is ½ on average
-        np.testing.assert_allclose(spreads, estimators.spreads(information), rtol=1e-7)
+        np.testing.assert_allclose(spreads, model.spreads(information), rtol=1e-7)
 
 
 def test_with_the_phase_in_it_the_first_problem_has_no_root():
