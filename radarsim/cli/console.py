@@ -102,9 +102,10 @@ class Progress:
         self.bar.update(self.task, total=total, completed=done, told=told, refresh=forbidden())
 
     def rate(self, computed: int, total: int | None) -> float:
-        """How many are computed in a second, on average since the first report of so many in all; 0 if unknown."""
+        """How many are computed in a second, on average since the last report of none or of another total; 0 if
+        unknown."""
         now = time.monotonic()
-        if total != self.last[2] or computed < self.last[1]:
+        if total != self.last[2] or computed < self.last[1] or not computed:
             self.first = now, computed, total
         self.last = now, computed, total
         return (computed - self.first[1]) / (now - self.first[0]) if now > self.first[0] else 0.0
@@ -139,14 +140,18 @@ class Counter(Progress):
     shares = False
 
     def rate(self, computed: int, total: int | None) -> float:
-        """How many are done in a second, on average from the beginning."""
-        return computed / max(time.monotonic() - self.started, 1e-9)
+        """How many are done in a second, on average since the first report: before it files are read, kernels made."""
+        if not self.first[1]:
+            self.first = time.monotonic(), computed, total
+        return (computed - self.first[1]) / max(time.monotonic() - self.first[0], 1e-9)
 
     def _told(self, done: int, total: int | None, rate: float) -> str:
         words = tr(
             "{title}: {done:,} {what}, {rate:,.0f}/s", title=tr(self.title), done=done, what=self.what, rate=rate
         )
-        return words if total is None else words + "  " + tr("about {left} left", left=clock((total - done) / rate))
+        if total is None or not rate:
+            return words
+        return words + "  " + tr("about {left} left", left=clock((total - done) / rate))
 
 
 def show(

@@ -47,6 +47,7 @@ SHARES = {OUTLIERS: (1e-3, 0.4, 3.0), CORRELATION: (1e-3, 0.99, 0.0)}  # least, 
 FAR_FROM_ZERO = 1e4  # times the value of a key that counts as zero
 IMPOSSIBLE = -1e300  # stands for the logarithm of zero likelihood: a search needs a number
 TOP, END, BESIDE = 130, 15, 60  # likelihood evaluations of a key to the maximum and to an end; of an explanation
+FURTHER = 1.5  # evaluations of a fit that allows for more, in those of the plain one
 NOTHING: Mapping[str, float] = MappingProxyType({})
 STARTS = (-2.0, 0.0, 2.0)  # of a search
 Progress = Callable[[int, int | None], None]  # likelihoods computed, and their expected number where known
@@ -54,6 +55,24 @@ Progress = Callable[[int, int | None], None]  # likelihoods computed, and their 
 
 def silent(evaluations: int, expected: int | None = None) -> None:
     """Progress that is not shown."""
+
+
+class Stages:
+    """Progress of one fit after the other; further: whether a second one, which takes FURTHER times as many
+    likelihoods, is known to follow."""
+
+    def __init__(self, progress: Progress, further: bool):
+        self.progress, self.further, self.before, self.done = progress, further, 0, 0
+
+    def report(self, evaluations: int, expected: int | None = None) -> None:
+        self.done = self.before + evaluations
+        whole = expected and self.before + round(expected * (1 + FURTHER * self.further))
+        self.progress(self.done, whole)
+
+    def next(self) -> Progress:
+        """The progress of a further fit."""
+        self.before, self.further = self.done, False
+        return self.report
 
 
 def units(likelihood: Likelihood) -> np.ndarray:
@@ -462,17 +481,27 @@ def answered(
 ) -> Fit:
     """The fit of a likelihood that allows for what is asked, or where None for outliers and correlation that are plain:
     which raise the likelihood by more than chance does in one recording of 1000. With the plain fit beside it."""
-    plain = found = fitted(likelihood, (), progress, rough)
     allowed = tuple(allowing or ())
+    check_explained(likelihood, allowed)
+    stages = Stages(progress, bool(allowed))
+    plain = found = fitted(likelihood, (), stages.report, rough)
     if allowed:
-        found = fitted(likelihood, allowed, progress, rough)
+        found = fitted(likelihood, allowed, stages.next(), rough)
     while allowing is None and (more := found.beside) and more.what in (OUTLIERS, CORRELATION) and more.gain > PLAIN:
         allowed = (*allowed, more.what)
         try:
-            found = fitted(likelihood, allowed, progress, rough)
+            found = fitted(likelihood, allowed, stages.next(), rough)
         except ConfigError:  # so many outliers that they are another law: the plain fit says so beside
             break
     return found if found is plain else replace(found, plain=plain)
+
+
+def check_explained(likelihood: Likelihood, allowing: Sequence[str]) -> None:
+    """ConfigError unless a likelihood can allow for these."""
+    for what in allowing:
+        if what not in likelihood.explains:
+            thing = {OUTLIERS: "outliers", CORRELATION: "errors that last"}[what]
+            raise ConfigError(f"the likelihood of filter {likelihood.filter} cannot allow for {thing}")
 
 
 def fitted(
@@ -481,10 +510,7 @@ def fitted(
     """The keys at the maximum of a likelihood, with profile intervals; allowing: for these of OUTLIERS and CORRELATION;
     rough: the likelihood of fewer rows, for a first search. Raises ConfigError where these cannot be allowed for, or
     the plots are impossible whatever the keys."""
-    for what in allowing:
-        if what not in likelihood.explains:
-            thing = {OUTLIERS: "outliers", CORRELATION: "errors that last"}[what]
-            raise ConfigError(f"the likelihood of filter {likelihood.filter} cannot allow for {thing}")
+    check_explained(likelihood, allowing)
     robust = OUTLIERS in allowing
     if CORRELATION in allowing:
         likelihood, rough = Correlated(likelihood), rough and Correlated(rough)

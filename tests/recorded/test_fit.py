@@ -129,6 +129,25 @@ def test_the_end_is_foretold_from_the_beginning(scans, robust):
     assert expected.max() < 2 * len(done)
 
 
+@pytest.mark.parametrize("allowing", [[], [OUTLIERS], [CORRELATION]])
+def test_the_end_of_several_fits_is_foretold_from_the_beginning(allowing):
+    told = []
+    fit.answered(likelihood(flown("scans=200")), None, allowing, lambda done, expected: told.append((done, expected)))
+    done, expected = np.array(told).T
+    assert (np.diff(done) > 0).all()
+    assert (expected >= done).all()
+    assert len(done) / 2 < expected.min()
+    assert expected.max() < 2 * len(done)
+
+
+def test_what_cannot_be_allowed_for_is_refused_before_anything_is_computed():
+    one = likelihood(recording(np.random.default_rng(5)))
+    one.explains, told = (), []
+    with pytest.raises(ConfigError, match="cannot allow for outliers"):
+        fit.answered(one, None, [OUTLIERS], lambda *counts: told.append(counts))
+    assert not told
+
+
 def test_a_key_at_zero_is_raised_where_that_makes_the_plots_likelier():
     """In realisations 12 and 15 the search comes to zero first, though the top is above it."""
     near = np.linspace(0.99, 1.01, 21)  # the top at zero lies half a per cent from the other, at most
