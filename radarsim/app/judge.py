@@ -20,6 +20,7 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.config.schema import OwnCode
 from radarsim.errors import ConfigError, DisagreementError, MeasureError, argument
 from radarsim.language import tr
+from radarsim.recorded import follow
 from radarsim.report import statistics
 from radarsim.studies import outside, registry
 from radarsim.studies.interface import TRUE, true_column
@@ -87,7 +88,8 @@ def judge(
     texts = run.merged(configs.check(overrides, out=out, **asked), None, seed)
     tuned = {"against": against, "wanted": wanted}
     loaded = configs.load(config, texts)
-    experiment, warnings = judged(loaded, estimates, name, components, one_by_one, realisations, **tuned)
+    named = (components,) if isinstance(components, str) else tuple(components)
+    experiment, warnings = judged(loaded, estimates, name, named, one_by_one, realisations, **tuned)
     member = experiment.cases[0].outside[-1]
     asked = {"precision": precision, "of": of, "progress": progress, "threads": 0 if member.in_order else threads}
     return finished(experiment, warnings, out, figures, width_mm, **asked)
@@ -121,14 +123,14 @@ def judged(
     experiment: Experiment,
     estimates: Any,
     name: str,
-    components: Sequence[str] = (),
+    components: tuple[str, ...] = (),
     one_by_one: bool = False,
     realisations: float | None = None,
     against: str | None = None,
     wanted: str | None = None,
 ) -> tuple[Experiment, list[str]]:
     """The experiment with a filter beside its own, under a name with the filter's, and what the checks say of it."""
-    left_out: list[str] = []
+    left_out, judged_at = list[str](), None
     if against not in (None, "tuned"):
         raise ConfigError(f"{argument('against', '--against')}: must be tuned, got {against!r}")
     if wanted is not None and not against:
@@ -136,10 +138,11 @@ def judged(
     if against:
         from radarsim.app import tune
 
-        experiment, left_out = tune.beside(experiment, wanted, realisations=realisations)
+        experiment, left_out, judged_at = tune.beside(experiment, wanted, realisations=realisations)
     _nameable(name)
     n, cases = configs.whole(realisations), experiment.cases
-    member = source(estimates, name, tuple(components), one_by_one, cases)
+    member = source(estimates, name, components, one_by_one, experiment)
+    member.judged_at = judged_at
     there = len(member.arrays[0]) if isinstance(member, Given) else None
     if there is not None and (n or 0) > there:
         raise ConfigError(f"{name}: there are estimates of {there} realisations, fewer than {n}")
@@ -150,27 +153,26 @@ def judged(
     return made, [*left_out, *(line for case in made.cases for line in tried(case, member))]
 
 
-def source(given: Any, name: str, components: tuple[str, ...], one_by_one: bool, cases: Sequence[Case]) -> Outside:
+def source(given: Any, name: str, components: tuple[str, ...], one_by_one: bool, experiment: Experiment) -> Outside:
     """Where the estimates come from. Raises ConfigError for what is none of the kinds."""
-    if isinstance(given, Outside):
-        return given
     if callable(given) or hasattr(given, "step") or hasattr(given, "start"):
         components = components or outside.components_of(given)
         of = given if hasattr(given, "__qualname__") else type(given)
         return Called(name, given, f"{of.__module__}.{of.__qualname__}", components, one_by_one)
-    if len(cases) > 1:
-        every = ", ".join(case.name for case in cases)
-        raise ConfigError(f"{name}: estimates are of one case, and there are {every}: give one config, or a function")
+    if len(cases := experiment.cases) > 1:
+        which = follow.choice(experiment, "radarsim judge {} ESTIMATES")
+        raise ConfigError(f"{name}: estimates are of one case, and there are {len(cases)}: give a function, or {which}")
     if isinstance(given, Iterator):
         return Chunks(name, given, "iterator", components)
     if isinstance(given, str | os.PathLike):
         given, components = read(Path(given), cases[0], components)
     x, P = outside.copied(given)
-    if x.ndim not in (2, 3) or x.dtype.kind not in "fiu":
+    if x.ndim not in (2, 3) or not x.size or x.dtype.kind not in "fiu":
         got = f"{x.dtype} {x.shape}" if x.ndim else f"{given!r:.60}"
         raise ConfigError(f"{name}: estimates must be an array (n, K, d), a function, an iterator or a file, got {got}")
-    if P is not None and len(P) != len(x):
-        raise ConfigError(f"{name}: covariances must be of {len(x)} realisations, as the estimates, got {len(P)}")
+    if P is not None and P.shape[:1] != x.shape[:1]:
+        there = f"{len(x)} realisations, as the estimates, got {len(P) if P.ndim else P}"
+        raise ConfigError(f"{name}: covariances must be of {there}")
     found = hashlib.sha256(np.ascontiguousarray(x).tobytes())
     found.update(b"" if P is None else np.ascontiguousarray(P).tobytes())
     return Given(name, (x, P), found.hexdigest(), components)
@@ -201,7 +203,7 @@ def read(path: Path, case: Case, components: tuple[str, ...]) -> tuple[Any, tupl
     """
     try:
         if path.suffix == ".npz":
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as held:  # which leaves a damaged one open
+            with path.open("rb") as file, np.lib.npyio.NpzFile(file, allow_pickle=False) as held:
                 return _of_arrays(path, dict(held), case, components)
         import pandas as pd
 
@@ -210,8 +212,7 @@ def read(path: Path, case: Case, components: tuple[str, ...]) -> tuple[Any, tupl
         table = pd.read_csv(path, comment="#") if path.suffix == ".csv" else pd.read_parquet(path)
         return _of_table(path, table.rename(columns=lambda name: str(name).strip()), case)
     except (OSError, EOFError, ValueError, TypeError, ImportError, BadZipFile) as error:
-        why = "it is no .npz archive, or cut short" if "pickled" in str(error) else error
-        raise ConfigError(f"{path}: cannot be read: {why}") from error
+        raise ConfigError(f"{path}: cannot be read: {error}") from error
 
 
 def _of_arrays(
@@ -219,34 +220,35 @@ def _of_arrays(
 ) -> tuple[Any, tuple[str, ...]]:
     if "estimates" not in held:
         raise ConfigError(f"{path}: must hold an array `estimates` (n, K, d), got {', '.join(held) or 'nothing'}")
-    if "seed" in held and int(held["seed"]) != case.seed:
-        raise ConfigError(f"{path}: of plots with seed {int(held['seed'])}; the run has seed {case.seed}")
+    if "seed" in held and (seed := held["seed"].ravel().tolist()) != [case.seed]:
+        raise ConfigError(f"{path}: of plots with seed {', '.join(map(str, seed))}; the run has seed {case.seed}")
     x, P = held["estimates"], held.get("covariances")
+    if x.ndim not in (2, 3):
+        raise ConfigError(f"{path}: estimates must be an array (n, K, d), got {x.dtype} {x.shape}")
     rows = next((held[one].ravel() for one in ("realisation", "realisations") if one in held), np.arange(len(x)))
-    if len(rows) != len(x):
-        raise ConfigError(
-            f"{path}: realisation: must be {len(x)} numbers, as many as there are estimates, got {len(rows)}"
-        )
+    if len(rows) != len(x) or rows.dtype.kind not in "fiu":
+        got = f"{len(rows)} of type {rows.dtype}"
+        raise ConfigError(f"{path}: realisation: must be {len(x)} numbers, as many as there are estimates, got {got}")
     order = _in_order(path, rows)
     own = tuple(map(str, np.atleast_1d(held["components"]))) if "components" in held else components
-    return (x[order], P[order] if len(P) == len(x) else P) if P is not None else x[order], own
+    return (x[order], P[order] if P.shape[:1] == x.shape[:1] else P) if P is not None else x[order], own
 
 
 def _of_table(path: Path, table: "pd.DataFrame", case: Case) -> tuple[Any, tuple[str, ...]]:
     """One row a realisation and scan: `realisation`, `k` or `t_s`, and a column for each component."""
-    world = outside.prepare(registry.study(case.study), case, CaseWork(case).plan).world
+    drawn = outside.drawing(registry.study(case.study), case)(0, 1)
     columns = {
         name: one
         for name in table
-        for one, unit in world.components
+        for one, unit in drawn.components
         if name in (one, true_column(one, unit).removeprefix(TRUE))
     }
     at = next((one for one in AXES[1:] if one in table), "")
     if "realisation" not in table or not at or not columns:
-        wanted = f"realisation, k or t_s, and of {', '.join(one for one, _ in world.components)} those it estimates"
+        wanted = f"realisation, k or t_s, and of {', '.join(one for one, _ in drawn.components)} those it estimates"
         raise ConfigError(f"{path}: must have the columns {wanted}; got {', '.join(map(str, table))}")
     held = {name: _numbers(path, table, name) for name in ("realisation", at, *columns)}
-    K, places = len(world.t_s), np.arange(1, len(world.t_s) + 1.0) if at == "k" else world.t_s
+    K, places = len(drawn.t_s), np.arange(1, len(drawn.t_s) + 1.0) if at == "k" else drawn.t_s
     scan = np.searchsorted((places[1:] + places[:-1]) / 2, held[at])
     off = np.abs(held[at] - places[scan]) > ROUNDED * np.diff(places).min(initial=np.inf)
     if off.any():
@@ -299,7 +301,7 @@ def tried(case: Case, member: Outside) -> list[str]:
     drawn = plan.draw(0, min(case.realisations, TRIED))
     plots = outside.plots_of(plan, drawn)
     given = member.estimates(plots)
-    raw = np.asarray(given[0] if isinstance(given, tuple) else given)
+    raw = outside.plain(outside.parts(given)[0])
     inner = outside.inner_errors(plan, 0, drawn.n)
     found = outside.judged(plan, member, given, drawn, outside.largest(inner))
     x, _ = outside.checked(member.name, given, drawn.n, len(plan.world.t_s), plan.names, member.components)
@@ -346,6 +348,8 @@ def _again(plan: Plan, member: Outside, plots: Plots) -> np.ndarray:
 
 
 def _differ(one: np.ndarray, other: np.ndarray, least: np.ndarray) -> bool:
+    if one.shape != other.shape:
+        return True
     with np.errstate(invalid="ignore"):
         return bool((np.isfinite(one) != np.isfinite(other)).any() or (np.abs(one - other) > least).any())
 
@@ -360,8 +364,9 @@ def _repeatable(plan: Plan, member: Any, x: np.ndarray, least: np.ndarray) -> It
             name=name,
         )
         return
-    half = max(n // 2, 1)
-    if half < n and _differ(_again(plan, member, outside.plots_of(plan, plan.draw(0, half))), x[:half], least):
+    rows = slice(n // 4, n // 4 + max(n // 2, 1))  # neither the first nor the last, which such a filter may refer to
+    part = outside.plots_of(plan, plan.draw(rows.start, rows.stop - rows.start))
+    if n > 1 and _differ(_again(plan, member, part), x[rows], least):
         yield tr("{name}: its estimates of a realisation depend on the others in the batch", name=name)
         return
     if hasattr(member.target, "step") or K < 2 or n < 2:

@@ -730,13 +730,16 @@ def _minimised(of: Objective, cases: int) -> str:
     return tr("{quantity}, mean of {cases} cases", **told)
 
 
-def beside(experiment: Experiment, wanted: str | None, **asked: Any) -> tuple[Experiment, list[str]]:
-    """The experiment with each of its filters as tuned over all its cases too, and why some are not; raises ConfigError
-    where none is.
+def beside(
+    experiment: Experiment, wanted: str | None, **asked: Any
+) -> tuple[Experiment, list[str], tuple[str, float] | None]:
+    """The experiment with each of its filters as tuned over all its cases too, why some are not, and the component and
+    time, s, that they are tuned for, None if of no component; raises ConfigError where none is.
 
     wanted: for what, by default σ of the first component at the last scan; asked: as `tune` takes it."""
     case, found, left_out = experiment.cases[0], list[Tuned](), []
-    wanted = wanted or f"sigma {registry.study(case.study).prepare(case).axes.components[0][0]}"
+    axes = registry.study(case.study).prepare(case).axes
+    wanted = wanted or f"sigma {axes.components[0][0]}"
     for one in case.spec.members:
         try:
             found.append(tune(experiment, wanted, filter=one.name, **asked))
@@ -748,4 +751,8 @@ def beside(experiment: Experiment, wanted: str | None, **asked: Any) -> tuple[Ex
     for each in experiment.cases:
         members = [*map(complete, each.spec.members), *(one.member(each) for one in found)]
         made.append(with_filters(each, members, getattr(each.spec, "baseline", None)))
-    return replace(experiment, cases=tuple(made)), left_out
+    quantity = found[0].quantity
+    at_s = axes.t_s[-1] if quantity.at_s is None else quantity.at_s
+    at_s = at_s if quantity.at_k is None else axes.t_s[list(axes.k).index(quantity.at_k)]
+    judged_at = (quantity.component, float(at_s)) if quantity.component else None
+    return replace(experiment, cases=tuple(made)), left_out, judged_at

@@ -85,7 +85,8 @@ def simulate(
     errors that the run accumulates. A missed plot is an empty cell; the truth is in columns true_….
 
     Several realisations follow one another in a CSV or Parquet file, with their number in the column `realisation`. An
-    .npz file holds an array for each column, (realisations, scans), with NaN for a missed plot, and the times t_s.
+    .npz file holds an array for each column, (realisations, scans), with NaN for a missed plot, the times t_s, and the
+    seed.
 
     \b
     Example

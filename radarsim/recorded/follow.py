@@ -16,6 +16,7 @@ import shlex
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -31,6 +32,7 @@ from radarsim.errors import ConfigError, PlotFault, argument
 from radarsim.recorded import plots
 from radarsim.recorded.plots import Places, cells
 from radarsim.report.files import Writer
+from radarsim.studies import outside
 from radarsim.studies.interface import Drawn, RecordedPlots, Tracker, true_column
 from radarsim.studies.registry import module as home_of
 from radarsim.studies.registry import study
@@ -234,8 +236,10 @@ def batches(experiment: Experiment, n: int, first: int = 0, chunk: int | None = 
         what = argument("first + n", "--realisations: STOP")
         raise ConfigError(f"{what}: must be at most {LARGEST_REALISATIONS}, got {first + n}")
     case = case_with_plots(experiment)
-    plots, last = recorded_of(case), first + n
-    return (plots.drawn(case, i, min(size, last - i)) for i in range(first, last, size))
+    plots, last, of = recorded_of(case), first + n, study(case.study)
+    world = cache(lambda: outside.world_of(of, case, plots.drawn(case, first, 1), of.prepare(case).axes.components))
+    own: dict[str, Any] = {"seed": case.seed, "known": world}
+    return (replace(plots.drawn(case, i, min(size, last - i)), **own) for i in range(first, last, size))
 
 
 def _whole(name: str, value: Any, least: int) -> int:
@@ -625,10 +629,10 @@ def write_many(
 
 
 def to_npz(file: Writer, one: Drawn, parts: Parts, n: int) -> None:
-    """`realisation` (n,), `t_s` (K,), and each array (n, K) or (n, K, M); (1, K) where all realisations have the same.
-    One array after the other, so that the plots are drawn as often as there are arrays."""
+    """`seed`, `t_s` (K,), `realisation` (n,), and each array (n, K) or (n, K, M); (1, K) where all have the same. One
+    array after the other, so that the plots are drawn as often as there are arrays."""
     widest = max(array.shape[2] for part in parts() for array in part.columns.values()) if one.several else 0
-    first, alone = {"realisation": np.arange(one.n), **one.arrays()}, {"t_s": one.t_s}
+    first, alone = {"realisation": np.arange(one.n), **one.arrays()}, {"t_s": one.t_s, "seed": np.array(one.seed)}
     alone |= {name: array[:1] for name, array in first.items() if array.strides[0] == 0}
     with zipfile.ZipFile(file.binary, "w") as archive:
         for name, array in (first | alone).items():

@@ -27,6 +27,7 @@ IMPROPER = "not_positive_definite"  # covariances, counted after the reasons
 SINGLE = 1e-3  # per cent: width of the interval of a gain that is nought but for rounding to single precision
 TUNED = ", tuned"  # the end of the names of filters that `radarsim tune` has tuned
 GAIN = ("gain_percent", "gain_lo", "gain_hi")
+SIGMA = ("sigma", "sigma_lo", "sigma_hi")
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------
@@ -216,16 +217,20 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
         none = tr("{name} has no estimate that could be compared", name=name)
         return [f"{case}{failing if fails['failed'] else none}."]
     start = case + (tr("{failing}; in the others ", failing=failing) if fails["failed"] else "")
-    component, unit = next(one for one in result.axes.components if one[0] in set(rows["component"]))
-    last = rows[rows["component"].eq(component) & rows["k"].eq(rows.loc[rows["component"].eq(component), "k"].max())]
+    there = [one for one in result.axes.components if one[0] in set(rows["component"])]
+    wanted, at_s = others(result)[0].axes.judged_at or (there[0][0], np.inf)
+    component, unit = next((one for one in there if one[0] == wanted), there[0])
+    of = rows[rows["component"] == component]
+    away = (of["t_s"] - min(at_s, of["t_s"].max())).abs()
+    last = of[of["k"] == of["k"][away.idxmin()]]
     curves = common.where(made["curves"], case=result.name, component=component, k=last["k"].iloc[0])
     sigma = dict(zip(curves["filter"], common.exact_first(curves, "sigma", "exact_sigma"), strict=True))
     own = [base for base in last["baseline"] if base in result.axes.filters]
     tuned = [base for base in own if base.endswith(TUNED)]
-    best = min(set(own).difference(tuned), key=lambda base: sigma[base])
+    best = min((base for base in own if base not in tuned), key=lambda base: sigma[base])
     row = last[last["baseline"] == best].iloc[0]
     told: dict[str, Any] = {"name": name, "best": best, "component": component, "t": numeral(f"{row['t_s']:g}")}
-    told["gain"] = wording.estimate((row[key] for key in GAIN), "%", ".3g")
+    told["gain"] = _gain(row)
     if row["gain_lo"] > 0:
         first = tr("{name} is better than {best}, the config's best in {component} at {t} s: gain {gain}", **told)
     elif row["gain_hi"] < 0:
@@ -237,7 +242,7 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
     rivals = [best, *sorted(tuned, key=lambda base: sigma[base])[:1]]
     if tuned:
         rival = last[last["baseline"] == rivals[1]].iloc[0]
-        told |= {"best": rival["baseline"], "gain": wording.estimate((rival[key] for key in GAIN), "%", ".3g")}
+        told |= {"best": rival["baseline"], "gain": _gain(rival)}
         if rival["gain_lo"] > 0:
             first += tr(", and better than {best}: gain {gain}", **told)
         elif rival["gain_hi"] < 0:
@@ -247,22 +252,29 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
         own_sigma = f"{wording.number(sigma[rival['baseline']])} {panels.unit_of(unit)}"
         first += tr(", whose σ is {sigma}", sigma=own_sigma.rstrip())
     mine = curves[curves["filter"] == name].iloc[0]
-    sigmas = wording.estimate((mine[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(unit))
+    sigmas = wording.estimate((mine[key] for key in SIGMA), panels.unit_of(unit))
     said = [start + first + "; " + tr("its σ is {sigma}, {floor}.", sigma=sigmas, floor=_floor(curves, best, unit))]
     floor = common.where(made["floor"], case=result.name, component=component, k=last["k"].iloc[0])
-    sigmas_there = {name: mine["sigma"]} | {one: sigma[one] for one in rivals}
-    said += _above_floor(floor, sigmas_there, float(mine["sigma_hi"]), panels.unit_of(unit))
-    against = [f"{one['baseline']} {wording.estimate((one[key] for key in GAIN), '%', '.3g')}"
-               for one in last.to_dict("records") if one["baseline"] != best]  # fmt: skip
+    said += _above_floor(floor, mine, {one: sigma[one] for one in rivals}, panels.unit_of(unit))
+    against = [f"{one['baseline']} {_gain(one)}" for one in last.to_dict("records") if one["baseline"] != best]
     if against:
         said.append(tr("Further gains of {name} there: against {gains}.", name=name, gains=listed(against)))
     extremes = rows[rows["baseline"] == best].sort_values("gain_percent").iloc[[0, -1]].to_dict("records")
-    ends = [tr("{gain} ({component} at {t} s)", gain=wording.estimate((one[key] for key in GAIN), "%", ".3g"),
-               component=one["component"], t=numeral(f"{one['t_s']:g}")) for one in extremes]  # fmt: skip
+    ends = [
+        tr("{gain} ({component} at {t} s)", gain=_gain(one), component=one["component"], t=numeral(f"{one['t_s']:g}"))
+        for one in extremes
+    ]
     if len(rows) > len(last):
         said.append(tr("Over all components and scans its gain against {best} is from {least} to {most}.",
                        best=best, least=ends[0], most=ends[1]))  # fmt: skip
     return [*said, *_nees(result, name, made)]
+
+
+def _gain(row: Any) -> str:
+    """A gain with its interval, to a thousandth of a per cent, its ends outward: what is finer is rounding."""
+    value, lo, hi = (float(row[key]) for key in GAIN)
+    rounded = np.round(value, 3), np.floor(1e3 * lo) / 1e3, np.ceil(1e3 * hi) / 1e3
+    return wording.estimate((one + 0.0 for one in rounded), "%", ".3g")
 
 
 def _floor(curves: "pd.DataFrame", best: str, unit: str) -> str:
@@ -270,24 +282,24 @@ def _floor(curves: "pd.DataFrame", best: str, unit: str) -> str:
     row = curves[curves["filter"] == best].iloc[0]
     if np.isnan(row["exact_sigma"]):
         return tr("that of {best} {sigma}", best=best, sigma=wording.estimate(
-            (row[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(unit)))  # fmt: skip
+            (row[key] for key in SIGMA), panels.unit_of(unit)))  # fmt: skip
     return tr("that of {best} {sigma} {unit} exactly", best=best, sigma=wording.number(row["exact_sigma"]),
               unit=panels.unit_of(unit))  # fmt: skip
 
 
-def _above_floor(floor: "pd.DataFrame", sigmas: Mapping[str, float], sigma_hi: float, unit: str) -> Iterator[str]:
-    """How far the filter from outside, the first of these σ, the config's best, and the best tuned one are from the
-    floor. sigma_hi: the upper end of its interval."""
-    name, *others = sigmas
+def _above_floor(floor: "pd.DataFrame", mine: Any, rivals: Mapping[str, float], unit: str) -> Iterator[str]:
+    """How far the filter from outside, a row of its curve, the config's best, and the best tuned one are from the
+    floor."""
+    name = mine["filter"]
     rows = common.where(floor, filter=name)
     if len(rows):
         least = float(rows["floor"].iloc[0])
-        own, *above = (f"{wording.number(round(100 * (sigma / least - 1), 2), 3)} %" for sigma in sigmas.values())
-        told = {"name": name, "own": own, "floor": f"{wording.number(least)} {unit}".rstrip()}
-        told["others"] = listed([f"{one} {size}" for one, size in zip(others, above, strict=True)])
+        own = wording.estimate((100 * (mine[key] / least - 1) for key in SIGMA), "%", ".3g")
+        others = [f"{one} {wording.number(round(100 * (of / least - 1), 2), 3)} %" for one, of in rivals.items()]
+        told = {"name": name, "own": own, "floor": f"{wording.number(least)} {unit}".rstrip(), "others": listed(others)}
         kind = tr(UNBIASED if rows["kind"].iloc[0].startswith("CRB") else ANY)
         said = tr("The floor there, {kind}, is {floor}: {name} is {own} above it, {others}.", kind=kind, **told)
-        if sigma_hi < least:
+        if mine["sigma_hi"] < least:
             said += " " + tr("Below it is only what is biased, or knows more than these plots.")
         yield said
 

@@ -192,7 +192,7 @@ def gain(
         # One realisation shows no spread: the interval is unbounded.
         step = np.where(n > 1, 0.5 * student(n - 1) * np.sqrt(variance), np.inf)
     with np.errstate(over="ignore"):  # of two realisations
-        factor = np.exp(step)
+        factor = np.where((ratio == 0) & (n > 1), 1, np.exp(step))  # of errors that are all nought
     return Estimate(100 * (1 - ratio), 100 * (1 - ratio * factor), 100 * (1 - ratio / factor))
 
 

@@ -169,7 +169,7 @@ class Coded(Outside):
 
     def estimates(self, plots: Plots) -> Any:
         target = self.target
-        with self._running(f"fails in realisations {plots.first}:{plots.n} (first:count) of {plots.world.case}"):
+        with self._running(f"fails in realisations {plots.first}:{plots.first + plots.n} of {plots.world.case}"):
             of = partial(made_of, self.name, target) if isinstance(target, type) else partial(partial, target)
             made = of(**self.given)
             return Called(self.name, made, alone=self.keys.one_by_one).estimates(plots)

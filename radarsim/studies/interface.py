@@ -78,6 +78,30 @@ def true_column(component: str, unit: str) -> str:
     return f"{TRUE}{component}_{IN_NAMES.get(plain, plain.replace('/', 'p'))}"
 
 
+@dataclass(frozen=True)
+class World:
+    """What a filter may know beforehand.
+
+    t_s (K,) times of the scans, s; columns: what is measured, units in the names; sigma: its standard deviations, where
+    the config states them; components: names and units of the state; keys: the config, as YAML has it;
+    case: what the case is called.
+    """
+
+    t_s: "np.ndarray"
+    columns: tuple[str, ...]
+    sigma: Mapping[str, float]
+    components: tuple[tuple[str, str], ...]
+    keys: Mapping[str, Any]
+    case: str = ""
+
+
+def column(columns: "Mapping[str, np.ndarray]", name: str) -> "np.ndarray":
+    """A column of plots by its name; the KeyError names those that are there."""
+    if name not in columns:
+        raise KeyError(f"{name}: plots have {', '.join(columns)}")
+    return columns[name]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Drawn:
     """The plots of n realisations from number `first` on, as a run draws them, and the truth at the times t_s (K,), s.
@@ -86,7 +110,8 @@ class Drawn:
                     several plots: these come first, the rest is not-a-number, and M is as large as needed
     truth (n, K, C) the true state, its components by name and unit; beside: further columns, true_…, of either shape
 
-    Arrays may be views that cannot be written."""
+    seed: of the noise; world: what a filter may know beforehand, a `World`. So a function that `radarsim.judge` takes
+    can be called with these: it reads `plots["range_m"]`, t_s, world. Arrays may be views that cannot be written."""
 
     t_s: "np.ndarray"
     columns: "Mapping[str, np.ndarray]"
@@ -94,6 +119,17 @@ class Drawn:
     truth: "np.ndarray"
     beside: "Mapping[str, np.ndarray]" = field(default_factory=dict)
     first: int = 0
+    seed: int = 0
+    known: Callable[[], World] | None = None  # the world, made when asked for
+
+    def __getitem__(self, name: str) -> "np.ndarray":
+        return column(self.columns, name)
+
+    @property
+    def world(self) -> World:
+        """See the class."""
+        assert self.known is not None  # as in what `radarsim.plots` gives
+        return self.known()
 
     @property
     def n(self) -> int:

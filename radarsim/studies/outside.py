@@ -31,6 +31,7 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Axes, CaseResult, Layout
 from radarsim.errors import ConfigError
+from radarsim.studies.interface import World, column
 
 if TYPE_CHECKING:
     from radarsim.studies.interface import Draw, Drawn, Study
@@ -45,22 +46,6 @@ Estimates = tuple[np.ndarray, np.ndarray | None]  # (n, K, d), and covariances (
 
 # ---- what a filter sees ----------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
-class World:
-    """What a filter may know beforehand.
-
-    t_s (K,) times of the scans, s; columns: what is measured, units in the names; sigma: its standard deviations, where
-    the config states them; components: names and units of the state; keys: the config, as YAML has it;
-    case: what the case is called."""
-
-    t_s: np.ndarray
-    columns: tuple[str, ...]
-    sigma: Mapping[str, float]
-    components: tuple[tuple[str, str], ...]
-    keys: Mapping[str, Any]
-    case: str = ""
-
-
-@dataclass(frozen=True)
 class Plots:
     """Plots of n realisations from number `first` on, not-a-number where missing: `plots["range_m"]`, (n, K). Of one
     scan these are (n,), and t_s is its time; of one realisation (K,)."""
@@ -72,7 +57,7 @@ class Plots:
     n: int
 
     def __getitem__(self, name: str) -> np.ndarray:
-        return self.columns[name]
+        return column(self.columns, name)
 
 
 # ---- where estimates come from ---------------------------------------------------------------------------------------
@@ -86,6 +71,7 @@ class Outside(ABC):
     in_order: bool = False
     written: Mapping[str, Any] | None = None  #: its keys, where a config has it
     baseline: bool = False  #: whether gains of the others are against it too
+    judged_at: tuple[str, float] | None = None  #: component and time, s, that the answer is about; None: first, last
 
     @abstractmethod
     def estimates(self, plots: Plots) -> Any:
@@ -149,7 +135,10 @@ def stepped(name: str, target: Any, plots: Plots) -> Any:
 
 
 def parts(given: Any) -> tuple[Any, Any]:
-    """Estimates, and covariances or None, of what a filter gave."""
+    """Estimates, and covariances or None, of what a filter gave: a tuple; or a list, whose second has one more axis."""
+    if isinstance(given, list) and len(given) == 2:
+        x, P = (getattr(one, "ndim", 0) for one in given)
+        given = tuple(given) if x and x + 1 == P else given
     return given if isinstance(given, tuple) and len(given) == 2 else (given, None)
 
 
@@ -176,7 +165,12 @@ def stacked(name: str, given: Sequence[Estimates], places: Sequence[str], axis: 
 
 def plain(values: Any) -> np.ndarray:
     """Values of any shape (n, …) as an array of its own: not-a-number where they are masked."""
-    return np.ma.filled(values.astype(float), np.nan) if isinstance(values, np.ma.MaskedArray) else np.array(values)
+    if isinstance(values, np.ma.MaskedArray):
+        return np.ma.filled(values.astype(float), np.nan)
+    try:
+        return np.array(values)
+    except ValueError:  # rows of several lengths
+        return np.array(None)  # which is refused, as it holds no numbers
 
 
 def components_of(target: Any) -> tuple[str, ...]:
@@ -197,8 +191,6 @@ class Given(Outside):
     def estimates(self, plots: Plots) -> Estimates:
         rows = slice(plots.first, plots.first + plots.n)
         x, P = self.arrays
-        if len(x) < rows.stop:
-            raise ConfigError(f"{self.name}: must hold {rows.stop} realisations, got {len(x)}")
         return x[rows], None if P is None else P[rows]
 
 
@@ -218,16 +210,28 @@ class Chunks(Outside):
         start, stop = plots.first, plots.first + plots.n
         while self._kept and self._first + len(self._kept[0][0]) <= start:
             self._first += len(self._kept.pop(0)[0])
-        while self._first + sum(len(x) for x, _ in self._kept) < stop:
+        while (there := self._first + sum(len(x) for x, _ in self._kept)) < stop:
             chunk = next(self.source, None)
             if chunk is None:
-                there = self._first + sum(len(x) for x, _ in self._kept)
-                raise ConfigError(f"{self.name}: must give {stop} realisations, ended after {there}")
-            self._kept.append(copied(chunk))
+                takes = f"; realisations={there} takes these" if there else ""
+                raise ConfigError(f"{self.name}: must give {stop} realisations, ended after {there}{takes}")
+            self._kept.append(self._chunk(chunk, plots))
         rows = slice(start - self._first, stop - self._first)
-        covariances = [P for _, P in self._kept if P is not None]
-        x = np.concatenate([x for x, _ in self._kept])[rows]
-        return x, np.concatenate(covariances)[rows] if len(covariances) == len(self._kept) else None
+        x = np.concatenate([x for x, _ in self._kept])
+        if all(P is None for _, P in self._kept):
+            return x[rows], None
+        every = [np.full((*x.shape, x.shape[2]), np.nan) if P is None else P for x, P in self._kept]
+        return x[rows], np.concatenate(every)[rows]
+
+    def _chunk(self, given: Any, plots: Plots) -> Estimates:
+        """A chunk's estimates (n, K, d) and covariances, in arrays of their own."""
+        x, P = copied(given)
+        names = [name for name, _ in plots.world.components]
+        shape = checked(self.name, (x, P), len(x) if x.ndim else 0, len(plots.t_s), names, self.components)[0].shape
+        if self._kept and shape[2] != self._kept[0][0].shape[2]:
+            raise ConfigError(f"{self.name}: chunks must hold the same components, got {self._kept[0][0].shape[2]} "
+                              f"and then {shape[2]}")  # fmt: skip
+        return x.reshape(shape), P
 
 
 def checked(name: str, given: Any, n: int, K: int, components: Sequence[str], own: Sequence[str]) -> Estimates:
@@ -266,10 +270,11 @@ def columns_of(name: str, d: int, components: Sequence[str], own: Sequence[str])
 @dataclass(frozen=True)
 class OutsideAxes(Axes):
     """Axes of filters from outside. baselines: those that the gains of the config's filters are against too;
-    identities: what the numbers of each depend on."""
+    identities: what the numbers of each depend on; judged_at: as of `Outside`."""
 
     baselines: tuple[str, ...] = ()
     identities: tuple[str, ...] = ()
+    judged_at: tuple[str, float] | None = None
 
 
 # ---- plan and sums ---------------------------------------------------------------------------------------------------
@@ -299,9 +304,7 @@ class Plan:
 
 def prepare(study: "Study", case: Case, inner: Any) -> Plan:
     """The plan beside the study's own. Raises ConfigError for a study whose errors no filter can be paired with."""
-    recorded, axes = study.recorded(), inner.axes
-    if recorded is None:
-        raise ConfigError(f"{case.name}: study {study.name} draws no plots that a filter from outside could take")
+    draw, axes = drawing(study, case), inner.axes
     if "paired" not in inner.layout.shapes:
         raise ConfigError(
             f"{case.name}: its trackers find tracks of their own, in other realisations each: there is no estimate in "
@@ -310,15 +313,11 @@ def prepare(study: "Study", case: Case, inner: Any) -> Plan:
     names = [member.name for member in case.outside]
     if taken := [name for i, name in enumerate(names) if name in (*axes.filters, *names[:i])]:
         raise ConfigError(f"{case.name}: name: there is a filter {taken[0]!r} already; give another name")
-    draw = recorded.drawing(case)
     first = draw(0, 1)
     scans = np.asarray(axes.k) - 1
     if first.several or scans[-1] >= len(first.t_s) or not np.allclose(first.t_s[scans] - first.t_s[0], axes.t_s):
         raise ConfigError(f"{case.name}: its plots do not stand at the scans of its errors")
-    keys = recorded.sigmas(case.spec)
-    stated = {one.rpartition("sigma_")[2]: one for of in keys.values() for one in of}
-    sigma = {name: attrgetter(stated[name])(case.spec) for name in first.columns if name in stated}
-    world = World(first.t_s, tuple(first.columns), sigma, axes.components, case.keys, case.name)
+    world = world_of(study, case, first, axes.components)
     G, (F, K, C) = len(names), axes.available.shape
     layout = Layout(
         error=(G, K, C, 4),
@@ -330,8 +329,26 @@ def prepare(study: "Study", case: Case, inner: Any) -> Plan:
     unknown = np.full((G, K, C), np.nan)
     labels = tuple(names), axes.components, axes.k, axes.t_s, np.ones((G, K, C), dtype=bool), 0, unknown, unknown
     baselines = tuple(member.name for member in case.outside if member.baseline)
-    own = OutsideAxes(*labels, baselines, tuple(member.identity for member in case.outside))
+    judged_at = next((member.judged_at for member in case.outside if member.judged_at), None)
+    own = OutsideAxes(*labels, baselines, tuple(member.identity for member in case.outside), judged_at)
     return Plan(study, inner, draw, world, scans, case.outside, own, layout)
+
+
+def drawing(study: "Study", case: Case) -> "Draw":
+    """What draws the plots of a case; raises ConfigError for a study without any."""
+    recorded = study.recorded()
+    if recorded is None:
+        raise ConfigError(f"{case.name}: study {study.name} draws no plots that a filter from outside could take")
+    return recorded.drawing(case)
+
+
+def world_of(study: "Study", case: Case, drawn: "Drawn", components: tuple[tuple[str, str], ...]) -> World:
+    """What a filter over these plots may know, of a state with these components."""
+    recorded = study.recorded()
+    keys = {} if recorded is None else recorded.sigmas(case.spec)
+    stated = {one.rpartition("sigma_")[2]: one for of in keys.values() for one in of}
+    sigma = {name: attrgetter(stated[name])(case.spec) for name in drawn.columns if name in stated}
+    return World(drawn.t_s, tuple(drawn.columns), sigma, components, case.keys, case.name)
 
 
 def plots_of(plan: Plan, drawn: "Drawn") -> Plots:

@@ -225,6 +225,7 @@ def test_what_a_filter_may_not_give_is_said_with_its_place():
         lambda plots: np.zeros((plots.n, 15, 2)), components=("r", "r")
     )
     assert "must have start(world) and step(plots)" in refusal(type("Half", (), {"step": Odd.step}))
+    assert refusal([[1.0, 2.0], [3.0]]).endswith("or a file, got [[1.0, 2.0], [3.0]]")
     for none in (np.full((1, 1), "a"), np.ones((1, 1)) * 1j):
         given = refusal(lambda plots, none=none: (plots["range_m"], np.broadcast_to(none, (plots.n, 15, 1, 1))))
         assert given.startswith("mine: covariances must be real numbers, got ")
@@ -251,6 +252,8 @@ def test_named_components_are_taken_in_their_order(estimates):
     shared = mine.curves["component"].isin(["r", "Vr"])
     assert of(swapped.curves, filter="mine").equals(of(mine.curves[shared], filter="mine"))
     assert "must be of r, Vr, ar, got x" in refusal(estimates[..., :1], components=("x",))
+    velocity = radarsim.judge("rls2", estimates[..., 1], components="Vr", realisations=200)
+    assert of(velocity.curves, filter="mine").equals(of(mine.curves, filter="mine", component="Vr"))
 
 
 # ---- what is said ----------------------------------------------------------------------------------------------------
@@ -280,8 +283,12 @@ def test_realisations_that_depend_on_each_other_are_said():
         x = twin(plots)
         return x + 0.1 * (x - x.mean(axis=0))
 
-    (line,) = tried(whitened, realisations=100)
-    assert "depend on the others in the batch" in line
+    def beside(i):
+        return lambda plots: plots["range_m"] + 0.1 * (plots["range_m"] - plots["range_m"][i])
+
+    for one in (whitened, beside(0), beside(-1)):
+        (line,) = tried(one, realisations=100)
+        assert "depend on the others in the batch" in line
 
 
 def test_a_filter_that_changes_the_plots_is_said_and_changes_nothing(judged):
@@ -349,6 +356,10 @@ def test_below_the_floor_it_is_said_why(estimates):
     truth = radarsim.plots("rls2", n=300).truth
     found = radarsim.judge("rls2", (estimates + 3 * truth) / 4).answer[1]
     assert "mine is −7" in found
+    perfect = radarsim.judge("rls2", truth).answer[0]
+    assert perfect.startswith(
+        "mine is better than r+Vr, the config's best in r at 140 s: gain 100 % [100, 100]; its σ is 0 "
+    )
     assert found.endswith("Below it is only what is biased, or knows more than these plots.")
 
 
@@ -400,9 +411,22 @@ def test_a_filter_stands_beside_that_of_the_config(tmp_path, monkeypatch):
     assert result.question == "Are raw and mine better than the filters of the config?"
 
 
-def test_an_iterator_that_ends_early_is_refused(estimates):
-    with pytest.raises(ConfigError, match="must give 301 realisations, ended after 300"):
-        radarsim.judge("rls2", iter([estimates]), realisations=301)
+def test_an_iterator_that_gives_less_or_something_else_is_refused(estimates):
+    def said(*chunks):
+        with pytest.raises(ConfigError) as error:
+            radarsim.judge("rls2", iter(chunks), realisations=301, figures=False)
+        return str(error.value)
+
+    assert said(estimates) == "mine: must give 301 realisations, ended after 300; realisations=300 takes these"
+    assert said(estimates, estimates[..., :2]) == "mine: chunks must hold the same components, got 3 and then 2"
+    assert said(3).endswith("must have shape (n, K, d) = (0, 15, 1 … 3), got ()")
+    assert said((estimates, np.ones((299, 15, 3, 3)))).endswith("(300, 15, 3, 3), got (299, 15, 3, 3)")
+
+
+def test_chunks_with_and_without_covariances_keep_those_that_are_there(estimates):
+    P = np.broadcast_to(np.diag([250.0, 15.0, 1.0]) ** 2, (100, 15, 3, 3))
+    chunks = (estimates[:100], P), estimates[100:200], [estimates[200:], P]  # a list of two arrays is a pair too
+    assert set(radarsim.judge("rls2", iter(chunks), realisations=300).tables["nees"]["n"]) == {200}
 
 
 def test_a_function_of_one_realisation(mine):
@@ -488,10 +512,17 @@ def test_files_of_other_realisations_are_refused(estimates, tmp_path):
         (tmp_path / name).write_bytes(b"")
         assert "cannot be read" in refusal(tmp_path / name)
     (tmp_path / "heading.csv").write_text("realisation,k,r\n")
-    assert "must hold" in refusal(tmp_path / "heading.csv")
+    assert refusal(tmp_path / "heading.csv").endswith("got float64 (0, 15, 1)")
     few = said("covariances.npz", estimates=estimates, covariances=np.zeros((299, 15, 3, 3)))
     assert few == "mine: covariances must be of 300 realisations, as the estimates, got 299"
-    assert "cannot be read" in said("seeds.npz", estimates=estimates, seed=[1, 2])
+    for seed in ([1, 2], 2017.5, "one", np.nan):
+        assert "; the run has seed 2017" in said("seeds.npz", estimates=estimates, seed=seed)
+    assert "must be 300 numbers" in said("words.npz", estimates=estimates, realisation=np.arange(300).astype(str))
+    assert "estimates must be an array (n, K, d), got float64 ()" in said("number.npz", estimates=3.0)
+    assert "as the estimates, got 3.0" in said("variance.npz", estimates=estimates, covariances=3.0)
+    (tmp_path / "plain.npy").write_bytes(b"")
+    np.save(tmp_path / "plain.npy", estimates)
+    assert "cannot be read" in refusal((tmp_path / "plain.npy").rename(tmp_path / "single.npz"))
     rows = pd.DataFrame({"realisation": [0, 0, 1], "k": [1, 2, 1], "r": 1.0})
     rows.to_csv(tmp_path / "short.csv", index=False)
     assert "realisation 0: must have a row for each of the 15 scans" in refusal(tmp_path / "short.csv")
@@ -693,12 +724,14 @@ def test_plots_of_a_file_come_back_as_estimates(tmp_path, monkeypatch):
         done = CliRunner().invoke(main, ["simulate", "rls2", "--realisations", "0:200", "-o", f"plots.{kind}"])
         assert done.exit_code == 0, done.output
     with np.load("plots.npz") as plots:
-        np.savez("back.npz", estimates=plots["range_m"], realisation=plots["realisation"])
+        np.savez("back.npz", estimates=plots["range_m"], realisation=plots["realisation"], seed=plots["seed"])
     rows = pd.read_csv("plots.csv")
     rows.assign(r_m=rows["range_m"])[["realisation", "t_s", "r_m"]].to_csv("back.csv", index=False)
     wanted = radarsim.judge("rls2", lambda plots: plots["range_m"], realisations=200)
     for name in ("back.npz", "back.csv"):
         assert same(radarsim.judge("rls2", name), wanted), name
+    with pytest.raises(ConfigError, match="plots with seed 2017; the run has seed 7"):
+        radarsim.judge("rls2", "back.npz", seed=7)
 
 
 @pytest.mark.slow
@@ -728,3 +761,23 @@ def test_axes_of_a_flight_have_their_words():
     assert set(words) == {name for name, _ in flight.COMPONENTS}
     with speaking("ru"):
         assert tr("σ of the {quantity}", quantity=words["vy"]) == "СКО скорости набора высоты"
+
+
+@pytest.mark.parametrize(
+    ("config", "overrides"),
+    [("rls2", ()), ("sonar_correlated", ("sweep.sensor.error_correlation=[0.3]",))],  # whose state has no acceleration
+)
+def test_a_function_takes_plots_as_judge_gives_them(config, overrides):
+    seen = []
+    raw = lambda plots: seen.append(plots) or plots["range_m"]  # noqa: E731
+    radarsim.judge(config, raw, realisations=300, overrides=overrides)
+    plots = radarsim.plots(config, n=256, overrides=overrides)
+    assert (plots.first, plots.n, plots.seed) == (seen[0].first, seen[0].n, load(config).seed)
+    for name in plots.columns:
+        np.testing.assert_array_equal(plots[name], seen[0][name])
+    world, known = seen[0].world, plots.world
+    assert (known.columns, known.sigma, known.components, known.keys, known.case) == (
+        world.columns, world.sigma, world.components, world.keys, world.case)  # fmt: skip
+    np.testing.assert_array_equal(known.t_s, world.t_s)
+    with pytest.raises(KeyError, match="range: plots have range_m, "):
+        plots["range"]

@@ -267,8 +267,24 @@ def test_both_rivals_stand_beside_the_floor():
     result = radarsim.judge("rls2", lambda plots: plots["range_m"], name="raw", against="tuned",
                             realisations=100)  # fmt: skip
     (floor,) = [line for line in result.answer if line.startswith("The floor there")]
-    assert floor.count(" % above it, ") == 1
+    sigma = result.curves.query("filter == 'raw' and component == 'r' and k == 15")[["sigma", "sigma_lo", "sigma_hi"]]
+    least = result.tables["floor"].query("filter == 'raw' and component == 'r' and k == 15")["floor"].item()
+    value, lo, hi = (f"{100 * (one / least - 1):.3g}" for one in sigma.to_numpy()[0])
+    assert f": raw is {value} % [{lo}, {hi}] above it, r+Vr " in floor
     assert ", tuned " in floor
+
+
+def test_the_answer_is_about_what_the_rivals_are_tuned_for():
+    """As text says it: at a time, at a scan, at the last; of a component that the filter lacks, of its first."""
+    velocity = lambda plots: np.stack([plots["range_m"], plots["velocity_mps"]], axis=-1)  # noqa: E731
+    for wanted, where in (
+        ("sigma Vr at 60 s", "in Vr at 60 s"),
+        ("gain Vr at k 6", "in Vr at 50 s"),
+        ("sigma Vr", "in Vr at 140 s"),
+        ("sigma ar at 60 s", "in r at 60 s"),
+    ):
+        first = radarsim.judge("rls2", velocity, against="tuned", wanted=wanted, realisations=100).answer[0]
+        assert f"the config's best {where}: " in first, wanted
 
 
 def test_what_cannot_be_tuned_is_said():

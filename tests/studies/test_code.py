@@ -210,7 +210,10 @@ class Mine:
         self.deep()
 """
 FAILURES = {  # a line of the filter: the frame that is shown last, and what is said
-    "z = plots['range']": ("my_filter.py:8, in step: z = plots['range']", "KeyError: 'range'"),
+    "z = plots['range']": (
+        "my_filter.py:8, in step: z = plots['range']",
+        "KeyError: 'range: plots have range_m, velocity_mps'",
+    ),
     "import sys; sys.exit('no licence')": ("my_filter.py:8, in step: import sys;", "SystemExit: no licence"),
     "helper.broken(plots)": ("helper.py:3, in broken: np.linalg.inv(plots['range_m'])", "LinAlgError: 1-dimensional"),
     "self.deep()": ("my_filter.py:11, in deep: self.deep()", "RecursionError: maximum recursion depth"),
@@ -226,12 +229,12 @@ def test_its_errors_are_its_own_traceback(place, line):
     Path("my_filter.py").write_text(FAILING.format(line=line))
     _, where, *frames, said = run("out", "--threads", 2, code=2).stderr.splitlines()
     assert where.startswith("mine.yaml:")
-    assert where.endswith(": filter mine, my_filter.py:Mine, fails in realisations 4096:4096 (first:count) of mine:")
+    assert where.endswith(": filter mine, my_filter.py:Mine, fails in realisations 4096:8192 of mine:")
     assert FAILURES[line][0] in frames[-1]
     assert said.startswith(FAILURES[line][1])
     assert 1 <= len(frames) <= 8
     assert all(frame.startswith(f"  {place}") for frame in frames)
-    with pytest.raises(ConfigError, match="fails in realisations 4096:4096"):
+    with pytest.raises(ConfigError, match="fails in realisations 4096:8192 of mine:"):
         radarsim.run("mine.yaml", threads=0)
 
 
