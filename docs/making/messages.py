@@ -10,6 +10,7 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from radarsim.app.configs import inventory
@@ -32,6 +33,7 @@ IN_TEMPLATE = re.compile(r'\b(tr|plural)\(((?:"(?:[^"\\]|\\.)*"(?:,\s*)?)+)')
 QUOTED = re.compile(r'"((?:[^"\\]|\\.)*)"')
 
 
+@cache
 def found() -> dict[tuple[str, str, str], list[str]]:
     """Context, text and plural of every message, with the places that say it."""
     said: dict[tuple[str, str, str], list[str]] = {}
