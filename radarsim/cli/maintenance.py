@@ -1,14 +1,9 @@
 """Commands for upkeep: list, doctor, clean and the like. Heavy imports are inside the commands."""
 
-from typing import TYPE_CHECKING
-
 import click
 
 from radarsim.cli.group import Count, json_option, main, out_option, seed_option, set_option
 from radarsim.errors import StoreError
-
-if TYPE_CHECKING:
-    pass
 
 
 @main.command(name="list")

@@ -61,6 +61,10 @@ def _called(name: object) -> str:
     return tr("track {number}", number=name)
 
 
+def _keys(track: Track) -> list[tuple[str, Style]]:
+    return [(panels.literal(name), Style(f, f)) for f, name in enumerate(track.filters[:MOST_FILTERS])]
+
+
 def _time() -> Axis:
     return Axis(tr("time, s"))
 
@@ -106,15 +110,8 @@ def plan(track: Track, paths: Mapping[str, Places]) -> Figure | None:
         ]
         marks.append(Line(np.zeros(1), np.zeros(1), "", RADAR, name=tr("radar")))
         marks += _ends(own[0], size)
-        view = Panel(
-            Axis(tr("east, {unit}", unit=unit)),
-            Axis(tr("north, {unit}", unit=unit)),
-            tuple(marks),
-            tr("Plan view"),
-            direct=False,
-            equal=True,
-        )
-        made.insert(0, view)
+        east, north = Axis(tr("east, {unit}", unit=unit)), Axis(tr("north, {unit}", unit=unit))
+        made.insert(0, Panel(east, north, tuple(marks), tr("Plan view"), direct=False, equal=True))
     keys = [(_called(name), style) for name, style in zip(names[:MOST_TRACKS], styles, strict=False)]
     if len(own) > MOST_TRACKS:
         keys.append((tr("{count} more", count=len(own) - MOST_TRACKS), styles[-1]))
@@ -129,9 +126,8 @@ def plan(track: Track, paths: Mapping[str, Places]) -> Figure | None:
         else tr("The range of the plots over time; the file does not give their bearing.")
     )
     columns = min(len(made), 2)
-    return Figure(
-        "plan", tr("Positions"), caption, tuple(made), columns, PAGE_MM if columns > 1 else COLUMN_MM, TALL_MM
-    )
+    width = PAGE_MM if columns > 1 else COLUMN_MM
+    return Figure("plan", tr("Positions"), caption, tuple(made), columns, width, TALL_MM)
 
 
 def _drawn_paths(track: Track, paths: Mapping[str, Places]) -> list[Places]:
@@ -187,8 +183,7 @@ def estimates(track: Track) -> Figure:
         "Estimates over the recorded plots; bands: twice each filter's own standard deviation (95 % if "
         "the filter is consistent)."
     )
-    keys = [(panels.literal(name), Style(f, f)) for f, name in enumerate(track.filters[:MOST_FILTERS])]
-    return _several("track", tr("Track"), caption, made, [(tr("plots"), PLOT), *keys])
+    return _several("track", tr("Track"), caption, made, [(tr("plots"), PLOT), *_keys(track)])
 
 
 def residuals(track: Track) -> Figure | None:
@@ -208,19 +203,15 @@ def residuals(track: Track) -> Figure | None:
             if track.residual_sigma is not None and np.isfinite(track.residual_sigma[f, known, d]).any():
                 bound = 2 * track.residual_sigma[f, known, d]
                 marks += [Line(t, bound, "", BOUND, name="± 2 σ"), Line(t, -bound, "", BOUND, name="± 2 σ")]
-            axis = Axis(
-                panels.with_unit(tr("residual of {measured}", measured=name.rpartition("_")[0]), unit),
-                limits=_usual(miss),
-            )
+            of = tr("residual of {measured}", measured=name.rpartition("_")[0])
+            axis = Axis(panels.with_unit(of, unit), limits=_usual(miss))
             made.append(Panel(_time(), axis, tuple(marks), panels.literal(filter_name), direct=False))
     caption = tr(
         "Difference of each plot from the estimate after it. Dashed: twice the filter's own standard "
         "deviation of that difference; 95 % of the plots lie between if the filter is consistent."
     )
-    if len(track.filters) > fitting:
-        caption += tr(
-            " The first {fitting} of {filters} filters are drawn.", fitting=fitting, filters=len(track.filters)
-        )
+    if (filters := len(track.filters)) > fitting:
+        caption += tr(" The first {fitting} of {filters} filters are drawn.", fitting=fitting, filters=filters)
     return _several("residuals", tr("Residuals"), caption, made) if made else None
 
 
@@ -244,19 +235,16 @@ def innovations(track: Track) -> Figure | None:
             marks += [Line(ends, np.full(2, value), "", BOUND, name=tr("bounds")) for value in (low, high)]
             values = np.concatenate([line.y for line in marks[1:]])
             ticks = tuple((at, f"{at:g}") for at in TICKS if values.min() <= at <= values.max())
-            made.append(
-                Panel(
-                    _time(), Axis(tr("mean NIS"), "log", ticks=ticks), tuple(marks), panels.literal(name), direct=False
-                )
-            )
+            y = Axis(tr("mean NIS"), "log", ticks=ticks)
+            made.append(Panel(_time(), y, tuple(marks), panels.literal(name), direct=False))
     caption = tr(
         "Normalised innovation squared, averaged over {window} plots: 1 for a consistent filter, whose "
         "averages lie between the dashed bounds in 95 % of cases. Above: plots worse than stated, or a "
         "manoeuvre.",
         window=WINDOW,
     )
-    keys = [(panels.literal(name), Style(f, f)) for f, name in enumerate(track.filters[:MOST_FILTERS])]
-    return _several("nis", tr("Innovations"), caption, made, [*keys, (tr("bounds"), BOUND)]) if made else None
+    keys = [*_keys(track), (tr("bounds"), BOUND)]
+    return _several("nis", tr("Innovations"), caption, made, keys) if made else None
 
 
 def probabilities(track: Track) -> Figure | None:
@@ -332,36 +320,32 @@ def verdict(followed: Followed, judged: Sequence[Judged], advised: Advice | None
 
 def rows(followed: Followed) -> list[str]:
     """Numbers of rows and tracks, time covered, missing values, and the gaps."""
-    span = followed.last_s - followed.first_s
-    told = {"rows": counted(followed.rows), "span": span, "first": followed.first_s}
-    lines = [labelled("plots", tr("{rows} over {span:g} s, from {first:g} s", **told))]
+    said: list[tuple[str, str]] = []
+    span, first = followed.last_s - followed.first_s, followed.first_s
+    rows = counted(followed.rows)
+    said.append(("plots", tr("{rows} over {span:g} s, from {first:g} s", rows=rows, span=span, first=first)))
     if followed.tracks:
         longest = counted(max(one.rows for one in followed.tracks.values()))
-        lines.append(labelled("tracks", tr("{count}, the longest of {rows}", count=len(followed.tracks), rows=longest)))
+        said.append(("tracks", tr("{count}, the longest of {rows}", count=len(followed.tracks), rows=longest)))
     if followed.passed_over:
-        lines.append(labelled("passed", tr("{rows} outside any track", rows=counted(followed.passed_over))))
+        said.append(("passed", tr("{rows} outside any track", rows=counted(followed.passed_over))))
     if followed.again:
         words = plural("{count} track number", "{count} track numbers", followed.again)
-        lines.append(labelled("again", tr("{numbers} used again after a gap: each begins a new track", numbers=words)))
+        said.append(("again", tr("{numbers} used again after a gap: each begins a new track", numbers=words)))
     if followed.doubles:
         words = plural("{count} plot", "{count} plots", followed.doubles)
-        lines.append(
-            labelled("doubles", tr("{plots} left out: the same scan has one nearer to the track", plots=words))
-        )
+        said.append(("doubles", tr("{plots} left out: the same scan has one nearer to the track", plots=words)))
     missing = [tr("{count} of {name}", count=count, name=name) for name, count in followed.missing.items() if count]
     if missing:
-        lines.append(labelled("missing", ", ".join(missing)))
+        said.append(("missing", ", ".join(missing)))
     for name, columns in followed.without_plots.items():
         told = {"name": name, "columns": listed(columns)}
-        lines.append(
-            labelled("missing", tr("{name} used no plot, because it needs {columns}: predictions only", **told))
-        )
+        said.append(("missing", tr("{name} used no plot, because it needs {columns}: predictions only", **told)))
     if followed.silent:
-        names = ", ".join(followed.silent)
-        lines.append(labelled("no rows", tr("{names}: no estimate from these plots", names=names)))
+        said.append(("no rows", tr("{names}: no estimate from these plots", names=", ".join(followed.silent))))
     if followed.untested:
         names = ", ".join(followed.untested)
-        lines.append(labelled("untested", tr("{names}: no innovation with a covariance, so no test", names=names)))
+        said.append(("untested", tr("{names}: no innovation with a covariance, so no test", names=names)))
     if followed.gaps:
         words = tr(
             "{count} longer than three times the usual interval of {usual:g} s; the longest {longest:g} s, "
@@ -371,8 +355,8 @@ def rows(followed: Followed) -> list[str]:
             longest=followed.longest_gap_s,
             at=followed.longest_gap_at_s,
         )
-        lines.append(labelled("gaps", words))
-    return lines
+        said.append(("gaps", words))
+    return [labelled(label, words) for label, words in said]
 
 
 def counted(rows: int) -> str:
@@ -456,11 +440,8 @@ def likely(followed: Followed, advised: Advice) -> list[str]:
         best = compared.best
         if min(gap for _, gap in behind) <= CLEAR:
             best = tr("{name} (not clearly)", name=best)
-        lines.append(
-            labelled(
-                "best", tr("{best}; the plots are less likely under the others: {others}", best=best, others=others)
-            )
-        )
+        words = tr("{best}; the plots are less likely under the others: {others}", best=best, others=others)
+        lines.append(labelled("best", words))
     if advised.folding is not None:
         lines.append(labelled("advice", fit.said(advised.folding, followed.case)))
     elif not advised.findings:

@@ -141,7 +141,8 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
         return line_figure(name, shown[0], [members], curves) if shown else None
     values = [list(dict.fromkeys(_hashable(dict(r.swept)[key]) for r in members)) for key in keys]
     ranked = [sorted(v, key=lambda one: (isinstance(one, str), one)) for v in values]
-    (x, x_axis), (y, y_axis) = (places(members[0], key, v) for key, v in zip(keys, ranked, strict=True))
+    (x, _), (y, _) = (places(members[0], key, v) for key, v in zip(keys, ranked, strict=True))
+    across, up = (_named(members[0], key, v) for key, v in zip(keys, ranked, strict=True))
     made = []
     filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
     for f in filters[:MOST_PANELS]:
@@ -150,22 +151,8 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
             column, row = (ranked[i].index(_hashable(dict(result.swept)[key])) for i, key in enumerate(keys))
             grid[row, column] = last(result, f, component, curves)[0]
         if np.isfinite(grid).any():
-            heat = Heat(
-                x, y, grid, panels.with_unit(tr("$\\sigma$ of {symbol}", symbol=panels.letter(component)), unit)
-            )
-            factors = [panels.axis_factor(members[0], key) for key in keys]
-            ticks = [
-                tuple(
-                    (
-                        float(i),
-                        panels.number(v) if factor == 1.0 else wording.number(factor * float(v), panels.FEW_DIGITS),
-                    )
-                    for i, v in enumerate(values)
-                )
-                for factor, values in zip(factors, ranked, strict=True)
-            ]
-            columns_axis, rows_axis = (Axis(one.label, ticks=t) for one, t in zip((x_axis, y_axis), ticks, strict=True))
-            made.append(Panel(columns_axis, rows_axis, (heat,), panels.literal(f)))
+            label = panels.with_unit(tr("$\\sigma$ of {symbol}", symbol=panels.letter(component)), unit)
+            made.append(Panel(across, up, (Heat(x, y, grid, label),), panels.literal(f)))
     if not made:
         return None
     first, second = (panels.key_label(members[0], key).text for key in keys)
@@ -182,6 +169,16 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
     width = panels.WIDE_MM if columns == 1 else PAGE_MM
     figure = Figure(name, title, caption, tuple(made), columns, width, 62)
     return seen.begun(figure, seen.extremes(figure))
+
+
+def _named(result: CaseResult, key: str, values: Sequence) -> Axis:
+    """The axis of a map, each of its values named."""
+    factor = panels.axis_factor(result, key)
+    ticks = (
+        (float(i), panels.number(v) if factor == 1.0 else wording.number(factor * float(v), panels.FEW_DIGITS))
+        for i, v in enumerate(values)
+    )
+    return Axis(panels.axis_of(result, key), ticks=tuple(ticks))
 
 
 def _hashable(value: object) -> int | float | str:
