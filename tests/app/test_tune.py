@@ -98,7 +98,7 @@ def test_whole_numbers_are_all_tried():
     best = min(
         with_start
         for n in range(2, 8)
-        for x in np.geomspace(1e-4, 10, 41)
+        for x in np.geomspace(1e-4, 10, 21)
         for with_start in [
             sigma("rls2", "target=turn", f"filters.1.initial_scans={n}", f"filters.1.manoeuvre_variance={float(x)}")
         ]

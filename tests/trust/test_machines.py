@@ -41,10 +41,6 @@ def passes(**environment):
     assert done.stdout.count("the known") == len(TOLERANCES)
 
 
-def test_another_blas_gives_the_same_answers():
-    passes(OPENBLAS_CORETYPE="SkylakeX" if can_run("SkylakeX") else "Prescott")
-
-
 @pytest.mark.machines
 @pytest.mark.parametrize(
     ("core", "target", "without"), [("Prescott", "generic", NARROW), ("Haswell", "haswell", WIDE)], ids=["old", "usual"]
