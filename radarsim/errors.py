@@ -68,7 +68,7 @@ class DisagreementError(StoreError):
 
 
 class StudyError(RadarsimError):
-    """The code of an installed package failed where its study was asked for something."""
+    """The code of an installed package failed where its study was used."""
 
 
 class MeasureError(StudyError):

@@ -65,7 +65,7 @@ def judge(
 
     estimates is an array (n, K, d) for realisations 0 … n - 1 of `plots`, or a pair with covariances (n, K, d, d); the
     file of one (npz, csv, parquet); an iterator of such chunks; a function of plots that gives one; or an object, or
-    class, with `start(world)` and `step(plots)`, which is asked scan by scan: see `radarsim.studies.outside`. The d
+    class, with `start(world)` and `step(plots)`, which is called scan by scan: see `radarsim.studies.outside`. The d
     components are the leading ones of the state, or those named. one_by_one: the function takes one realisation.
 
     Gains are against every filter of the config, paired on the same realisations. Not-a-number before the first
@@ -104,7 +104,7 @@ def finished(
     command: str = "none: the filter was given in Python",
     **asked: Any,
 ) -> "Result":
-    """The result of an experiment of `judged`, with what the checks found, written where asked."""
+    """The result of an experiment of `judged`, with what the checks found, written if `out` is given."""
     try:
         result = run.run(experiment, **asked)
     except (DisagreementError, MeasureError) as error:  # raised again below

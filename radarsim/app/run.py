@@ -165,7 +165,7 @@ def _collector(work: CaseWork, options: RunOptions, progress: Progress, of: Call
 
 
 class Wanted(NamedTuple):
-    """A precision in per cent, of which quantity, the table that holds it, and that of curves if `tailed`."""
+    """A precision in per cent, its quantity, the table that holds it, and that of curves if `tailed`."""
 
     percent: float
     of: Quantity

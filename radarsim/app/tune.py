@@ -268,7 +268,7 @@ def put(plain: Any, path: Path, value: float) -> None:
 
 
 def parsed(wanted: str, chosen: str | None) -> Wanted:
-    """What is asked for, of text such as `sigma r at 60 s`, `lock at k = 6`. Raises ConfigError."""
+    """The quantity named by text such as `sigma r at 60 s`, `lock at k = 6`. Raises ConfigError."""
     match = WANTED.fullmatch(wanted.strip()) if isinstance(wanted, str) else None
     if match is None or " at " in f" {match['part']} ":
         example = '"sigma r at 60 s"'

@@ -156,7 +156,7 @@ class Count(click.ParamType):
 
 
 class Span(click.ParamType):
-    """Two whole numbers FIRST:STOP, of which STOP is beyond the last that is meant."""
+    """Two whole numbers FIRST:STOP; STOP is one beyond the last."""
 
     name = "FIRST:STOP"
 

@@ -572,7 +572,7 @@ DURATION = key(
 
 
 class Member(Model):
-    """A member of a list whose members are told apart by their names."""
+    """A member of a list whose members differ by their names."""
 
     name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
 

@@ -45,7 +45,7 @@ class TimeLimit:
         return max(0.0, self._end - time.monotonic())
 
     def reserving(self, seconds: float) -> "TimeLimit":
-        """The limit reduced by so many seconds, by at most half of what is left."""
+        """The limit reduced by so many seconds, by at most half of the rest."""
         return TimeLimit(self.seconds, self.begun, min(seconds, 0.5 * self.left))
 
 
@@ -310,7 +310,7 @@ PROGRESS_S = 0.1
 class Progress:
     """How realisations were obtained: those asked for, those read, those simulated in this call.
 
-    kernel_seconds is the time inside tasks, summed over the workers; stopped says why there are less than asked."""
+    kernel_seconds is the time inside tasks, summed over the workers; stopped says why there are fewer than wanted."""
 
     asked: int
     from_store: int

@@ -25,7 +25,7 @@ class Unfit(TypeError):
 
 
 class OneForAll(Unfit):
-    """Python asked for the one value of what has eight."""
+    """Python needs one value where there are eight."""
 
 
 class Lane:

@@ -11,7 +11,7 @@ applications). The squares are Tukey's biweight after Huber's function, each in 
 
 Intervals are by clusters, so that errors may be correlated within an aircraft: variance and degrees of freedom of Bell
 and McCaffrey (2002, Survey Methodology 28, 169), for the linear model that has the pseudo-residuals of the robust
-estimate as its errors (Huber, sec. 7.6). A bias that moves the plots as others do is taken as 0, and told as unknown.
+estimate as its errors (Huber, sec. 7.6). A bias that moves the plots as others do is taken as 0 and called unknown.
 """
 
 import itertools

@@ -490,7 +490,7 @@ class _Frame:
         for y, text, v in ys:
             made += text_at(left - 5, y + 0.35 * SIZE, text, "end", data=("y", v))
         deep = max((len(text.split("\n")) for _, text, _ in xs), default=1)
-        made += text_at((left + right) / 2, bottom + (1.4 + 1.05 * deep) * SIZE, self.panel.x.label, "middle", "lab")
+        made += text_at((left + right) / 2, bottom + (1.4 + deep) * SIZE, self.panel.x.label, "middle", "lab")
         return made + text_at(2, SIZE + 1, self.panel.y.label, "start", "lab")
 
     def draw(self, mark: Mark, numbers: dict[str, int], points: int) -> Markup:

@@ -266,7 +266,7 @@ MOST_SENTENCES = 12  # sentences; the table has all
 
 
 def sentences(made: "pd.DataFrame", measured: Iterable[Quantity] = COMMON) -> list[str]:
-    """At the last common time, for the first component of the quantities `told`: both values and their difference."""
+    """At the last common time, for the first component of each quantity in `told`: both values and their difference."""
     last = at_the_end(made)
     lines: list[str] = []
     for of in told(made, measured):
@@ -290,7 +290,7 @@ def sentences(made: "pd.DataFrame", measured: Iterable[Quantity] = COMMON) -> li
 
 
 def told(made: "pd.DataFrame", measured: Iterable[Quantity]) -> list[Quantity]:
-    """The quantities in sentences: the first, and those that neither follow from it (gains) nor are of many shares."""
+    """The quantities in sentences: the first, and those that neither follow from it (gains) nor list many shares."""
     found = [of for of in measured if (made["quantity"] == of.value).any()]
     return [of for n, of in enumerate(found) if not n or (not of.paired and of.per in ("", "component"))]
 

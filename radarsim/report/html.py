@@ -260,7 +260,7 @@ def comparison(
 ) -> str:
     """The page of a comparison: sentences, figures, differing keys, the table.
 
-    differing: tables of keys by their title, empty where the configs are of several; outputs: the files beside
+    differing: tables of keys by their title, empty for configs of several studies; outputs: the files beside
     the page."""
     return whole(
         "compare.html.j2",

@@ -123,7 +123,7 @@ def _at(series: Series, at: int | None) -> Estimate:
 
 # ---- readings --------------------------------------------------------------------------------------------------------
 class Readings(PaperReadings):
-    """Readings whose alternatives set keys of a case, by dotted names; a bare name is of every filter."""
+    """Readings whose alternatives set keys of a case, by dotted names; a bare name applies to every filter."""
 
     def __init__(self, paper: str, choices: tuple[Choice, ...]):
         self.paper, self.choices = paper, choices

@@ -63,7 +63,7 @@ class Plots:
 # ---- where estimates come from ---------------------------------------------------------------------------------------
 class Outside(ABC):
     """A filter from outside. identity: what its numbers depend on beside the plots; components: names of those it
-    estimates, by default the leading ones. in_order: realisations must be asked for in their order, by one thread."""
+    estimates, by default the leading ones. in_order: realisations must be computed in their order, by one thread."""
 
     name: str
     identity: str
@@ -121,7 +121,7 @@ def made_of(name: str, target: type, **keys: Any) -> Any:
 
 
 def stepped(name: str, target: Any, plots: Plots) -> Any:
-    """What a filter gives that is asked scan by scan."""
+    """The estimates of a filter that is called scan by scan."""
     target.start(plots.world)
     found = []
     for k, t in enumerate(plots.t_s):

@@ -108,7 +108,7 @@ def room_for(blocks: int) -> tuple[np.ndarray, ...]:
 def estimate_strips(physics, law, tables, windows, options, noise, first, out) -> None:
     """As `sequence.estimate_block`, with block sums: errors (n, F, K, 6) and passes (n, F) are written.
 
-    law is of the sums drawn: mean (blocks, 4) and factor (blocks, 10); noise the keys (2, 2), and sigma (6,) of the
+    law describes the sums drawn: mean (blocks, 4) and factor (blocks, 10); noise the keys (2, 2), and sigma (6,) of the
     forecast's errors; tables those of `burst.Tables`; out = (errors, passes). All is relative to the truth."""
     (mean, factor), (keys, sigma) = law, noise
     run_strips(physics, mean, factor, tables, windows, options, keys, first, sigma, room_for(len(mean)), *out)

@@ -76,7 +76,7 @@ class Options:
     to write, all where empty. zero: origin of t_s, "first" (record), "midnight" (of the first record's day, UTC) or s
     from 1970. truth: a second recording, of positions. towards: Doppler speeds are positive where the range falls.
     columns: of a CSV, theirs by ours. encoding: of text that is neither UTF-8 nor UTF-16, Windows-1252 where none is
-    named. keep_marked: what is of no aircraft (asterix.NO_AIRCRAFT) is in tracks and truth too. whose: the track,
+    named. keep_marked: records of no aircraft (asterix.NO_AIRCRAFT) are in tracks and truth too. whose: the track,
     address, callsign or code of the plots whose truth is the one path of the second recording, for receivers that know
     nothing of these. biases: of plots, by BIASES, to be subtracted."""
 
@@ -690,7 +690,7 @@ def truth_of(text: str | None) -> tuple[str | None, str]:
 
 
 def encoding_named(name: str) -> str:
-    """An encoding of text that was asked for."""
+    """An encoding of text by its name."""
     try:
         "".encode(name or "utf-8")
     except (LookupError, ValueError):

@@ -132,7 +132,7 @@ class Header:
 
     columns: by name of the quantity; identities: the indices of those in
     IDENTITIES; on_earth: whether positions are read, not plots; aviation, maritime: whether
-    names are of their customs."""
+    names follow their customs."""
 
     def __init__(self, path: str, names: list[str], given: Mapping[str, str]):
         self.path, self.names = path, [_printable(name) for name in names]

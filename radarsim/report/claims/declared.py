@@ -444,7 +444,7 @@ class Claim:
     """A statement of a paper: its place, its interpretation, the parts that judge it, the config that holds them.
 
     original is the sentence in the paper's language. An extension is ours, and not counted. reported: the paper reports
-    an assertion of others: judged under every reading, and not counted. unstated: what the paper leaves out and the
+    an assertion of others: judged under every reading, and not counted. unstated: what the paper omits and the
     statement cannot be judged without; joint: one variant has to give every number; internal: both sides are printed,
     so that a disagreement is within the print."""
 
@@ -486,7 +486,7 @@ class PaperClaims:
     that only shorten or extend a run: quantities that do not depend on its end are still judged. may_grow: the study's
     lists to which members may be added while it stays the paper's experiment; every other key must be as in the claim's
     config, see `radarsim.report.claims.declared`. held_too: by the stem of a shipped config, the claims of other
-    configs of which it holds every part: if it is changed so that it no longer judges them, it says so."""
+    configs all of whose parts it holds: if it is changed so that it no longer judges them, it says so."""
 
     claims: Sequence[Claim]
     evidence: type[Evidence]

@@ -318,7 +318,7 @@ def in_a_row(claims: Sequence[str]) -> str:
 
 
 def of_class(kind: str, count: int) -> str:
-    """How many claims are of a class, in words."""
+    """The number of claims of a class, in words."""
     if kind == DEPENDS:
         return plural(
             "{count} depends on what the paper leaves open", "{count} depend on what the paper leaves open", count

@@ -226,7 +226,7 @@ WORST = (REFUTED, CONTRADICTORY, UNDECIDED, UNJUDGEABLE, IMMATERIAL, CONFIRMED)
 def claim(parts: Sequence[Judged], *, unstated: bool = False, joint: bool = False, internal: bool = False) -> Outcome:
     """The outcome of a claim with these parts; of an extension without asserted parts, as if all were.
 
-    unstated: the paper leaves out what the statement is about, so that it cannot be judged. joint: one variant has to
+    unstated: the paper omits what the statement is about, so that it cannot be judged. joint: one variant has to
     give every number; where each is reproduced in some variant and no variant gives all, the print contradicts itself.
     internal: both sides are printed; where they differ, the print contradicts itself."""
     asserted = [part for part in parts if part.asserted] or list(parts)

@@ -65,7 +65,7 @@ class Radar(fields.Radar):
 
 
 def joint_span(one: float, other: float) -> float:
-    """The least common multiple of two spans whose ratio is of whole numbers up to MOST_RATIO; else zero."""
+    """The least common multiple of two spans in a ratio of whole numbers up to MOST_RATIO; else zero."""
     ratio = Fraction(one / other).limit_denominator(MOST_RATIO)
     if one == other or ratio.numerator > MOST_RATIO or not math.isclose(ratio, one / other, rel_tol=DISTINCT):
         return 0.0

@@ -49,7 +49,7 @@ ORTHOGONAL = 0.75  # Lovász' condition: how much shorter a vector must become b
 
 
 class TooMany(ValueError):
-    """There are more vectors than asked for."""
+    """There are more vectors than the limit."""
 
 
 def reduced(A: np.ndarray, T: np.ndarray) -> np.ndarray:

@@ -337,7 +337,7 @@ def follows_the_model(spec: Any, one: Any) -> bool:
 
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
-    """Sums of one block, in the order of the plan's layout; with `rare` the common ones are of plain realisations."""
+    """Sums of one block, in the order of the plan's layout; with `rare` the common ones count plain realisations."""
     values = np.zeros(plan.layout.size)
     arrays = plan.layout.unpack(values)
     common = records.Sums(**{name: arrays[name] for name in records.Sums._fields})

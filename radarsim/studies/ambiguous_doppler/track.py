@@ -437,9 +437,9 @@ class Tracker:
     """The filters of a case over recorded plots at any times, chunk by chunk in flat memory.
 
     A recorded velocity counts as folded. A filter that says `unfolded` has no estimate: it needs the true folds, which
-    a recording lacks; only where no filter unfolds does it take the velocity as it stands. The span is that which
-    stands beside the velocity, else the config's; with several repetition rates the scan that a row is of follows from
-    its time. Innovations of the velocity are tested where the fold is certain."""
+    a recording lacks; only where no filter unfolds does it take the velocity as it stands. The span is the one
+    beside the velocity in its row, else the config's; with several repetition rates the scan of a row follows from its
+    time. Innovations of the velocity are tested where the fold is certain."""
 
     most_rows: int | None = None
     several: bool = False

@@ -1,4 +1,4 @@
-"""One burst through the windows of an estimator, for the figure that shows it: the paper's figure 2 is of one.
+"""One burst through the windows of an estimator, for the figure that shows it: the paper's figure 2 shows one.
 
 P4's figures: residuals against the window (figure 2), locks, accuracy, and the maps of where the sequence locks."""
 

@@ -85,7 +85,7 @@ class Evidence(claims.Evidence):
         return Estimate(*(scale * part for part in root_mean_square(moments[1], moments[3], result.count)))
 
     def potential(self, key: Key, component: str) -> Estimate:
-        """Potential spread by the discrete sum over the pulses l = 0 … n − 2, of which the paper's digits are."""
+        """Potential spread by the discrete sum over the pulses l = 0 … n − 2, which gives the paper's digits."""
         burst = study.burst_of(self.case(key).spec)
         found = model.spreads(model.fisher_sums(burst, len(COMPONENTS), [burst.pulses - 1])[0])
         return certain(found[COMPONENTS.index(component)])

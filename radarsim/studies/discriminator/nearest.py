@@ -220,7 +220,7 @@ class Room:
 
     def errors(self, f: int, z: np.ndarray, options: np.void | None = None) -> np.ndarray:
         """Errors (n, K, 6) of estimator f with the normals z (n, 6 + 4B), n at most eight; see `Loss` for their order.
-        In turns over the burst; zero at windows that the options leave out."""
+        In turns over the burst; zero at windows that the options omit."""
         z = np.concatenate([z, np.repeat(z[-1:], WIDTH - len(z), axis=0)])
         for j in range(SIZE):
             self.row(PRIOR + j)[:] = self.plan.prior_sigma[j] * z[:, j]
@@ -302,7 +302,7 @@ def crossing(room: Room, f: int, unit: np.ndarray, begin: float, farthest: float
 
 
 class Watched(NamedTuple):
-    """What a gradient is of: which window's estimate, under which options, in differences of how many σ."""
+    """What a gradient refers to: which window's estimate, under which options, in differences of how many σ."""
 
     window: int
     options: np.void

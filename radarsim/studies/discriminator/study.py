@@ -449,7 +449,7 @@ def doppler_error(burst: model.Burst, phase: Phase) -> float:
 
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
-    """Sums of one block, in the order of the plan's layout; with `rare` the common ones are of the plain bursts."""
+    """Sums of one block, in the order of the plan's layout; with `rare` the common ones count the plain bursts."""
     values = np.zeros(plan.layout.size)
     arrays = plan.layout.unpack(values)
     sums = sums_of.Sums(**{name: arrays[name] for name in sums_of.Sums._fields})

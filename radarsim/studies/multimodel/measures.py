@@ -177,8 +177,8 @@ def blocks_over(
 
 
 def bend(range_m: float, sigma_range_m: np.ndarray, sigma_angle_rad: np.ndarray) -> np.ndarray:
-    """What linearisation leaves out of a plot's mean squared error along the line of sight, over what it has. A plot
-    converted to rectangular coordinates falls short by r(α² + β²)/2, whose mean square is 2r²σ⁴."""
+    """The part of a plot's mean squared error that linearisation omits along the line of sight, over what it has. A
+    plot converted to rectangular coordinates falls short by r(α² + β²)/2, whose mean square is 2r²σ⁴."""
     return 2 * (range_m * sigma_angle_rad**2 / sigma_range_m) ** 2
 
 
@@ -188,7 +188,7 @@ SIGMA_RANGE_M, SIGMA_ANGLE_RAD = (1.0, 150.0), tuple(np.radians(np.array([2.0, 1
 def share_linear(
     seen: Evidence | None, key: tuple, range_m: float, even_logarithms: bool = False, most: float = 0.1
 ) -> float:
-    """Share of the printed accuracies of radars of which `bend` is at most so much; each range is spread evenly."""
+    """Share of the printed accuracies of radars with a `bend` of at most so much; each range is spread evenly."""
     steps = 1000
     middles = (np.arange(steps) + 0.5) / steps
     axes = [

@@ -114,7 +114,7 @@ class Filters(NamedTuple):
 class Hypotheses(NamedTuple):
     """Up to H hypotheses of each of n realisations, H a whole number of lanes."""
 
-    states: np.ndarray  #: (n, H, 9) see `chain.state_of`
+    states: np.ndarray  #: (n, H, 9) see `state_of`
     weights: np.ndarray  #: (n, H) logarithms, the best one's 0
     count: np.ndarray  #: (n,) how many there are
     right: np.ndarray  #: (n, H) 1 of those that have taken no velocity in a wrong fold, else 0
@@ -144,14 +144,14 @@ def hypotheses(realisations: int, most: int) -> Hypotheses:
 class Work(NamedTuple):
     """Work arrays for n realisations."""
 
-    #: (n, 9) states and covariances, see `chain.state_of`; of several hypotheses the best before the burst
+    #: (n, 9) states and covariances, see `state_of`; of several hypotheses the best before the burst
     tracks: np.ndarray
     forecasts: np.ndarray  #: (n, 2) errors of the forecasts of velocity and acceleration
     entries: np.ndarray  #: (n,) of the menu
     measured: np.ndarray  #: (n, 2) the bursts' velocity and acceleration, less the truth
     ages: np.ndarray  #: (n,) scans since the last burst that was lost
     passes: np.ndarray  #: (n,) passes over a window's data so far
-    room: tuple[np.ndarray, ...]  #: see `chain.room_for`
+    room: tuple[np.ndarray, ...]  #: see `room_for`
     held: Hypotheses  #: of filters that keep several
 
 
@@ -539,7 +539,7 @@ def put_estimate(own, held, i, best, whole, to):
 
 @part
 def take_folds(world, filters, f, k, work, sums):
-    """As `chain.take_estimates`, by hypotheses."""
+    """As `take_estimates`, by hypotheses."""
     own, held, span, sigma = filters.filters[f], work.held, world.span, filters.sigma[f, k]
     locks, folds = sums.locks[f, k], sums.folds[f, k]
     lists = Lists(

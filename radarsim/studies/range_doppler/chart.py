@@ -36,8 +36,8 @@ MAP_C_THETA, MAP_LAMBDA = np.geomspace(1e-2, 1e4, 49), np.geomspace(1e-4, 10.0, 
 class Place:
     """Where a case lies: its numbers, its steady gains (3,) exactly and as the period shrinks, its course over time.
 
-    inputs are σ_r (m), σ_V (m/s), Δt (s), D_M ((m/s³)²). t_s (n,) and gain (n, 3), per cent, are of the scans at which
-    both filters have all estimates."""
+    inputs are σ_r (m), σ_V (m/s), Δt (s), D_M ((m/s³)²). t_s (n,) and gain (n, 3), per cent, belong to the scans at
+    which both filters have all estimates."""
 
     name: str
     inputs: tuple[float, float, float, float]
@@ -145,7 +145,7 @@ def corrected(place: Place) -> np.ndarray:
 
 
 def aside(case: Case) -> str:
-    """What of a case the chart leaves out of account, as a further sentence; nothing where there is nothing."""
+    """What the chart ignores of a case, as a further sentence; nothing where there is nothing."""
     left = [] if case.spec.radar.as_the_papers else [tr("missed plots and biases")]
     left += [] if case.spec.target.kind == "polynomial" else [tr("the target's manoeuvre")]
     usual = {getattr(one, "process_noise", "random_jerk") for one in case.spec.filters} == {"random_jerk"}

@@ -71,7 +71,7 @@ Displaced = Annotated[NonNegative, Added()]
 
 
 class Flying(Model):
-    """A flight in space of which the first state is drawn: it is displaced, and flies the same accelerations."""
+    """A flight in space with a random first state: it is displaced, and flies the same accelerations."""
 
     sigma_position_m: Displaced = key(
         "σ of the first position",

@@ -3,7 +3,7 @@
 Three things run together: P, the covariance that a filter believes, which gives its gains; S, the covariance of what
 the noise of the plots puts into its error; and E, the C parts of the error that do not change from plot to plot. Column
 0 is the mean error; each further column is what one drawn bias of unit variance leads to. So the second moment of the
-error is S + E Eᵀ. The last columns are of a truth that is drawn, by how its motion leaves that of the middle.
+error is S + E Eᵀ. The last columns belong to a random truth, by how its motion leaves that of the middle.
 
 The world of P1: the true range of a target at the scans, and what is drawn of it for each realisation.
 
@@ -47,8 +47,8 @@ from radarsim.studies.range_doppler.config import FlyBy, Flying, Keys, Recorded,
 # ---- propagation -----------------------------------------------------------------------------------------------------
 class Plots(NamedTuple):
     """What plots are: standard deviations sigma, mean errors bias, and standard deviations sigma_bias of the errors
-    that are drawn once a realisation, each (2,) of range in m and velocity in m/s; the probability of detection; how
-    many columns of E are of a drawn truth."""
+    that are drawn once a realisation, each (2,) of range in m and velocity in m/s; the probability of detection; the
+    number of columns of E for a random truth."""
 
     sigma: np.ndarray
     bias: np.ndarray = np.zeros(2)
@@ -409,7 +409,7 @@ def steady_gain(c: float) -> np.ndarray:
 def noise_variances(c: np.ndarray | float, step: np.ndarray | float = 0.0) -> np.ndarray:
     """σ_r², σ_V², σ_a² (3, …) of the limit filter on a quadratic truth, over σ_r² Δt/τ₂ · (1, τ₂⁻², τ₂⁻⁴). Of the range
     alone, c = 0, they are 5/3, 3/2, 1/3. They are what the filter believes, less what the manoeuvre would add that such
-    a truth has not. step is Δt/τ₂, of which the first order is kept: half a scan of extrapolation."""
+    a truth has not. step is Δt/τ₂, to first order: half a scan of extrapolation."""
     A, P = damping(c), believed(c)
     X, p11 = A**3, P[0, 0]
     b, d = A**2 / 2 - A * (X - 8) / 4 * p11, X - 2

@@ -10,7 +10,7 @@ from radarsim.studies.range_doppler.config import PLOTS_NEEDED, Keys
 
 
 def floor(spec: Keys, axes: Axes) -> Floor | None:
-    """A polynomial is of the second degree, or of its own where that is higher; of other motions none is defined, but
+    """A polynomial has the second degree, or its own where that is higher; of other motions none is defined, but
     where flights are drawn. A drawn bias of the plots is one more unknown of each realisation."""
     radar, t = spec.radar, np.asarray(axes.t_s, dtype=float)
     drawn = filters.is_drawn(spec.target)

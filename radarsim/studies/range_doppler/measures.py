@@ -202,7 +202,7 @@ def gain_by_variance(seen: Evidence, radar: int) -> Estimate:
 
 def ineffective_from(seen: Evidence, radar: int, asked_s: float) -> Estimate:
     """The first time at which the acceleration gain is gone (zero or a loss); missing where the run is over before
-    the time that is asked about."""
+    that time."""
     found = seen.k_gain(radar, "ar")
     found.last()
     if found.t[-1] < asked_s and found.value.min() > 0:

@@ -155,7 +155,7 @@ MOST_MEANS = 128
 
 
 def means(design: Design, beside: Sequence[Design], made: Designed) -> Means:
-    """The means of one filter over the patterns; those of the last that were asked for are kept."""
+    """The means of one filter over the patterns; the last ones computed are kept."""
     seen = [part[: design.observes] for part in made.plots[:3]]
     arrays = (*seen, made.x, made.drawn)
     others = tuple((one.observes, one.start) for one in beside)

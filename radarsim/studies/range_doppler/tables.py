@@ -1,7 +1,8 @@
 """Tables of filters that measure range and radial velocity (P1).
 
-With missed plots `n` of `curves.csv` is how many realisations have an estimate at that scan, and a gain is of those in
-which both filters have one; `exact_sigma` is the mean over all patterns of plots, empty where these are too many."""
+With missed plots `n` of `curves.csv` is how many realisations have an estimate at that scan, and a gain counts
+those in which both filters have one; `exact_sigma` is the mean over all patterns of plots, empty where these are too
+many."""
 
 from collections.abc import Sequence
 from functools import lru_cache

@@ -220,7 +220,7 @@ def in_a_turn(case: Case, filter_name: str, variance: float) -> Turning:
 
 
 def likely(spec: Keys, filter_name: str | None) -> Filter | None:
-    """The filter of a name, where there is one, else the one that takes most of a plot; None: it is of a package."""
+    """The filter of a name, where there is one, else the one that takes most of a plot; None: a package's filter."""
     named = [f for f in spec.filters if f.name == filter_name]
     own = [f for f in named or spec.filters if isinstance(f, Filter)]
     return max(own, key=lambda one: len(one.observes), default=None)

@@ -39,7 +39,7 @@ class Seen(NamedTuple):
 
 
 def manoeuvre_variances(filters: tuple[Filter, ...], seen: Seen) -> tuple[float, ...]:
-    """D_M of each filter, (m/s³)²: as given, or the best on what is seen; not-a-number where it has none."""
+    """D_M of each filter, (m/s³)²: as given, or the best for these plots; not-a-number where it has none."""
     return tuple(
         best(one, wanted, seen) if isinstance(wanted, Best) else wanted
         for one in filters
@@ -48,7 +48,7 @@ def manoeuvre_variances(filters: tuple[Filter, ...], seen: Seen) -> tuple[float,
 
 
 def best(one: Filter, wanted: Best, seen: Seen) -> float:
-    """The manoeuvre variance that a filter's config asks for, (m/s³)², on what is seen."""
+    """The manoeuvre variance that a filter's config asks for, (m/s³)², for these plots."""
     low, high = limits(len(seen.x), seen.plots.sigma, seen.dt)
     whole = seen._replace(plots=seen.plots._replace(detection=1.0))
 

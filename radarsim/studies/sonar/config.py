@@ -571,7 +571,7 @@ class Keys(fields.Study):
         """The parts whose questions a case asks; the part that computes it comes last.
 
         `clutter`: its filters have to find their plots among false ones. `manoeuvre`: it measures detectors or uses of
-        a track, or has filters that respond to manoeuvres; the questions of `smoothing` are asked of it too.
+        a track, or has filters that respond to manoeuvres; it answers the questions of `smoothing` too.
         """
         if any(member.association is not None for member in self.filters):
             return ("clutter",)

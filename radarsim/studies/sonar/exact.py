@@ -116,7 +116,7 @@ def weighted_errors(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Bias (M, 3) and covariance (M, 3, 3) of an estimate with weights (M, 3, n) of the plots first … first + n - 1.
 
-    The estimate is of the state at the last of these scans. C (n, n) is the covariance of the plots; a random
+    The estimate is that of the state at the last of these scans. C (n, n) is the covariance of the plots; a random
     acceleration `walk`, if any, acts from scan `origin` on (earlier effects cancel once the estimate reproduces
     straight lines)."""
     n = weights.shape[2]

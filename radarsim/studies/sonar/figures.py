@@ -1,4 +1,4 @@
-"""P3's figures: σ of each component against time, lines from rows of tables; and what is asked of smoothing.
+"""P3's figures: σ of each component against time, lines from rows of tables; and the figures of smoothing.
 
 Of filters that know their plots: gain of each plot, gains, believed and true σ, misses, conversion."""
 

@@ -257,7 +257,7 @@ def shares_by_rule(work, listed, first, size, c, main, rule):
 
 @inline
 def keep_by_rule(work, size, main, rule):
-    """Set to zero the weights that a rule other than `moment` leaves out, and return the sum of the rest.
+    """Set to zero the weights that a rule other than `moment` drops, and return the sum of the rest.
 
     best: the largest weight. combined: the main hypothesis where it outweighs all others together, else all.
     modified: the main one where it does, else the main one and the best. Ties go to the lower number."""
@@ -381,7 +381,7 @@ def update_probabilities(work, bank, size, least):
 
 @part
 def merge_gpb1(work, listed, old, new, size, rule):
-    """Merge the new bank over its own first hypothesis; the main one is of the model that was most probable before
+    """Merge the new bank over its own first hypothesis; the main one belongs to the model that was most probable before
     the plot."""
     top, main = full(-1.0), full(0.0)
     for j in range(size):

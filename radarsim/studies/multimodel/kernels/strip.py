@@ -647,7 +647,7 @@ def density(work, old, new, rules, lane):
     """The logarithm of the density that the old bank gave the plot of a lane: Σ c N(innovation; 0, S) over the models.
 
     c is the predicted probability of a model. Of pairs of models (GPB2) the memory still has those that end in the last
-    one: their sum is its part of the whole, of which its new probability is the share."""
+    one: their sum over that of all models is its new probability."""
     size, total, least = rules.size, 0.0, 1e300
     last, at = size - 1, rec.RESULT if rules.family == rec.GPB2 else rec.RESULT_GROUP
     for i in range(size):

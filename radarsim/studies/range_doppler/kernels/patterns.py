@@ -196,7 +196,7 @@ FIRST = 11  # of the probabilities of a plot alone
 
 
 class World(NamedTuple):
-    """What a filter sees over K scans, and what is asked of it."""
+    """The plots of a filter over K scans, and the results wanted."""
 
     defect: np.ndarray  #: (K, 3, C) of the truth at every scan from the one before, as `filters.defects` has it
     Q: np.ndarray  #: (6,) covariance that a scan adds, packed

@@ -12,7 +12,7 @@ Management Science 13, 291). Here it is as near to that as misses are to being i
 
 A young track may also be wrong from its first plots on: because of their errors, so that the next plots are outside its
 gate one after the other, or because one of them is false. So there is a law for the track of each number of plots
-from that which confirms it on, under which the errors that lead there are stretched, and two under which a false plot
+from its confirmation on, under which the errors that lead there are stretched, and two under which a false plot
 is in its gate, beside the target's or in place of it.
 
 P3's second half: tracks among false and missed plots.

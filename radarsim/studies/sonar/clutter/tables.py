@@ -295,7 +295,7 @@ def _ended(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
 def ends_note(
     drawn: rare.Drawn, ended: np.ndarray, among_false: bool, kinds: Sequence[int] = range(KINDS)
 ) -> np.ndarray:
-    """What is to be said (n,) of rates of ends of some kinds, from sums (n, KINDS, 4): of all or a part that matters.
+    """Notes (n,) on rates of ends of some kinds, from sums (n, KINDS, 4): of all or a part that matters.
 
     Runs of misses have equal weights, and many; the few tracks that end by far plots, or by false ones beside the
     target's, have large ones, which the whole does not show while they are few. A part matters where it may be over a

@@ -94,7 +94,7 @@ def leading_inverse(Y, rank):
 def normal_equations(recent, length, longest, i, origin, half):
     """Normal equations Y x = b of a polynomial through the last `length` plots of group i, at present: Y (6), b (3).
 
-    recent is the address of the recent plots, of which `longest` are kept; they are taken relative to origin. half is
+    recent is the address of the recent plots, at most `longest`; they are taken relative to origin. half is
     0.5 for a parabola and 0 for a straight line."""
     zero = full(0.0)
     Y, b = (zero, zero, zero, zero, zero, zero), (zero, zero, zero)

@@ -14,7 +14,7 @@ filtered separately, so their errors are independent. Course and speed are assum
 
 Exact laws of P3's manoeuvre detector: false alarms, detection, and delay where tests are independent.
 
-The statistic is â²/σ_a² (P3 eq. 3, with the estimate that the paper leaves out), where â is the acceleration of a
+The statistic is â²/σ_a² (P3 eq. 3, with the estimate that the paper omits), where â is the acceleration of a
 parabola through n plots. â is linear in the plots, so it is Gaussian where their errors are. The statistic of one
 coordinate is χ² with one degree of freedom, noncentral by (mean of â / σ_a)² in a manoeuvre; the sum over C coordinates
 is χ² with C degrees of freedom. This holds for any deterministic course."""

@@ -462,7 +462,7 @@ def may_be_seduced(laws, k, certain, own, i):
 def detect_drawn(detections, laws, scan, status, predicted, target, course, sigma, own):
     """Set target.detected as each realisation's law has it, and bring the ratios of runs in own up to date.
 
-    Before association: predicted (5, CHUNK) is of this scan; plots lie about course with σ (2,) in m and rad. A
+    Before association: predicted (5, CHUNK) belongs to this scan; plots lie about course with σ (2,) in m and rad. A
     realisation whose track has ended has no more plots."""
     k, certain, detection = scan.k, detections.certain[scan.k], detections.probability
     detected, z, most, free = target.detected, target.z, laws.length.max(), k > laws.young.max()
@@ -514,7 +514,7 @@ def drawn_false(laws, k, certain, missed, detected, status, own, i):
 @part
 def associate_young(field, detections, keys, laws, scan, tracks, status, target, work, own, counts):
     """Associate a scan's plots with every track, as `tracker.associate`; about young tracks false plots are drawn. The
-    ratios of the laws of false plots, the last two, are brought up to date; keys are of those plots."""
+    ratios of the laws of false plots, the last two, are brought up to date; keys belong to those plots."""
     draws, out, rule, tally = tracker.draws_of(field), work.association, laws.rule, address(counts)
     predicted, detected, z, lives = work.predicted, target.detected, target.z, address(status)
     last, missed = own.shape[0] - 1, 1.0 - detections.probability

@@ -38,7 +38,7 @@ The life of a track: confirmed by m plots in its first n scans, dropped after mi
 
 Letters as in `tracker`; i numbers the realisations of a chunk.
 
-False plots of a whole sector, of which a gate draws only those that it needs.
+False plots of a whole sector; a gate draws only those that it needs.
 
 The sector is divided into cells of equal area, uniform in q = r²/2 and in the bearing. Poisson processes on disjoint
 cells are independent, so the number of plots in a cell (by inversion of the distribution function) and their positions
@@ -378,7 +378,7 @@ def transposed(C):
 @inline
 def updated_pair(P, P_other, C, start, n, w):
     """Both lines after a plot of one: gains K and K_other (2), covariances P and P_other (6), and C (4) between them. P
-    is of the line that has the plot, start (K, P) its least squares; C is that line by the other."""
+    belongs to the line that has the plot, start (K, P) its least squares; C is that line by the other."""
     h = (C[0], C[1])  # covariance of the measured value with the other line
     scale = w / (P[0] + 1.0)
     K, P = updated_line(P, start, n, w)
