@@ -161,7 +161,7 @@ def source(given: Any, name: str, components: tuple[str, ...], one_by_one: bool,
         return Called(name, given, f"{of.__module__}.{of.__qualname__}", components, one_by_one)
     if len(cases := experiment.cases) > 1:
         which = follow.choice(experiment, "radarsim judge {} ESTIMATES")
-        raise ConfigError(f"{name}: estimates are of one case, and there are {len(cases)}: give a function, or {which}")
+        raise ConfigError(f"{name}: estimates are of one case, and there are {len(cases)}: {which}")
     if isinstance(given, Iterator):
         return Chunks(name, given, "iterator", components)
     if isinstance(given, str | os.PathLike):

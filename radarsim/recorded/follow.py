@@ -638,7 +638,7 @@ def to_npz(file: Writer, one: Drawn, parts: Parts, n: int) -> None:
         for name, array in (first | alone).items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                 if name in alone:
-                    np.lib.format.write_array(member, np.ascontiguousarray(array))
+                    np.lib.format.write_array(member, np.asarray(array, order="C"))
                     continue
                 shape = (n, *array.shape[1:2], *[widest] * (array.ndim - 2))
                 header = {"descr": np.lib.format.dtype_to_descr(array.dtype), "fortran_order": False, "shape": shape}

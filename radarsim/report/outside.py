@@ -216,7 +216,7 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
     if not len(rows):
         none = tr("{name} has no estimate that could be compared", name=name)
         return [f"{case}{failing if fails['failed'] else none}."]
-    start = case + (tr("{failing}; in the others ", failing=failing) if fails["failed"] else "")
+    start = case + (tr("{failing}, and in the others ", failing=failing) if fails["failed"] else "")
     there = [one for one in result.axes.components if one[0] in set(rows["component"])]
     wanted, at_s = others(result)[0].axes.judged_at or (there[0][0], np.inf)
     component, unit = next((one for one in there if one[0] == wanted), there[0])

@@ -80,7 +80,7 @@ def interval(low: str, high: str) -> str:
 
 def estimate(values: Iterable[float], unit: str = "", form: str = ".4g") -> str:
     """A value with its unit and its 95 % interval, from the value and the two ends: 12.3 m [12, 12.6]."""
-    said, lo, hi = (numeral(format(one, form)) for one in values)
+    said, lo, hi = (numeral(format(one, form)).replace("inf", "∞") for one in values)
     return f"{' '.join(filter(None, (said, unit)))} {interval(lo, hi)}"
 
 

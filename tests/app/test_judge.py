@@ -17,7 +17,7 @@ from radarsim.app.result import case_figures
 from radarsim.cli import main
 from radarsim.errors import ConfigError
 from radarsim.language import speaking, tr
-from radarsim.report import outside
+from radarsim.report import html, outside
 from radarsim.report import tables as common
 from radarsim.studies import registry
 from radarsim.studies.multimodel import study as flight
@@ -315,6 +315,7 @@ def test_failures_are_counted_and_sigma_is_of_the_others(estimates):
     counted = dict(result.tables["failures"][["reason", "failed"]].itertuples(index=False))
     assert counted == {"any": 10, "not_a_number": 5, "no_estimate": 1, "diverged": 4}
     assert result.answer[0].startswith("mine fails in 3.33 % [")
+    assert html.headline(result.answer).split("), and in the others ")[1].startswith("mine cannot be distinguished")
     mine = of(result.curves, filter="mine")
     assert set(mine["n"]) == {290}
     last = mine[(mine["component"] == "r") & (mine["k"] == 15)].iloc[0]
@@ -590,6 +591,10 @@ def test_studies_without_paired_plots_are_refused_with_the_reason():
     for config, why in (("discriminator", "draws no plots"), ("sonar_clutter", "trackers find tracks of their own")):
         with pytest.raises(ConfigError, match=why):
             radarsim.judge(config, held, realisations=64)
+    with pytest.raises(
+        ConfigError, match=r"are of one case, and there are 4: choose of sensor\.detection_prob"
+    ):
+        radarsim.judge("sonar_missed", np.zeros((64, 20, 2)))
 
 
 # ---- a planted loss --------------------------------------------------------------------------------------------------
