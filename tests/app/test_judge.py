@@ -315,7 +315,10 @@ def test_failures_are_counted_and_sigma_is_of_the_others(estimates):
     counted = dict(result.tables["failures"][["reason", "failed"]].itertuples(index=False))
     assert counted == {"any": 10, "not_a_number": 5, "no_estimate": 1, "diverged": 4}
     assert result.answer[0].startswith("mine fails in 3.33 % [")
-    assert html.headline(result.answer).split("), and in the others ")[1].startswith("mine cannot be distinguished")
+    how = html.headline(result.answer).split("), and in the others ")[1]
+    assert how.startswith(
+        "mine cannot be distinguished from r+Vr, the config's best in r at 140 s: gain 0 % [−0.001, 0.001]"
+    )
     mine = of(result.curves, filter="mine")
     assert set(mine["n"]) == {290}
     last = mine[(mine["component"] == "r") & (mine["k"] == 15)].iloc[0]
@@ -323,6 +326,14 @@ def test_failures_are_counted_and_sigma_is_of_the_others(estimates):
     assert last["sigma"] == pytest.approx(np.sqrt(np.mean((estimates[10:, 14, 0] - truth) ** 2)), rel=1e-12)
     nil = of(result.gains, filter="mine", baseline="r+Vr")
     assert (nil["gain_percent"].abs() < 1e-9).all()
+
+
+def test_of_equal_filters_the_first_is_the_best_and_one_realisation_tells_nothing():
+    keys = [{"name": name, "observes": ["range"], "manoeuvre_variance": 1e-3} for name in "cab"]
+    said = radarsim.judge("rls2", held, realisations=1, overrides={"filters": keys}).answer[0]
+    assert re.match(
+        r"mine cannot be distinguished from c, the config's best in r at 140 s: gain \S+ % \[−∞, 100\]", said
+    )
 
 
 def test_a_filter_that_starts_late_does_not_fail(estimates):
