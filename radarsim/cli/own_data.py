@@ -7,7 +7,7 @@ import click
 
 from radarsim.cli import group
 from radarsim.cli.group import Count, completed, config_argument, main, set_option
-from radarsim.language import plural, tr
+from radarsim.language import plural, speaking, tr
 
 if TYPE_CHECKING:
     from radarsim.engine.results import Track
@@ -197,6 +197,7 @@ def import_(recording: str, output: str, **asked: Any) -> None:
     """
     from radarsim.cli import console
     from radarsim.recorded.formats import importing, sites
+    from radarsim.report import wording
 
     antenna = sites.antenna_of(asked["antenna"]) if asked["antenna"] else None
     given: Any = (
@@ -205,16 +206,15 @@ def import_(recording: str, output: str, **asked: Any) -> None:
         *(asked["doppler_towards"], importing.columns_of(asked["columns"])),
         *(importing.encoding_named(asked["encoding"]), asked["keep_marked"], importing.biases_of(asked["biases"])),
     )
-    with console.Counter("reading", "records") as counter:
-        done = importing.import_recording(recording, output, importing.Options(*given), counter.update)
-    count = len([name for name in done.tracks if name])
-    rows, of = plural("{count} row", "{count} rows", done.rows), plural("{count} track", "{count} tracks", count)
-    told = {"file": output, "rows": rows, "tracks": of, "columns": ", ".join(done.columns)}
-    console.field("plots", tr("{file} ({rows} of {tracks}: {columns})", **told))
-    records = plural("{count} record read", "{count} records read", done.records)
-    console.field("", f"{done.format}, {records}")
-    for line in (*(f"{what} left out" for what in done.skipped), *done.notes):
-        click.echo(f"         {line}", err=True)
+    with speaking("en"):  # as all that the readers of formats say of a file
+        with console.Counter("reading", "records") as counter:
+            done = importing.import_recording(recording, output, importing.Options(*given), counter.update)
+        rows = wording.plural(done.rows, "row")
+        tracks = wording.plural(len([name for name in done.tracks if name]), "track")
+        console.field("plots", f"{output} ({rows} of {tracks}: {', '.join(done.columns)})")
+        console.field("", f"{done.format}, {wording.plural(done.records, 'record')} read")
+        for line in (*(f"{what} left out" for what in done.skipped), *done.notes):
+            click.echo(f"         {line}", err=True)
 
 
 @main.command()

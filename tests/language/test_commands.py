@@ -155,3 +155,13 @@ def test_what_solve_announces():
     assert near.startswith("среднее")
     assert untranslated(near, set()) == []
     assert untranslated(quantity, {"Vr"}) == []
+
+
+def test_import_is_in_one_language(tmp_path):
+    """English, as what its readers say of a file: not in two."""
+    (tmp_path / "log.csv").write_text("time,track,range_m\n0,1,1000\n5,1,1100\n5,1,1100\n9,,900\n")
+    with speaking("ru"):
+        said = command("import", tmp_path / "log.csv", "-o", tmp_path / "plots.csv")
+    assert said.stdout.startswith(f"plots    {tmp_path / 'plots.csv'} (3 rows of 1 track: ")
+    assert "left out" in said.stderr
+    assert not re.search("[А-я]", said.stdout + said.stderr)
