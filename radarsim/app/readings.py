@@ -292,12 +292,9 @@ def undecided(rows: Sequence[dict[str, Any]]) -> list[str]:
             if needed is None
             else f"about {roughly(needed):,} would"
         )
-        lines.append(f"{parts[0]['claim']} not yet decided at {_most(parts):,.0f} realisations; {would}")
+        most = max(page.number(part["n"]) or 0.0 for part in parts)
+        lines.append(f"{parts[0]['claim']} not yet decided at {most:,.0f} realisations; {would}")
     return lines
-
-
-def _most(parts: Sequence[Any]) -> float:
-    return max(page.number(part["n"]) or 0.0 for part in parts)
 
 
 # ---- readings --------------------------------------------------------------------------------------------------------

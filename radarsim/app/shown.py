@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from radarsim.app.configs import Inventory
     from radarsim.app.outlook import Outlook
     from radarsim.app.result import Result
-    from radarsim.app.run import Shares
     from radarsim.app.sensitivity import Sensitivity
     from radarsim.app.solve import Answer
     from radarsim.app.tune import Tuned
@@ -170,11 +169,6 @@ def result(one: "Result") -> dict[str, Any]:
         "files": list(written.files),
         "warnings": one.warnings,
     }
-
-
-def share_record(done: "Shares") -> dict[str, Any]:
-    """Realisations of a share, by case."""
-    return {**asdict(done), "unmet": done.unmet, "warnings": done.warnings}
 
 
 def outlook(experiment: "Experiment", one: "Outlook") -> dict[str, Any]:

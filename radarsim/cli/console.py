@@ -34,12 +34,7 @@ COLUMNS = (  # of tables
 )
 TITLES = (term("reading"), term("writing"), term("tracking"), term("judging"), term("fitting"))  # of Counter
 WHAT = (
-    term("likelihoods"),
-    term("realisations"),
-    term("cases"),
-    term("values"),
-    term("keys"),
-    term("records"),
+    *(term("likelihoods"), term("realisations"), term("cases"), term("values"), term("keys"), term("records")),
     term("rows"),
 )
 

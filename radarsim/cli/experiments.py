@@ -1,6 +1,7 @@
 """Commands that run experiments, and read, compare and judge their results. Heavy imports are inside the commands."""
 
 from collections.abc import Callable
+from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any, cast
 
@@ -177,7 +178,7 @@ def _compute_each(
             done = cast("Result", error.result)
         unmet += [f"{one.stem}: {reason}" for reason in done.unmet]
         if isinstance(done, simulation.Shares):
-            made.append(shown.share_record(done))
+            made.append({**asdict(done), "unmet": done.unmet, "warnings": done.warnings})
             if not (quiet or as_json):
                 outcomes.print_share(done, out)
         else:

@@ -223,14 +223,8 @@ def print_needs(experiment: "Experiment", outlook: "Outlook") -> None:
         most = max((need.realisations or math.inf) for need in needs.values())
         cure = tr("; -n {most} would do", most=str(most)) if math.isfinite(most) else ""
         cases = counted_cases(len(short))
-        say(
-            tr(
-                "precision not within reach of {cases}: {names}{cure}",
-                cases=cases,
-                names=", ".join(short[:3]),
-                cure=cure,
-            )
-        )
+        told = {"cases": cases, "names": ", ".join(short[:3]), "cure": cure}
+        say(tr("precision not within reach of {cases}: {names}{cure}", **told))
 
 
 def _unreached(need: "Need") -> str:
@@ -440,9 +434,8 @@ def report_fit(found: "Fit") -> None:
     lines = [labelled("plots", told)]
     if found.doubles:
         words = plural("{count} plot", "{count} plots", found.doubles)
-        lines.append(
-            labelled("doubles", tr("{plots} left out: the same scan has one nearer to the track", plots=words))
-        )
+        words = tr("{plots} left out: the same scan has one nearer to the track", plots=words)
+        lines.append(labelled("doubles", words))
     plain = {} if found.plain is None else {one.key: one for one in found.plain.keys}
     for one in found.keys:
         line = f"{one.key}: {_known(one)}"
@@ -467,15 +460,9 @@ def report_fit(found: "Fit") -> None:
         if found.plain.beside is not None:
             words = tr("{words}; the plots contradict that, so those intervals are too narrow", words=words)
         lines.append(labelled("", words))
-    lines.append(
-        labelled(
-            "",
-            tr(
-                "with these values the plots are {times} times as likely as with the stated ones",
-                times=page.times(found.gain),
-            ),
-        )
-    )
+    so = page.times(found.gain)
+    words = tr("with these values the plots are {times} times as likely as with the stated ones", times=so)
+    lines.append(labelled("", words))
     if settings:
         lines.append(labelled("", tr("to use the fitted values: {settings}", settings=settings)))
     for line in lines:

@@ -621,7 +621,7 @@ class _Search:
         self.highest = start + math.log(REACH)
         if robust:
             start, self.lowest, self.highest = (
-                np.append(keys, _logit(share))
+                np.append(keys, math.log(share / (1 - share)))
                 for keys, share in ((start, 0.05), (self.lowest, LEAST_SHARE), (self.highest, MOST_SHARE))
             )
         self.top_at = (TOP if near is None else NEAR) * start.size
@@ -877,10 +877,6 @@ class _Search:
         except (np.linalg.LinAlgError, IndexError):  # IndexError: no curvature, where neighbours are impossible
             return 0.1
         return min(1.2 * math.sqrt(2 * HALF_CHI2_95 * spread), 1.0) if 0 < spread < math.inf else 0.1
-
-
-def _logit(share: float) -> float:
-    return math.log(share / (1 - share))
 
 
 def settings(found: Fit) -> dict[str, float]:

@@ -43,7 +43,6 @@ NAMES_SHARE = 0.3  # maximum share of a panel's cell for names at the ends of it
 AT_ENDS_MM = 4.4  # of a panel's height for each name at a line's end
 ROW_MM, LETTER_MM, SAMPLE_MM = 3.5, 1.45, 12.0  # of a legend: a row, a letter, the sample of a line with its gaps
 LEAST_PANEL_MM = 55.0  # width, in a figure of a chosen width
-WIDTHS_MM = (85, 120, 175)  # of a journal's page: one column, one and a half, two
 MOST_BESIDE = 16  # names in one column beside a panel
 
 Keys = Mapping[str, Style | None]  # words and the look that they explain; None for the crosses of exact values

@@ -262,11 +262,9 @@ def from_csv(content: bytes) -> "pd.DataFrame":
 def read_rows(rows: Sequence[Mapping[Any, Any]], names: Iterable[str]) -> "pd.DataFrame":
     """Columns of rows of a CSV file: numbers as numbers, NaN where a cell is empty."""
     columns = {name: [row[name] for row in rows] for name in names}
-    return frame({name: _typed(name, column) for name, column in columns.items()})
-
-
-def _typed(name: str, column: Sequence[Any]) -> Sequence[Any] | np.ndarray:
-    return column if all(isinstance(one, bool) for one in column) else _read(name, list(map(str, column)))
+    flags = {name for name, column in columns.items() if all(isinstance(one, bool) for one in column)}
+    read = {name: column if name in flags else _read(name, list(map(str, column))) for name, column in columns.items()}
+    return frame(read)
 
 
 def _read(name: str, column: Sequence[str]) -> Sequence[str] | np.ndarray:
