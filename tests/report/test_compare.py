@@ -29,16 +29,16 @@ def side(label, errors, filters, noise="n", count=COUNT):
     """A side with these filters, the first the baseline; each time is an experiment."""
     t = np.arange(TIMES, dtype=float)
     curves, gains = [], []
-    base = errors[filters[0]]
+    squares = {f: errors[f] ** 2 for f in filters}
+    sums = {f: (one.sum(1), (one**2).sum(1)) for f, one in squares.items()}
     for f in filters:
-        e = errors[f]
-        sigma = statistics.root_mean_square((e**2).sum(1), (e**4).sum(1), COUNT)
+        sigma = statistics.root_mean_square(*sums[f], COUNT)
         labels = {"case": label, "filter": f, "component": "r", "unit": "m", "t_s": t}
         curves.append(labels | tables.interval_columns("sigma", sigma) | {"exact_sigma": np.full(TIMES, RATIOS[f])})
         if f != filters[0]:
-            cross = (e**2 * base**2).sum(1)
-            sums = ((e**2).sum(1), (e**4).sum(1), (base**2).sum(1), (base**4).sum(1), cross)
-            gain = tables.interval_columns("gain_percent", statistics.gain(*sums, COUNT), "gain")
+            cross = (squares[f] * squares[filters[0]]).sum(1)
+            paired = statistics.gain(*sums[f], *sums[filters[0]], cross, COUNT)
+            gain = tables.interval_columns("gain_percent", paired, "gain")
             gains.append(labels | gain | {"baseline": filters[0], "exact_percent": np.nan})
     made = {"curves": frame(curves)} | ({"gains": frame(gains)} if gains else {})
     return Side(label, label, label, noise, count, made)

@@ -117,7 +117,8 @@ def test_rare_errors_that_last_are_marked_where_a_sample_lacks_them(reach, monke
         e = rng.normal(size=(N, scans))
         for start in range(scans):
             e[rng.random(N) < 1 / 1500, start : start + 3] += 30
-        m2, m4 = (e**2).sum(axis=0), (e**4).sum(axis=0)
+        squares = e**2
+        m2, m4 = squares.sum(axis=0), (squares**2).sum(axis=0)
         of, effective = statistics.root_mean_square(m2, m4, N), statistics.effective(m2, m4, N)
         curves = pd.DataFrame({"case": "a", "filter": "f", "component": "x", "k": range(scans), "n_eff": effective})
         free = notes.nearby(curves) >= notes.EFFECTIVE
