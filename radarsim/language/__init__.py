@@ -218,7 +218,8 @@ def numeral(text: str) -> str:
     >>> [numeral(one) for one in ("-0.5", "6.678e+09", "1e-05")]
     ['−0.5', '6.678·10⁹', '10⁻⁵']
     """
-    text = POWER.sub(_raised, text)
+    if "e" in text:
+        text = POWER.sub(_raised, text)
     if current() == ENGLISH:
         return text.replace("-", "−")
     said = translations(current())

@@ -26,7 +26,7 @@ from urllib.parse import quote
 from radarsim.config.experiment import Case, Experiment
 from radarsim.config.fields import Model
 from radarsim.config.load import as_yaml
-from radarsim.language import called, current, numeral, plural, term, tr
+from radarsim.language import called, current, numeral, plural, speaking, term, tr
 from radarsim.report import chart, files, wording
 from radarsim.report import tables as common
 from radarsim.report.chart import spoken
@@ -426,7 +426,8 @@ def _tables(made: "Mapping[str, pd.DataFrame]") -> list[dict[str, Any]]:
     rows, most = [len(table) for table in made.values()], ROWS
     while most > 10 and sum(min(count, most) for count in rows) > ALL_ROWS:
         most -= 10
-    return [_table(name, table, most) for name, table in made.items()]
+    with speaking(current()):  # looked up once, not for each of ten thousand cells
+        return [_table(name, table, most) for name, table in made.items()]
 
 
 def table_in_words(name: str, table: "pd.DataFrame") -> dict[str, Any]:

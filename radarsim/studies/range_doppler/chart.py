@@ -176,6 +176,7 @@ def table(places: Sequence[Place]) -> "pd.DataFrame":
 
 
 # ---- figures ---------------------------------------------------------------------------------------------------------
+@cache
 def limit_course(c: float) -> tuple[np.ndarray, np.ndarray]:
     """t/τ₁ (n,) and gains (n, 3) by the recursion with scans so dense that the period no longer matters. After SETTLED
     memories the steady values stand."""
