@@ -673,8 +673,9 @@ def test_nees_of_a_right_covariance_covers_one():
         truth = plan.draw(0, 400).truth
         P = np.array([[250.0**2, 900, 0], [900, 15.0**2, 1], [0, 1, 0.3]])
         noise = np.random.default_rng(seed).normal(size=truth.shape) @ np.linalg.cholesky(P).T
-        member = judging.source((truth + noise, np.broadcast_to(P, (*truth.shape, 3))), "mine", (), False, [None])
-        case = judging.replace(load("rls2", [f"seed={seed}"]).cases[0], outside=(member,), realisations=400)
+        experiment = load("rls2", [f"seed={seed}"])
+        member = judging.source((truth + noise, np.broadcast_to(P, (*truth.shape, 3))), "mine", (), False, experiment)
+        case = judging.replace(experiment.cases[0], outside=(member,), realisations=400)
         work = CaseWork(case)
         found = judging.run.case_result(case, work, judging.run.collect(work, 400, threads=0))
         rows = common.joined([outside.consistency(found)])

@@ -62,7 +62,7 @@ def threshold_figure(results: Sequence[Result], made: "Mapping[str, pd.DataFrame
         return {}
     caption = tr(
         "P(not locked): share of bursts that do not lock, at the worst scan: velocity (or acceleration, "
-        "where used) in error by more than five Fisher bounds; estimators that always lock have no line. "
+        "where used) in error by more than five Fisher bounds; where all lock there is no point. "
         "σ of the range at the last scan. Bands: 95 % intervals."
     )
     figure = Figure("threshold", tr("The threshold"), caption, tuple(panels.in_legend(drawn)), 3, PAGE_MM, 60)
