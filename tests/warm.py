@@ -89,6 +89,7 @@ def become(asked: dict) -> None:
     """Be the process that was asked for."""
     os.chdir(asked["cwd"])
     os.environ.update(asked["environment"])
+    sys.dont_write_bytecode = bool(os.environ.get("PYTHONDONTWRITEBYTECODE"))  # Python read it when it started
     for number, file in enumerate((os.devnull, *asked["printed"])):
         opened = os.open(file, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o600)
         os.dup2(opened, number)

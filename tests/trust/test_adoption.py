@@ -77,7 +77,7 @@ def test_no_fault_of_meaning_that_moves_a_number_takes_blocks_over(rls2):
 
 # Rare branches among them: tracks that end, folds that are wrong, plots that are missed.
 TRIALS = {
-    "radarsim/kernels": ("rls2", 9000),
+    "radarsim/kernels/linear": ("rls2", 9000),
     "radarsim/studies/multimodel": ("multimodel", 4000),
     "radarsim/studies/sonar/clutter": ("sonar_clutter_ends", 20_000),
     "radarsim/studies/discriminator": ("discriminator_rare", 6000),
