@@ -302,6 +302,7 @@ def settings(authority, own, key):
 def test_a_scheduler_with_certificates_of_ones_own(tmp_path, monkeypatch):
     """The same sums over tls://; a certificate of another authority opens nothing."""
     import dask
+    import distributed  # noqa: F401  # whose defaults have to be there before they are set
 
     ours, theirs = certificates(tmp_path / "ours"), certificates(tmp_path / "theirs")
     with encrypted(*ours, tmp_path / "scheduler.json") as address:
