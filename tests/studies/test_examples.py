@@ -73,7 +73,7 @@ def test_a_filter_whose_column_a_file_lacks_is_named(radarsim, tmp_path):
 @pytest.mark.parametrize(
     ("name", "n", "further", "figures"),
     [
-        ("chirp", N, (), {"sigma_r.svg", "gain_v.svg"}),
+        ("chirp", N, ("floor.csv",), {"sigma_r.svg", "gain_v.svg"}),
         ("bearings", 1500, ("believed.csv", "consistency.csv"), {"consistency.svg"}),
         ("learned", 700, ("believed.csv", "consistency.csv", "failures.csv"), {"sigma_x.svg"}),
     ],
