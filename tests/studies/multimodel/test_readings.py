@@ -87,7 +87,7 @@ def test_a_flown_reading_is_measured_over_its_own_stages(tmp_path):
     from radarsim.app import readings
 
     of = next(one for one in readings.asked(["P2.3"]))
-    wanted = readings.Asked(of.paper, of.claims, whole=False, only={"flight": "pull-up 250"})
+    wanted = readings.Asked(of.paper, of.claims, whole=False)
     done = readings.judged([wanted], out=tmp_path, realisations=16, figures=False)
     flown = [one for one in done.read[0].over[0].under if one.reading["flight"] == "pull-up 250"]
     assert flown
