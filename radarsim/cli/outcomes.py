@@ -477,7 +477,7 @@ def _known(one: "Fitted") -> str:
 
 def report_registration(found: "Registration", other: str) -> None:
     """Print a registration, and the options that correct the radar's plots."""
-    from radarsim.recorded import register
+    from radarsim.recorded import identity, register
 
     plots = plural("{count} plot", "{count} plots", found.plots)
     by = ", ".join(f"{kind} {count}" for kind, count in found.by.items())
@@ -485,7 +485,7 @@ def report_registration(found: "Registration", other: str) -> None:
     lines = [
         labelled("plots", tr("{matched} of {plots} have a position of their aircraft in {file} (by {by})", **told))
     ]
-    apart = tr("{distance} from it (median)", distance=register.distance(*found.apart))
+    apart = tr("{distance} from it (median)", distance=identity.distance(*found.apart))
     aircraft = tr("{count} aircraft", count=len(found.aircraft))
     bent = tr("positions in between err by less than {most:.2g} m (95 %)", most=found.bent_m)
     lines += [labelled("", f"{aircraft}; {apart}; {bent}")]

@@ -1,5 +1,6 @@
 """Commands for users' own data and radars. Heavy imports are inside the commands."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -7,7 +8,7 @@ import click
 
 from radarsim.cli import group
 from radarsim.cli.group import Count, completed, config_argument, main, set_option
-from radarsim.language import plural, speaking, tr
+from radarsim.language import plural, tr
 
 if TYPE_CHECKING:
     from radarsim.engine.results import Track
@@ -195,7 +196,7 @@ def import_(recording: str, output: str, **asked: Any) -> None:
       radarsim import radar.ast --at 52.30,4.76,12 -o plots.csv
       radarsim track range_doppler_own plots.csv -o track.csv
     """
-    from radarsim.cli import console
+    from radarsim.cli import console, outcomes
     from radarsim.recorded.formats import importing, sites
     from radarsim.report import wording
 
@@ -206,15 +207,15 @@ def import_(recording: str, output: str, **asked: Any) -> None:
         *(asked["doppler_towards"], importing.columns_of(asked["columns"])),
         *(importing.encoding_named(asked["encoding"]), asked["keep_marked"], importing.biases_of(asked["biases"])),
     )
-    with speaking("en"):  # as all that the readers of formats say of a file
-        with console.Counter("reading", "records") as counter:
-            done = importing.import_recording(recording, output, importing.Options(*given), counter.update)
-        rows = wording.plural(done.rows, "row")
-        tracks = wording.plural(len([name for name in done.tracks if name]), "track")
-        console.field("plots", f"{output} ({rows} of {tracks}: {', '.join(done.columns)})")
-        console.field("", f"{done.format}, {wording.plural(done.records, 'record')} read")
-        for line in (*(f"{what} left out" for what in done.skipped), *done.notes):
-            click.echo(f"         {line}", err=True)
+    with console.Counter("reading", "records") as counter:
+        done = importing.import_recording(recording, output, importing.Options(*given), counter.update)
+    told = {"rows": plural("{count} row", "{count} rows", done.rows), "columns": ", ".join(done.columns)}
+    told |= {"tracks": plural("{count} track", "{count} tracks", len([name for name in done.tracks if name]))}
+    console.field("plots", f"{output} ({tr('{rows} of {tracks}: {columns}', **told)})")
+    read = plural("{format}, {count} record read", "{format}, {count} records read", done.records, format=done.format)
+    console.field("", read)
+    for line in (*(tr("left out: {what}", what=what) for what in done.skipped), *done.notes):
+        outcomes.write(sys.stderr, wording.labelled("", line))
 
 
 @main.command()

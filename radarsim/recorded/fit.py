@@ -33,7 +33,7 @@ import numpy as np
 
 from radarsim.config.experiment import Case, Experiment
 from radarsim.errors import ConfigError
-from radarsim.language import tr
+from radarsim.language import speaking, tr
 from radarsim.recorded import plots
 from radarsim.recorded.follow import Followed, borrowed, by_track, one_case, recorded_of, refuse_borrowed
 from radarsim.report.wording import significant_digits
@@ -429,7 +429,8 @@ def likelihood_of(
     found = of.likelihood(case, filter_name, long)
     folding = folded(case, long)
     if folding and found is not None and VELOCITY in found.by_number(np.asarray(found.stated)):
-        raise ConfigError(f"{source}: {said(folding, case)}")
+        with speaking("en"):  # as all faults
+            raise ConfigError(f"{source}: {said(folding, case)}")
     if found is None:
         raise ConfigError(unlikely(case, filter_name, [name for name in names if of.likelihood(case, name, long)]))
     return found, of.likelihood(case, filter_name, some(long, min(ROUGH_ROWS, of.rows_asked))), doubles

@@ -15,7 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.language import listed, tr
 from radarsim.recorded.plots import grouped
+from radarsim.report.wording import number
 
 KINDS = ("address", "callsign", "mode_3a")  # of identity, the strongest first
 OF_MANY = "00"  # the end of codes that are given to many
@@ -205,6 +207,12 @@ def apart(missed: np.ndarray) -> tuple[float, float]:
     known = missed[np.isfinite(missed[:, 1]), 1]
     turn = math.degrees(np.median(np.abs(known))) if len(known) else math.nan
     return float(np.median(np.abs(missed[:, 0]))), turn
+
+
+def distance(far_m: float, turn_deg: float) -> str:
+    """A distance in range and, where it is known, in bearing."""
+    turn = [] if math.isnan(turn_deg) else [f"{number(turn_deg, 2)}°"]
+    return listed([f"{number(far_m, 3)} {tr('m')}", *turn])
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:

@@ -29,7 +29,7 @@ from radarsim.errors import ConfigError
 from radarsim.language import plural, speaking, tr
 from radarsim.recorded import plots as files
 from radarsim.recorded.formats.sites import BIASES, DAY_S, Site
-from radarsim.recorded.identity import KINDS, Paths, apart, are_far, offsets
+from radarsim.recorded.identity import KINDS, Paths, apart, are_far, distance, offsets
 from radarsim.recorded.plots import grouped
 from radarsim.report.wording import interval, significant_digits
 
@@ -143,14 +143,6 @@ def lines(found: Registration) -> list[str]:
     command = f"radarsim import … {' '.join(options)}"
     said.append(tr("to correct: `{command}`", command=command) if shown else tr("no bias differs from 0"))
     return said
-
-
-def distance(far_m: float, turn_deg: float) -> str:
-    """A distance in range and, where it is known, in bearing."""
-    far = f"{significant_digits(far_m, '.3g')} {tr('m')}"
-    if not math.isfinite(turn_deg):
-        return far
-    return tr("{first} and {last}", first=far, last=f"{significant_digits(turn_deg, '.2g')}°")
 
 
 def apart_in_time(found: Registration) -> list[Aircraft]:

@@ -157,11 +157,18 @@ def test_what_solve_announces():
     assert untranslated(quantity, {"Vr"}) == []
 
 
-def test_import_is_in_one_language(tmp_path):
-    """English, as what its readers say of a file: not in two."""
-    (tmp_path / "log.csv").write_text("time,track,range_m\n0,1,1000\n5,1,1100\n5,1,1100\n9,,900\n")
+def test_what_import_says_is_russian_and_its_faults_and_its_file_are_not(tmp_path):
+    log, plots = tmp_path / "log.csv", tmp_path / "plots.csv"
+    log.write_text("time,track,range_m\n0,1,1000\n5,1,1100\n5,1,1100\n9,,900\n")
+    command("import", log, "-o", plots)
+    english = plots.read_bytes()
     with speaking("ru"):
-        said = command("import", tmp_path / "log.csv", "-o", tmp_path / "plots.csv")
-    assert said.stdout.startswith(f"plots    {tmp_path / 'plots.csv'} (3 rows of 1 track: ")
-    assert "left out" in said.stderr
-    assert not re.search("[А-я]", said.stdout + said.stderr)
+        said = command("import", log, "-o", plots)
+        fault = command("import", log, "-o", plots, "--track", "1", "--bias", "range_m=9999", code=2)
+    assert re.search(r"plots.csv \(3 строки, 1 трасса: .*\n +csv, прочитано 4 записи", said.stdout)
+    assert said.stderr.split("\n")[:-1] == [
+        " " * 14 + "не учтено: строки не позже предыдущей той же трассы (1)",
+        " " * 14 + "отметок вне трасс, которые `radarsim track` пропустит: 1 из 3",
+    ]
+    assert plots.read_bytes() == english
+    assert "left out: rows no farther away than the bias of their range (4)" in fault.stderr

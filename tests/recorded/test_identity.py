@@ -103,7 +103,7 @@ def test_the_truth_of_one_aircraft_is_not_that_of_all(tmp_path):
     plots = table(tmp_path, "plots", {"4ca815": 4.5, "3c6444": 4.9, "484161": 5.5})
     truth = table(tmp_path, "truth", {"4ca815": 4.5})
     done = import_recording(plots, tmp_path / "out.csv", Options(site=Site(52.3, 4.76, 0.0), truth=str(truth)))
-    assert done.notes[-1].startswith("truth: of 40 of 120 plots (33%; by address 40), which lie ")
+    assert done.notes[-1].startswith("truth: of 40 of 120 plots (33 %; by address 40), which lie ")
     rows = [line.split(",") for line in (tmp_path / "out.csv").read_text().splitlines() if not line.startswith("#")]
     at = rows[0].index("true_r_m")
     assert {row[1] for row in rows[1:] if row[at]} == {"4ca815"}

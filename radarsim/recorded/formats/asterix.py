@@ -15,6 +15,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from radarsim.errors import ConfigError
+from radarsim.language import ANY, term, tr
 from radarsim.recorded.formats import layout, sites
 from radarsim.recorded.formats.layout import Damaged, Profile
 from radarsim.recorded.identity import Tracks
@@ -26,7 +27,6 @@ RECENT = 4096  # data blocks; one that comes again among them is the double of a
 SURVEYED = 50_000  # data blocks at the beginning of a file in which radars say where they stand
 READ = (1, 2, 21, 34, 48, 62)
 OF_RADARS = {1, 48}
-NOWHERE = "records without time or position"
 REPORTS = ("", "PSR", "SSR", "SSR+PSR", "Mode S", "Mode S", "Mode S+PSR", "Mode S+PSR")  # by the type of item 048/020
 NO_AIRCRAFT = ("test target", "simulated", "field monitor", "coasted")
 MARKS = (*NO_AIRCRAFT, "garbled code", "garbled height")
@@ -326,7 +326,7 @@ class Asterix:
                 if self.truth and category not in self.trusted:
                     self.plots |= category in OF_RADARS
                 elif held is not None and self._again(data):
-                    self.skipped["data blocks that came twice"] += 1
+                    self.skipped[term("data blocks that came twice")] += 1
                 else:
                     self._block(category, begin, data, held)
                     if held is not None and len(held) >= sites.BATCH:
@@ -340,19 +340,22 @@ class Asterix:
     def notes(self, radars: Iterable[str]) -> list[str]:
         """What was marked, and what is known of these radars, in words."""
         found = []
-        turns = [f"{radar} {self.survey.turns[radar]:.4g} s" for radar in radars if radar in self.survey.turns]
+        turns = [(radar, self.survey.turns[radar]) for radar in radars if radar in self.survey.turns]
         if turns:
-            found.append(f"a turn of the antenna (I034/041) takes: {', '.join(turns)}")
-        for mark in NO_AIRCRAFT:
-            if count := self.marked[mark]:
-                kept = "" if self.keep else ": in no track and no truth; --keep-marked keeps them there"
-                found.append(f"{count} records are marked {mark}{kept}")
-        if garbled := [f"{self.marked[mark]} with a {mark}" for mark in MARKS[len(NO_AIRCRAFT) :] if self.marked[mark]]:
-            found.append(f"{' and '.join(garbled)}, which is not used")
+            each = ", ".join(tr("{radar} {turn:.4g} s", radar=radar, turn=turn) for radar, turn in turns)
+            found.append(tr("a turn of the antenna (I034/041) takes: {each}", each=each))
+        for mark, count in self.marked.items():
+            if mark not in NO_AIRCRAFT:
+                kept = tr("; it is not used")
+            else:
+                kept = "" if self.keep else tr("; in no track and no truth: --keep-marked keeps them there")
+            if count:
+                found.append(tr("records marked “{mark}”: {count}", mark=mark, count=count) + kept)
         if again := sum(one.again for one in self.tracks.values()):
-            found.append(f"track numbers are given again to another aircraft {again} times: NUMBER-2 and so on")
+            found.append(tr("track numbers given again to another aircraft, NUMBER-2 and so on: {count}", count=again))
         if shared := sum(len(one.shared) for one in self.tracks.values()):
-            found.append(f"{shared} Mode 3/A codes are of several aircraft or of one seen again: ACODE-2 and so on")
+            codes = term("Mode 3/A codes of several aircraft or of one seen again, ACODE-2 and so on: {count}")
+            found.append(tr(codes, count=shared))
         return found
 
     def _again(self, data: bytes) -> bool:
@@ -370,7 +373,7 @@ class Asterix:
             elif category == 2:
                 self._sectors(data)
             else:
-                self.skipped[f"data blocks of category {category:03d}"] += 1
+                self.skipped[term("data blocks of category #").replace(ANY, f"{category:03d}")] += 1
         except Damaged as fault:
             edition = f"{category:03d} in edition {layout.edition(category)}, which is taken for granted"
             raise ConfigError(f"{self.path}: byte {begin + fault.at}, record {self.records + 1}: not ASTERIX of "
@@ -383,7 +386,7 @@ class Asterix:
             self.records += 1
             when = next((places[i] for i in category.when if places[i] >= 0), -1)
             if when < 0 or all(places[i] < 0 for i in category.where):
-                self.skipped[NOWHERE] += 1
+                self.skipped[sites.NOWHERE] += 1
                 continue
             held.places.extend(places)
             held.begins.append(held.size)
@@ -417,7 +420,7 @@ class Asterix:
         batch = sites.Batch(kind, tracks, words.pop("address"), radars, columns, words)
         if kind == sites.PLOTS:
             nowhere = columns["range_m"] == 0
-            self.skipped[NOWHERE] += int(nowhere.sum())
+            self.skipped[sites.NOWHERE] += int(nowhere.sum())
             return batch.rows(np.flatnonzero(~nowhere).tolist()) if nowhere.any() else batch
         return batch.rows(np.flatnonzero(~out).tolist()) if self.truth else batch
 

@@ -20,6 +20,7 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 
 from radarsim.errors import ConfigError
+from radarsim.language import speaking, term, tr
 from radarsim.recorded import fit
 from radarsim.recorded.formats import asterix, logs
 from radarsim.recorded.formats import sites as ais
@@ -40,7 +41,17 @@ from radarsim.recorded.formats.sites import (
     utc_s,
 )
 from radarsim.recorded.formats.text import Sheet, Table, comma_separated
-from radarsim.recorded.identity import FARTHEST_M, FARTHEST_RAD, KINDS, LONGEST_GAP_S, Paths, apart, are_far, offsets
+from radarsim.recorded.identity import (
+    FARTHEST_M,
+    FARTHEST_RAD,
+    KINDS,
+    LONGEST_GAP_S,
+    Paths,
+    apart,
+    are_far,
+    distance,
+    offsets,
+)
 from radarsim.recorded.plots import cells, grouped
 from radarsim.report.files import Writer
 
@@ -56,7 +67,17 @@ HEAD = 4096  # bytes used to detect the format
 ZIPPED = b"\x1f\x8b"  # how gzip begins
 MOST_LISTED = 12
 CONTRADICTS_M = 100.0  # of two places of a radar; a geoid is that far from the ellipsoid
-NOT_LATER = "rows not later than the one before of their track"
+NOT_LATER = term("rows not later than the one before of their track")
+ELSEWHERE = term("rows of radar #/#, whose place neither it nor --at says")
+BESIDE = {PLOTS: term("plots beside positions"), POSITIONS: term("positions beside plots")}
+AT_SEA_LEVEL = term("positions without altitude, placed at sea level: {count} of {all}")
+UNPLACED = term(
+    "plots without height, or with one that their range cannot have: {count} of {all}; x_m, y_m, z_m are empty there"
+)
+BEHIND = term(
+    "plots behind the antenna or without height: {count} of {all}; elevation_rad and azimuth_rad are empty there"
+)
+UNNAMED = term("plots of no track, which `radarsim track` skips: {count} of {all}")
 LEAST_DATED_S = 1e8  # since 1970; smaller times count from anywhere
 SIGN_TESTS = 2000  # pairs of plots on which the sign of the Doppler speed is tested
 LEAST_TESTS = 20
@@ -236,10 +257,9 @@ def import_recording(
                     first = False
                 file.write(rows)
                 progress(reader.records)
-            if first:
-                raise ConfigError(work.nothing())
-            if faults := work.faults():
-                raise ConfigError(*faults)
+            with speaking("en"):  # as all faults
+                if faults := work.faults() if work.done.rows else [work.nothing()]:
+                    raise ConfigError(*faults)
     done = work.finished()
     done.notes = contradictions + done.notes
     return done
@@ -253,8 +273,9 @@ def placed(options: Options, reader: Reader) -> tuple[Options, list[str]]:
     for name, site in given.items():
         if name in sites and (far := site.distance_m(sites[name])) > CONTRADICTS_M:
             lat, lon, height = stated[name]
-            said.append(f"--at puts radar {name} {far:.0f} m from where it says it stands, {lat:.5f},{lon:.5f},"
-                        f"{height:.0f} (I034/120); --at is taken")  # fmt: skip
+            told = {"name": name, "far": far, "place": f"{lat:.5f},{lon:.5f},{height:.0f}"}
+            said.append(tr("--at puts radar {name} {far:.0f} m from where it says it stands, {place} (I034/120); "
+                           "--at is taken", **told))  # fmt: skip
     return (options if options.site else replace(options, sites=sites | dict(options.sites))), said
 
 
@@ -270,7 +291,7 @@ class _Import:
         self.last: dict[str, float] = {}
         self.left = Counter[str]()
         self.radars = Counter[str]()
-        self.behind = self.unplaced = self.at_sea_level = 0
+        self.without = Counter[str]()  # by what a note says of these rows
         self.sign, self.folds = _Sign(), _Folds()
         self.seen: set[str] = set()
 
@@ -282,7 +303,7 @@ class _Import:
                 self.kind = PLOTS if plots else batch.kind
             if batch.kind != self.kind:
                 if batch.kind == PLOTS or self.truth is None or not self.truth.own:
-                    self.left[f"{batch.kind} beside {self.kind}"] += len(batch.track)
+                    self.left[BESIDE[batch.kind]] += len(batch.track)
                 continue
             kept = self._kept(self._unbiased(batch))
             if kept is not None:
@@ -297,7 +318,7 @@ class _Import:
             columns["range_m"] = (measured - biases.get("range_m", 0.0)) / (1 + biases.get("range_scale", 0.0))
             columns["bearing_rad"] = (columns["bearing_rad"] - biases.get("bearing_rad", 0.0)) % (2 * math.pi)
             if (gone := (measured > 0) & (columns["range_m"] <= 0)).any():
-                self.left["rows no farther away than the bias of their range"] += int(gone.sum())
+                self.left[term("rows no farther away than the bias of their range")] += int(gone.sum())
                 return batch.rows(np.flatnonzero(~gone).tolist())
         elif biases:
             raise ConfigError("bias: is subtracted from plots of a radar; the recording has positions")
@@ -311,9 +332,9 @@ class _Import:
             if len(self.seen) < MOST_LISTED:
                 self.seen.add(track)
             if self.options.sites and batch.kind == PLOTS and radar not in self.options.sites:
-                self.left[f"rows of radar {radar or 'without a name'}, whose place neither it nor --at says"] += 1
+                self.left[ELSEWHERE.replace("#/#", radar) if radar else term("rows of a radar without a name")] += 1
             elif wanted and track not in wanted:
-                self.left["rows of other tracks"] += 1
+                self.left[term("rows of other tracks")] += 1
             elif track and t <= self.last.get(track, -math.inf):
                 self.left[NOT_LATER] += 1
             else:
@@ -371,7 +392,7 @@ class _Import:
                 raise ConfigError("at: must say where the radar stands, LAT,LON,HEIGHT: the recording has positions "
                                   "on the earth, not ranges")  # fmt: skip
             seen = site.seen(given)
-            self.at_sea_level += int(np.isnan(given["altitude_m"]).sum())
+            self.without[AT_SEA_LEVEL] += int(np.isnan(given["altitude_m"]).sum())
             columns = {name: seen[name] for name in (*PLACED, "level_elevation_rad", *LOCAL)}
             return columns | {"altitude_m": given["altitude_m"]} | self._angles(columns)
         columns = {name: given[name] for name in (*PLACED, "span_mps", "altitude_m")}
@@ -382,7 +403,7 @@ class _Import:
             place = self.options.sites.get(name) or site
             assert place is not None  # rows of other radars are left out
             local[own] = place.local(*(given[key][own] for key in ("range_m", "bearing_rad", "altitude_m")))
-        self.unplaced += int(np.isnan(local[:, 1]).sum())
+        self.without[UNPLACED] += int(np.isnan(local[:, 1]).sum())
         columns |= {"level_elevation_rad": described(local)["level_elevation_rad"]}
         columns |= dict(zip(LOCAL, local.T, strict=True))
         return columns | self._angles(columns)
@@ -391,7 +412,7 @@ class _Import:
         if self.options.antenna is None:
             return {}
         angles = biconical(np.stack([columns[name] for name in LOCAL], axis=-1), self.options.antenna)
-        self.behind += int(np.isnan(angles["elevation_rad"]).sum())
+        self.without[BEHIND] += int(np.isnan(angles["elevation_rad"]).sum())
         return angles
 
     def comment(self) -> list[str]:
@@ -443,7 +464,7 @@ class _Import:
             more = " …" if len(there) >= MOST_LISTED else ""
             return f"{path}: track: must be one of {', '.join(there)}{more}; got {', '.join(self.options.tracks)}"
         passed = [*counted(self.reader.skipped), *counted(self.left)]
-        why = f" ({'; '.join(passed)} passed over)" if passed else ""
+        why = f"; left out: {', '.join(passed)}" if passed else ""
         return f"{path}: has no plots; {self.reader.records} records were read{why}"
 
     def faults(self) -> list[str]:
@@ -464,30 +485,20 @@ class _Import:
         done = self.done
         done.records = self.reader.records
         done.skipped = [*counted(self.reader.skipped), *counted(self.left)]
-        if self.unplaced:
-            fault = "have no height, or one that their range cannot have: x_m, y_m, z_m are empty there"
-            done.notes.append(f"{self.unplaced} of {done.rows} plots {fault}")
-        if self.at_sea_level:
-            done.notes.append(
-                f"{self.at_sea_level} of {done.rows} positions have no altitude: they are placed at sea level"
-            )
-        if self.behind:
-            fault = "are behind the antenna or without height: elevation_rad and azimuth_rad are empty there"
-            done.notes.append(f"{self.behind} of {done.rows} plots {fault}")
+        self.without[UNNAMED] = done.tracks.get("", 0)
+        done.notes += [tr(what, count=count, all=done.rows) for what, count in self.without.items() if count]
         if len(self.radars) > 1:
             each = ", ".join(f"{name} ({count})" for name, count in self.radars.items())
-            done.notes.append(f"plots of {len(self.radars)} radars, SAC/SIC (rows): {each}; the tracks of all but the "
-                              "first have its name before their number")  # fmt: skip
+            done.notes.append(tr("plots of several radars, SAC/SIC (rows): {each}; the tracks of all but the first "
+                                 "have its name before their number", each=each))  # fmt: skip
         if isinstance(self.reader, Table | Asterix) and (turns := self.reader.clock.turns):
-            done.notes.append(f"the times of day pass midnight: t_s runs on ({turns} × 24 h)")
+            done.notes.append(tr("the times of day pass midnight: t_s runs on ({turns} × 24 h)", turns=turns))
         if isinstance(self.reader, Table | Ais):
             done.notes += self.reader.notes()
         if isinstance(self.reader, Asterix):
             done.notes += self.reader.notes(self.radars)
         if self.truth is not None:
             done.notes += self.truth.notes()
-        if unnamed := done.tracks.get("", 0):
-            done.notes.append(f"{unnamed} of {done.rows} plots belong to no track; `radarsim track` skips them")
         if note := self.sign.note(self.options.towards):
             done.notes.append(note)
         if (folded := fit.folding(self.folds.tracks())) is not None:
@@ -592,23 +603,20 @@ class _Truth:
             missed = np.concatenate(parts)
             if are_far(missed[:, :2], missed[:, 2]):
                 most = f"{FARTHEST_M:g} m, and in bearing {math.degrees(FARTHEST_RAD):g}° more than these make"
-                found.append(f"truth: the plots of {names[number]} lie {_apart(missed)} from it (median), allowed are "
+                far = distance(*apart(missed[:, :2]))
+                found.append(f"truth: the plots of {names[number]} lie {far} from it (median), allowed are "
                              f"{most}: it is another aircraft or clock, or --at is wrong")  # fmt: skip
         return found
 
     def notes(self) -> list[str]:
         """How many of the plots have a truth, and how far they are from it."""
         if not self.missed:
-            return ["truth: of no plot"] if self.paths.paths else []
+            return [tr("truth: of no plot")] if self.paths.paths else []
         missed = np.concatenate([one for own in self.missed.values() for one in own])
         by = ", ".join(f"{KINDS[k]} {count}" for k, count in sorted(self.kinds.items()))
-        share = f"{len(missed)} of {self.rows} plots ({len(missed) / self.rows:.0%}; by {by})"
-        return [f"truth: of {share}, which lie {_apart(missed)} from it (median)"]
-
-
-def _apart(missed: np.ndarray) -> str:
-    r, b = apart(missed[:, :2])
-    return f"{r:.3g} m in range" + ("" if math.isnan(b) else f" and {b:.2g}° in bearing")
+        told = {"distance": distance(*apart(missed[:, :2])), "by": by}
+        said = term("truth: of {count} of {all} plots ({share:.0f} %; by {by}), which lie {distance} from it (median)")
+        return [tr(said, count=len(missed), all=self.rows, share=100 * len(missed) / self.rows, **told)]
 
 
 class _Sign:
@@ -642,11 +650,9 @@ class _Sign:
         as_is, turned = float(np.median(self.as_is)), float(np.median(self.turned))
         if turned >= 0.5 * as_is:
             return None
-        cure = "leave out" if towards else "give"
-        return (
-            f"the Doppler speeds miss the change of the range by {as_is:.1f} m/s (median), with the other sign by "
-            f"{turned:.1f} m/s: {cure} --doppler-towards"
-        )
+        cure = tr("leave out --doppler-towards") if towards else tr("give --doppler-towards")
+        return tr("the Doppler speeds miss the change of the range by {as_is:.1f} m/s (median), with the other sign by "
+                  "{turned:.1f} m/s: {cure}", as_is=as_is, turned=turned, cure=cure)  # fmt: skip
 
 
 class _Folds:

@@ -24,6 +24,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 
 from radarsim.errors import ConfigError
+from radarsim.language import ANY, term
 from radarsim.recorded.formats import sites
 
 Skip = Callable[[bytes, int], int]  # data and start of an item: its end
@@ -350,7 +351,8 @@ PCAPNG, ORDER = b"\x0a\x0d\x0d\x0a", {struct.pack(order + "I", 0x1A2B3C4D): orde
 INTERFACE, OLD_PACKET, SIMPLE_PACKET, PACKET = 1, 2, 3, 6  # of pcapng
 LINKS = {1: 14, 113: 16, 276: 20, 12: 0, 14: 0, 101: 0, 228: 0, 229: 0, 0: 4, 108: 4}  # bytes before a packet of IP
 VLAN, UDP = (b"\x81\x00", b"\x88\xa8", b"\x91\x00"), 17  # the type before a tag
-FRAGMENTS = "fragments of datagrams, which are not put together"
+FRAGMENTS = term("fragments of datagrams, which are not put together")
+CUT_OFF = term("packets cut off by the end of the file")
 EXTENSIONS, FRAGMENT = (0, 43, 60), 44  # headers of IPv6 before the datagram
 
 
@@ -449,7 +451,7 @@ def _captured(path: str, file: BinaryIO, left: Counter[str]) -> Iterator[Block]:
     after = Counter[int]()
     for begin, link, data, whole in _packets(path, file, left):
         if not whole:
-            left["packets of which the capture kept the beginning only"] += 1
+            left[term("packets of which the capture kept the beginning only")] += 1
             continue
         place = _datagram(data, link, left)
         if place is None:
@@ -457,12 +459,12 @@ def _captured(path: str, file: BinaryIO, left: Counter[str]) -> Iterator[Block]:
         start, end = place
         found, more = content(data[start:end])
         if not found:
-            left["datagrams without ASTERIX"] += 1
+            left[term("datagrams without ASTERIX")] += 1
         elif more:
             after[more] += 1
         yield from ((category, begin + start + at, block) for category, at, block in found)
     for count, times in after.items():
-        left[f"tails of {count} bytes after the data blocks of datagrams"] = times
+        left[term("tails of # bytes after the data blocks of datagrams").replace(ANY, str(count))] = times
 
 
 def _packets(path: str, file: BinaryIO, left: Counter[str]) -> Iterator[tuple[int, int, bytes, bool]]:
@@ -484,7 +486,7 @@ def _pcap(path: str, file: BinaryIO, magic: bytes, left: Counter[str]) -> Iterat
             raise ConfigError(f"{path}: byte {at}: must be a packet of at most {LARGEST_PACKET} bytes; got {size}")
         data = file.read(size)
         if len(head) < 16 or len(data) < size:
-            left["packets cut off by the end of the file"] += 1
+            left[CUT_OFF] += 1
             return
         yield at + 16, link, data, size >= had
         at += 16 + size
@@ -501,7 +503,7 @@ def _pcapng(path: str, file: BinaryIO, magic: bytes, left: Counter[str]) -> Iter
             raise ConfigError(f"{path}: byte {at}: must be a block of a pcapng file; got {head.hex(' ')}")
         body = head[8:] + file.read(size - 12) if size else b""
         if len(head) < 12 or len(body) < size - 8:
-            left["packets cut off by the end of the file"] += 1
+            left[CUT_OFF] += 1
             return
         body = body[:-4]  # the size stands once more behind it
         if kind == INTERFACE and len(body) >= 2:
@@ -528,7 +530,7 @@ def _datagram(data: bytes, link: int, left: Counter[str]) -> tuple[int, int] | N
     """Where the content of a packet's datagram of UDP begins and ends; none where it has none, which is counted."""
     at = LINKS.get(link)
     if at is None:
-        left[f"packets of the kind of link {link}, which is not read"] += 1
+        left[term("packets of the kind of link #, which is not read").replace(ANY, str(link))] += 1
         return None
     while data[max(at - 2, 0) : at] in VLAN:
         at += 4
@@ -536,7 +538,7 @@ def _datagram(data: bytes, link: int, left: Counter[str]) -> tuple[int, int] | N
     place = version(data, at) if version else None
     if isinstance(place, tuple) and place[1] <= len(data):
         return place[0] + 8, place[1]  # after ports, length and check sum
-    left[place if isinstance(place, str) else "packets other than UDP"] += 1
+    left[place if isinstance(place, str) else term("packets other than UDP")] += 1
     return None
 
 

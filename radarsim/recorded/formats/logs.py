@@ -13,6 +13,7 @@ from typing import Any, BinaryIO
 from xml.etree import ElementTree
 
 from radarsim.errors import ConfigError
+from radarsim.language import term, tr
 from radarsim.recorded.formats import sites
 from radarsim.recorded.formats.text import Sheet
 
@@ -86,7 +87,7 @@ def _trace(document: dict[str, Any], sheet: Sheet) -> Iterator[list[str]]:
         dt, lat, lon, altitude, speed, course, flags, climb, _, _, geometric = [*entry, *[None] * 11][:11]
         flags = flags if isinstance(flags, int) else 0
         if flags & STALE:
-            sheet.skipped["positions marked as stale"] += 1
+            sheet.skipped[term("positions marked as stale")] += 1
             continue
         if altitude == "ground":  # then the course is where the nose points
             altitude = course = None
@@ -131,7 +132,7 @@ def _records(document: Sequence[Any], sheet: Sheet) -> Iterator[list[str]]:
             sheet.header = sheet.header or list(record)
             yield [_text(record.get(name)) for name in sheet.header]
         else:
-            sheet.skipped["entries that are no records"] += 1
+            sheet.skipped[term("entries that are no records")] += 1
 
 
 def _number(value: Any) -> float:
@@ -212,9 +213,8 @@ def from_gpx(path: str, file: BinaryIO) -> Sheet:
         except ElementTree.ParseError as error:
             raise ConfigError(f"{path}:{error.position[0]}: must be GPX: {error}; {number} points were read") from error
 
-    return Sheet(
-        path, POINT, rows(), notes=["altitudes are as the file has them, mostly above the sea, not the ellipsoid"]
-    )
+    note = tr("altitudes are as the file has them, mostly above the sea, not the ellipsoid")
+    return Sheet(path, POINT, rows(), notes=[note])
 
 
 def _local(element: ElementTree.Element) -> str:
@@ -227,7 +227,6 @@ FIX = {"lat": "lat", "lon": "lon", "speed": "speed [kn]", "course": "course [deg
 RECEIVER = re.compile(rb"\$[A-Z]{2}(?:GGA|RMC),[^\r\n]*")
 DATED = re.compile(rb"\$[A-Z]{2}RMC,[^,]*,A(?:,[^,]*){6},\d{6}")
 CLOCK = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-6]\d(?:\.\d+)?)")
-NO_FIX = "sentences without a fix"
 
 
 def from_nmea(path: str, file: BinaryIO) -> Sheet:
@@ -275,13 +274,13 @@ def _fix(line: bytes, sheet: Sheet) -> dict[str, float]:
     """The numbers of a sentence by the names of FIX, `clock` in s of the day; nothing where it has no fix."""
     found = RECEIVER.search(line)
     if not found or (b"*" in found[0] and not sites.sound(found[0])):
-        sheet.skipped["damaged sentences" if found else "other lines"] += 1
+        sheet.skipped[term("damaged sentences") if found else term("other lines")] += 1
         return {}
     kind, clock, *cells = [*found[0].partition(b"*")[0].decode("ascii", "replace").split(","), *[""] * 12]
     time = CLOCK.fullmatch(clock)
     first = kind.endswith("RMC")  # the place then begins one later
     if not time or (cells[0] != "A" if first else cells[4] in ("", "0")):
-        sheet.skipped[NO_FIX] += 1
+        sheet.skipped[term("sentences without a fix")] += 1
         return {}
     said = {"clock": 3600.0 * int(time[1]) + 60 * int(time[2]) + float(time[3])}
     said |= {"lat": _angle(*cells[first : 2 + first]), "lon": _angle(*cells[2 + first : 4 + first])}

@@ -23,6 +23,7 @@ import numpy as np
 
 from radarsim import physics
 from radarsim.errors import ConfigError
+from radarsim.language import term, tr
 
 # ---- records ---------------------------------------------------------------------------------------------------------
 BATCH = 20_000  # records held at a time
@@ -33,6 +34,7 @@ PLOTS, POSITIONS = "plots", "positions"
 PLOT_COLUMNS = ("t_s", "range_m", "bearing_rad", "velocity_mps", "span_mps", "altitude_m")
 BIASES = ("range_m", "range_scale", "bearing_rad", "time_s")  # of plots, to be subtracted
 POSITION_COLUMNS = ("t_s", "latitude_deg", "longitude_deg", "altitude_m", "east_mps", "north_mps", "up_mps")
+NOWHERE = term("records without time or position")  # a reason to skip them
 
 
 class Batch(NamedTuple):
@@ -147,7 +149,7 @@ def needs(module: str, extra: str) -> ConfigError:
 
 def counted(skipped: Mapping[str, int]) -> list[str]:
     """Numbers of skipped records, in words."""
-    return [f"{count} {what}" for what, count in skipped.items() if count]
+    return [f"{tr(what)} ({count})" for what, count in skipped.items() if count]
 
 
 # ---- site ------------------------------------------------------------------------------------------------------------
@@ -340,8 +342,9 @@ class Ais:
         """How times were found where the lines do not state them."""
         if not self.untimed:
             return []
-        rest = "are made to run on" if math.isnan(self.stamp) else "are taken as nearest to the times before them"
-        return [f"{self.untimed} reports state no time: their seconds of the minute {rest}"]
+        if math.isnan(self.stamp):
+            return [tr("reports that state no time: {count}; the seconds of their minute run on", count=self.untimed)]
+        return [tr("reports that state no time: {count}; they get the nearest with their second", count=self.untimed)]
 
     def batches(self) -> Iterator[Batch]:
         """The position reports in batches; raises ConfigError where most sentences are damaged."""
@@ -368,7 +371,7 @@ class Ais:
             raise ConfigError(f"{first}: must be AIS sentences (!AIVDM,…); {damaged} lines are not, or are damaged; "
                               f"{self.records} messages were read")  # fmt: skip
         if damaged:
-            self.skipped["damaged lines"] = damaged
+            self.skipped[term("damaged lines")] = damaged
         if len(gathered):
             yield gathered.taken()
 
@@ -380,9 +383,9 @@ class Ais:
                 moment = datetime.datetime(year, month, day, hour, minute, second, 1000 * thousandths, datetime.UTC)
                 self.ahead = moment.timestamp()
             except ValueError:
-                self.skipped["damaged lines of time"] += 1
+                self.skipped[term("damaged lines of time")] += 1
         elif line.lstrip().startswith(b"$"):
-            self.skipped["sentences other than AIS"] += 1
+            self.skipped[term("sentences other than AIS")] += 1
 
     def _decoded(self, sentence: bytes, stated: float) -> tuple[Any, float]:
         """The message that a sentence completes, none while further sentences of it are to come; the first time that
@@ -428,14 +431,14 @@ class Ais:
     def _take(self, message: Any, stated: float, gathered: Gathered) -> None:
         latitude, longitude = getattr(message, "lat", None), getattr(message, "lon", None)
         if latitude is None or longitude is None or message.msg_type not in (1, 2, 3, 18, 19):
-            self.skipped["messages other than ships' positions"] += 1
+            self.skipped[term("messages other than ships' positions")] += 1
             return
         if None in (message.second, message.speed, message.course):
-            self.skipped["messages cut short"] += 1
+            self.skipped[term("messages cut short")] += 1
             return
         second = int(message.second)
         if abs(latitude) > 90 or abs(longitude) > 180 or (math.isnan(stated) and second >= NO_SECOND):
-            self.skipped["reports without position or time"] += 1
+            self.skipped[NOWHERE] += 1
             return
         t = stated
         if math.isnan(t):

@@ -26,6 +26,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, TextIO
 
 from radarsim.errors import ConfigError
+from radarsim.language import term, tr
 from radarsim.recorded.formats import sites
 from radarsim.recorded.formats.sites import KNOT_MPS
 from radarsim.recorded.plots import Faults
@@ -229,19 +230,21 @@ class Header:
 
     def notes(self) -> list[str]:
         """What was assumed, and what was not used."""
-        taken = ", ".join(f"{one.name} in {one.unit}" for one in self.columns.values() if one.assumed and one.unit)
-        found = [f"assumed because the name has no unit: {taken}"] if taken else []
+        assumed = [one for one in self.columns.values() if one.assumed and one.unit]
+        taken = ", ".join(tr("{name} in {unit}", name=one.name, unit=one.unit) for one in assumed)
+        found = [tr("assumed because the name has no unit: {units}", units=taken)] if taken else []
         time = self.columns["t_s"].name
         known = {stem: name for (stem, _), name in zip(self.stems, self.names, strict=True)}
         used = {one.name for one in self.columns.values()}
         others = [known[stem] for stem in known if stem in QUANTITIES["t_s"].names and known[stem] not in used]
         if others:
-            found.append(f"times are {time}; not used: {', '.join(others)}")
+            found.append(tr("times are {time}; not used: {others}", time=time, others=", ".join(others)))
         if self.maritime and self.on_earth and BOW in known and "course_deg" not in self.columns:
-            found.append(f"no speeds: {known[BOW]} is where the bow points, not the course")
+            found.append(tr("no speeds: {heading} is where the bow points, not the course", heading=known[BOW]))
         ranges = [known[stem] for stem in known if stem in QUANTITIES["range_m"].names]
         if self.on_earth and ranges:
-            found.append(f"positions are read, not plots; for these: --column range_UNIT={shlex.quote(ranges[0])}")
+            column = f"--column range_UNIT={shlex.quote(ranges[0])}"
+            found.append(tr("positions are read, not plots; for these: {column}", column=column))
         return found
 
 
@@ -347,32 +350,38 @@ class Table:
     def notes(self) -> list[str]:
         """Assumptions on units and times, and signs against them."""
         found = [*self.header.notes(), *self.sheet.notes]
-        if self.sheet.encoding != "UTF-8":
-            found.append(f"the text is read as {self.sheet.encoding}, as it is not UTF-8; for another: --encoding NAME")
+        if (encoding := self.sheet.encoding) != "UTF-8":
+            found.append(
+                tr("the text is read as {name}, as it is not UTF-8; for another: --encoding NAME", name=encoding)
+            )
         if self.doubtful and not self.decimal:
             value = float(self.doubtful.replace(",", "."))
-            found.append(f"commas are decimal: {self.doubtful} is read as {value:g}")
+            found.append(tr("commas are decimal: {text} is read as {value:g}", text=self.doubtful, value=value))
         if self.unit_s < 1:
-            found.append(f"times are so large that they are read in units of {self.unit_s:g} s")
+            found.append(tr("times are so large that they are read in units of {unit:g} s", unit=self.unit_s))
         if "" in self.slashed and len(self.slashed) == 1:
             cure = f"--column t_mdy={self.columns['t_s'].name}"
-            found.append(f"{self.slashed['']} is read as day and month; if the month stands first: {cure}")
+            words = term("{date} is read as day and month; if the month stands first: {cure}")
+            found.append(tr(words, date=self.slashed[""], cure=cure))
         if self.barometric:
-            found.append(f"{self.barometric} altitudes are barometric, as the geometric one is missing")
+            found.append(tr("barometric altitudes, where the geometric one is missing: {count}", count=self.barometric))
         if self.silent and "course_deg" in self.columns:
-            found.append(f"{self.silent} of {self.records} reports have no speed or no course")
+            words = term("reports without speed or course: {count} of {all}")
+            found.append(tr(words, count=self.silent, all=self.records))
         if self.highest > HIGHEST_M and not self.header.aviation:
             name = (self.columns.get("altitude_m") or self.columns["barometric_m"]).name
-            found.append(f"altitudes up to {self.highest:.0f} m: if {name} is in feet, name it {name}_ft")
+            words = term("altitudes up to {highest:.0f} m: if {name} is in feet, name it {name}_ft")
+            found.append(tr(words, highest=self.highest, name=name))
         if likely := self._likely():
-            found.append(f"no column identifies the tracks, all rows are taken as one; if a column does, "
-                         f"--column track=THEIRS; it may be: {likely}")  # fmt: skip
+            found.append(tr("no column identifies the tracks, all rows are taken as one; if a column does, "
+                            "--column track=THEIRS; it may be: {likely}", likely=likely))  # fmt: skip
         return found
 
     def _likely(self) -> str:
         """The columns that may name the aircraft, where none is known to: each value in two rows or more on average."""
         likely = [(i, len(cells)) for i, cells in self.cells.items() if 1 < len(cells) <= self.records / 2]
-        return ", ".join(f"{self.header.names[i]} ({count} different)" for i, count in likely)
+        names = self.header.names
+        return ", ".join(tr("{name} ({count} different)", name=names[i], count=count) for i, count in likely)
 
     def whose(self, late: int) -> str | None:
         """The question which column names the aircraft, where none does and so many rows are out of time order."""
@@ -412,7 +421,7 @@ class Table:
         if self.faults:  # the rest is only read for further ones
             return
         if any(math.isnan(row[i]) for i in ((0, 1, 2) if self.kind == sites.POSITIONS else (0, 1))):
-            self.skipped["records without time or position"] += 1
+            self.skipped[sites.NOWHERE] += 1
             return
         for place, seen in self.cells.items():
             if len(seen) < NAMES_AT_MOST:
@@ -421,7 +430,7 @@ class Table:
         if self.kind == sites.POSITIONS:
             stands = math.hypot(row[4], row[5]) <= STILL_MPS
             if self.before_it.get(name) == row[1:3] and not stands:
-                self.skipped["rows that repeat the position before them"] += 1
+                self.skipped[term("rows that repeat the position before them")] += 1
                 return
             self.before_it[name] = row[1:3]
         whose = self.header.identities.get("address")

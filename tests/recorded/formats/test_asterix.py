@@ -126,7 +126,7 @@ PLAINLY = [ethernet(ipv4(udp(one))) for one in BLOCKS]
 def test_a_capture_holds_what_the_radar_sent(tmp_path, data):
     done, columns, _ = imported(tmp_path, data)
     assert (done.format, done.rows) == ("asterix", 4)
-    assert done.skipped == ["1 data blocks of category 008"]
+    assert done.skipped == ["data blocks of category 008 (1)"]
     np.testing.assert_array_equal(columns["t_s"], [0, 1, 2, 4])
     np.testing.assert_allclose(columns["range_m"], np.array([6001, 6002, 6003, 6100]) * NM / 256)
 
@@ -144,17 +144,17 @@ def test_what_a_capture_has_besides_is_counted(tmp_path):
     done, columns, _ = imported(tmp_path, pcap([*others, *after])[:-1])
     np.testing.assert_array_equal(columns["t_s"], [0, 1, 2])
     assert sorted(done.skipped) == [
-        "1 data blocks of category 008",
-        "1 datagrams without ASTERIX",
-        "1 packets cut off by the end of the file",
-        "3 fragments of datagrams, which are not put together",
-        "3 packets other than UDP",
-        "4 tails of 8 bytes after the data blocks of datagrams",
+        "data blocks of category 008 (1)",
+        "datagrams without ASTERIX (1)",
+        "fragments of datagrams, which are not put together (3)",
+        "packets cut off by the end of the file (1)",
+        "packets other than UDP (3)",
+        "tails of 8 bytes after the data blocks of datagrams (4)",
     ]
     assert refused_alone(tmp_path, pcap(PLAINLY, cut=1)).endswith(
-        "(5 packets of which the capture kept the beginning only passed over)"
+        "; left out: packets of which the capture kept the beginning only (5)"
     )
-    assert "5 packets of the kind of link 147, which is not read" in refused_alone(tmp_path, pcap(PLAINLY, link=147))
+    assert "packets of the kind of link 147, which is not read (5)" in refused_alone(tmp_path, pcap(PLAINLY, link=147))
 
 
 def refused_alone(tmp_path, data):
@@ -191,7 +191,7 @@ def test_a_second_network_brings_nothing_twice(tmp_path):
     both = [one for k in range(0, 100, 10) for one in (*sent[k : k + 10], *reversed(sent[max(k - 5, 0) : k + 5]))]
     done, columns, _ = imported(tmp_path, pcap([ethernet(ipv4(udp(one))) for one in both]))
     assert len(np.unique(columns["t_s"])) == done.rows == 100
-    assert done.skipped == [f"{len(both) - 100} data blocks that came twice"]
+    assert done.skipped == [f"data blocks that came twice ({len(both) - 100})"]
 
 
 # ---- radars ----------------------------------------------------------------------------------------------------------
@@ -206,7 +206,7 @@ def test_radars_stand_where_they_say(tmp_path):
     data = block(48, *plots) + block(34, services[0]) + block(34, services[1])  # said after the plots
     done, columns, tracks = imported(tmp_path, data)
     assert tracks == ["77", "25/13:77"] * 5
-    assert done.skipped == ["5 rows of radar 25/14, whose place neither it nor --at says"]
+    assert done.skipped == ["rows of radar 25/14, whose place neither it nor --at says (5)"]
     assert "a turn of the antenna (I034/041) takes: 25/12 4.188 s, 25/13 4.203 s" in done.notes
     at = np.stack([columns[name] for name in ("x_m", "y_m", "z_m")], -1)
     for n, place in enumerate(places.values()):
@@ -239,7 +239,7 @@ def test_an_address_of_two_radars_is_two_tracks(tmp_path):
     records = [plot_048(k, radar=(25, 10 + k % 2), address=0x4CA1FA) for k in range(4)]
     done, _, tracks = imported(tmp_path, block(48, *records, plot_048(5, rho=0, address=0x4CA1FA)))
     assert tracks == ["4ca1fa", "25/11:4ca1fa"] * 2
-    assert done.skipped == ["1 records without time or position"]
+    assert done.skipped == ["records without time or position (1)"]
 
 
 def test_truth_of_the_radar_that_says_where_it_stands(tmp_path):
@@ -248,7 +248,7 @@ def test_truth_of_the_radar_that_says_where_it_stands(tmp_path):
         data += block(62, position_062(4.0 * k, 53 + k / 111.25, 4.76, address=0xA1, track=7, height_ft=30000))
         data += block(48, plot_048(4.0 * k, 10750 + 137 * k, 40, address=0xA1, track=3, level=1200))
     done, columns, _ = imported(tmp_path, data)
-    assert done.notes[-1].startswith("truth: of 30 of 30 plots (100%; by address 30)")
+    assert done.notes[-1].startswith("truth: of 30 of 30 plots (100 %; by address 30)")
     assert np.isfinite(columns["true_r_m"]).all()
 
 
@@ -270,7 +270,7 @@ def test_truth_of_each_of_several_radars(tmp_path):
             number = 10 + (site is sites["25/11"])
             plots.append(plot_048(4.0 * k, *own, radar=(25, number), address=0xA1, track=3, level=1200))
     done, columns, _ = imported(tmp_path, truth + block(48, *plots), Options(sites=sites))
-    assert done.notes[-1].startswith("truth: of 60 of 60 plots (100%; by address 60)")
+    assert done.notes[-1].startswith("truth: of 60 of 60 plots (100 %; by address 60)")
     for name in "xyz":
         np.testing.assert_allclose(columns[f"{name}_m"], columns[f"true_{name}_m"], atol=15)
     np.testing.assert_allclose(columns["true_r_m"], columns["range_m"], atol=10)
@@ -315,11 +315,12 @@ def test_what_is_known_of_a_plot_is_kept(tmp_path):
     ]
     np.testing.assert_array_equal(columns["altitude_m"], [3048, *7 * [np.nan]])
     assert tracks == ["1", "A0012", "1", "1", "", "", "", "1"]
-    kept = ": in no track and no truth; --keep-marked keeps them there"
-    assert done.notes == [
-        *(f"1 records are marked {mark}{kept}" for mark in ("test target", "simulated", "field monitor", "coasted")),
-        "1 with a garbled code and 1 with a garbled height, which is not used",
-        "3 of 8 plots belong to no track; `radarsim track` skips them",
+    out, unused = "; in no track and no truth: --keep-marked keeps them there", "; it is not used"
+    kinds = dict.fromkeys(("test target", "simulated", "field monitor", "coasted"), out)
+    kinds |= dict.fromkeys(("garbled code", "garbled height"), unused)
+    assert sorted(done.notes) == [
+        "plots of no track, which `radarsim track` skips: 3 of 8",
+        *sorted(f"records marked “{mark}”: 1{rest}" for mark, rest in kinds.items()),
     ]
     command("import", tmp_path / "recording", "-o", tmp_path / "plots.csv", "--keep-marked")
     assert texts(tmp_path, "track") == [["1", "A0012", *6 * ["1"]]]
@@ -342,7 +343,7 @@ def test_a_code_used_twice_is_two_aircraft(tmp_path):
     records = [plot_048(t, *polar(*place), code=0o7000) for t, place, _ in flown]
     done, _, tracks = imported(tmp_path, block(48, *records))
     assert tracks == [name for _, _, name in flown]
-    assert "1 Mode 3/A codes are of several aircraft or of one seen again: ACODE-2 and so on" in done.notes
+    assert "Mode 3/A codes of several aircraft or of one seen again, ACODE-2 and so on: 1" in done.notes
 
 
 def test_a_code_is_that_of_the_aircraft_that_flies_there():
@@ -387,9 +388,7 @@ def test_a_number_given_again_is_another_track(tmp_path, pause, addresses, track
                for t, own in zip((1, 5, 5 + pause, 9 + pause), addresses, strict=True)]  # fmt: skip
     done, _, found = imported(tmp_path, block(48, *records))
     assert found == tracks
-    assert any("track numbers are given again to another aircraft 1 times" in note for note in done.notes) == (
-        "77-2" in tracks
-    )
+    assert ("track numbers given again to another aircraft, NUMBER-2 and so on: 1" in done.notes) == ("77-2" in tracks)
 
 
 # ---- positions -------------------------------------------------------------------------------------------------------
@@ -484,7 +483,7 @@ def test_ads_b_is_the_truth_before_the_tracks_of_a_centre(tmp_path):
         (tmp_path / "plots.csv").unlink(missing_ok=True)
         done, columns, _ = imported(tmp_path, plots + no_truth, Options(site=SITE))
         assert "true_r_m" not in columns
-        assert (done.rows, done.skipped) == (30, ["30 positions beside plots"])
+        assert (done.rows, done.skipped) == (30, ["positions beside plots (30)"])
         _, columns, _ = imported(tmp_path, plots + no_truth, Options(site=SITE, keep_marked=True))
         assert np.isfinite(columns["true_r_m"]).all()
 

@@ -74,7 +74,7 @@ def test_midnight_passes_and_other_categories_are_passed_over(tmp_path):
     data = block(8, b"\x80\x19\x0a") + block(48, plot_048(86399.5, track=1)) + block(48, plot_048(3.5, track=1))
     done, columns, _ = imported(tmp_path, data)
     np.testing.assert_array_equal(columns["t_s"], [0, 4])
-    assert done.skipped == ["1 data blocks of category 008"]
+    assert done.skipped == ["data blocks of category 008 (1)"]
 
 
 def test_category_001_takes_its_time_from_the_sectors(tmp_path):
@@ -101,7 +101,7 @@ def test_category_001_takes_its_time_from_the_sectors(tmp_path):
     np.testing.assert_array_equal(columns["t_s"], [39999.5, 40001.0, 40001.5, 40449.25])
     assert tracks == ["6", "5", "", "5-2"]  # 448 s without a plot
     np.testing.assert_allclose(columns["velocity_mps"], np.array([-2, -2, np.nan, -2]) * NM / 256)
-    assert any("belong to no track" in note for note in done.notes)
+    assert any("plots of no track" in note for note in done.notes)
 
 
 def test_category_062_is_the_truth_of_the_plots_beside_it(tmp_path):
@@ -114,8 +114,8 @@ def test_category_062_is_the_truth_of_the_plots_beside_it(tmp_path):
     done, columns, tracks = imported(tmp_path, data, Options(site=SITE))
     assert tracks == ["3"] * 15
     miss = np.median(np.abs(columns["range_m"] - columns["true_r_m"]))
-    of = "truth: of 15 of 15 plots (100%; by address 15), which lie"
-    assert done.notes[-1] == f"{of} {miss:.3g} m in range and 0.22° in bearing from it (median)"
+    of = "truth: of 15 of 15 plots (100 %; by address 15), which lie"
+    assert done.notes[-1] == f"{of} {miss:.3g} m and 0.22° from it (median)"
     height = 30000 * 0.3048
     t = columns["t_s"] + 2.5
     for half, names in ((0.0, ("x_m", "y_m", "z_m")), (2.0, ("vx_mps", "vy_mps", "vz_mps"))):
@@ -135,7 +135,7 @@ def test_the_tracks_of_two_radars_stay_apart(tmp_path):
     done, columns, tracks = imported(tmp_path, block(48, *records))
     assert tracks == ["1", "25/13:1"] * 4
     assert done.skipped == []
-    assert any("plots of 2 radars, SAC/SIC (rows): 25/12 (4), 25/13 (4)" in note for note in done.notes)
+    assert any("plots of several radars, SAC/SIC (rows): 25/12 (4), 25/13 (4)" in note for note in done.notes)
     assert [line.split(",")[2] for line in (tmp_path / "plots.csv").read_text().splitlines()[-2:]] == ["25/12", "25/13"]
     (line,) = refused_again(tmp_path, block(48, *records), Options(site=SITE))
     assert "must say where each radar stands" in line
@@ -148,10 +148,10 @@ def test_the_tracks_of_two_radars_stay_apart(tmp_path):
         np.testing.assert_array_equal(np.stack([columns[name][n::2] for name in ("x_m", "y_m", "z_m")], -1), alone)
     done, _, tracks = imported(tmp_path, block(48, *records), Options(sites={"25/13": places["25/13"]}))
     assert set(tracks) == {"25/13:1"}
-    assert done.skipped == ["4 rows of radar 25/12, whose place neither it nor --at says"]
+    assert done.skipped == ["rows of radar 25/12, whose place neither it nor --at says (4)"]
     (line,) = refused_again(tmp_path, block(48, *records), Options(sites={"25/99": SITE}))
-    assert line.endswith("(4 rows of radar 25/12, whose place neither it nor --at says; 4 rows of radar 25/13, whose "
-                         "place neither it nor --at says passed over)")  # fmt: skip
+    assert line.endswith("; left out: rows of radar 25/12, whose place neither it nor --at says (4), rows of radar "
+                         "25/13, whose place neither it nor --at says (4)")  # fmt: skip
 
 
 def flights(*names, speed=250.0, count=30, step=4.0):
@@ -329,7 +329,7 @@ def test_the_angles_of_an_antenna_are_those_that_multimodel_takes(tmp_path):
     assert np.isfinite(columns["azimuth_rad"]).all()
     done, columns, _ = imported(tmp_path, ADSB.encode(), Options(site=SITE, antenna=Antenna(math.pi / 2 + 0.1, 0.0)))
     assert np.isnan(columns["azimuth_rad"]).tolist() == [True, True, False]
-    assert any("2 of 3 plots are behind the antenna" in note for note in done.notes)
+    assert any("plots behind the antenna or without height: 2 of 3;" in note for note in done.notes)
 
 
 def test_ships_by_ais(tmp_path):
@@ -384,12 +384,12 @@ def ship(second, north=0.0, mmsi=244660000):
         (
             [ship(50), ship(10), "$GPZDA,1,2*00", ship(15)],
             [0, 20, 25],
-            "3 reports state no time: their seconds of the minute are made to run on",
+            "reports that state no time: 3; the seconds of their minute run on",
         ),
         (  # some have a time, and 1700000000 is 20 s past the minute
             [f"\\c:1700000000*00\\{ship(19)}", ship(18, mmsi=2), ship(25), ship(50), ship(5)],
             [0, -2, 5, 30, 45],
-            "4 reports state no time: their seconds of the minute are taken as nearest to the times before them",
+            "reports that state no time: 4; they get the nearest with their second",
         ),
     ],
 )  # fmt: skip
@@ -397,7 +397,7 @@ def test_times_of_ships(tmp_path, lines, times, note):
     done, columns, _ = imported(tmp_path, "\n".join(lines).encode(), Options(site=SITE))
     np.testing.assert_allclose(columns["t_s"], times, atol=1e-6)
     assert [one for one in done.notes if "state no time" in one] == ([note] if note else [])
-    assert done.skipped == (["1 sentences other than AIS"] if "ZDA" in "".join(lines) else [])
+    assert done.skipped == (["sentences other than AIS (1)"] if "ZDA" in "".join(lines) else [])
 
 
 def test_a_report_in_two_sentences_has_the_time_of_the_first(tmp_path):
@@ -452,7 +452,7 @@ def test_names_and_units():
             "range [parsec]: the unit must be one of m, km, ft, feet, nm, nmi; got 'parsec'",
         ),
         ("time,lat,lon\n1,95,4\n", "recording:2:2: lat: must be from -90 to 90 degrees, got 95"),
-        ("time,range_m\n,\n", "has no plots; 1 records were read (1 records without time or position passed over)"),
+        ("time,range_m\n,\n", "has no plots; 1 records were read; left out: records without time or position (1)"),
         ("", "recording: is empty"),
         ("hello\n", "must be a recording in one of asterix, opensky, ais, csv"),
     ],
@@ -536,7 +536,7 @@ def test_times_are_those_of_the_positions(tmp_path):
         text += f"{1.7e9 + 10 * k},a1,{52.6 + old * 200 / 111_250},4.76,200,0,{1.7e9 + 10 * k // 20 * 20 + 3.5}\n"
     done, columns, _ = imported(tmp_path, text.encode(), Options(site=SITE))
     np.testing.assert_array_equal(columns["t_s"], [0, 20, 40])
-    assert done.skipped == ["3 rows that repeat the position before them"]
+    assert done.skipped == ["rows that repeat the position before them (3)"]
     assert "times are lastposupdate; not used: time" in done.notes
     at_anchor = b"time,mmsi,lat,lon,sog,cog\n1,7,52,4,0,0\n2,7,52,4,0.1,90\n"
     assert imported(tmp_path, at_anchor, Options(site=SITE))[0].rows == 2
@@ -606,7 +606,7 @@ def test_an_unknown_track_names_those_there_are(tmp_path):
 def test_rows_that_are_not_later_are_left_out(tmp_path):
     done, columns, _ = imported(tmp_path, block(48, *(plot_048(t, track=1) for t in (1, 2, 2, 3))))
     np.testing.assert_array_equal(columns["t_s"], [0, 1, 2])
-    assert done.skipped == ["1 rows not later than the one before of their track"]
+    assert done.skipped == ["rows not later than the one before of their track (1)"]
 
 
 @pytest.mark.parametrize("span", [0, 60])

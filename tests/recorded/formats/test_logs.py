@@ -45,9 +45,9 @@ def test_a_trace_of_readsb(tmp_path, packed):
     np.testing.assert_allclose(places(columns)[1], local(52.6 + STEP, 4.76, 30500 * FT), atol=1e-6)
     assert 299 * KN > columns["velocity_mps"][0] > 250 * KN
     assert np.isnan(columns["velocity_mps"][4])  # on the ground the course is where the nose points
-    assert done.skipped == ["1 positions marked as stale"]
-    assert "1 altitudes are barometric, as the geometric one is missing" in done.notes
-    assert "1 of 5 positions have no altitude: they are placed at sea level" in done.notes
+    assert done.skipped == ["positions marked as stale (1)"]
+    assert "barometric altitudes, where the geometric one is missing: 1" in done.notes
+    assert "positions without altitude, placed at sea level: 1 of 5" in done.notes
 
 
 def test_moments_of_readsb_one_a_line(tmp_path):
@@ -62,7 +62,8 @@ def test_moments_of_readsb_one_a_line(tmp_path):
     done, columns, tracks = imported(tmp_path, "\n".join(lines).encode(), AT)
     np.testing.assert_allclose(columns["t_s"], [0, 19])
     assert set(tracks) == {"4ca1fa"}
-    assert sorted(done.skipped) == ["2 rows that repeat the position before them", "4 records without time or position"]
+    skipped = ["records without time or position (4)", "rows that repeat the position before them (2)"]
+    assert sorted(done.skipped) == skipped
     _, alone, _ = imported(tmp_path, json.dumps(json.loads(lines[0]), indent=1).encode(), AT)
     np.testing.assert_array_equal(places(alone), places(columns)[:1])
 
@@ -240,7 +241,7 @@ def test_a_satellite_receiver(tmp_path, kinds, talker):
     height = 47.0 if "GGA" in kinds else 0.0
     np.testing.assert_allclose(places(columns)[1], local(52.6 + STEP, 4.76, height), atol=0.002)
     assert np.isfinite(columns["velocity_mps"]).all() == ("RMC" in kinds)
-    assert sorted(done.skipped) == ["1 other lines", "1 sentences without a fix"]
+    assert sorted(done.skipped) == ["other lines (1)", "sentences without a fix (1)"]
     dated = Options(site=SITE, zero=1_706_659_200.0)  # 2024-01-31
     _, columns, _ = imported(tmp_path, fixes(kinds=kinds).encode(), dated)
     assert columns["t_s"][0] == pytest.approx(86385)
@@ -257,7 +258,7 @@ def test_a_damaged_sentence_is_left_out(tmp_path):
     lines[1] = lines[1].replace("5236", "5336")
     done, columns, _ = imported(tmp_path, "".join(lines).encode(), AT)
     np.testing.assert_allclose(columns["t_s"], [0, 20, 30])
-    assert done.skipped == ["1 damaged sentences"]
+    assert done.skipped == ["damaged sentences (1)"]
 
 
 SEEN = [float(np.linalg.norm(local(52.6 + STEP * (k + 0.45), 4.76, 20.5))) for k in range(4)]  # 5 s after each point

@@ -172,7 +172,7 @@ def test_speeds_that_are_not_available_are_counted(tmp_path):
     rows = [f"24,2020-01-01T00:00:0{k},52.4{k},4.76,{cell}\n".encode() for k, cell in enumerate(cells)]
     done, columns, _ = imported(tmp_path, text + b"".join(rows), SOUTH)
     assert np.isfinite(columns["velocity_mps"]).tolist() == [True] + 5 * [False]
-    assert "5 of 6 reports have no speed or no course" in done.notes
+    assert "reports without speed or course: 5 of 6" in done.notes
 
 
 def test_a_barometric_altitude_stands_in_where_the_geometric_one_is_missing(tmp_path):
@@ -181,5 +181,5 @@ def test_a_barometric_altitude_stands_in_where_the_geometric_one_is_missing(tmp_
     )
     done, columns, _ = imported(tmp_path, text, Options(site=SITE))
     np.testing.assert_array_equal(columns["altitude_m"], [3100, 3000, np.nan])
-    assert "1 altitudes are barometric, as the geometric one is missing" in done.notes
-    assert "1 of 3 positions have no altitude: they are placed at sea level" in done.notes
+    assert "barometric altitudes, where the geometric one is missing: 1" in done.notes
+    assert "positions without altitude, placed at sea level: 1 of 3" in done.notes
