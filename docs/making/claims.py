@@ -8,7 +8,6 @@ Where results/ holds a full reproduction the page is made from that, with every 
 import csv
 import io
 import sys
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -55,17 +54,9 @@ def rows(results: Path = RESULTS) -> tuple[list[dict], bool]:
 def markdown(results: Path = RESULTS) -> str:
     """The page without its title."""
     found, whole = rows(results)
-    asks = {(key, one.key): one.asks for key, of in readings.papers().items() for one in of.readings.choices}
-    found = [row | {"depends_on": "; ".join(_asked(row, asks))} for row in found]
+    found = page.in_words(found, (of.readings for of in readings.papers().values()))
     text = page.page(found, {of.paper: of.page for of in run.papers()}, whole).removeprefix(page.TITLE).strip()
     return text.replace("\n\n## ", f"\n\n{PICTURE}\n\n## ", 1)
-
-
-def _asked(row: dict, asks: dict[tuple[str, str], str]) -> Iterator[str]:
-    """The choices that a claim depends on, in words within a sentence."""
-    for name in filter(None, row["depends_on"].split(", ")):
-        words = asks[row["claim"].partition(".")[0], name]
-        yield words[0].lower() + words[1:] if words[1].islower() else words
 
 
 def drawn(app, exception) -> None:

@@ -132,8 +132,9 @@ def in_readings() -> Iterator[tuple[str, str, str]]:
     for number in (*range_doppler.PRINTED, *discriminator.PRINTED):
         yield number.what, "", "radarsim/studies"
         yield number.unit, "", "radarsim/studies"
-    for text in (range_doppler.READ_AS, discriminator.READ_AS):
-        yield text, "", "radarsim/studies"
+    for module in (range_doppler, discriminator):
+        for text in (*module.ASKS.values(), module.READ_AS):
+            yield text, "", "radarsim/studies"
 
 
 def in_inventory() -> Iterator[tuple[str, str, str]]:

@@ -31,7 +31,7 @@ def shipped(paper: str) -> str:
     rows = []
     for claim in of.claims.claims:
         if (found := known.get(claim.id)) is not None:
-            said = page.words(found.kind, found.kind, found.depends_on)
+            said = page.words(found.kind, found.kind, of.readings.asked(filter(None, found.depends_on.split(", "))))
             rows.append((claim.id, claim.statement, said, f"{found.holds} of {found.of}"))
     parts = [
         f"{of.claims.paper}. {HERE.format(paper=paper)}",

@@ -128,11 +128,10 @@ class Plan:
                 self._fail(key, error.lines[0])
                 self.held = before + count  # these are not computed
             done += count
-        contradicting = frozenset(choice.key for choice in self._paper.readings.choices if choice.contradicts)
         found, every = list[Over](), sum(len(self._paper.readings.of_claim(claim.id)) for claim in self._wanted.claims)
         for claim in self._wanted.claims:
             verdicts = tuple(self._under(claim, one) for one in self._paper.readings.of_claim(claim.id))
-            found.append(Over(claim, verdicts, contradicting))
+            found.append(Over(self._paper.readings, claim, verdicts))
             _without_runs(judging, sum(len(over.under) for over in found), every)
         return found
 
@@ -336,9 +335,8 @@ class Readings(Shown):
 
     @property
     def _described(self) -> dict[str, Figure]:
-        every = ((read.paper.readings, over) for read in self.read for over in read.over)
-        several = ((of, over) for of, over in every if len(over.under) > 1 and over.outcome is not None)
-        return {over.claim.id: page.specification(of, over) for of, over in several}
+        several = (over for over in self.over if len(over.under) > 1 and over.outcome is not None)
+        return {over.claim.id: page.specification(over) for over in several}
 
     def _said(self) -> list[str]:
         lines = [f"{over.claim.id} {tr(over.outcome.kind)}: {over.sentence()}" for over in self.over if over.outcome]
@@ -454,7 +452,7 @@ def readings(
     if the time did not suffice.
 
     >>> readings("P1.4")
-    P1.4 depends on: holds in 4 of 6 readings; depends on: start
+    P1.4 depends on: holds in 4 of 6 readings; depends on how the filter starts
     """
     configs.check(threads=threads, time_limit=time_limit, out=out, figures=figures)
     configs.texts(names)
@@ -490,7 +488,8 @@ def _left(over: Over) -> str:
 
 def _counted(paper: Paper, over: list[Over]) -> Search | Joint:
     """The joint search of a paper: over all readings that are computed at once, else over its declared ones."""
-    return paper.readings.search() or joint(paper.readings, over)
+    found = paper.readings.search()
+    return joint(paper.readings, over) if found is None else replace(found, asks={**found.asks, **paper.readings.asks})
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
@@ -515,10 +514,9 @@ def _table(done: Readings) -> str:
 
 def _classes(done: Readings) -> str:
     """The class of each claim over its readings."""
-    every = [(read.paper.readings, over) for read in done.read for over in read.over]
-    new = [found.as_row() for of, over in every if (found := page.of_over(of, over)) is not None]
+    new = [found.as_row() for over in done.over if (found := page.of_over(over)) is not None]
     kept = [one.as_row() for one in stored_classes(done.folder.parent)]
-    return _with(page.COLUMNS, kept, new, {over.claim.id for _, over in every})
+    return _with(page.COLUMNS, kept, new, {over.claim.id for over in done.over})
 
 
 def _outdated(done: Readings) -> tuple[str, ...]:

@@ -520,6 +520,7 @@ def write_files(
         cost=own.cost(outside.without(made, results), run),
         agreement=notes.agreement(made["curves"]) if own.exact_errors else None,
         drawn_from=own.drawn_from(),
+        readings=own.readings(),
     )
     contents["report.html"] = report.encode()
     contents["run.json"] = files.to_json(files.with_output(record, "report.html", contents["report.html"]))

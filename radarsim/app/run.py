@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
     from radarsim.app.result import Result
     from radarsim.report.claims import PaperClaims
+    from radarsim.report.claims.over import PaperReadings
     from radarsim.report.drawing import Figure
     from radarsim.report.precision import Cell, Table
 
@@ -684,8 +685,15 @@ def _keys(ids: Iterable[str]) -> list[str]:
 class Claims(Shown):
     """Claims of papers and their verdicts; one row for each measured part of a claim."""
 
-    def __init__(self, rows: Sequence[dict[str, Any]]):
-        self.rows = tuple(rows)
+    def __init__(self, rows: Sequence[dict[str, Any]], readings: "Iterable[PaperReadings]" = ()):
+        self.rows, self._readings = tuple(rows), tuple(readings)
+
+    @property
+    def in_words(self) -> list[dict[str, Any]]:
+        """The rows for people: what a claim depends on is in words, not in keys."""
+        from radarsim.report.claims import page
+
+        return page.in_words(self.rows, self._readings)
 
     @property
     def table(self) -> "pd.DataFrame":
@@ -705,7 +713,7 @@ class Claims(Shown):
         from radarsim.report.claims import page
 
         lines = [page.counted(self.rows)] if self.rows else []
-        for parts in page.grouped(self.rows):
+        for parts in page.grouped(self.in_words):
             verdict = page.verdict_of(parts).replace("*", "")
             lines.append(f"{parts[0]['claim']} {verdict}: {tr(parts[0]['statement'])}")
         return lines
@@ -763,4 +771,4 @@ def claims(*names: str, out: str | os.PathLike[str] = configs.RESULTS) -> Claims
     own = [row for row in listed(every, held) if row["claim"] in shown]
     rows += [row for row in own if (row["claim"], row["config"]) not in there]
     open_ = [(paper.readings, paper.claims) for paper in readings.papers(keys).values()]
-    return Claims(with_classes(rows, kept.classes_of(open_, Path(out))))
+    return Claims(with_classes(rows, kept.classes_of(open_, Path(out))), [one for one, _ in open_])

@@ -388,8 +388,8 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
     CONFIG that is not a paper's experiment, lists the claims that it cannot judge, and why.
 
     How they are judged stands in docs/verdicts.md: exact values first, each number with a margin, and over every
-    reading that the paper allows. "refuted as shipped; depends on start": false with the choices that the config takes
-    where the paper leaves them open, and true with another start.
+    reading that the paper allows. "refuted as shipped; depends on how the filter starts": false with the choices that
+    the config takes where the paper leaves them open, and true with another start.
 
     \b
     Examples
@@ -412,9 +412,10 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
     elif markdown:
         from radarsim.report.claims import page
 
-        click.echo(page.page(rows, {of.paper: of.page for of in simulation.papers()}), nl=False)
+        click.echo(page.page(found.in_words, {of.paper: of.page for of in simulation.papers()}), nl=False)
     else:
-        outcomes.print_claims(rows, {row["claim"] for row in rows if parts or row["claim"] in names}, out, names)
+        detailed = {row["claim"] for row in rows if parts or row["claim"] in names}
+        outcomes.print_claims(found.in_words, detailed, out, names)
 
 
 @group.main.command()

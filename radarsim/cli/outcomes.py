@@ -629,8 +629,9 @@ def print_readings(done: "Readings", detailed: bool) -> None:
         for over in read.over:
             if detailed:
                 for one in over.under:
-                    outcome = tr(one.outcome.kind) if one.outcome else tr("not possible: {why}", why=rule.said(one.why))
-                    say(f"       {one.kind}  {outcome:<24} {one.name}")
+                    outcome = tr(one.outcome.kind) if one.outcome else tr("not possible")
+                    why = f" ({rule.said(one.why)})" if one.why else ""
+                    say(f"       {one.kind}  {outcome:<24} {over.of.said(one.reading)}{why}")
             found = over.outcome
             words = tr(found.kind) if found else tr("not judged")  # on what it depends, the sentence says
             say(f"{over.claim.id:<6} {words:<28} {over.sentence()}")

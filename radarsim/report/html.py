@@ -33,6 +33,7 @@ from radarsim.report.chart import spoken
 from radarsim.report.claims import page as claims_page
 from radarsim.report.claims import rule
 from radarsim.report.claims.judge import LOOKED
+from radarsim.report.claims.over import PaperReadings
 from radarsim.report.drawing import Figure, Line
 from radarsim.report.wording import number
 
@@ -188,15 +189,16 @@ def report_page(
     agreement: "pd.DataFrame | None" = None,
     cost: "pd.DataFrame | None" = None,
     drawn_from: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    readings: PaperReadings | None = None,
 ) -> str:
     """The page of an experiment: question, answer, request, figures, claims, exact values, tables, provenance.
 
     figures are described ones (none with --no-figures); record is run.json's; inputs, agreement and cost (against
-    accuracy) are tables, or None. drawn_from: of the study, see `Study.drawn_from`."""
+    accuracy) are tables, or None. drawn_from and readings: of the study, see `Study`."""
     figures = [one for one in figures if one.name != "claims"]  # the page has them in a table, a line each
     written = {name for name, table in made.items() if f"{name}.csv" in record["outputs"] and len(table)}
     sources = {one.name: tables_of(one.name, drawn_from, written) for one in figures}
-    claims = _claims(made["claims"], sources, written)
+    claims = _claims(made["claims"], sources, written, readings)
     answer = in_clauses(answer)
     return whole(
         "report.html.j2",
@@ -396,15 +398,19 @@ def _css(verdict: str) -> str:
 
 
 def _claims(
-    table: "pd.DataFrame", sources: Mapping[str, Sequence[str]], written: Collection[str]
+    table: "pd.DataFrame",
+    sources: Mapping[str, Sequence[str]],
+    written: Collection[str],
+    readings: PaperReadings | None,
 ) -> list[dict[str, Any]]:
     """Claims with their parts, from claims.csv's rows, with the figures and tables behind each.
 
     sources: the tables of each figure; written: the tables that are files."""
     found = []
     looked = table.attrs.get(LOOKED, [()] * len(table))
-    rows = [row | {LOOKED: own} for row, own in zip(table.to_dict("records"), looked, strict=True)]
-    for parts in claims_page.grouped(rows):
+    records: Any = table.to_dict("records")
+    rows = [row | {LOOKED: own} for row, own in zip(records, looked, strict=True)]
+    for parts in claims_page.grouped(claims_page.in_words(rows, [readings])):
         same = {
             key: parts[0][key] for key in ("statement", "paper", "place", "reading", "original", "overall", "class")
         }

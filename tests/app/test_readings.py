@@ -67,7 +67,7 @@ def test_a_verdict_is_that_of_the_rule_on_the_table(first):
         assert found.holds_in == sum(one == rule.CONFIRMED for one in by_reading.values())
         assert over.sentence().startswith(f"holds in {found.holds_in} of {found.readings} readings")
         if found.depends_on:
-            assert f"depends on: {', '.join(found.depends_on)}" in over.sentence()
+            assert f"depends on {over.of.asked(found.depends_on)}" in over.sentence()
 
 
 def test_the_classes_of_the_first_paper_are_those_that_are_shipped(first):
@@ -188,7 +188,9 @@ def test_a_damaged_table_is_reported(tmp_path):
 def test_the_command(tmp_path):
     run = partial(command, "readings", "--out", tmp_path)
     text = run("P1.7").stdout
-    assert re.search(r"^P1\.7 +depends on +holds in 2 of 3 readings; depends on: start", text, re.MULTILINE)
+    assert re.search(
+        r"^P1\.7 +depends on +holds in 2 of 3 readings; depends on how the filter starts", text, re.MULTILINE
+    )
     assert (tmp_path / "readings/P1.7.svg").stat().st_size > 10_000
     (document,) = json.loads(run("P1.7", "--json").stdout)
     assert set(document) == {"claim", "verdict", "holds", "of", "depends_on", "readings"}

@@ -87,7 +87,7 @@ def test_the_page_of_readings_has_every_class_and_choice(paper, tmp_path):
         if one.claim.startswith(f"{paper}."):
             assert re.search(rf"^\| {re.escape(one.claim)} \| .* \| {one.holds} of {one.of} \|$", made, re.M), one.claim
     choices = readings.readings.papers()[paper].readings.choices
-    assert [f"### `{choice.key}`" for choice in choices] == re.findall("^### .*$", made, re.M)
+    assert [f"### `{choice.key}`: {choice.asks}" for choice in choices] == re.findall("^### .*$", made, re.M)
     whole = tmp_path / "readings" / f"{paper}.md"
     whole.parent.mkdir()
     whole.write_text("# Title\n\nEverything.\n")

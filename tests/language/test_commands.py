@@ -20,8 +20,6 @@ from radarsim.studies.range_doppler.study import exact_but_for
 from tests.language.test_russian import NAMES, shown, untranslated
 from tests.program import command
 
-CHOICE = re.compile(r"\b\w+: [^;|.]+")  # a choice of a reading, as it is typed
-
 
 @pytest.fixture(scope="module")
 def drawn():
@@ -83,12 +81,10 @@ def test_readings_of_a_claim_and_their_curve(claim, tmp_path):
     with speaking("ru"):
         done = readings.judged(readings.asked([claim]), out=tmp_path, figures=False)
         page = readings.pages(done)
-        of, over = done.read[0].paper.readings, done.read[0].over[0]
-        texts = [CHOICE.sub("", text) for text in shown(curve.specification(of, over))]
-    typed = {part for choice in of.choices for one in choice.alternatives for part in re.findall("[A-Za-z]+", one.name)}
-    typed |= {"scans", "span", "same", "time"} | {
-        part for choice in of.choices for part in re.findall("[A-Za-z]+", choice.key)
-    }
+        over = done.read[0].over[0]
+        texts = shown(curve.specification(over))
+    every = [one.name for choice in over.of.choices for one in choice.alternatives]
+    typed = {part for name in every for part in re.findall("[A-Za-z]+", name)} | {"same", "time"}
     names = NAMES | typed | {"readings", "markdown", "results", "verdicts"}
     assert {text: found for text in [*texts, *page.splitlines()] if (found := untranslated(text, names))} == {}
 

@@ -14,7 +14,6 @@ from radarsim.config.document import SHIPPED
 from radarsim.language import called, speaking, tr
 from radarsim.report.drawing import Figure
 from radarsim.report.tables import to_csv
-from radarsim.studies import registry
 
 # A config of each study, and what of each other kind is quick.
 QUICK = ["rls2", "multimodel_1hz", "sonar_asynchronous", "sonar_manoeuvre", "discriminator_noise", "ambiguous_rls2"]
@@ -89,8 +88,6 @@ UNPARTED = re.compile(r"\[[^];]*\d,\d[^];]*, ")  # an interval of decimal commas
 def check(stem: str, realisations: int, folder) -> None:
     result = run(stem, realisations=realisations, out=folder, figures=False)
     names = NAMES | {part for text in own_names(result) for part in re.findall("[A-Za-z]+", text)}
-    if (readings := registry.study(result.experiment.study).readings()) is not None:
-        names |= {word for choice in readings.choices for word in re.findall("[A-Za-z]+", choice.key)}  # as typed
     config = (SHIPPED / "configs" / f"{stem}.yaml").read_text(encoding="utf-8")
     names |= {path.stem for path in (SHIPPED / "scenarios").glob("*.yaml") if f"target: {path.stem}" in config}
     before = {name: to_csv(table) for name, table in output.case_tables(result.cases, stem=stem).items()}

@@ -1,5 +1,6 @@
 """Claims in YAML: what they become, and what is said of a mistake in one."""
 
+import re
 import subprocess
 import sys
 from types import ModuleType
@@ -8,6 +9,7 @@ import pytest
 
 from radarsim.app.run import papers
 from radarsim.errors import ConfigError
+from radarsim.language import speaking, tr
 from radarsim.report.claims import above, declared, printed
 from radarsim.report.claims.over import choices_in, claims_in, of_other_cases, with_arguments
 from radarsim.report.statistics import Estimate
@@ -177,6 +179,16 @@ def test_a_choice_bears_on_claims_that_there_are():
         readings = registry.study(name).readings()
         known = {claim.id for claim in registry.study(name).claims().claims} if readings else set()
         assert readings is None or {one for choice in readings.choices for one in choice.claims} <= known
+
+
+@pytest.mark.parametrize("language", ["en", "ru"])
+def test_a_choice_is_named_by_few_words_within_a_sentence(language):
+    """In a list of several, and beside a figure."""
+    with speaking(language):
+        said = [
+            tr(one.asks) for name in registry.SHIPPED if (of := registry.study(name).readings()) for one in of.choices
+        ]
+    assert [words for words in said if len(words) > 36 or ", " in words or re.match("[A-ZА-Я][a-zа-я ]", words)] == []
 
 
 def test_how_long_fast_radars_are_watched_bears_on_all_claims_that_look_at_one():

@@ -34,7 +34,7 @@ class Small(PaperReadings):
     paper = "P9"
     choices = (
         Choice(
-            *("scale", "How large", "nichts", "nothing"),
+            *("scale", "how large it is", "nichts", "nothing"),
             (
                 Alternative("one", UNSTATED, "plain"),
                 Alternative("two", UNSTATED, "double"),
@@ -42,7 +42,7 @@ class Small(PaperReadings):
             ),
         ),
         Choice(
-            *("form", "In which form", "nichts", "nothing"),
+            *("form", "its form", "nichts", "nothing"),
             (Alternative("round", EQUIVALENT, "plain"), Alternative("square", EQUIVALENT, "alike")),
             ("P9.1",),
         ),
@@ -84,7 +84,7 @@ def over(of, one):
         except Missing as missing:
             every.append(under(of, dataclasses.replace(one, parts=()), reading, None))
             every[-1] = dataclasses.replace(every[-1], claim=one, outcome=None, why=missing.args[0])
-    return Over(one, tuple(every))
+    return Over(of, one, tuple(every))
 
 
 def test_readings_of_a_claim_leave_out_what_does_not_bear_on_it():
@@ -111,10 +111,10 @@ def test_a_claim_over_its_readings():
     assert [each.outcome.kind for each in one.under] == [CONFIRMED, REFUTED, REFUTED]
     assert one.outcome.kind == DEPENDS
     assert (one.outcome.holds_in, one.outcome.readings, one.outcome.depends_on) == (1, 2, ("scale",))
-    assert one.sentence() == "holds in 1 of 2 readings; depends on: scale"
+    assert one.sentence() == "holds in 1 of 2 readings; depends on how large it is"
     never = over(of, claim(2, "10"))
     assert never.outcome.kind == REFUTED
-    assert "it holds, against the print, with scale: ten" in never.sentence()
+    assert "it holds, against the print, with how large it is: ten" in never.sentence()
 
 
 def test_the_rule_looks_at_all_readings_once(monkeypatch):
@@ -156,9 +156,9 @@ def test_printed_numbers_together():
     assert [one.what for one in found.numbers.values()] == ["number 1", "number 1.6", "number 2"]
     assert by_name["as shipped"].held == ()
     assert by_name["as shipped"].count(granular=False) == by_name["as shipped"].count(granular=True) == 1
-    assert by_name["scale: two"].held == ("P9.2",)
-    assert len(by_name["scale: two"].outcomes) == 3
-    assert by_name["scale: two; form: square"].judged == ("P9.2",)  # the form does not bear on it
+    assert by_name["how large it is: two"].held == ("P9.2",)
+    assert len(by_name["how large it is: two"].outcomes) == 3
+    assert by_name["how large it is: two; its form: square"].judged == ("P9.2",)  # the form does not bear on it
     assert found.every[0].count(granular=False) == 1
     assert found.best(granular=False) is found.shipped  # of several with one, none nearer the shipped
     windows = found.windows("scale")
@@ -173,7 +173,7 @@ def test_a_number_comes_out_by_its_interval():
     came = {}
     for name, seen in {"in": (10, 9.5, 10.5), "wide": (10, 8.7, 11), "beyond": (15, 14, 16)}.items():
         found = under(Sampled(), one, Sampled().reading(), Ends(*seen))
-        own = joint(Sampled(), [Over(one, (found,))]).shipped
+        own = joint(Sampled(), [Over(Sampled(), one, (found,))]).shipped
         came[name] = [(number.strict, number.granular, number.open) for number in own.outcomes.values()]
     assert came["in"] == [(True, True, False), (True, True, False)]
     assert came["wide"] == [(False, False, True), (False, True, False)]
@@ -189,7 +189,7 @@ def test_what_is_open_says_what_would_decide_it():
         under(of, dataclasses.replace(one, parts=(part,)), reading, Ends(*ends[reading["scale"]]), 1000)
         for reading in of.of_claim(one.id)
     ]
-    found = Over(one, tuple(every))
+    found = Over(of, one, tuple(every))
     assert [each.outcome.kind for each in every] == [CONFIRMED, UNDECIDED, UNDECIDED]
     needed = every[1].outcome.needed
     assert 1000 < needed < every[2].outcome.needed
@@ -209,7 +209,7 @@ def test_of_variants_one_suffices_and_void_parts_count_for_nothing():
     ours = Part((), "ours", "m", lambda seen: certain(seen), printed("1"), asserted=False)
     one = Claim("P9.4", "somewhere", "one or two", (*parts, void, ours))
     found = under(Small(), one, Small().reading(), 2.0)
-    own = joint(Small(), [Over(one, (found,))]).shipped
+    own = joint(Small(), [Over(Small(), one, (found,))]).shipped
     ((number, came),) = own.outcomes.items()
     assert number == ("P9.4", ": one")
     assert (came.value, came.strict) == (2.0, True)
@@ -224,7 +224,8 @@ def search():
     axes = {"scale": ("1", "2", "3"), "form": ("round", "square")}
     fine = {"scale": Fine([1.0, 1.5, 2.0, 2.5], np.array([[1, 1, 0, 0], [0, 1, 0, 1]], dtype=bool))}
     values = np.arange(12.0).reshape(2, 3, 2)
-    return Search("P9", numbers, axes, {"scale": "1", "form": "round"}, strict, granular, values, fine)
+    asks = {"scale": "how large it is"}
+    return Search(numbers, axes, {"scale": "1", "form": "round"}, strict, granular, values, fine, asks=asks)
 
 
 def test_the_best_combination(search):
@@ -232,9 +233,9 @@ def test_the_best_combination(search):
     assert search.place == (0, 0)
     assert search.count(granular=False).tolist() == [[1, 0], [1, 2], [0, 2]]
     assert search.best(granular=False) == (1, 1)  # of two with two, none nearer the shipped: the first
-    assert search.words((1, 1)) == "scale: 2; form: square"
+    assert search.words((1, 1)) == "how large it is: 2; form: square"
     assert "6 readings" in search.sentence()
-    assert "as shipped 1 of 2 match to the printed digit, 2 with scale: 2; form: square" in search.sentence()
+    assert "as shipped 1 of 2 match to the printed digit, 2 with how large it is: 2; form: square" in search.sentence()
 
 
 def test_windows(search):

@@ -55,7 +55,7 @@ from radarsim.config.fields import Anything, Flag, Model, Name, Stem
 from radarsim.config.load import parse, read
 from radarsim.engine.results import CaseResult
 from radarsim.errors import OF_AUTHORS, ConfigError, MeasureError, RadarsimError
-from radarsim.language import term, tr
+from radarsim.language import listed, term, tr
 from radarsim.report.claims import rule
 from radarsim.report.claims.declared import (
     Claim,
@@ -98,11 +98,12 @@ class Alternative:
 
 @dataclass(frozen=True)
 class Choice:
-    """An open point of a paper: the column of the table, the question, and the paper's sentence on it.
+    """An open point of a paper: the column of the table, its name in a sentence, and the paper's sentence on it.
 
-    original is the sentence in the paper's language, english in English; both say "nothing" where it is silent. The
-    first alternative is the default. claims: the ids of the claims affected; empty: all of the paper. contradicts: the
-    print has more than one of the alternatives."""
+    asks: what a verdict depends on, such as "how the filter starts", without a comma. original is the sentence in the
+    paper's language, english in English; both say "nothing" where it is silent. The first alternative is the default.
+    claims: the ids of the claims affected; empty: all of the paper. contradicts: the print has more than one of the
+    alternatives."""
 
     key: str
     asks: str
@@ -199,6 +200,19 @@ class PaperReadings(ABC):
         words = [f"{choice.key}: {reading[choice.key]}" for choice in self._other(reading)]
         return "; ".join(words) or DEFAULT
 
+    def said(self, reading: Reading) -> str:
+        """How a reading differs from the shipped configs, for people."""
+        return in_words({choice.key: reading[choice.key] for choice in self._other(reading)}, self.asks)
+
+    @cached_property
+    def asks(self) -> Mapping[str, str]:
+        """The choices by key, in words."""
+        return {choice.key: choice.asks for choice in self.choices}
+
+    def asked(self, keys: Iterable[str]) -> str:
+        """Choices within a sentence."""
+        return listed([tr(self.asks[key]) for key in keys])
+
     def sets(self, reading: Reading) -> dict[str, Any]:
         """The settings of a reading's alternatives."""
         return {key: value for one in self.choices for key, value in one[reading[one.key]].sets.items()}
@@ -230,6 +244,12 @@ class PaperReadings(ABC):
     def search(self) -> "Search | None":
         """The printed numbers of the paper under many readings at once. Default: none."""
         return None
+
+
+def in_words(taken: Mapping[str, str], asks: Mapping[str, str]) -> str:
+    """What is taken of choices in place of the default, for people."""
+    words = [f"{tr(asks.get(key, key))}: {name.replace('_', ' ')}" for key, name in taken.items()]
+    return "; ".join(words) or tr(DEFAULT)
 
 
 @dataclass(frozen=True)
@@ -276,9 +296,8 @@ class Search:
 
     axes: key of a choice → its values, the shipped one given by `shipped`. strict and granular (n, *lengths of axes):
     whether a number is reproduced; `values`: the numbers. fine: for choices whose values are numbers without steps.
-    read_as: strict and granular in words."""
+    read_as: strict and granular in words. asks: the choices in words, by key; of a study, its further ones."""
 
-    paper: str
     printed: Sequence[Printed]
     axes: Mapping[str, Sequence[str]]
     shipped: Mapping[str, str]
@@ -287,6 +306,7 @@ class Search:
     values: np.ndarray
     fine: Mapping[str, Fine] = field(default_factory=dict)
     read_as: str = ""
+    asks: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def readings(self) -> int:
@@ -336,8 +356,8 @@ class Search:
 
     def words(self, place: tuple[int, ...]) -> str:
         """How a combination differs from the shipped one."""
-        other = [f"{key}: {value}" for key, value in self.taken(place).items() if value != self.shipped[key]]
-        return "; ".join(other) or tr("as shipped")
+        other = {key: value for key, value in self.taken(place).items() if value != self.shipped[key]}
+        return in_words(other, self.asks)
 
     def windows(self, key: str) -> list[str]:
         """The values of one choice, all others as shipped, at which each number equals the printed digits."""
@@ -744,6 +764,7 @@ def _misfit(annotation: Any, value: Any) -> str:
 
 
 # ---- over ------------------------------------------------------------------------------------------------------------
+DEPENDS_ON = term("depends on {choices}")
 NOTHING = "there is nothing to measure it with"
 FIRST = ("claim", "part", "reading", "kind")
 LAST = (
@@ -810,9 +831,9 @@ def _judged(part: Part, seen: Evidence, exact: bool, n: int, shipped: bool) -> J
 class Over:
     """A claim over all readings of its paper, the default one first."""
 
+    of: PaperReadings
     claim: Claim
     under: tuple[Under, ...]
-    contradicting: frozenset[str] = frozenset()  # choices with several alternatives in the print
 
     @cached_property
     def outcome(self) -> Outcome | None:
@@ -822,7 +843,7 @@ class Over:
             return None
         found = rule.over_readings(own, [one.as_rule() for one in self.under])
         printed_twice = any(part.against_print for part in self.claim.parts)
-        torn = printed_twice and not self.contradicting.isdisjoint(found.depends_on)
+        torn = printed_twice and any(one.contradicts and one.key in found.depends_on for one in self.of.choices)
         torn = torn or (self.claim.joint and self._each_somewhere())
         if torn:
             return replace(found, kind=rule.CONTRADICTORY)
@@ -870,10 +891,10 @@ class Over:
         if self.still_open():
             words.append(self.still_open())
         if found.depends_on:
-            words.append(tr("depends on: {choices}", choices=", ".join(found.depends_on)))
+            words.append(tr(DEPENDS_ON, choices=self.of.asked(found.depends_on)))
         held = [one for one in self.against_print if one.outcome and one.outcome.kind == rule.CONFIRMED]
         if held and found.holds_in == 0:
-            names = " | ".join(one.name for one in held)
+            names = " | ".join(self.of.said(one.reading) for one in held)
             words.append(tr("it holds, against the print, with {readings}", readings=names))
         if self.impossible:
             words.append(tr("{count} not possible", count=len(self.impossible)))
@@ -1079,7 +1100,7 @@ def joint(of: PaperReadings, over: Sequence[Over]) -> Joint:
         held = tuple(one.under.claim.id for one in own if one.held)
         outcomes = {key: value for one in own for key, value in one.outcomes.items()}
         judged = tuple(one.under.claim.id for one in own)
-        found.append(Together(reading, of.name(reading), of.kind(reading), held, judged, outcomes))
+        found.append(Together(reading, of.said(reading), of.kind(reading), held, judged, outcomes))
     found.sort(key=lambda one: (-one.count(False), -one.count(True), -len(one.held), changed(of, one.reading)))
     numbers: dict[Key, Asserted] = {}
     for key, asserted in (item for own in claims for one in own.values() for item in one.numbers.items()):

@@ -11,7 +11,7 @@ Everything else that shows a class looks it up."""
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from textwrap import shorten
 from typing import Any
@@ -23,7 +23,7 @@ from radarsim.language import numeral, plural, term, tr
 from radarsim.report.claims import rule
 from radarsim.report.claims.declared import Claim
 from radarsim.report.claims.judge import NOT_JUDGED, NOT_RUN
-from radarsim.report.claims.over import DEFAULT, Choice, Over, PaperReadings, Under, depth
+from radarsim.report.claims.over import DEFAULT, DEPENDS_ON, Choice, Over, PaperReadings, Under, depth
 from radarsim.report.claims.rule import (
     CLASSES,
     CONFIRMED,
@@ -52,14 +52,14 @@ KINDS = {
 }
 
 
-def specification(of: PaperReadings, over: Over) -> Figure:
+def specification(over: Over) -> Figure:
     """The curve of a claim: above its worst part's distance from the paper's words, below the alternatives taken."""
     judged = [(one, depth(one)) for one in over.under if one.outcome is not None]
     judged.sort(key=lambda pair: pair[1][0])
     every = [one for one, _ in judged]
     where = np.arange(1, len(every) + 1)
     ends = np.clip(np.array([found for _, found in judged]), -FURTHEST, FURTHEST)
-    varied = [choice for choice in of.choices if len({one.reading[choice.key] for one in every}) > 1]
+    varied = [choice for choice in over.of.choices if len({one.reading[choice.key] for one in every}) > 1]
     caption = tr(
         "{statement}. {outcome}. Above: distance of the claim's worst part from the paper's words, in "
         "margins of that part, cut at ± {furthest:g}; below 0 it holds, above 1 it fails beyond the "
@@ -114,10 +114,10 @@ def _below(varied: list[Choice], every: list[Under], where: np.ndarray) -> Panel
     ticks, marks, height = [], [], HEADING - 1.0
     for choice in varied:
         height -= HEADING
-        ticks.append((float(height), _short(f"{choice.key}:")))
+        ticks.append((float(height), _short(f"{tr(choice.asks)}:")))
         for one in choice.alternatives:
             height -= 1
-            ticks.append((float(height), _short(one.name)))
+            ticks.append((float(height), _short(one.name.replace("_", " "))))
             taken = np.array([reading.reading[choice.key] == one.name for reading in every])
             if taken.any():
                 style = Style(
@@ -140,7 +140,6 @@ def _short(text: str) -> str:
 # ---- classes ---------------------------------------------------------------------------------------------------------
 COLUMNS = ("claim", "class", "holds", "of", "depends_on", "needed", "declared")
 OVER = ("class", "overall", "holds", "of", "depends_on", "needed")  # columns of claims.csv
-DEPENDS_ON = term("depends on {keys}")
 BOTH = term("{own} as shipped; {over}")
 OVER_ALL = term("{kind} over all readings")
 ALONE = term("{own} as shipped; other readings not judged")
@@ -198,13 +197,13 @@ def declared(of: PaperReadings, claim: Claim) -> str:
     return digest([parts, claim.how, choices])[:16]
 
 
-def of_over(of: PaperReadings, over: Over) -> Class | None:
+def of_over(over: Over) -> Class | None:
     """The class of a claim over its readings; None where it could not be judged."""
     found = over.outcome
     if found is None or found.readings is None or found.holds_in is None:
         return None
     needed, on = float(found.needed or math.nan), ", ".join(found.depends_on)
-    return Class(over.claim.id, found.kind, found.holds_in, found.readings, on, needed, declared(of, over.claim))
+    return Class(over.claim.id, found.kind, found.holds_in, found.readings, on, needed, declared(over.of, over.claim))
 
 
 def with_classes(rows: Sequence[Mapping[str, Any]], known: Known) -> list[dict[str, Any]]:
@@ -227,6 +226,16 @@ def _over(row: Mapping[str, Any], known: Known) -> dict[str, Any]:
     return every | needed | {"overall": words(found.kind, own, found.depends_on)}
 
 
+def in_words(rows: Iterable[Mapping[str, Any]], every: Iterable[PaperReadings | None]) -> list[dict[str, Any]]:
+    """Rows of claims.csv for people: what a claim depends on is in the words of its paper's readings."""
+    of = {one.paper: one for one in every if one is not None}
+    found = [dict(row) for row in rows]
+    for row in found:
+        if row["depends_on"]:
+            row["depends_on"] = of[row["claim"].partition(".")[0]].asked(row["depends_on"].split(", "))
+    return found
+
+
 def alone(row: Mapping[str, Any]) -> bool:
     """Whether a claim was judged only as shipped, though open choices may change its verdict."""
     return bool(row["overall"] == ALONE.format(own=row["as_shipped"]))
@@ -243,7 +252,7 @@ def words(kind: str, own: str, depends_on: str = "", say: Callable[..., str] = s
     """The verdict on a claim as a phrase: its class, and the one as shipped if it differs.
 
     say: puts values into a message, as `language.tr` does; default: in English."""
-    over: str = say(DEPENDS_ON, keys=depends_on) if kind == rule.DEPENDS and depends_on else say(kind)
+    over: str = say(DEPENDS_ON, choices=depends_on) if kind == rule.DEPENDS and depends_on else say(kind)
     if own == kind:
         return over
     if kind not in (rule.DEPENDS, rule.CONTRADICTORY):

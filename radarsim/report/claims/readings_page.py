@@ -75,7 +75,7 @@ def _claims(over: Sequence[Over]) -> str:
     for one in over:
         found = one.outcome
         holds = tr("{count} of {of}", count=found.holds_in or 0, of=found.readings or 0) if found else ""
-        said = words(found.kind, found.kind, ", ".join(found.depends_on), tr) if found else tr("not judged")
+        said = words(found.kind, found.kind, one.of.asked(found.depends_on), tr) if found else tr("not judged")
         verdict = "; ".join(filter(None, (said, one.still_open())))
         rows.append((one.claim.id, tr(one.claim.statement), verdict, holds))
     return table((term("claim"), term("statement"), term("verdict"), term("holds in")), rows)
@@ -83,7 +83,7 @@ def _claims(over: Sequence[Over]) -> str:
 
 def _changed(over: Sequence[Over]) -> str:
     rows = [
-        (one.claim.id, tr(reading.name), tr(reading.outcome.kind))
+        (one.claim.id, one.of.said(reading.reading), tr(reading.outcome.kind))
         for one in over
         for reading in one.against_print
         if reading.outcome is not None
@@ -95,7 +95,7 @@ def _impossible(over: Sequence[Over]) -> str:
     reasons: dict[tuple[str, str], list[str]] = {}
     for one in over:
         for reading in one.impossible:
-            reasons.setdefault((one.claim.id, reading.why), []).append(reading.name)
+            reasons.setdefault((one.claim.id, reading.why), []).append(one.of.said(reading.reading))
     rows = [(claim, str(len(names)), names[0], said(why)) for (claim, why), names in reasons.items()]
     return table((term("claim"), term("readings"), term("such as"), term("why not")), rows) if rows else ""
 
@@ -105,7 +105,7 @@ def _best(of: Joint) -> str:
     best = of.every[:SHOWN]
     rows = [
         (
-            *(tr(one.name), one.kind, tr("{count} of {of}", count=one.count(False), of=len(one.outcomes))),
+            *(one.name, one.kind, tr("{count} of {of}", count=one.count(False), of=len(one.outcomes))),
             *(str(one.count(True)), str(one.open)),
             *(tr("{count} of {of}", count=len(one.held), of=len(one.judged)), ", ".join(one.held)),
         )
@@ -154,7 +154,7 @@ def _alternatives(of: Joint) -> str:
         if any(own[key] not in ("all", "none") for own in kept.values())
     ]
     words = tr("Values of one choice, all others as shipped, for which a number matches the print.")
-    return f"{words}\n\n{table((*PRINTED[:2], *kept), rows)}"
+    return f"{words}\n\n{table((*PRINTED[:2], *map(tr, map(of.of.asks.__getitem__, kept))), rows)}"
 
 
 def _numbers(search: Search) -> str:
@@ -199,7 +199,7 @@ def _windows(search: Search) -> str:
     never = int(np.sum(~search.strict.reshape(len(search.printed), -1).any(axis=1)))
     if never:
         words += plural(" {count} matches under no combination.", " {count} match under no combination.", never)
-    return f"{words}\n\n{table((*PRINTED[:2], *kept), rows)}"
+    return f"{words}\n\n{table((*PRINTED[:2], *(tr(search.asks.get(key, key)) for key in kept)), rows)}"
 
 
 def _listed(window: str) -> str:
@@ -213,7 +213,6 @@ def _listed(window: str) -> str:
 
 def _choice(choice: Choice) -> str:
     rows = [(one.name, one.kind, tr(one.reason)) for one in choice.alternatives]
-    on = tr(" Affects {claims}.", claims=", ".join(choice.claims)) if choice.claims else ""
     quoted = (
         choice.original
         if current() == PAPERS or choice.original == choice.english
@@ -221,8 +220,8 @@ def _choice(choice: Choice) -> str:
     )
     return "\n\n".join(
         [
-            f"### `{choice.key}`",
-            f"{tr(choice.asks)}.{on}",
+            f"### `{choice.key}`: {tr(choice.asks)}",
+            *([tr("Affects {claims}.", claims=", ".join(choice.claims))] if choice.claims else []),
             f"> {quoted}",
             table((term("value"), term("kind"), term("why")), rows),
         ]

@@ -273,6 +273,7 @@ AXES: dict[str, tuple[str, ...]] = {
     **{"curvature": get_args(Curvature), "pulses": ("30000", "29999"), "sum": get_args(Sum)},
 }
 FURTHER = {"counted": COUNTED, "amplitude": tuple(AMPLITUDES)}
+ASKS = {"amplitude": "the amplitude"}
 SHARE = 0.01  # of a number, under the granular rule
 READ_AS = "To the digit: what rounds to the print. To the steps of the print: within 1 % of it."
 
@@ -309,7 +310,7 @@ def search() -> Search:
     strict, granular = (_inside(values, [getattr(one, rule) for one in PRINTED]) for rule in ("strict", "granular"))
     axes = AXES | FURTHER
     shipped = {key: own[0] for key, own in axes.items()}
-    return Search("P4", PRINTED, axes, shipped, strict, granular, values, read_as=READ_AS)
+    return Search(PRINTED, axes, shipped, strict, granular, values, read_as=READ_AS, asks=ASKS)
 
 
 def _version(*names: str) -> Version:

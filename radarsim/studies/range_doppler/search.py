@@ -205,6 +205,7 @@ SHIPPED = {
     **{"process_noise": FORMS[0], "manoeuvre_variance": "0.001", "start": START_NAMES[0]},
     **{"truth": TRUTHS[0], "scans": "15", "span": SPANS[0]},
 }
+ASKS = {"scans": "how many scans there are", "span": "how long fast radars are observed"}
 LONG = 400  # scans after which RLS 2 is taken as settled
 TOLERANCE = 0.05  # of the steady value
 R, V, A = range(3)
@@ -409,7 +410,7 @@ def search() -> Search:
         **{"process_noise": FORMS, "manoeuvre_variance": tuple(f"{v:g}" for v in VARIANCES), "start": START_NAMES},
         **{"truth": TRUTHS, "scans": tuple(str(n) for n in SCANS), "span": SPANS},
     }
-    return Search("P1", PRINTED, axes, SHIPPED, strict, granular, values, {"manoeuvre_variance": _fine()}, READ_AS)
+    return Search(PRINTED, axes, SHIPPED, strict, granular, values, {"manoeuvre_variance": _fine()}, READ_AS, ASKS)
 
 
 def _inside(values: np.ndarray, ends: Sequence[tuple[float, float]]) -> np.ndarray:

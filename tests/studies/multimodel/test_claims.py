@@ -74,6 +74,6 @@ def test_what_the_paper_reports_of_others_is_no_number_of_its_own(transition):
             seen.cases, seen.tables, {one.name: {"filters": set(range(len(one.spec.filters)))} for one in seen.cases}
         )
     )
-    over = [Over(CLAIMS["P2.12"], (under(of, CLAIMS["P2.12"], of.reading(), evidence, 64),))]
+    over = [Over(of, CLAIMS["P2.12"], (under(of, CLAIMS["P2.12"], of.reading(), evidence, 64),))]
     assert over[0].outcome.kind == REFUTED
     assert not joint(of, over).numbers
