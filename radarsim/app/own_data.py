@@ -71,14 +71,24 @@ def read_plots(path: str | os.PathLike[str]) -> "pd.DataFrame":
     Raises ConfigError if it cannot be read."""
     import pandas as pd
 
+    if not isinstance(path, str | os.PathLike):
+        raise ConfigError(f"path: must be the path of a file, as str or Path, got {path!r}")
     try:
         texts = pd.read_csv(path, comment="#", dtype=str, keep_default_na=False)
-        # Python's own parsing of numbers loses no digit.
-        measured = [str(name) for name in texts if name not in (files.TRACK, "radar", *asterix.WORDS)]
-        numbers = {name: texts[name].replace("", "nan").astype(float) for name in measured}
     except (OSError, ValueError) as error:
         raise ConfigError(f"{os.fspath(path)}: cannot be read: {error}") from error
-    return texts.assign(**numbers)
+    faults = []
+    for number, name in enumerate(texts, start=1):
+        if name not in (files.TRACK, "radar", *asterix.WORDS):
+            try:
+                texts[name] = texts[name].replace("", "nan").astype(float)  # Python's own parsing loses no digit
+            except ValueError:
+                row = int(pd.to_numeric(texts[name].replace("", "0"), errors="coerce").isna().argmax())
+                must = f"{number}: {name}: must be a number or empty, got {texts[name][row]!r}"
+                faults.append(f"{files.place_of(path, row)}:{must}")
+    if faults:
+        raise ConfigError(*faults)
+    return texts
 
 
 def track(config: Config, recorded: Recorded, overrides: Overrides = ()) -> "pd.DataFrame":

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 SILENT_S = 0.7  # a run shorter than this shows no progress
 REFRESH_S = 0.1
+STEADY = 1.5  # factor between the latest rate and that since the beginning, beyond which no time left is known
+Report = tuple[float, int, int | None]  # when, computed, of how many
 PIPED_WIDTH = 10_000  # whatever reads it wraps it, or not
 COLUMNS = (  # of tables
     *(term("case"), term("filter"), term("component"), term("at"), term("sigma"), term("exact"), term("gain")),
@@ -55,12 +57,12 @@ class Progress:
     stored results count."""
 
     shares = True  # the share of a whole is known, and shown by a bar
+    first: Report = (0.0, 0, None)
+    last: Report = first
 
     def __init__(self, title: str, what: str = "realisations", quiet: bool = False):
         self.title, self.quiet, self.what = title, quiet, tr(what)
         self.started = self.due = time.monotonic()
-        self.first: tuple[float, int, int | None] = (0.0, 0, None)  # reports: when, computed, of how many
-        self.last: tuple[float, int, int | None] = self.first
         self.bar: Bar | None = None
         self.task: TaskID
         self.lock = threading.Lock()
@@ -129,22 +131,32 @@ class Progress:
         return bar
 
 
+def _between(begin: Report, end: Report) -> float:
+    """The rate between two reports, a second."""
+    return (end[1] - begin[1]) / max(end[0] - begin[0], 1e-9)
+
+
 class Counter(Progress):
-    """Progress of work without a known end, on stderr if that is a terminal, once it has lasted two seconds."""
+    """Progress of work without a known end, on stderr if that is a terminal, once it has lasted most of a second."""
 
     shares = False
+    before: Report = (0.0, 0, None)  # the report before the last; here they are those since which the time has doubled
 
     def rate(self, computed: int, total: int | None) -> float:
         """How many are done in a second, on average since the first report: before it files are read, kernels made."""
+        now = time.monotonic(), computed, total
         if not self.first[1]:
-            self.first = time.monotonic(), computed, total
-        return (computed - self.first[1]) / max(time.monotonic() - self.first[0], 1e-9)
+            self.first = self.last = self.before = now
+        if now[0] - self.first[0] >= 2 * (self.last[0] - self.first[0]):
+            self.before, self.last = self.last, now
+        return _between(self.first, now)
 
     def _told(self, done: int, total: int | None, rate: float) -> str:
         words = tr(
             "{title}: {done:,} {what}, {rate:,.0f}/s", title=tr(self.title), done=done, what=self.what, rate=rate
         )
-        if total is None or not rate:
+        lately = _between(self.before, (time.monotonic(), done, total))  # over the last half of the time, or more
+        if total is None or not rate / STEADY < lately < rate * STEADY:
             return words
         return words + "  " + tr("about {left} left", left=clock((total - done) / rate))
 

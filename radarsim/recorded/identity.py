@@ -62,6 +62,7 @@ class Paths:
         self.wearers: dict[tuple[str, str], list[int]] = {}
         self.addresses: dict[str, str] = {}  # by track
         self.unnamed = 0  # fixes that nothing identifies
+        self.asked: set[tuple[str, ...]] = set()  # identities by KINDS of the plots that `find` was asked for
 
     def names(self) -> list[str]:
         """What identifies each aircraft best."""
@@ -113,6 +114,7 @@ class Paths:
         """The aircraft of plots (n,) with identities by KINDS; turned: states in the axes of their radar."""
         found = Found(np.full((len(t), 6), np.nan), np.full(len(t), -1), np.full(len(t), -1))
         for values, rows in grouped(list(zip(*cleaned(identity, len(t)), strict=True))).items():
+            self.asked.add(values)
             for k, (kind, value) in enumerate(zip(KINDS, values, strict=True)):
                 wearers = [i for i in self.wearers.get((kind, value), ()) if not self.paths[i].is_another(values[:k])]
                 if wearers:

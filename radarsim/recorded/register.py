@@ -122,6 +122,9 @@ def lines(found: Registration) -> list[str]:
         if not one.identifiable:
             said.append(tr("{key}: unknown: {why}", key=one.key, why=one.why))
             continue
+        if one.lo == one.hi == 0:
+            said.append(tr("{key}: 0, to the last digits of the numbers", key=name))
+            continue
         value, *ends = (significant_digits(factor * number) for number in (one.value, one.lo, one.hi))
         zero = tr("; 0 is possible") if one.lo <= 0 <= one.hi else ""
         said.append(f"{name}: {value} {interval(*ends)}{zero}")
@@ -337,9 +340,12 @@ def adjust(pairs: Pairs) -> Adjusted:
         if length < CONVERGED:
             break
     errors, slopes = _linear(pairs, values)
+    # How far biases of 1 move a plot, in the last digits of its numbers: what moves none by one of these is none.
+    moved = np.abs(slopes / _floor(pairs)[:, None]).max(axis=(0, 1))
     u, slopes, clusters = errors / sigma, slopes / sigma[:, None], _clusters(pairs)
     weights = _biweight(u)
     half = _halves(u, slopes, clusters, used)
+    values, half = np.where((np.abs(values) + half) * moved > 1, [values, half], 0.0)
     lags = {number: _lag(u[rows], slopes[rows, :, 3]) for number, rows in grouped(pairs.path.tolist()).items()}
     biases = [
         Bias(key, math.nan, math.nan, math.nan, why[key]) if why.get(key) else Bias(key, v, v - h, v + h)

@@ -41,3 +41,10 @@ def test_faults_are_those_of_the_command(table, tmp_path):
         radarsim.track("rls2", table.drop(columns="range_m"))
     with pytest.raises(radarsim.ConfigError, match="cannot be read"):
         radarsim.read_plots(tmp_path / "none.csv")
+    (path := tmp_path / "plots.csv").write_text("# made\nt_s,range_m,bearing_rad\n0,1,\n1,2,unknown\n2,x,unknown\n")
+    with pytest.raises(radarsim.ConfigError) as caught:
+        radarsim.read_plots(path)
+    assert caught.value.lines == (
+        f"{path}:5:2: range_m: must be a number or empty, got 'x'",
+        f"{path}:4:3: bearing_rad: must be a number or empty, got 'unknown'",
+    )

@@ -158,6 +158,23 @@ def test_without_threads_a_bar_begins_with_the_first_report(monkeypatch):
         assert "tracking: 50 rows" in screen.getvalue()
 
 
+@pytest.mark.parametrize(("later", "left"), [(100, {"about 0:00:06 left"}), (10, set())])
+def test_no_time_left_is_shown_while_the_rate_changes(monkeypatch, later, left):
+    """100 a second, and after four seconds as many, or a tenth of it; 10 s of 1600."""
+    screen, now = Terminal(), [0.0]
+    monkeypatch.setattr("sys.stderr", screen)
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    monkeypatch.setattr(console, "SILENT_S", 0)
+    with limited(0), console.Counter("fitting", "likelihoods") as counter:
+        for k in range(1, 11):
+            now[0] = float(k)
+            screen.seek(0)
+            screen.truncate()
+            counter.update(100 * min(k, 4) + later * max(k - 4, 0), 1600)
+        assert "fitting: " in screen.getvalue()
+    assert set(re.findall(r"about \S+ left", screen.getvalue())) == left
+
+
 def test_list_is_one_screen_and_takes_words(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 

@@ -167,4 +167,4 @@ def test_what_import_says_is_russian_and_its_faults_and_its_file_are_not(tmp_pat
         " " * 14 + "отметок вне трасс, которые `radarsim track` пропустит: 1 из 3",
     ]
     assert plots.read_bytes() == english
-    assert "left out: rows no farther away than the bias of their range (4)" in fault.stderr
+    assert "left out: plots whose range is not above 0 (4)" in fault.stderr

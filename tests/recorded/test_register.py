@@ -18,7 +18,7 @@ from radarsim.errors import ConfigError
 from radarsim.recorded import register
 from radarsim.recorded.formats.importing import Options, biases_of, import_recording
 from radarsim.recorded.formats.sites import BIASES, Site, sites_of
-from radarsim.recorded.identity import interpolated
+from radarsim.recorded.identity import distance, interpolated
 from tests.recorded.formats.made import block, plot_048, position_021
 
 NONE = (0.0, 0.0, 0.0, 0.0)
@@ -84,6 +84,7 @@ def test_known_biases_without_noise(biases):
     for key, wanted, unit in zip(BIASES, biases, (1.0, 1e-5, 1e-5, 0.01), strict=True):
         assert one[key].identifiable
         assert one[key].value == pytest.approx(wanted, rel=1e-9, abs=1e-9 * unit)
+        assert (one[key].lo == one[key].hi == 0) == (wanted == 0)
 
 
 def test_an_independent_search_finds_the_same():
@@ -314,8 +315,8 @@ def test_recordings_that_do_not_belong_together(tmp_path):
 
 
 def test_ranges_alone_have_a_distance_in_range_alone():
-    assert register.distance(98.94, math.nan) == "98.9 m"
-    assert register.distance(98.94, 0.123) == "98.9 m and 0.12°"
+    assert distance(98.94, math.nan) == "98.9 m"
+    assert distance(98.94, 0.123) == "98.9 m and 0.12°"
 
 
 @pytest.mark.parametrize("wrong", [None, 5, [], b"plots.csv"])
@@ -323,6 +324,10 @@ def test_python_takes_files_and_tables_alone(wrong):
     for call in (lambda: radarsim.register(wrong, "positions.csv"), lambda: radarsim.fit("rls2", wrong)):
         with pytest.raises(ConfigError, match=r"recorded: must be the path of a file or a table \(pandas\), got"):
             call()
+    with pytest.raises(
+        ConfigError, match=r"path: must be the path of a file, as str or Path, got (None|5|\[\]|b'plots.csv')"
+    ):
+        radarsim.read_plots(wrong)
 
 
 @pytest.mark.parametrize("wrong", ["outliers", ["x"], [None], 5, True])
@@ -331,12 +336,13 @@ def test_a_fit_allows_for_what_it_knows(wrong):
         radarsim.fit("rls2", "plots.csv", allowing=wrong)
 
 
-def test_a_bias_leaves_no_range_that_is_not_positive(tmp_path):
+def test_no_range_that_is_not_above_zero_is_written(tmp_path):
     table, out = tmp_path / "table.csv", tmp_path / "plots.csv"
     table.write_text("time_s,track,range_m,bearing_deg\n0,1,90,20\n4,1,100,20\n8,1,110,20\n")
+    assert import_recording(table, out, Options()).rows == 3
     done = import_recording(table, out, Options(biases={"range_m": 100.0}))
     assert [line.split(",")[2] for line in out.read_text().splitlines() if line[0].isdigit()] == ["10.0"]
-    assert done.skipped == ["rows no farther away than the bias of their range (2)"]
+    assert done.skipped == ["plots whose range is not above 0 (2)"]
 
 
 def test_a_radar_has_one_place():
@@ -344,9 +350,23 @@ def test_a_radar_has_one_place():
         sites_of(["1/2=52,4,0", "1/2=53,4,0"])
 
 
-@pytest.mark.parametrize("text", ["range=1", "range_m", "range_m=x", "range_m=nan", "range_scale=-1", "range_m=1,2"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "range=1",
+        "range_m",
+        "range_m=x",
+        "range_m=nan",
+        "range_scale=-1",
+        "range_m=1,2",
+        "time_s=1e308",
+        "bearing_deg=181",
+    ],
+)
 def test_a_bias_that_cannot_be_is_refused(text):
-    with pytest.raises(ConfigError, match=r"bias: must be range_m=NUMBER, .*, each once; got"):
+    with pytest.raises(
+        ConfigError, match=r"bias: must be range_m=NUMBER, .*, each once; their size is .* at most; got"
+    ):
         biases_of([text])
     with pytest.raises(ConfigError, match="each once"):
         biases_of(["bearing_deg=1", "bearing_rad=1"])

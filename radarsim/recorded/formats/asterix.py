@@ -418,11 +418,7 @@ class Asterix:
         names = sites.PLOT_COLUMNS if kind == sites.PLOTS else sites.POSITION_COLUMNS
         columns = {name: t if name == "t_s" else columns[name] for name in names}
         batch = sites.Batch(kind, tracks, words.pop("address"), radars, columns, words)
-        if kind == sites.PLOTS:
-            nowhere = columns["range_m"] == 0
-            self.skipped[sites.NOWHERE] += int(nowhere.sum())
-            return batch.rows(np.flatnonzero(~nowhere).tolist()) if nowhere.any() else batch
-        return batch.rows(np.flatnonzero(~out).tolist()) if self.truth else batch
+        return batch.rows(np.flatnonzero(~out).tolist()) if self.truth and kind == sites.POSITIONS else batch
 
     def _named(self, kind: str, t: np.ndarray, columns: Columns, radars: list[str], words: dict[str, list[str]],
                excluded: np.ndarray) -> list[str]:  # fmt: skip

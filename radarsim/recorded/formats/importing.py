@@ -79,6 +79,7 @@ BEHIND = term(
 )
 UNNAMED = term("plots of no track, which `radarsim track` skips: {count} of {all}")
 LEAST_DATED_S = 1e8  # since 1970; smaller times count from anywhere
+MOST_BIAS = dict(zip(BIASES, (1e6, 0.5, math.pi, DAY_S), strict=True))  # in size
 SIGN_TESTS = 2000  # pairs of plots on which the sign of the Doppler speed is tested
 LEAST_TESTS = 20
 FOLD_TESTS = 3000  # rows on which folding of the Doppler speed is tested
@@ -310,18 +311,19 @@ class _Import:
                 yield self._written(kept)
 
     def _unbiased(self, batch: Batch) -> Batch:
-        """A batch without the biases of the radar."""
+        """A batch without the biases of the radar, and without plots that then have no range."""
         biases, columns = self.options.biases, batch.columns
         if biases and batch.kind == PLOTS:
             columns["t_s"] -= biases.get("time_s", 0.0)
-            measured = columns["range_m"]
-            columns["range_m"] = (measured - biases.get("range_m", 0.0)) / (1 + biases.get("range_scale", 0.0))
+            columns["range_m"] = (columns["range_m"] - biases.get("range_m", 0.0)) / (
+                1 + biases.get("range_scale", 0.0)
+            )
             columns["bearing_rad"] = (columns["bearing_rad"] - biases.get("bearing_rad", 0.0)) % (2 * math.pi)
-            if (gone := (measured > 0) & (columns["range_m"] <= 0)).any():
-                self.left[term("rows no farther away than the bias of their range")] += int(gone.sum())
-                return batch.rows(np.flatnonzero(~gone).tolist())
         elif biases:
             raise ConfigError("bias: is subtracted from plots of a radar; the recording has positions")
+        if batch.kind == PLOTS and (gone := columns["range_m"] <= 0).any():
+            self.left[term("plots whose range is not above 0")] += int(gone.sum())
+            return batch.rows(np.flatnonzero(~gone).tolist())
         return batch
 
     def _kept(self, batch: Batch) -> Batch | None:
@@ -596,9 +598,10 @@ class _Truth:
         found, names = [], self.paths.names()
         if names and not self.missed and not self.own:
             more = " …" if len(names) > MOST_LISTED else ""
+            plots = tracks if self.whose else sorted(next(filter(None, one), "") for one in self.paths.asked)
             found.append(f"truth: no plot has the address, the callsign or the code of an aircraft in it at that time "
                          f"and place; it has {', '.join(names[:MOST_LISTED])}{more}, the plots "
-                         f"{', '.join(filter(None, tracks)) or 'no names'}")  # fmt: skip
+                         f"{', '.join(list(filter(None, plots))[:MOST_LISTED]) or 'no names'}")  # fmt: skip
         for number, parts in self.missed.items():
             missed = np.concatenate(parts)
             if are_far(missed[:, :2], missed[:, 2]):
@@ -716,10 +719,12 @@ def biases_of(texts: Sequence[str]) -> dict[str, float]:
             value = float(number)
         except ValueError:
             value = math.nan
-        if name not in BIASES or not math.isfinite(value) or name in found or (name == "range_scale" and value <= -1):
-            must = "must be range_m=NUMBER, range_scale=…, bearing_deg=… or time_s=…, each once"
-            faults.append(f"bias: {must}; got {text!r}")
-        found[name] = math.radians(value) if key.strip().endswith("_deg") else value
+        value = math.radians(value) if key.strip().endswith("_deg") else value
+        if name in found or not abs(value) <= MOST_BIAS.get(name, -1.0):
+            must = "must be range_m=NUMBER, range_scale=…, bearing_deg=… or time_s=…, each once; their size is"
+            faults.append(f"bias: {must} {MOST_BIAS['range_m']:g} m, {MOST_BIAS['range_scale']:g}, 180 deg and "
+                          f"{MOST_BIAS['time_s']:g} s at most; got {text!r}")  # fmt: skip
+        found[name] = value
     if faults:
         raise ConfigError(*faults)
     return found

@@ -33,6 +33,7 @@ from radarsim.recorded.plots import Faults
 
 # ---- columns ---------------------------------------------------------------------------------------------------------
 LENGTHS = {"m": 1.0, "km": 1e3, "ft": 0.3048, "feet": 0.3048, "nm": 1852.0, "nmi": 1852.0}
+HEIGHTS, FLIGHT_LEVELS = {**LENGTHS, "fl": 30.48}, ("fl", "flight_level")  # of 100 ft; names that are this unit
 SPEEDS = {
     **dict.fromkeys(("mps", "m/s", "ms"), 1.0), **dict.fromkeys(("kn", "kt", "kts", "knots"), KNOT_MPS),
     **dict.fromkeys(("kmh", "km/h"), 1 / 3.6), **dict.fromkeys(("fpm", "ft/min"), 0.3048 / 60),
@@ -68,9 +69,11 @@ QUANTITIES = {
     "latitude_deg": Quantity(("lat", "latitude"), DEGREES, "deg"),
     "longitude_deg": Quantity(("lon", "lng", "long", "longitude"), DEGREES, "deg"),
     "altitude_m": Quantity(
-        ("geoaltitude", "geo_altitude", "alt_geom", "altitude", "alt", "height", "ele"), LENGTHS, "m"
+        ("geoaltitude", "geo_altitude", "alt_geom", "altitude", "alt", "height", "ele"), HEIGHTS, "m"
     ),
-    "barometric_m": Quantity(("baroaltitude", "baro_altitude", "alt_baro"), LENGTHS, "m"),
+    "barometric_m": Quantity(
+        ("baroaltitude", "baro_altitude", "alt_baro", "mode_c", "modec", *FLIGHT_LEVELS), HEIGHTS, "m"
+    ),
     "speed_mps": Quantity(("velocity", "groundspeed", "ground_speed", "gs", "speed", "sog"), SPEEDS, "m/s"),
     # Of a ship the heading is where its bow points; aircraft have their course under this name too.
     "course_deg": Quantity(
@@ -94,7 +97,9 @@ UNNAMED = ("t_s", "date", "track")  # what a bracket says of these is no unit: T
 ON_EARTH = ("latitude_deg", "longitude_deg")
 MEASURED = ("range_m", "bearing_rad")
 POSITION = "position"  # latitude and longitude in one cell, parted by a comma
-AVIATION = ("gs", "groundspeed", "ground_speed", "alt", "alt_baro", "alt_geom", "direction")  # names without a unit
+AVIATION = (  # names without a unit
+    *("gs", "groundspeed", "ground_speed", "alt", "alt_baro", "alt_geom", "direction", "mode_c", "modec"),
+)
 AVIATION_UNITS = {"altitude_m": "ft", "barometric_m": "ft", "speed_mps": "kn", "up_mps": "fpm"}
 MARITIME = ("sog", "cog", "mmsi")  # names of AIS
 BOW = "heading"
@@ -120,7 +125,7 @@ def split(name: str) -> tuple[str, str]:
         return re.sub(r"\s+", "_", found[1].strip()), found[2].strip()
     name = re.sub(r"\s+", "_", name)
     stem, _, last = name.rpartition("_")
-    return (stem, last) if stem and last in UNITS else (name, "")
+    return (stem, last) if stem and last in UNITS else (name, "fl" if name in FLIGHT_LEVELS else "")
 
 
 def _printable(name: str) -> str:

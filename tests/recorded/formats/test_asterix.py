@@ -239,7 +239,7 @@ def test_an_address_of_two_radars_is_two_tracks(tmp_path):
     records = [plot_048(k, radar=(25, 10 + k % 2), address=0x4CA1FA) for k in range(4)]
     done, _, tracks = imported(tmp_path, block(48, *records, plot_048(5, rho=0, address=0x4CA1FA)))
     assert tracks == ["4ca1fa", "25/11:4ca1fa"] * 2
-    assert done.skipped == ["records without time or position (1)"]
+    assert done.skipped == ["plots whose range is not above 0 (1)"]
 
 
 def test_truth_of_the_radar_that_says_where_it_stands(tmp_path):

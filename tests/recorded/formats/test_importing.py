@@ -178,7 +178,7 @@ def test_truth_is_never_another_aircraft(tmp_path):
         (
             ("0000b2",),
             "truth: no plot has the address, the callsign or the code of an aircraft in it at that time and "
-            "place; it has 0000b2, the plots 3, 4",
+            "place; it has 0000b2, the plots 0000a1",
         ),
         (
             ("", ""),

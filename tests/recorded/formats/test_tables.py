@@ -66,6 +66,18 @@ def test_plots_and_positions_in_one_table_are_both_to_be_had(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("header", "height", "said"),
+    [("Mode C [ft]", 91.44, ""), ("Mode C", 91.44, "Mode C in ft"), ("modec", 91.44, "modec in ft"),
+     ("FL", 9144.0, ""), ("Flight level", 9144.0, ""), ("Altitude [FL]", 9144.0, ""), ("FL [m]", 300.0, "")],
+)  # fmt: skip
+def test_heights_of_a_transponder(tmp_path, header, height, said):
+    text = f"Time,Range [km],{header},track\n1,20,300,a\n5,21,300,a\n"
+    done, columns, _ = imported(tmp_path, text.encode())
+    np.testing.assert_allclose(columns["altitude_m"], [height, height])
+    assert done.notes == ([f"assumed because the name has no unit: {said}"] if said else [])
+
+
+@pytest.mark.parametrize(
     ("times", "expected"),
     [
         (("00:01:03:180", "00:01:04:680"), 1.5),
