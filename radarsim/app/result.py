@@ -414,23 +414,16 @@ def case_figures(
     drawn = of_outside | {name: figure for name, figure in drawn.items() if name not in of_outside}
     if made["claims"]["claim"].nunique() > FEW_CLAIMS and (judged := page.figure(made["claims"].to_dict("records"))):
         drawn["claims"] = judged
-    if any(notes.heavy(made[name]).any() for name in ("curves", "gains")):
-        drawn = {
-            name: _said(figure) if name.startswith(("sigma", "gain")) else figure for name, figure in drawn.items()
-        }
     if not own.draws_sweeps:
         from radarsim.report import sweeps
 
-        drawn |= sweeps.figures(outside.joined(results), common.groups(made["curves"], "case", "filter", "component"))
+        curves = common.groups(banded["curves"], "case", "filter", "component")
+        drawn |= sweeps.figures(outside.joined(results), curves)
+    if any(notes.heavy(made[name]).any() for name in ("curves", "gains")):
+        drawn = {name: panels.unbanded(figure) for name, figure in drawn.items()}
     names = names_in(results)
     said = {name: reworded(seen.crossed(figure), partial(called, names=names)) for name, figure in drawn.items()}
     return {name: panels.joined(figure) for name, figure in said.items()}
-
-
-def _said(figure: Figure) -> Figure:
-    """The figure with a caption that says why a band is missing."""
-    said = tr("No band is drawn where a few large errors dominate.")
-    return replace(figure, caption=f"{figure.caption} {said}")
 
 
 def _banded(made: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:

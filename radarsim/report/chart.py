@@ -13,7 +13,7 @@ kept with them and in attributes."""
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from markupsafe import Markup, escape
@@ -117,6 +117,7 @@ MARGIN = {"x": 0.02, "y": 0.06}  # of the span of the data, on either side
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 TICK_DIGITS = 6
 WIDE = 20.0  # ratio of values from which the colours of maps are logarithmic
+FEWEST_SCANS, LAST_APART = 5, 0.5  # scans from which ticks stand at them; of an interval, before the last tick
 FURTHER = 3  # ticks more than wanted that a logarithmic axis may have
 MOST_DECADES = 7  # labelled on a logarithmic axis
 
@@ -274,6 +275,38 @@ def extent_of(mark: Mark, log: bool) -> tuple[np.ndarray, np.ndarray]:
     return none, none
 
 
+class Scans(NamedTuple):
+    """Even values from zero to the last."""
+
+    step: float
+    last: float
+
+
+def scans_of(panel: Panel) -> Scans | None:
+    """Step and last of even values from zero on (scans) on which all lines of a panel lie; None where not."""
+    every = [np.asarray(mark.x, float) for mark in panel.marks if isinstance(mark, Line)]
+    x = np.unique(np.concatenate(every or [np.zeros(0)]))
+    if panel.x.scale == "log" or len(x) < FEWEST_SCANS or x[0] < 0:
+        return None
+    step = float(x[-1] / np.round(x[-1] / np.diff(x).min()))
+    even = np.abs(x / step - np.round(x / step)).max() < 1e-6 and x[0] <= FEWEST_SCANS * step
+    said = abs(float(f"{step:.3g}") - step) < 1e-9 * step  # by few digits
+    return Scans(step, float(x[-1])) if even and said else None
+
+
+def at_scans(scans: Scans, intervals: int) -> list[tuple[float, str]]:
+    """Ticks at every few scans from zero, about so many intervals, and at the last scan. One interval more, or down to
+    half as many, if all intervals are then equally long."""
+    count = round(scans.last / scans.step)
+    every = [m * 10**p for p in range(9) for m in (1, 2, 3, 4, 5)]
+    whole = [n for n in every if count % n == 0 and intervals / 2 <= count / n <= intervals + 1]
+    chosen = (whole or [n for n in every if count / n <= intervals])[0]
+    found = list(range(0, count + 1, chosen))
+    if rest := count - found[-1]:
+        found = [*(found[:-1] if rest < LAST_APART * chosen and len(found) > 1 else found), count]
+    return [(n * scans.last / count, tick_text(n * scans.last / count)) for n in found]
+
+
 def by_number(panel: Panel) -> Panel:
     """Whether it is a panel of bars or of a map: its places are numbers of columns and rows, whatever their values."""
     mark = next(mark for mark in panel.marks if isinstance(mark, Heat | Bars))
@@ -422,7 +455,8 @@ def at_ends(panel: Panel) -> list[str]:
 
 def _panel(figure: Figure, panel: Panel, numbers: dict[str, int], points: int, heats: Heats) -> Drawn:
     frame = _Frame(panel, heats)
-    marks = Markup("").join(frame.draw(mark, numbers, points) for mark in panel.marks)
+    ordered = sorted(panel.marks, key=lambda mark: isinstance(mark, Note) and mark.place == "top")  # over the lines
+    marks = Markup("").join(frame.draw(mark, numbers, points) for mark in ordered)
     whole = " – ".join(filter(None, (spoken(figure.title), spoken(panel.title))))
     axes = tr("{y} against {x}", y=spoken(panel.y.label), x=spoken(panel.x.label))
     svg = Markup(
@@ -442,6 +476,8 @@ class _Frame:
         self.panel, extent = panel, [extent_of(mark, panel.y.scale == "log") for mark in panel.marks]
         if any(isinstance(mark, Heat | Bars) for mark in panel.marks):
             panel = self.panel = by_number(panel)
+        elif not panel.x.ticks and (scans := scans_of(panel)):
+            panel = self.panel = replace(panel, x=replace(panel.x, ticks=tuple(at_scans(scans, 6))))
         above = len(panel.y.label.split("\n"))
         self.top = 8.0 + 1.3 * SIZE * above
         ys = scale(panel.y, [y for _, y in extent], "y", HEIGHT - BOTTOM, self.top)

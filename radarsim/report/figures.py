@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -32,7 +32,7 @@ from matplotlib.transforms import ScaledTranslation
 from radarsim.errors import ConfigError
 from radarsim.language import tr
 from radarsim.report import chart
-from radarsim.report.chart import Scale, contrast, tick_text
+from radarsim.report.chart import Scale, Scans, at_scans, contrast, scans_of, tick_text
 from radarsim.report.drawing import GREY, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.drawing import Axis as Ends
 from radarsim.report.wording import formulas, number, spoken
@@ -103,7 +103,8 @@ def named(figure: Figure) -> Named:
         own = [Legend(one, title) if one else None for one, title in zip(keys, titled, strict=True)]
         return Named(panels, at_ends, tuple(own), None, False)
     beside = len(panels) == 1 and panels[0].legend == "right" and len(merged) <= MOST_BESIDE
-    return Named(panels, at_ends, none, Legend(merged, next(iter(titles), "")) if merged else None, beside)
+    ordered = dict(sorted(merged.items(), key=lambda one: one[1] is None))  # what explains all curves stands last
+    return Named(panels, at_ends, none, Legend(ordered, next(iter(titles), "")) if merged else None, beside)
 
 
 def _key_title(panel: Panel, at_ends: bool) -> str:
@@ -173,7 +174,6 @@ LETTER_EM = 0.62  # of a number, in its size: how wide a figure of the font is
 TOPPED_PT = 14.0  # from a panel to its title, over words along its top
 TICK_GAP_PT = 3.0  # between numbers of ticks
 REMEMBERED = ("_update_ticks", "_get_ticklabel_bboxes")  # methods of Matplotlib's axes: of no argument; ticks, renderer
-FEWEST_SCANS, LAST_APART = 5, 0.5  # scans from which ticks stand at them; of an interval, before the last tick
 BEYOND = ("↓", "↑")  # behind the name of a line that ends below or above its axis
 MARKED = 16  # at most about so many markers or crosses a line
 WHOLE = (0, 1)  # limits of a share
@@ -413,25 +413,6 @@ def _bytes(canvas: Canvas, kind: str, figure: Figure, made_by: str) -> bytes:
     return out.getvalue()
 
 
-class Scans(NamedTuple):
-    """Even values from zero to the last."""
-
-    step: float
-    last: float
-
-
-def _scans(panel: Panel) -> Scans | None:
-    """Step and last of even values from zero on (scans) on which all lines of a panel lie; None where not."""
-    every = [np.asarray(mark.x, float) for mark in panel.marks if isinstance(mark, Line)]
-    x = np.unique(np.concatenate(every or [np.zeros(0)]))
-    if panel.x.scale == "log" or len(x) < FEWEST_SCANS or x[0] < 0:
-        return None
-    step = float(x[-1] / np.round(x[-1] / np.diff(x).min()))
-    even = np.abs(x / step - np.round(x / step)).max() < 1e-6 and x[0] <= FEWEST_SCANS * step
-    said = abs(float(f"{step:.3g}") - step) < 1e-9 * step  # by few digits
-    return Scans(step, float(x[-1])) if even and said else None
-
-
 def _draw(axes: Axes, panel: Panel, maps: Colours) -> None:
     """Draw a panel's marks and axes."""
     axes.set_xscale(panel.x.scale)
@@ -460,7 +441,7 @@ def _draw(axes: Axes, panel: Panel, maps: Colours) -> None:
         whole = (*panel.x.limits, *panel.y.limits)
         axes.set_aspect("equal", adjustable="datalim" if None in whole else "box")
     placed = any(isinstance(mark, Bars | Heat) for mark in panel.marks)
-    _ticks(axes.xaxis, panel.x, placed, _scans(panel))
+    _ticks(axes.xaxis, panel.x, placed, scans_of(panel))
     _ticks(axes.yaxis, panel.y, any(isinstance(mark, Heat) for mark in panel.marks))
     if panel.y.limits == WHOLE and panel.x.limits[1] is None:  # a share of one is drawn whole
         for line in axes.lines:
@@ -479,19 +460,6 @@ def _ticks(side: XAxis | YAxis, axis: Ends, placed: bool, scans: Scans | None = 
         side.set_major_locator(chosen)
         side.set_major_formatter(FuncFormatter(lambda value, _: chosen.words.get(value, tick_text(value))))
     side.set_minor_formatter(NullFormatter())
-
-
-def at_scans(scans: Scans, intervals: int) -> list[tuple[float, str]]:
-    """Ticks at every few scans from zero, about so many intervals, and at the last scan. One interval more, or down to
-    half as many, if all intervals are then equally long."""
-    count = round(scans.last / scans.step)
-    every = [m * 10**p for p in range(9) for m in (1, 2, 3, 4, 5)]
-    whole = [n for n in every if count % n == 0 and intervals / 2 <= count / n <= intervals + 1]
-    chosen = (whole or [n for n in every if count / n <= intervals])[0]
-    found = list(range(0, count + 1, chosen))
-    if rest := count - found[-1]:
-        found = [*(found[:-1] if rest < LAST_APART * chosen and len(found) > 1 else found), count]
-    return [(n * scans.last / count, tick_text(n * scans.last / count)) for n in found]
 
 
 class Round(Locator):

@@ -1,6 +1,7 @@
 """Figures common to all studies, made from the tables alone: σ against time, gain against time."""
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -100,9 +101,16 @@ def device(result: CaseResult) -> str:
     return literal(result.spec.device) if result.spec.device else stem(result)
 
 
-def swept(result: CaseResult) -> str:
-    """The swept keys of a case in short: "D_M = 10⁻³", "σ_V = 5 m/s"."""
-    return ", ".join(f"{symbol_of(result, key)} = {with_its_unit(result, key, value)}" for key, value in result.swept)
+def swept(result: CaseResult, without: Iterable[str] = ()) -> str:
+    """The swept keys of a case in short, but for some: "D_M = 10⁻³", "σ_V = 5 m/s"."""
+    told = [(key, value) for key, value in result.swept if key not in set(without)]
+    return ", ".join(f"{symbol_of(result, key)} = {with_its_unit(result, key, value)}" for key, value in told)
+
+
+def shared_keys(results: Sequence[CaseResult]) -> set[str]:
+    """The swept keys that have one value in all of several cases."""
+    values = [dict(result.swept) for result in results]
+    return {key for key in values[0] if all(one.get(key) == values[0][key] for one in values)} if values[1:] else set()
 
 
 def with_its_unit(result: CaseResult, key: str, value: object) -> str:
@@ -114,8 +122,13 @@ def with_its_unit(result: CaseResult, key: str, value: object) -> str:
     if not isinstance(value, int | float) or isinstance(value, bool):
         return number(value)
     factor, own = in_degrees(key_label(result, key).unit)
-    shown = number(value, is_power(key)) if factor == 1.0 else wording.number(factor * value, FEW_DIGITS)
+    shown = number(value, is_power(key)) if factor == 1.0 else turned_number(factor * value)
     return f"{shown}{own}" if own.startswith("°") else " ".join(filter(None, (shown, own.partition("(")[0])))
+
+
+def turned_number(degrees: float) -> str:
+    """An angle that was given in radians, at few digits: 1° of 0.01745 rad."""
+    return wording.number(float(f"{degrees:.{FEW_DIGITS}g}"), FEW_DIGITS)
 
 
 def key_label(result: CaseResult, key: str) -> Label:
@@ -286,19 +299,22 @@ def by_panel(results: Sequence[CaseResult], most: float = MOST_LINES) -> dict[st
         words = ", ".join(f"{symbol_of(result, key)} = {with_its_unit(result, key, value)}" for key, value in outer)
         of = (device(result) if several or not words else "", words)
         found.setdefault("\0".join((stem(result), *filter(None, of))), []).append(result)
-    titles = [key.partition("\0")[2].replace("\0", ", ") for key in found]
-    if len(set(titles)) < len(titles):  # of several configs
-        titles = [key.replace("\0", ", ") for key in found]
-    groups = dict(zip(titles, found.values(), strict=True))
-    parted: dict[str, list[CaseResult]] = {}
-    for title, members in groups.items():
+    parted: list[tuple[str, list[CaseResult]]] = []
+    for key, members in found.items():
         counts = [len(result.axes.filters) for result in members]
         if sum(counts) <= most or max(counts) <= FEW_FILTERS or len(members) == 1:
-            parted[title] = members
+            parted.append((key.partition("\0")[2].replace("\0", ", "), members))
         else:
             start = [device(members[0])] if several else []
-            parted |= {", ".join([*start, swept(result) or result.name]): [result] for result in members}
-    return parted
+            parted += [(", ".join([*start, swept(result) or result.name]), [result]) for result in members]
+    return distinct([(title, stem(members[0])) for title, members in parted], [members for _, members in parted])
+
+
+def distinct(titles: Sequence[tuple[str, str]], values: Sequence[Any]) -> dict[str, Any]:
+    """Values by their titles; by config and title, the second of each pair first, where a title occurs twice."""
+    often = Counter(title for title, _ in titles)
+    names = [title if often[title] == 1 else ", ".join(filter(None, (config, title))) for title, config in titles]
+    return dict(zip(names, values, strict=True))
 
 
 def spread_out(items: Sequence[Any], most: int) -> list[Any]:
@@ -395,6 +411,14 @@ def loss_axis(label: str, lines: Sequence[Line]) -> Axis:
     return Axis(label, "log", (float(values[values > 0].min(initial=1.0)) / 2, None))
 
 
+def unbanded(figure: Figure) -> Figure:
+    """The figure, where a line has a band but not at all of its points, with words on why."""
+    lines = (mark for panel in figure.panels for mark in panel.marks if isinstance(mark, Line) and mark.lo is not None)
+    if not any((np.isnan(np.asarray(line.lo, float)) & np.isfinite(line.y)).any() for line in lines):
+        return figure
+    return replace(figure, caption=f"{figure.caption} {tr('No band is drawn where a few large errors dominate.')}")
+
+
 def joined(figure: Figure) -> Figure:
     """The figure with lines that coincide in all its panels drawn once, their names joined by "=". Lines that are
     named, by themselves or by a legend of their names, not those told apart by dash and shade."""
@@ -403,7 +427,7 @@ def joined(figure: Figure) -> Figure:
     for name in dict.fromkeys(name for named in every for name in named):
         first = next((one for one in alike if _coincide(one, name, every, figure)), name)
         alike.setdefault(first, []).append(name)
-    renamed = {first: " = ".join(names) for first, names in alike.items()}
+    renamed = {first: _joined_name(names) for first, names in alike.items()}
     gone = {name for names in alike.values() for name in names[1:]}
     if not gone:
         return figure
@@ -424,6 +448,14 @@ def joined(figure: Figure) -> Figure:
     )
     said = tr("Curves that coincide are drawn once, with both names.")
     return replace(figure, panels=panels, caption=f"{figure.caption} {said}")
+
+
+def _joined_name(names: Sequence[str]) -> str:
+    """Names of one curve: "nearest = PDA"; a swept value that they share once, at the end."""
+    heads, tails = zip(*((head, tail) for head, _, tail in (name.partition(", ") for name in names)), strict=True)
+    if len(set(tails)) == 1 and "=" in tails[0]:
+        return f"{' = '.join(heads)}, {tails[0]}"
+    return " = ".join(names)
 
 
 def _own_name(mark: Mark, figure: Figure) -> str:
@@ -520,7 +552,8 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: 
 
     curves is tables.groups(table, "case", "filter", "component")."""
     every = by_panel(results)
-    panels = [_sigma_panel(title, members, curves, of) for title, members in every.items()]
+    filters = filters_of(results)
+    panels = [_sigma_panel(title, members, curves, of, filters) for title, members in every.items()]
     panels = [panel for panel in panels if panel.marks]
     caption = tr(
         "Root-mean-square error of the {quantity} about the truth against time, of {realisations}. "
@@ -564,19 +597,27 @@ def in_columns(figure: Figure) -> Figure:
     return replace(figure, columns=2 if count in (2, 4) else 3, width_mm=PAGE_MM, panel_height_mm=56.0)
 
 
-def _sigma_panel(title: str, members: Sequence[CaseResult], curves: Mapping, of: Component) -> Panel:
-    marks = lines_of(members, curves, of.name, SIGMA)
+def _sigma_panel(
+    title: str, members: Sequence[CaseResult], curves: Mapping, of: Component, filters: Sequence[str]
+) -> Panel:
+    marks = lines_of(members, curves, of.name, SIGMA, filters)
     y = fitting_axis(sigma_of(of.symbol, of.unit), marks)
-    return keyed(Panel(time_axis(), y, tuple(marks), title), members)
+    return keyed(Panel(time_axis(), y, tuple(marks), title), members, filters)
 
 
-def lines_of(members: Sequence[CaseResult], rows: Mapping, component: str, columns: Sequence[str]) -> list[Mark]:
+def filters_of(results: Sequence[CaseResult]) -> list[str]:
+    """The filters of all cases of a figure, each once: a filter's place in it decides how its line looks."""
+    return list(dict.fromkeys(f for result in results for f in result.axes.filters))
+
+
+def lines_of(
+    members: Sequence[CaseResult], rows: Mapping, component: str, columns: Sequence[str], filters: Sequence[str]
+) -> list[Mark]:
     """A line for each filter of each case of a panel: named by the filter if there is one case, else by the swept
     value.
 
-    rows by case, filter and component; columns as for `line`. A filter has the same style in every figure of its cases.
-    """
-    filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
+    rows by case, filter and component; columns as for `line`; filters as of `filters_of`: a filter has the same style
+    in all panels of a figure."""
     marks: list[Mark] = []
     for i, result in enumerate(members):
         for f in result.axes.filters:
@@ -597,15 +638,15 @@ def lines_of(members: Sequence[CaseResult], rows: Mapping, component: str, colum
 def _shown_value(result: CaseResult, key: str, value: object) -> str:
     """A value of a key without its unit, as on its axis."""
     factor = axis_factor(result, key)
-    turned = factor != 1.0 and isinstance(value, int | float) and not isinstance(value, bool)
-    return wording.number(factor * float(str(value)), FEW_DIGITS) if turned else number(value, is_power(key))
+    is_turned = factor != 1.0 and isinstance(value, int | float) and not isinstance(value, bool)
+    return turned_number(factor * float(str(value))) if is_turned else number(value, is_power(key))
 
 
-def family_panel(title: str, members: Sequence[CaseResult], rows: Mapping, words: str) -> Panel:
+def family_panel(title: str, members: Sequence[CaseResult], rows: Mapping, words: str, filters: Sequence[str]) -> Panel:
     """A panel of any quantity of the members about one; rows by case, filter and its column, against t_s."""
     column = next(key[2] for key in rows)
-    marks = lines_of(members, rows, column, ("t_s", column))
-    return keyed(Panel(time_axis(), fitting_axis(words, marks), (Reference(1), *marks), title), members)
+    marks = lines_of(members, rows, column, ("t_s", column), filters)
+    return keyed(Panel(time_axis(), fitting_axis(words, marks), (Reference(1), *marks), title), members, filters)
 
 
 NEES = term("NEES per component\n(1 = consistent, below = pessimistic)")
@@ -613,7 +654,8 @@ NEES = term("NEES per component\n(1 = consistent, below = pessimistic)")
 
 def nees_panels(results: Sequence[CaseResult], rows: Mapping) -> list[Panel]:
     """NEES against time, a panel for each config; rows by case, filter and `nees`."""
-    every = [family_panel(title, members, rows, tr(NEES)) for title, members in by_panel(results).items()]
+    filters = filters_of(results)
+    every = [family_panel(title, members, rows, tr(NEES), filters) for title, members in by_panel(results).items()]
     return [panel for panel in every if len(panel.marks) > 1]
 
 
@@ -628,13 +670,12 @@ def nees_figure(drawn: Sequence[Panel], left_out: str) -> Figure:
     return in_columns(Figure("consistency", title, caption + left_out, tuple(drawn)))
 
 
-def keyed(panel: Panel, members: Sequence[CaseResult], baseline: bool = True) -> Panel:
+def keyed(panel: Panel, members: Sequence[CaseResult], filters: Sequence[str], baseline: bool = True) -> Panel:
     """A panel whose legend explains dashes by filter and colours by swept value; few lines are named at their ends.
 
-    baseline: whether to draw the baseline filter."""
+    filters as for `lines_of`; baseline: whether to draw the baseline filter."""
     if len(members) == 1:
         return panel
-    filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
     shown = {
         f for result in members for n, f in enumerate(result.axes.filters) if baseline or n != result.axes.baseline
     }
@@ -683,11 +724,11 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, of: Co
     )
     several = any(len(result.axes.filters) > 2 for result in results)
     if any(result.swept for result in results) or (several and len(results) > 1):
-        drawn = []
+        drawn, filters = [], filters_of(results)
         for words, members in by_panel(results).items():
-            lines = lines_of(members, gains, of.name, GAIN)
+            lines = lines_of(members, gains, of.name, GAIN, filters)
             panel = Panel(time_axis(), *_cut(y, lines), words)
-            drawn += [keyed(panel, members, baseline=False)] if lines else []
+            drawn += [keyed(panel, members, filters, baseline=False)] if lines else []
         return _gains_said(in_columns(Figure(name, title, caption, tuple(drawn))))
     marks: list[Mark] = []
     for i, result in enumerate(results):

@@ -105,8 +105,8 @@ def at_the_end(figure: Figure, way: Way = LOWEST) -> str:
     if all(_level(lines) for lines in drawn) and (not several or all(len(lines) > 1 for lines in drawn)):
         return tr("At the end all are within each other's intervals.")
     both = {
-        **{"lowest": _names(_foremost(every, 1, several), several), "low": _ending(every, 1, unit)},
-        **{"highest": _names(_foremost(every, -1, several), several), "high": _ending(every, -1, unit)},
+        **{"lowest": _names(_foremost(every, 1, several), several), "low": _ending(_foremost(every, 1), unit)},
+        **{"highest": _names(_foremost(every, -1, several), several), "high": _ending(_foremost(every, -1), unit)},
     }
     if not several:
         return tr(way.one, **both)
@@ -152,7 +152,7 @@ def most(figure: Figure) -> str:
     return tr(
         "At most {most} ({name}, at {t_s:g} s); {last} at the end.",
         **told,
-        **{"t_s": float(line.x[at]), "last": _ending([line], 1, "%")},
+        **{"t_s": float(line.x[at]), "last": _ending([line], "%")},
     )
 
 
@@ -281,10 +281,12 @@ def _name(line: Line) -> str:
     return spoken(line.name or line.label)
 
 
-def _ending(lines: Sequence[Seen], sign: int, unit: str) -> str:
-    """The lowest (sign 1) or highest (−1) last value of lines, "about" it where its interval is unknown."""
-    line = min(lines, key=lambda one: sign * one.last)
-    return tr("about {value}", value=_valued(line.last, unit)) if line.rough else _valued(line.last, unit)
+def _ending(lines: Sequence[Seen], unit: str) -> str:
+    """The last values of lines from the least to the most, "about" it where the interval of such a one is unknown."""
+    ends = [min(lines, key=lambda one: one.last), max(lines, key=lambda one: one.last)]
+    said = list(dict.fromkeys(wording.number(line.last, DIGITS) for line in ends))
+    value = " ".join(filter(None, ("–".join(said), unit)))
+    return tr("about {value}", value=value) if any(line.rough for line in ends) else value
 
 
 def _valued(value: float, unit: str) -> str:

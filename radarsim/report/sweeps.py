@@ -8,7 +8,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import tr
-from radarsim.report import panels, seen, wording
+from radarsim.report import panels, seen
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Style
 
 WIDE = 20  # ratio of swept values from which the axis is logarithmic
@@ -175,7 +175,7 @@ def _named(result: CaseResult, key: str, values: Sequence) -> Axis:
     """The axis of a map, each of its values named."""
     factor = panels.axis_factor(result, key)
     ticks = (
-        (float(i), panels.number(v) if factor == 1.0 else wording.number(factor * float(v), panels.FEW_DIGITS))
+        (float(i), panels.number(v) if factor == 1.0 else panels.turned_number(factor * float(v)))
         for i, v in enumerate(values)
     )
     return Axis(panels.axis_of(result, key), ticks=tuple(ticks))

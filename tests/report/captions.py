@@ -76,9 +76,9 @@ def found(template, caption):
     return match and match.groupdict()
 
 
-def value(words):
-    """The last number of words, that may be a power of ten: 278 of "about 278 m"."""
-    words = words.rpartition("(")[2].replace(",", ".")
+def value(words, sign=1):
+    """A number of words, that may be a power of ten: 278 of "about 278 m"; of a range by sign its first or last."""
+    words = words.rpartition("(")[2].replace(",", ".").split("–")[0 if sign > 0 else -1]
     if power := POWER.search(words):
         sign, mantissa, exponent = power.groups()
         exponent = exponent.translate(str.maketrans(RAISED, "0123456789-"))
@@ -138,8 +138,8 @@ def judged(result, figure, caption):
     devices = {one.name: called(panels.plain_label(one), names_in(result.cases)) for one in result.cases}
     faults, told = [], 0
 
-    def says(words, true, names=None, who=()):
-        if not close(value(words), true):
+    def says(words, true, names=None, who=(), sign=1):
+        if not close(value(words, sign), true):
             faults.append(f"{figure}: {words!r} is {true:.4g}")
         named = [row for row in who if called(row.filter) in names or devices[row.case] in names]
         if names is not None and not named:
@@ -154,7 +154,7 @@ def judged(result, figure, caption):
             told += 1
             (low, lowest), (high, highest) = at(every, 1), at(every, -1)
             says(claim["low"], low, claim["lowest"], lowest)
-            says(claim["high"], high, claim["highest"], highest)
+            says(claim["high"], high, claim["highest"], highest, -1)
     if tr(LEVEL) in caption:
         told += 1
         by_panel = panels_of(study, cases or result.cases, every)
@@ -240,7 +240,9 @@ def rates(result, figure, caption):
         else:
             return [f"{figure}: nothing was judged of: {spoke[:200]}"]
         for end, names, true in pairs:
-            if not close(value(claim[end]), true) or not any(called(one) in claim[names] for one in who[true]):
+            if not close(value(claim[end], 1 if end == "low" else -1), true) or not any(
+                called(one) in claim[names] for one in who[true]
+            ):
                 wrong[-1].append(f"{figure}: {claim[end]!r} of {claim[names]!r} is {true:.4g} of {who[true]}")
     return [] if [] in wrong else wrong[0]
 

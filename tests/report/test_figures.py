@@ -1,6 +1,7 @@
 """Figures: what is drawn is what is described, in the same bytes each time, and no user's name breaks them."""
 
 import gc
+import re
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -111,6 +112,27 @@ def test_lines_that_coincide_in_every_panel_are_drawn_once_and_named_together():
     ):
         figure = Figure("f", "", "Drawn.", apart)
         assert panels.joined(figure) is figure
+
+
+def test_a_swept_value_that_joined_names_share_is_told_once():
+    x = np.arange(3.0)
+    names = [f"{tracker}, $P_D$ = {chance}" for chance in (0.7, 0.9) for tracker in ("nearest", "PDA")]
+    lines = tuple(Line(x, x + (n > 1), name, Style(n, n, n)) for n, name in enumerate(names))
+    (panel,) = panels.joined(one(*lines)).panels
+    assert [mark.label for mark in panel.marks] == ["nearest = PDA, $P_D$ = 0.7", "nearest = PDA, $P_D$ = 0.9"]
+
+
+def test_a_missing_band_is_told_of_in_its_figure_alone():
+    x = np.arange(3.0)
+    whole = one(Line(x, x, "a", lo=x - 1, hi=x + 1))
+    assert panels.unbanded(whole) is whole
+    ends = np.array([0.5, np.nan, 1.5])
+    assert panels.unbanded(one(Line(x, x, "a", lo=ends, hi=ends))).caption.endswith("a few large errors dominate.")
+
+
+def test_names_along_the_top_stand_over_the_lines_of_the_page():
+    (panel,) = chart.chart(one(Note(1.0, np.nan, "climb", "top"), line())).panels
+    assert panel.svg.index('class="l') < panel.svg.index("climb")
 
 
 def test_lines_that_a_legend_of_names_explains_are_joined_there_and_those_told_apart_by_dash_are_not():
@@ -436,6 +458,10 @@ def test_ticks_stand_at_scans_and_at_the_last(step, count):
     np.testing.assert_allclose(gaps[:-1], gaps[0])
     assert 0.5 <= gaps[-1] / gaps[0] < 1.5
     assert 3 <= len(ticks) <= 8
+    (panel,) = chart.chart(one(Line(x, 1.0 + x, "a"))).panels
+    page = np.array([float(v) for v in re.findall(r'<text[^>]* data-x="([-\d.e]+)"', panel.svg)])  # at scans too
+    assert (page[0], page[-1]) == (0.0, pytest.approx(x[-1]))
+    np.testing.assert_allclose(page / step, np.round(page / step), atol=1e-6)
 
 
 def test_uneven_times_have_round_ticks():

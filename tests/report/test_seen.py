@@ -29,7 +29,7 @@ def test_of_one_panel_the_lowest_and_the_highest_with_their_values():
 
 def test_lines_whose_intervals_overlap_are_told_together():
     made = figure((line("a", 1.0), line("b", 1.15), line("c", 3.0)))
-    assert "lowest: a and b (1)" in seen.at_the_end(made)
+    assert "lowest: a and b (1–1.15)" in seen.at_the_end(made)
     assert "highest: c (3)" in seen.at_the_end(made)
     level = figure((line("a", 1.0), line("b", 1.1)))
     assert seen.at_the_end(level) == "At the end all are within each other's intervals."
@@ -41,7 +41,9 @@ def test_a_line_of_unknown_interval_is_told_roughly():
     told = seen.at_the_end(figure((line("a", 1.0), line("c", 3.0), high)))
     assert told == "At the end lowest: a (1); highest: cured, gated (about 278)."
     low = replace(high, y=np.linspace(9.0, 1.04, 5))
-    assert "lowest: a and “cured, gated” (1)" in seen.at_the_end(figure((line("a", 1.0), low, line("c", 3.0))))
+    assert "lowest: a and “cured, gated” (about 1–1.04)" in seen.at_the_end(
+        figure((line("a", 1.0), low, line("c", 3.0)))
+    )
 
 
 def test_a_line_ends_where_its_last_known_point_is():
@@ -56,7 +58,7 @@ def test_intervals_that_share_no_value_are_not_all_alike():
     near = Line(T, np.linspace(9.0, 1.2, 5), "near", lo=np.full(5, 1.1), hi=np.full(5, 1.3))
     far = Line(T, np.linspace(9.0, 1.8, 5), "far", lo=np.full(5, 1.7), hi=np.full(5, 1.9))
     told = seen.at_the_end(figure((wide, near, far)))
-    assert told == "At the end lowest: wide, near and far (1); highest: wide and far (1.8)."
+    assert told == "At the end lowest: wide, near and far (1–1.8); highest: wide and far (1–1.8)."
 
 
 def titled(*panels):

@@ -163,14 +163,25 @@ def test_targets_that_are_swept_are_named_by_their_kind_and_what_sets_them_apart
     lines = panels.lines_of(
         [replace(result, name=f"rls2 {n}", swept=(("target", one),)) for n, one in enumerate(targets)],
         {(f"rls2 {n}", "r", "r"): tables.frame({"x": [n], "y": [n]}) for n in range(3)},
-        "r",
-        ("x", "y"),
+        *("r", ("x", "y"), ["r"]),
     )
     assert [one.label for one in lines] == words
 
 
 def test_panels_of_several_configs_that_would_be_called_the_same_are_told_by_their_config():
     result = run.run("ambiguous_stagger", realisations=8, figures=False)
-    assert list(panels.by_panel(result.cases)) == [
-        *("ambiguous_rls4, RLS 4", "RLS 4, $F_r$ = 1000, 1200 Hz", "RLS 4, $F_r$ = 1000, 1200, 1400 Hz")
-    ]
+    plain, *swept = panels.by_panel(result.cases)
+    assert [plain, *swept] == ["RLS 4", "RLS 4, $F_r$ = 1000, 1200 Hz", "RLS 4, $F_r$ = 1000, 1200, 1400 Hz"]
+    again = [*result.cases, replace(result.cases[0], name="other")]
+    assert list(panels.by_panel(again)) == ["ambiguous_rls4, RLS 4", *swept, "other, RLS 4"]
+
+
+def test_a_filter_looks_the_same_in_all_panels_of_a_figure():
+    """Of ambiguous_stagger the second config has a filter more, before others that both have."""
+    result = run.run("ambiguous_stagger", realisations=30, figures=False)
+    drawn = output.case_figures(result.cases, result.tables, result.experiment)
+    styles = {}
+    for one in (mark for panel in drawn["sigma_r"].panels for mark in panel.marks):
+        styles.setdefault(one.label, set()).add(one.style)
+    assert {"remainder", "no memory", "memory"} <= styles.keys()
+    assert all(len(own) == 1 for own in styles.values())

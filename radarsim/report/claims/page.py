@@ -37,7 +37,7 @@ from radarsim.report.claims.rule import (
     roughly,
 )
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
-from radarsim.report.wording import interval
+from radarsim.report.wording import formulas, interval
 
 # ---- curve -----------------------------------------------------------------------------------------------------------
 FURTHEST = 5.0  # margins: larger distances are drawn there
@@ -581,7 +581,7 @@ def _panel(paper: str, found: Sequence[tuple[Sequence[Mapping], Mapping]]) -> Pa
     ticks, marks, values = [], [], []
     for y, (own, row) in enumerate(found):
         statement = shorten(tr(own[0]["statement"]), STATEMENT, placeholder=" …", break_on_hyphens=False)
-        ticks.append((float(y), f"{statement}  {own[0]['claim'].partition('.')[2]}"))
+        ticks.append((float(y), f"{formulas(statement)}  {own[0]['claim'].partition('.')[2]}"))
         values.append(Note(RIM, float(y), shown(row), "e"))
     for kind, style in STYLES.items():
         of = [(y, row) for y, (own, row) in enumerate(found) if own[0]["class"] == kind]

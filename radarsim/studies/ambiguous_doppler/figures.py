@@ -102,7 +102,9 @@ def share_figure(
 
     of is a value of SHARES: the column of the table, the axis, the caption."""
     rows = tables.groups(table, "case", "filter")
-    drawn = [_share_panel(title, members, rows, of[:2]) for title, members in panels.by_panel(results).items()]
+    filters = panels.filters_of(results)
+    every = panels.by_panel(results).items()
+    drawn = [_share_panel(title, members, rows, of[:2], filters) for title, members in every]
     drawn = [panel for panel in drawn if panel.marks]
     if not drawn:
         return None
@@ -139,15 +141,17 @@ def rare_figure(results: Sequence[Result], table: "pd.DataFrame") -> dict[str, F
     return {"right": seen.begun(figure, seen.extremes(figure))}
 
 
-def _share_panel(title: str, members: Sequence[Result], rows: Mapping, of: tuple[str, str]) -> Panel:
+def _share_panel(
+    title: str, members: Sequence[Result], rows: Mapping, of: tuple[str, str], filters: Sequence[str]
+) -> Panel:
     columns = ("t_s", of[0], f"{of[0]}_lo", f"{of[0]}_hi", *(["exact_right"] if of[0] == "right" else []))
-    marks = panels.lines_of(members, {(*key, of[0]): own for key, own in rows.items()}, of[0], columns)
+    marks = panels.lines_of(members, {(*key, of[0]): own for key, own in rows.items()}, of[0], columns, filters)
     lines = [mark for mark in marks if isinstance(mark, Line)]
     rare = lines and max(float(line.y[-1]) for line in lines) < panels.RARE
     panel = Panel(
         panels.time_axis(), panels.loss_axis(of[1], lines) if rare else Axis(of[1], limits=(0, 1)), tuple(marks), title
     )
-    return panels.keyed(panel, members)
+    return panels.keyed(panel, members, filters)
 
 
 def hypotheses_figure(cases: Sequence[Case]) -> dict[str, Figure]:
@@ -165,6 +169,8 @@ def hypotheses_figure(cases: Sequence[Case]) -> dict[str, Figure]:
             drawn.append(_fan_panel(case, shown[case.stem], remember[-1]))
     if not drawn:
         return {}
+    named = panels.distinct([(panel.title, config) for panel, config in zip(drawn, shown, strict=True)], drawn)
+    drawn = [replace(panel, title=title) for title, panel in named.items()]
     counts = [len(velocities) for velocities, _, _ in next(iter(shown.values())).lists]
     caption = tr(
         "Fold sequences kept, {name}: {first} at first, {last} after {scans} scans. One realisation "

@@ -238,11 +238,15 @@ def _as_good(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> s
         )
         return tr("lost: {off}", off=off) if last["beyond"] > HALF else off
     keys = ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")
-    return tr(
-        "σ of the velocity is still {above} above that of unfolded velocity at scan {k}, the last",
-        above=wording.estimate((end[key] for key in keys), "%", ".3g"),
-        k=end["k"],
-    )
+    told = {"above": wording.estimate((end[key] for key in keys), "%", ".3g"), "k": end["k"]}
+    if end["above_oracle_percent"] <= AS_GOOD:
+        return tr(
+            "σ of the velocity is {above} above that of unfolded velocity at scan {k}, the last: too few realisations "
+            "to tell whether within {percent:g} %",
+            percent=AS_GOOD,
+            **told,
+        )
+    return tr("σ of the velocity is still {above} above that of unfolded velocity at scan {k}, the last", **told)
 
 
 def _above(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> "pd.DataFrame":

@@ -173,11 +173,9 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
     )
     panel, said = _shares(Axis(tr(WINDOW), "log"), marks, 0)
     caption += said + panels.left_out(result.axes.filters, drawn)
-    figure = Figure(
-        *("locks", tr("Locked bursts against the window"), caption, (panel,)),
-        width_mm=panels.WIDE_MM,
-        panel_height_mm=80.0,
-    )
+    lost = panel.y.scale == "log"
+    title = tr("Bursts not locked against the window") if lost else tr("Locked bursts against the window")
+    figure = Figure(*("locks", title, caption, (panel,)), width_mm=panels.WIDE_MM, panel_height_mm=80.0)
     return seen.begun(figure, seen.at_the_end(figure))
 
 
@@ -229,7 +227,7 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
     scale = "log" if x.min() > 0 and x.max() / x.min() > 20 else "linear"
     called = panels.key_label(members[0], key).text
     caption = tr(
-        "Share of bursts locked in the last window against the {called}, of {count:,} each. Bands: 95 % intervals.",
+        "Lock in the last window against the {called}, of {count:,} bursts each. Bands: 95 % intervals.",
         called=called,
         count=members[0].count,
     )

@@ -44,9 +44,29 @@ def question(experiment: Experiment) -> str:
 
 
 def answer(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> list[str]:
-    """For each case: the filters nearest to their idealisation and furthest; of each its locks and σ; the burst."""
+    """Of several cases first each filter where it is furthest from its idealisation. For each case: the filters nearest
+    to their idealisation and furthest; of each its locks and σ; the burst."""
     shown, others = panels.reported(results, 3)
-    return [*(sentence for result in shown for sentence in _sentences(result, made)), *others]
+    of_all = _of_all(results, made) if len(results) > 1 else []
+    return [*of_all, *(sentence for result in shown for sentence in _sentences(result, made)), *others]
+
+
+def _of_all(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> list[str]:
+    """Of each filter the largest σ of the range at the last scan over its idealisation's; none without any."""
+    last = tables.where(made["idealisations"], component="r").groupby(["case", "filter"], sort=False).tail(1)
+    places = dict(zip((result.name for result in results), panels.names_of(results), strict=True))
+    last = last[last["case"].isin(places)].dropna(subset=["over_ideal"])
+    worst = last.sort_values("over_ideal", kind="stable").groupby("filter", sort=False).tail(1)
+    found = [
+        f"{row['filter']} {wording.estimate((row[key] for key in OVER), form='.3g')} ({places[row['case']]})"
+        for row in worst.to_dict("records")
+    ]
+    words = tr(
+        "σ of the range at the last scan over its idealisation's, at worst of {count} cases: {found}.",
+        count=len(results),
+        found="; ".join(found),
+    )
+    return [words] if found else []
 
 
 def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:

@@ -102,12 +102,14 @@ def sigma_figure(
     """σ(t) of one component: a panel for each case, a line for each filter."""
     drawn = []
     factor, unit = panels.in_degrees(of.unit)
+    shared = panels.shared_keys(results)
     for result in results:
         marks = [panels.scaled(one, factor) for one in case_lines(result, curves, of.name, panels.SIGMA)]
         if marks:
             y = panels.fitting_axis(panels.sigma_of(of.symbol, unit), marks)
             shown: tuple[Mark, ...] = (*ends(result), *marks)
-            drawn.append(Panel(panels.time_axis(), y, shown, panels.swept(result), direct=False))
+            title = panels.swept(result, without=shared)
+            drawn.append(Panel(panels.time_axis(), y, shown, title, direct=False))
     if not drawn:
         return None
     caption = (
@@ -120,6 +122,9 @@ def sigma_figure(
         + (" " + tr("Dotted: beginning and end of the manoeuvre.") if any(map(ends, results)) else "")
         + left_out
     )
+    if shared:
+        same = panels.swept(results[0], without={key for key, _ in results[0].swept} - shared)
+        caption += " " + tr("All panels: {values}.", values=panels.plain(same))
     figure = panels.in_columns(Figure(name, tr("σ of the {name}", name=of.words), caption, tuple(drawn)))
     return seen.begun(figure, seen.at_the_end(figure))
 
@@ -251,8 +256,8 @@ def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.Dat
 
 
 def conversion_figure(table: "pd.DataFrame") -> Figure | None:
-    """Bias of the converted plot against range × bearing error, in σ of the range."""
-    if len(table) < 3:
+    """Bias of the converted plot against range × bearing error, in σ of the range; none of a single such product."""
+    if table["across_m"].round(6).nunique() < 2:
         return None
     marks: list[Mark] = [Reference(-1.0, label=tr("one σ of the range"))]
     names = ("bias_m", "bias_lo", "bias_hi", "formula_m")

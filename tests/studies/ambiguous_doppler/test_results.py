@@ -95,6 +95,27 @@ def test_of_several_radars_the_answer_counts_those_in_which_folded_velocity_is_a
     assert first.split("; ")[1].startswith(worst.replace("ambiguous_rls", "RLS "))
 
 
+@pytest.mark.parametrize(
+    ("ends", "words"),
+    [
+        (
+            (4.9, 3.7, 6.1),
+            "σ of the velocity is 4.9 % [3.7, 6.1] above that of unfolded velocity at scan 15, the last: too",
+        ),
+        (
+            (5.1, 4.1, 6.2),
+            "σ of the velocity is still 5.1 % [4.1, 6.2] above that of unfolded velocity at scan 15, the last;",
+        ),
+    ],
+)
+def test_an_interval_about_five_per_cent_is_not_told_as_above_it(found, ends, words):
+    gains = found.tables["gains"].copy()
+    last = (gains["component"] == "Vr") & (gains["filter"] == "memory") & (gains["k"] == 15)
+    gains.loc[last, ["above_oracle_percent", "above_oracle_lo", "above_oracle_hi"]] = ends
+    (told,) = registry.study("ambiguous_doppler").answer(found.cases, {**found.tables, "gains": gains})
+    assert words in told
+
+
 @pytest.mark.parametrize("combine", [False, True])
 def test_without_any_plot_nothing_is_said(combine):
     orders = "orders: [1, 2], combine: likelihood, manoeuvre_variance: [100, 1e-3]"

@@ -108,6 +108,16 @@ def test_sentences(found):
     assert "idealisation" in spectrum
 
 
+def test_of_several_cases_the_answer_is_where_each_filter_is_furthest_from_its_idealisation(swept):
+    last = swept.tables["idealisations"].query("component == 'r'").groupby(["case", "filter"]).tail(1)
+    assert swept.answer[0].startswith("σ of the range at the last scan over its idealisation's, at worst of 3 cases: ")
+    for name, own in last.groupby("filter"):
+        worst = own.loc[own["over_ideal"].idxmax()]
+        where = worst["case"].rpartition("=")[2].replace("-", "−")
+        found = re.search(rf"[:;] {name} ([\d.]+) \[[^]]*\] \(q = {where} dB\)", swept.answer[0])
+        assert float(found[1]) == pytest.approx(worst["over_ideal"], rel=6e-3)
+
+
 def test_figures(found, swept):
     assert {"sigma_r", "gain_Vr", "locks", "measured"} <= set(found.figures)
     assert "threshold" in swept.figures

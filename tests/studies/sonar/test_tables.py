@@ -8,7 +8,7 @@ import radarsim
 from radarsim.app import result as output
 from radarsim.report import claims, figures, statistics
 from radarsim.studies.sonar import STUDY, exact
-from radarsim.studies.sonar.figures import plots_figure
+from radarsim.studies.sonar.figures import conversion_figure, plots_figure
 from tests.studies.sonar import counted
 
 FIGURES = {
@@ -16,6 +16,7 @@ FIGURES = {
     "sonar_correlated": {"believed", "sigma_r"},
     "sonar_missed": {"missed", "sigma_b"},
     "sonar_conversion": {"conversion", "sigma_x", "sigma_vy"},
+    "sonar_fluctuating": {"sweep_target", "sigma_r"},
 }
 
 
@@ -32,6 +33,27 @@ def test_each_config_has_its_figures_and_they_draw(results):
             drawn = figures.render(described[name])
             assert drawn.axes
             assert described[name].caption
+
+
+def test_filters_of_equal_accuracy_are_named_together(results):
+    """Without process noise the Kalman filter is growing memory; and what is asked is answered first."""
+    first, *_, optimistic = results["sonar_fluctuating"].answer
+    assert "least with growing and kalman, " in first
+    assert optimistic.startswith("Most optimistic: growing and kalman (target = sonar turning); the true σ is ")
+    first, second, *_ = results["sonar_correlated"].answer
+    assert first.startswith("Most optimistic: naive (ρ = 0.9")
+    assert "least with augmented and differenced, " in second
+
+
+def test_the_answer_on_conversion_is_the_largest_bias_and_its_figure_has_several(results):
+    table = results["sonar_conversion"].tables["conversion"]
+    plain = table[table["frame"] == "cartesian"]
+    worst = plain.loc[plain["bias_m"].abs().idxmax()]
+    told = results["sonar_conversion"].answer[0]
+    ratio = f"{worst['bias_to_sigma_range']:.3g}".replace("-", "−")
+    assert f"plainly: {worst['bias_m']:.3g}".replace("-", "−") in told
+    assert f", {ratio} σ of the range (σ_β = 8°); converted without bias: " in told
+    assert conversion_figure(table[table["across_m"] == table["across_m"].max()]) is None
 
 
 def test_what_a_plot_buys_has_the_papers_formulas(results):

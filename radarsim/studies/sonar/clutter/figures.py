@@ -83,7 +83,7 @@ def by_line(tracking: "pd.DataFrame", column: str, result: CaseResult[ClutterAxe
     others = [other for other in KEYS if other != column and tracking[other].nunique() > 1]
     names = tracking["filter"].map(panels.literal).astype(object)
     for other in others:
-        symbol = panels.plain(panels.symbol_of(result, KEYS[other]))
+        symbol = panels.symbol_of(result, KEYS[other])
         names = names + [f", {symbol} = {panels.with_its_unit(result, KEYS[other], v)}" for v in tracking[other]]
     return tracking.assign(filter=names)
 
