@@ -381,7 +381,7 @@ def points(path):
 @pytest.mark.parametrize("touch", [False, True])
 def test_a_drag_looks_closer_and_a_double_click_at_all_again(page, results, touch):
     page.open(results / "rls2" / "report.html")
-    assert ticks(page)[0] == [0, 25, 50, 75, 100, 125]
+    assert ticks(page)[0] == [0, 20, 40, 60, 80, 100, 120, 140]
     before = page.evaluate(CURVES)
     x, y, width = first_panel(page)
     page.drag((x - 0.1 * width, y), (x + 0.1 * width, y + 2), touch)
@@ -390,7 +390,7 @@ def test_a_drag_looks_closer_and_a_double_click_at_all_again(page, results, touc
     assert seen[-1] - seen[0] < 35
     assert page.evaluate("getComputedStyle(document.querySelector('button.back')).display") != "none"
     page.click("svg.chart", times=2)
-    assert ticks(page)[0] == [0, 25, 50, 75, 100, 125]
+    assert ticks(page)[0] == [0, 20, 40, 60, 80, 100, 120, 140]
     for own, drawn in zip(before, page.evaluate(CURVES), strict=True):
         assert points(drawn) == [pytest.approx(point, abs=0.11) for point in points(own)]
     assert page.evaluate("document.querySelector('button.back').hidden")
