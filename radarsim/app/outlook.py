@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 import numpy as np
 
 from radarsim.app import configs
+from radarsim.app.ahead import seconds_each
 from radarsim.app.configs import CaseWork, Config, Overrides
 from radarsim.app.run import case_result, check_precision, merged, table_of, tailed, unknown
 from radarsim.app.shown import Shown
@@ -31,8 +32,6 @@ TOTAL = term(
     "{cases}, {realisations}, {seconds} on {threads}, {memory:.0f} MB; figures and tables take some seconds more"
 )
 PILOT_S = 0.3  # of all cases together, unless single realisations take longer
-LADDER, FOR_NOTHING = 8, 1.2  # factor between numbers of realisations tried; times that count as equal
-SHORT_S = 0.01
 SURELY_SHORT_S, SURELY_SMALL = 1.0, 1000  # CPU time of all cases, estimates of a case: below these nothing is timed
 PILOT_OF_PRECISION_S, LEAST, MOST = 1.0, 256, 16_384  # realisations of the pilot for a precision
 
@@ -231,29 +230,6 @@ def ending(need: Need, most: int) -> int:
     from radarsim.report import precision
 
     return max(n for n in precision.looks(most) if need.realisations is None or n <= need.realisations)
-
-
-def seconds_each(work: CaseWork, realisations: int, pilot_s: float) -> float:
-    """Seconds of one thread for one realisation, from growing numbers of them, at most a block, in about pilot_s.
-    Kernels calculate whole chunks: one realisation may take as long as hundreds. So larger numbers are tried as long as
-    they take no longer."""
-    most, count, taken, free = min(work.block, realisations), 1, timed(work, 1), True
-    while count < most and (free or LADDER * taken < pilot_s):
-        more = min(LADDER * count, most)
-        longer = timed(work, more)
-        free = longer < FOR_NOTHING * taken
-        count, taken = more, longer
-    return taken / count
-
-
-def timed(work: CaseWork, count: int) -> float:
-    """CPU seconds of `count` realisations; of short ones the lesser of two measurements."""
-    seconds: list[float] = []
-    while not seconds or (len(seconds) < 2 and seconds[0] < SHORT_S):
-        started = time.thread_time()
-        work.simulate(0, count)
-        seconds.append(time.thread_time() - started)
-    return min(seconds)
 
 
 def lacking(experiment: Experiment, out: str | os.PathLike[str]) -> str | None:

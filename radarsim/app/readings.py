@@ -10,19 +10,23 @@ import csv
 import io
 import os
 import tempfile
-from collections.abc import Collection, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.app import configs, result, run
 from radarsim.app import stored as stored_claims
-from radarsim.app.run import Progress, RunOptions, SimulatedCases
+from radarsim.app.ahead import Ahead, Progress, estimated
+from radarsim.app.configs import CaseWork
+from radarsim.app.run import RunOptions, SimulatedCases
 from radarsim.app.shown import Shown
 from radarsim.app.stored import CLASSES, PLACE, stored_classes, stored_readings
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.run import Either, Signals, Stop, TimeLimit
+from radarsim.engine.store import available_cores
 from radarsim.errors import ConfigError, StoreError, TargetUnmet, argument
 from radarsim.language import tr
 from radarsim.report import files
@@ -73,6 +77,10 @@ class Asked:
     whole: bool
 
 
+# Expected seconds of judging a run, of an exact verdict, of a joint search and of a figure, until some are measured.
+RUN_JUDGED_S, VERDICT_S, SEARCH_S, FIGURE_S = 0.05, 0.001, 1.0, 0.13
+
+
 class Plan:
     """The runs that a paper's readings need, each once, and the verdicts from them. A run is judged as soon as it is
     done and then dropped: memory is that of one run, however many readings there are."""
@@ -85,7 +93,8 @@ class Plan:
         self._impossible: dict[tuple[str, Reading], str] = {}
         self._judged: dict[tuple[str, Reading], Under] = {}
         self._claims = {claim.id: claim for claim in wanted.claims}
-        self.held = 0  # realisations not computed, but read or impossible
+        self._seconds: dict[tuple[str, str], float] = {}  # of a realisation, by config and case
+        self._open: dict[tuple[str, ...], None] = {}  # keys of the runs ahead
         for claim in wanted.claims:
             for reading in self._paper.readings.of_claim(claim.id):
                 if not self._paper.readings.exact(claim, reading):
@@ -110,33 +119,53 @@ class Plan:
             self._experiments[config] = configs.load(configs.shipped_file(config) or config)
         return self._experiments[config]
 
-    @property
-    def total(self) -> int:
-        """Realisations over all runs."""
-        return sum(len(pairs) for pairs in self._jobs.values()) * self._n
+    def expect(self, ahead: Ahead) -> None:
+        """Add the runs, verdicts and search ahead."""
+        self._expect_runs(ahead, self._jobs)
+        for claim in self._wanted.claims:
+            own = self._paper.readings.of_claim(claim.id)
+            ahead.add(f"verdict of {claim.id}", VERDICT_S, sum((claim.id, one) not in self._key for one in own))
+        ahead.add("search", SEARCH_S, self._wanted.whole)
 
-    def judged(
-        self, options: RunOptions, progress: Progress | None, stop: Signals | None, judging: Progress | None = None
-    ) -> list[Over]:
-        """Every claim under every reading; progress is called for the runs, judging for the verdicts after them."""
-        done = 0
+    def _expect_runs(self, ahead: Ahead, keys: Iterable[tuple[str, ...]]) -> None:
+        self._open = dict.fromkeys(keys)
+        for key in self._open:
+            ahead.add(f"judging of {key[0]}", RUN_JUDGED_S)
+            ahead.add(f"run of {key[0]}", 1.0, self._expected(key))
+
+    def estimate(self, ahead: Ahead, threads: int | None) -> None:
+        """Measure a few realisations of every case as shipped, and add the seconds of the runs ahead."""
+        cases = {(key[0], case.name): case for key in self._open for case, _ in self._jobs[key]}
+        each = self._n * (available_cores() if threads is None else max(threads, 1))
+        timed = estimated({of: (CaseWork(case), self._n) for of, case in cases.items()})
+        self._seconds = {of: seconds / each for of, seconds in timed.items()}
+        for key in self._open:
+            ahead.add(f"run of {key[0]}", 1.0, self._expected(key))
+
+    def _expected(self, key: tuple[str, ...]) -> float:
+        """Expected seconds of a run; 0 before `estimate`."""
+        return sum(self._seconds.get((key[0], case.name), 0.0) for case, _ in self._jobs[key]) * self._n
+
+    def judged(self, options: RunOptions, ahead: Ahead, stop: Signals | None) -> list[Over]:
+        """Every claim under every reading."""
         for key, pairs in self._jobs.items():
-            count, before = len(pairs) * self._n, self.held
             try:
-                self._see(key, pairs, options, _shifted(progress, done, held=before), stop)
+                self._see(key, pairs, options, ahead, stop)
             except ConfigError as error:
                 self._fail(key, error.lines[0])
-                self.held = before + count  # these are not computed
-            done += count
-        found, every = list[Over](), sum(len(self._paper.readings.of_claim(claim.id)) for claim in self._wanted.claims)
+                ahead.add(f"judging of {key[0]}", RUN_JUDGED_S, -1)
+        found = list[Over]()
         for claim in self._wanted.claims:
-            verdicts = tuple(self._under(claim, one) for one in self._paper.readings.of_claim(claim.id))
-            found.append(Over(self._paper.readings, claim, verdicts))
-            _without_runs(judging, sum(len(over.under) for over in found), every)
+            verdicts = []
+            for reading in self._paper.readings.of_claim(claim.id):
+                run_for = (claim.id, reading) in self._key
+                with nullcontext() if run_for else ahead.doing(f"verdict of {claim.id}"):
+                    verdicts.append(self._under(claim, reading))
+            found.append(Over(self._paper.readings, claim, tuple(verdicts)))
         return found
 
     def decided(
-        self, over: list[Over], most: int, options: RunOptions, progress: Progress | None, stop: Signals | None
+        self, over: list[Over], most: int, options: RunOptions, ahead: Ahead, stop: Signals | None
     ) -> list[Over]:
         """The claims again, undecided ones after longer runs of the readings that leave them undecided. Looks are at
         declared numbers only, as in `run --decide`; each claim is judged at its own last look, so that other requests
@@ -151,11 +180,11 @@ class Plan:
             keys = dict.fromkeys(key for place, key in self._key.items() if place in open_)
             if not keys:
                 break
-            self._n, total, done, self.held = n, sum(len(self._jobs[key]) for key in keys) * n, 0, 0
+            self._n = n
+            self._expect_runs(ahead, keys)
             for key in keys:
                 pairs = [(case, replace(changed, realisations=n)) for case, changed in self._jobs[key]]
-                self._see(key, pairs, options, _shifted(progress, done, total, self.held), stop, open_)
-                done += len(pairs) * n
+                self._see(key, pairs, options, ahead, stop, open_)
             over = [replace(one, under=tuple(self._under(one.claim, own.reading) for own in one.under)) for one in over]
         return over
 
@@ -164,29 +193,39 @@ class Plan:
         key: tuple[str, ...],
         pairs: Sequence[tuple[Case, Case]],
         options: RunOptions,
-        progress: Progress | None,
+        ahead: Ahead,
         stop: Signals | None,
         only: Collection[tuple[str, Reading]] | None = None,
     ) -> None:
         """Run or continue the cases of a key, and judge what they show; `only`: for these places."""
+        progress = ahead.running(f"run of {key[0]}", partial(self._expected, key))
         try:
-            seen = self._run(key[0], pairs, options, progress)
+            done = self._run(key, pairs, options, progress)
+        except ConfigError:
+            progress(1, 1, 1)  # nothing of it is ahead
+            raise
         except TargetUnmet:
             if stop is not None:
                 stop.raise_if_received()
             raise
-        for place in (place for place, own in self._key.items() if own == key and (only is None or place in only)):
-            self._judged[place] = self._judge(self._claims[place[0]], place[1], seen)
+        finally:
+            del self._open[key]
+        with ahead.doing(f"judging of {key[0]}"):
+            seen = self._seen(pairs, done)
+            for place in (place for place, own in self._key.items() if own == key and (only is None or place in only)):
+                self._judged[place] = self._judge(self._claims[place[0]], place[1], seen)
 
     def _run(
-        self, config: str, pairs: Sequence[tuple[Case, Case]], options: RunOptions, progress: Progress | None
-    ) -> Seen:
+        self, key: tuple[str, ...], pairs: Sequence[tuple[Case, Case]], options: RunOptions, progress: Progress
+    ) -> SimulatedCases:
         changed = tuple(other for _, other in pairs)
-        experiment = replace(self._experiment(config), cases=changed, realisations=self._n)
+        experiment = replace(self._experiment(key[0]), cases=changed, realisations=self._n)
         simulated = run.simulate(experiment, options, progress=progress)
         if simulated.stopped:
             raise TargetUnmet(f"readings: {simulated.stopped}: the same command continues")
-        self.held += sum(collected.from_store for _, _, collected in simulated.cases)
+        return simulated
+
+    def _seen(self, pairs: Sequence[tuple[Case, Case]], simulated: SimulatedCases) -> Seen:
         results = run.finished(simulated)
         tables = result.measured(results)
         originals = [replace(own, spec=case.spec) for own, (case, _) in zip(results, pairs, strict=True)]
@@ -217,17 +256,6 @@ class Plan:
             except Unreadable as error:
                 why = str(error)
         return Under(claim, reading, of.name(reading), of.kind(reading), why=why)
-
-
-def _shifted(progress: Progress | None, before: int, of: int = 0, held: int = 0) -> Progress | None:
-    """Progress offset by the realisations done before, `held` of them without computing."""
-    return progress and (lambda done, total, own: progress(before + done, of or total, held + own))
-
-
-def _without_runs(progress: Progress | None, done: int, total: int) -> None:
-    """Report the count of verdicts or figures as progress without a rate: no realisations are computed for them."""
-    if progress is not None:
-        progress(done, total, done)
 
 
 # ---- decide ----------------------------------------------------------------------------------------------------------
@@ -415,18 +443,31 @@ def judged(
         raise ConfigError(f"{argument('realisations')}: must be >= 1, got {realisations}")
     options = replace(options or RunOptions(), out=out)
     plans = [Plan(one, _first(one.paper.readings, realisations, decide)) for one in wanted]
-    total, done, held = sum(plan.total for plan in plans), 0, 0
+
+    def estimate() -> None:
+        for plan in plans:
+            plan.estimate(ahead, options.threads)
+
+    ahead = Ahead(progress, estimate)
+    for plan in plans:
+        plan.expect(ahead)
+    if write and figures:
+        several = [claim for one in wanted for claim in one.claims if len(one.paper.readings.of_claim(claim.id)) > 1]
+        ahead.add("figure", FIGURE_S, len(several))
     read, left = [], []
     for plan, one in zip(plans, wanted, strict=True):
-        over = plan.judged(options, _shifted(progress, done, max(total, 1), held), stop, progress)
+        over = plan.judged(options, ahead, stop)
         if decide:
-            over = plan.decided(over, realisations or one.paper.readings.most, options, progress, stop)
+            over = plan.decided(over, realisations or one.paper.readings.most, options, ahead, stop)
             left += [line for each in over if (line := _left(each))]
-        done, held = done + plan.total, held + plan.held
-        read.append(Read(one.paper, over, _counted(one.paper, over) if one.whole else None))
+        counted = None
+        if one.whole:
+            with ahead.doing("search"):
+                counted = _counted(one.paper, over)
+        read.append(Read(one.paper, over, counted))
     made = Readings(read, Path(out) / PLACE.parent, left=tuple(left))
     if write:
-        made.files = _write(made, figures, progress)
+        made.files = _write(made, figures, ahead)
         made.outdated = _outdated(made)
     return made
 
@@ -493,15 +534,15 @@ def _counted(paper: Paper, over: list[Over]) -> Search | Joint:
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
-def _write(done: Readings, figures: bool, progress: Progress | None) -> tuple[str, ...]:
+def _write(done: Readings, figures: bool, ahead: Ahead) -> tuple[str, ...]:
     """Write the table, with the stored rows of other claims, and a curve for each claim."""
     contents = {PLACE.name: _table(done).encode(), CLASSES.name: _classes(done).encode()}
     described = done._described if figures else {}
-    for n, (name, figure) in enumerate(described.items(), 1):
+    for name, figure in described.items():
         from radarsim.report.figures import save  # Matplotlib
 
-        contents[f"{name}.svg"] = save(figure, ("svg",))["svg"]
-        _without_runs(progress, n, len(described))
+        with ahead.doing("figure"):
+            contents[f"{name}.svg"] = save(figure, ("svg",))["svg"]
     files.replace_all(done.folder, contents)
     return tuple(sorted(contents))
 

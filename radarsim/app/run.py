@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from radarsim.app import configs
+from radarsim.app.ahead import Progress, Weighed
 from radarsim.app.configs import CaseWork, Config, Overrides, command, load, repeated, shipped
 from radarsim.app.shown import Shown
 from radarsim.config.experiment import Case, Experiment
@@ -45,9 +46,6 @@ if TYPE_CHECKING:
 
 
 # ---- simulation ------------------------------------------------------------------------------------------------------
-Progress = Callable[[int, int, int], None]
-
-
 @dataclass
 class SimulatedCases:
     """For each case with a finished realisation, in the experiment's order, its work and sums.
@@ -120,43 +118,46 @@ def simulate(
     precision: float | None = None,
     of: str = "sigma",
 ) -> SimulatedCases:
-    """Collect every case in turn, cases of one identity once; progress(done, total, from_store) is over all of them.
+    """Collect every case in turn, cases of one identity once; progress(done, total, from_store) is over all of them, in
+    realisations of mean length.
 
     precision is in per cent: a case ends at the first look at which every quantity `of` that kind is known to that
     precision, and large errors would have been seen (all report.precision). Raises ConfigError where a case has none.
     """
-    total = sum(case.realisations for case in experiment.cases)
-    made: dict[tuple[str, int], tuple[CaseWork, Collected, Cell | None]] = {}
-    simulation, done, held = SimulatedCases(precision=precision), 0, 0
-
-    def over_all(case_done: int, _: int, case_held: int) -> None:
-        if progress is not None:
-            progress(done + case_done, total, held + case_held)
-
+    made: dict[tuple[str, int], tuple[Collected, Cell | None]] = {}
+    simulation, works = SimulatedCases(precision=precision), _distinct(experiment)
+    weighed = Weighed(progress, {key: (work, key[1]) for key, work in works.items()})
     with ExitStack() as stack:
         if precision is not None and options.out is None:
             options = replace(options, out=stack.enter_context(tempfile.TemporaryDirectory(prefix="radarsim-")))
         for case in experiment.cases:
-            work = CaseWork(case)
-            key = (work.identity, case.realisations)
-            if not (known := key in made):
-                collector = _collector(work, options, over_all, collect)
+            key = CaseWork(case).identity, case.realisations
+            work = works[key]
+            if key not in made:
+                collector = _collector(work, options, weighed.of(key), collect)
                 wanted = None
                 if precision is not None:
                     quantity = registry.quantity(of, case)
                     wanted = Wanted(precision, quantity, table_of(case, quantity), tailed(work, quantity))
-                made[key] = work, *_collected(case, work, wanted, collector)
-            work, collected, cell = made[key]
+                made[key] = _collected(case, work, wanted, collector)
+            collected, cell = made[key]
             if collected.count:
                 simulation.cases.append((case, work, collected))
             if cell is not None:
                 simulation.cells[case.name] = replace(cell, case=case.name)
-            done += collected.count
-            held += collected.count if known else collected.from_store
             if collected.stopped:
                 simulation.stopped = collected.stopped
                 break
     return simulation
+
+
+def _distinct(experiment: Experiment) -> dict[tuple[str, int], CaseWork]:
+    """The work of the first case of each identity and number of realisations."""
+    found: dict[tuple[str, int], CaseWork] = {}
+    for case in experiment.cases:
+        work = CaseWork(case)
+        found.setdefault((work.identity, case.realisations), work)
+    return found
 
 
 def _collector(work: CaseWork, options: RunOptions, progress: Progress, of: Callable[..., Any]) -> Callable[..., Any]:
@@ -273,24 +274,12 @@ def shared(
     """Put a share of every case, as (2, 3) the second of three, into the store under options.out. Stops early on
     `stop`."""
     assert options.out is not None  # a share is only what it stores
-    total = sum(case.realisations for case in experiment.cases) // part[1]
-    made: set[tuple[str, int]] = set()
+    works = _distinct(experiment)
+    weighed = Weighed(progress, {key: (work, -(-key[1] // part[1])) for key, work in works.items()})
     shares: dict[str, Shared] = {}
-    done = held = 0
-
-    def over_all(case_done: int, _: int, case_held: int) -> None:
-        if progress is not None:
-            progress(done + case_done, max(total, done + case_done), held + case_held)
-
-    for case in experiment.cases:
-        work = CaseWork(case)
-        if (key := (work.identity, case.realisations)) in made:
-            continue
-        one = _collector(work, options, over_all, share)(case.realisations, part)
-        made.add(key)
-        shares[case.name] = one
-        done += one.done
-        held += one.from_store
+    for key, work in works.items():
+        one = _collector(work, options, weighed.of(key), share)(key[1], part)
+        shares[work.case.name] = one
         if one.stopped:
             break
     return Shares(experiment.stem, *part, shares)

@@ -61,7 +61,7 @@ class Progress:
     last: Report = first
 
     def __init__(self, title: str, what: str = "realisations", quiet: bool = False):
-        self.title, self.quiet, self.what = title, quiet, tr(what)
+        self.title, self.quiet, self.what = title, quiet, what and tr(what)
         self.started = self.due = time.monotonic()
         self.bar: Bar | None = None
         self.task: TaskID
@@ -114,9 +114,12 @@ class Progress:
         if done >= total:
             told += tr("  the results follow")
         elif rate > 0:
-            speed = numeral(f"{rate:,.0f}" if rate >= 10 else f"{rate:.2g}")
             left = clock((total - done) / rate)
-            told += tr("  {rate} {what}/s  {left} left", rate=speed, what=self.what, left=left)
+            speed = numeral(f"{rate:,.0f}" if rate >= 10 else f"{rate:.2g}")
+            if self.what:
+                told += tr("  {rate} {what}/s  {left} left, then the results", rate=speed, what=self.what, left=left)
+            else:
+                told += tr("  {left} left", left=left)
         return told
 
     def _begun(self) -> "Bar":
@@ -134,6 +137,14 @@ class Progress:
 def _between(begin: Report, end: Report) -> float:
     """The rate between two reports, a second."""
     return (end[1] - begin[1]) / max(end[0] - begin[0], 1e-9)
+
+
+class Share(Progress):
+    """Progress that is the share of the expected time, the results included."""
+
+    def rate(self, computed: int, total: int | None) -> float:
+        """The share that passes in a second, on average."""
+        return computed / max(time.monotonic() - self.started, 1e-9)
 
 
 class Counter(Progress):

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app import outlook as overview
+from radarsim.app import ahead
 from radarsim.app import result as output
 from radarsim.app import run as writing
 from radarsim.app.configs import CaseWork, load
@@ -346,9 +346,9 @@ def test_a_pilot_that_saw_large_errors_foretells_where_a_run_ends(tmp_path):
 @pytest.mark.parametrize("chunk", [1, 8, 512])
 def test_a_pilot_knows_that_kernels_calculate_chunks(monkeypatch, chunk):
     """One realisation costs as much as a chunk of them, and stands for no more than its share."""
-    monkeypatch.setattr(overview, "timed", lambda work, count: 0.02 * -(-count // chunk))
+    monkeypatch.setattr(ahead, "timed", lambda work, count: 0.02 * -(-count // chunk))
     for pilot_s in (0.3, 0.06):
-        seconds = overview.seconds_each(SimpleNamespace(block=4096), 100_000, pilot_s)
+        seconds = ahead.seconds_each(SimpleNamespace(block=4096), 100_000, pilot_s)
         assert seconds == pytest.approx(0.02 / chunk, rel=1e-9)
 
 
