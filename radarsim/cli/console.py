@@ -35,10 +35,7 @@ COLUMNS = (  # of tables
     *(term("value"), term("name"), term("what it is"), term("paper and question"), term("study"), term("keys")),
 )
 TITLES = (term("reading"), term("writing"), term("tracking"), term("judging"), term("fitting"))  # of Counter
-WHAT = (
-    *(term("likelihoods"), term("realisations"), term("cases"), term("values"), term("keys"), term("records")),
-    term("rows"),
-)
+WHAT = (term("likelihoods"), term("realisations"), term("records"), term("rows"))  # of Counter
 
 
 def console(stream: TextIO) -> "Console":
@@ -50,7 +47,7 @@ def console(stream: TextIO) -> "Console":
 
 
 class Progress:
-    """Finished work, its rate and the time left, on stderr if that is a terminal, once it has lasted most of a second.
+    """Finished work and the time left, on stderr if that is a terminal, once it has lasted most of a second.
 
     Until the first report, while kernels are compiled, the bar moves without a number; by a thread, so where threads
     are forbidden it begins with that report. The rate is that of computations since then: neither compilation nor
@@ -59,9 +56,10 @@ class Progress:
     shares = True  # the share of a whole is known, and shown by a bar
     first: Report = (0.0, 0, None)
     last: Report = first
+    whole = False  # nothing follows after the last report
 
-    def __init__(self, title: str, what: str = "realisations", quiet: bool = False):
-        self.title, self.quiet, self.what = title, quiet, what and tr(what)
+    def __init__(self, title: str, quiet: bool = False):
+        self.title, self.quiet = title, quiet
         self.started = self.due = time.monotonic()
         self.bar: Bar | None = None
         self.task: TaskID
@@ -108,18 +106,14 @@ class Progress:
         return (computed - self.first[1]) / (now - self.first[0]) if now > self.first[0] else 0.0
 
     def _told(self, done: int, total: int | None, rate: float) -> str:
-        """The share that is done, the rate and the time left."""
+        """The share that is done and the time left."""
         assert total is not None
         told = tr("{share} %", share=numeral(f"{100 * done / max(total, 1):5.1f}"))
         if done >= total:
             told += tr("  the results follow")
         elif rate > 0:
-            left = clock((total - done) / rate)
-            speed = numeral(f"{rate:,.0f}" if rate >= 10 else f"{rate:.2g}")
-            if self.what:
-                told += tr("  {rate} {what}/s  {left} left, then the results", rate=speed, what=self.what, left=left)
-            else:
-                told += tr("  {left} left", left=left)
+            told += tr("  {left} left", left=clock((total - done) / rate))
+            told += "" if self.whole else tr(", then the results")
         return told
 
     def _begun(self) -> "Bar":
@@ -140,7 +134,9 @@ def _between(begin: Report, end: Report) -> float:
 
 
 class Share(Progress):
-    """Progress that is the share of the expected time, the results included."""
+    """Progress that is the share of the expected time of all, the results included."""
+
+    whole = True
 
     def rate(self, computed: int, total: int | None) -> float:
         """The share that passes in a second, on average."""
@@ -152,6 +148,10 @@ class Counter(Progress):
 
     shares = False
     before: Report = (0.0, 0, None)  # the report before the last; here they are those since which the time has doubled
+
+    def __init__(self, title: str, what: str):
+        super().__init__(title)
+        self.what = tr(what)
 
     def rate(self, computed: int, total: int | None) -> float:
         """How many are done in a second, on average since the first report: before it files are read, kernels made."""

@@ -112,7 +112,7 @@ def solve(config: str, key: str, filter_name: str | None, as_json: bool, **given
     from radarsim.errors import TargetUnmet
 
     asked = {name.removeprefix(OF): value for name, value in given.items()} | {"filter": filter_name}
-    with console.Progress(key, quiet=as_json, what="values") as progress:
+    with console.Progress(key, quiet=as_json) as progress:
         said = None if as_json else console.say_aside
         answer = solving(config, key, progress=progress.update, notify=said, **asked)
     if as_json:
@@ -169,7 +169,7 @@ def tune(config: str, filter_name: str | None, wanted: str, write: str | None, a
 
     if write:
         configs.writable(write, config, asked["overrides"])
-    with console.Progress(config, quiet=as_json, what="values") as progress:
+    with console.Progress(config, quiet=as_json) as progress:
         said = None if as_json else console.say_aside
         asked |= {"filter": filter_name, "progress": progress.update, "notify": said}
         found = tuning.tune(config, wanted, **asked)
@@ -204,7 +204,7 @@ def chart(configs: tuple[str, ...], drawing: group.Drawing, as_json: bool, **ask
     from radarsim.app import compare, shown
     from radarsim.cli import console, outcomes
 
-    with console.Progress("chart", quiet=as_json, what="figures") as progress:
+    with console.Progress("chart", quiet=as_json) as progress:
         drawn = compare.chart(*configs, progress=progress.update, **asked, **drawing.arguments)
     if as_json:
         click.echo(shown.text(shown.drawn(drawn)))
@@ -244,7 +244,7 @@ def sensitivity(config: str, drawing: group.Drawing, as_json: bool, **asked: Any
     from radarsim.app import shown
     from radarsim.cli import console, outcomes
 
-    with console.Progress(config, quiet=as_json, what="keys") as progress:
+    with console.Progress(config, quiet=as_json) as progress:
         found = finding.sensitivity(config, progress=progress.update, **asked, **drawing.arguments)
     if as_json:
         click.echo(shown.text(shown.sensitivity(found)))

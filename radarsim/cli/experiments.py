@@ -322,7 +322,7 @@ def check(
     loaded = simulation.load_all(configs, simulation.merged(overrides, realisations, seed))
     _say_code(loaded, as_json)
     for one in loaded:
-        with console.Progress(one.stem, quiet=as_json, what="cases") as bar:
+        with console.Progress(one.stem, quiet=as_json) as bar:
             outlook = overview.check(one, progress=bar.update, **asked)
         made.append(shown.outlook(one, outlook))
         if not as_json:
@@ -500,7 +500,7 @@ def readings(
         from radarsim.cli import console, outcomes
 
         asked |= {"time_limit": limit, "figures": not no_figures, "stop": stop}
-        with console.Share("readings", quiet=quiet or as_json or markdown, what="") as progress:
+        with console.Share("readings", quiet=quiet or as_json or markdown) as progress:
             done = app.readings(*names, progress=progress.update, **asked)
         if as_json:
             click.echo(shown.text(app.documents(done)))
