@@ -60,7 +60,7 @@ def _places(error: BaseException) -> Iterator[Place]:
         yield Place(frame.f_code.co_filename, line, frame.f_code.co_qualname.rpartition("<locals>.")[2])
     if isinstance(error, SyntaxError) and error.filename:
         yield Place(error.filename, error.lineno or 1)
-    elif found := re.search(r'File "([^"]+)", line (\d+)', str(error)):
+    elif found := re.search(r'File "([^"]+)", line (\d+)', _message(error)):
         yield Place(found[1], int(found[2]))
 
 
@@ -84,7 +84,7 @@ def frames(error: BaseException, own: str) -> list[str]:
 
 def words(error: BaseException) -> str:
     """An error in one line: its kind, and the first non-empty line of its message."""
-    message = str(error.msg) if isinstance(error, SyntaxError) else str(error)
+    message = str(error.msg) if isinstance(error, SyntaxError) else _message(error)
     lines = [line.strip() for line in message.splitlines() if line.strip() and not COMPILING.match(line)]
     line = lines[0][:LONGEST] if lines else ""
     if OF_NUMPY in message:
@@ -92,6 +92,13 @@ def words(error: BaseException) -> str:
     whole = isinstance(error, RadarsimError) or getattr(error, "for_the_author", False)
     kind = "" if whole else type(error).__name__
     return ": ".join(filter(None, (kind, line)))
+
+
+def _message(error: BaseException) -> str:
+    try:
+        return str(error)
+    except OF_AUTHORS:
+        return "its __str__ fails"
 
 
 def summary(error: BaseException) -> str:

@@ -69,7 +69,7 @@ class Commands(click.Group):
             what = f"{error.filename}: cannot be read or written" if error.filename else "output: cannot be written"
             fail(StoreError(f"{what}: {error.strerror or error}"))
         except OF_AUTHORS as error:
-            if str(error) == NO_THREAD:
+            if error.args == (NO_THREAD,):
                 fail(ConfigError("no thread can be started here; --threads 0 needs none"))
             from radarsim.studies.registry import fault_of
 

@@ -284,6 +284,9 @@ TAIL = 4
 # under a tenth of what independent filters would have cover 81 %, all others 95 %.
 ALIKE = "filters nearly alike: rare differences decide"
 INDEPENDENT = 0.1
+# Filters from outside are paired one by one, so that the moments of the differences of squares are known. Those of a
+# filter that differs a little in every realisation are products of Gaussians: n/8 of them count.
+TAIL_OF_DIFFERENCES = 16
 # Of every row of a table: what its interval is of, not that it rests on too little. What is computed at an estimate has
 # a spread of its own: ratios of `sonar_manoeuvre` cover 93 %, one in twenty 31.
 VARIES = "interval of sigma alone: the believed one varies from one realisation to the next"
@@ -422,11 +425,26 @@ def nearby(curves: "pd.DataFrame") -> np.ndarray:
     own = curves["n_eff"].to_numpy(dtype=float)
     fewest = own.copy()
     for rows in curves.groupby(SAME[:3], sort=False).indices.values():
-        reach = max(1, round(NEARBY * len(rows)))
-        for by in range(1, min(reach + 1, len(rows))):
-            fewest[rows[by:]] = np.fmin(fewest[rows[by:]], own[rows[:-by]])
-            fewest[rows[:-by]] = np.fmin(fewest[rows[:-by]], own[rows[by:]])
+        fewest[rows] = _fewest(own[rows])
     return fewest
+
+
+def _fewest(own: np.ndarray) -> np.ndarray:
+    """The least values (K, …) within NEARBY of the scans (K, …) on either side."""
+    fewest = own.copy()
+    for by in range(1, min(max(1, round(NEARBY * len(own))) + 1, len(own))):
+        fewest[by:] = np.fmin(fewest[by:], own[:-by])
+        fewest[:-by] = np.fmin(fewest[:-by], own[by:])
+    return fewest
+
+
+def few_differ(square: np.ndarray, fourth: np.ndarray, n: np.ndarray) -> np.ndarray:
+    """Whether few realisations decide the gain between two filters (F, K, C), here or at a scan nearby: Σd² and Σd⁴ of
+    the differences d of their squared errors, over n realisations."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        effective = square**2 / (fourth - square**2 / n)
+    fewest = np.moveaxis(_fewest(np.moveaxis(effective, 1, 0)), 0, 1)
+    return ~(fewest >= np.minimum(EFFECTIVE, n / TAIL_OF_DIFFERENCES))
 
 
 def _alike(gains: "pd.DataFrame", curves: "pd.DataFrame", paired: Sequence[Quantity]) -> np.ndarray:

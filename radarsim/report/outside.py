@@ -45,24 +45,33 @@ def names(result: CaseResult) -> tuple[str, ...]:
 def gains(result: CaseResult) -> common.Columns:
     """Gains of the filters from outside of one case against all that come before them; then of the config's own
     against those that it names as baselines."""
-    every = [_gains(result, name, one) for one in others(result) for name in names(result)]
-    return common.stacked(every + [_gained(result, name, one) for one in others(result) for name in one.axes.baselines])
+    return common.stacked([_paired(*one) for one in _pairs(result)])
 
 
-def _gains(result: CaseResult, base: str, of: CaseResult) -> common.Columns:
-    every = (*result.axes.filters, *of.axes.filters)
-    return _paired(np.asarray(of.sums["both"])[:, every.index(base)], base, of)
+def _pairs(result: CaseResult) -> Iterator[tuple[np.ndarray, str, CaseResult]]:
+    """Of every baseline its sums (F, K, C, 7) with a case's filters, its name, and the case."""
+    for of in others(result):
+        both, every = np.asarray(of.sums["both"]), (*result.axes.filters, *of.axes.filters)
+        yield from ((both[:, every.index(base)], base, of) for base in names(result))
+        for base in of.axes.baselines:
+            own = both[of.axes.filters.index(base), : len(result.axes.filters)]
+            yield own[..., [0, 3, 4, 1, 2, 5, 6]], base, result
 
 
-def _gained(result: CaseResult, base: str, of: CaseResult) -> common.Columns:
-    both = np.asarray(of.sums["both"])[of.axes.filters.index(base), : len(result.axes.filters)]
-    return _paired(both[..., [0, 3, 4, 1, 2, 5]], base, result)
+def _rare(result: CaseResult) -> np.ndarray:
+    """Which gains (rows,) rest on the few realisations in which two filters differ much."""
+    found = []
+    for both, _, of in _pairs(result):
+        at = common.shown(of, both[..., 0] > 0)
+        n, _, own_4, _, base_4, cross, fourth = np.moveaxis(both, -1, 0)
+        found.append(notes.few_differ(own_4 + base_4 - 2 * cross, fourth, n)[at])
+    return np.concatenate(found)
 
 
 def _paired(both: np.ndarray, base: str, of: CaseResult) -> common.Columns:
-    """Gains of a case's filters from sums (F, K, C, 6) with those of a baseline."""
+    """Gains of a case's filters from sums (F, K, C, 7) with those of a baseline."""
     at = f, k, c = common.shown(of, both[..., 0] > 0)
-    n, own, own_4, base_2, base_4, cross = np.moveaxis(both[at], -1, 0)
+    n, own, own_4, base_2, base_4, cross, _ = np.moveaxis(both[at], -1, 0)
     gain = statistics.gain(own, own_4, base_2, base_4, cross, n)
     return {
         **common.leading(of, f, k, baseline=np.full(f.size, base, dtype=object), **common.components(of, c)),
@@ -120,19 +129,18 @@ def added(made: Made, results: Sequence[CaseResult], own: Made) -> "dict[str, pd
     with_own = [one for one in results if one.outside is not None]
     rows = {"curves": _below(made["curves"], own["curves"]), "gains": own["gains"]}
     rows = notes.noted(rows, [*results, *outside], exact=False)
-    if "note" in rows["gains"]:  # of a filter that equals one of the config but for rounding
-        equal = rows["gains"]["gain_hi"] - rows["gains"]["gain_lo"] < SINGLE
-        rows["gains"]["note"] = rows["gains"]["note"].mask(equal, "")
+    if "note" in (found := rows["gains"]):
+        equal = found["gain_hi"] - found["gain_lo"] < SINGLE  # but for rounding
+        everywhere = found["note"].eq(notes.ALIKE) & ~np.concatenate([_rare(one) for one in with_own])
+        found["note"] = found["note"].mask(equal | everywhere, "")
     rows["curves"] = rows["curves"].tail(len(own["curves"]))
-    if "note" in rows["curves"] and not rows["curves"]["note"].any():
-        rows["curves"] = rows["curves"].drop(columns="note")
+    for name, table in rows.items():
+        if "note" in table and not table["note"].any():
+            rows[name] = table.drop(columns="note")
     rows["failures"] = common.joined(map(failures, with_own))
     rows["nees"] = common.joined(map(consistency, with_own))
-    found = dict(made)
-    for name, table in rows.items():
-        if len(table):
-            found[name] = _below(made[name], table) if name in made else table
-    return found
+    below = {name: _below(made[name], own) if name in made else own for name, own in rows.items() if len(own)}
+    return {**made, **below}
 
 
 def measured(results: Sequence[CaseResult]) -> Made:
@@ -330,8 +338,8 @@ def figures(
     drawn: Mapping[str, Figure],
     shown: Sequence[Component],
 ) -> dict[str, Figure]:
-    """σ and gain with the filters from outside: in place of the study's figures of these names, at least of the first
-    component. shown: the components as the study calls them."""
+    """σ, gain and NEES over time with the filters from outside: in place of the study's figures of these names, σ and
+    gain at least of the first component. shown: the components as the study calls them."""
     if not any(result.outside for result in results):
         return {}
     joint = [one for one, result in zip(joined(results), results, strict=True) if result.outside]
@@ -341,6 +349,9 @@ def figures(
     ]
     rows = {**made, "gains": common.against_own(made["gains"], joint)}
     found = panels.per_component(joint, rows, each, experiment)
+    if "nees" in made and "consistency" in made and {"t_s", "nees"} <= set(made["consistency"]) - {"component"}:
+        every = _below(made["consistency"], made["nees"])
+        found |= panels.consistency(panels.unswept(joint), every, experiment)
     first = {f"{kind}_{each[0].name}" for kind in ("gain", "sigma")}
     return {name: figure for name, figure in found.items() if name in drawn or name in first}
 

@@ -652,6 +652,15 @@ def family_panel(title: str, members: Sequence[CaseResult], rows: Mapping, words
 NEES = term("NEES per component\n(1 = consistent, below = pessimistic)")
 
 
+def consistency(results: Sequence[CaseResult], table: "pd.DataFrame", experiment: Experiment) -> dict[str, Figure]:
+    """The figure `consistency` of a table with NEES by case, filter and time, a panel for each config."""
+    rows = {(*key, "nees"): own for key, own in common.groups(table, "case", "filter").items()}
+    some, left_out = shown_families(results, named(experiment, "consistency"))
+    figure = nees_figure(nees_panels(some, rows), left_out)
+    begun = seen.all_begun({"consistency": figure}, {"consistency": seen.extremes})
+    return {name: one for name, one in begun.items() if one}
+
+
 def nees_panels(results: Sequence[CaseResult], rows: Mapping) -> list[Panel]:
     """NEES against time, a panel for each config; rows by case, filter and `nees`."""
     filters = filters_of(results)

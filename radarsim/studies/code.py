@@ -228,5 +228,5 @@ class Coded(Outside):
                 package = self.module.partition(".")[0] if INSTALLED & set(Path(self.folder).parts) else ""
                 own = os.path.join(self.folder, package)
                 within = f": of a package, it is {Path(self.folder).name}.{self.module}:{self.made}"
-                hint = within if "no known parent package" in str(error) else ""
+                hint = within if "no known parent package" in failures.words(error) else ""
                 raise ConfigError(line, *failures.frames(error, own), failures.words(error) + hint) from error

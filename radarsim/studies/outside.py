@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 DIVERGED = 100.0  # times the largest error of the config's filters in the same realisation
 FAILURES = ("not_a_number", "no_estimate", "diverged")
 COUNTS = (*FAILURES, "not_positive_definite")
-PAIRED = 6  # sums over the realisations that both have: 1, e², e⁴, b², b⁴, e²b²
+PAIRED = 7  # sums over the realisations that both have: 1, e², e⁴, b², b⁴, e²b², (e² − b²)⁴
 
 Estimates = tuple[np.ndarray, np.ndarray | None]  # (n, K, d), and covariances (n, K, d, d) where there are any
 
@@ -434,6 +434,7 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
                 (there, base),
                 (there, base_fourth),
                 (square, base),
+                (there * other, np.square(np.square(square - base))),
             )
             for j, (one, two) in enumerate(pairs):
                 sums["both"][g, b, ..., j] = np.einsum("nkc,nkc->kc", one, two)

@@ -399,16 +399,10 @@ class StepStudy(OneFile):
     def figures(
         self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
-        from radarsim.report import panels, seen, tables
+        from radarsim.report import panels
 
         drawn = super().figures(results, made, experiment)
-        if "consistency" not in made:
-            return drawn
-        rows = {(*key, "nees"): own for key, own in tables.groups(made["consistency"], "case", "filter").items()}
-        some, left_out = panels.shown_families(results, panels.named(experiment, "consistency"))
-        figure = panels.nees_figure(panels.nees_panels(some, rows), left_out)
-        begun = seen.all_begun({"consistency": figure}, {"consistency": seen.extremes})
-        return drawn | {name: one for name, one in begun.items() if one}
+        return drawn | panels.consistency(results, made["consistency"], experiment) if "consistency" in made else drawn
 
     # ---- recorded plots ------------------------------------------------------------------------------------------
     def columns(self, spec: Any, one: Any) -> tuple[str, ...]:

@@ -16,8 +16,9 @@ from radarsim.app.result import case_figures
 from radarsim.cli import main
 from radarsim.errors import ConfigError
 from radarsim.language import speaking, tr
-from radarsim.report import html, outside
+from radarsim.report import html, notes, outside
 from radarsim.report import tables as common
+from radarsim.report.drawing import Line
 from radarsim.studies import registry
 from radarsim.studies.multimodel import study as flight
 from tests.studies.range_doppler import naive
@@ -73,9 +74,12 @@ def judged():
 
 @pytest.fixture(scope="module")
 def estimates():
-    plots = radarsim.plots("rls2", n=300)
-    plan = CaseWork(judging.judged(load("rls2"), twin, "mine", realisations=300)[0].cases[0]).plans[-1]
-    return twin(judging.outside.plots_of(plan, plots))
+    return twins(300)
+
+
+def twins(n):
+    plan = CaseWork(judging.judged(load("rls2"), twin, "mine", realisations=n)[0].cases[0]).plans[-1]
+    return twin(judging.outside.plots_of(plan, radarsim.plots("rls2", n=n)))
 
 
 def of(table, **values):
@@ -120,6 +124,11 @@ def test_nees_is_that_of_the_run(judged):
     mine = judged.tables["nees"].merge(of(judged.tables["consistency"], filter="r+Vr"), on="k")
     assert len(mine) == 14
     np.testing.assert_allclose(mine["nees_x"], mine["nees_y"], rtol=1e-9)
+    (panel,) = case_figures(judged.cases, judged.tables, judged.experiment)["consistency"].panels
+    own, theirs = (
+        {mark.label: mark.y for mark in panel.marks if isinstance(mark, Line)}[name] for name in ("mine", "r+Vr")
+    )
+    np.testing.assert_allclose(own, theirs[-14:], rtol=1e-9)
 
 
 # ---- what is refused -------------------------------------------------------------------------------------------------
@@ -641,6 +650,21 @@ def test_a_planted_loss_is_known_as_well_as_theory_says():
     mine = (gains["gain_hi"] - gains["gain_lo"]) / 2
     np.testing.assert_allclose(mine, theirs, rtol=6 / np.sqrt(n))
     assert "mine is worse than r+Vr" in result.answer[0]
+
+
+@pytest.mark.parametrize("every", [1, 500])
+def test_rare_differences_are_said_to_decide_where_they_are_rare(every):
+    """A filter that differs from one of the config by 1 % of σ in all realisations, or by 1 σ in four of 2000."""
+    x = twins(2000)
+    sigma = np.nanstd(x - radarsim.plots("rls2", n=2000).truth, axis=(0, 1))
+    x[::every] += np.random.default_rng(1).normal(size=x[::every].shape) * sigma * (0.01 if every == 1 else 1)
+    result = radarsim.judge("rls2", x)
+    if every == 1:
+        assert "note" not in result.gains
+        assert result.warnings == []
+    else:
+        assert of(result.gains, filter="mine", baseline="r+Vr")["note"].eq(notes.ALIKE).mean() > 0.7
+        assert "rare realisations decide them and few or none occurred (mine)" in result.warnings[0]
 
 
 @pytest.mark.slow

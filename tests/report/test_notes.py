@@ -10,7 +10,7 @@ import pytest
 import radarsim
 from radarsim.app import result as output
 from radarsim.config.document import SHIPPED
-from radarsim.report import notes
+from radarsim.report import notes, statistics
 from radarsim.report.quantities import Quantity
 from radarsim.report.statistics import FEW
 
@@ -76,6 +76,28 @@ def test_a_paired_quantity_that_a_study_declares_is_marked_likewise(value, alike
     declared = Quantity("above", "above", "apart", "above_percent|above", kind="signed", unit="%", paired=True)
     noted = notes.noted({"curves": curves, "apart": table}, [], declared=[declared])["apart"]
     assert list(noted.get("note", [""])) == [notes.ALIKE if alike else ""]
+
+
+@pytest.mark.parametrize("share", [1.0, 0.002])
+def test_a_gain_is_marked_where_few_realisations_differ_and_covers_where_all_do(share):
+    """1000 runs of 1000 realisations of two filters whose squared errors differ in this share of them."""
+    runs, n, rng = 1000, 1000, np.random.default_rng(6)
+    b = rng.standard_normal((runs, n))
+    there = rng.random((runs, n)) < share
+    e = b + there * rng.standard_normal((runs, n)) * (0.02 if share == 1 else 1.0)
+    true = 100 * (1 - np.sqrt(1 + share * (0.02**2 if share == 1 else 1.0)))
+    sums = [(one**power).sum(1) for one in (e, b) for power in (2, 4)]
+    gain = statistics.gain(*sums, (e**2 * b**2).sum(1), n)
+    differ = e**2 - b**2
+    square, fourth = ((differ**power).sum(1)[:, None, None] for power in (2, 4))
+    marked = notes.few_differ(square, fourth, np.full((runs, 1, 1), float(n))).ravel()
+    inside = (gain.lo < true) & (true < gain.hi)
+    if share == 1:
+        assert marked.mean() < 0.03
+        assert abs(inside[~marked].mean() - 0.95) < 3 * np.sqrt(0.95 * 0.05 / runs)
+    else:
+        assert marked.all()
+        assert inside.mean() < 0.8
 
 
 def test_a_gain_of_all_there_is_divides_by_nothing():

@@ -218,6 +218,10 @@ FAILURES = {  # a line of the filter: the frame that is shown last, and what is 
     "helper.broken(plots)": ("helper.py:3, in broken: np.linalg.inv(plots['range_m'])", "LinAlgError: 1-dimensional"),
     "self.deep()": ("my_filter.py:11, in deep: self.deep()", "RecursionError: maximum recursion depth"),
     "raise GeneratorExit": ("my_filter.py:8, in step: raise GeneratorExit", "GeneratorExit"),
+    "raise type('Odd', (Exception,), {'__str__': lambda self: 1 / 0})": (
+        "in step: raise type('Odd'",
+        "Odd: its __str__ fails",
+    ),
     "raise ValueError": ("my_filter.py:8, in step: raise ValueError", "ValueError"),
 }
 
