@@ -25,7 +25,7 @@ import itertools
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -889,19 +889,9 @@ def settings(found: Fit) -> dict[str, float]:
 
 def as_rows(found: Fit) -> list[dict[str, Any]]:
     """The keys as rows of a table, with the plain answer beside that which allows for outliers or correlation."""
-    plain = {one.key: one for one in (found.plain or found).keys}
-    return [
-        {
-            **{"key": one.key, "stated": one.stated, "value": one.value, "lo": one.lo},
-            "hi": one.hi,
-            "identifiable": one.identifiable,
-            "plain": beside and beside.value,
-            "plain_lo": beside and beside.lo,
-            "plain_hi": beside and beside.hi,
-        }
-        for one in found.keys
-        for beside in [plain.get(one.key)]
-    ]
+    plain = {one.key: (one.value, one.lo, one.hi) for one in (found.plain or found).keys}
+    names = ("plain", "plain_lo", "plain_hi")
+    return [asdict(one) | dict(zip(names, plain.get(one.key, (None,) * 3), strict=True)) for one in found.keys]
 
 
 # ---- advice ----------------------------------------------------------------------------------------------------------

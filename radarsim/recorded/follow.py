@@ -9,16 +9,15 @@ any difference by itself.
 The plots of many realisations in a file: arrays of NumPy (.npz), or one row a plot as Parquet or CSV. Memory does not
 grow with their number."""
 
-import itertools
 import json
 import os
 import shlex
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -37,10 +36,6 @@ from radarsim.studies.interface import Drawn, RecordedPlots, Tracker, true_colum
 from radarsim.studies.registry import module as home_of
 from radarsim.studies.registry import study
 from radarsim.threads import mapping
-
-if TYPE_CHECKING:
-    from radarsim.report.drawing import Figure
-
 
 # ---- rounding --------------------------------------------------------------------------------------------------------
 STRETCH = 1 + 2.0**-33
@@ -579,27 +574,6 @@ def together(case: Case, found: Mapping[str | None, Followed], passed_over: int)
             total.count, total.squares = total.count + own.count, total.squares + own.squares
             total.normed += own.normed
     return whole
-
-
-@np.errstate(all="ignore")  # of a filter that diverged
-def drawn(followed: Followed) -> "dict[str, Figure]":
-    """The figures of a track, or of the longest of several, described; by name."""
-    from radarsim.recorded import page
-
-    ways = {name: one.places for name, one in followed.tracks.items()} or {"": followed.places}
-    order = sorted(ways, key=lambda name: ways[name] is not followed.places)
-    return page.figures(followed.track(), {name: ways[name] for name in order})
-
-
-def put(folder: str | os.PathLike, contents: Mapping[str, bytes], sources: Iterable[str | os.PathLike] = ()) -> None:
-    """Write files into a folder. Raises StoreError, and ConfigError, with nothing written, where a file would overwrite
-    one of the sources."""
-    from radarsim.report import files
-
-    for name, source in itertools.product(contents, sources):
-        if files.same_file(Path(folder) / name, source):
-            raise ConfigError(f"{Path(folder) / name}: would be overwritten; choose another folder")
-    files.replace_all(Path(folder), contents)
 
 
 # ---- bulk ------------------------------------------------------------------------------------------------------------

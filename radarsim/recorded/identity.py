@@ -184,6 +184,15 @@ def cleaned(identity: Mapping[str, Sequence[str]], n: int) -> list[list[str]]:
     ]
 
 
+def owned(whose: str, track: Sequence[str], identity: Mapping[str, Sequence[str]]) -> Mapping[str, Sequence[str]]:
+    """The identities (n,) by KINDS of plots; where all that is known is whose track, address, callsign or code the one
+    path has, that of the plots with it."""
+    if not whose:
+        return identity
+    names = (map(str.lower, one) for one in zip(track, *identity.values(), strict=True))
+    return {"address": [whose * (whose.lower() in own) for own in names]}
+
+
 def offsets(states: np.ndarray, range_m: np.ndarray, bearing_rad: np.ndarray) -> np.ndarray:
     """How far plots (n,) lie from aircraft there, (…, n, 6), in range and bearing: (…, n, 2)."""
     r, b = np.linalg.norm(states[..., :3], axis=-1), np.arctan2(states[..., 2], states[..., 0])

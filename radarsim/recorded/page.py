@@ -5,6 +5,7 @@ Whether the stated accuracies fit is judged by the filters' own innovations. For
 innovations, divided by their predicted variance, average 1 for each degree of freedom (NIS). Larger: the plots are
 worse than stated, or the target manoeuvres more than the filter assumes; smaller: they are better."""
 
+import itertools
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,10 +18,11 @@ import numpy as np
 
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.results import Track
+from radarsim.errors import ConfigError
 from radarsim.language import listed, plural, power_of_ten, term, tr
 from radarsim.recorded import fit
 from radarsim.recorded.fit import Advice, Asked, Finding
-from radarsim.recorded.follow import Followed, Tally, drawn, put, recorded_of
+from radarsim.recorded.follow import Followed, Tally, recorded_of
 from radarsim.recorded.plots import Places
 from radarsim.report import panels
 from radarsim.report.drawing import COLUMN_MM, GREY, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
@@ -43,12 +45,14 @@ TICKS = (0.01, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0, 1000.0)  # of a mean N
 FAR_M = 2e4  # distance from which a plan view uses km
 
 
-def figures(track: Track, paths: Mapping[str, Places]) -> dict[str, Figure]:
-    """`plan`, `track`, `residuals`, `nis` and `probabilities`, as far as available, described; by name.
-
-    track: the one to draw; paths: the places of every track's plots, that one first."""
+def figures(followed: Followed) -> dict[str, Figure]:
+    """`plan`, `track`, `residuals`, `nis` and `probabilities`, as far as available, described; by name. Of several
+    tracks the plots of all and the estimates of the longest."""
+    ways = {name: one.places for name, one in followed.tracks.items()} or {"": followed.places}
+    order = sorted(ways, key=lambda name: ways[name] is not followed.places)
+    track = followed.track()
     drawn = {
-        "plan": plan(track, paths),
+        "plan": plan(track, {name: ways[name] for name in order}),
         "track": estimates(track),
         "residuals": residuals(track),
         "nis": innovations(track),
@@ -533,11 +537,12 @@ def write(
     folder: str | os.PathLike,
     sources: Iterable[str | os.PathLike] = (),
 ) -> list[str]:
-    """Write the page and `figures/` into a folder; the names of the figures. Errors as of `follow.put`."""
-    from radarsim.report import html
+    """Write the page and `figures/` into a folder; the names of the figures. Raises StoreError, and ConfigError, with
+    nothing written, where a file would overwrite one of the sources."""
+    from radarsim.report import files, html
     from radarsim.report.figures import save
 
-    made, name = drawn(followed), os.path.basename(os.fspath(source))
+    made, name = figures(followed), os.path.basename(os.fspath(source))
     page = html.followed(
         experiment.stem,
         name,
@@ -551,7 +556,10 @@ def write(
     contents = {NAME: page.encode()}
     for name, one in made.items():
         contents |= {f"figures/{name}.{kind}": data for kind, data in save(one).items()}
-    put(Path(folder), contents, sources)
+    for path, source in itertools.product((Path(folder, name) for name in contents), sources):
+        if files.same_file(path, source):
+            raise ConfigError(f"{path}: would be overwritten; choose another folder")
+    files.replace_all(Path(folder), contents)
     return list(made)
 
 

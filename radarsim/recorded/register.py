@@ -29,7 +29,7 @@ from radarsim.errors import ConfigError
 from radarsim.language import plural, speaking, tr
 from radarsim.recorded import plots as files
 from radarsim.recorded.formats.sites import BIASES, DAY_S, Site
-from radarsim.recorded.identity import KINDS, Paths, apart, are_far, distance, offsets
+from radarsim.recorded.identity import KINDS, Paths, apart, are_far, distance, offsets, owned
 from radarsim.recorded.plots import grouped
 from radarsim.report.wording import interval, significant_digits
 
@@ -205,11 +205,9 @@ def register(radar: str, other: str) -> Registration:
     apart."""
     from radarsim.recorded.formats.importing import truth_of
 
-    other, whose = str((owned := truth_of(other))[0]), owned[1].lower()
-    plots, positions = read(radar, RADAR), read(other, OTHER)
+    path, whose = truth_of(other)
+    plots, positions = read(radar, RADAR), read(other := str(path), OTHER)
     if whose:
-        named = zip(plots.tracks, *plots.identity.values(), strict=True)
-        plots.identity["address"] = [whose if whose in map(str.lower, one) else "" for one in named]
         positions.identity["address"] = [whose] * len(positions.tracks)
     fixes, t = np.stack([positions.columns[name] for name in OTHER[0]], axis=1), plots.columns["t_s"]
     if plots.place and positions.place and plots.place != positions.place:
@@ -226,7 +224,7 @@ def register(radar: str, other: str) -> Registration:
     paths.add(fixes, positions.tracks, positions.identity)
     r = plots.columns["range_m"]
     b = plots.columns.get("bearing_rad", np.full(len(r), np.nan))
-    found = paths.find(t, r, b, plots.identity)
+    found = paths.find(t, r, b, owned(whose, plots.tracks, plots.identity))
     missed, own, names = offsets(found.states, r, b), found.path >= 0, paths.names()
     strange, others = int((~own).sum()), []
     bent = np.zeros(len(t))

@@ -339,7 +339,7 @@ class Asterix:
 
     def notes(self, radars: Iterable[str]) -> list[str]:
         """What was marked, and what is known of these radars, in words."""
-        found = []
+        found = self.clock.notes()
         turns = [(radar, self.survey.turns[radar]) for radar in radars if radar in self.survey.turns]
         if turns:
             each = ", ".join(tr("{radar} {turn:.4g} s", radar=radar, turn=turn) for radar, turn in turns)

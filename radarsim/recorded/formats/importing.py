@@ -51,6 +51,7 @@ from radarsim.recorded.identity import (
     are_far,
     distance,
     offsets,
+    owned,
 )
 from radarsim.recorded.plots import cells, grouped
 from radarsim.report.files import Writer
@@ -428,9 +429,14 @@ class _Import:
                 "track: number or address or A and the Mode 3/A code; radar: SAC/SIC; address: hexadecimal; mode_3a: "
                 f"octal; report: what saw the aircraft; marks: {' or '.join(asterix.MARKS)}"
             )
+        zero, dated = self.options.zero, self.zero is not None and self.zero >= LEAST_DATED_S
+        if not isinstance(zero, str):
+            zero = datetime.datetime.fromtimestamp(zero, datetime.UTC).isoformat()
+        origin = {"first": "the first record", "midnight": "midnight (UTC) before the first record"}.get(zero, zero)
+        epoch = "midnight" if self.reader.of_day else "1970" if dated else "the start of its clock"
         lines = [
             f"# made by radarsim import from a recording in the format {self.done.format}",
-            f"# t_s: seconds from {self._zero_words()} ({self.zero!r} s after {self._epoch()}); {named}",
+            f"# t_s: seconds from {origin} ({self.zero!r} s after {epoch}); {named}",
             "# range_m: slant range; bearing_rad: from north to east; velocity_mps: radial and positive where the "
             "range grows; span_mps: what a folded velocity is ambiguous by",
         ]
@@ -447,31 +453,19 @@ class _Import:
             )
         return lines
 
-    def _zero_words(self) -> str:
-        zero = self.options.zero
-        if not isinstance(zero, str):
-            return datetime.datetime.fromtimestamp(zero, datetime.UTC).isoformat()
-        return "midnight (UTC) before the first record" if zero == "midnight" else "the first record"
-
-    def _epoch(self) -> str:
-        """What the times of the recording count from."""
-        dated = self.zero is not None and self.zero >= LEAST_DATED_S
-        return "midnight" if self.reader.of_day else "1970" if dated else "the start of its clock"
-
     def nothing(self) -> str:
         """The fault of a recording without any row."""
-        path = getattr(self.reader, "path", "the recording")
-        if self.options.tracks and self.seen:
-            there = sorted(self.seen)
-            more = " …" if len(there) >= MOST_LISTED else ""
-            return f"{path}: track: must be one of {', '.join(there)}{more}; got {', '.join(self.options.tracks)}"
-        passed = [*counted(self.reader.skipped), *counted(self.left)]
+        path, names = self.reader.path, self.options.tracks
+        if names and self.seen:
+            more = " …" if len(self.seen) >= MOST_LISTED else ""
+            return f"{path}: track: must be one of {', '.join(sorted(self.seen))}{more}; got {', '.join(names)}"
+        passed = counted(self.reader.skipped + self.left)
         why = f"; left out: {', '.join(passed)}" if passed else ""
         return f"{path}: has no plots; {self.reader.records} records were read{why}"
 
     def faults(self) -> list[str]:
         """Faults in the rows written, known when all are read."""
-        path, found = getattr(self.reader, "path", "the recording"), []
+        path, found = self.reader.path, []
         if len(self.radars) > 1 and self.options.site:
             names = ", ".join(self.radars)
             found.append(f"at: must say where each radar stands whose plots are wanted, --at SAC/SIC=LAT,LON,HEIGHT: "
@@ -486,19 +480,14 @@ class _Import:
         """The result, with notes for the user."""
         done = self.done
         done.records = self.reader.records
-        done.skipped = [*counted(self.reader.skipped), *counted(self.left)]
+        done.skipped = counted(self.reader.skipped + self.left)
         self.without[UNNAMED] = done.tracks.get("", 0)
         done.notes += [tr(what, count=count, all=done.rows) for what, count in self.without.items() if count]
         if len(self.radars) > 1:
             each = ", ".join(f"{name} ({count})" for name, count in self.radars.items())
             done.notes.append(tr("plots of several radars, SAC/SIC (rows): {each}; the tracks of all but the first "
                                  "have its name before their number", each=each))  # fmt: skip
-        if isinstance(self.reader, Table | Asterix) and (turns := self.reader.clock.turns):
-            done.notes.append(tr("the times of day pass midnight: t_s runs on ({turns} × 24 h)", turns=turns))
-        if isinstance(self.reader, Table | Ais):
-            done.notes += self.reader.notes()
-        if isinstance(self.reader, Asterix):
-            done.notes += self.reader.notes(self.radars)
+        done.notes += self.reader.notes(self.radars)
         if self.truth is not None:
             done.notes += self.truth.notes()
         if note := self.sign.note(self.options.towards):
@@ -519,7 +508,7 @@ class _Truth:
         self.missed: dict[int, list[np.ndarray]] = {}  # range and bearing, and the range (n, 3), by aircraft
         self.own = options.truth is None
         self.paths = Paths()
-        self.whose, self.alone = options.whose.lower(), set[str]()
+        self.whose, self.alone = options.whose, set[str]()
         self.of_day = False
         if self.own:
             self._read_own(path, options)
@@ -561,13 +550,6 @@ class _Truth:
             self.alone.update(batch.track)
             self.paths.add(table, batch.track, {"address": [self.whose] * len(table)} if self.whose else batch.identity)
 
-    def _identity(self, batch: Batch) -> Mapping[str, Sequence[str]]:
-        """What identifies plots; where the user says whose the path is, whether it is theirs."""
-        if not self.whose:
-            return batch.identity
-        names = zip(batch.track, *batch.identity.values(), strict=True)
-        return {"address": [self.whose if self.whose in map(str.lower, own) else "" for own in names]}
-
     def columns(self, batch: Batch, seen: Mapping[str, np.ndarray], reader: Reader) -> dict[str, np.ndarray]:
         """The truth at the times of plots (n,) seen there: range, bearing, velocity, place, speeds (n,)."""
         if not self.paths.paths:
@@ -578,7 +560,8 @@ class _Truth:
         for radar, own in grouped(batch.radar).items():
             site, one = self.sites.get(radar, self.site), batch.rows(own.tolist())
             t, r, b = one.columns["t_s"], seen["range_m"][own], seen["bearing_rad"][own]
-            found = self.paths.find(t, r, b, self._identity(one), partial(site.turned, self.site))
+            identity = owned(self.whose, one.track, one.identity)
+            found = self.paths.find(t, r, b, identity, partial(site.turned, self.site))
             states[own] = found.states
             self.kinds.update(found.kind[found.kind >= 0].tolist())
             missed = np.column_stack([offsets(found.states, r, b), r])

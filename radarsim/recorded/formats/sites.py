@@ -14,7 +14,7 @@ import math
 import operator
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType, ModuleType
 from typing import Any, BinaryIO, NamedTuple, Protocol
@@ -69,14 +69,18 @@ class Batch(NamedTuple):
 class Reader(Protocol):
     """A reader of one format. Times count from midnight where `of_day`, else from 1970 (UTC), as in the format.
 
-    records: number read so far; skipped: number of them skipped, by reason."""
+    path: of the file; records: number read so far; skipped: number of them skipped, by reason."""
 
+    path: str
     of_day: bool
     records: int
     skipped: Counter[str]
 
     def batches(self) -> Iterator[Batch]:
         """The records in batches; raises ConfigError with file, place, expected and actual content."""
+
+    def notes(self, radars: Iterable[str]) -> list[str]:
+        """What was assumed, and what is known of the radars that have plots, in words."""
 
 
 @dataclass
@@ -134,6 +138,10 @@ class Unrolled:
                 return t + (self.turns - 1) * self.period_s
         self.last = t
         return t + self.turns * self.period_s
+
+    def notes(self) -> list[str]:
+        """How often midnight has passed on a clock of a day."""
+        return [tr("the times of day pass midnight: t_s runs on ({turns} × 24 h)", turns=self.turns)] * (self.turns > 0)
 
 
 def utc_s(text: str) -> float:
@@ -338,7 +346,7 @@ class Ais:
         self.ahead = math.nan  # that of a line of time before the next sentence
         self.untimed = 0  # reports whose minute none states
 
-    def notes(self) -> list[str]:
+    def notes(self, radars: Iterable[str] = ()) -> list[str]:
         """How times were found where the lines do not state them."""
         if not self.untimed:
             return []

@@ -21,7 +21,7 @@ import re
 import shlex
 import types
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple, TextIO
 
@@ -352,9 +352,9 @@ class Table:
         free = [] if "track" in self.columns else [i for i in range(self.width) if i not in taken]
         self.cells: dict[int, set[str]] = {i: set() for i in free}  # of columns that may name the aircraft
 
-    def notes(self) -> list[str]:
+    def notes(self, radars: Iterable[str] = ()) -> list[str]:
         """Assumptions on units and times, and signs against them."""
-        found = [*self.header.notes(), *self.sheet.notes]
+        found = [*self.clock.notes(), *self.header.notes(), *self.sheet.notes]
         if (encoding := self.sheet.encoding) != "UTF-8":
             found.append(
                 tr("the text is read as {name}, as it is not UTF-8; for another: --encoding NAME", name=encoding)
