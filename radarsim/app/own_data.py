@@ -3,7 +3,6 @@
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
@@ -158,8 +157,7 @@ class Registered(Shown):
         import pandas as pd
 
         self._found = found
-        self.biases = pd.DataFrame([asdict(one) | {"identifiable": one.identifiable} for one in found.adjusted.biases])
-        self.aircraft = pd.DataFrame([asdict(one) for one in found.aircraft])
+        self.biases, self.aircraft = (pd.DataFrame(registering.as_json(found)[name]) for name in ("biases", "aircraft"))
         self.sigma_range_m, self.sigma_bearing_rad = found.adjusted.sigma
         self.plots, self.matched = found.plots, found.matched
 

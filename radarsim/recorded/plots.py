@@ -91,6 +91,55 @@ class _Seen:
     usual_s: float = math.nan
     scan_s: float = 0.0
 
+    def tidied(self, t: np.ndarray, where: np.ndarray, kept: np.ndarray, names: np.ndarray) -> None:
+        """Which of the next plots, at times (n,) and places (n, 3), are kept, and their names: changed in place."""
+        steps = np.diff(t, prepend=self.last[-1][0] if self.last else t[0])
+        self._timed(steps if self.last else steps[1:])
+        gap = max(USED_AGAIN * self.usual_s, USED_AGAIN_S)  # without a usual interval: not-a-number, and no gap
+        close = (steps <= 0) | (steps < self.scan_s)
+        close[:1] &= bool(self.last)
+        if self.times == 1 and not (steps > gap).any() and not close.any():
+            self.last = [*self.last, *zip(t[-2:].tolist(), where[-2:], strict=True)][-2:]
+            return
+        i = 0
+        while i < len(t):
+            before = self.last[-1][0] if self.last else -math.inf
+            if self.last and t[i] - before > gap:
+                self.times, self.last = self.times + 1, []
+            end = i + 1
+            if self.last and (t[i] <= before or t[i] - before < self.scan_s):
+                kept[i] = False  # the rest of a scan that the rows before have begun
+            else:
+                while end < len(t) and (t[end] == t[i] or t[end] - t[i] < self.scan_s):
+                    end += 1
+                best = i + self._nearest(t[i:end], where[i:end])
+                kept[i:end] = np.arange(i, end) == best
+                names[best] = self.name if self.times == 1 else f"{self.name} ({self.times})"
+                self.last = [*self.last, (float(t[best]), where[best])][-2:]
+            i = end
+
+    def _timed(self, steps: np.ndarray) -> None:
+        """The usual interval of a track, and whether it is that of a turning antenna."""
+        self.steps = steps = np.concatenate([self.steps, steps[steps > 0]])[-MOST_STEPS:]
+        if steps.size < LEAST_STEPS:
+            return
+        self.usual_s = float(np.median(steps))
+        scans = steps / self.usual_s
+        whole = (np.abs(scans - np.rint(scans)) < NEARLY) & (scans > SAME_SCAN)
+        self.scan_s = SAME_SCAN * self.usual_s if whole.mean() >= REGULAR else 0.0
+
+    def _nearest(self, t: np.ndarray, where: np.ndarray) -> int:
+        """Which of the plots of one scan is nearest to where the last two lead; the first where that is not known."""
+        if len(t) == 1 or not self.last:
+            return 0
+        led = np.tile(self.last[-1][1], (len(t), 1))
+        if len(self.last) == 2:
+            (t0, first), (t1, second) = self.last
+            led = second + np.outer((t - t1) / (t1 - t0), second - first)
+        off = (where - led)[:, :2] if np.isfinite(where[:, :2]).all() and np.isfinite(led[:, :2]).all() else where - led
+        far = np.nansum(off**2, axis=1)
+        return int(far.argmin()) if np.isfinite(off).any(axis=1).all() else 0
+
 
 class Numbers:
     """The numbers of tracks over time. One that is used again after a gap is that of another track, with a name of its
@@ -100,90 +149,24 @@ class Numbers:
 
     def __init__(self) -> None:
         self._tracks: dict[str, _Seen] = {}
-        self.again = self.doubles = 0
+        self.doubles = 0
+
+    @property
+    def again(self) -> int:
+        """How many numbers were used again."""
+        return sum(one.times - 1 for one in self._tracks.values())
 
     def tidied(self, t: np.ndarray, names: list[str], places: Mapping[str, np.ndarray]) -> tuple[np.ndarray, list[str]]:
         """Which of the next rows (n,) are kept, and their tracks; places: columns (n,)."""
-        kept, names, found = np.ones(len(t), dtype=bool), list(names), in_plane(places)
+        kept, called, found = np.ones(len(t), dtype=bool), np.array(names, dtype=object), in_plane(places)
         where = np.full((len(t), 3), np.nan) if found is None else found
         for name, rows in grouped(names).items():
             if name:
-                self._one(self._tracks.setdefault(name, _Seen(name)), t, rows, where, kept, names)
-        return kept, [name for name, one in zip(names, kept.tolist(), strict=True) if one]
-
-    def _one(
-        self, seen: _Seen, t: np.ndarray, rows: np.ndarray, where: np.ndarray, kept: np.ndarray, names: list[str]
-    ) -> None:
-        """The rows of one number; kept and names are changed in place."""
-        own = t[rows]
-        steps = np.diff(own, prepend=seen.last[-1][0] if seen.last else own[0])
-        self._timed(seen, steps[1:] if not seen.last else steps)
-        gap = max(USED_AGAIN * seen.usual_s, USED_AGAIN_S)  # without a usual interval: not-a-number, and no gap
-        begins = steps > gap
-        close = (steps <= 0) | (steps < seen.scan_s)
-        close[:1] &= bool(seen.last)
-        if begins.any() or close.any() or seen.times > 1:
-            self._by_row(seen, own, rows, where, kept, names, gap)
-        else:
-            seen.last = [*seen.last, *((t[i], where[i]) for i in rows[-2:])][-2:]
-
-    @staticmethod
-    def _timed(seen: _Seen, steps: np.ndarray) -> None:
-        """The usual interval of a track, and whether it is that of a turning antenna."""
-        seen.steps = steps = np.concatenate([seen.steps, steps[steps > 0]])[-MOST_STEPS:]
-        if steps.size < LEAST_STEPS:
-            return
-        seen.usual_s = float(np.median(steps))
-        scans = steps / seen.usual_s
-        whole = (np.abs(scans - np.rint(scans)) < NEARLY) & (scans > SAME_SCAN)
-        seen.scan_s = SAME_SCAN * seen.usual_s if whole.mean() >= REGULAR else 0.0
-
-    def _by_row(
-        self,
-        seen: _Seen,
-        own: np.ndarray,
-        rows: np.ndarray,
-        where: np.ndarray,
-        kept: np.ndarray,
-        names: list[str],
-        gap: float,
-    ) -> None:
-        """Row by row, where a number is used again or plots are of one scan."""
-        i = 0
-        while i < len(own):
-            before = seen.last[-1][0] if seen.last else -math.inf
-            if seen.last and own[i] - before > gap:
-                seen.times, seen.last = seen.times + 1, []
-                self.again += 1
-            if seen.last and (
-                own[i] <= before or own[i] - before < seen.scan_s
-            ):  # the rest of a scan that the rows before have begun
-                kept[rows[i]] = False
-                self.doubles, i = self.doubles + 1, i + 1
-                continue
-            end = i + 1
-            while end < len(own) and (own[end] == own[i] or own[end] - own[i] < seen.scan_s):
-                end += 1
-            best = i + self._nearest(seen, own[i:end], where[rows[i:end]])
-            kept[rows[i:end]] = False
-            kept[rows[best]] = True
-            self.doubles += end - i - 1
-            names[rows[best]] = seen.name if seen.times == 1 else f"{seen.name} ({seen.times})"
-            seen.last = [*seen.last, (float(own[best]), where[rows[best]])][-2:]
-            i = end
-
-    @staticmethod
-    def _nearest(seen: _Seen, t: np.ndarray, where: np.ndarray) -> int:
-        """Which of the plots of one scan is nearest to where the last two lead; the first where that is not known."""
-        if len(t) == 1 or not seen.last:
-            return 0
-        led = np.tile(seen.last[-1][1], (len(t), 1))
-        if len(seen.last) == 2:
-            (t0, first), (t1, second) = seen.last
-            led = second + np.outer((t - t1) / (t1 - t0), second - first)
-        off = (where - led)[:, :2] if np.isfinite(where[:, :2]).all() and np.isfinite(led[:, :2]).all() else where - led
-        far = np.nansum(off**2, axis=1)
-        return int(far.argmin()) if np.isfinite(off).any(axis=1).all() else 0
+                some, own = kept[rows], called[rows]
+                self._tracks.setdefault(name, _Seen(name)).tidied(t[rows], where[rows], some, own)
+                kept[rows], called[rows] = some, own
+        self.doubles += int((~kept).sum())
+        return kept, called[kept].tolist()
 
 
 # ---- plots -----------------------------------------------------------------------------------------------------------

@@ -145,7 +145,7 @@ def doppler_048(cut: Cut) -> tuple[np.ndarray, np.ndarray]:
     # The specification names no sign; no target has 32 km/s, so the upper half is taken as negative.
     folded = layout.field_in(raw, "DOP")._replace(signed=True).of(data, second)
     span = layout.field_in(raw, "AMB").of(data, second)
-    return np.where(second < 0, velocity, folded), np.where(span > 0, span, np.nan)
+    return np.where(second < 0, velocity, folded), span
 
 
 def plots_001(cut: Cut) -> Read:

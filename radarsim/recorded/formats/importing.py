@@ -81,10 +81,8 @@ BEHIND = term(
 UNNAMED = term("plots of no track, which `radarsim track` skips: {count} of {all}")
 LEAST_DATED_S = 1e8  # since 1970; smaller times count from anywhere
 MOST_BIAS = dict(zip(BIASES, (1e6, 0.5, math.pi, DAY_S), strict=True))  # in size
-SIGN_TESTS = 2000  # pairs of plots on which the sign of the Doppler speed is tested
-LEAST_TESTS = 20
-FOLD_TESTS = 3000  # rows on which folding of the Doppler speed is tested
-FOLD_COLUMNS = ("t_s", "range_m", "velocity_mps")
+DOPPLER_TESTS, LEAST_TESTS = 3000, 20  # rows on which sign and folding of the Doppler speed are tested
+DOPPLER = ("t_s", "range_m", "velocity_mps")
 PLACED = ("range_m", "bearing_rad", "velocity_mps")
 LOCAL = ("x_m", "y_m", "z_m")
 SPEEDS = ("vx_mps", "vy_mps", "vz_mps")
@@ -294,7 +292,7 @@ class _Import:
         self.left = Counter[str]()
         self.radars = Counter[str]()
         self.without = Counter[str]()  # by what a note says of these rows
-        self.sign, self.folds = _Sign(), _Folds()
+        self.doppler = _Doppler()
         self.seen: set[str] = set()
 
     def rows(self) -> Iterator[Iterable[tuple[str, ...]]]:
@@ -312,17 +310,19 @@ class _Import:
                 yield self._written(kept)
 
     def _unbiased(self, batch: Batch) -> Batch:
-        """A batch without the biases of the radar, and without plots that then have no range."""
+        """A batch without the biases of the radar, without spans of 0, and without plots that then have no range."""
         biases, columns = self.options.biases, batch.columns
-        if biases and batch.kind == PLOTS:
-            columns["t_s"] -= biases.get("time_s", 0.0)
-            columns["range_m"] = (columns["range_m"] - biases.get("range_m", 0.0)) / (
-                1 + biases.get("range_scale", 0.0)
-            )
-            columns["bearing_rad"] = (columns["bearing_rad"] - biases.get("bearing_rad", 0.0)) % (2 * math.pi)
-        elif biases:
-            raise ConfigError("bias: is subtracted from plots of a radar; the recording has positions")
-        if batch.kind == PLOTS and (gone := columns["range_m"] <= 0).any():
+        if batch.kind == POSITIONS:
+            if biases:
+                raise ConfigError("bias: is subtracted from plots of a radar; the recording has positions")
+            return batch
+        if biases:
+            bias, scale, turn, lag = (biases.get(name, 0.0) for name in BIASES)
+            columns["t_s"] -= lag
+            columns["range_m"] = (columns["range_m"] - bias) / (1 + scale)
+            columns["bearing_rad"] = (columns["bearing_rad"] - turn) % (2 * math.pi)
+        columns["span_mps"][columns["span_mps"] <= 0] = np.nan
+        if (gone := columns["range_m"] <= 0).any():
             self.left[term("plots whose range is not above 0")] += int(gone.sum())
             return batch.rows(np.flatnonzero(~gone).tolist())
         return batch
@@ -360,8 +360,7 @@ class _Import:
             self.zero = self._zero(float(t[0]))
         columns = {"t_s": t - self.zero} | self._placed(batch)
         if batch.kind == PLOTS:
-            self.sign.take(batch)
-            self.folds.take(batch)
+            self.doppler.take(batch)
         if self.truth is not None:
             columns |= self.truth.columns(batch, columns, self.reader)
         names = {"track": batch.track}
@@ -490,10 +489,7 @@ class _Import:
         done.notes += self.reader.notes(self.radars)
         if self.truth is not None:
             done.notes += self.truth.notes()
-        if note := self.sign.note(self.options.towards):
-            done.notes.append(note)
-        if (folded := fit.folding(self.folds.tracks())) is not None:
-            done.notes.append(fit.said(folded))
+        done.notes += self.doppler.notes(self.options.towards)
         return done
 
 
@@ -605,64 +601,47 @@ class _Truth:
         return [tr(said, count=len(missed), all=self.rows, share=100 * len(missed) / self.rows, **told)]
 
 
-class _Sign:
-    """Whether Doppler speeds fit the rate of the range as they are, or with the other sign; folded ones too."""
-
-    def __init__(self) -> None:
-        self.last: dict[str, tuple[float, float]] = {}
-        self.as_is: list[float] = []
-        self.turned: list[float] = []
-
-    def take(self, batch: Batch) -> None:
-        """Test pairs of plots of one track."""
-        names = ("t_s", "range_m", "velocity_mps", "span_mps")
-        values = zip(batch.track, *(batch.columns[name].tolist() for name in names), strict=True)
-        for track, t, r, v, span in values:
-            if len(self.as_is) >= SIGN_TESTS:
-                return
-            before = self.last.get(track)
-            self.last[track] = (t, r)
-            if not track or before is None or math.isnan(v) or not 0 < t - before[0] < LONGEST_GAP_S:
-                continue
-            rate = (r - before[1]) / (t - before[0])
-            for misses, sign in ((self.as_is, 1), (self.turned, -1)):
-                miss = sign * v - rate
-                misses.append(abs(miss if math.isnan(span) else miss - span * round(miss / span)))
-
-    def note(self, towards: bool) -> str | None:
-        """A note for the user if the other sign fits clearly better."""
-        if len(self.as_is) < LEAST_TESTS:
-            return None
-        as_is, turned = float(np.median(self.as_is)), float(np.median(self.turned))
-        if turned >= 0.5 * as_is:
-            return None
-        cure = tr("leave out --doppler-towards") if towards else tr("give --doppler-towards")
-        return tr("the Doppler speeds miss the change of the range by {as_is:.1f} m/s (median), with the other sign by "
-                  "{turned:.1f} m/s: {cure}", as_is=as_is, turned=turned, cure=cure)  # fmt: skip
-
-
-class _Folds:
-    """Plots on which folding of Doppler speeds is tested: of rows that do not give their span."""
+class _Doppler:
+    """The first rows of tracks, on which sign and folding of their Doppler speeds are tested."""
 
     def __init__(self) -> None:
         self.rows: dict[str, list[np.ndarray]] = {}
         self.count = 0
 
     def take(self, batch: Batch) -> None:
-        """Keep the first FOLD_TESTS rows of tracks."""
-        if self.count >= FOLD_TESTS:
+        """Keep a batch, while there are fewer than DOPPLER_TESTS rows."""
+        if self.count >= DOPPLER_TESTS:
             return
-        table = np.stack([batch.columns[name] for name in FOLD_COLUMNS], axis=1)
-        usable = np.isfinite(table).all(axis=1) & np.isnan(batch.columns["span_mps"])
+        table = np.stack([batch.columns[name] for name in (*DOPPLER, "span_mps")], axis=1)
+        usable = np.isfinite(table[:, :3]).all(axis=1)
         self.count += int(usable.sum())
         for name, rows in grouped(batch.track).items():
             if name:
                 self.rows.setdefault(name, []).append(table[rows][usable[rows]])
 
-    def tracks(self) -> list[dict[str, np.ndarray]]:
-        """Their columns (n,) by track."""
-        whole = (np.concatenate(parts).T for parts in self.rows.values())
-        return [dict(zip(FOLD_COLUMNS, columns, strict=True)) for columns in whole]
+    def notes(self, towards: bool) -> list[str]:
+        """Notes for the user if the other sign fits the rate of the range clearly better, and of folded speeds."""
+        tracks, found = [np.concatenate(parts) for parts in self.rows.values()], []
+        misses = np.abs(np.concatenate([np.empty((2, 0)), *map(_misses, tracks)], axis=1))
+        if misses.shape[1] >= LEAST_TESTS:
+            as_is, turned = np.median(misses, axis=1).tolist()
+            if turned < 0.5 * as_is:
+                cure = tr("leave out --doppler-towards") if towards else tr("give --doppler-towards")
+                told = {"as_is": as_is, "turned": turned, "cure": cure}
+                found = [tr("the Doppler speeds miss the change of the range by {as_is:.1f} m/s (median), with the "
+                            "other sign by {turned:.1f} m/s: {cure}", **told)]  # fmt: skip
+        plain = [dict(zip(DOPPLER, one[np.isnan(one[:, 3]), :3].T, strict=True)) for one in tracks]
+        folded = fit.folding(plain)
+        return found if folded is None else [*found, fit.said(folded)]
+
+
+def _misses(track: np.ndarray) -> np.ndarray:
+    """By how much the speeds of a track (n, 4) and the opposite ones miss the rates of its range (2, m), m/s, but for
+    whole spans."""
+    (dt, dr, *_), (v, span) = np.diff(track, axis=0).T, track[1:, 2:].T
+    near = (dt > 0) & (dt < LONGEST_GAP_S)
+    off = np.stack([v, -v])[:, near] - dr[near] / dt[near]
+    return off - np.nan_to_num(span[near] * np.rint(off / span[near]))
 
 
 def zero_of(text: str) -> str | float:

@@ -267,15 +267,10 @@ def site_of(text: str) -> Site:
         latitude, longitude, height = (float(part) for part in text.split(","))
     except ValueError:
         raise ConfigError(f"at: must be LATITUDE,LONGITUDE,HEIGHT in degrees, degrees, m; got {text!r}") from None
-    faults = []
-    if not -90 <= latitude <= 90:
-        faults.append(f"at: the latitude must be from -90 to 90 degrees, got {latitude:g}")
-    if not -180 <= longitude <= 360:
-        faults.append(f"at: the longitude must be from -180 to 360 degrees, got {longitude:g}")
-    if not -500 <= height <= 100e3:
-        faults.append(f"at: the height must be from -500 to 100000 m, got {height:g}")
-    if faults:
-        raise ConfigError(*faults)
+    limits = (("latitude", -90, 90, "degrees"), ("longitude", -180, 360, "degrees"), ("height", -500, 100_000, "m"))
+    places = zip(limits, (latitude, longitude, height), strict=True)
+    if wrong := [(*one, value) for one, value in places if not one[1] <= value <= one[2]]:
+        raise ConfigError(*("at: the {} must be from {} to {} {}, got {:g}".format(*one) for one in wrong))
     return Site(latitude, longitude, height)
 
 

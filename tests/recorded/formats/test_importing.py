@@ -622,6 +622,11 @@ def test_a_doppler_speed_of_the_other_sign_is_seen(tmp_path, span):
     np.testing.assert_array_equal(columns["velocity_mps"], -speed)
 
 
+def test_a_span_of_zero_is_none(tmp_path):
+    text = "time,track,range_m,velocity,span\n" + "".join(f"{4 * k},1,{1000 + 20 * k},5,0\n" for k in range(30))
+    assert np.isnan(imported(tmp_path, text.encode())[1]["span_mps"]).all()
+
+
 def test_described_is_textbook():
     seen = described(np.array([[3.0, 12.0, 4.0], [-1.0, 0.0, -1.0]]))
     np.testing.assert_allclose(seen["range_m"], [13, math.sqrt(2)])
