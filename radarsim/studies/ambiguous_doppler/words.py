@@ -1,6 +1,7 @@
 """What the report of folded Doppler asks and answers, in words."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -290,6 +291,7 @@ def cures(spec: Any, name: str, swept: Iterable[str] = ()) -> Iterator[tuple[str
             yield said, share
 
 
+@lru_cache(maxsize=64)  # an answer is asked once for each interval that may matter
 def _lost(spec: Any) -> float:
     """The share of realisations in which the only filter's velocity is off by more than half the span at the end."""
     plan = prepare(Case("", "", "ambiguous_doppler", spec, (), TRIED, 1))
