@@ -6,7 +6,7 @@ change comes from the changes without one batch each."""
 import contextlib
 import math
 import os
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -26,7 +26,7 @@ from radarsim.config.fields import Study
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.engine.run import collect
 from radarsim.errors import ConfigError
-from radarsim.language import listed, term, tr
+from radarsim.language import few, listed, term, tr
 from radarsim.report import files, panels, statistics
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MORE = 0.1
-MOST_BARS = 16
+MOST_BARS, LEAST_BAR = 16, 0.01  # of a tornado; and of its longest bar, what is seen
 NOTHING = 1e-9  # per cent: changes below it may be rounding
 ROUNDED = NOTHING / 100  # the same of a ratio; of gains, in points, still less
 FOLDER = "sensitivity"
@@ -352,9 +352,11 @@ def interval(but_one: np.ndarray, value: float) -> tuple[float, float, float]:
 def tornado(found: Sensitivity) -> Figure:
     """Bars of the changes of the leading component by key: each quantity of each filter."""
     rows = [row for row in found.rows if row["component"] == found.leading]
-    keys = list(dict.fromkeys(row["key"] for row in rows))[:MOST_BARS][::-1]
     filters = list(dict.fromkeys(row["filter"] for row in rows))
     kinds = [of for of in found.of if any(math.isfinite(row[of.changes[0]]) for row in rows)]
+    every = list(dict.fromkeys(row["key"] for row in rows))
+    seen = [key for key in every if _is_seen(key, rows, kinds)]
+    keys = seen[:MOST_BARS][::-1]
     made = []
     for n, of in enumerate(kinds):
         change, *bounds = of.changes
@@ -390,9 +392,21 @@ def tornado(found: Sensitivity) -> Figure:
         caption += " " + tr("Keys with −10 % cannot grow and fall instead.")
     if not all(row["exact"] for row in rows):
         caption += " " + tr("Thin lines: 95 % intervals.")
+    if little := [panels.plain(found.labels[key].text) for key in every if key not in seen]:
+        caption += " " + tr("Too small to be drawn: {keys}.", keys=few(little))
     title = tr("Effect of +10 % of each key, {stem}", stem=found.stem)
     height = 24 + 6.5 * max(3, len(keys))
     return Figure("tornado", title, caption, tuple(made), len(made), PAGE_MM, height)
+
+
+def _is_seen(key: str, rows: Sequence[Mapping[Hashable, Any]], kinds: Sequence[Quantity]) -> bool:
+    """Whether the bar of a key is long enough to be seen beside the longest, of any quantity."""
+    for change in (of.changes[0] for of in kinds):
+        sizes = [(abs(row[change]), row["key"]) for row in rows if math.isfinite(row[change])]
+        most = max((size for size, _ in sizes), default=0.0)
+        if any(size >= LEAST_BAR * most and of == key for size, of in sizes):
+            return True
+    return False
 
 
 def tick(name: Label) -> str:

@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from radarsim.config.document import SHIPPED
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.results import Track
 from radarsim.errors import ConfigError
-from radarsim.language import listed, plural, power_of_ten, term, tr
+from radarsim.language import few, listed, plural, power_of_ten, term, tr
 from radarsim.recorded import fit
 from radarsim.recorded.fit import Advice, Asked, Finding
 from radarsim.recorded.follow import Followed, Tally, recorded_of
@@ -46,19 +47,19 @@ FAR_M = 2e4  # distance from which a plan view uses km
 
 
 def figures(followed: Followed) -> dict[str, Figure]:
-    """`plan`, `track`, `residuals`, `nis` and `probabilities`, as far as available, described; by name. Of several
+    """`track`, `plan`, `residuals`, `nis` and `probabilities`, as far as available, described; by name. Of several
     tracks the plots of all and the estimates of the longest."""
     ways = {name: one.places for name, one in followed.tracks.items()} or {"": followed.places}
     order = sorted(ways, key=lambda name: ways[name] is not followed.places)
     track = followed.track()
     drawn = {
-        "plan": plan(track, {name: ways[name] for name in order}),
         "track": estimates(track),
+        "plan": plan(track, {name: ways[name] for name in order}),
         "residuals": residuals(track),
         "nis": innovations(track),
         "probabilities": probabilities(track),
     }
-    return {name: figure for name, figure in drawn.items() if figure is not None}
+    return {name: panels.joined(figure) for name, figure in drawn.items() if figure is not None}
 
 
 def _called(name: object) -> str:
@@ -113,7 +114,7 @@ def plan(track: Track, paths: Mapping[str, Places]) -> Figure | None:
             for path, style, line in zip(own, styles, over_time, strict=True)
         ]
         marks.append(Line(np.zeros(1), np.zeros(1), "", RADAR, name=tr("radar")))
-        marks += _ends(own[0], size)
+        marks += (ends := _ends(own[0], size))
         east, north = Axis(tr("east, {unit}", unit=unit)), Axis(tr("north, {unit}", unit=unit))
         made.insert(0, Panel(east, north, tuple(marks), tr("Plan view"), direct=False, equal=True))
     keys = [(_called(name), style) for name, style in zip(names[:MOST_TRACKS], styles, strict=False)]
@@ -121,14 +122,12 @@ def plan(track: Track, paths: Mapping[str, Places]) -> Figure | None:
         keys.append((tr("{count} more", count=len(own) - MOST_TRACKS), styles[-1]))
     if several:
         made.append(Panel(_time(), _time(), (), keys=((tr("radar"), RADAR), *keys)))
-    caption = (
-        tr(
-            "Positions of the plots. Triangle: the radar; start and end of the longest track with their "
-            "times. Where a file has no heights, slant range replaces ground range."
-        )
-        if len(made) > 1 + several
-        else tr("The range of the plots over time; the file does not give their bearing.")
-    )
+    if len(made) > 1 + several:
+        caption = tr("Positions of the plots. Triangle: the radar.")
+        caption += " " + tr("Start and end of the longest track with their times.") if ends else ""
+        caption += " " + tr("Where a file has no heights, slant range replaces ground range.")
+    else:
+        caption = tr("The range of the plots over time; the file does not give their bearing.")
     columns = min(len(made), 2)
     width = PAGE_MM if columns > 1 else COLUMN_MM
     return Figure("plan", tr("Positions"), caption, tuple(made), columns, width, TALL_MM)
@@ -149,9 +148,10 @@ def _drawn_paths(track: Track, paths: Mapping[str, Places]) -> list[Places]:
 
 
 def _ends(path: Places, size: float) -> list:
-    """Labels at the first and the last place of a track, on the side away from the track."""
+    """Labels at the first and the last place of a track, on the side away from the track; none at plots of which
+    several have one time, as among false ones: they are no track."""
     known = np.flatnonzero(np.isfinite(path.places[:, :2]).all(axis=1))
-    if not known.size:
+    if not known.size or (np.diff(path.t_s[known]) == 0).any():
         return []
     made, third = [], max(len(known) // 3, 1)  # its direction at an end is that of the nearest third
     ends = ((known[0], known[min(third, len(known) - 1)], tr("start")), (known[-1], known[-third], tr("end")))
@@ -167,21 +167,22 @@ def _ends(path: Places, size: float) -> list:
 def estimates(track: Track) -> Figure:
     """A panel for each component: the filters' estimates with their standard deviations, and the plots."""
     made, every = [], max(1, len(track.components) // max(1, len(track.measured)))
-    for c, (component, unit) in enumerate(track.components):
+    for c, (component, own_unit) in enumerate(track.components):
         marks: list = []
+        factor, unit = panels.in_degrees(own_unit)
         d, is_value = divmod(c, every)
         if track.residual is not None and is_value == 0 and d < len(track.measured):
             plots = track.residual[..., d] + track.estimate[..., c]  # the same for every filter that has an estimate
             first, known = np.isfinite(plots).argmax(axis=0), np.isfinite(plots).any(axis=0)
             plots = plots[first, np.arange(plots.shape[1])]
-            marks.append(Line(track.t_s[known], plots[known], "", PLOT, name=tr("plots")))
+            marks.append(Line(track.t_s[known], factor * plots[known], "", PLOT, name=tr("plots")))
         for f, name in enumerate(track.filters[:MOST_FILTERS]):
-            x, half = track.estimate[f, :, c], Z95 * track.sigma[f, :, c]
+            x, half = factor * track.estimate[f, :, c], factor * Z95 * track.sigma[f, :, c]
             if np.isfinite(x).any():
                 label = panels.literal(name)
                 marks.append(Line(track.t_s, x, "", Style(f, f), x - half, x + half, name=label))
         if marks:
-            y = Axis(panels.with_unit(panels.letter(component), unit), limits=_usual(track.estimate[..., c]))
+            y = Axis(panels.with_unit(panels.letter(component), unit), limits=_usual(factor * track.estimate[..., c]))
             made.append(Panel(_time(), y, tuple(marks), direct=False))
     caption = tr(
         "Estimates over the recorded plots; bands: twice each filter's own standard deviation (95 % if "
@@ -197,15 +198,16 @@ def residuals(track: Track) -> Figure | None:
     made: list[Panel] = []
     fitting = max(MOST_RESIDUALS // len(track.measured), 1)
     for f, filter_name in enumerate(track.filters[:fitting]):
-        for d, (name, unit) in enumerate(track.measured):
+        for d, (name, own_unit) in enumerate(track.measured):
+            factor, unit = panels.in_degrees(own_unit)
             known = np.flatnonzero(np.isfinite(track.residual[f, :, d]))
             if not known.size:
                 continue
             known = known[:: -(-known.size // MOST_DOTS)]
-            t, miss = track.t_s[known], track.residual[f, known, d]
+            t, miss = track.t_s[known], factor * track.residual[f, known, d]
             marks: list = [Reference(0.0), Line(t, miss, "", Style(f, None, 0, size_pt=1.8), name=tr("plots"))]
             if track.residual_sigma is not None and np.isfinite(track.residual_sigma[f, known, d]).any():
-                bound = 2 * track.residual_sigma[f, known, d]
+                bound = 2 * factor * track.residual_sigma[f, known, d]
                 marks += [Line(t, bound, "", BOUND, name="± 2 σ"), Line(t, -bound, "", BOUND, name="± 2 σ")]
             of = tr("residual of {measured}", measured=name.rpartition("_")[0])
             axis = Axis(panels.with_unit(of, unit), limits=_usual(miss))
@@ -314,6 +316,7 @@ def _of_folds(case: Case, one: Judged, every: Sequence[Judged]) -> str:
 
 # ---- words -----------------------------------------------------------------------------------------------------------
 DOUBTLESS = 6  # power of ten from which a ratio of likelihoods says no more than that one model is wrong
+EQUAL = 1e-6  # of the log-likelihood: below it two filters are one
 CLEAR = 3.0  # of the log-likelihood, twenty times: from there on one filter is clearly the best
 
 
@@ -346,9 +349,11 @@ def rows(followed: Followed) -> list[str]:
         told = {"name": name, "columns": listed(columns)}
         said.append(("missing", tr("{name} used no plot, because it needs {columns}: predictions only", **told)))
     if followed.silent:
-        said.append(("no rows", tr("{names}: no estimate from these plots", names=", ".join(followed.silent))))
+        said.append(
+            ("no rows", tr("{names}: no estimate from these plots", names=few(followed.silent, len(followed.silent))))
+        )
     if followed.untested:
-        names = ", ".join(followed.untested)
+        names = few(followed.untested, len(followed.untested))
         said.append(("untested", tr("{names}: no innovation with a covariance, so no test", names=names)))
     if followed.gaps:
         words = tr(
@@ -428,7 +433,7 @@ def consistent(judged: Sequence[Judged]) -> list[str]:
     for one in judged:
         verdicts.setdefault(one.filter, set()).add(one.verdict)
     fitting = [name for name, found in verdicts.items() if found == {FITS}]
-    words = tr("{names}: consistent in all tests", names=", ".join(fitting))
+    words = tr("{names}: consistent in all tests", names=few(fitting, len(fitting)))
     return [labelled("", words)] if 0 < len(fitting) < len(verdicts) else []
 
 
@@ -436,15 +441,19 @@ def likely(followed: Followed, advised: Advice) -> list[str]:
     """The filter that predicts the plots best, and errors in the numbers of the one that takes most columns."""
     compared, lines = advised.compared, []
     if len(compared.behind) > 1 and advised.folding is None:
-        behind = sorted(((n, gap) for n, gap in compared.behind.items() if n != compared.best), key=itemgetter(1))
+        equal = [name for name, gap in compared.behind.items() if gap < EQUAL or name == compared.best]
+        behind = sorted(((n, gap) for n, gap in compared.behind.items() if n not in equal), key=itemgetter(1))
         alike: dict[str, list[str]] = {}
         for name, gap in behind:
             alike.setdefault(times(gap), []).append(name)
-        others = ", ".join(tr("{times} times under {name}", times=so, name=listed(own)) for so, own in alike.items())
-        best = compared.best
-        if min(gap for _, gap in behind) <= CLEAR:
-            best = tr("{name} (not clearly)", name=best)
-        words = tr("{best}; the plots are less likely under the others: {others}", best=best, others=others)
+        others = ", ".join(
+            tr("{times} times under {name}", times=so, name=few(own, len(own))) for so, own in alike.items()
+        )
+        words = few(equal, len(equal))
+        if behind and behind[0][1] <= CLEAR:
+            words = tr("{name} (not clearly)", name=words)
+        if behind:
+            words = tr("{best}; the plots are less likely under the others: {others}", best=words, others=others)
         lines.append(labelled("best", words))
     if advised.folding is not None:
         lines.append(labelled("advice", fit.said(advised.folding, followed.case)))
@@ -546,12 +555,12 @@ def write(
     page = html.followed(
         experiment.stem,
         name,
-        _said(verdict(followed, judged, advised)) or [tr("Too few plots to judge the filters by.")],
+        _said(verdict(followed, judged, advised)) or [_unjudged(followed)],
         _said(rows(followed)),
         list(made.values()),
         {tr(ERRORS): errors(followed), tr(TESTS): tests(judged), tr("Tracks"): _tracks(followed)},
         html.yaml_of(experiment.resolved),
-        f"radarsim track {experiment.path or experiment.stem} {name}",
+        f"radarsim track {_typed(experiment)} {name}",
     )
     contents = {NAME: page.encode()}
     for name, one in made.items():
@@ -561,6 +570,19 @@ def write(
             raise ConfigError(f"{path}: would be overwritten; choose another folder")
     files.replace_all(Path(folder), contents)
     return list(made)
+
+
+def _typed(experiment: Experiment) -> str:
+    """A config as it is asked for: a shipped one by its name."""
+    path = experiment.path
+    return path if path and not Path(path).is_relative_to(SHIPPED) else experiment.stem
+
+
+def _unjudged(followed: Followed) -> str:
+    """Why the plots do not tell which filter is best."""
+    if followed.untested:
+        return tr("The plots do not tell which filter is best: the filters give no innovation with a covariance.")
+    return tr("Too few plots to judge the filters by.")
 
 
 def _said(lines: Sequence[str]) -> list[str]:

@@ -84,19 +84,37 @@ def test_places_are_thinned():
     assert len(set(np.diff(path.t_s))) == 1
 
 
-def test_the_report_shows_what_the_terminal_says(tmp_path):
+def test_the_report_shows_what_the_terminal_says(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     one = loaded("sonar_smoothing")
     source = written(tmp_path / "plots <b>.csv", follow.simulated(one), track=["7"] * 40)
     result = command("track", "sonar_smoothing", source, "-o", tmp_path / "track.csv", "--report", tmp_path / "out")
     text = (tmp_path / "out/report.html").read_text(encoding="utf-8")
     assert "What do the filters of sonar_smoothing make of plots &lt;b&gt;.csv?" in text
-    assert "Best: " in text
+    assert "Best: growing and kalman" in text  # the same filter twice, of which neither is the better
+    assert "1.0 times" not in text
+    assert "radarsim track sonar_smoothing plots" in text  # not where the shipped config lies
+    assert text.index('id="figure-track"') < text.index('id="figure-plan"')
+    assert "residual of bearing, °" in text
     assert re.search(r"Advice: the stated values of \w+.* agree with 40 rows\.", text)
     for name in ("plan", "track", "residuals", "nis"):
         assert f'id="figure-{name}"' in text
         assert (tmp_path / f"out/figures/{name}.png").stat().st_size > 1000
     assert "Errors against the truth" in text
     assert f"report   {tmp_path / 'out/report.html'}" in result.stdout
+
+
+def test_among_false_plots_no_track_is_marked_and_no_filter_called_untried_for_want_of_plots(tmp_path):
+    config = "sweep.sensor.false_plots_per_km2=[0.03]"
+    source = written(tmp_path / "plots.csv", follow.simulated(loaded("sonar_clutter", config)))
+    said = command(
+        *("track", "sonar_clutter", source, "--set", config, "-o", tmp_path / "t.csv", "--report", tmp_path / "out")
+    ).stdout
+    assert "untested  nearest, PDA and “nearest, 4 of 6”: no innovation" in said
+    text = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert "The plots do not tell which filter is best: the filters give no innovation with a covariance." in text
+    assert "Triangle: the radar. Where a file has no heights" in text
+    assert "longest track" not in text
 
 
 def test_a_ratio_beyond_doubt_is_no_number_and_a_line_without_label_goes_on():

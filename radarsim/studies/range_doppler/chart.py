@@ -102,14 +102,16 @@ def sentence(place: Place) -> str:
     c, last = significant_digits(place.of.c, ".2g"), place.gain[-1]
     verbs = [
         tr("takes {size:g} % off the range", size=r) if r >= 0 else tr("adds {size:g} % to the range", size=-r),
-        tr("{size:g} % off the velocity", size=V) if V >= 0 else tr("adds {size:g} % to the velocity", size=-V),
+        tr("adds {size:g} % to the velocity", size=-V) if V < 0 else tr("{size:g} % off the velocity", size=V),
     ]
+    if r < 0 <= V:
+        verbs[1] = tr("takes {size:g} % off the velocity", size=V)
     gained = tr("the acceleration gains {size:g} %", size=a)
     acceleration = gained if a >= 0 else tr("the acceleration loses {size:g} %", size=-a)
     away = significant_digits(float(np.abs(place.exact - place.limit).max()), ".2g")
     period = place.inputs[2]
     return tr(
-        "{name}: c = {c} (τ₁ = {tau_1:.3g} s, τ₂ = {tau_2:.3g} s): Doppler {verbs} in the long run; {acceleration}. "
+        "{name}: in the long run Doppler {verbs}; {acceleration} (c = {c}, τ₁ = {tau_1:.3g} s, τ₂ = {tau_2:.3g} s). "
         "At its last scan, {t_s:g} s: {gains} %. With Δt/τ₁ = {first:.2g} and Δt/τ₂ = {second:.2g} the curve of short "
         "periods is up to {away} points off.",
         name=place.name,
@@ -349,7 +351,11 @@ LIVE = ("body.html.j2", "style.css", "script.js")
 SAID = (  # by the page's script
     *(term("range"), term("velocity"), term("acceleration"), term("time, s"), term("Scan {k}, {t} s: {values}")),
     *(term("takes {size} % off the range"), term("adds {size} % to the range")),
-    *(term("takes {size} % off the velocity"), term("adds {size} % to the velocity")),
+    *(
+        term("{size} % off the velocity"),
+        term("takes {size} % off the velocity"),
+        term("adds {size} % to the velocity"),
+    ),
     *(term("the acceleration gains {size} %"), term("the acceleration loses {size} %"), term("from {low} to {high}")),
-    term("c = {c} (τ₁ = {one} s, τ₂ = {two} s): at scan {k}, {t} s, Doppler {range} and {velocity}; {acceleration}."),
+    term("At scan {k}, {t} s, Doppler {range} and {velocity}; {acceleration} (c = {c}, τ₁ = {one} s, τ₂ = {two} s)."),
 )

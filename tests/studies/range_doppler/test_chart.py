@@ -109,7 +109,7 @@ def test_the_papers_radars_lie_where_the_paper_has_them(tmp_path):
 
 def test_ones_own_radar_is_named_and_marked(made):
     (sentence,) = made.sentences
-    assert sentence.startswith("rls2, as set: c = 6.3 (τ₁ = 50 s, τ₂ = 19.9 s): Doppler takes 45.4 % off the range")
+    assert sentence.startswith("rls2, as set: in the long run Doppler takes 45.4 % off the range")
     figures = {"gain_against_time.svg", "map.svg", "steady_gain.svg"}
     assert {"chart.csv", "chart.html", "captions.md", *figures} == set(made.files)
     rows = pd.read_csv(made.folder / "chart.csv")
@@ -182,7 +182,7 @@ def test_the_table_on_the_wall_is_the_closed_form():
 
 def test_the_command(tmp_path):
     document = json.loads(command("chart", "rls4", "--out", tmp_path, "--no-figures", "--json").stdout)
-    assert document["sentences"][0].startswith("rls4: c = 18")
+    assert document["sentences"][0].startswith("rls4: in the long run Doppler takes 52.4 % off")
     assert document["cases"][0]["component"] == "r"
     assert sorted(p.name for p in (tmp_path / "chart").iterdir()) == ["chart.csv", "chart.html"]
     assert "page     " in command("chart", "rls4", "--out", tmp_path, "--no-figures").stdout

@@ -152,10 +152,10 @@ const radar = (() => {
     const told = {
       c: short(c, 2), one: short(one, 3), two: short(two, 3), k: setting.k, t: short((setting.k - 1) * setting.dt),
       range: part(r, "takes {size} % off the range", "adds {size} % to the range"),
-      velocity: part(V, "takes {size} % off the velocity", "adds {size} % to the velocity"),
+      velocity: part(V, r >= 0 ? "{size} % off the velocity" : "takes {size} % off the velocity", "adds {size} % to the velocity"),
       acceleration: part(a, "the acceleration gains {size} %", "the acceleration loses {size} %"),
     };
-    node("sentence").textContent = filled("c = {c} (τ₁ = {one} s, τ₂ = {two} s): at scan {k}, {t} s, Doppler {range} and {velocity}; {acceleration}.", told);
+    node("sentence").textContent = filled("At scan {k}, {t} s, Doppler {range} and {velocity}; {acceleration} (c = {c}, τ₁ = {one} s, τ₂ = {two} s).", told);
   }
 
   function redraw() {
