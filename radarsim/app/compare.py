@@ -373,7 +373,7 @@ def described(cases: Sequence[Case]) -> Chart:
     """The chart of some cases, or without any of the one study that has a chart. Raises ConfigError."""
     studies = list(dict.fromkeys(case.study for case in cases))
     if len(studies) > 1:
-        raise ConfigError(f"one study a chart, these are of {', '.join(studies)}")
+        raise ConfigError(f"one study per chart; these belong to {', '.join(studies)}")
     for name in studies or registry.names():
         made = registry.study(name).chart(cases, references(name))
         if made is not None:

@@ -203,7 +203,7 @@ def _recomputed(found: Inspection, audit: Audit, case: Case | None, most: int) -
         found.realisations += header["count"]
         found.recomputed.append(str(path))
         if header["block"] != work.block or values.size != work.size:
-            found.faults.append(f"{path}: is of other blocks than this program makes")
+            found.faults.append(f"{path}: has other blocks than this program makes")
             continue
         elsewhere |= {*header["platforms"]} - {here}
         if not agree(work, simulated(work, piece), values, {*header["platforms"], here}):

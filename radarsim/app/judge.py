@@ -154,14 +154,14 @@ def judged(
 
 
 def source(given: Any, name: str, components: tuple[str, ...], one_by_one: bool, experiment: Experiment) -> Outside:
-    """Where the estimates come from. Raises ConfigError for what is none of the kinds."""
+    """Where the estimates come from. Raises ConfigError for any other kind."""
     if callable(given) or hasattr(given, "step") or hasattr(given, "start"):
         components = components or outside.components_of(given)
         of = given if hasattr(given, "__qualname__") else type(given)
         return Called(name, given, f"{of.__module__}.{of.__qualname__}", components, one_by_one)
     if len(cases := experiment.cases) > 1:
         which = follow.choice(experiment, "radarsim judge {} ESTIMATES")
-        raise ConfigError(f"{name}: estimates are of one case, and there are {len(cases)}: {which}")
+        raise ConfigError(f"{name}: estimates belong to one case, and there are {len(cases)}: {which}")
     if isinstance(given, Iterator):
         return Chunks(name, given, "iterator", components)
     if isinstance(given, str | os.PathLike):

@@ -126,8 +126,8 @@ def fit(
     """Fit σ and the manoeuvre variance to recorded plots (a file or a table), with 95 % intervals.
 
     Columns: key, stated, value, lo, hi, identifiable; plain, plain_lo, plain_hi: of errors that are normal and
-    independent. allowing: for "outliers", "correlation" (a further key correlation_time_s) or both; default: for what
-    is plain. Raises ConfigError.
+    independent. allowing: for "outliers", "correlation" (a further key correlation_time_s) or both; default: for
+    those that the plots show plainly. Raises ConfigError.
 
     >>> import radarsim
     >>> plots = radarsim.simulate("rls2", overrides=["scans=60"])
@@ -149,7 +149,7 @@ class Registered(Shown):
     """The biases of a radar; its text is the answer.
 
     biases: a row for each of range_m, range_scale, bearing_rad, time_s with value, lo, hi (95 %), identifiable, why (it
-    is not). aircraft: a row for each with what the biases leave: range_m, bearing_rad (medians), time_s, sigma_time_s.
+    is not). aircraft: a row for each with its remaining errors: range_m, bearing_rad (medians), time_s, sigma_time_s.
     sigma_range_m, sigma_bearing_rad: of a plot, without outliers. plots, matched: their number, and those with a
     position of their aircraft."""
 

@@ -415,7 +415,7 @@ def _unknown(name: str, every: Mapping[str, Paper], owner: Mapping[str, str]) ->
     if paper not in every and any(claim.partition(".")[0] == paper for claim in judged):
         return f"readings: {name}: its study declares no choices that {paper} leaves open: there are no other readings"
     if name in judged:
-        return f"readings: {name} is an extension, ours, of which no paper leaves anything open"
+        return f"readings: {name} is an extension of ours: no paper leaves anything open in it"
     ids = [claim for claim, key in owner.items() if key == paper]
     allowed = f"its claims: {', '.join(ids)}" if ids else f"papers: {', '.join(every)}; claims as P1.4"
     return f"readings: no paper or claim {name!r}; {allowed}"

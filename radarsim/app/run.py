@@ -355,7 +355,7 @@ def load_all(sources: Sequence[str | os.PathLike[str]], overrides: Sequence[str]
 
 
 def codes(experiments: Sequence[Experiment]) -> list[str]:
-    """The user's own code in experiments, a line each; imports it. Raises ConfigError for what cannot be imported."""
+    """The user's own code in experiments, a line each; imports it. Raises ConfigError where it cannot be imported."""
     every = [one for experiment in experiments for case in experiment.cases for one in case.outside if one.written]
     return list({f"{one.made} in {one.file}": one.target for one in every})
 

@@ -491,9 +491,9 @@ def nearest(values: Sequence[float], asked: Question) -> float:
 def boundary(asked: Question, curve: Curve, x: float) -> tuple[str, ...]:
     """Whether the nearest value lies at an end of the search range, or of the config's bounds, in words."""
     if x in (asked.over.low, asked.over.high):
-        return (tr("the end of what was searched; {between} searches elsewhere", between=ends()),)
+        return (tr("the end of the searched range; {between} searches elsewhere", between=ends()),)
     beyond = [other for other in curve.refused if abs(other - x) <= 0.05 * abs(x)]
-    return (term("the limit of what the config allows"),) if beyond else ()
+    return (term("the limit that the config allows"),) if beyond else ()
 
 
 # ---- sampled search --------------------------------------------------------------------------------------------------

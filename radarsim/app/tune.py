@@ -352,7 +352,7 @@ def _searched(
 
 class Objective:
     """What is minimised, at a place of the search: over the family the root of the mean square of a size, the mean of
-    anything else; of what is better the more there is, what it leaves of 100 %."""
+    anything else; of a quantity that is better the larger, 100 % less its value."""
 
     def __init__(self, variants: Sequence[Variants], curves: Sequence[Curve], exact: bool, count: int):
         self.variants, self.curves, self.exact, self.count = variants, curves, exact, count
@@ -438,7 +438,7 @@ def flat(of: Objective, best: Place, i: int) -> tuple[float, float]:
 
 
 def inert(of: Objective, best: Place, i: int) -> bool:
-    """Whether a key changes nothing from end to end of what is searched."""
+    """Whether a key changes nothing over the whole searched range."""
     over = of.searched[i].over
     ends = (of((*best[:i], x, *best[i + 1 :])) for x in (over.low, over.high))
     return all(math.isclose(value, of(best), rel_tol=SAME) for value in ends)
@@ -490,7 +490,7 @@ def spread(of: Objective, best: Place) -> dict[Path, tuple[float, float]]:
 
 
 def at_end(of: Searched, x: float) -> bool:
-    """Whether a value is at an end of what was searched."""
+    """Whether a value is at an end of the searched range."""
     low, high, at = (of.over.inner(one) for one in (of.over.low, of.over.high, x))
     return min(at - low, high - at) < NEAR_END * min(1.0, high - low)
 
@@ -689,7 +689,7 @@ def _told(
     judgements = judged(of, [one.name for one in every], pairs)
     held = {one.path for one, x in zip(searched, best, strict=True) if one.over.whole or at_end(one, x)}
     notes = [
-        tr("{key} ends at {value}, the end of what was searched; --free KEY=LOW:HIGH searches elsewhere", **told)
+        tr("{key} ends at {value}, the end of the searched range; --free KEY=LOW:HIGH searches elsewhere", **told)
         for one, x in zip(searched, best, strict=True)
         for told in [{"key": ".".join(map(str, one.path)), "value": shown(x)}]
         if at_end(one, x)
@@ -734,9 +734,9 @@ def beside(
     experiment: Experiment, wanted: str | None, **asked: Any
 ) -> tuple[Experiment, list[str], tuple[str, float] | None]:
     """The experiment with each of its filters as tuned over all its cases too, why some are not, and the component and
-    time, s, that they are tuned for, None if of no component; raises ConfigError where none is.
+    time, s, that they are tuned for, None if it has no component; raises ConfigError where none is.
 
-    wanted: for what, by default σ of the first component at the last scan; asked: as `tune` takes it."""
+    wanted: the quantity, by default σ of the first component at the last scan; asked: as `tune` takes it."""
     case, found, left_out = experiment.cases[0], list[Tuned](), []
     axes = registry.study(case.study).prepare(case).axes
     wanted = wanted or f"sigma {axes.components[0][0]}"

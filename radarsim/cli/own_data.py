@@ -301,7 +301,7 @@ def track(config: str, plots: str, output: str | None, quiet: bool, overrides: t
 )
 @click.option("--robust", is_flag=True, help="Allow for outliers: plots with errors of ten times their σ.")
 @click.option("--correlated", is_flag=True, help="Fit the correlation time of the errors, correlation_time_s, too.")
-@click.option("--plain", is_flag=True, help="Allow for neither; default: for what is plain in the plots.")
+@click.option("--plain", is_flag=True, help="Allow for neither; default: for those that the plots show plainly.")
 @click.option(
     "--write",
     metavar="MINE.yaml",

@@ -606,7 +606,7 @@ class Expander:
     def _refuse_mixture(self, drafts: list[Draft], document: Document) -> None:
         studies = {draft.study for draft in drafts}
         if len(studies) > 1:
-            message = f"one study a run, these are of {', '.join(sorted(studies))}"
+            message = f"one study per run; these belong to {', '.join(sorted(studies))}"
             self.faults.add(document.origin(("include",)), ("include",), message)
 
     def _check_figure_names(self, common: Common, drafts: list[Draft], document: Document) -> None:

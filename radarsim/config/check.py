@@ -342,7 +342,7 @@ def label(keys: Study | type[Study] | None, key: str) -> Label:
     >>> label(registry.keys("range_doppler"), "radar.sigma_velocity_mps")
     Label(text='σ of the measured radial velocity', symbol='σ_V', unit='m/s')
 
-    A key that no schema tells of is called by its own words:
+    A key without a schema is named by its own words:
 
     >>> label(None, "echo.rise_time_s")
     Label(text='rise time', symbol='', unit='s')

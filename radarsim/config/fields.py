@@ -463,7 +463,7 @@ class Study(Model):
 
     @property
     def device(self) -> str | None:
-        """The display name of what measures: of the first part of the config that has a name."""
+        """The display name of the sensor: that of the first part of the config with a name."""
         parts = (getattr(self, key) for key in type(self).model_fields)
         names = (dict(part).get("name") for part in parts if isinstance(part, Model))
         return next(filter(None, names), None)
@@ -930,7 +930,7 @@ class Recorded(Model):
     file: Annotated[str, DataFile()] = key("file", "path of the file, relative to this one")
 
     def reach_m(self, t: float) -> float:
-        """A bound on the range up to a time t (s): of what is in the file none is known here."""
+        """A bound on the range up to a time t (s): none is known here for the content of the file."""
         return 0.0
 
 

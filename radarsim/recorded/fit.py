@@ -480,8 +480,8 @@ def answered(
     allowing: Sequence[str] | None = None,
     progress: Progress = silent,
 ) -> Fit:
-    """The fit of a likelihood that allows for what is asked, or where None for outliers and correlation that are plain:
-    which raise the likelihood by more than chance does in one recording of 1000. With the plain fit beside it."""
+    """The fit of a likelihood, with the plain fit beside it. allowing: for which errors; None: for outliers and
+    correlation that raise the likelihood by more than chance does in one recording of 1000."""
     allowed = tuple(allowing or ())
     check_explained(likelihood, allowed)
     stages = Stages(progress, bool(allowed))
@@ -523,7 +523,7 @@ def fitted(
         raise ConfigError(f"filter {likelihood.filter} cannot take the plots: `radarsim track` says at which row")
     share = float(search.natural(search.best)[-1]) if robust else None
     if share is not None and share > MOST_OUTLIERS:
-        raise ConfigError(f"robust: {100 * share:.0f} % of the plots would have to be outliers: their errors are of "
+        raise ConfigError(f"robust: {100 * share:.0f} % of the plots would have to be outliers: their errors follow "
                           "another law (few different values?); fit without it")  # fmt: skip
     keys = tuple(search.interval(i) for i in range(len(likelihood.keys)))
     stated = likelihood(np.array(likelihood.stated), 0.0)
@@ -888,7 +888,7 @@ def settings(found: Fit) -> dict[str, float]:
 
 
 def as_rows(found: Fit) -> list[dict[str, Any]]:
-    """The keys as rows of a table, with the plain answer beside that which allows for outliers or correlation."""
+    """The keys as rows of a table, with the plain answer beside the one that allows for outliers or correlation."""
     plain = {one.key: (one.value, one.lo, one.hi) for one in (found.plain or found).keys}
     names = ("plain", "plain_lo", "plain_hi")
     return [asdict(one) | dict(zip(names, plain.get(one.key, (None,) * 3), strict=True)) for one in found.keys]

@@ -99,9 +99,9 @@ class Adjusted:
 
 @dataclass(frozen=True)
 class Registration:
-    """What `register` finds: biases and errors of plots; those matched, of how many and by what; their median distance
-    in range and bearing before; what was left out; the distance of 95 % of interpolated positions from straight lines.
-    """
+    """What `register` finds: biases and errors of plots; the matched ones, out of how many and how; their median
+    distance in range and bearing before; the items left out; the distance of 95 % of interpolated positions from
+    straight lines."""
 
     adjusted: Adjusted
     aircraft: tuple[Aircraft, ...]

@@ -202,7 +202,7 @@ def _estimate(rows: "pd.DataFrame", end: str) -> Estimate:
 
 
 def correlation(pair: Pair, of: Quantity, rows: "pd.DataFrame") -> tuple[np.ndarray, np.ndarray]:
-    """For each row the correlation of both estimates, in the worst case, and a word on what is known of it."""
+    """For each row the correlation of both estimates, in the worst case, and how it is known."""
     n = len(rows)
     if not pair.common_noise:
         return np.zeros(n), np.full(n, INDEPENDENT, dtype=object)

@@ -215,8 +215,8 @@ def believed(result: CaseResult, sigma: np.ndarray) -> dict[str, np.ndarray]:
     """The measured σ, by component and scan, beside the σ that the filters believe, sigma (F, K, C).
 
     Over 1 a filter is *optimistic*, its errors are larger than it believes; under 1 it is *pessimistic*. The interval
-    is that of the measured σ alone. Where the believed one hangs on which plots are missed its mean has a chance of its
-    own, which is small beside: rows of a radar that misses plots cover 94 … 95 %. Filters that adapt bring a `note`."""
+    is that of the measured σ alone. Where the believed one depends on which plots are missed, its mean has a small
+    sampling error of its own: rows of a radar that misses plots cover 94 … 95 %. Filters that adapt bring a `note`."""
     at = f, k, c = tables.shown(result)
     n = tables.realisations(result)[at]
     true, claimed = statistics.errors(np.asarray(result.sums["error"])[at], n).sigma, sigma[at]

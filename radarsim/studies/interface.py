@@ -159,9 +159,9 @@ class Drawn:
         return {**self.columns, **self.beside, **state}
 
     def table(self) -> "dict[str, np.ndarray]":
-        """All realisations one after the other as columns (rows,): `realisation`, `t_s`, what is measured, the truth. A
-        row a scan; where a scan may have several plots a row a plot, and one without values where it has none; of the
-        truth these have what stands beside it alone."""
+        """All realisations one after the other as columns (rows,): `realisation`, `t_s`, what is measured, the truth.
+        One row per scan; where a scan may have several plots, one per plot, without values where it has none, and of
+        the truth with the columns of `beside` alone."""
         import numpy as np
 
         n, K = self.truth.shape[:2]

@@ -135,7 +135,7 @@ def stepped(name: str, target: Any, plots: Plots) -> Any:
 
 
 def parts(given: Any) -> tuple[Any, Any]:
-    """Estimates, and covariances or None, of what a filter gave: a tuple; or a list, whose second has one more axis."""
+    """Estimates, and covariances or None, of a filter's answer: a tuple, or a list whose second has one more axis."""
     if isinstance(given, list) and len(given) == 2:
         x, P = (getattr(one, "ndim", 0) for one in given)
         given = tuple(given) if x and x + 1 == P else given
@@ -248,7 +248,7 @@ def checked(name: str, given: Any, n: int, K: int, components: Sequence[str], ow
     if x.ndim != 3 or x.shape[:2] != (n, K) or not (x.shape[2] == most if own else 1 <= x.shape[2] <= most):
         orders = itertools.permutations(range(3)) if x.ndim == 3 else ()
         order = next((o for o in orders if x.shape[o[1]] == K and 1 <= x.shape[o[2]] <= most and o != (0, 1, 2)), None)
-        hint = f"; its axes are in another order: transpose{order} mends it" if order else ""
+        hint = f"; its axes are in another order: transpose{order} fixes it" if order else ""
         raise ConfigError(f"{name}: estimates must have shape {wanted}, got {x.shape}{hint}")
     d = x.shape[2]
     if P is not None and (P := plain(P)).dtype.kind not in "fiu":
@@ -376,7 +376,7 @@ class Judged:
 
 
 def judged(plan: Plan, member: Outside, given: Any, drawn: "Drawn", scale: np.ndarray) -> Judged:
-    """The errors of what a filter gave. scale (n, C): the largest error of the study's own filters."""
+    """The errors of a filter's estimates. scale (n, C): the largest error of the study's own filters."""
     names, K = plan.names, len(plan.world.t_s)
     x, P = checked(member.name, given, drawn.n, K, names, member.components)
     places = columns_of(member.name, x.shape[2], names, member.components)

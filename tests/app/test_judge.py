@@ -610,7 +610,7 @@ def test_studies_without_paired_plots_are_refused_with_the_reason():
     for config, why in (("discriminator", "draws no plots"), ("sonar_clutter", "trackers find tracks of their own")):
         with pytest.raises(ConfigError, match=why):
             radarsim.judge(config, held, realisations=64)
-    with pytest.raises(ConfigError, match=r"are of one case, and there are 4: choose of sensor\.detection_prob"):
+    with pytest.raises(ConfigError, match=r"belong to one case, and there are 4: choose of sensor\.detection_prob"):
         radarsim.judge("sonar_missed", np.zeros((64, 20, 2)))
 
 

@@ -170,7 +170,7 @@ def test_unknown_names_say_what_is_allowed():
         app.asked(["P9", "P1.99"])
     assert caught.value.lines[0].startswith("readings: no paper or claim 'P9'; papers: P1, ")
     assert "its claims: P1.1, P1.2" in caught.value.lines[1]
-    with pytest.raises(ConfigError, match=r"P1\.E1 is an extension, ours"):
+    with pytest.raises(ConfigError, match=r"P1\.E1 is an extension of ours"):
         app.asked(["P1.E1"])
 
 

@@ -182,7 +182,7 @@ def test_whole_numbers_alone_have_no_interval():
     assert one.tuned in (1, 2, 3)
     assert (one.lo, one.hi) == (None, None)
     assert found.notes == (
-        "hypotheses ends at 3, the end of what was searched; --free KEY=LOW:HIGH searches elsewhere",
+        "hypotheses ends at 3, the end of the searched range; --free KEY=LOW:HIGH searches elsewhere",
     )
 
 

@@ -306,7 +306,7 @@ def test_a_study_may_be_named_beside_include_but_must_agree(folder, said):
 
 def test_one_study_a_run(folder, said):
     folder("configs/both.yaml", "include: [a, sonar_smoothing]\n")
-    assert said("both") == ["configs/both.yaml:1:10: include: one study a run, these are of range_doppler, sonar"]
+    assert said("both") == ["configs/both.yaml:1:10: include: one study per run; these belong to range_doppler, sonar"]
 
 
 def test_too_many_cases_by_include_alone(folder, said):

@@ -58,7 +58,7 @@ class Cut:
         return layout.flag(self.spec, item, name).of(self.data, self.at[item])
 
     def tests(self, item: str) -> np.ndarray:
-        """Marks (n,) of what is no aircraft."""
+        """Which reports (n,) are of no aircraft."""
         flags = (("test target", "TST"), ("simulated", "SIM"), ("field monitor", "RAB"))
         return np.bitwise_or.reduce([mark(what, self.flag(item, name)) for what, name in flags])
 
@@ -338,7 +338,7 @@ class Asterix:
                 yield self._batch(self.held[number])
 
     def notes(self, radars: Iterable[str]) -> list[str]:
-        """What was marked, and what is known of these radars, in words."""
+        """The marked reports, and the facts on these radars, in words."""
         found = self.clock.notes()
         turns = [(radar, self.survey.turns[radar]) for radar in radars if radar in self.survey.turns]
         if turns:

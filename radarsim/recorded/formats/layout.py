@@ -451,7 +451,7 @@ def _captured(path: str, file: BinaryIO, left: Counter[str]) -> Iterator[Block]:
     after = Counter[int]()
     for begin, link, data, whole in _packets(path, file, left):
         if not whole:
-            left[term("packets of which the capture kept the beginning only")] += 1
+            left[term("packets cut short by the capture")] += 1
             continue
         place = _datagram(data, link, left)
         if place is None:

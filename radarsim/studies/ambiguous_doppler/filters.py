@@ -164,7 +164,7 @@ def model(order: int, variance: float, dt: float) -> tuple[np.ndarray, np.ndarra
 
 
 def prior_variances(order: int, prior: Any) -> np.ndarray:
-    """Variances (2,) of velocity and acceleration before the first plot; zero of what the model has not."""
+    """Variances (2,) of velocity and acceleration before the first plot; zero where the model has none."""
     return np.array([prior.sigma_velocity_mps**2, prior.sigma_acceleration_mps2**2 if order == 2 else 0.0])
 
 
@@ -376,7 +376,7 @@ def advanced(
 
 
 def widths(bias: np.ndarray, noise: np.ndarray, of: Sequence[Member], prior: Any) -> np.ndarray:
-    """Half widths (K, I, 3) of intervals of INTERVAL_SIGMAS; zero of what a filter does not estimate.
+    """Half widths (K, I, 3) of intervals of INTERVAL_SIGMAS; zero where a filter has no estimate.
 
     bias (2, I, K, 3) of a drawn velocity and acceleration of one, noise (K, I, 3, I, 3). What is drawn from the prior
     is no manoeuvre: a velocity, and an acceleration to a model that has one."""

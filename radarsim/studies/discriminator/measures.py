@@ -30,7 +30,7 @@ ESTIMATE = 1.17  # the paper's own estimate of the amplitude, which it puts into
 
 
 class Evidence(claims.Evidence):
-    """Finds the paper's experiment in its two readings, its swept variants, and the estimators, by what they are."""
+    """Finds the paper's experiment in its two readings, its swept variants, and the estimators, by their settings."""
 
     def case(self, key: Any) -> CaseResult:
         """key: a reading, or (swept key, value) of the maps."""

@@ -43,7 +43,7 @@ class Readings(PaperReadings):
         return claim.id in EXACT
 
     def of_claim(self, claim: str) -> list[Reading]:
-        """Of what is exact all combinations of E and U; of what is run, of the choices that bear on it."""
+        """All combinations of E and U for exact claims; for claims that need runs, of the choices that bear on them."""
         own = [choice for choice in self.choices if choice.bears_on(claim)]
         singly = [
             self.reading(**{choice.key: one.name})

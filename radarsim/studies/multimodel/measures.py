@@ -34,7 +34,7 @@ def is_flight(target: Any, flight: str) -> bool:
 
 
 class Evidence(claims.Evidence):
-    """Finds cases by (target's stages and kind, scan period), and filters by what they are."""
+    """Finds cases by (target's stages and kind, scan period), and filters by their settings."""
 
     def case(self, key: Any) -> CaseResult:
         """key: (name of the flight, scan period, filters that must be there)."""

@@ -60,14 +60,14 @@ def _changed(one: Any, reading: Reading, period_s: float) -> Any:
 
 
 class Flown(measures.Evidence):
-    """What was flown under a reading, found by what the shipped filters are; stages are those of what was flown."""
+    """The flights under a reading, found by the settings of the shipped filters; stages are those of the flights."""
 
     def __init__(self, seen: Seen):
         super().__init__(seen.results, seen.tables, seen.places)
         self._ran = {one.name: one for one in seen.ran}
 
     def stage(self, key: Any, name: str) -> int:
-        """The number of a stage of what was flown."""
+        """The number of a stage of a flight."""
         return tables.stage_names(self._ran[self.case(key).name]).index(name)
 
     def _bounds(self, of: Any, stage: str) -> tuple[float, float]:

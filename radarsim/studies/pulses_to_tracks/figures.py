@@ -22,7 +22,7 @@ DRAWN_FROM = {"threshold": ("locks", "curves"), "measured": ("estimates",)}
 
 
 def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
-    """sigma_r … gain_ar; folds; locks, measured, losses of what is not swept, threshold of what is."""
+    """sigma_r … gain_ar; folds; locks, measured, losses of cases without a sweep, threshold of the others."""
     drawn = panels.per_component(results, made, RADIAL, experiment)
     for name, (draw, title, caption) in OWN.items():
         unswept = [result for result in panels.unswept(results) if not result.swept]

@@ -10,7 +10,7 @@ from radarsim.studies.pulses_to_tracks.study import PulsesAxes
 
 
 def floor(spec: Any, axes: PulsesAxes) -> Floor | None:
-    """A burst tells of velocity and acceleration at most what its Fisher bounds say; the designation is a measurement.
+    """A burst measures velocity and acceleration no better than its Fisher bounds; the designation is a measurement.
     Of the second degree, or of the target's own where that is higher; of other motions none is defined."""
     if spec.target.kind != "polynomial":
         return None

@@ -59,7 +59,7 @@ def prepare(case: Case) -> Plan:
 def observed(
     case: Case, truth: np.ndarray, bursts: list[Burst], made: filters.Designed, missed: np.ndarray
 ) -> kernels.World:
-    """The kernels' arrays of what is observed."""
+    """The kernels' arrays of the observations."""
     spec, burst, dt = case.spec, bursts[0], case.spec.radar.scan_period_s
     laws = {one.noise_variance: i for i, one in enumerate(dict.fromkeys(bursts))}
     sigmas = np.sqrt([one.noise_variance for one in bursts])

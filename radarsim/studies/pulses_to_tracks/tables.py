@@ -51,7 +51,7 @@ def marks(results: Sequence[Result]) -> dict[tuple[str, str, str, int], str]:
 
 
 def noted(table: "pd.DataFrame", found: Mapping[tuple[str, str, str, int], str]) -> "pd.DataFrame":
-    """A table with the notes of its filters, or of what they are compared with."""
+    """A table with the notes of its filters, or of their baselines."""
     if not found or not len(table):
         return table
     of = [table[label] for label in ("case", "filter", "component", "k")]

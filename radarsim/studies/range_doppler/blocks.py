@@ -15,7 +15,7 @@ Problem = linear.Problem | missed.Problem
 
 
 def problem(case: Case, made: Designed, baseline: int) -> Problem:
-    """Of the paper's world a problem for all gains alike, of any other one for each its own."""
+    """For the paper's world a problem with shared gains, for any other one with gains of each realisation."""
     of = shared_gains if made.plain else own_gains
     return of(case, made, baseline).plain()
 

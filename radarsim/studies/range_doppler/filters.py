@@ -334,7 +334,7 @@ def design(
 
 
 def updated(P: Any, F: Any, Q: Any, R: Any, there: Any) -> tuple[Any, Any, Any]:
-    """A covariance after a scan, packed, and its gains (3,) on range and velocity, of which there are some; R (2,)."""
+    """A covariance after a scan, packed, and its gains (3,) on the range and velocity where there are any; R (2,)."""
     P, of_range, of_velocity = algebra.predicted_covariance(P, F, Q), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if there[0]:
         P, of_range, _ = algebra.take_value(P, R[0], 1.0)
@@ -469,7 +469,7 @@ def errors_of_many(C_theta: np.ndarray, Lambda: np.ndarray) -> np.ndarray:
 def error_recursion(
     one: LinearFilter, plots: Plots, truth: np.ndarray, dt: float, drawn: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Lasting errors E (K, 3, C) and covariance S (K, 3, 3) of what noise makes, at every scan of a truth (K, 3).
+    """Lasting errors E (K, 3, C) and covariance S (K, 3, 3) due to noise, at every scan of a truth (K, 3).
 
     drawn: see `defects`. Before the start the estimates are the plots."""
     defect, observes, begun = defects(truth, dt, plots, drawn), one.observes, one.start - 1

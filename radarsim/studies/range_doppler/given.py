@@ -20,9 +20,9 @@ STEADY = 1e-9  # relative change of a gain from one scan to the next that counts
 
 
 class Scans(NamedTuple):
-    """What gains are made for: K scans, or rows of recorded plots, of which there is a start and what comes after.
+    """What gains are made for: K scans, or rows of recorded plots: a start and the rows after it.
 
-    t_s (K,) are their times, s; there (K, 2) says of which range and velocity come and are observed; sigma (2,) are the
+    t_s (K,) are their times, s; there (K, 2): where range and velocity come and are observed; sigma (2,) are the
     standard deviations of these, m and m/s. start is the scan, from 1, at which the least-squares start ends, and
     covariance (3, 3) that of its range, velocity and acceleration, m, m/s, m/s²."""
 
@@ -45,7 +45,7 @@ class Scans(NamedTuple):
         return gains
 
     def errors(self, gains: np.ndarray, noise: Callable[[float], np.ndarray]) -> np.ndarray:
-        """Covariances (K, 3, 3) of the errors that gains (K, 3, 2) leave: of the plots, and of what noise(dt) adds."""
+        """Covariances (K, 3, 3) of the errors that gains (K, 3, 2) leave: of the plots and of noise(dt)."""
         made, R = np.zeros((len(self.t_s), 3, 3)), np.diag(self.sigma**2)
         made[self.start - 1] = self.covariance
         F, Q, over = np.eye(3), np.zeros((3, 3)), 0.0
@@ -187,7 +187,7 @@ def followed(
     """Estimates, standard deviations (n, 3), and normalised innovations squared (n, 2) over the rows after the start.
 
     x (3,) is the state at the start, z (K, 2) are the plots. The velocity's innovation is what the range's leaves of
-    it. Last, the variances (n, 2) of what the plots differ by from the estimates."""
+    it. Last, the variances (n, 2) of the differences between plots and estimates."""
     made = checked(one, scans)
     noise = noise_of(one)
     P, R = scans.errors(made, noise), np.diag(scans.sigma**2)

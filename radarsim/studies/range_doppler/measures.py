@@ -26,7 +26,7 @@ Key = int | tuple[int, float]  # a radar at D_M = 10⁻³, or a radar and its D_
 
 
 class Evidence(claims.Evidence):
-    """Finds the paper's radars, and its two filters, by what they are."""
+    """Finds the paper's radars, and its two filters, by their settings."""
 
     extremum = 1.0  # point of gain: what differs by less is no material difference, of two times either
 

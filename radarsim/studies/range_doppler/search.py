@@ -36,7 +36,7 @@ USUAL_SCANS = (3, 2)
 
 
 def covariance_of(form: Form, variance: float, sigma_range_m: float, dt: float) -> np.ndarray:
-    """Q (3, 3) of one scan, by what the number D_M is taken to be.
+    """Q (3, 3) of one scan, by the meaning of the number D_M.
 
     random_jerk: eq. (6), the variance of a jerk that is constant over the scan, (m/s³)². white_jerk: the spectral
     density of a white jerk, m²/s⁵. white_jerk_rate: D_M Δt in place of that density. acceleration_step: the variance of

@@ -96,7 +96,7 @@ def shortened(case: Case, at_s: float | None, at_k: int | None) -> Case:
 
 
 def exact_but_for(case: Case) -> str:
-    """What σ of missed plots is, where not every pattern of plots is followed on its own."""
+    """How exact σ of missed plots is, where not every pattern of plots is followed on its own."""
     spec: Keys = case.spec
     if spec.radar.detection_probability == 1:
         return ""

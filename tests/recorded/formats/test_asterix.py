@@ -151,9 +151,7 @@ def test_what_a_capture_has_besides_is_counted(tmp_path):
         "packets other than UDP (3)",
         "tails of 8 bytes after the data blocks of datagrams (4)",
     ]
-    assert refused_alone(tmp_path, pcap(PLAINLY, cut=1)).endswith(
-        "; left out: packets of which the capture kept the beginning only (5)"
-    )
+    assert refused_alone(tmp_path, pcap(PLAINLY, cut=1)).endswith("; left out: packets cut short by the capture (5)")
     assert "packets of the kind of link 147, which is not read (5)" in refused_alone(tmp_path, pcap(PLAINLY, link=147))
 
 

@@ -152,7 +152,7 @@ def test_a_name_cannot_break_out_of_the_page():
 def test_what_has_no_place_on_it(tmp_path):
     with pytest.raises(ConfigError, match="has no chart"):
         chart("sonar_missed", out=tmp_path)
-    with pytest.raises(ConfigError, match="one study a chart"):
+    with pytest.raises(ConfigError, match="one study per chart"):
         chart("rls2", "sonar_missed", out=tmp_path)
     alone = chart(
         "rls2",

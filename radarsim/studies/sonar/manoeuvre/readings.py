@@ -33,7 +33,7 @@ class Readings(PaperReadings):
         return claim.id in (ENOUGH, SINGLE) or "plots" in self.sets(reading)
 
     def of_claim(self, claim: str) -> list[Reading]:
-        """All combinations of what bears on a claim."""
+        """All combinations of the choices that bear on a claim."""
         return list(self.combined([choice for choice in self.choices if choice.bears_on(claim)]))
 
     def parts(self, claim: Claim, reading: Reading) -> Sequence[Part]:
