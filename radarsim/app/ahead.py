@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from radarsim.app.configs import CaseWork
 
 Progress = Callable[[int, int, int], None]
-Key = TypeVar("Key")
+Name = TypeVar("Name")
 
 LADDER, FOR_NOTHING = 8, 1.2  # factor between numbers of realisations tried; times that count as equal
 SHORT_S = 0.01
@@ -41,7 +41,7 @@ def timed(work: CaseWork, count: int) -> float:
     return min(seconds)
 
 
-def estimated(cases: Mapping[Key, tuple[CaseWork, int]]) -> dict[Key, float]:
+def estimated(cases: Mapping[Name, tuple[CaseWork, int]]) -> dict[Name, float]:
     """Seconds of one thread for the realisations of each case, from a few of them, after compilation."""
     seconds = {}
     for key, (work, realisations) in cases.items():
