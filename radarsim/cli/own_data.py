@@ -263,14 +263,12 @@ def track(config: str, plots: str, output: str | None, quiet: bool, overrides: t
     started = False
 
     def sink(piece: "Track", name: str | None) -> None:
-
         nonlocal started
         if not started:
             write([files.header_of(piece, name is not None)])
             started = True
         write(files.rows_of(piece, name))
 
-    sources = [plots, *([loaded.path] if loaded.path else [])]
     with contextlib.ExitStack() as stack:
         write = stack.enter_context(Writer(output, read)).write if output else outcomes.echo
         counter = stack.enter_context(console.Counter("tracking", "rows"))
@@ -285,7 +283,7 @@ def track(config: str, plots: str, output: str | None, quiet: bool, overrides: t
     if output:
         console.field("track", output)
     if folder:
-        page.write(followed, loaded, plots, judged, advised, folder, sources)
+        page.write(followed, loaded, plots, judged, advised, folder)
         click.echo(wording.labelled("report", str(Path(folder) / page.NAME)), err=output is None)
     console.print_warnings(run.cache_troubles())
 

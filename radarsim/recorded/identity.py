@@ -117,31 +117,19 @@ class Paths:
             self.asked.add(values)
             for k, (kind, value) in enumerate(zip(KINDS, values, strict=True)):
                 wearers = [i for i in self.wearers.get((kind, value), ()) if not self.paths[i].is_another(values[:k])]
-                if wearers:
-                    rest = rows[found.path[rows] < 0]
-                    states = turned(np.stack([self._at(i, (kind, value), t[rest]) for i in wearers]))
-                    self._take(found, rest, k, wearers, states, range_m[rest], bearing_rad[rest])
+                if not wearers:
+                    continue
+                rest = rows[found.path[rows] < 0]
+                states = turned(np.stack([self._at(i, (kind, value), t[rest]) for i in wearers]))
+                may = np.isfinite(states[..., 0])
+                if k:
+                    may &= near(offsets(states, range_m[rest], bearing_rad[rest]), range_m[rest])
+                one = may.sum(axis=0) == 1  # just one of them may be its own
+                which = may.argmax(axis=0)[one]
+                found.states[rest[one]] = states[which, np.flatnonzero(one)]
+                found.path[rest[one]] = np.array(wearers)[which]
+                found.kind[rest[one]] = k
         return found
-
-    def _take(
-        self,
-        found: Found,
-        rows: np.ndarray,
-        k: int,
-        wearers: list[int],
-        states: np.ndarray,
-        range_m: np.ndarray,
-        bearing_rad: np.ndarray,
-    ) -> None:
-        """Give each of the rows the wearer, with these states there, that may be its own, if there is just one."""
-        may = np.isfinite(states[..., 0])
-        if k:
-            may &= near(offsets(states, range_m, bearing_rad), range_m)
-        one = may.sum(axis=0) == 1
-        which = may.argmax(axis=0)[one]
-        found.states[rows[one]] = states[which, np.flatnonzero(one)]
-        found.path[rows[one]] = np.array(wearers)[which]
-        found.kind[rows[one]] = k
 
     def _at(self, number: int, name: tuple[str, str], t: np.ndarray) -> np.ndarray:
         """Position and speed (n, 6) of an aircraft at the times at which it has this identity."""

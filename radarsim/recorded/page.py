@@ -5,10 +5,9 @@ Whether the stated accuracies fit is judged by the filters' own innovations. For
 innovations, divided by their predicted variance, average 1 for each degree of freedom (NIS). Larger: the plots are
 worse than stated, or the target manoeuvres more than the filter assumes; smaller: they are better."""
 
-import itertools
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from pathlib import Path
@@ -375,18 +374,10 @@ def counted(rows: int) -> str:
 
 def errors(followed: Followed) -> list[dict[str, Any]]:
     """The filters' errors, where the file has the truth: a row each, by column."""
-    return [
-        {
-            "filter": one.filter,
-            "component": one.component,
-            "RMS error": one.rms,
-            "unit": tr(unit_of(one.unit)),
-            "of own σ": one.ratio,
-            "estimates": one.count,
-        }
-        for one in followed.errors.values()
-        if one.count
-    ]
+    columns = ("filter", "component", "RMS error", "unit", "of own σ", "estimates")
+    every = [one for one in followed.errors.values() if one.count]
+    rows = [(one.filter, one.component, one.rms, tr(unit_of(one.unit)), one.ratio, one.count) for one in every]
+    return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
 ERRORS, TESTS = (term("Errors against the truth"), term("Innovations (NIS of a consistent filter: 1)"))
@@ -400,19 +391,9 @@ FINDINGS = {
 
 def tests(judged: Sequence[Judged]) -> list[dict[str, Any]]:
     """The tests of the innovations: a row each, by column."""
-    return [
-        {
-            "filter": one.filter,
-            "number": one.name,
-            "plots": one.tests,
-            "NIS": one.nis,
-            "95 % from": one.lo,
-            "95 % to": one.hi,
-            "stated σ": tr(one.verdict),
-        }
-        for one in judged
-        if one.tests
-    ]
+    columns = ("filter", "number", "plots", "NIS", "95 % from", "95 % to", "stated σ")
+    rows = [(one.filter, one.name, one.tests, one.nis, one.lo, one.hi, tr(one.verdict)) for one in judged if one.tests]
+    return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
 NUMBERS = {  # columns of these, and how they are printed
@@ -544,10 +525,9 @@ def write(
     judged: Sequence[Judged],
     advised: Advice | None,
     folder: str | os.PathLike,
-    sources: Iterable[str | os.PathLike] = (),
 ) -> list[str]:
     """Write the page and `figures/` into a folder; the names of the figures. Raises StoreError, and ConfigError, with
-    nothing written, where a file would overwrite one of the sources."""
+    nothing written, where a file would overwrite the plots or the config."""
     from radarsim.report import files, html
     from radarsim.report.figures import save
 
@@ -565,8 +545,8 @@ def write(
     contents = {NAME: page.encode()}
     for name, one in made.items():
         contents |= {f"figures/{name}.{kind}": data for kind, data in save(one).items()}
-    for path, source in itertools.product((Path(folder, name) for name in contents), sources):
-        if files.same_file(path, source):
+    for path in (Path(folder, name) for name in contents):
+        if any(files.same_file(path, one) for one in (source, experiment.path) if one):
             raise ConfigError(f"{path}: would be overwritten; choose another folder")
     files.replace_all(Path(folder), contents)
     return list(made)

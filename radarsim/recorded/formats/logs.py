@@ -93,12 +93,8 @@ def _trace(document: dict[str, Any], sheet: Sheet) -> Iterator[list[str]]:
             altitude = course = None
         if geometric is None and flags & GEOMETRIC:
             geometric, altitude = altitude, None
-        time = start + _number(dt)
-        yield [
-            "" if math.isnan(time) else repr(time),
-            name,
-            *map(_text, (lat, lon, geometric, altitude, speed, course, climb)),
-        ]
+        cells = (start + _number(dt), name, lat, lon, geometric, altitude, speed, course, climb)
+        yield [*map(_text, cells)]
 
 
 def _aircraft(document: dict[str, Any], sheet: Sheet) -> Iterator[list[str]]:
@@ -111,12 +107,8 @@ def _aircraft(document: dict[str, Any], sheet: Sheet) -> Iterator[list[str]]:
         ground = one.get("alt_baro") == "ground"
         names = ("lat", "lon", "alt_geom", *(("",) * ground or ("alt_baro",)), "gs", *(("",) * ground or ("track",)))
         climb = one.get("geom_rate", one.get("baro_rate"))
-        cells = [_text(one.get(name)) for name in ("hex", *names)]
-        yield [
-            "" if math.isnan(time) else repr(time),
-            *cells,
-            *map(_text, (climb, one.get("flight"), one.get("squawk"))),
-        ]
+        cells = (time, *map(one.get, ("hex", *names)), climb, one.get("flight"), one.get("squawk"))
+        yield [*map(_text, cells)]
 
 
 def _states(document: dict[str, Any], sheet: Sheet) -> Iterator[list[str]]:
@@ -179,7 +171,10 @@ def _one_line(error: Exception) -> str:
 
 
 # ---- GPX -------------------------------------------------------------------------------------------------------------
-POINT = ["time", "track_id", "lat", "lon", "ele [m]", "speed [m/s]", "course [deg]"]
+POINT = {  # what a point and its track have, by the columns of a sheet
+    **{"time": "time", "track": "track_id", "lat": "lat", "lon": "lon"},
+    **{"ele": "ele [m]", "speed": "speed [m/s]", "course": "course [deg]"},
+}
 
 
 def from_gpx(path: str, file: BinaryIO) -> Sheet:
@@ -199,22 +194,14 @@ def from_gpx(path: str, file: BinaryIO) -> Sheet:
                 elif tag == "trkpt":
                     number += 1
                     held = {_local(one): (one.text or "").strip() for one in element.iter()}
-                    place = [element.get("lat", ""), element.get("lon", "")]
-                    yield (
-                        number,
-                        [
-                            held.get("time", ""),
-                            name or str(tracks),
-                            *place,
-                            *map(held.get, ("ele", "speed", "course"), [""] * 3),
-                        ],
-                    )
+                    held |= {"track": name or str(tracks), **element.attrib}
+                    yield number, [held.get(cell, "") for cell in POINT]
                     segment.clear()  # so that memory does not grow
         except ElementTree.ParseError as error:
             raise ConfigError(f"{path}:{error.position[0]}: must be GPX: {error}; {number} points were read") from error
 
     note = tr("altitudes are as the file has them, mostly above the sea, not the ellipsoid")
-    return Sheet(path, POINT, rows(), notes=[note])
+    return Sheet(path, [*POINT.values()], rows(), notes=[note])
 
 
 def _local(element: ElementTree.Element) -> str:
@@ -264,10 +251,7 @@ def _row(held: dict[str, float]) -> list[str]:
     minutes, seconds = divmod(held["clock"], 60)
     clock = f"{minutes // 60:02.0f}:{minutes % 60:02.0f}:{seconds:09.6f}"
     cells = [held.get(name, math.nan) for name in FIX]
-    return [
-        repr(held["time"]) if "time" in held else clock,
-        *("" if math.isnan(cell) else repr(cell) for cell in cells),
-    ]
+    return [_text(held.get("time", clock)), *map(_text, cells)]
 
 
 def _fix(line: bytes, sheet: Sheet) -> dict[str, float]:
