@@ -18,7 +18,6 @@ import struct
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
-from types import ModuleType
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
@@ -26,6 +25,12 @@ import numpy as np
 from radarsim.errors import ConfigError
 from radarsim.language import ANY, term
 from radarsim.recorded.formats import sites
+
+base: Any
+try:
+    from asterix import base
+except ImportError:
+    base = None  # `newest` says so
 
 Skip = Callable[[bytes, int], int]  # data and start of an item: its end
 
@@ -76,20 +81,15 @@ class Flag(NamedTuple):
         return np.where(there, data[at + self.byte] >> self.shift & (1 << self.bits) - 1, 0)
 
 
-def _library() -> tuple[ModuleType, ModuleType]:
-    """The modules `base` and `generated` of libasterix; raises ConfigError where it is not installed."""
-    try:
-        from asterix import base, generated
-    except ImportError as error:
-        raise sites.needs("libasterix", "asterix") from error
-    return base, generated
-
-
 @cache
 def newest(category: int) -> Any:
     """The newest edition of a category in libasterix."""
-    _, generated = _library()
-    return max(generated.manifest["CATS"][category], key=lambda edition: edition.cv_edition)
+    try:
+        from asterix import generated
+    except ImportError as error:
+        raise sites.needs("libasterix", "asterix") from error
+    manifest: Any = generated.manifest
+    return max(manifest["CATS"][category], key=lambda edition: edition.cv_edition)
 
 
 def edition(category: int) -> str:
@@ -111,7 +111,6 @@ def field(spec: Any, item: str, *path: str) -> Field:
 
 def field_in(variation: Any, *path: str) -> Field:
     """The same in a given element or group."""
-    base, _ = _library()
     offset = 0
     for name in path:
         for part, size in variation.cv_items_list:
@@ -121,12 +120,11 @@ def field_in(variation: Any, *path: str) -> Field:
             offset += size
         else:
             raise KeyError(name)
-    return _placed(base, variation, offset)
+    return _placed(variation, offset)
 
 
 def flag(spec: Any, item: str, name: str) -> Flag:
     """The place of a flag in an item of parts of one byte."""
-    base, _ = _library()
     for byte, part in enumerate(spec.cv_items_dict[item].cv_rule.cv_variation.cv_items_list):
         shift = 8
         for one, bits in (entry for entry in part if entry):
@@ -136,7 +134,7 @@ def flag(spec: Any, item: str, name: str) -> Flag:
     raise KeyError(name)
 
 
-def _placed(base: ModuleType, variation: Any, offset: int) -> Field:
+def _placed(variation: Any, offset: int) -> Field:
     content = variation.cv_rule.cv_content
     quantity = issubclass(content, base.ContentQuantity)
     signed = quantity and issubclass(content.cv_signedness, base.Signed)
@@ -150,7 +148,7 @@ def variation_of(rule: Any) -> Any:
     return getattr(rule, "cv_variation", None) or rule.cv_default_variation
 
 
-def size_in_bits(base: ModuleType, variation: Any) -> int:
+def size_in_bits(variation: Any) -> int:
     """How many bits an element or a group has."""
     if not issubclass(variation, base.Element | base.Group):
         raise TypeError(variation)
@@ -160,14 +158,13 @@ def size_in_bits(base: ModuleType, variation: Any) -> int:
 @cache
 def skip(variation: Any) -> Skip:
     """A function that finds the end of an item of a libasterix variation."""
-    base, _ = _library()
     if issubclass(variation, base.Element | base.Group):
-        size = size_in_bits(base, variation) // 8
+        size = size_in_bits(variation) // 8
         return lambda data, at: at + size
     if issubclass(variation, base.Extended):
         return _extended(variation)
     if issubclass(variation, base.Repetitive):
-        return _repetitive(base, variation)
+        return _repetitive(variation)
     if issubclass(variation, base.Explicit):
         return _explicit
     if issubclass(variation, base.Compound):
@@ -188,9 +185,9 @@ def _extended(variation: Any) -> Skip:
     return end
 
 
-def _repetitive(base: ModuleType, variation: Any) -> Skip:
+def _repetitive(variation: Any) -> Skip:
     counted, inner = variation.cv_rep_bytes, variation.cv_variation
-    bits = size_in_bits(base, inner)
+    bits = size_in_bits(inner)
 
     def by_count(data: bytes, at: int) -> int:
         return at + counted + int.from_bytes(data[at : at + counted], "big") * (bits // 8)
@@ -260,7 +257,6 @@ class Profile:
     """Places of the wanted items of a category's records; the plan of each field specification is made once."""
 
     def __init__(self, category: int, wanted: Sequence[str], variant: str | None = None):
-        base, _ = _library()
         self.wanted = wanted
         self.spec = record(category, variant)
         self.items = [
@@ -291,7 +287,6 @@ class Profile:
         return places, at
 
     def _plan(self, data: bytes, begin: int) -> list[Step]:
-        base, _ = _library()
         numbers, at = _named(data, begin)
         plan: list[Step] = []
         fixed: list[tuple[int, int]] = []
@@ -300,7 +295,7 @@ class Profile:
             index = self.wanted.index(name) if name in self.wanted else -1
             if issubclass(variation, base.Element | base.Group):
                 fixed += [(index, size)] if index >= 0 else []
-                size += size_in_bits(base, variation) // 8
+                size += size_in_bits(variation) // 8
             else:
                 plan.append(Step(fixed, size, index, skip(variation)))
                 fixed, size = [], 0
