@@ -120,7 +120,11 @@ def field_in(variation: Any, *path: str) -> Field:
             offset += size
         else:
             raise KeyError(name)
-    return _placed(variation, offset)
+    content, bits = variation.cv_rule.cv_content, variation.cv_bit_size
+    quantity = issubclass(content, base.ContentQuantity)
+    signed = quantity and issubclass(content.cv_signedness, base.Signed)
+    count = (offset % 8 + bits + 7) // 8
+    return Field(offset // 8, 8 * count - offset % 8 - bits, count, bits, signed, content.cv_lsb if quantity else 1.0)
 
 
 def flag(spec: Any, item: str, name: str) -> Flag:
@@ -134,42 +138,21 @@ def flag(spec: Any, item: str, name: str) -> Flag:
     raise KeyError(name)
 
 
-def _placed(variation: Any, offset: int) -> Field:
-    content = variation.cv_rule.cv_content
-    quantity = issubclass(content, base.ContentQuantity)
-    signed = quantity and issubclass(content.cv_signedness, base.Signed)
-    bits = variation.cv_bit_size
-    count = (offset % 8 + bits + 7) // 8
-    return Field(offset // 8, 8 * count - offset % 8 - bits, count, bits, signed, content.cv_lsb if quantity else 1.0)
-
-
 def variation_of(rule: Any) -> Any:
     """The variation behind a rule of libasterix; of one that depends on another item the default."""
     return getattr(rule, "cv_variation", None) or rule.cv_default_variation
-
-
-def size_in_bits(variation: Any) -> int:
-    """How many bits an element or a group has."""
-    if not issubclass(variation, base.Element | base.Group):
-        raise TypeError(variation)
-    return int(variation.cv_bit_size)
 
 
 @cache
 def skip(variation: Any) -> Skip:
     """A function that finds the end of an item of a libasterix variation."""
     if issubclass(variation, base.Element | base.Group):
-        size = size_in_bits(variation) // 8
+        size = variation.cv_bit_size // 8
         return lambda data, at: at + size
-    if issubclass(variation, base.Extended):
-        return _extended(variation)
-    if issubclass(variation, base.Repetitive):
-        return _repetitive(variation)
-    if issubclass(variation, base.Explicit):
-        return _explicit
-    if issubclass(variation, base.Compound):
-        return _compound(variation)
-    raise TypeError(variation)
+    kinds = {base.Extended: _extended, base.Repetitive: _repetitive, base.Compound: _compound}
+    kinds[base.Explicit] = lambda _: _explicit
+    (make,) = (make for kind, make in kinds.items() if issubclass(variation, kind))
+    return make(variation)
 
 
 def _extended(variation: Any) -> Skip:
@@ -187,7 +170,7 @@ def _extended(variation: Any) -> Skip:
 
 def _repetitive(variation: Any) -> Skip:
     counted, inner = variation.cv_rep_bytes, variation.cv_variation
-    bits = size_in_bits(inner)
+    bits = inner.cv_bit_size
 
     def by_count(data: bytes, at: int) -> int:
         return at + counted + int.from_bytes(data[at : at + counted], "big") * (bits // 8)
@@ -295,7 +278,7 @@ class Profile:
             index = self.wanted.index(name) if name in self.wanted else -1
             if issubclass(variation, base.Element | base.Group):
                 fixed += [(index, size)] if index >= 0 else []
-                size += size_in_bits(variation) // 8
+                size += variation.cv_bit_size // 8
             else:
                 plan.append(Step(fixed, size, index, skip(variation)))
                 fixed, size = [], 0
