@@ -149,9 +149,8 @@ def skip(variation: Any) -> Skip:
     if issubclass(variation, base.Element | base.Group):
         size = variation.cv_bit_size // 8
         return lambda data, at: at + size
-    kinds = {base.Extended: _extended, base.Repetitive: _repetitive, base.Compound: _compound}
-    kinds[base.Explicit] = lambda _: _explicit
-    (make,) = (make for kind, make in kinds.items() if issubclass(variation, kind))
+    kinds = ((base.Extended, _extended), (base.Repetitive, _repetitive), (base.Compound, _compound))
+    (make,) = (make for kind, make in (*kinds, (base.Explicit, lambda _: _explicit)) if issubclass(variation, kind))
     return make(variation)
 
 
@@ -426,7 +425,6 @@ def content(data: bytes) -> tuple[list[Block], int]:
 
 
 def _captured(path: str, file: BinaryIO, left: Counter[str]) -> Iterator[Block]:
-    after = Counter[int]()
     for begin, link, data, whole in _packets(path, file, left):
         if not whole:
             left[term("packets cut short by the capture")] += 1
@@ -439,10 +437,8 @@ def _captured(path: str, file: BinaryIO, left: Counter[str]) -> Iterator[Block]:
         if not found:
             left[term("datagrams without ASTERIX")] += 1
         elif more:
-            after[more] += 1
+            left[term("tails of a few bytes after the data blocks of datagrams")] += 1
         yield from ((category, begin + start + at, block) for category, at, block in found)
-    for count, times in after.items():
-        left[term("tails of # bytes after the data blocks of datagrams").replace(ANY, str(count))] = times
 
 
 def _packets(path: str, file: BinaryIO, left: Counter[str]) -> Iterator[tuple[int, int, bytes, bool]]:
