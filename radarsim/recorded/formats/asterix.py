@@ -152,7 +152,6 @@ def plots_001(cut: Cut) -> Read:
     """The same of the older category."""
     columns, words, marks = seen_by_radar(cut, "HGT", "SSRPSR")
     columns["velocity_mps"] = cut.number("120") * NAUTICAL_MILE_M
-    columns["span_mps"] = np.full(len(marks), np.nan)
     return columns, words | {"track": cut.text(str, "161")}, marks
 
 
@@ -164,7 +163,6 @@ def tracks_062(cut: Cut) -> Read:
         "altitude_m": cut.height("130", "136"),
         "east_mps": cut.number("185", "VX"),
         "north_mps": cut.number("185", "VY"),
-        "up_mps": np.full(len(cut.at["105"]), np.nan),
     }
     codes, marks = cut.code("060")
     words = {
@@ -416,7 +414,7 @@ class Asterix:
         tracks = self._named(kind, t, columns, radars, words, out)
         del words["track"]
         names = sites.PLOT_COLUMNS if kind == sites.PLOTS else sites.POSITION_COLUMNS
-        columns = {name: t if name == "t_s" else columns[name] for name in names}
+        columns = {name: t if name == "t_s" else columns.get(name, np.full(len(t), np.nan)) for name in names}
         batch = sites.Batch(kind, tracks, words.pop("address"), radars, columns, words)
         return batch.rows(np.flatnonzero(~out).tolist()) if self.truth and kind == sites.POSITIONS else batch
 
@@ -430,18 +428,15 @@ class Asterix:
             north = columns["range_m"] * np.cos(columns["bearing_rad"])
             east = columns["range_m"] * np.sin(columns["bearing_rad"])
             codes = words["mode_3a"]
-        rows = zip(t.tolist(), radars, words["track"], words["address"], codes, excluded.tolist(), strict=True)
-        for i, (when, radar, number, address, code, out) in enumerate(rows):
-            if out:
+        numbers = (one.tolist() for one in (t, north, east, excluded))
+        rows = zip(radars, words["track"], words["address"], codes, *numbers, strict=True)
+        for radar, number, address, code, when, x, y, out in rows:
+            if out or not (number or address or code):
                 found.append("")
             elif number:
                 found.append(tracks.by_number(radar, number, address, when))
-            elif address:
-                found.append(tracks.of(radar, address))
-            elif code:
-                found.append(tracks.by_code(radar, code, when, float(north[i]), float(east[i])))
             else:
-                found.append("")
+                found.append(tracks.of(radar, address) if address else tracks.by_code(radar, code, when, x, y))
         return found
 
 

@@ -289,7 +289,7 @@ class _Import:
         self.zero: float | None = None
         self.by_track: bool | None = None  # whether tracks are addresses, and nothing else identifies an aircraft
         self.last: dict[str, float] = {}
-        self.left = Counter[str]()
+        self.left = reader.skipped
         self.radars = Counter[str]()
         self.without = Counter[str]()  # by what a note says of these rows
         self.doppler = _Doppler()
@@ -305,12 +305,13 @@ class _Import:
                 if batch.kind == PLOTS or self.truth is None or not self.truth.own:
                     self.left[BESIDE[batch.kind]] += len(batch.track)
                 continue
-            kept = self._kept(self._unbiased(batch))
-            if kept is not None:
+            kept = self._kept(self._mended(batch))
+            if kept.track:
                 yield self._written(kept)
 
-    def _unbiased(self, batch: Batch) -> Batch:
-        """A batch without the biases of the radar, without spans of 0, and without plots that then have no range."""
+    def _mended(self, batch: Batch) -> Batch:
+        """A batch without the biases of the radar, with its sign of the Doppler speed turned, without spans of 0, and
+        without plots that have no range."""
         biases, columns = self.options.biases, batch.columns
         if batch.kind == POSITIONS:
             if biases:
@@ -321,13 +322,14 @@ class _Import:
             columns["t_s"] -= lag
             columns["range_m"] = (columns["range_m"] - bias) / (1 + scale)
             columns["bearing_rad"] = (columns["bearing_rad"] - turn) % (2 * math.pi)
+        columns["velocity_mps"] *= -1 if self.options.towards else 1
         columns["span_mps"][columns["span_mps"] <= 0] = np.nan
         if (gone := columns["range_m"] <= 0).any():
             self.left[term("plots whose range is not above 0")] += int(gone.sum())
             return batch.rows(np.flatnonzero(~gone).tolist())
         return batch
 
-    def _kept(self, batch: Batch) -> Batch | None:
+    def _kept(self, batch: Batch) -> Batch:
         """The records of a batch that are wanted and later than their track's last."""
         wanted, keep = set(self.options.tracks), []
         times = batch.columns["t_s"].tolist()
@@ -346,12 +348,7 @@ class _Import:
                 if batch.kind == PLOTS:
                     self.radars[radar] += 1
                 self.done.tracks[track] = self.done.tracks.get(track, 0) + 1
-        if not keep:
-            return None
-        kept = batch.rows(keep)
-        if self.options.towards and "velocity_mps" in kept.columns:
-            kept.columns["velocity_mps"] *= -1
-        return kept
+        return batch.rows(keep)
 
     def _written(self, batch: Batch) -> Iterable[tuple[str, ...]]:
         """The rows of a batch, as text."""
@@ -458,7 +455,7 @@ class _Import:
         if names and self.seen:
             more = " …" if len(self.seen) >= MOST_LISTED else ""
             return f"{path}: track: must be one of {', '.join(sorted(self.seen))}{more}; got {', '.join(names)}"
-        passed = counted(self.reader.skipped + self.left)
+        passed = counted(self.left)
         why = f"; left out: {', '.join(passed)}" if passed else ""
         return f"{path}: has no plots; {self.reader.records} records were read{why}"
 
@@ -479,7 +476,7 @@ class _Import:
         """The result, with notes for the user."""
         done = self.done
         done.records = self.reader.records
-        done.skipped = counted(self.reader.skipped + self.left)
+        done.skipped = counted(self.left)
         self.without[UNNAMED] = done.tracks.get("", 0)
         done.notes += [tr(what, count=count, all=done.rows) for what, count in self.without.items() if count]
         if len(self.radars) > 1:
