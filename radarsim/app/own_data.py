@@ -196,4 +196,7 @@ def _with_file(recorded: Recorded, act: Callable[[str], Found]) -> Found:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "plots.csv"
         recorded.to_csv(path, index=False)
-        return act(str(path))
+        try:
+            return act(str(path))
+        except ConfigError as error:
+            raise ConfigError(*(line.replace(str(path), "the table") for line in error.lines)) from error

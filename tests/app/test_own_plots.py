@@ -37,7 +37,7 @@ def test_several_tracks_keep_their_names(table):
 
 
 def test_faults_are_those_of_the_command(table, tmp_path):
-    with pytest.raises(radarsim.ConfigError, match="must have the columns t_s, range_m, velocity_mps"):
+    with pytest.raises(radarsim.ConfigError, match=r"^the table:1: must have the columns t_s, range_m, velocity_mps"):
         radarsim.track("rls2", table.drop(columns="range_m"))
     with pytest.raises(radarsim.ConfigError, match="cannot be read"):
         radarsim.read_plots(tmp_path / "none.csv")
