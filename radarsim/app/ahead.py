@@ -14,7 +14,6 @@ Name = TypeVar("Name")
 LADDER, FOR_NOTHING = 8, 1.2  # factor between numbers of realisations tried; times that count as equal
 SHORT_S = 0.01
 PATIENCE_S, PILOT_S, PART = 1.0, 0.3, 20  # nothing is timed for work that ends sooner; at most a PART of it is
-WHOLE = 1_000_000  # of the expected time
 TRUSTED_S = 1.0
 
 
@@ -51,8 +50,8 @@ def estimated(cases: Mapping[Name, tuple[CaseWork, int]]) -> dict[Name, float]:
 
 
 class Weighed:
-    """Progress over cases in realisations of mean length. Until a second has passed, all count as equally long; filters
-    from outside are not called for a forecast.
+    """Progress over cases in realisations of mean length, once a second has passed or all is done; filters from outside
+    are not called for a forecast, and count as equally long.
 
     cases: the work and the number of realisations of each."""
 
@@ -69,15 +68,20 @@ class Weighed:
         def report(done: int, _: int, held: int) -> None:
             self._counts[key] = done, held
             if self._progress is not None:
+                self._weigh()
                 self._report(self._progress)
 
         return report
 
-    def _report(self, progress: Progress) -> None:
+    def _weigh(self) -> None:
         if time.monotonic() > self._due and any(done > held for done, held in self._counts.values()):
             self._due = float("inf")
             self._seconds = estimated(self._cases)
+
+    def _report(self, progress: Progress) -> None:
         total = sum(count for _, count in self._cases.values())
+        if self._due < float("inf") and sum(done for done, _ in self._counts.values()) < total:
+            return  # a share of unweighted cases would go back
         each = {key: self._seconds[key] / count for key, (_, count) in self._cases.items()}
         scale = total / sum(self._seconds.values())
         done, held = (round(scale * sum(each[key] * of[i] for key, of in self._counts.items())) for i in (0, 1))
@@ -95,15 +99,13 @@ class Kind:
 
 
 class Ahead:
-    """Progress over work of several kinds, in millionths of the expected time.
+    """Progress over work of several kinds: milliseconds that have passed, and that all is expected to take.
 
     estimate: called once a run has computed something; it adds what the runs ahead will take."""
 
     def __init__(self, progress: Progress | None, estimate: Callable[[], None]):
         self._progress, self._estimate, self._kinds = progress, estimate, dict[str, Kind]()
         self._started, self._estimated = time.monotonic(), progress is None
-        if progress is not None:
-            progress(0, WHOLE, 0)
 
     def add(self, kind: str, expected: float, count: float = 1.0) -> None:
         """Expect this many more of a kind, each in so many seconds; less than none: they fall away."""
@@ -145,9 +147,8 @@ class Ahead:
 
     def _report(self) -> None:
         if self._progress is not None:
-            passed = time.monotonic() - self._started
-            left = max(0.0, self._left())
-            self._progress(round(WHOLE * passed / max(passed + left, 1e-9)), WHOLE, 0)
+            passed = round(1000 * (time.monotonic() - self._started))
+            self._progress(passed, passed + max(0, round(1000 * self._left())), 0)
 
     def _left(self) -> float:
         """Expected seconds of what is ahead: as measured, where expectations count as TRUSTED_S of it, slower or faster

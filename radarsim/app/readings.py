@@ -79,6 +79,7 @@ class Asked:
 
 # Expected seconds of judging a run, of an exact verdict, of a joint search and of a figure, until some are measured.
 RUN_JUDGED_S, VERDICT_S, SEARCH_S, FIGURE_S = 0.05, 0.001, 1.0, 0.13
+LOOK_PART = 0.5  # of the time of all first runs, expected of each later look: fewer of them, and longer
 
 
 class Plan:
@@ -95,6 +96,7 @@ class Plan:
         self._claims = {claim.id: claim for claim in wanted.claims}
         self._seconds: dict[tuple[str, str], float] = {}  # of a realisation, by config and case
         self._open: dict[tuple[str, ...], None] = {}  # keys of the runs ahead
+        self._looks, self._look_s = 0, 0.0  # later looks ahead, and the expected seconds of each
         for claim in wanted.claims:
             for reading in self._paper.readings.of_claim(claim.id):
                 if not self._paper.readings.exact(claim, reading):
@@ -119,8 +121,9 @@ class Plan:
             self._experiments[config] = configs.load(configs.shipped_file(config) or config)
         return self._experiments[config]
 
-    def expect(self, ahead: Ahead) -> None:
-        """Add the runs, verdicts and search ahead."""
+    def expect(self, ahead: Ahead, most: int) -> None:
+        """Add the runs, verdicts, search, and looks up to so many realisations that are ahead."""
+        self._looks = sum(n > self._n for n in looks(most))
         self._expect_runs(ahead, self._jobs)
         for claim in self._wanted.claims:
             own = self._paper.readings.of_claim(claim.id)
@@ -141,6 +144,11 @@ class Plan:
         self._seconds = {of: seconds / each for of, seconds in timed.items()}
         for key in self._open:
             ahead.add(f"run of {key[0]}", 1.0, self._expected(key))
+        self._look_s = LOOK_PART * sum(map(self._expected, self._jobs))
+        self._expect_looks(ahead, self._looks)
+
+    def _expect_looks(self, ahead: Ahead, count: int) -> None:
+        ahead.add("later looks", 1.0, self._look_s * count)
 
     def _expected(self, key: tuple[str, ...]) -> float:
         """Expected seconds of a run; 0 before `estimate`."""
@@ -181,11 +189,15 @@ class Plan:
             if not keys:
                 break
             self._n = n
+            self._looks -= 1
+            self._expect_looks(ahead, -1)
             self._expect_runs(ahead, keys)
             for key in keys:
                 pairs = [(case, replace(changed, realisations=n)) for case, changed in self._jobs[key]]
                 self._see(key, pairs, options, ahead, stop, open_)
             over = [replace(one, under=tuple(self._under(one.claim, own.reading) for own in one.under)) for one in over]
+        self._expect_looks(ahead, -self._looks)
+        self._looks = 0
         return over
 
     def _see(
@@ -449,8 +461,8 @@ def judged(
             plan.estimate(ahead, options.threads)
 
     ahead = Ahead(progress, estimate)
-    for plan in plans:
-        plan.expect(ahead)
+    for plan, one in zip(plans, wanted, strict=True):
+        plan.expect(ahead, realisations or one.paper.readings.most if decide else 0)
     if write and figures:
         several = [claim for one in wanted for claim in one.claims if len(one.paper.readings.of_claim(claim.id)) > 1]
         ahead.add("figure", FIGURE_S, len(several))

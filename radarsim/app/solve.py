@@ -340,7 +340,7 @@ class Curve:
         self.scans = set[int]()  # scans at which the quantity was read, of simulated values
         self.from_tables = False
         self.rough = False  # whether cheaper approximate values exist, for a first search
-        self.expected = 1
+        self.done, self.expected = 0, 0  # realisations simulated, or values that need none; 0 expected: unknown
 
     def exact(self, axes: Axes) -> bool:
         """Whether the quantity is known exactly: from the plan, or from one realisation's tables."""
@@ -387,9 +387,11 @@ class Curve:
             self.refused[value] = error
             found = UNKNOWN
         self.known[place] = found
-        if self.progress is not None:
-            self.expected = max(self.expected, len(self.known))
-            self.progress(len(self.known), self.expected, 0)
+        each = max(count, 1)
+        self.done += each
+        if self.expected and self.progress is not None:
+            self.expected = max(self.expected, self.done + each)  # whoever asks once more may ask again
+            self.progress(self.done, self.expected, 0)
         return found
 
     def _exact_of(self, case: Case) -> Estimate:
@@ -508,7 +510,7 @@ def by_sampling(asked: Question, curve: Curve, notify: Callable[[str], None]) ->
     """The answer where the quantity is simulated, with the same noise at every value."""
     over, count = asked.over, curve.realisations
     grid, pilot = over.grid(PILOT_POINTS), min(count, max(PILOT_LEAST, count // PILOT_SHARE))
-    curve.expected = len(grid) + WITH_ALL
+    curve.expected = len(grid) * pilot + WITH_ALL * count
     curve.simulated(None, 1)  # compiles
     begun = time.monotonic()
     attained_now = curve.simulated(None, count).value
@@ -528,6 +530,7 @@ def by_sampling(asked: Question, curve: Curve, notify: Callable[[str], None]) ->
     if apart:
         notify("; ".join(apart))
         count = curve.realisations = UNPAIRED * count
+        curve.expected = curve.done + WITH_ALL * count
     answer = partial(answered, asked, attained_now, exact=False)
     best, _ = min(known, key=lambda one: abs(one[1]))
     places = _changes(scanned) or [grid.index(best)]
@@ -607,7 +610,16 @@ def _interval(asked: Question, curve: Curve, one: tuple[float, float], other: tu
         found = curve.simulated(x, count)
         return not over.whole and abs(y) <= RESIDUE * (found.hi - found.lo)
 
-    value = quantities.closed(partial(part, "value"), over, one, other, partial(close, "value"))
+    def closed(of: str, one: tuple[float, float], other: tuple[float, float]) -> float:
+        # Other noise at every value makes jumps, which a search for the target itself would close to rounding.
+        near = curve.simulated(one[0], count)
+        part_of = RESIDUE * (near.hi - near.lo) / abs(one[1] - other[1]) if len(curve.scans) > 1 else 0.0
+        width = part_of * abs(one[0] - other[0]) / max(abs(one[0]), abs(other[0]), 1e-300)
+        return quantities.closed(
+            partial(part, of), over, one, other, partial(close, of), max(width, quantities.EXACTLY)
+        )
+
+    value = closed("value", one, other)
     if over.whole:
         value = fulfilling(asked, value, lambda n: curve.simulated(n, count).value)
     rising = other[1] > one[1]
@@ -617,7 +629,7 @@ def _interval(asked: Question, curve: Curve, one: tuple[float, float], other: tu
         if inside[1] * outside[1] >= 0 or math.isnan(outside[1]):
             ends.append(outside[0])  # the interval holds the target up to the end of the search
         else:
-            ends.append(quantities.closed(partial(part, of), over, inside, outside, partial(close, of)))
+            ends.append(closed(of, inside, outside))
     return Estimate(value, *ends)
 
 

@@ -48,8 +48,10 @@ MOST_WHOLE = 100  # combinations of whole numbers
 FLAT = 1e-3  # of the quantity: within it a key is as good as tuned
 LEAST_SHARE = 1e-4  # of a probability, and of what is left of 1
 STEP = 0.25  # on the scale of the search, of derivatives of sampled values
-# Of exact and of sampled values: how closely the scale is searched, the logarithm of what is minimised, values a key.
+# Of exact and of sampled values: how closely the scale is searched, the logarithm of what is minimised, values a key of
+# a simplex at most, and those expected of both.
 CLOSE, ALIKE, TRIED = {True: 1e-7, False: 1e-2}, {True: 1e-12, False: 1e-6}, {True: 200, False: 50}
+EXPECTED = {True: 100, False: 40}
 SIMPLEX = 0.5, 0.1  # first steps, one simplex after the other
 POINTS, PILOT_SHARE, PILOT_LEAST = 13, 8, 200  # of the scan of sampled values: values, and realisations of all
 SAME = 1e-9  # of the quantity: it changes no more where a key has no effect
@@ -360,6 +362,11 @@ class Objective:
         self.of = curves[0].quantity.of
         self.rough = exact and any(curve.rough for curve in curves)
 
+    @property
+    def pilot(self) -> int:
+        """Realisations of a value of a scan."""
+        return min(self.count, max(PILOT_LEAST, self.count // PILOT_SHARE))
+
     def combined(self, values: Sequence[Any]) -> Any:
         """The quantity of the family, of values of its cases, numbers or arrays."""
         size = self.of.kind == "size"
@@ -390,7 +397,7 @@ def least(of: Objective) -> Place:
 
     searched, start = of.searched, tuple(one.stated for one in of.searched)
     real = [i for i, one in enumerate(searched) if not one.over.whole]
-    pilot = None if of.exact else min(of.count, max(PILOT_LEAST, of.count // PILOT_SHARE))
+    pilot = None if of.exact else of.pilot
     grids = [one.over.grid() if one.over.whole else [one.stated] for one in searched]
     if math.prod(map(len, grids)) > MOST_WHOLE:
         raise ConfigError(f"{argument('free', '--free')}: too many whole numbers to try: give KEY=LOW:HIGH")
@@ -510,12 +517,13 @@ def _predict(notify: Callable[[str], None], of: Objective, each: float) -> None:
     grids = [len(one.over.grid(None if of.exact or one.over.whole else POINTS)) for one in of.searched]
     whole = [one.over.whole for one in of.searched]
     scans = math.prod(itertools.compress(grids, whole)) * max(1, sum(grids) - sum(itertools.compress(grids, whole)))
-    full = TRIED[of.exact] // 2 * whole.count(False)
+    full = EXPECTED[of.exact] * whole.count(False)
+    pilot, count = (1, 1) if of.exact else (of.pilot, of.count)
     for curve in of.curves:
-        curve.expected = scans + full
+        curve.expected = scans * pilot + full * count
     keys = plural("{count} key", "{count} keys", len(grids))
     what = tr("searches {keys}, about {count} places", keys=keys, count=scans + full)
-    solve.predict(notify, what, each * (scans * (1.0 if of.exact else 1 / PILOT_SHARE) + full))
+    solve.predict(notify, what, each * (scans * pilot / count + full))
 
 
 def judged(of: Objective, names: Sequence[str], pairs: Sequence[np.ndarray]) -> list[Judged]:

@@ -94,7 +94,11 @@ class Progress:
         self._begin()
         assert self.bar is not None  # it has just begun
         told = self._told(done, total, rate)
-        self.bar.update(self.task, total=total, completed=done, told=told, refresh=forbidden())
+        self.bar.update(self.task, total=total, completed=self.completed(done, total), told=told, refresh=forbidden())
+
+    def completed(self, done: int, total: int | None) -> float:
+        """How many of the total the bar shows."""
+        return done
 
     def rate(self, computed: int, total: int | None) -> float:
         """How many are computed in a second, on average since the last report of none or of another total; 0 if
@@ -108,7 +112,8 @@ class Progress:
     def _told(self, done: int, total: int | None, rate: float) -> str:
         """The share that is done and the time left."""
         assert total is not None
-        told = tr("{share} %", share=numeral(f"{100 * done / max(total, 1):5.1f}"))
+        share = self.completed(done, total) / max(total, 1)
+        told = tr("{share} %", share=numeral(f"{100 * share:5.1f}"))
         if done >= total:
             told += tr("  the results follow")
         elif rate > 0:
@@ -133,14 +138,22 @@ def _between(begin: Report, end: Report) -> float:
     return (end[1] - begin[1]) / max(end[0] - begin[0], 1e-9)
 
 
-class Share(Progress):
-    """Progress that is the share of the expected time of all, the results included."""
+class Foretold(Progress):
+    """Progress in milliseconds, of those that all is expected to take, the results included. The share shown never goes
+    back: where more is expected than before, it waits."""
 
     whole = True
+    share = 0.0
 
     def rate(self, computed: int, total: int | None) -> float:
-        """The share that passes in a second, on average."""
-        return computed / max(time.monotonic() - self.started, 1e-9)
+        """How many pass in a second."""
+        return 1000.0
+
+    def completed(self, done: int, total: int | None) -> float:
+        """The largest share so far, of the total."""
+        assert total is not None
+        self.share = max(self.share, done / max(total, 1))
+        return self.share * total
 
 
 class Counter(Progress):

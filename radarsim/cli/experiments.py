@@ -500,7 +500,7 @@ def readings(
         from radarsim.cli import console, outcomes
 
         asked |= {"time_limit": limit, "figures": not no_figures, "stop": stop}
-        with console.Share("readings", quiet=quiet or as_json or markdown) as progress:
+        with console.Foretold("readings", quiet=quiet or as_json or markdown) as progress:
             done = app.readings(*names, progress=progress.update, **asked)
         if as_json:
             click.echo(shown.text(app.documents(done)))

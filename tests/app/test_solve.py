@@ -3,6 +3,7 @@
 import json
 import math
 import shlex
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -227,8 +228,11 @@ SEEN = Wanted("sigma", "r", "r", at_s=60.0)
 def test_a_key_that_moves_the_scans_is_said_not_to_be_paired():
     exact = solve("rls2", "radar.scan_period_s", SEEN, 190, **MOVED)
     sampled = {"sampled": True, "realisations": 200, "threads": 1}
-    said = []
-    found = solve("rls2", "radar.scan_period_s", SEEN, 190, notify=said.append, **MOVED, **sampled)
+    said, seen = [], []
+    keep = {"notify": said.append, "progress": lambda *of: seen.append(of)}
+    found = solve("rls2", "radar.scan_period_s", SEEN, 190, **keep, **MOVED, **sampled)
+    assert len(seen) < 13 + 40  # values: noise that differs is not searched to rounding
+    assert all(before[0] < after[0] < after[1] for before, after in pairwise(seen))  # it never seems to be done
     words = (
         "radar.scan_period_s moves the scans, so the noise differs between values: "
         "each value gets 800 realisations, 4 times as many"

@@ -120,12 +120,25 @@ class Clock:
         return self.now
 
 
-def bar(monkeypatch):
+def bar(monkeypatch, of=console.Progress):
     """A clock of one's own, and a bar on a terminal that goes by it."""
     clock = Clock()
     monkeypatch.setattr("sys.stderr", Terminal())
     monkeypatch.setattr(console, "time", clock)
-    return clock, console.Progress(FIRST, quiet=False)
+    return clock, of(FIRST, quiet=False)
+
+
+def test_a_bar_of_foretold_time_never_goes_back(monkeypatch):
+    """Where more turns out to be ahead, the share waits, and the time left is what is foretold."""
+    clock, progress = bar(monkeypatch, console.Foretold)
+    with progress:
+        told = []
+        for total in (4000, 16_000, 16_000):
+            clock.now += 2
+            progress.update(round(1000 * (clock.now - Clock.now)), total, 0)
+            told.append(progress.bar.tasks[0].fields["told"].split())
+    assert [words[0] for words in told] == ["50.0", "50.0", "50.0"]
+    assert [words[2] for words in told] == ["0:00:02", "0:00:12", "0:00:10"]
 
 
 def test_a_bar_says_in_the_language_what_is_left(monkeypatch):
