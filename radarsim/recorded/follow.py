@@ -29,7 +29,7 @@ from radarsim.config.schema import LARGEST_REALISATIONS
 from radarsim.engine.results import Track
 from radarsim.errors import ConfigError, PlotFault, argument
 from radarsim.recorded import plots
-from radarsim.recorded.plots import Places, cells
+from radarsim.recorded.plots import Places, Thinned, cells
 from radarsim.report.files import Writer
 from radarsim.studies import outside
 from radarsim.studies.interface import Drawn, RecordedPlots, Tracker, true_column
@@ -116,7 +116,6 @@ def unlike(track: Track, other: Track) -> np.ndarray:
 
 
 # ---- follow ----------------------------------------------------------------------------------------------------------
-MOST_DRAWN = 2000  # rows kept for figures; when there are more, every second is dropped
 GAP = 3.0  # in median intervals
 MOST_NAMED = 12  # configs or values listed where one must be chosen
 BEFORE = 10  # first estimates of a filter, which are not compared with the truth
@@ -308,8 +307,8 @@ class Followed:
     longest_gap_at_s: float = np.nan
     tallies: dict[tuple[str, str], Tally] = field(default_factory=dict)
     estimating: set[str] = field(default_factory=set)
-    drawn: list[Track] = field(default_factory=list)
-    stride: int = 1
+    drawn: Track | None = None  # thinned for figures
+    thinned: Thinned = field(default_factory=Thinned)
     sample: "Sample" = field(default_factory=lambda: Sample())
     median_s: float = np.nan
     tracks: dict[str, "Followed"] = field(default_factory=dict)  # by name, where the file has several
@@ -335,7 +334,8 @@ class Followed:
                 tally = self.tallies.setdefault((filter_name, name), Tally(filter_name, name, freedom))
                 tally.count, tally.total = tally.count + known.size, tally.total + float(known.sum())
         self.sample.add(columns)
-        self._draw(track)
+        kept = self.thinned.kept(len(track.t_s))
+        self.drawn = rows_of(joined([self.drawn, track]) if self.drawn else track, np.flatnonzero(kept))
         self.rows += len(t)
 
     def compare(self, track: Track, t_s: np.ndarray, truth: Mapping[str, np.ndarray]) -> None:
@@ -381,18 +381,6 @@ class Followed:
             self.longest_gap_at_s = float(t[at] - steps[at])
         self.last_s = float(t[-1])
 
-    def _draw(self, track: Track) -> None:
-        kept = np.flatnonzero((self.rows + np.arange(len(track.t_s))) % self.stride == 0)
-        self.drawn.append(rows_of(track, kept))
-        while sum(len(part.t_s) for part in self.drawn) > MOST_DRAWN:
-            self.stride *= 2
-            whole = self.track()
-            self.drawn = [rows_of(whole, np.arange(0, len(whole.t_s), 2))]
-
-    def track(self) -> Track:
-        """The track, thinned for figures."""
-        return joined(self.drawn)
-
 
 def rows_of(track: Track, kept: np.ndarray) -> Track:
     """Some rows of a track, copied."""
@@ -412,27 +400,18 @@ def joined(parts: list[Track]) -> Track:
 
 
 @dataclass
-class Sample:
-    """Rows of a track, columns (n,), in blocks spread over its whole time; when there are more than SAMPLE, every
-    second block is dropped. number (n,): of each row."""
+class Sample(Thinned):
+    """Rows of a track, columns (n,), in blocks that follow each other."""
 
+    most: int = SAMPLE
+    block: int = BLOCK
     columns: dict[str, np.ndarray] = field(default_factory=dict)
-    number: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    seen: int = 0
-    stride: int = 1
 
     def add(self, columns: Mapping[str, np.ndarray]) -> None:
         """Add the next rows."""
-        number = self.seen + np.arange(len(columns["t_s"]))
-        kept = number // BLOCK % self.stride == 0
+        kept = self.kept(len(columns["t_s"]))
         before = self.columns or {name: column[:0] for name, column in columns.items()}
-        self.columns = {name: np.concatenate([before[name], column[kept]]) for name, column in columns.items()}
-        self.number, self.seen = np.concatenate([self.number, number[kept]]), self.seen + len(number)
-        while len(self.number) > SAMPLE:
-            self.stride *= 2
-            kept = self.number // BLOCK % self.stride == 0
-            self.number = self.number[kept]
-            self.columns = {name: column[kept] for name, column in self.columns.items()}
+        self.columns = {name: np.concatenate([before[name], column])[kept] for name, column in columns.items()}
 
     def stretches(self) -> list[dict[str, np.ndarray]]:
         """The rows that follow each other, stretch by stretch: the whole track where no block was dropped."""

@@ -50,7 +50,8 @@ def figures(followed: Followed) -> dict[str, Figure]:
     tracks the plots of all and the estimates of the longest."""
     ways = {name: one.places for name, one in followed.tracks.items()} or {"": followed.places}
     order = sorted(ways, key=lambda name: ways[name] is not followed.places)
-    track = followed.track()
+    track = followed.drawn
+    assert track is not None  # a file without rows is refused
     drawn = {
         "track": estimates(track),
         "plan": plan(track, {name: ways[name] for name in order}),

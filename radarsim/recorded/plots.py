@@ -30,7 +30,7 @@ Name = TypeVar("Name", bound=Hashable)
 
 
 # ---- places ----------------------------------------------------------------------------------------------------------
-MOST = 2000  # places of a track that are kept; when there are more, every second is dropped
+MOST = 2000  # rows of a track that are kept for figures
 
 
 def in_plane(places: Mapping[str, np.ndarray]) -> np.ndarray | None:
@@ -48,28 +48,42 @@ def in_plane(places: Mapping[str, np.ndarray]) -> np.ndarray | None:
     return np.stack([r * np.cos(b), r * np.sin(b), r], axis=1)
 
 
+@dataclass(kw_only=True)
+class Thinned:
+    """Rows of a track, spread over its whole time: when there are more than most, every second block of them is
+    dropped. number (n,): of each row that is held."""
+
+    most: int = MOST
+    block: int = 1
+    number: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    seen: int = 0
+    stride: int = 1
+
+    def kept(self, more: int) -> np.ndarray:
+        """Which of the rows held (n,), and of so many more, are held from now on: (n + more,)."""
+        number = np.concatenate([self.number, self.seen + np.arange(more)])
+        while (kept := number // self.block % self.stride == 0).sum() > self.most:
+            self.stride *= 2
+        self.number, self.seen = number[kept], self.seen + more
+        return kept
+
+
 @dataclass
-class Places:
-    """Times (n,) and places (n, 3) of a track's plots, north, east and range in m, thinned to at most MOST."""
+class Places(Thinned):
+    """Times (n,) and places (n, 3) of a track's plots, north, east and range in m."""
 
     t_s: np.ndarray = field(default_factory=lambda: np.zeros(0))
     places: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-    seen: int = 0
-    stride: int = 1
 
     def add(self, t_s: np.ndarray, places: Mapping[str, np.ndarray]) -> None:
         """Add plots; those without any place are left out."""
         found = in_plane(places)
         if found is None:
             return
-        kept = (self.seen + np.arange(len(t_s))) % self.stride == 0
-        kept &= np.isfinite(found).any(axis=1)
-        self.seen += len(t_s)
-        self.t_s = np.concatenate([self.t_s, t_s[kept]])
-        self.places = np.concatenate([self.places, found[kept]])
-        while len(self.t_s) > MOST:
-            self.stride *= 2
-            self.t_s, self.places = self.t_s[::2], self.places[::2]
+        there = np.isfinite(found).any(axis=1)
+        kept = self.kept(int(there.sum()))
+        self.t_s = np.concatenate([self.t_s, t_s[there]])[kept]
+        self.places = np.concatenate([self.places, found[there]])[kept]
 
 
 # ---- numbers of tracks -----------------------------------------------------------------------------------------------
