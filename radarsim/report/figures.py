@@ -35,7 +35,7 @@ from radarsim.report import chart
 from radarsim.report.chart import Scale, Scans, at_scans, contrast, scans_of, tick_text
 from radarsim.report.drawing import GREY, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.drawing import Axis as Ends
-from radarsim.report.wording import formulas, number, spoken
+from radarsim.report.wording import formulas, letters_in, number, spoken
 
 # ---- legends ---------------------------------------------------------------------------------------------------------
 LONGEST_AT_END = 28  # letters of a name at a line's end
@@ -375,12 +375,12 @@ def _wrapped(axis: Ends, side_mm: float) -> Ends:
 
 def wrapped(text: str, letters: float, mark: str = ", ") -> str:
     """Words in lines of at most so many letters, broken at a mark, of text without one between words."""
-    if len(spoken(text)) <= letters or "\n" in text:
+    if letters_in(text) <= letters or "\n" in text:
         return text
     mark = mark if mark in text else " "
     lines: list[str] = []
     for part in text.split(mark):
-        if lines and len(spoken(lines[-1])) + len(mark) + len(spoken(part)) <= letters:
+        if lines and letters_in(lines[-1]) + len(mark) + letters_in(part) <= letters:
             lines[-1] += f"{mark}{part}"
         else:
             lines.append(part)

@@ -118,12 +118,13 @@ def with_its_unit(result: CaseResult, key: str, value: object) -> str:
     if isinstance(value, Mapping):
         return in_words(result, key, value)
     if isinstance(value, list | tuple):
-        return " ".join(filter(None, (number(value), key_label(result, key).unit)))
+        return " ".join(filter(None, (number(value), unit_of(key_label(result, key).unit))))
     if not isinstance(value, int | float) or isinstance(value, bool):
         return number(value)
     factor, own = in_degrees(key_label(result, key).unit)
     shown = number(value, is_power(key)) if factor == 1.0 else turned_number(factor * value)
-    return f"{shown}{own}" if own.startswith("°") else " ".join(filter(None, (shown, own.partition("(")[0])))
+    said = unit_of(own)
+    return f"{shown}{said}" if said.startswith("°") else " ".join(filter(None, (shown, said.partition("(")[0])))
 
 
 def turned_number(degrees: float) -> str:
@@ -132,9 +133,9 @@ def turned_number(degrees: float) -> str:
 
 
 def key_label(result: CaseResult, key: str) -> Label:
-    """The name of a key of a case, in the current language."""
+    """The name of a key of a case, in the current language; its unit as in tables."""
     found = label_of(result.spec, key)
-    return found._replace(text=tr(found.text), unit=unit_of(found.unit))
+    return found._replace(text=tr(found.text))
 
 
 def unit_of(name: str) -> str:
@@ -204,7 +205,7 @@ def with_unit(words: str, unit: str) -> str:
 
 def label(result: CaseResult) -> str:
     """Device and swept keys, for a line or a panel."""
-    return " ".join(filter(None, (device(result), swept(result))))
+    return ", ".join(filter(None, (device(result), swept(result))))
 
 
 def line(rows: "pd.DataFrame", columns: Sequence[str], label: str, style: Style | int, name: str = "") -> Line:

@@ -203,3 +203,12 @@ def formulas(words: str) -> str:
 def spoken(text: str) -> str:
     """The text without marks, in one line: "σ of D_M"."""
     return " ".join("".join({"sub": "_", "sup": "^"}.get(kind, "") + part for part, kind in subscripts(text)).split())
+
+
+CYRILLIC_WIDER = 0.12  # of a Latin letter
+
+
+def letters_in(text: str) -> float:
+    """How wide words are, in Latin letters: Cyrillic ones are wider."""
+    words = spoken(text)
+    return len(words) + CYRILLIC_WIDER * sum("а" <= letter.lower() <= "ё" for letter in words)

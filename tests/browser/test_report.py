@@ -194,6 +194,7 @@ def test_tables_are_sorted_by_number_and_by_word(page, results):
     page.click(f"#table-curves th:nth-child({sigma + 1}) button")
     rising = [float(text) for text in column(sigma)]
     assert rising == sorted(rising)
+    assert page.evaluate("document.querySelectorAll('thead th button sub').length")  # formulas stay such
     assert sorted(before) == sorted(column(sigma))
     page.click(f"#table-curves th:nth-child({sigma + 1}) button")
     assert [float(text) for text in column(sigma)] == rising[::-1]

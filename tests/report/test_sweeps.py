@@ -8,6 +8,7 @@ import pytest
 
 from radarsim.app import result as output
 from radarsim.app import run
+from radarsim.language import speaking
 from radarsim.report import chart, figures, panels, sweeps, tables
 from radarsim.report.claims import page
 from radarsim.report.drawing import Line
@@ -185,3 +186,12 @@ def test_a_filter_looks_the_same_in_all_panels_of_a_figure():
         styles.setdefault(one.label, set()).add(one.style)
     assert {"remainder", "no memory", "memory"} <= styles.keys()
     assert all(len(own) == 1 for own in styles.values())
+
+
+@pytest.mark.parametrize(("code", "words"), [("en", "turn rate = 1°/s"), ("ru", "угловая скорость поворота = 1°/с")])
+def test_an_angle_is_told_in_degrees_in_every_language(code, words):
+    key = "target.turns.0.rate_radps"
+    result = run.run("sonar_manoeuvre_turning", realisations=8, overrides=[f"sweep.{key}=[0.01745]"], figures=False)
+    with speaking(code):
+        assert panels.swept(result.cases[0], without=["frame"]) == words
+        assert panels.axis_of(result.cases[0], key).partition(", ")[2] == words[-3:]

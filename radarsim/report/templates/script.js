@@ -674,9 +674,10 @@ function sortable(table) {
   const body = table.tBodies[0];
   const groups = [...table.tBodies];
   for (const [column, head] of [...table.tHead.rows[0].cells].entries()) {
-    const button = make("button", head.textContent, null);
+    const button = make("button", "", null);
     button.type = "button";
-    head.replaceChildren(button);
+    button.append(...head.childNodes); // with its formulas
+    head.append(button);
     head.setAttribute("aria-sort", "none");
     button.addEventListener("click", () => {
       const up = head.getAttribute("aria-sort") !== "ascending";

@@ -10,7 +10,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.language import numeral, term, tr
+from radarsim.language import listed, numeral, term, tr
 from radarsim.report import panels, seen, tables, wording
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.quantities import Component
@@ -165,6 +165,7 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
         "The true flight: the ground track from its start, at one scale "
         "north and east, with the radar at the origin. Dotted: ends of the stages."
     )
+    caption += _stages_said(drawn, results)
     return _of_the_paper(_several("trajectory", tr("Flight"), caption, drawn, 56), results, "1 … 4")
 
 
@@ -199,9 +200,19 @@ def _stage_lines(results: Sequence[CaseResult], letters: int = ACROSS) -> tuple[
         return ()
     marks: list[Reference | Note] = [Reference(end, "x") for end in ends]
     for stage, (begin, end) in zip(stages, pairwise([0.0, *ends, last]), strict=True):
-        if len(name := tr(stage.name)) <= letters * (end - begin) / last:
+        if wording.letters_in(name := tr(stage.name)) <= letters * (end - begin) / last:
             marks.append(Note((begin + end) / 2, np.nan, name, "top"))
     return tuple(marks)
+
+
+def _stages_said(drawn: Sequence[Panel], results: Sequence[CaseResult]) -> str:
+    """The stages in order, for a caption, where a panel has no room for all their names; else empty."""
+    stages = {result.spec.target.stages for result in results}
+    named = [sum(isinstance(mark, Note) and mark.place == "top" for mark in panel.marks) for panel in drawn]
+    (only,) = stages if len(stages) == 1 else ((),)
+    if len(only) < 2 or min(filter(None, named), default=0) >= len(only):
+        return ""
+    return " " + tr("Stages in order: {names}.", names=listed([tr(stage.name) for stage in only]))
 
 
 def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str) -> Figure | None:
@@ -228,7 +239,7 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
         "intervals. Dotted: ends of the stages.",
         quantity=quantity,
         count=results[0].count if results else 0,
-    )
+    ) + _stages_said(drawn, results)
     figure = _several(f"sigma_{component}", tr("σ of {quantity}", quantity=quantity), caption, drawn, 76)
     if figure is None:
         return None
@@ -274,7 +285,9 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
             "Mean posterior probabilities of the models; the numbers after the motions are the spreads of "
             "the random acceleration, m/s². Dotted: ends of the stages."
         )
-    ) + left
+        + _stages_said(drawn, results)
+        + left
+    )
     return _of_the_paper(_several("probabilities", tr("Probabilities of the models"), caption, drawn, 58), results, "7")
 
 

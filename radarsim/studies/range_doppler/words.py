@@ -240,7 +240,7 @@ def _tried_on(results: Sequence[Result]) -> dict[str, list[Result]]:
                 for key, v in result.swept
                 if not _is_variance(key)
             )
-            found.setdefault(" ".join(filter(None, (panels.device(result), others))), []).append(result)
+            found.setdefault(", ".join(filter(None, (panels.device(result), others))), []).append(result)
     return {name: members for name, members in found.items() if len(members) > 1 and all(map(_given, members))}
 
 

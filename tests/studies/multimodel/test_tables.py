@@ -1,6 +1,7 @@
 """P2's tables, figures and claims, on a small run of the shipped config."""
 
 import json
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +9,9 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.report import claims, html
+from radarsim.app import result as output
+from radarsim.language import speaking
+from radarsim.report import claims, figures, html
 from radarsim.report.drawing import Note
 from radarsim.studies.multimodel import STUDY, words
 from radarsim.studies.multimodel.measures import Evidence
@@ -88,6 +91,24 @@ def test_figures_are_described(result):
         tops = [(mark.text, mark.x) for mark in panel.marks if isinstance(mark, Note) and mark.place == "top"]
         end = float(result.cases[0].axes.t_s[-1])
         assert tops == [("start", 10), ("ballistic", 72.5), ("manoeuvre", 147.5), ("after", (170 + end) / 2)]
+
+
+def test_names_of_stages_do_not_touch_and_the_caption_has_those_without_room():
+    made = radarsim.run("multimodel_recorded", realisations=3)
+    with speaking("ru"):
+        drawn = output.case_figures(made.cases, made.tables, made.experiment)
+    for name in ("sigma_y", "trajectory"):
+        assert (
+            "Этапы по порядку: начало, прямая, разворот, набор высоты, обратный разворот и после."
+            in drawn[name].caption
+        )
+        canvas = figures.render(drawn[name])
+        (*_, axes) = canvas.axes
+        boxes = [
+            text.get_window_extent() for text in axes.texts if text.get_text() in ("разворот", "набор высоты", "после")
+        ]
+        assert len(boxes) >= 2
+        assert all(left.x1 < right.x0 for left, right in pairwise(sorted(boxes, key=lambda box: box.x0)))
 
 
 def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):
