@@ -769,7 +769,7 @@ def test_the_first_figure_is_of_the_filter_whatever_the_config_names(tmp_path):
     result = radarsim.judge("sonar_smoothing", range_alone, components=["r"], realisations=64)
     written = result.write(tmp_path, figures="svg")
     headings = re.findall(r"(?m)^## (.+)$", (written.folder / "figures/captions.md").read_text(encoding="utf-8"))
-    assert headings == ["gain_r", "plots", "smoothing_gains", "sigma_r", "claims"]
+    assert headings == ["gain_r", "sigma_r", "plots", "smoothing_gains", "claims"]
 
 
 def range_alone(plots):
