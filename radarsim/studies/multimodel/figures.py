@@ -343,10 +343,11 @@ def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
         y = Axis(panels.sigma_of("$y$", "m"), "log")
         drawn.append(Panel(x, y, tuple(marks), tr(str(stage)), direct=False))
     points = [mark for mark in drawn[-1].marks if isinstance(mark, Line)]
-    cheap, good = min(points, key=lambda one: float(one.x[0])), min(points, key=lambda one: float(one.y[0]))
+    fewest, good = min(float(one.x[0]) for one in points), min(points, key=lambda one: float(one.y[0]))
+    cheap = listed([one.label for one in points if float(one.x[0]) == fewest])
     told = tr(
         "Fewest operations: {cheap} ({count:.0f}); least σ, {stage}: {good} ({sigma} m). ",
-        **{"cheap": cheap.label, "count": float(cheap.x[0]), "stage": drawn[-1].title},
+        **{"cheap": cheap, "count": fewest, "stage": drawn[-1].title},
         **{"good": good.label, "sigma": wording.number(float(good.y[0]), 3)},
     )
     drawn = _beside(drawn, result, dash=None)

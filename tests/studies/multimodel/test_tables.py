@@ -111,6 +111,15 @@ def test_names_of_stages_do_not_touch_and_the_caption_has_those_without_room():
         assert all(left.x1 < right.x0 for left, right in pairwise(sorted(boxes, key=lambda box: box.x0)))
 
 
+def test_filters_of_as_few_operations_are_named_together():
+    made = radarsim.run("multimodel_families_1hz", realisations=3)
+    counts = made.tables["operations"].query("stage == 'after'").set_index("filter")["operations"]
+    fewest = counts[counts == counts.min()].index
+    assert set(fewest) == {"MMA1 best", "MMA2 best"}
+    caption = output.case_figures(made.cases, made.tables, made.experiment)["cost"].caption
+    assert caption.startswith(f"Fewest operations: MMA2 best and MMA1 best ({counts.min():.0f}); ")
+
+
 def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):
     first, height, climb = words.answer(result.cases, result.tables)
     for stage in ("start", "ballistic", "manoeuvre", "after"):
