@@ -18,7 +18,7 @@ from radarsim.config.check import models_in
 from radarsim.config.fields import Model
 from radarsim.config.schema import Common
 from radarsim.language import ANY, NUMBERS, catalogue
-from radarsim.report.claims import judge, rule
+from radarsim.report.claims import judge, over, rule
 from radarsim.studies import registry
 from radarsim.studies.discriminator import search as discriminator
 from radarsim.studies.range_doppler import search as range_doppler
@@ -118,14 +118,15 @@ def in_claims() -> Iterator[tuple[str, str, str]]:
 
 
 def in_readings() -> Iterator[tuple[str, str, str]]:
-    """What the papers leave open, why, and the numbers of their joint searches."""
+    """What the papers leave open, its alternatives, why, and the numbers of their joint searches."""
     for name in registry.SHIPPED:
         of = registry.study(name).readings()
         if of is None:
             continue
         place = f"radarsim/studies/{name}/readings.yaml"
         for choice in of.choices:
-            for text in (choice.asks, *(one.reason for one in choice.alternatives)):
+            own = ((one.reason, over.spaced(one.name)) for one in choice.alternatives)
+            for text in (choice.asks, *(text for both in own for text in both)):
                 yield text, "", place
             if choice.original == choice.english:  # the paper is silent
                 yield choice.original, "", place

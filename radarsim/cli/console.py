@@ -265,9 +265,9 @@ def field(label: str, text: str) -> None:
 
 
 def wrapped(line: str, width: int) -> list[str]:
-    """A line broken between words, a unit kept with its number; further lines are indented to its first words."""
-    label = re.match(r"(\S+( \S+)?)? {2,}|", line)
-    indent = " " * len(label[0]) if label and len(label[0]) < width // 2 else ""
+    """A line broken between words, a unit kept with its number; further lines are indented to its last column."""
+    columns = [gap.end() for gap in re.finditer(r"(^| ) +(?=\S)", line) if gap.end() < width // 2]
+    indent = " " * max(columns, default=0)
     kept = unbroken(line)
     broken = textwrap.wrap(
         kept, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False, drop_whitespace=True

@@ -640,7 +640,8 @@ def print_readings(done: "Readings", detailed: bool) -> None:
     if done.files:
         curves = sum(name.endswith(".svg") for name in done.files)
         drawn = plural("{count} curve", "{count} curves", curves)
-        field("table", tr("{file}, {curves} beside it", file=str(done.folder / "readings.csv"), curves=drawn))
+        file = str(done.folder / "readings.csv")
+        field("table", tr("{file}, {curves} beside it", file=file, curves=drawn) if curves else file)
     if done.outdated:
         command = f"radarsim report {shlex.join(done.outdated)}{configs.into(done.folder.parent)}"
         told = {"configs": listed(done.outdated), "command": command}

@@ -14,6 +14,7 @@ from radarsim.language import speaking, tr
 from radarsim.report.claims import page as curve
 from radarsim.report.claims import rule
 from radarsim.report.claims.declared import differences
+from radarsim.report.claims.over import alternative
 from radarsim.report.quantities import SIGMA
 from radarsim.studies.range_doppler.chart import SAID
 from radarsim.studies.range_doppler.study import exact_but_for
@@ -83,10 +84,20 @@ def test_readings_of_a_claim_and_their_curve(claim, tmp_path):
         page = readings.pages(done)
         over = done.read[0].over[0]
         texts = shown(curve.specification(over))
-    every = [one.name for choice in over.of.choices for one in choice.alternatives]
+    every = [one.name for choice in over.of.choices for one in choice.alternatives]  # the page has them as keys
     typed = {part for name in every for part in re.findall("[A-Za-z]+", name)} | {"same", "time"}
     names = NAMES | typed | {"readings", "markdown", "results", "verdicts"}
     assert {text: found for text in [*texts, *page.splitlines()] if (found := untranslated(text, names))} == {}
+
+
+def test_what_papers_leave_open_is_said_in_the_language():
+    choices = [choice for paper in readings.papers().values() for choice in paper.readings.choices]
+    names = {one.name for choice in choices for one in choice.alternatives}
+    with speaking("ru"):
+        said = {name: alternative(name) for name in names}
+    assert {name: words for name, words in said.items() if untranslated(words, set())} == {}
+    assert said["0.003"] == "0,003"
+    assert (alternative("half σ_a"), alternative("process_noise")) == ("half σ_a", "process noise")
 
 
 REASONS = (

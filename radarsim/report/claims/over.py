@@ -35,6 +35,7 @@ rounds to, under the granular one if it lies within the margin of its words."""
 import inspect
 import itertools
 import math
+import re
 from abc import ABC
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -55,7 +56,7 @@ from radarsim.config.fields import Anything, Flag, Model, Name, Stem
 from radarsim.config.load import parse, read
 from radarsim.engine.results import CaseResult
 from radarsim.errors import OF_AUTHORS, ConfigError, MeasureError, RadarsimError
-from radarsim.language import listed, term, tr
+from radarsim.language import listed, numeral, term, tr
 from radarsim.report.claims import rule
 from radarsim.report.claims.declared import (
     Claim,
@@ -248,8 +249,18 @@ class PaperReadings(ABC):
 
 def in_words(taken: Mapping[str, str], asks: Mapping[str, str]) -> str:
     """What is taken of choices in place of the default, for people."""
-    words = [f"{tr(asks.get(key, key))}: {name.replace('_', ' ')}" for key, name in taken.items()]
+    words = [f"{tr(asks.get(key, key))}: {alternative(name)}" for key, name in taken.items()]
     return "; ".join(words) or tr(DEFAULT)
+
+
+def alternative(name: str) -> str:
+    """The name of an alternative, for people."""
+    return tr(spaced(name)) if re.search("[a-zA-Z]", name) else numeral(name)
+
+
+def spaced(name: str) -> str:
+    """A name with its words apart; σ_a stays."""
+    return re.sub("(?<=[a-z])_(?=[a-z])", " ", name)
 
 
 @dataclass(frozen=True)

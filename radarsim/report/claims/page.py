@@ -23,7 +23,7 @@ from radarsim.language import numeral, plural, term, tr
 from radarsim.report.claims import rule
 from radarsim.report.claims.declared import Claim
 from radarsim.report.claims.judge import NOT_JUDGED, NOT_RUN
-from radarsim.report.claims.over import DEFAULT, DEPENDS_ON, Choice, Over, PaperReadings, Under, depth
+from radarsim.report.claims.over import DEFAULT, DEPENDS_ON, Choice, Over, PaperReadings, Under, alternative, depth
 from radarsim.report.claims.rule import (
     CLASSES,
     CONFIRMED,
@@ -117,7 +117,7 @@ def _below(varied: list[Choice], every: list[Under], where: np.ndarray) -> Panel
         ticks.append((float(height), _short(f"{tr(choice.asks)}:")))
         for one in choice.alternatives:
             height -= 1
-            ticks.append((float(height), _short(one.name.replace("_", " "))))
+            ticks.append((float(height), _short(alternative(one.name))))
             taken = np.array([reading.reading[choice.key] == one.name for reading in every])
             if taken.any():
                 style = Style(
