@@ -2,11 +2,12 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from radarsim.app.configs import CaseWork
+from radarsim.errors import ConfigError
 
 Progress = Callable[[int, int, int], None]
 Name = TypeVar("Name")
@@ -41,11 +42,13 @@ def timed(work: CaseWork, count: int) -> float:
 
 
 def estimated(cases: Mapping[Name, tuple[CaseWork, int]]) -> dict[Name, float]:
-    """Seconds of one thread for the realisations of each case, from a few of them, after compilation."""
-    seconds = {}
+    """Seconds of one thread for the realisations of each case, from a few of them, after compilation; 0 of a case that
+    cannot be run, which its own run says."""
+    seconds = dict.fromkeys(cases, 0.0)
     for key, (work, realisations) in cases.items():
-        work.simulate(0, 1)
-        seconds[key] = realisations * seconds_each(work, max(1, realisations // PART), PILOT_S / len(cases))
+        with suppress(ConfigError):
+            work.simulate(0, 1)
+            seconds[key] = realisations * seconds_each(work, max(1, realisations // PART), PILOT_S / len(cases))
     return seconds
 
 

@@ -628,10 +628,11 @@ def print_readings(done: "Readings", detailed: bool) -> None:
     for read in done.read:
         for over in read.over:
             if detailed:
-                for one in over.under:
-                    outcome = tr(one.outcome.kind) if one.outcome else tr("not possible")
+                outcomes = [tr(one.outcome.kind) if one.outcome else tr("not possible") for one in over.under]
+                width = max(map(len, outcomes))
+                for one, outcome in zip(over.under, outcomes, strict=True):
                     why = f" ({rule.said(one.why)})" if one.why else ""
-                    say(f"       {one.kind}  {outcome:<24} {over.of.said(one.reading)}{why}")
+                    say(f"       {one.kind}  {outcome:<{width}}  {over.of.said(one.reading)}{why}")
             found = over.outcome
             words = tr(found.kind) if found else tr("not judged")  # on what it depends, the sentence says
             say(f"{over.claim.id:<6} {words:<28} {over.sentence()}")

@@ -7,6 +7,7 @@ import pytest
 
 from radarsim.app import ahead
 from radarsim.app.ahead import Ahead, Weighed
+from radarsim.errors import ConfigError
 
 
 class Clock:
@@ -78,6 +79,15 @@ def test_nothing_is_timed_for_short_work_or_with_filters_from_outside(clock, eac
     seen = over(clock, works, 10_000)
     assert [work.called for work in works] == [0, 0]
     assert seen[-1][1:] == (20_000, 20_000, 0)
+
+
+def test_a_case_that_cannot_be_run_is_no_fault_of_the_run_that_foretells(clock):
+    class Impossible(Work):
+        def simulate(self, _first, _count):
+            raise ConfigError("it hits the ground")
+
+    found = ahead.estimated({"one": (Work(clock, 0.01), 1000), "other": (Impossible(clock, 0.01), 1000)})
+    assert found == {"one": pytest.approx(10), "other": 0}
 
 
 def foretold(clock, kinds, expected, slower, stored):
