@@ -134,7 +134,7 @@ class Plan:
         self._open = dict.fromkeys(keys)
         for key in self._open:
             ahead.add(f"judging of {key[0]}", RUN_JUDGED_S)
-            ahead.add(f"run of {key[0]}", 1.0, self._expected(key))
+            ahead.add(self._kind(key), 1.0, self._expected(key))
 
     def estimate(self, ahead: Ahead, threads: int | None) -> None:
         """Measure a few realisations of every case as shipped, and add the seconds of the runs ahead."""
@@ -143,12 +143,16 @@ class Plan:
         timed = estimated({of: (CaseWork(case), self._n) for of, case in cases.items()})
         self._seconds = {of: seconds / each for of, seconds in timed.items()}
         for key in self._open:
-            ahead.add(f"run of {key[0]}", 1.0, self._expected(key))
+            ahead.add(self._kind(key), 1.0, self._expected(key))
         self._look_s = LOOK_PART * sum(map(self._expected, self._jobs))
         self._expect_looks(ahead, self._looks)
 
     def _expect_looks(self, ahead: Ahead, count: int) -> None:
         ahead.add("later looks", 1.0, self._look_s * count)
+
+    def _kind(self, key: tuple[str, ...]) -> str:
+        """What is foretold together: a reading may change what a case takes, but hardly that of other cases."""
+        return ", ".join(("run of", key[0], *(case.name for case, _ in self._jobs[key])))
 
     def _expected(self, key: tuple[str, ...]) -> float:
         """Expected seconds of a run; 0 before `estimate`."""
@@ -210,7 +214,7 @@ class Plan:
         only: Collection[tuple[str, Reading]] | None = None,
     ) -> None:
         """Run or continue the cases of a key, and judge what they show; `only`: for these places."""
-        progress = ahead.running(f"run of {key[0]}", partial(self._expected, key))
+        progress = ahead.running(self._kind(key), partial(self._expected, key))
         try:
             done = self._run(key, pairs, options, progress)
         except ConfigError:
