@@ -285,15 +285,26 @@ def check(experiment: Experiment) -> None:
 
 
 def simulated(experiment: Experiment, options: RunOptions, progress: Progress | None = None) -> SimulatedCases:
-    """The cases at the first look at which every claim is decided, or at the last permitted look."""
+    """The cases at the first look at which every claim is decided, or at the last permitted look; progress is towards
+    that one."""
     most = max(case.realisations for case in experiment.cases)
+    each = [realisations for _, realisations in run.distinct(experiment)]
+    before = 0  # realisations of the looks before
+
+    def towards(done: int, _: int, held: int) -> None:
+        if progress is not None:
+            progress(before + done - held, sum(each), before)
+
     with ExitStack() as stack:
         if options.out is None:
             options = replace(options, out=stack.enter_context(tempfile.TemporaryDirectory(prefix="radarsim-")))
         best: SimulatedCases | None = None
         for n in dict.fromkeys((*looks(most), most)):
             cases = tuple(replace(case, realisations=min(n, case.realisations)) for case in experiment.cases)
-            found = run.simulate(replace(experiment, cases=cases), options, progress=progress)
+            if before:
+                towards(0, 0, 0)  # judging is not in the rate
+            found = run.simulate(replace(experiment, cases=cases), options, progress=progress and towards)
+            before = sum(min(n, one) for one in each)
             if found.stopped and best is not None and len(found.cases) < len(best.cases):
                 return replace(best, stopped=found.stopped)
             best = found
@@ -506,7 +517,8 @@ def readings(
     in seconds. out: directory for readings.csv, a figure for each claim, and the stored runs.
 
     `table` is readings.csv: a row for each claim, reading and part. Raises ConfigError for unknown names, TargetUnmet
-    if the time did not suffice.
+    if the time did not suffice. progress is called with the milliseconds that have passed, those that all is expected
+    to take, and 0.
 
     >>> readings("P1.4")
     P1.4 depends on: holds in 4 of 6 readings; depends on how the filter starts

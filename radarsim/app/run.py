@@ -125,7 +125,7 @@ def simulate(
     precision, and large errors would have been seen (all report.precision). Raises ConfigError where a case has none.
     """
     made: dict[tuple[str, int], tuple[Collected, Cell | None]] = {}
-    simulation, works = SimulatedCases(precision=precision), _distinct(experiment)
+    simulation, works = SimulatedCases(precision=precision), distinct(experiment)
     weighed = Weighed(progress, {key: (work, key[1]) for key, work in works.items()})
     with ExitStack() as stack:
         if precision is not None and options.out is None:
@@ -151,7 +151,7 @@ def simulate(
     return simulation
 
 
-def _distinct(experiment: Experiment) -> dict[tuple[str, int], CaseWork]:
+def distinct(experiment: Experiment) -> dict[tuple[str, int], CaseWork]:
     """The work of the first case of each identity and number of realisations."""
     found: dict[tuple[str, int], CaseWork] = {}
     for case in experiment.cases:
@@ -274,7 +274,7 @@ def shared(
     """Put a share of every case, as (2, 3) the second of three, into the store under options.out. Stops early on
     `stop`."""
     assert options.out is not None  # a share is only what it stores
-    works = _distinct(experiment)
+    works = distinct(experiment)
     weighed = Weighed(progress, {key: (work, -(-key[1] // part[1])) for key, work in works.items()})
     shares: dict[str, Shared] = {}
     for key, work in works.items():

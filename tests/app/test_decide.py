@@ -10,7 +10,10 @@ from tests.program import command
 
 
 def test_what_is_known_exactly_is_decided_at_the_first_look(tmp_path):
-    result = radarsim.run("range_doppler", realisations=8000, decide=True, out=tmp_path, figures=False)
+    seen = []
+    keep = {"out": tmp_path, "progress": lambda *of: seen.append(of)}
+    result = radarsim.run("range_doppler", realisations=8000, decide=True, figures=False, **keep)
+    assert seen[-1] == (25 * 2000, 25 * 8000, 0)  # 25 of the 30 cases differ; towards the last look
     assert {case.count for case in result.cases} == {2000}
     assert result.unmet == []
     assert result.facts["stop"] == "done"
