@@ -405,7 +405,8 @@ def run(
     end at the first of these numbers at which every claim of the config is decided. time_limit is in seconds, including
     tables and figures, or a condition that is already running. `result.unmet` names the targets that were not reached.
     workers: number of processes on this machine; scheduler: address of a Dask scheduler; executor: one that is already
-    open. width_mm: width of the figures, instead of their own.
+    open. width_mm: width of the figures, instead of their own. progress is called with the realisations that are done,
+    are to be done, and were stored, where cases are weighed by their time.
 
     Raises ConfigError for an invalid config, StoreError for a disk fault, NonFiniteError for a filter that diverged,
     TargetUnmet if the time did not suffice for a single block, and Interrupted on a signal; finished blocks are then
