@@ -169,6 +169,7 @@ def test_a_figure_names_keys_as_people_do(exact):
     assert "Too small to be drawn: r: plots in the initialisation, r: manoeuvre variance, r+Vr: plots" in told
 
 
+@pytest.mark.slow
 def test_where_some_filters_have_no_exact_values_all_are_sampled():
     """Else the others would be said to change nothing."""
     found = sensitivity("ambiguous_rls2", overrides=["scans=4"], realisations=40)

@@ -126,6 +126,7 @@ def test_of_whole_numbers_one_that_does_as_well():
     assert found.slope == pytest.approx(sigma[found.value + 1] - sigma[found.value], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_linear_sonar_filters_are_exact_too():
     """Least squares over growing memory: σ is proportional to that of a plot."""
     quantity = Wanted("sigma", "growing", "r")

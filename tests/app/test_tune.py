@@ -165,6 +165,7 @@ def test_a_gain_is_not_that_of_the_training(matched):
     assert min(one.gain for one in gains) < 0
 
 
+@pytest.mark.slow
 def test_a_gain_is_measured_on_the_realisations_of_the_config():
     found = tune("ambiguous_rls2", "sigma r at k 8", filter="nearest fold", realisations=400)
     curves = radarsim.run("ambiguous_rls2", realisations=400, figures=False).curves
@@ -186,6 +187,7 @@ def test_whole_numbers_alone_have_no_interval():
     )
 
 
+@pytest.mark.slow
 def test_columns_of_a_matrix_sum_to_one_and_zeros_stay():
     given = {"transition": None, "models.2.sigma_acceleration_mps2": (3, 300)}
     shorter = ["filters.0.models.0.sigma_acceleration_mps2=1", "scans=30"]
@@ -274,6 +276,7 @@ def test_both_rivals_stand_beside_the_floor():
     assert ", tuned " in floor
 
 
+@pytest.mark.slow
 def test_the_answer_is_about_what_the_rivals_are_tuned_for():
     """As text says it: at a time, at a scan, at the last; of a component that the filter lacks, of its first."""
     velocity = lambda plots: np.stack([plots["range_m"], plots["velocity_mps"]], axis=-1)  # noqa: E731

@@ -126,6 +126,7 @@ def test_two_keys_make_a_panel_a_value_and_a_map_and_leave_nothing_out():
             figures.save(figure, ("svg",))
 
 
+@pytest.mark.slow
 def test_of_very_many_cases_the_caption_says_how_many_are_left_out():
     velocities, variances = list(range(1, 15)), [10.0**-n for n in range(10)]
     keys = (f"sweep.radar.sigma_velocity_mps={velocities}", f"sweep.manoeuvre_variance={variances}")
