@@ -166,7 +166,9 @@ LETTERS = {
     **{"sigma": "σ", "beta": "β", "rho": "ρ", "varphi": "φ", "varepsilon": "ε", "theta": "θ", "lambda": "λ"},
     **{"Delta": "Δ", "times": "×", "cdot": "·", "mu": "μ", "chi": "χ", "nu": "ν"},
 }
-INDEXED = re.compile(r"(?<![\w.])(Δ?[^\W\d_])_(?:\{([^{}\s]+)\}|([^\W_]{1,3})(?!\w|\.\w))")  # D_M, g_{n−1}, no key
+INDEXED = re.compile(
+    r"(?<![\w.])(Δ?[^\W\d_])_(?:\{([^{}\s]+)\}|([^\W_²³]{1,3})(?![^\W²³]|\.\w))"
+)  # D_M, g_{n−1}, σ_η², no key
 DOT_ABOVE, HAT_ABOVE = "\u0307", "\u0302"
 PARTS = re.compile(r"\\(dot|hat)\s*(\w)|\\([A-Za-z]+)\s?|([_^])(\{[^}]*\}|\\[A-Za-z]+|.)|([^\W\d_]+)|(.)", re.DOTALL)
 
@@ -194,8 +196,8 @@ def subscripts(text: str) -> Iterator[tuple[str, str]]:
 def formulas(words: str) -> str:
     r"""Plain words as a text with formulas: letters with an index become such.
 
-    >>> formulas("σ_r at the best D_M and g_{n−1}: sigma_range_m")
-    '$σ_{r}$ at the best $D_{M}$ and $g_{n−1}$: sigma_range_m'
+    >>> formulas("σ_r² at the best D_M and g_{n−1}: sigma_range_m")
+    '$σ_{r}$² at the best $D_{M}$ and $g_{n−1}$: sigma_range_m'
     """
     return INDEXED.sub(lambda found: f"${found[1]}_{{{found[2] or found[3]}}}$", words.replace("$", r"\$"))
 

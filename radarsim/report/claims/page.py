@@ -79,12 +79,13 @@ def specification(over: Over) -> Figure:
         name=over.claim.id,
         title=tr("{claim} under every reading", claim=over.claim.id),
         caption=caption,
-        panels=(_above(every, where, ends, over), *([_below(varied, every, where)] if varied else [])),
+        headline=f"{over.claim.id}: {over.sentence()}",
+        panels=(_above(every, where, ends), *([_below(varied, every, where)] if varied else [])),
         width_mm=PAGE_MM,
     )
 
 
-def _above(every: list[Under], where: np.ndarray, ends: np.ndarray, over: Over) -> Panel:
+def _above(every: list[Under], where: np.ndarray, ends: np.ndarray) -> Panel:
     marks = []
     for kind, (label, style) in KINDS.items():
         of = np.array([one.kind == kind for one in every])
@@ -100,7 +101,6 @@ def _above(every: list[Under], where: np.ndarray, ends: np.ndarray, over: Over) 
             Reference(0.0, label=tr("as the paper says")),
             Reference(1.0, label=tr("beyond the margin")),
         ),
-        title=f"{over.claim.id}: {over.sentence()}",
         direct=False,
     )
 
@@ -114,7 +114,7 @@ def _below(varied: list[Choice], every: list[Under], where: np.ndarray) -> Panel
     ticks, marks, height = [], [], HEADING - 1.0
     for choice in varied:
         height -= HEADING
-        ticks.append((float(height), _short(f"{tr(choice.asks)}:")))
+        ticks.append((float(height), formulas(_short(f"{tr(choice.asks)}:"))))
         for one in choice.alternatives:
             height -= 1
             ticks.append((float(height), _short(alternative(one.name))))
