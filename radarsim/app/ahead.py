@@ -79,7 +79,9 @@ class Weighed:
     def _weigh(self) -> None:
         if time.monotonic() > self._due and any(done > held for done, held in self._counts.values()):
             self._due = float("inf")
-            self._seconds = estimated(self._cases)
+            found = estimated(self._cases)
+            if any(found.values()):  # a coarse clock may see none of them
+                self._seconds = found
 
     def _report(self, progress: Progress) -> None:
         total = sum(count for _, count in self._cases.values())
@@ -115,11 +117,11 @@ class Ahead:
         self._kinds.setdefault(kind, Kind(expected)).ahead += count
 
     @contextmanager
-    def doing(self, kind: str, count: float = 1.0) -> Iterator[None]:
-        """Measure this many of a kind."""
+    def doing(self, kind: str) -> Iterator[None]:
+        """Measure one of a kind."""
         started = time.monotonic()
         yield
-        self.did(kind, count, time.monotonic() - started)
+        self.did(kind, 1.0, time.monotonic() - started)
 
     def did(self, kind: str, count: float, seconds: float) -> None:
         """This many of a kind took so many seconds."""

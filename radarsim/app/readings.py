@@ -288,7 +288,7 @@ def simulated(experiment: Experiment, options: RunOptions, progress: Progress | 
     """The cases at the first look at which every claim is decided, or at the last permitted look; progress is towards
     that one."""
     most = max(case.realisations for case in experiment.cases)
-    each = [realisations for _, realisations in run.distinct(experiment)]
+    each = [realisations for _, realisations in dict(run.keyed(experiment))]
     before = 0  # realisations of the looks before
 
     def towards(done: int, _: int, held: int) -> None:

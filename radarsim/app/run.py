@@ -125,14 +125,12 @@ def simulate(
     precision, and large errors would have been seen (all report.precision). Raises ConfigError where a case has none.
     """
     made: dict[tuple[str, int], tuple[Collected, Cell | None]] = {}
-    simulation, works = SimulatedCases(precision=precision), distinct(experiment)
-    weighed = Weighed(progress, {key: (work, key[1]) for key, work in works.items()})
+    simulation, works = SimulatedCases(precision=precision), keyed(experiment)
+    weighed = Weighed(progress, {key: (work, key[1]) for key, work in works})
     with ExitStack() as stack:
         if precision is not None and options.out is None:
             options = replace(options, out=stack.enter_context(tempfile.TemporaryDirectory(prefix="radarsim-")))
-        for case in experiment.cases:
-            key = CaseWork(case).identity, case.realisations
-            work = works[key]
+        for case, (key, work) in zip(experiment.cases, works, strict=True):
             if key not in made:
                 collector = _collector(work, options, weighed.of(key), collect)
                 wanted = None
@@ -151,13 +149,12 @@ def simulate(
     return simulation
 
 
-def distinct(experiment: Experiment) -> dict[tuple[str, int], CaseWork]:
-    """The work of the first case of each identity and number of realisations."""
+def keyed(experiment: Experiment) -> list[tuple[tuple[str, int], CaseWork]]:
+    """For each case its identity and number of realisations, and the work of the first case that has both."""
     found: dict[tuple[str, int], CaseWork] = {}
-    for case in experiment.cases:
-        work = CaseWork(case)
-        found.setdefault((work.identity, case.realisations), work)
-    return found
+    works = [CaseWork(case) for case in experiment.cases]
+    keys = [(work.identity, work.case.realisations) for work in works]
+    return [(key, found.setdefault(key, work)) for key, work in zip(keys, works, strict=True)]
 
 
 def _collector(work: CaseWork, options: RunOptions, progress: Progress, of: Callable[..., Any]) -> Callable[..., Any]:
@@ -274,7 +271,7 @@ def shared(
     """Put a share of every case, as (2, 3) the second of three, into the store under options.out. Stops early on
     `stop`."""
     assert options.out is not None  # a share is only what it stores
-    works = distinct(experiment)
+    works = dict(keyed(experiment))
     weighed = Weighed(progress, {key: (work, -(-key[1] // part[1])) for key, work in works.items()})
     shares: dict[str, Shared] = {}
     for key, work in works.items():

@@ -152,3 +152,11 @@ def test_nobody_looks(clock):
     one.add("figure", 0.1)
     with one.doing("figure"):
         clock.now += 1
+
+
+def test_a_clock_too_coarse_for_the_pilot_leaves_cases_equally_long(clock, monkeypatch):
+    works = [Work(clock, 0.02), Work(clock, 0.02)]
+    monkeypatch.setattr(Work, "simulate", lambda *_: None)
+    seen = over(clock, works, 10_000)
+    assert seen[-1][1:] == (20_000, 20_000, 0)
+    assert (2000, 20_000, 0) in {one[1:] for one in seen}
