@@ -22,7 +22,8 @@ def compiled(names: list[str]) -> dict[str, float]:
     """CPU seconds by kernel that is called from Python, of all cases of these configs."""
     from numba.core import event
 
-    from radarsim.app.configs import CaseWork, load
+    from radarsim.app.case_work import CaseWork
+    from radarsim.app.configs import load
 
     found: dict[str, float] = {}
 

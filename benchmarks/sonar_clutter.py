@@ -38,7 +38,8 @@ def config(association: str, density: float) -> dict:
 
 def measure(n: int) -> dict:
     """Figures of one process."""
-    from radarsim.app.configs import CaseWork, load
+    from radarsim.app.case_work import CaseWork
+    from radarsim.app.configs import load
     from radarsim.studies.sonar.clutter.kernels.tracker import FALSE, FALSE_KEPT, LOOKED
 
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-1:])

@@ -46,7 +46,8 @@ def c_limit(folder: Path):
 
 def work():
     """RLS 2 as the engine sees it."""
-    from radarsim.app.configs import CaseWork, load
+    from radarsim.app.case_work import CaseWork
+    from radarsim.app.configs import load
 
     (case,) = load(CONFIG).cases
     made = CaseWork(case)

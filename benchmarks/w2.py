@@ -75,7 +75,8 @@ def full_matrix(size: int) -> np.ndarray:
 
 def work(every: int, name: str = "multimodel", filters: int = 1):
     """The whole chain of a shipped config, its first filters."""
-    from radarsim.app.configs import CaseWork, load
+    from radarsim.app.case_work import CaseWork
+    from radarsim.app.configs import load
 
     (case,) = load(name, (f"report_every={every}", f"scans={SCANS}")).cases
     spec = case.spec.model_copy(update={"filters": case.spec.filters[:filters]})

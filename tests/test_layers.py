@@ -30,6 +30,7 @@ ROOMS = {
     "config": ("errors", "constants"),
     "threads": (),
     "engine": ("errors", "threads"),
+    "module_sources": ("errors",),
     "kernels": (),
     "constants": (),
     "physics": ("constants",),
@@ -62,7 +63,8 @@ ROOMS = {
     "studies.judged": ("errors", "config", *DATA, "report"),  # claims and readings of studies in one file
     "studies.code": ("errors", "failures", "config", "studies.interface", "studies.outside"),
     "studies.registry": ("errors", "failures", "config", "report.quantities", "studies.code", "studies.interface"),
-    "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry"),
+    "studies.sources": ("config", "module_sources", "studies.registry"),
+    "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry", "studies.sources"),
     "recorded": ("errors", "threads", "config", "language", "engine", "kernels", "physics", "report", "studies"),
     "app": ("errors", "threads", "config", "language", "engine", "kernels", "physics", "report", "studies", "recorded"),
     "cli": (

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.app import configs, stored
 from radarsim.app.configs import RESULTS, Config, Overrides, command, load
-from radarsim.app.result import Result, captions, names_in, recorded_case
+from radarsim.app.recorded_cases import recorded_case
+from radarsim.app.result import Result, captions, names_in
 from radarsim.app.run import namesakes
 from radarsim.app.shown import Shown
 from radarsim.config.experiment import Case, Experiment, canonical, digest, world

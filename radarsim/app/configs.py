@@ -1,4 +1,4 @@
-"""Configs, read with all available studies; cases as the engine sees them; the command that repeats a result.
+"""Configs, read with all available studies; the command that repeats a result.
 
 Arguments of Python functions are refused as the command refuses its options."""
 
@@ -7,8 +7,8 @@ import operator
 import os
 import re
 import shlex
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cache, cached_property
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex, TypeGuard
@@ -21,18 +21,12 @@ from radarsim.errors import ConfigError, argument
 from radarsim.language import term, tr
 from radarsim.report import files
 from radarsim.studies import registry
-from radarsim.studies.interface import Plan
-from radarsim.studies.registry import study
 
 if TYPE_CHECKING:
-    import numpy as np
+    pass
 
 
 # ---- configs ---------------------------------------------------------------------------------------------------------
-BLAMED = {  # sums that may not be finite, and the fault then
-    "error": "not finite",
-    "believed": "with a covariance that is not positive and finite",
-}
 Config = str | os.PathLike[str] | Mapping[str, Any] | Experiment
 Overrides = reading.Overrides
 document.further_folders = registry.folders
@@ -328,90 +322,6 @@ def _number(name: str, value: object, most: float, unit: str = "") -> list[str]:
         return []
     bound = f" and ≤ {most:g}{unit}" if math.isfinite(most) else ""
     return [f"{name}: must be > 0{bound}, got {value!r}"]
-
-
-# ---- work ------------------------------------------------------------------------------------------------------------
-class CaseWork:
-    """A case as the engine sees it: identity, block length and sums. Pickles as the case alone."""
-
-    def __init__(self, case: Case):
-        self.case = case
-
-    def __reduce__(self) -> tuple[type["CaseWork"], tuple[Case]]:
-        return CaseWork, (self.case,)
-
-    @cached_property
-    def plan(self) -> Plan:
-        """The prepared plan, made when first needed."""
-        if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
-            raise ConfigError("NUMBA_DISABLE_JIT is set: without the compiler no block is simulated; unset it")
-        return study(self.case.study).prepare(self.case)
-
-    @cached_property
-    def plans(self) -> tuple[Plan, ...]:
-        """The plan, that of each further baseline, and of filters from outside; their sums are concatenated."""
-        of = study(self.case.study)
-        plans = (self.plan, *(of.prepare(one) for one in self.case.companions))
-        if not self.case.outside:
-            return plans
-        from radarsim.studies import outside
-
-        return (*plans, outside.prepare(of, self.case, self.plan))
-
-    @cached_property
-    def identity(self) -> str:
-        """See `radarsim.studies.identity`."""
-        from radarsim.studies.identity import identity
-
-        return identity(self.case)
-
-    @property
-    def block(self) -> int:
-        """Realisations in a block; depends on the study only."""
-        return self.plan.block
-
-    @property
-    def size(self) -> int:
-        """Length of the vector of sums."""
-        return sum(plan.layout.size for plan in self.plans)
-
-    def simulate(self, first: int, count: int) -> "np.ndarray":
-        """Sums (size,) over realisations first … first + count - 1."""
-        import numpy as np
-
-        own = self.plans[:-1] if self.case.outside else self.plans
-        made = [study(self.case.study).simulate(plan, first, count) for plan in own]
-        if self.case.outside:
-            from radarsim.studies import outside
-
-            beside: Any = self.plans[-1]
-            made.append(outside.simulate(beside, first, count))
-        return made[0] if len(made) == 1 else np.concatenate(made)
-
-    def unpacked(self, values: "np.ndarray") -> "Iterator[dict[str, np.ndarray]]":
-        """The named sums of each plan, of all sums (size,)."""
-        for plan in self.plans:
-            yield plan.layout.unpack(values)
-            values = values[plan.layout.size :]
-
-    def explain(self, first: int, count: int) -> list[str]:
-        """Where the sums of these realisations are not finite: a line for each filter, scan and count."""
-        import numpy as np  # `radarsim list` does without it
-
-        axes, layout = self.plan.axes, self.plan.layout
-        shape = len(axes.filters), len(axes.k)
-        names = [name for name in BLAMED if layout.shapes.get(name, ())[:2] == shape]
-        bad = {name: np.zeros(shape, dtype=int) for name in names}
-        for i in range(first, first + count):
-            sums = layout.unpack(self.simulate(i, 1))
-            for name in names:
-                bad[name] += ~np.isfinite(sums[name]).reshape(*shape, -1).all(axis=2)
-        return [
-            f"{self.case.name}: filter {axes.filters[f]!r}, scan {axes.k[k]}: "
-            f"{bad[name][f, k]} of {count} realisations {BLAMED[name]}"
-            for name in names
-            for f, k in np.argwhere(bad[name])[:20]
-        ]
 
 
 # ---- repeat ----------------------------------------------------------------------------------------------------------

@@ -26,23 +26,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from radarsim.app import run
-from radarsim.app.configs import CaseWork, load
+from radarsim.app.case_work import CaseWork
 from radarsim.app.configs import document as lookup
-from radarsim.app.result import recorded_case
+from radarsim.app.configs import load
+from radarsim.app.recorded_cases import recorded_case
 from radarsim.config.experiment import Case
 from radarsim.engine.blocks import Node, Partial, simulated
+from radarsim.engine.machine import available_cores, instruction_set, machine_facts, platform, platform_name
 from radarsim.engine.results import Sums
-from radarsim.engine.store import (
-    Audit,
-    audited,
-    available_cores,
-    described,
-    folder_of,
-    instruction_set,
-    is_directory,
-    platform,
-    platform_name,
-)
+from radarsim.engine.store.audit import Audit, audit_blocks
+from radarsim.engine.store.block_file import block_path, is_directory
+from radarsim.engine.store.store import is_other_source, other_sources
 from radarsim.errors import ConfigError, StoreError
 from radarsim.report import files
 from radarsim.studies import registry
@@ -56,7 +50,7 @@ def machine() -> dict[str, str]:
     """The machine, what runs on it, and where compiled kernels are kept, a text each."""
     from radarsim.kernels import compile
 
-    facts, cache = described(), compile.ROOT
+    facts, cache = machine_facts(), compile.ROOT
     kept = [path.stat().st_size for path in cache.rglob("*") if path.is_file()] if cache.is_dir() else []
     writable = "writable" if os.access(cache, os.W_OK) else "not writable"
     free = shutil.disk_usage(Path.cwd()).free
@@ -97,8 +91,9 @@ class Inspection:
 def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
     """Check a folder of results against its run.json, and all stored blocks of its cases; recompute some of them.
 
-    recompute is the number of stored pieces to recompute for each case, the smallest first. Raises ConfigError where
-    the folder holds no results, and where blocks cannot be recomputed because the sources have changed."""
+    recompute is the number of stored pieces to recompute for each case, the smallest first. Blocks that other sources
+    made are noted. Raises ConfigError where the folder holds no results, and where blocks cannot be recomputed because
+    the sources have changed."""
     found = Inspection(Path(folder))
     blocks = _blocks(found.folder)
     record = _settled(found)
@@ -107,14 +102,16 @@ def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
     elsewhere = []
     for name, stored_as in record["identities"].items():
         store = blocks / stored_as
+        case = recorded_case(record, name)
+        found.notes += _notes_on_sources(store, name, case)
         if not is_directory(store):
             found.notes.append(f"{store}: no blocks of {name} are stored, so the tables cannot be checked against them")
             continue
-        audit = audited(store, int(record["cases"][name]["done"]))
+        audit = audit_blocks(store, int(record["cases"][name]["done"]))
         found.pieces += len(audit.pieces)
         found.faults += audit.faults
         found.notes += audit.notes
-        if recompute and not _recomputed(found, audit, recorded_case(record, name), recompute):
+        if recompute and not _recomputed(found, audit, case, recompute):
             elsewhere.append(name)
     if elsewhere and not found.faults:
         raise ConfigError(
@@ -122,6 +119,21 @@ def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
             "since; all that is stored is whole"
         )
     return found
+
+
+def _notes_on_sources(store: Path, name: str, case: Case | None) -> list[str]:
+    """Whether the blocks of a case, or others beside them, were made by other sources than these."""
+    present = store if case is None else store.with_name(CaseWork(case).identity)
+    notes = []
+    if is_other_source(present, store):
+        notes.append(f"{store}: blocks of {name} that sources made which have changed since: a run computes anew")
+    stale = [path.name for path in other_sources(store) if path != present]
+    if stale:
+        notes.append(
+            f"{store.parent}: further blocks of {name} by other sources, which no run here uses: {', '.join(stale)}; "
+            "`radarsim clean --other-sources` removes them"
+        )
+    return notes
 
 
 def _blocks(folder: Path) -> Path:
@@ -192,14 +204,14 @@ def _outputs(found: Inspection, outputs: dict[str, str]) -> None:
 
 def _recomputed(found: Inspection, audit: Audit, case: Case | None, most: int) -> bool:
     """Recompute some pieces and compare; False if this program's sums are stored elsewhere."""
-    if case is None or folder_of(audit.path.parent, CaseWork(case)) != audit.path:
+    if case is None or CaseWork(case).identity != audit.path.name:
         return False
     work, here = CaseWork(case), platform_name()
     elsewhere: set[str] = set()
     own = (piece for piece in audit.pieces if isinstance(piece, Node | Partial))
     for piece in sorted(own, key=lambda piece: piece.realisations(work.block)[1])[:most]:
         header, values = audit.pieces[piece]
-        path = audit.path / f"{piece.name}.sums"
+        path = block_path(audit.path, piece)
         found.realisations += header["count"]
         found.recomputed.append(str(path))
         if header["block"] != work.block or values.size != work.size:

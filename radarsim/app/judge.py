@@ -13,7 +13,8 @@ from zipfile import BadZipFile
 import numpy as np
 
 from radarsim.app import configs, run
-from radarsim.app.configs import CaseWork, Config, Overrides
+from radarsim.app.case_work import CaseWork
+from radarsim.app.configs import Config, Overrides
 from radarsim.config.check import check
 from radarsim.config.document import Document, Faults, Origin
 from radarsim.config.experiment import Case, Experiment

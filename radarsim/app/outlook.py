@@ -11,13 +11,16 @@ import numpy as np
 
 from radarsim.app import configs
 from radarsim.app.ahead import seconds_each
-from radarsim.app.configs import CaseWork, Config, Overrides
+from radarsim.app.case_work import CaseWork
+from radarsim.app.configs import Config, Overrides
 from radarsim.app.run import case_result, check_precision, merged, table_of, tailed, unknown
 from radarsim.app.shown import Shown
 from radarsim.config.experiment import Experiment
 from radarsim.engine.blocks import Total
+from radarsim.engine.machine import available_cores
 from radarsim.engine.run import collect
-from radarsim.engine.store import Stock, Store, available_cores, stock
+from radarsim.engine.store.inventory import Inventory, take_inventory
+from radarsim.engine.store.store import Store
 from radarsim.errors import ConfigError
 from radarsim.language import few, listed, plural, term, tr
 from radarsim.report.quantities import SIGMA, Quantity
@@ -62,7 +65,7 @@ class CaseOutlook:
     seconds: float
     timed: bool = True
     need: Need | None = None
-    stock: Stock | None = None
+    stock: Inventory | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -157,7 +160,7 @@ def check(
         axes = work.plan.axes
         preparing += time.perf_counter() - started
         labels = case.name, ", ".join((*axes.filters, *(one.name for one in case.outside))), len(axes.k)
-        stocked = partial(stock, work, store=out, part=share or (1, 1))
+        stocked = partial(take_inventory, work, store=out, part=share or (1, 1))
         short = None if precision is not None else surely_short(work, SURELY_SHORT_S / len(experiment.cases))
         if short is not None:
             held = stocked(case.realisations)
@@ -190,7 +193,7 @@ def measured(
     work: CaseWork,
     labels: tuple[str, str, int],
     pilot_s: float,
-    stocked: Callable[[int], Stock],
+    stocked: Callable[[int], Inventory],
     precision: float | None,
     of: str,
 ) -> CaseOutlook:
@@ -234,12 +237,12 @@ def ending(need: Need, most: int) -> int:
 
 def lacking(experiment: Experiment, out: str | os.PathLike[str]) -> str | None:
     """The realisations that a store with gaps lacks, in words; None without gaps, as of cases with nothing stored."""
-    found: dict[str, tuple[CaseWork, Stock]] = {}
+    found: dict[str, tuple[CaseWork, Inventory]] = {}
     for case in experiment.cases:
         work = CaseWork(case)
         pieces = Store(out, work).pieces()
         if pieces and Total(case.realisations) not in pieces:
-            held = stock(work, case.realisations, out)
+            held = take_inventory(work, case.realisations, out)
             if held.loose and held.missing:
                 found.setdefault(work.identity, (work, held))
     if not found:
@@ -252,7 +255,7 @@ def lacking(experiment: Experiment, out: str | os.PathLike[str]) -> str | None:
     return words + (tr(" (of {case}, the first of {count} such cases)", **told) if others else "")
 
 
-def missing(held: Stock) -> str:
+def missing(held: Inventory) -> str:
     """Which realisations a store lacks, and which shares these look like."""
     runs = few([tr("{first:,} to {last:,}", first=first, last=last) for first, last in held.missing], 3)
     if held.shares is None:

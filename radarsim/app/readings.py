@@ -20,13 +20,13 @@ from typing import TYPE_CHECKING, Any
 from radarsim.app import configs, result, run
 from radarsim.app import stored as stored_claims
 from radarsim.app.ahead import Ahead, Progress, estimated
-from radarsim.app.configs import CaseWork
+from radarsim.app.case_work import CaseWork
 from radarsim.app.run import RunOptions, SimulatedCases
 from radarsim.app.shown import Shown
 from radarsim.app.stored import CLASSES, PLACE, stored_classes, stored_readings
 from radarsim.config.experiment import Case, Experiment
+from radarsim.engine.machine import available_cores
 from radarsim.engine.run import Either, Signals, Stop, TimeLimit
-from radarsim.engine.store import available_cores
 from radarsim.errors import ConfigError, StoreError, TargetUnmet, argument
 from radarsim.language import tr
 from radarsim.report import files

@@ -1,6 +1,4 @@
-"""The cases of an earlier run.json as today's program reads them; results of other sources.
-
-The result of a finished experiment: tables, figures, claims, run.json and report.html, in memory and as files."""
+"""The result of a finished experiment: tables, figures, claims, run.json and report.html, in memory and as files."""
 
 import os
 import re
@@ -13,14 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.app import configs
-from radarsim.app.configs import load
 from radarsim.app.shown import Several, Shown
 from radarsim.app.stored import classes_of
 from radarsim.config.experiment import DRAWN_FOR_ALL, Case, Experiment, matches
-from radarsim.engine import store
+from radarsim.engine.machine import machine_facts
 from radarsim.engine.results import CaseResult
 from radarsim.errors import OF_AUTHORS, DisagreementError, MeasureError, RadarsimError
-from radarsim.language import ENGLISH, called, current, few, plural, tr
+from radarsim.language import ENGLISH, called, current, plural, tr
 from radarsim.report import claims, files, notes, outside, panels, seen
 from radarsim.report import tables as common
 from radarsim.report.claims import page
@@ -34,60 +31,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-# ---- records ---------------------------------------------------------------------------------------------------------
-LABELS = ("case", "swept")  # in a resolved case, beside its keys
-NAMED = 3  # cases in a line, or one more
-SURE = 3  # a change that shows in one of m / 3 realisations is missed by m of them with a probability of e⁻³ = 5 %
-
-
-def recorded_case(record: Mapping, name: str) -> Case | None:
-    """A case as run.json resolved it; None where it no longer reads as a config."""
-    try:
-        for case in record["resolved"]["cases"]:
-            if case["case"] == name:
-                keys = {key: value for key, value in case.items() if key not in LABELS}
-                return load({"study": record["study"], **keys}).cases[0]
-    except (RadarsimError, LookupError, TypeError):
-        pass
-    return None
-
-
-def of_other_sources(names: Mapping[str, str]) -> list[str]:
-    """A line on blocks of other sources that are kept, one on those that are not; once for each process.
-
-    names: of cases, by identity."""
-    # The last of an identity counts: earlier ones are of folders that gave other bytes, or of another directory.
-    found = {one.identity: one for one in store.settled if one.identity in names}.values()
-    store.settled[:] = [one for one in store.settled if one.identity not in names]
-    lines = []
-    if kept := [one for one in found if one.same]:
-        line = tr(
-            "stored blocks of {cases} were made by other sources; {again:,} of {stored:,} realisations were computed "
-            "again and have the same bytes: all are kept",
-            cases=_listed(kept, names),
-            again=sum(one.again for one in kept),
-            stored=sum(one.stored for one in kept),
-        )
-        if unseen := [one.again for one in kept if one.again < one.stored]:
-            some = min(unseen) // SURE
-            line += tr(". A change in one realisation of {some:,} would have shown, rarer ones may not", some=some)
-        lines.append(line)
-    if begun := [one for one in found if not one.same]:
-        lines.append(
-            tr(
-                "stored blocks of {cases} were made by other sources that give other bytes, and are not used; "
-                "`radarsim clean` removes them",
-                cases=_listed(begun, names),
-            )
-        )
-    return lines
-
-
-def _listed(found: list[store.Settled], names: Mapping[str, str]) -> str:
-    return few(list(dict.fromkeys(names[one.identity] for one in found)), NAMED)
-
-
-# ---- result ----------------------------------------------------------------------------------------------------------
 MOST_ROWS = 40  # shown in a notebook
 
 
@@ -501,7 +444,7 @@ def write_files(
     drawn = time.perf_counter()
     warned = of_intervals(results, made)
     run = {**run, "warnings": [*run.get("warnings", ()), *warned, *unnamed(own, described)]}
-    record = files.record(experiment, results, run, contents, answer, store.described())
+    record = files.record(experiment, results, run, contents, answer, machine_facts())
     report = html.report_page(
         experiment,
         made,

@@ -20,15 +20,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from radarsim.app import configs
 from radarsim.app.ahead import Progress, Weighed
-from radarsim.app.configs import CaseWork, Config, Overrides, command, load, repeated, shipped
+from radarsim.app.case_work import CaseWork
+from radarsim.app.configs import Config, Overrides, command, load, repeated, shipped
 from radarsim.app.shown import Shown
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine import run as stopping
+from radarsim.engine.machine import available_cores
 from radarsim.engine.results import CaseResult
 from radarsim.engine.run import Collected, Executor, Shared, Signals, Stop, collect, share, stored
-from radarsim.engine.store import Stock, available_cores, stock
+from radarsim.engine.store.inventory import Inventory, take_inventory
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
-from radarsim.language import tr
+from radarsim.language import few, tr
 from radarsim.report import files
 from radarsim.report.quantities import GAIN, SIGMA, Quantity
 from radarsim.studies import registry
@@ -530,7 +532,7 @@ def stored_result(
             continue
         collected = stored(work, case.realisations, out)
         if collected is None:
-            missing.append(lack(case.name, stock(work, case.realisations, out), out))
+            missing.append(lack(case.name, take_inventory(work, case.realisations, out), out))
         else:
             held.cases.append((case, work, collected))
     if missing:
@@ -541,7 +543,7 @@ def stored_result(
     return result_of(experiment, held, facts_of(held, 0, 0.0), repeated(asked, held.done, overrides, None))
 
 
-def lack(name: str, held: Stock, out: str | os.PathLike[str]) -> str:
+def lack(name: str, held: Inventory, out: str | os.PathLike[str]) -> str:
     """The line of a case that is not completely stored: how much of it is, and what is missing."""
     if not held.stored:
         return f"{name}: {held.asked} realisations are not stored in {out}"
@@ -582,8 +584,6 @@ def finished(simulated: SimulatedCases) -> list[CaseResult]:
 
 def facts_of(simulated: SimulatedCases, threads: int, seconds: float) -> dict[str, Any]:
     """The facts of a run for run.json: stop reason, threads, times, warnings, identities, precision reached."""
-    from radarsim.app.result import of_other_sources
-
     collected = [c for _, _, c in simulated.cases]
     facts: dict[str, Any] = {
         "stop": "; ".join(simulated.unmet) or "done",
@@ -595,10 +595,10 @@ def facts_of(simulated: SimulatedCases, threads: int, seconds: float) -> dict[st
         "realisations_from_store": sum(c.from_store for c in collected),
         "warnings": [
             *dict.fromkeys(warning for c in collected for warning in c.warnings),
-            *of_other_sources({work.identity: case.name for case, work, _ in simulated.cases}),
+            *superseded_blocks([case.name for case, _, c in simulated.cases if c.superseded]),
             *cache_troubles(),
         ],
-        "identities": {case.name: c.kept_as or work.identity for case, work, c in simulated.cases},
+        "identities": {case.name: work.identity for case, work, _ in simulated.cases},
     }
     if measured := seconds_per_update(work for _, work, _ in simulated.cases):
         facts["seconds_per_update"] = measured
@@ -609,6 +609,22 @@ def facts_of(simulated: SimulatedCases, threads: int, seconds: float) -> dict[st
         for name, cell in simulated.cells.items()
     }
     return facts | {"precision": {"asked_percent": simulated.precision, "widest": widest}}
+
+
+MAX_NAMED_CASES = 3  # in a line
+
+
+def superseded_blocks(cases: Sequence[str]) -> list[str]:
+    """A line on stored blocks of these cases that other sources made; nothing without such."""
+    if not cases:
+        return []
+    return [
+        tr(
+            "stored blocks of {cases} were made by other sources and are not used; "
+            "`radarsim clean --other-sources` removes them",
+            cases=few(list(dict.fromkeys(cases)), MAX_NAMED_CASES),
+        )
+    ]
 
 
 def cache_troubles() -> list[str]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from radarsim.app import configs, quantities
-from radarsim.app.configs import CaseWork
+from radarsim.app.case_work import CaseWork
 from radarsim.app.quantities import UNPAIRED, Asked
 from radarsim.app.run import case_result, merged
 from radarsim.app.shown import Shown

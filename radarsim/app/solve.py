@@ -15,7 +15,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Protocol, SupportsFloat, TypeVar
 
 from radarsim.app import configs, quantities
-from radarsim.app.configs import CaseWork, Config, load
+from radarsim.app.case_work import CaseWork
+from radarsim.app.configs import Config, load
 from radarsim.app.quantities import UNKNOWN, UNPAIRED, Asked, Wanted
 from radarsim.app.run import case_result, merged
 from radarsim.app.shown import Shown

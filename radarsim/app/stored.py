@@ -1,7 +1,5 @@
 """Stored results: run.json and its tables, read only if they are the ones that it records.
 
-What `radarsim clean` removes: stored blocks, and nothing outside DIR/.blocks.
-
 Stored results of `radarsim readings`: rows of its tables under a directory, and the shipped classes. classes.csv beside
 this module is that of the shipped configs, copied by `make readings-pages`; a claim judged in a directory of results
 takes its class from there."""
@@ -10,25 +8,17 @@ import csv
 import hashlib
 import io
 import json
-import os
-import re
 import time
 from collections.abc import Callable, Collection, Iterable
-from contextlib import suppress
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from radarsim.config.experiment import Experiment
-from radarsim.engine.blocks import QUESTION
-from radarsim.engine.store import is_directory, removable
-from radarsim.errors import ConfigError, StoreError
+from radarsim.errors import StoreError
 from radarsim.report import files, tables
 from radarsim.report.claims.declared import PaperClaims
 from radarsim.report.claims.over import PaperReadings
 from radarsim.report.claims.page import COLUMNS, Class, Known, declared
-from radarsim.studies.identity import identity
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,52 +88,6 @@ def table(folder: Path, name: str, outputs: "dict[str, str]") -> "pd.DataFrame |
         return tables.from_csv(text)
     except ValueError as error:
         raise StoreError(f"{path}: is no table; {AGAIN}") from error
-
-
-# ---- clean -----------------------------------------------------------------------------------------------------------
-@dataclass(frozen=True)
-class Cleaned:
-    """The amount dropped, or to be dropped: files and bytes of so many identities."""
-
-    path: Path
-    identities: int
-    files: int
-    size: int
-
-
-def clean(
-    out: str | os.PathLike[str], experiments: Iterable[Experiment] | None = None, dry_run: bool = False
-) -> Cleaned:
-    """Drop the stored blocks of all experiments, or of some, below out/.blocks; with dry_run only count them.
-
-    This includes a case's blocks from other sources. Links are not followed; files that no store makes remain, and so
-    do their folders. Raises ConfigError if `out` does not exist or its .blocks is a link, StoreError if a file cannot
-    be removed."""
-    blocks = Path(out) / ".blocks"
-    if not is_directory(Path(out)):
-        raise ConfigError(f"{out}: no such directory of results")
-    if blocks.is_symlink():
-        raise ConfigError(f"{blocks}: is a link; clean the directory that it points to")
-    wanted = None
-    if experiments is not None:
-        wanted = {identity(case)[:QUESTION] for experiment in experiments for case in experiment.cases}
-    try:
-        folders = [path for path in sorted(blocks.iterdir()) if _is_identity(path)] if is_directory(blocks) else []
-        folders = [path for path in folders if wanted is None or path.name[:QUESTION] in wanted]
-        files = [one for folder in folders for one in removable(folder)]
-        if not dry_run:
-            for path, _ in files:
-                path.unlink(missing_ok=True)
-            for folder in [*folders, blocks]:
-                with suppress(OSError):  # somebody else's file is in it
-                    folder.rmdir()
-    except OSError as error:
-        raise StoreError(f"{error.filename or blocks}: cannot be removed: {error.strerror}") from error
-    return Cleaned(blocks, len(folders), len(files), sum(size for _, size in files))
-
-
-def _is_identity(path: Path) -> bool:
-    return bool(re.fullmatch(r"[0-9a-f]{2,128}", path.name)) and path.is_dir() and not path.is_symlink()
 
 
 # ---- stored claims ---------------------------------------------------------------------------------------------------

@@ -126,28 +126,37 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
 @seed_option
 @set_option
 @out_option
+@click.option("--other-sources", is_flag=True, help="Delete only blocks that an edited or other version made.")
 @click.option("--dry-run", is_flag=True, help="Delete nothing; print how much would be deleted.")
 @json_option
 def clean(
-    configs: tuple[str, ...], seed: int | None, overrides: tuple[str, ...], out: str, dry_run: bool, as_json: bool
+    configs: tuple[str, ...],
+    seed: int | None,
+    overrides: tuple[str, ...],
+    out: str,
+    other_sources: bool,
+    dry_run: bool,
+    as_json: bool,
 ) -> None:
     """Delete stored blocks; tables, figures and reports stay.
 
-    Without CONFIG, deletes all blocks under DIR/.blocks, including those of older configs and versions. Nothing else is
-    changed.
+    Without CONFIG, deletes all blocks under DIR/.blocks, including those of older configs and versions; with
+    --other-sources those of the results in DIR that this version would compute anew. Nothing else is changed.
 
     \b
     Examples
       radarsim clean --dry-run
       radarsim clean rls2 --out results
+      radarsim clean --other-sources
     """
-    from radarsim.app import run, shown, stored
+    from radarsim.app import clean as cleaning
+    from radarsim.app import run, shown
     from radarsim.cli import outcomes
 
     if not configs and (overrides or seed is not None):
         raise click.UsageError("--set and --seed need a CONFIG")
     chosen = run.load_all(configs, run.merged(overrides, None, seed)) if configs else None
-    cleaned = stored.clean(out, chosen, dry_run)
+    cleaned = cleaning.clean(out, chosen, dry_run, other_sources)
     if as_json:
         click.echo(shown.text(shown.fields(cleaned) | {"dry_run": dry_run}))
     else:

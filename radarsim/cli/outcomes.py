@@ -19,6 +19,7 @@ from radarsim.report.wording import unit as unit_of
 if TYPE_CHECKING:
     import pandas as pd
 
+    from radarsim.app.clean import Cleaned
     from radarsim.app.compare import Comparison, DopplerChart
     from radarsim.app.configs import Inventory
     from radarsim.app.doctor import Inspection
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from radarsim.app.run import Shares
     from radarsim.app.sensitivity import Sensitivity
     from radarsim.app.solve import Answer
-    from radarsim.app.stored import Cleaned
     from radarsim.app.tune import Tuned
     from radarsim.config.experiment import Experiment
     from radarsim.recorded.fit import Advice, Fit, Fitted

@@ -15,7 +15,7 @@ import numpy as np
 from radarsim.engine.results import Sums
 from radarsim.errors import NonFiniteError
 
-QUESTION = 32  # digits of an identity for the request; the further ones are for the sources
+REQUEST_DIGITS = 32  # of an identity, for the request; the others are for the sources that compute
 
 
 class Work(Protocol):

@@ -19,8 +19,10 @@ from queue import Empty, SimpleQueue
 from typing import Any, NoReturn, Protocol
 
 from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, Work, added, gaps, share_of, simulated, widest
+from radarsim.engine.machine import available_cores, platform_name
 from radarsim.engine.results import Sums
-from radarsim.engine.store import Keeper, Store, available_cores, mixture, platform_name
+from radarsim.engine.store.store import Store, mixture
+from radarsim.engine.store.writer import StoreWriter
 from radarsim.errors import Interrupted, StoreError
 from radarsim.threads import forbidden, limited
 
@@ -323,10 +325,11 @@ class Progress:
 
 @dataclass(frozen=True, kw_only=True)
 class Collected(Progress, Sums):
-    """The sums of realisations 0 … count-1, and how they were obtained; kept_as the identity under which the store has
-    them, None without a store."""
+    """The sums of realisations 0 … count-1, and how they were obtained.
 
-    kept_as: str | None
+    superseded: whether the store had blocks of the same request only from other sources, which are not used."""
+
+    superseded: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -376,15 +379,16 @@ class Dispatch:
         self.from_store = self.computed = 0
         self.kernel_seconds = 0.0
         self.started = time.perf_counter()
-        self._keeper = None if store is None else Keeper(Store(store, work))
+        self._writer = None if store is None else StoreWriter(Store(store, work))
+        self._superseded = self._writer is not None and self._writer.store.superseded()
         self._progress, self._progress_due = progress, 0.0
         self._fault: tuple[Node | Partial, Exception] | None = None  # the leftmost, and what it raised
 
-    def _read_pieces(self, keeper: Keeper) -> None:
-        self.forest = keeper.store.forest(self.full)
-        keeper.found(self.forest.nodes)
+    def _read_pieces(self, writer: StoreWriter) -> None:
+        self.forest = writer.store.forest(self.full)
+        writer.note_stored(self.forest.nodes)
         if self.rest:
-            self.partial = keeper.store.read(Partial(self.full, self.rest))
+            self.partial = writer.store.read(Partial(self.full, self.rest))
 
     def compute(self, executor: Executor, stop: Stop | None) -> str | None:
         """Dispatch what is missing and collect the outcomes; the reason, if stop gave one."""
@@ -406,8 +410,8 @@ class Dispatch:
                 waiting -= 1
                 self._take(outcome, pace)
             self._report()
-            if self._keeper is not None:
-                self._keeper.offer(self.forest.nodes)
+            if self._writer is not None:
+                self._writer.offer(self.forest.nodes)
         if self._fault is not None:
             raise self._fault[1]
         return stopped
@@ -436,9 +440,8 @@ class Dispatch:
                 self._fault = outcome.piece, sums
             return
         self.computed += sums.count
-        if self._keeper is not None:
-            self._keeper.store.platforms.add(outcome.platform)
-            self._keeper.store.mark(outcome.piece, sums)
+        if self._writer is not None:
+            self._writer.store.platforms.add(outcome.platform)
         if isinstance(outcome.piece, Partial):
             self.partial = sums
         else:
@@ -462,15 +465,15 @@ class Dispatch:
 
     def keep(self, pieces: Mapping[Piece, Sums]) -> None:
         """Put these into the store, if there is one."""
-        if self._keeper is not None:
-            self._keeper.finish(pieces)
+        if self._writer is not None:
+            self._writer.finish(pieces)
 
     def _progressed(self, stopped: str | None) -> dict[str, Any]:
         """The fields of `Progress`."""
         warnings: tuple[str, ...] = ()
-        if self._keeper is not None:
-            platforms = self._keeper.store.platforms
-            warnings = (*self._keeper.store.warnings, *([mixture(platforms)] if len(platforms) > 1 else []))
+        if self._writer is not None:
+            platforms = self._writer.store.platforms
+            warnings = (*self._writer.store.warnings, *([mixture(platforms)] if len(platforms) > 1 else []))
         seconds, stopped_by = time.perf_counter() - self.started, {"stopped": stopped, "warnings": warnings}
         counts = {"asked": self.asked, "from_store": self.from_store, "computed": self.computed}
         return counts | {"seconds": seconds, "kernel_seconds": self.kernel_seconds} | stopped_by
@@ -483,11 +486,11 @@ class Run(Dispatch):
 
     def restored(self) -> bool:
         """Read stored pieces; whether these are all."""
-        if self._keeper is None:
+        if self._writer is None:
             return False
-        self.total = self._keeper.store.read(Total(self.asked))
+        self.total = self._writer.store.read(Total(self.asked))
         if self.total is None:
-            self._read_pieces(self._keeper)
+            self._read_pieces(self._writer)
         held = [self.total] if self.total is not None else self.pieces().values()
         self.from_store = sum(sums.count for sums in held)
         return self.from_store == self.asked
@@ -509,8 +512,7 @@ class Run(Dispatch):
         if self.total is None and self.partial is not None and sums.count == self.full * self.work.block:
             sums = added(sums, self.partial, 0) if self.full else self.partial
         short = stopped if sums.count < self.asked else None
-        kept_as = None if self._keeper is None else self._keeper.store.path.name
-        return Collected(count=sums.count, values=sums.values, kept_as=kept_as, **self._progressed(short))
+        return Collected(count=sums.count, values=sums.values, superseded=self._superseded, **self._progressed(short))
 
 
 class Share(Dispatch):
@@ -525,13 +527,13 @@ class Share(Dispatch):
         progress: Callable[[int, int, int], None] | None,
     ):
         super().__init__(work, realisations, None, progress)
-        self._keeper: Keeper = Keeper(Store(store, work))
+        self._writer: StoreWriter = StoreWriter(Store(store, work))
         self.first, self.stop, self.rest = share_of(realisations, work.block, part)
         self.asked = (self.stop - self.first) * work.block + self.rest
 
     def restored(self) -> bool:
         """Read stored pieces; whether these are all of the share."""
-        self._read_pieces(self._keeper)
+        self._read_pieces(self._writer)
         self.from_store = self.done()
         return self.from_store == self.asked
 
@@ -542,7 +544,7 @@ class Share(Dispatch):
 
     def finished(self, stopped: str | None) -> Shared:
         """The result, once it is stored; without a block an empty directory, to be copied too."""
-        self._keeper.store.make()
+        self._writer.store.make_folder()
         self.keep(self.pieces())
         self._report(last=True)
         done = self.done()

@@ -102,6 +102,11 @@ class StudyFolder(Study):
     def keys(self) -> "type[Keys]":
         return self.file("config").Keys
 
+    def computing_modules(self, spec: Any, plots: bool) -> Sequence[str]:
+        optional = {"given": "own_filters" in self.offers, "track": plots and "recorded" in self.offers}
+        files = ("config", "study", *(file for file, computes in optional.items() if computes))
+        return tuple(f"{self.package}.{file}" for file in files)
+
     def quantities(self, spec: Any = None) -> tuple[Quantity, ...]:
         return (*COMMON, *self.own_quantities)
 

@@ -402,6 +402,13 @@ class Study(ABC):
     def prepare(self, case: "Case") -> Plan:
         """The plan of a case: truth, matrices, gains, exact values. Raises ConfigError for an impossible case."""
 
+    def computing_modules(self, spec: Any, plots: bool) -> Sequence[str]:
+        """The modules that prepare and simulate the cases with these keys, read the keys, and, if asked, draw plots.
+
+        Stored blocks belong to the sources of these modules and of all that they import, directly or not: see
+        `radarsim.studies.sources`. Default: the module of the class; what its methods import counts, too."""
+        return (type(self).__module__,)
+
     @abstractmethod
     def simulate(self, plan: Any, first: int, count: int) -> "np.ndarray":
         """The sums of realisations first … first + count − 1, in the order of the plan's layout.

@@ -9,8 +9,10 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app.configs import CaseWork, load
-from radarsim.app.result import gains_of, recorded_case
+from radarsim.app.case_work import CaseWork
+from radarsim.app.configs import load
+from radarsim.app.recorded_cases import recorded_case
+from radarsim.app.result import gains_of
 from radarsim.app.run import RunOptions, case_result, check_precision, simulate
 from radarsim.errors import ConfigError
 from radarsim.report import tables

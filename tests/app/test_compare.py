@@ -7,7 +7,7 @@ import shutil
 import pytest
 
 from radarsim.app import run
-from radarsim.app.result import recorded_case
+from radarsim.app.recorded_cases import recorded_case
 from radarsim.report import tables
 from tests.program import command
 

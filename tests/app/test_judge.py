@@ -11,7 +11,8 @@ from click.testing import CliRunner
 
 import radarsim
 from radarsim.app import judge as judging
-from radarsim.app.configs import CaseWork, load
+from radarsim.app.case_work import CaseWork
+from radarsim.app.configs import load
 from radarsim.app.result import case_figures
 from radarsim.cli import main
 from radarsim.errors import ConfigError

@@ -7,7 +7,8 @@ import pytest
 import radarsim
 from radarsim.app import doctor
 from radarsim.engine import run as engine_run
-from radarsim.engine.store import LIBRARIES, decoded, linear_algebra, platform_name, processor
+from radarsim.engine.machine import LIBRARIES, linear_algebra, platform_name, processor
+from radarsim.engine.store.block_file import decode
 from tests.engine.test_damage import reforged
 
 BLOCK = 4096
@@ -33,22 +34,22 @@ def blocks(out):
 def moved_elsewhere(out, change=None):
     """The stored blocks as another platform might have made them."""
     for path in blocks(out):
-        _, values = decoded(path.read_bytes())
+        _, values = decode(path.read_bytes())
         reforged(path, platforms=[ELSEWHERE], values=values if change is None else change(values.copy()))
 
 
 def test_a_header_names_what_decides_the_last_bits(out):
-    header, _ = decoded(blocks(out)[0].read_bytes())
+    header, _ = decode(blocks(out)[0].read_bytes())
     (named,) = header["platforms"]
     assert all(word in named for word in (processor(), linear_algebra(), *LIBRARIES))
 
 
 @pytest.mark.parametrize("library", ["numpy", "numba"])
 def test_another_version_is_another_platform(monkeypatch, library):
-    from radarsim.engine import store
+    from radarsim.engine import machine
 
     here = platform_name()
-    monkeypatch.setattr(store, "platform", lambda: {name: "9.9" if name == library else "1" for name in LIBRARIES})
+    monkeypatch.setattr(machine, "platform", lambda: {name: "9.9" if name == library else "1" for name in LIBRARIES})
     assert platform_name.__wrapped__() != here
     assert f"{library} 9.9" in platform_name.__wrapped__()
 
@@ -91,6 +92,6 @@ def test_a_store_of_another_platform_is_compared_as_conditioning_allows(out, cha
 def test_a_store_of_this_platform_is_compared_to_the_last_bit(out):
     assert not doctor.inspected(out / "rls2", recompute=1).faults
     for path in blocks(out):
-        _, values = decoded(path.read_bytes())
+        _, values = decode(path.read_bytes())
         reforged(path, values=values * (1 + 1e-15))
     assert doctor.inspected(out / "rls2", recompute=1).faults

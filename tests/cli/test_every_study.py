@@ -6,7 +6,8 @@ import signal
 import pytest
 from click.testing import CliRunner
 
-from radarsim.app.configs import CaseWork, load
+from radarsim.app.case_work import CaseWork
+from radarsim.app.configs import load
 from radarsim.app.run import case_result
 from radarsim.cli import main
 from radarsim.engine.run import collect

@@ -12,7 +12,8 @@ import radarsim
 from radarsim.app import ahead
 from radarsim.app import result as output
 from radarsim.app import run as writing
-from radarsim.app.configs import CaseWork, load
+from radarsim.app.case_work import CaseWork
+from radarsim.app.configs import load
 from radarsim.app.run import case_result
 from radarsim.engine import run as stopping
 from radarsim.engine.run import collect

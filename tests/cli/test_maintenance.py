@@ -86,9 +86,9 @@ def test_forged_sums_are_found_by_computing_them_again(out):
     for total in (out / ".blocks" / identity).glob("T*"):
         total.unlink()
     (cut,) = (out / ".blocks" / identity).glob("P*")
-    from radarsim.engine.store import decoded
+    from radarsim.engine.store.block_file import decode
 
-    reforged(cut, values=decoded(cut.read_bytes())[1] * 1.000001)
+    reforged(cut, values=decode(cut.read_bytes())[1] * 1.000001)
     result = command("doctor", out / "rls2", "--recompute", 1, code=4)
     assert f"{cut}: computed again, the sums differ" in result.stderr
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from radarsim.app import configs, run
-from radarsim.app.configs import CaseWork
+from radarsim.app.case_work import CaseWork
 from radarsim.cli import group, main
 from radarsim.config import document
 from radarsim.config.experiment import canonical

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from radarsim.engine import store
 from radarsim.engine.results import Sums
 from radarsim.engine.run import Signals, collect
+from radarsim.engine.store import writer as store_writer
 from radarsim.threads import limited
 
 
@@ -93,11 +93,11 @@ def main() -> None:
     parser.add_argument("realisations", type=int)
     parser.add_argument("--pause", type=float, default=0.0)
     parser.add_argument("--stuck-at", type=int, default=-1)
-    parser.add_argument("--period", type=float, default=store.PERIOD_S)
+    parser.add_argument("--period", type=float, default=store_writer.PERIOD_S)
     parser.add_argument("--linger", action="store_true")
     parser.add_argument("--threads", type=int, default=2)
     asked = parser.parse_args()
-    store.PERIOD_S = asked.period
+    store_writer.PERIOD_S = asked.period
     said = []
 
     def progress(done: int, total: int, from_store: int) -> None:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from radarsim.engine.run import collect, share
-from radarsim.engine.store import agree, audited, removable
+from radarsim.engine.store.audit import agree, audit_blocks
+from radarsim.engine.store.store import removable_files
 from tests.engine.fake import NAMES, WORK, Fake, N, contents
 from tests.engine.test_damage import reforged
 
@@ -28,12 +29,12 @@ def damage(path, draw):
 def test_a_hundred_of_a_hundred_damaged_blocks_are_found_and_named(tmp_path, blocks):
     collect(WORK, N, store=tmp_path)
     good, draw = contents(blocks), random.Random(3)
-    assert audited(blocks, N).faults == []
+    assert audit_blocks(blocks, N).faults == []
     for _ in range(100):
         name = draw.choice(NAMES)
         kind = damage(blocks / name, draw)
         before = contents(blocks)
-        faults = audited(blocks, N).faults
+        faults = audit_blocks(blocks, N).faults
         assert [fault.split(":")[0] for fault in faults] == [str(blocks / name)], (kind, name, faults)
         assert contents(blocks) == before
         (blocks / name).write_bytes(good[name])
@@ -42,7 +43,7 @@ def test_a_hundred_of_a_hundred_damaged_blocks_are_found_and_named(tmp_path, blo
 def test_sums_that_were_forged_with_a_right_checksum_do_not_add_up(tmp_path, blocks):
     collect(WORK, N, store=tmp_path)
     reforged(blocks / "L03-38.sums", values=np.ones(5))
-    assert audited(blocks, N).faults == [f"{blocks / 'T5005.sums'}: is not the sum of the blocks beside it"]
+    assert audit_blocks(blocks, N).faults == [f"{blocks / 'T5005.sums'}: is not the sum of the blocks beside it"]
 
 
 @pytest.mark.parametrize("sizes", [(N,), (16, 5, 160, 99), (100, 5_000, 37), (4_096, 4_096 + 7)])
@@ -50,22 +51,22 @@ def test_what_runs_of_any_sizes_leave_is_whole(tmp_path, blocks, sizes):
     for size in sizes:
         collect(WORK, size, store=tmp_path)
     for size in sizes:
-        assert audited(blocks, size).faults == []
+        assert audit_blocks(blocks, size).faults == []
 
 
 def test_shares_and_stopped_runs_are_whole(tmp_path, blocks):
     share(WORK, N, (2, 3), store=tmp_path)
     asked = iter([None] * 8)
     cut = collect(Fake(pause_s=1e-3), N, store=tmp_path, threads=2, stop=lambda: next(asked, "enough"))
-    assert audited(blocks, cut.count or None).faults == []
-    assert audited(blocks, N).faults == [f"{blocks / f'T{N}.sums'}: missing"]
+    assert audit_blocks(blocks, cut.count or None).faults == []
+    assert audit_blocks(blocks, N).faults == [f"{blocks / f'T{N}.sums'}: missing"]
 
 
 def test_what_was_set_aside_is_noted_and_foreign_files_are_none_of_its_business(tmp_path, blocks):
     collect(WORK, 64, store=tmp_path)
     (blocks / "L00-9.sums.damaged").write_bytes(b"x")
     (blocks / "notes.txt").write_text("mine")
-    found = audited(blocks, 64)
+    found = audit_blocks(blocks, 64)
     assert found.faults == []
     assert found.notes == [f"{blocks / 'L00-9.sums.damaged'}: set aside as damaged by an earlier run"]
 
@@ -73,7 +74,7 @@ def test_what_was_set_aside_is_noted_and_foreign_files_are_none_of_its_business(
 def test_blocks_of_several_sizes_are_told(tmp_path, blocks):
     collect(WORK, 64, store=tmp_path)
     collect(Fake(block=8), 4, store=tmp_path)
-    assert f"{blocks}: blocks of several sizes" in audited(blocks, 64).faults
+    assert f"{blocks}: blocks of several sizes" in audit_blocks(blocks, 64).faults
 
 
 def test_sums_of_several_machines_agree_to_rounding_those_of_one_to_the_bit():
@@ -90,5 +91,5 @@ def test_only_what_a_store_makes_is_removable(tmp_path, blocks):
     for name in ("L00-9.sums.damaged", ".L00-9.sums.0abc.tmp", "notes.txt", ".hidden", ".x.tmp"):
         (blocks / name).write_bytes(b"x")
     (blocks / "T16.sums").symlink_to(blocks / "T5005.sums")
-    names = sorted(path.name for path, _ in removable(blocks))
+    names = sorted(path.name for path, _ in removable_files(blocks))
     assert names == sorted([*NAMES, "L00-9.sums.damaged", ".L00-9.sums.0abc.tmp"])

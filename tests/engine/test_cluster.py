@@ -18,10 +18,11 @@ from pathlib import Path
 import psutil
 import pytest
 
-from radarsim.engine import cluster, store
+from radarsim.engine import cluster
 from radarsim.engine.blocks import Node
 from radarsim.engine.cluster import Cluster
 from radarsim.engine.run import collect
+from radarsim.engine.store import writer as store_writer
 from radarsim.errors import ClusterError, ConfigError, NonFiniteError
 from tests.engine.fake import WORK, Fake, N, same, textbook
 
@@ -177,7 +178,7 @@ LOST = """
 
 
 def test_a_scheduler_that_goes_away_is_told_and_what_was_done_is_stored(tmp_path, monkeypatch):
-    monkeypatch.setattr(store, "PERIOD_S", 0.1)
+    monkeypatch.setattr(store_writer, "PERIOD_S", 0.1)
     program = [sys.executable, "-c", textwrap.dedent(LOST)]
     with subprocess.Popen(program, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as there:
         address = there.stdout.readline().strip()

@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from radarsim.engine.machine import available_cores
 from radarsim.engine.run import Pace, Serial, Threads, TimeLimit, collect
-from radarsim.engine.store import available_cores
 from radarsim.errors import NonFiniteError
 from tests.engine.fake import Fake, textbook
 

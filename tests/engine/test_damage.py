@@ -12,26 +12,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarsim.engine import store
 from radarsim.engine.blocks import Node
 from radarsim.engine.results import Sums
 from radarsim.engine.run import collect, stored
-from radarsim.engine.store import Store, audited, decoded, encoded
+from radarsim.engine.store import writer as store_writer
+from radarsim.engine.store.audit import audit_blocks
+from radarsim.engine.store.block_file import MAGIC, decode, encode
+from radarsim.engine.store.store import Store
 from radarsim.errors import StoreError
 from tests.engine.fake import NAMES, WORK, Fake, N, contents, names, same
 
 
 def reforged(path, **changes):
     """A file with a right checksum and a changed header or sums."""
-    header, values = decoded(path.read_bytes())
+    header, values = decode(path.read_bytes())
     values = changes.pop("values", values)
-    path.write_bytes(encoded(header | changes, values))
+    path.write_bytes(encode(header | changes, values))
 
 
 DAMAGE = {
     "empty": lambda path: path.write_bytes(b""),
     "one byte": lambda path: path.write_bytes(b"r"),
-    "magic only": lambda path: path.write_bytes(store.MAGIC),
+    "magic only": lambda path: path.write_bytes(MAGIC),
     "text": lambda path: path.write_bytes(b"hello\n" * 100),
     "half": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
     "without its last byte": lambda path: path.write_bytes(path.read_bytes()[:-1]),
@@ -47,10 +49,10 @@ DAMAGE = {
     "not a number": lambda path: reforged(path, values=np.array([1.0, 2.0, np.nan, 4.0, 5.0])),
     "no platforms": lambda path: reforged(path, platforms=None),
     "platforms of another kind": lambda path: reforged(path, platforms=[1]),
-    "JSON too deep": lambda path: path.write_bytes(signed(store.MAGIC + b"[" * 100_000 + b"\n" + bytes(40))),
-    "no JSON": lambda path: path.write_bytes(signed(store.MAGIC + b"{]\n" + bytes(40))),
-    "JSON of another kind": lambda path: path.write_bytes(signed(store.MAGIC + b"[]\n" + bytes(40))),
-    "part of a number": lambda path: path.write_bytes(signed(store.MAGIC + b"{}\n" + bytes(43))),
+    "JSON too deep": lambda path: path.write_bytes(signed(MAGIC + b"[" * 100_000 + b"\n" + bytes(40))),
+    "no JSON": lambda path: path.write_bytes(signed(MAGIC + b"{]\n" + bytes(40))),
+    "JSON of another kind": lambda path: path.write_bytes(signed(MAGIC + b"[]\n" + bytes(40))),
+    "part of a number": lambda path: path.write_bytes(signed(MAGIC + b"{}\n" + bytes(43))),
 }
 
 
@@ -63,7 +65,7 @@ def signed(body):
 def test_damage_is_found_named_and_computed_again(tmp_path, blocks, kind, name):
     collect(WORK, N, store=tmp_path)
     DAMAGE[kind](blocks / name)
-    assert str(blocks if kind == "another block" else blocks / name) in audited(blocks, N).faults[0]
+    assert str(blocks if kind == "another block" else blocks / name) in audit_blocks(blocks, N).faults[0]
     if not name.startswith("T"):
         (blocks / "T5005.sums").unlink()
     result = collect(WORK, N, store=tmp_path)
@@ -117,14 +119,14 @@ def test_a_file_appears_whole_and_safe_before_what_it_replaces_goes(tmp_path, bl
         monkeypatch.setattr(owner, name, call)
 
     def replaced(temporary, path):
-        assert decoded(Path(temporary).read_bytes())
+        assert decode(Path(temporary).read_bytes())
         assert not path.exists()
         return f"rename {path.name}"
 
     recorded(os, "fsync", lambda fd: "sync directory" if stat.S_ISDIR(os.fstat(fd).st_mode) else "sync file")
     recorded(os, "replace", replaced)
     recorded(Path, "unlink", lambda path: f"remove {path.name}")
-    writer = store.Keeper(Store(tmp_path, WORK))
+    writer = store_writer.StoreWriter(Store(tmp_path, WORK))
     writer.finish({Node(2, 0): Sums(64, np.ones(5))})
     assert events == ["sync file", "rename L02-0.sums", "sync directory", "remove L01-0.sums"]
 
@@ -147,7 +149,7 @@ def test_a_full_disk_names_the_file_and_leaves_the_old_ones(tmp_path, blocks, mo
     collect(WORK, N, store=tmp_path)
     before = contents(blocks)
     with monkeypatch.context() as patch:
-        patch.setattr(store, "PERIOD_S", float("inf"))  # nothing is written, and merged, before the end
+        patch.setattr(store_writer, "PERIOD_S", float("inf"))  # nothing is written, and merged, before the end
         full_disk(patch, calls_that_work)
         with pytest.raises(StoreError, match=r"\.blocks/ab12/.*: cannot be written: No space left on device") as caught:
             collect(WORK, 100_000, store=tmp_path)
@@ -162,7 +164,7 @@ def test_a_full_disk_names_the_file_and_leaves_the_old_ones(tmp_path, blocks, mo
 
 
 def test_a_disk_that_fills_up_while_running_ends_the_run_at_once(tmp_path, blocks, monkeypatch):
-    monkeypatch.setattr(store, "PERIOD_S", 0.05)
+    monkeypatch.setattr(store_writer, "PERIOD_S", 0.05)
     full_disk(monkeypatch, 3)
     done = []
     with pytest.raises(StoreError, match="No space left"):

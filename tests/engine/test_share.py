@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from radarsim.engine.blocks import Node, Total
 from radarsim.engine.run import Share, collect, share, stored
-from radarsim.engine.store import BY_CHANCE, Stock, Store, as_shares, stock
+from radarsim.engine.store.inventory import CHANCE_LIMIT, Inventory, missing_shares, take_inventory
+from radarsim.engine.store.store import Store
 from tests.engine.fake import WORK, Fake, N, same
 
 
@@ -91,8 +92,8 @@ def test_what_is_missing_is_named_by_realisations_and_shares(tmp_path_factory, r
     root = tmp_path_factory.mktemp("stock")
     for number in set(numbers) - absent:
         share(WORK, realisations, (number, of), store=root, threads=0)
-    found = stock(WORK, realisations, root)
-    parts = {number: stock(WORK, realisations, root, (number, of)) for number in numbers}
+    found = take_inventory(WORK, realisations, root)
+    parts = {number: take_inventory(WORK, realisations, root, (number, of)) for number in numbers}
     assert found.asked == realisations == sum(part.asked for part in parts.values())
     assert found.stored == sum(part.stored for part in parts.values())
     for number, part in parts.items():
@@ -112,25 +113,25 @@ def test_a_share_that_lacks_is_named(tmp_path):
         root = tmp_path / "".join(map(str, absent))
         for number in {1, 2, 3} - absent:
             share(WORK, N, (number, 3), store=root, threads=0)
-        found = stock(WORK, N, root)
+        found = take_inventory(WORK, N, root)
         assert (found.shares, found.loose) == (shares, True)
         assert collect(WORK, N, store=root, threads=0).computed == N - found.stored
-        assert stock(WORK, N, root) == Stock(N, N, (), None, loose=False)
+        assert take_inventory(WORK, N, root) == Inventory(N, N, (), None, loose=False)
 
 
 def test_of_a_run_that_ended_nothing_is_loose(tmp_path):
     collect(WORK, 1000, store=tmp_path, threads=0)
-    larger = stock(WORK, N, tmp_path)
+    larger = take_inventory(WORK, N, tmp_path)
     assert (larger.stored, larger.missing, larger.loose) == (992, ((992, N - 1),), False)
-    assert stock(WORK, N, None) == Stock(N, 0, ((0, N - 1),), None, loose=False)
-    assert stock(WORK, N, tmp_path / "nowhere") == stock(WORK, N, None)
-    assert stock(WORK, 1000, tmp_path).missing == ()
+    assert take_inventory(WORK, N, None) == Inventory(N, 0, ((0, N - 1),), None, loose=False)
+    assert take_inventory(WORK, N, tmp_path / "nowhere") == take_inventory(WORK, N, None)
+    assert take_inventory(WORK, 1000, tmp_path).missing == ()
 
 
 def test_ends_that_lie_by_chance_are_no_shares():
     """Of 3000 runs of missing blocks wherever, as a killed run leaves them, few are taken for shares."""
     draw, blocks, n = random.Random(1), 300, 3000
-    taken = sum(as_shares([sorted(draw.sample(range(1, blocks), 2))], blocks) is not None for _ in range(n))
-    assert 0 < taken < BY_CHANCE * n
-    taken = sum(as_shares([(draw.randrange(1, blocks), blocks)], blocks) is not None for _ in range(n))
-    assert 0 < taken < BY_CHANCE * n
+    taken = sum(missing_shares([sorted(draw.sample(range(1, blocks), 2))], blocks) is not None for _ in range(n))
+    assert 0 < taken < CHANCE_LIMIT * n
+    taken = sum(missing_shares([(draw.randrange(1, blocks), blocks)], blocks) is not None for _ in range(n))
+    assert 0 < taken < CHANCE_LIMIT * n

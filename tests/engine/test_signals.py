@@ -13,7 +13,7 @@ import pytest
 
 from radarsim.engine.blocks import Node
 from radarsim.engine.run import Signals, collect, stored
-from radarsim.engine.store import Store
+from radarsim.engine.store.store import Store
 from radarsim.errors import Interrupted
 from radarsim.threads import limited
 from tests.engine.fake import Fake, textbook

@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 
 from radarsim.engine import run as engine_run
-from radarsim.engine import store as keeper
 from radarsim.engine.blocks import Node, Partial, Total
 from radarsim.engine.results import Sums
 from radarsim.engine.run import collect, stored
-from radarsim.engine.store import Store, decoded, is_directory, piece_named
+from radarsim.engine.store import writer as store_writer
+from radarsim.engine.store.block_file import decode, is_directory, piece_named
+from radarsim.engine.store.store import Store
 from radarsim.errors import NonFiniteError
 from tests.engine.fake import NAMES, WORK, Fake, N, contents, names, same
 from tests.engine.tree import decomposition
@@ -170,7 +171,7 @@ def test_a_stored_cut_block_counts_only_once_all_before_it_is_done(tmp_path, blo
 
 def test_instruction_sets_are_recorded_and_mixing_warns(tmp_path, blocks, monkeypatch):
     collect(WORK, N, store=tmp_path)
-    header, _ = decoded((blocks / "L08-0.sums").read_bytes())
+    header, _ = decode((blocks / "L08-0.sums").read_bytes())
     assert header["platforms"] == [engine_run.platform_name()]
     assert header["versions"].keys() >= {"python", "numpy"}
     monkeypatch.setattr(engine_run, "platform_name", lambda: "abacus")
@@ -183,7 +184,7 @@ def test_instruction_sets_are_recorded_and_mixing_warns(tmp_path, blocks, monkey
 
 
 def test_what_is_new_is_written_about_once_a_period(tmp_path, monkeypatch):
-    monkeypatch.setattr(keeper, "PERIOD_S", 0.2)
+    monkeypatch.setattr(store_writer, "PERIOD_S", 0.2)
     written = []
     write = Store.write
 
@@ -214,8 +215,8 @@ class Slow(Store):
 
 
 def test_workers_do_not_wait_for_the_disk_and_one_thing_is_written_at_a_time(tmp_path, monkeypatch):
-    monkeypatch.setattr(keeper, "PERIOD_S", 0.01)
-    writer = keeper.Keeper(Slow(tmp_path, WORK))
+    monkeypatch.setattr(store_writer, "PERIOD_S", 0.01)
+    writer = store_writer.StoreWriter(Slow(tmp_path, WORK))
     for index in (0, 2, 4):
         time.sleep(0.02)
         writer.offer({Node(0, index): Sums(16, np.ones(5))})
@@ -227,7 +228,7 @@ def test_workers_do_not_wait_for_the_disk_and_one_thing_is_written_at_a_time(tmp
 
 @pytest.mark.parametrize("sizes", [(20_000, 20_000), (20_000, 9_999, 33_333)])
 def test_several_runs_on_one_store_at_once(tmp_path, monkeypatch, sizes):
-    monkeypatch.setattr(keeper, "PERIOD_S", 0.0)
+    monkeypatch.setattr(store_writer, "PERIOD_S", 0.0)
     results = {}
 
     def run(place, realisations):
@@ -284,7 +285,7 @@ def test_the_file_is_what_the_description_says(tmp_path, blocks):
 
 def test_blocks_that_are_cleaned_away_while_a_run_works_are_written_again(tmp_path, monkeypatch):
     """Whatever is written before the end goes at once, the directory too."""
-    monkeypatch.setattr(keeper, "PERIOD_S", 0.0)
+    monkeypatch.setattr(store_writer, "PERIOD_S", 0.0)
     monkeypatch.setattr("radarsim.engine.run.PROGRESS_S", 0.0)
     removed = []
 
@@ -301,14 +302,14 @@ def test_blocks_that_are_cleaned_away_while_a_run_works_are_written_again(tmp_pa
     assert same(again, N)
 
 
-def test_a_keeper_looks_again_at_what_it_wrote(tmp_path):
+def test_a_writer_looks_again_at_what_it_wrote(tmp_path):
     store = Store(tmp_path, WORK)
-    own = keeper.Keeper(store)
+    writer = store_writer.StoreWriter(store)
     nodes = (Node(0, 0), Node(0, 3))
     pieces = {node: Sums(WORK.block, WORK.simulate(node.first * WORK.block, WORK.block)) for node in nodes}
-    own._put(pieces)
+    writer._put(pieces)
     (store.path / "L00-0.sums").unlink()
-    own.finish(pieces)
+    writer.finish(pieces)
     assert store.pieces() == set(pieces)
 
 

@@ -13,7 +13,8 @@ import pandas as pd
 from scipy.stats import binom
 
 from radarsim.app import result
-from radarsim.app.configs import CaseWork, load
+from radarsim.app.case_work import CaseWork
+from radarsim.app.configs import load
 from radarsim.config.document import SHIPPED
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult

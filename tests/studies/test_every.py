@@ -8,7 +8,7 @@ import pytest
 
 import radarsim
 from radarsim.app import result as output
-from radarsim.app.configs import CaseWork
+from radarsim.app.case_work import CaseWork
 from radarsim.report.drawing import GREY, Line
 from radarsim.studies import registry
 from radarsim.studies.interface import Study

@@ -95,7 +95,7 @@ def names_in_the_identity(right):
     return lambda case: right(case)[:32] + repr(case.spec)
 
 
-@fault("app.configs:CaseWork.simulate", f"{P1_STUDY}::test_every_sigma_is_exact_within_its_statistical_error")
+@fault("app.case_work:CaseWork.simulate", f"{P1_STUDY}::test_every_sigma_is_exact_within_its_statistical_error")
 def every_block_is_the_first(right):
     return lambda work, first, count: right(work, 0, count)
 
@@ -128,12 +128,14 @@ def arrays_of_sums_in_another_order(right):
     return unpacked
 
 
-@fault("engine.store:Store._check", "engine/test_store.py")
+@fault("engine.store.block_file:check_block", "engine/test_store.py")
 def a_block_of_another_case_is_read(right):
-    return lambda store, header, values, piece: None
+    return lambda header, values, expected: None
 
 
-@fault("engine.store:agree", "engine/test_audit.py::test_sums_that_were_forged_with_a_right_checksum_do_not_add_up")
+@fault(
+    "engine.store.audit:agree", "engine/test_audit.py::test_sums_that_were_forged_with_a_right_checksum_do_not_add_up"
+)
 def forged_sums_agree(right):
     return lambda *_: True
 

@@ -91,7 +91,7 @@ def test_a_run_forks_nothing(tmp_path, more):
 SUMS = """
 import sys
 from radarsim.app.configs import load
-from radarsim.app.configs import CaseWork
+from radarsim.app.case_work import CaseWork
 for stem in sys.argv[1:]:
     print(CaseWork(load(stem).cases[0]).simulate(0, 72).tobytes().hex())
 """

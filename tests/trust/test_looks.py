@@ -244,7 +244,6 @@ class Synthetic:
                 kernel_seconds=0.0,
                 stopped=None,
                 warnings=(),
-                kept_as=None,
             )
 
         study = SimpleNamespace(

@@ -13,7 +13,7 @@ import pytest
 
 from radarsim.app.doctor import TOLERANCES
 from radarsim.bursts.kernels.scoring import triangular_root
-from radarsim.engine.store import _flags
+from radarsim.engine.machine import _processor_flags
 
 # What this NumPy has further loops for, and this processor runs; it knows no other names.
 FOUND = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
@@ -25,7 +25,7 @@ TARGETS = ("generic", "haswell", "skylake-avx512")
 
 def can_run(name):
     """Whether this processor has the instructions that a BLAS kernel or a compiler target asks for."""
-    flags = set(_flags())
+    flags = set(_processor_flags())
     return {"SkylakeX": "avx512f" in flags, "skylake-avx512": "avx512f" in flags}.get(name, "avx2" in flags)
 
 

@@ -6,7 +6,7 @@ import random
 import numpy as np
 import pytest
 
-from radarsim.app.configs import CaseWork
+from radarsim.app.case_work import CaseWork
 from radarsim.engine.blocks import Forest, Node
 from radarsim.engine.results import Sums
 from tests.trust.cases import CASES

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.app.configs import CaseWork, load
+from radarsim.app.case_work import CaseWork
+from radarsim.app.configs import load
 from radarsim.engine.blocks import Node
-from radarsim.engine.store import Store
+from radarsim.engine.store.store import Store
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.alone

@@ -15,7 +15,9 @@ def refuse(*_, **__):
 threading.Thread.start = threading._start_new_thread = _thread.start_new_thread = refuse
 """
 COMMAND = "from radarsim.cli import entry; entry()"
-BUSY = "from radarsim.engine import store; store.PERIOD_S = 0; "  # it writes after every task, not once a second
+BUSY = (
+    "from radarsim.engine.store import writer; writer.PERIOD_S = 0; "  # it writes after every task, not once a second
+)
 NATIVE = "print(*(line.split()[1] for line in open('/proc/self/status') if line.startswith('Threads:')))"
 
 

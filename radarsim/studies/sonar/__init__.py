@@ -68,6 +68,11 @@ class Sonar(Study):
         plan: Plan = file_of(case.spec.parts[-1], "study").prepare(case)
         return plan
 
+    def computing_modules(self, spec: "Keys", plots: bool) -> Sequence[str]:
+        part = PARTS[spec.parts[-1]]
+        drawing = (f"{__name__}.track", f"{part}.track") if plots else ()
+        return f"{__name__}.config", f"{part}.study", *drawing
+
     def simulate(self, plan: Any, first: int, count: int) -> "np.ndarray":
         sums: np.ndarray = plan.simulate(first, count)
         return sums

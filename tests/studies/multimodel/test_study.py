@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from radarsim import physics
-from radarsim.app.configs import CaseWork, load
+from radarsim.app.case_work import CaseWork
+from radarsim.app.configs import load
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.studies.multimodel import STUDY, tables

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from radarsim.app.configs import CaseWork, load
+from radarsim.app.case_work import CaseWork
+from radarsim.app.configs import load
 from radarsim.engine.run import collect
 
 RADARS = ("rls1", "rls2", "rls3", "rls4", "rls5")

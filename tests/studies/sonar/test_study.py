@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from radarsim.app.configs import CaseWork, load
+from radarsim.app.case_work import CaseWork
+from radarsim.app.configs import load
 from radarsim.studies.sonar import STUDY
 
 N = 100_000

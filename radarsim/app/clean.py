@@ -1,0 +1,69 @@
+"""What `radarsim clean` removes: stored blocks, and nothing outside DIR/.blocks."""
+
+import os
+import re
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from radarsim.app.recorded_cases import recorded_cases
+from radarsim.config.experiment import Experiment
+from radarsim.engine.blocks import REQUEST_DIGITS
+from radarsim.engine.store.block_file import is_directory
+from radarsim.engine.store.store import removable_files
+from radarsim.errors import ConfigError, StoreError
+from radarsim.studies.identity import identity
+
+
+@dataclass(frozen=True)
+class Cleaned:
+    """The amount dropped, or to be dropped: files and bytes of so many identities."""
+
+    path: Path
+    identities: int
+    files: int
+    size: int
+
+
+def clean(
+    out: str | os.PathLike[str],
+    experiments: Iterable[Experiment] | None = None,
+    dry_run: bool = False,
+    other_sources: bool = False,
+) -> Cleaned:
+    """Drop the stored blocks of all experiments, or of some, below out/.blocks; with dry_run only count them.
+
+    This includes a case's blocks from other sources; with other_sources only these are dropped, without experiments
+    those of all results below `out`. Links are not followed; files that no store makes remain, and so
+    do their folders. Raises ConfigError if `out` does not exist or its .blocks is a link, StoreError if a file cannot
+    be removed."""
+    blocks = Path(out) / ".blocks"
+    if not is_directory(Path(out)):
+        raise ConfigError(f"{out}: no such directory of results")
+    if blocks.is_symlink():
+        raise ConfigError(f"{blocks}: is a link; clean the directory that it points to")
+    cases = None if experiments is None else [case for experiment in experiments for case in experiment.cases]
+    if cases is None and other_sources:
+        cases = recorded_cases(Path(out))
+    present = None if cases is None else {identity(case) for case in cases}
+    requests = None if present is None else {name[:REQUEST_DIGITS] for name in present}
+    keep = present if present is not None and other_sources else set()
+    try:
+        folders = [path for path in sorted(blocks.iterdir()) if _is_identity(path)] if is_directory(blocks) else []
+        folders = [path for path in folders if requests is None or path.name[:REQUEST_DIGITS] in requests]
+        folders = [path for path in folders if path.name not in keep]
+        files = [file for folder in folders for file in removable_files(folder)]
+        if not dry_run:
+            for path, _ in files:
+                path.unlink(missing_ok=True)
+            for folder in [*folders, blocks]:
+                with suppress(OSError):  # somebody else's file is in it
+                    folder.rmdir()
+    except OSError as error:
+        raise StoreError(f"{error.filename or blocks}: cannot be removed: {error.strerror}") from error
+    return Cleaned(blocks, len(folders), len(files), sum(size for _, size in files))
+
+
+def _is_identity(path: Path) -> bool:
+    return bool(re.fullmatch(r"[0-9a-f]{2,128}", path.name)) and path.is_dir() and not path.is_symlink()

@@ -1,0 +1,134 @@
+"""Which modules compute the numbers of a case, and one hash of their sources.
+
+The list follows the imports, from the modules that a study names (`Study.computing_modules`), those of the filters'
+keys, and those that take a case through the engine. Imports within functions count; those for a type checker alone do
+not, nor does what only shows results. A package from outside counts with its files of data, and as a whole where it
+imports by names that are computed; the versions of all installed packages count then as well, as it may use any."""
+
+import hashlib
+import re
+from collections.abc import Iterator
+from functools import cache
+from importlib.metadata import distributions
+from pathlib import Path
+
+from radarsim.config.experiment import Case
+from radarsim.config.fields import Model
+from radarsim.module_sources import module_digest, module_source, module_spec, note_loaded_modules
+from radarsim.studies.registry import study
+
+RADARSIM = __package__.partition(".")[0]
+ENGINE = "radarsim.app.case_work", "radarsim.engine.run"  # what takes a case through the engine
+SHOW_RESULTS = "radarsim.report", "radarsim.language"
+
+_COMMENT = re.compile(r"#.*")
+_TYPE_CHECKING = re.compile(r"^if TYPE_CHECKING:\n(?:[ \t]+.*\n|\n)+", re.MULTILINE)
+_IMPORT = re.compile(
+    r"^(?P<before>[ \t]*|.*[;:][ \t]*)"
+    r"(?:from[ \t]+(?P<base>[.\w]+)[ \t]+import[ \t]*(?P<names>\([^)]*\)|(?:[^\n;\\]|\\\n)+)"
+    r"|import[ \t]+(?P<modules>(?:[^\n;\\]|\\\n)+))",
+    re.MULTILINE,
+)
+_NAME = re.compile(r"(\w[\w.]*)(?:\s+as\s+\w+)?")
+_COMPUTED_IMPORT = re.compile(rb"\b(?:import_module|__import__|runpy|spec_from_file_location|exec)\b")
+
+
+def sources_digest(case: Case) -> str:
+    """SHA-256 of the sources that compute a case's numbers, in hexadecimal."""
+    note_loaded_modules(RADARSIM)
+    digests = {name: module_digest(name) for name in computing_modules(_first_modules(case))}
+    outside = sorted({name.partition(".")[0] for name in digests} - {RADARSIM})
+    for top in outside:
+        digests |= {f"{top}: {name}": digest for name, digest in _data_digests(top).items()}
+    versions = _installed_versions() if outside else []
+    return hashlib.sha256(repr((sorted(digests.items()), versions)).encode()).hexdigest()
+
+
+def _first_modules(case: Case) -> tuple[str, ...]:
+    """The modules from which the imports are followed."""
+    members = getattr(case.spec, case.spec.bare_keys, ())
+    kinds = {base.__module__ for member in members for base in type(member).__mro__ if issubclass(base, Model)}
+    return (*ENGINE, *study(case.study).computing_modules(case.spec, bool(case.outside)), *sorted(kinds))
+
+
+@cache
+def computing_modules(first: tuple[str, ...]) -> frozenset[str]:
+    """These modules, and all of radarsim and of their own packages that they import, directly or not."""
+    tops = {RADARSIM, *(name.partition(".")[0] for name in first)}
+    modules: set[str] = set()
+    waiting = list(first)
+    while waiting:
+        name = waiting.pop()
+        if name in modules or name.partition(".")[0] not in tops or _is_within(name, SHOW_RESULTS):
+            continue
+        if (spec := module_spec(name)) is None or not spec.has_location:
+            continue
+        modules.add(name)
+        source = module_source(name)
+        top, is_package = name.partition(".")[0], spec.submodule_search_locations is not None
+        if top != RADARSIM and _COMPUTED_IMPORT.search(source):
+            waiting += _all_modules(top)
+        parent = name.rpartition(".")[0]
+        # A package of radarsim is mostly passed on the way to a module in it: what its functions would import is not.
+        passed = is_package and top == RADARSIM and name not in first
+        text = source.decode(errors="replace")
+        waiting += imported_modules(text, name if is_package else parent, within_functions=not passed)
+        waiting += [parent] if parent else []
+    return frozenset(modules)
+
+
+def imported_modules(text: str, package: str, within_functions: bool = True) -> list[str]:
+    """The names of modules that a source in a package imports, and names in them that may be modules."""
+    modules = []
+    for match in _IMPORT.finditer(_TYPE_CHECKING.sub("\n", _COMMENT.sub("", text))):
+        if match["before"][:1] in (" ", "\t") and not within_functions:
+            continue
+        if match["modules"]:
+            modules += _NAME.findall(match["modules"])
+            continue
+        base = match["base"]
+        if level := len(base) - len(base.lstrip(".")):
+            above = package.split(".")[: len(package.split(".")) - level + 1]
+            base = ".".join(filter(None, [*above, base.lstrip(".")]))
+        modules.append(base)
+        spec = module_spec(base) if base.partition(".")[0] in (RADARSIM, package.partition(".")[0]) else None
+        if spec is not None and spec.submodule_search_locations is not None:
+            modules += [f"{base}.{name}" for name in _NAME.findall(match["names"])]
+    return modules
+
+
+def _is_within(name: str, packages: tuple[str, ...]) -> bool:
+    return any(f"{name}.".startswith(f"{package}.") for package in packages)
+
+
+def _all_modules(top: str) -> list[str]:
+    """The modules of a top-level package that lie in folders."""
+    return [
+        ".".join((top, *path.relative_to(folder).with_suffix("").parts)).removesuffix(".__init__")
+        for folder in _folders(top)
+        for path in folder.rglob("*.py")
+    ]
+
+
+def _data_digests(top: str) -> dict[str, str]:
+    """SHA-256 of the files of a top-level package that are no sources, by their paths in it.
+
+    What it ships for users is no part of how it computes: a config counts where it is run."""
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for folder in _folders(top)
+        for path in folder.rglob("*")
+        if path.is_file() and path.suffix != ".py" and not {"__pycache__", "shipped"} & set(path.parts)
+    }
+
+
+def _folders(top: str) -> Iterator[Path]:
+    spec = module_spec(top)
+    for folder in [] if spec is None else spec.submodule_search_locations or []:
+        yield Path(folder)
+
+
+@cache
+def _installed_versions() -> list[tuple[str, str]]:
+    every_metadata = (distribution.metadata for distribution in distributions())
+    return sorted({(metadata["Name"], metadata["Version"]) for metadata in every_metadata})

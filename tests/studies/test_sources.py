@@ -1,0 +1,192 @@
+"""Which modules compute the numbers of a case: all that run while blocks are made, and none that only shows them."""
+
+import ast
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+import radarsim
+from radarsim import module_sources
+from radarsim.app.configs import load
+from radarsim.errors import ConfigError
+from radarsim.studies import registry, sources
+
+PACKAGE = Path(radarsim.__file__).parent
+CONFIGS = {
+    "range_doppler": ["rls2", "rls3"],
+    "multimodel": ["multimodel"],
+    "sonar": ["sonar_smoothing", "sonar_manoeuvre", "sonar_clutter_rare", "sonar_clutter_ends"],
+    "discriminator": ["discriminator", "discriminator_rare"],
+    "ambiguous_doppler": ["ambiguous_rls4", "ambiguous_rare"],
+    "pulses_to_tracks": ["pulses"],
+}
+COMPUTE = """
+import json, sys
+from radarsim.app.case_work import CaseWork
+from radarsim.app.configs import load
+from radarsim.engine.run import collect
+from radarsim.studies import sources
+modules = set()
+for config in json.loads(sys.argv[1]):
+    case = load(config).cases[0]
+    modules |= sources.computing_modules(sources._first_modules(case))
+    collect(CaseWork(case), 2, store=sys.argv[2], threads=0)
+loaded = [name for name in sys.modules if name.startswith("radarsim")]
+print(json.dumps([loaded, sorted(modules)]))
+"""
+# What reads a config, or says what is wrong or shown, changes no number.
+READ_AND_SHOW = "radarsim.app.configs", "radarsim.config", "radarsim.language", "radarsim.report", "radarsim.errors"
+USER_FILTER = """
+import numpy as np
+
+def last_range(plots):
+    return next(iter(plots.columns.values()))[:, :, None]
+"""
+
+
+def is_within(name, packages):
+    return any(f"{name}.".startswith(f"{package}.") for package in packages)
+
+
+def with_user_filter(config, folder):
+    """A shipped config with a filter of a user's in a folder."""
+    (folder / "mine.py").write_text(USER_FILTER)
+    case = load(config).cases[0]
+    members = [*case.keys["filters"], {"name": "mine", "python": "mine.py:last_range"}]
+    return {"study": case.study, "realisations": 2, **case.keys, "filters": members}
+
+
+@pytest.mark.parametrize("study", [*registry.SHIPPED, "rls2", "sonar_missed", "sonar_manoeuvre", "ambiguous_rls4"])
+def test_every_module_that_is_loaded_while_blocks_are_made_counts(study, libraries, tmp_path):
+    configs = CONFIGS.get(study) or [with_user_filter(study, tmp_path)]
+    done = libraries.run(json.dumps(configs), tmp_path / "out", code=COMPUTE, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    loaded, computing = map(set, json.loads(done.stdout))
+    assert {name for name in loaded - computing if not is_within(name, READ_AND_SHOW)} <= {"radarsim.app"}
+    assert len(computing) > 40
+
+
+@pytest.mark.parametrize("study", registry.SHIPPED)
+def test_no_module_that_only_shows_results_counts(study):
+    for config in CONFIGS[study]:
+        modules = sources.computing_modules(sources._first_modules(load(config).cases[0]))
+        of_study = {name.rpartition(".")[2] for name in modules if is_within(name, [registry.SHIPPED[study]])}
+        assert "study" in of_study
+        assert not of_study & {"tables", "figures", "words", "measures", "readings", "track", "chart", "search"}
+
+
+def imports_by_syntax(path):
+    """The modules of ours that a source imports, by its syntax tree, without those for a type checker alone."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            node.body = []
+    names = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return {name for name in names if is_within(name, ["radarsim"]) and module_file(name)}
+
+
+def module_file(name):
+    path = PACKAGE.parent.joinpath(*name.split("."))
+    return next((file for file in (path / "__init__.py", path.with_suffix(".py")) if file.is_file()), None)
+
+
+def test_imports_are_those_of_the_syntax_tree_in_every_module():
+    for path in sorted(PACKAGE.rglob("*.py")):
+        found = sources.imported_modules(path.read_text(encoding="utf-8"), "radarsim")
+        assert {name for name in found if is_within(name, ["radarsim"])} >= imports_by_syntax(path), path
+
+
+@pytest.mark.parametrize(
+    ("text", "modules"),
+    [
+        ("import radarsim.physics as p, radarsim.bursts.burst", ["radarsim.physics", "radarsim.bursts.burst"]),
+        ("from radarsim.config import (  # a) b\n    fields,\n    load as l,\n)", ["radarsim.config.fields"]),
+        ("from radarsim.config import \\\n    fields", ["radarsim.config.fields"]),
+        ("def f():\n    x = 1; from radarsim import physics", ["radarsim.physics"]),
+        ("if True: import radarsim.physics", ["radarsim.physics"]),
+        ("try:\n\timport radarsim.physics\nexcept ImportError: pass", ["radarsim.physics"]),
+        ("from . import physics", ["radarsim.physics"]),
+        ("from .config.fields import Model", ["radarsim.config.fields"]),
+    ],
+)
+def test_an_import_is_seen_however_it_is_written(text, modules):
+    assert set(modules) <= set(sources.imported_modules(text, "radarsim"))
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A package of a user's: `package(text, …)` writes its modules and gives those that compute."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(module_sources, "_digests", {})
+    top = f"user_package_{tmp_path.name.replace('-', '_')}"
+
+    def write(**files):
+        for name, text in files.items():
+            path = Path(tmp_path, top, *name.split("__")).with_suffix(".py")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            for folder in (path.parent, Path(tmp_path, top)):
+                (folder / "__init__.py").touch()
+            path.write_text(text)
+        sources.computing_modules.cache_clear()
+        modules = sources.computing_modules((f"{top}.study",))
+        return {name.removeprefix(f"{top}.") for name in modules if name.startswith(f"{top}.")}
+
+    write.folder = tmp_path / top
+    yield write
+    for name in [name for name in sys.modules if name.startswith(top)]:
+        del sys.modules[name]
+
+
+def test_a_file_that_moves_into_a_subfolder_still_counts(package):
+    assert package(study="from . import design", design="", tables="") == {"study", "design"}
+    moved = package(study="def prepare():\n    from .deep.below import design", deep__below__design="")
+    assert {"study", "deep.below.design"} <= moved
+    assert "tables" not in moved
+
+
+def test_a_package_that_computes_the_names_of_its_imports_counts_as_a_whole(package):
+    text = "from importlib import import_module\ndef simulate(name):\n    import_module(name)"
+    assert package(study=text, other="", deep__words="") == {"study", "other", "deep", "deep.words"}
+
+
+def test_files_of_data_count_by_their_paths_and_contents(package):
+    package(study="")
+    top = package.folder.name
+    for folder in ("one", "two"):
+        (package.folder / folder).mkdir()
+        (package.folder / folder / "gains.npz").write_bytes(folder.encode())
+    both = sources._data_digests(top)
+    assert {"one/gains.npz", "two/gains.npz"} == set(both)
+    (package.folder / "two/gains.npz").write_bytes(b"other")
+    (package.folder / "shipped").mkdir()
+    (package.folder / "shipped/walk.yaml").write_text("")
+    changed = sources._data_digests(top)
+    assert [name for name in changed if changed[name] != both.get(name)] == ["two/gains.npz"]
+
+
+def test_a_loaded_module_keeps_the_hash_of_what_was_loaded(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(module_sources, "_digests", {})
+    for name in ("loaded_before", "loaded_later"):
+        (tmp_path / f"{name}.py").write_text("x = 1")
+    __import__("loaded_before")
+    first = {name: module_sources.module_digest(name) for name in ("loaded_before", "loaded_later")}
+    assert len(set(first.values())) == 1
+    for name in first:
+        (tmp_path / f"{name}.py").write_text("x = 2")
+    assert module_sources.module_digest("loaded_before") == first["loaded_before"]  # the code that runs
+    edited = module_sources.module_digest("loaded_later")
+    assert edited != first["loaded_later"]  # the code that would be loaded
+    (tmp_path / "loaded_later.py").write_text("x = 3")
+    __import__("loaded_later")
+    with pytest.raises(ConfigError, match=r"loaded_later: was edited while this process ran; start a new one"):
+        module_sources.module_digest("loaded_later")
+    for name in first:
+        del sys.modules[name]
