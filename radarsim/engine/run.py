@@ -528,6 +528,8 @@ class Share(Dispatch):
     ):
         super().__init__(work, realisations, None, progress)
         self._writer: StoreWriter = StoreWriter(Store(store, work))
+        if not self._writer.store.trusted:
+            raise StoreError(*self._writer.store.warnings)
         self.first, self.stop, self.rest = share_of(realisations, work.block, part)
         self.asked = (self.stop - self.first) * work.block + self.rest
 

@@ -3,6 +3,7 @@
 A file is one line of magic, one line of JSON, the sums as little-endian float64 and the SHA-256 of all that. It is
 written under a temporary name, synchronised and renamed: it is complete or absent."""
 
+import errno
 import hashlib
 import json
 import os
@@ -16,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from radarsim.engine.blocks import Node, Partial, Piece, Total
+from radarsim.private_files import UntrustedFileError, create_private_file, entry_fault
 
 MAGIC = b"radarsim sums 1\n"  # another number if the same realisations are ever added in another order
 SUFFIX = ".sums"
@@ -84,19 +86,24 @@ def check_block(header: Mapping, values: np.ndarray, expected: Mapping) -> None:
 
 
 def read_file(path: Path) -> bytes:
-    """The content of a stored file; Damage for a pipe, a device or a directory, which no run writes."""
+    """The content of a stored file; Damage for a pipe, a device or a directory, which no run writes, and
+    UntrustedFileError for a file that another user may have made or changed."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # or a pipe would wait for a writer
     with open(descriptor, "rb") as file:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
             raise Damage("no regular file")
+        if fault := entry_fault(path, status):
+            raise UntrustedFileError(errno.EPERM, fault, str(path))
         return file.read()
 
 
 def write_file(path: Path, content: bytes) -> None:
-    """Write a file, completely or not at all, durable except for its name; OSError with the file's name."""
+    """Write a file for the user alone, completely or not at all, durable except for its name; OSError with the file's
+    name."""
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
     try:
-        with open(temporary, "xb") as file:
+        with create_private_file(temporary) as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())

@@ -36,6 +36,7 @@ from radarsim.engine.store.block_file import (
     write_file,
 )
 from radarsim.errors import StoreError
+from radarsim.private_files import UntrustedFileError, entry_fault, make_private_folder, make_readable_folder
 
 STALE_S = 600  # age from which a temporary file is one of a killed run
 ATTEMPTS = 4  # at reading or writing what another program merges or removes at the same time
@@ -43,7 +44,10 @@ ATTEMPTS = 4  # at reading or writing what another program merges or removes at 
 
 class Store:
     """The pieces of one work under a results directory. Makes no directory before the first write. `warnings` collects
-    damage; `platforms` those of all sums read or computed so far."""
+    damage; `platforms` those of all sums read or computed so far.
+
+    A folder that another user may have made or may write is not trusted: nothing is read from it or written to it, and
+    `warnings` says so."""
 
     def __init__(self, directory: str | os.PathLike, work: Work):
         if not re.fullmatch(r"[0-9a-f]{2,128}", work.identity):
@@ -51,11 +55,22 @@ class Store:
         self.path = Path(directory) / ".blocks" / work.identity
         self.warnings: list[str] = []
         self.platforms: set[str] = set()
-        self._damaged: set[Piece] = set()
+        self._unusable: set[Piece] = set()  # damaged, or of another user
         self._work = work
+        self.trusted = self._is_trusted()
+
+    def _is_trusted(self) -> bool:
+        for folder in (self.path.parent, self.path):
+            with suppress(OSError):  # absent, or reported by whoever reads or writes there
+                if fault := entry_fault(folder, folder.stat()):
+                    self.warnings.append(f"{folder}: {fault}: blocks in it are not used, and none are kept")
+                    return False
+        return True
 
     def pieces(self) -> set[Piece]:
-        """The stored pieces, by file names; empty if the directory does not exist."""
+        """The stored pieces, by file names; empty if the directory does not exist, or is not trusted."""
+        if not self.trusted:
+            return set()
         try:
             names = os.listdir(self.path)
         except FileNotFoundError:
@@ -66,11 +81,13 @@ class Store:
 
     def superseded(self) -> bool:
         """Whether there is no folder of this identity, but one of the same request and other sources."""
-        return not self.path.exists() and bool(other_sources(self.path))
+        return self.trusted and not self.path.exists() and bool(other_sources(self.path))
 
     def read(self, piece: Piece) -> Sums | None:
-        """The sums of a piece, checked; None if it is absent or damaged. A damaged file is renamed to `<name>.damaged`
-        and named in warnings."""
+        """The sums of a piece, checked; None if it is absent, damaged or not trusted. A damaged file is renamed to
+        `<name>.damaged` and named in warnings."""
+        if not self.trusted:
+            return None
         path = block_path(self.path, piece)
         try:
             header, values = decode(read_file(path))
@@ -79,25 +96,30 @@ class Store:
                 raise Damage(f"expected {self._work.size} numbers, got {values.size}")
         except FileNotFoundError:
             return None
+        except UntrustedFileError as error:
+            self.warnings.append(f"{path}: {error.strerror}: not used")
+            self._unusable.add(piece)
+            return None
         except OSError as error:
             raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
         except Damage as damage:
             self.warnings.append(f"{path}: damaged: {damage}; set aside")
-            self._damaged.add(piece)
+            self._unusable.add(piece)
             with suppress(OSError):
                 os.replace(path, path.with_name(path.name + ".damaged"))
             return None
         self.platforms.update(header["platforms"])
-        self._damaged.discard(piece)
+        self._unusable.discard(piece)
         return Sums(header["count"], values)
 
     def _header(self, piece: Piece) -> dict[str, object]:
         return piece_header(self.path, piece, self._work.block) | {"size": self._work.size}
 
     def make_folder(self, last: bool = True) -> None:
-        """Make the folder, if absent; FileNotFoundError is passed on except on the last attempt."""
+        """Make the folder, for the user alone, if absent; FileNotFoundError is passed on except on the last attempt."""
         try:
-            self.path.mkdir(parents=True, exist_ok=True)
+            make_readable_folder(self.path.parent.parent)
+            make_private_folder(self.path)
         except OSError as error:
             if isinstance(error, FileNotFoundError) and not last:
                 raise
@@ -106,7 +128,7 @@ class Store:
     def write(self, pieces: Mapping[Piece, Sums]) -> None:
         """Put pieces on disk; on return they survive a power cut. StoreError, with the old files intact, if the disk is
         full or cannot be written."""
-        if not pieces:
+        if not (pieces and self.trusted):
             return
         for attempt in range(ATTEMPTS):
             last = attempt == ATTEMPTS - 1
@@ -155,7 +177,7 @@ class Store:
         """All stored pieces of blocks 0 … blocks-1, merged."""
         for _ in range(ATTEMPTS):
             forest, lost = Forest(self._work.block, self._work.size), False
-            candidates = self.pieces() - self._damaged
+            candidates = self.pieces() - self._unusable
             for node in maximal([piece for piece in candidates if isinstance(piece, Node)], blocks):
                 sums = self.read(node)
                 if sums is None:
