@@ -15,11 +15,11 @@ import pytest
 from radarsim.engine import run as engine_run
 from radarsim.engine.blocks import Node, Partial, Total
 from radarsim.engine.results import Sums
-from radarsim.engine.run import collect, stored
+from radarsim.engine.run import collect, share, stored
 from radarsim.engine.store import writer as store_writer
 from radarsim.engine.store.block_file import decode, is_directory, piece_named
 from radarsim.engine.store.store import Store
-from radarsim.errors import NonFiniteError
+from radarsim.errors import NonFiniteError, StoreError
 from tests.engine.fake import NAMES, WORK, Fake, N, contents, names, same
 from tests.engine.tree import decomposition
 
@@ -326,3 +326,57 @@ def test_a_directory_that_may_not_be_looked_at_is_not_taken_for_none(monkeypatch
     monkeypatch.setattr(Path, "stat", closed)
     with pytest.raises(PermissionError):
         is_directory(tmp_path)
+
+
+@pytest.mark.parametrize("umask", [0o000, 0o077, 0o777])
+def test_blocks_are_for_the_user_alone_and_results_can_be_written_by_nobody_else(tmp_path, umask):
+    before = os.umask(umask)
+    try:
+        collect(WORK, N, store=tmp_path / "new" / "results")
+    finally:
+        os.umask(before)
+    blocks = tmp_path / "new/results/.blocks"
+    assert {path.stat().st_mode & 0o777 for path in (blocks, blocks / WORK.identity)} == {0o700}
+    assert {path.stat().st_mode & 0o777 for path in (blocks / WORK.identity).iterdir()} == {0o600}
+    assert not (tmp_path / "new/results").stat().st_mode & 0o022
+
+
+def give_away(path):
+    os.chown(path, 4242, 4242)
+
+
+def open_to_all(path):
+    path.chmod(path.stat().st_mode | 0o022)
+
+
+OTHERS = [open_to_all, pytest.param(give_away, marks=pytest.mark.skipif(os.getuid(), reason="needs root"))]
+
+
+@pytest.mark.parametrize("change", OTHERS)
+@pytest.mark.parametrize("place", [".blocks", ".blocks/ab12"])
+def test_a_folder_that_another_user_may_have_filled_is_neither_read_nor_written(tmp_path, blocks, change, place):
+    collect(WORK, N, store=tmp_path)
+    change(tmp_path / place)
+    before = contents(blocks)
+    result = collect(WORK, 2 * N, store=tmp_path)
+    assert same(result, 2 * N)
+    assert result.from_store == 0
+    assert len(result.warnings) == 1
+    assert str(tmp_path / place) in result.warnings[0]
+    assert contents(blocks) == before
+    assert stored(WORK, N, tmp_path) is None
+    with pytest.raises(StoreError, match="not used"):
+        share(WORK, N, (1, 2), store=tmp_path)
+
+
+@pytest.mark.parametrize("change", OTHERS)
+def test_a_file_that_another_user_may_have_written_is_computed_again(tmp_path, blocks, change):
+    collect(WORK, N, store=tmp_path)
+    (blocks / "T5005.sums").unlink()
+    change(blocks / "L08-0.sums")
+    result = collect(WORK, N, store=tmp_path)
+    assert same(result)
+    assert result.computed == 256 * 16
+    assert str(blocks / "L08-0.sums") in result.warnings[0]
+    again = collect(WORK, N, store=tmp_path)
+    assert (again.computed, again.warnings) == (0, ())

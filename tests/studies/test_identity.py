@@ -1,4 +1,4 @@
-"""A run uses the blocks of its own request and its own sources, and no others: not for an edit, not for an undone one."""
+"""A run uses the blocks of its own request and its own sources, and no others: for an edit, and once it is undone."""
 
 import json
 import shutil

@@ -33,7 +33,11 @@ class StoreWriter:
 
         A node of less than SMALLEST_SHARE of the largest new one is left out: it will soon be part of another, and
         would cost as much to write. All of them together are a thirtieth of what a kill would lose anyway."""
-        if time.monotonic() < self._due or (self._thread is not None and self._thread.is_alive()):
+        if (
+            not self.store.trusted
+            or time.monotonic() < self._due
+            or (self._thread is not None and self._thread.is_alive())
+        ):
             return
         self._raise_error()
         self._durable &= nodes.keys()
@@ -48,7 +52,9 @@ class StoreWriter:
         self._due = time.monotonic() + PERIOD_S
 
     def finish(self, pieces: Mapping[Piece, Sums]) -> None:
-        """Write all nodes not yet on disk, and wait for that."""
+        """Write all nodes not yet on disk, and wait for that. Nothing is written to a store that is not trusted."""
+        if not self.store.trusted:
+            return
         if self._thread is not None:
             self._thread.join()
         self._raise_error()
@@ -58,7 +64,7 @@ class StoreWriter:
             self._raise_error()
             # `radarsim clean` may have removed what this run wrote before.
             stored = self.store.pieces()
-            if not self.store.trusted or all(piece in stored or any(node in stored for node in piece.above(64)) for piece in pieces):
+            if all(piece in stored or any(node in stored for node in piece.above(64)) for piece in pieces):
                 return
             self._durable.clear()
 
