@@ -44,6 +44,13 @@ def make_private_folder(path: str | os.PathLike) -> None:
             folder.chmod(mode | stat.S_IRWXU)
 
 
+def make_trusted_folder(path: str | os.PathLike) -> None:
+    """As `make_private_folder`; raises UntrustedFileError where another user may write to the folder or replace it."""
+    _check_trust(path)
+    make_private_folder(path)
+    _check_trust(path)
+
+
 def create_private_file(path: str | os.PathLike) -> BinaryIO:
     """A new file, open for writing, that the user alone may read and write (0600) whatever the umask.
 
@@ -87,6 +94,11 @@ def read_trusted(path: str | os.PathLike) -> bytes:
             if reason is None:
                 return file.read()
     raise UntrustedFileError(errno.EPERM, reason, os.fspath(path))
+
+
+def _check_trust(path: str | os.PathLike) -> None:
+    if reason := distrust_reason(path):
+        raise UntrustedFileError(errno.EPERM, reason, os.fspath(path))
 
 
 def _follow(path: str | os.PathLike) -> tuple[Path, str | None]:
