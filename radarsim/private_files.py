@@ -57,6 +57,11 @@ def make_readable_folder(path: str | os.PathLike) -> None:
     except OSError:
         if not folder.is_dir():
             raise
+def make_trusted_folder(path: str | os.PathLike) -> None:
+    """As `make_private_folder`; raises UntrustedFileError where another user may write to the folder or replace it."""
+    _check_trust(path)
+    make_private_folder(path)
+    _check_trust(path)
 
 
 def create_private_file(path: str | os.PathLike) -> BinaryIO:
@@ -109,6 +114,11 @@ def read_trusted(path: str | os.PathLike) -> bytes:
             if reason is None:
                 return file.read()
     raise UntrustedFileError(errno.EPERM, reason, os.fspath(path))
+
+
+def _check_trust(path: str | os.PathLike) -> None:
+    if reason := distrust_reason(path):
+        raise UntrustedFileError(errno.EPERM, reason, os.fspath(path))
 
 
 def _follow(path: str | os.PathLike) -> tuple[Path, str | None]:

@@ -12,6 +12,7 @@ from radarsim.private_files import (
     create_private_file,
     distrust_reason,
     make_private_folder,
+    make_trusted_folder,
     read_trusted,
     write_private_file,
 )
@@ -110,6 +111,20 @@ def test_trust_by_owner_and_mode(tmp_path, monkeypatch, owner, bits, reason, kin
         with pytest.raises(UntrustedFileError) as error:
             read_trusted(file)
         assert (error.value.strerror, error.value.filename) == (reason, str(file))
+
+
+@as_root
+def test_a_folder_is_made_only_where_nobody_else_can_replace_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "geteuid", lambda: USER)
+    make_trusted_folder(tmp_path / "a/b")
+    make_trusted_folder(tmp_path / "a/b")
+    (tmp_path / "a").chmod(0o777)
+    for path in (tmp_path / "a/b", tmp_path / "a/c"):
+        with pytest.raises(UntrustedFileError, match="can be written by every user"):
+            make_trusted_folder(path)
+    assert [path.name for path in (tmp_path / "a").iterdir()] == ["b"]
+    (tmp_path / "a").chmod(0o1777)
+    make_trusted_folder(tmp_path / "a/c")
 
 
 @as_root

@@ -48,9 +48,9 @@ ROUNDINGS = 10  # a power p ≤ 4 of an error, and heavy tails in it
 
 def machine() -> dict[str, str]:
     """The machine, what runs on it, and where compiled kernels are kept, a text each."""
-    from radarsim.kernels import compile
+    from radarsim.kernels import cache as kernel_cache
 
-    facts, cache = machine_facts(), compile.ROOT
+    facts, cache = machine_facts(), kernel_cache.ROOT
     kept = [path.stat().st_size for path in cache.rglob("*") if path.is_file()] if cache.is_dir() else []
     writable = "writable" if os.access(cache, os.W_OK) else "not writable"
     free = shutil.disk_usage(Path.cwd()).free
@@ -258,14 +258,14 @@ class Compiled(NamedTuple):
 def compiled(configs: Sequence[str]) -> Iterator[Compiled]:
     """Compile the kernels of configs (default: all shipped ones) and cache their machine code. One realisation of each
     case is simulated and discarded. Raises ConfigError where the machine code cannot be cached."""
-    from radarsim.kernels import compile
+    from radarsim.kernels.cache import troubles
 
     for name in configs or lookup.stems("configs"):
         started = time.process_time()
         for case in load(name).cases:
             CaseWork(case).simulate(0, 1)
-            if "write" in compile.troubles:
-                raise ConfigError(compile.troubles["write"])
+            if lines := [troubles[kind] for kind in ("write", "compiler") if kind in troubles]:
+                raise ConfigError(*lines)
         yield Compiled(name, time.process_time() - started)
 
 

@@ -628,9 +628,9 @@ def superseded_blocks(cases: Sequence[str]) -> list[str]:
 
 
 def cache_troubles() -> list[str]:
-    """Faults of the cache of compiled kernels in this process, a line for each kind; no result depends on it. A kernel
-    that could not be read or kept was compiled, as on a new machine."""
-    cache = sys.modules.get("radarsim.kernels.compile")  # nothing is compiled where it is not loaded
+    """Faults of the compiler and its cache in this process, a line for each kind. A kernel that could not be read or
+    kept was compiled, as on a new machine."""
+    cache = sys.modules.get("radarsim.kernels.cache")  # nothing is compiled where it is not loaded
     return list(cache.troubles.values()) if cache else []
 
 

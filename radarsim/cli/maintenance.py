@@ -95,12 +95,10 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
     """
     if recompute and result is None:
         raise click.UsageError("--recompute needs a RESULT: a folder such as results/rls2")
-    from radarsim.app import doctor, shown
+    from radarsim.app import doctor, run, shown
     from radarsim.cli import console, outcomes
 
     if result is None:
-        from radarsim.app import doctor
-
         facts = doctor.machine()
         if not as_json:
             console.print_facts(facts)
@@ -109,6 +107,7 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
             click.echo(shown.text({**facts, "self-test": [shown.fields(verdict) for verdict in verdicts]}))
         else:
             console.print_facts({f"self-test {verdict.study}": verdict.words for verdict in verdicts})
+        console.print_warnings(run.cache_troubles())
         bad = [f"self-test: {verdict.study}: {verdict.words}" for verdict in verdicts if not verdict.good]
     else:
         found = doctor.inspected(result, recompute)

@@ -23,13 +23,11 @@ NO_NOISE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Formula:
-    """A function of Python, to which `radarsim.kernels.compile` gives a compiled twin where a kernel calls it.
+    """A function of Python, to which `radarsim.kernels.compile` gives a compiled twin where a kernel calls it."""
 
-    compiled: the type of the twin, as Numba knows it, where that is no translation of the function."""
-
-    def __init__(self, function: Callable, compiled=None):
+    def __init__(self, function: Callable):
         functools.update_wrapper(self, function)
-        self.function, self.compiled = function, compiled
+        self.function = function
 
     def __call__(self, *arguments):
         return self.function(*arguments)

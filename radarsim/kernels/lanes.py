@@ -9,18 +9,16 @@ Small matrices are tuples of lanes, passed through functions that are inlined. W
 float64 array: row r holds the eight lanes of one quantity, at r * WIDTH … r * WIDTH + 7; `rows` makes such an array."""
 
 import functools
+import inspect
 import operator
+from collections.abc import Callable
 
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.core.typing.templates import ConcreteTemplate, infer_global, make_intrinsic_template, signature
-from numba.extending import intrinsic, lower_builtin, models, register_model
-from numba.np.arrayobj import make_array
+from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
 from radarsim.kernels import traced
-from radarsim.kernels.algebra import Formula
 from radarsim.kernels.compile import inline
 
 WIDTH = 8
@@ -37,6 +35,7 @@ class LanesType(types.Type):
 
 
 lanes = LanesType()
+OPERANDS = LanesType, types.Float, types.Integer
 
 
 @register_model(LanesType)
@@ -70,22 +69,30 @@ def _power_of_two(builder, x):
 
 
 def _called(builder, name, value):
-    function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(VECTOR, [VECTOR]), name)
+    function = builder.module.globals.get(name) or ir.Function(builder.module, ir.FunctionType(VECTOR, [VECTOR]), name)
     return builder.call(function, [value])
 
 
+def _members(builder, pack):
+    return [builder.extract_value(pack, i) for i in range(len(pack.type.elements))]
+
+
 def _arithmetic(op, instruction):
-    pairs = ((lanes, lanes), (lanes, types.float64), (types.float64, lanes))
-    for left, right in pairs:
+    def generate(context, builder, sig, args):
+        values = (v if t == lanes else _spread(builder, v) for v, t in zip(args, sig.args, strict=True))
+        return getattr(builder, instruction)(*values)
 
-        @lower_builtin(op, left, right)
-        def lower(context, builder, sig, args):
-            values = (v if t == lanes else _spread(builder, v) for v, t in zip(args, sig.args, strict=True))
-            return getattr(builder, instruction)(*values)
+    for left, right in ((lanes, lanes), (lanes, types.float64), (types.float64, lanes)):
+        lower_builtin(op, left, right)(generate)
 
-    @infer_global(op)
-    class Typing(ConcreteTemplate):
-        cases = [signature(lanes, *pair) for pair in pairs]  # noqa: RUF012 (Numba's own form)
+    @type_callable(op)
+    def type_operation(context):
+        def resolve(left, right):
+            if lanes in (left, right) and all(isinstance(kind, OPERANDS) for kind in (left, right)):
+                return lanes(*(kind if kind == lanes else types.float64 for kind in (left, right)))
+            return None
+
+        return resolve
 
 
 for _op, _instruction in (
@@ -97,25 +104,41 @@ for _op, _instruction in (
     _arithmetic(_op, _instruction)
 
 
-def for_arrays(plain):
-    """A decorator of an intrinsic that Python calls too: then it is `plain`, on arrays or single numbers."""
+class LaneOperation:
+    """An operation that kernels apply to lanes; Python calls `plain` in its place, on arrays or single numbers."""
 
-    def decorated(one):
-        made = Formula(plain, types.Function(make_intrinsic_template(one, one._defn, one.__name__)))
-        return functools.update_wrapper(made, one)
+    def __init__(self, plain: Callable, generate: Callable):
+        functools.update_wrapper(self, generate)
+        self.plain = plain
 
-    return decorated
+    def __call__(self, *arguments):
+        return self.plain(*arguments)
 
 
-@for_arrays(lambda x, y, yes, no: traced.where(x > y, yes, no))
-@intrinsic
-def where_greater(typingctx, x, y, yes, no):
+def lane_operation(plain: Callable, signature):
+    """A decorator of what translates an operation of this signature to LLVM."""
+
+    def decorate(generate: Callable) -> LaneOperation:
+        operation = LaneOperation(plain, generate)
+        lower_builtin(operation, *signature.args)(generate)
+
+        @type_callable(operation)
+        def type_operation(context):
+            def resolve(*arguments):
+                return signature
+
+            resolve.__signature__ = inspect.signature(plain)
+            return resolve
+
+        return operation
+
+    return decorate
+
+
+@lane_operation(lambda x, y, yes, no: traced.where(x > y, yes, no), lanes(lanes, lanes, lanes, lanes))
+def where_greater(context, builder, sig, args):
     """Lane by lane: yes where x > y, else no. Every choice (maximum, minimum, a merging rule) is made of it."""
-
-    def generate(context, builder, sig, args):
-        return builder.select(builder.fcmp_ordered(">", args[0], args[1]), args[2], args[3])
-
-    return lanes(lanes, lanes, lanes, lanes), generate
+    return builder.select(builder.fcmp_ordered(">", args[0], args[1]), args[2], args[3])
 
 
 @intrinsic
@@ -129,44 +152,28 @@ def any_greater(typingctx, x, y):
     return types.boolean(lanes, lanes), generate
 
 
-@for_arrays(lambda number: number)
-@intrinsic
-def full(typingctx, number):
+@lane_operation(lambda number: number, lanes(types.float64))
+def full(context, builder, sig, args):
     """A number as lanes."""
-    return lanes(types.float64), lambda context, builder, sig, args: _spread(builder, args[0])
+    return _spread(builder, args[0])
 
 
-@for_arrays(traced.sqrt)
-@intrinsic
-def root(typingctx, x):
+@lane_operation(traced.sqrt, lanes(lanes))
+def root(context, builder, sig, args):
     """Square root, lane by lane."""
-
-    def generate(context, builder, sig, args):
-        return _called(builder, "llvm.sqrt.v8f64", args[0])
-
-    return lanes(lanes), generate
+    return _called(builder, "llvm.sqrt.v8f64", args[0])
 
 
-@for_arrays(traced.nearest)
-@intrinsic
-def nearest(typingctx, x):
+@lane_operation(traced.nearest, lanes(lanes))
+def nearest(context, builder, sig, args):
     """The nearest whole number, ties to even, lane by lane."""
-
-    def generate(context, builder, sig, args):
-        return _called(builder, "llvm.rint.v8f64", args[0])
-
-    return lanes(lanes), generate
+    return _called(builder, "llvm.rint.v8f64", args[0])
 
 
-@for_arrays(traced.power_of_two)
-@intrinsic
-def power_of_two(typingctx, x):
+@lane_operation(traced.power_of_two, lanes(lanes))
+def power_of_two(context, builder, sig, args):
     """2**x for whole numbers x from -1022 to 1023, written into the exponent."""
-
-    def generate(context, builder, sig, args):
-        return _power_of_two(builder, args[0])
-
-    return lanes(lanes), generate
+    return _power_of_two(builder, args[0])
 
 
 @intrinsic
@@ -223,7 +230,7 @@ def address(typingctx, array):
     call; that alone took a third of a filter step."""
 
     def generate(context, builder, sig, args):
-        return make_array(sig.args[0])(context, builder, args[0]).data
+        return context.make_array(sig.args[0])(context, builder, args[0]).data
 
     return types.CPointer(array.dtype)(array), generate
 
@@ -360,7 +367,7 @@ def emitted(program: traced.Program):
     @intrinsic
     def run(typingctx, arrays):
         def generate(context, builder, sig, args):
-            _run(program, builder, cgutils.unpack_tuple(builder, args[0]))
+            _run(program, builder, _members(builder, args[0]))
             return context.get_dummy_value()
 
         return types.none(arrays), generate
@@ -376,8 +383,8 @@ def emitted_sums(program: traced.Program):
     @intrinsic
     def run(typingctx, arrays, sums):
         def generate(context, builder, sig, args):
-            made = _run(program, builder, cgutils.unpack_tuple(builder, args[0]))
-            held = cgutils.unpack_tuple(builder, args[1])
+            made = _run(program, builder, _members(builder, args[0]))
+            held = _members(builder, args[1])
             added = [builder.fadd(a, made[at]) for a, at in zip(held, program.sums, strict=True)]
             return context.make_tuple(builder, kind, added)
 

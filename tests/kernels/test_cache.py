@@ -1,6 +1,7 @@
 """The cache of compiled kernels: damage and bad disks are misses, reported once; one study's edit leaves the others."""
 
 import errno
+import hashlib
 import json
 import os
 import pickle
@@ -16,8 +17,9 @@ from numba import njit
 from numba.core.registry import cpu_target
 
 from radarsim.app import doctor
-from radarsim.kernels import compile
-from radarsim.kernels.compile import COMMON
+from radarsim.kernels import cache
+from radarsim.kernels.compile import FLAGS
+from radarsim.kernels.numba_internals import COMMON, KernelCache, compile_kernel
 
 
 def twice(x):
@@ -28,15 +30,15 @@ def twice(x):
 def troubles(monkeypatch):
     """The lines for the user, none at first."""
     found = {}
-    monkeypatch.setattr(compile, "troubles", found)
+    monkeypatch.setattr(cache, "troubles", found)
     return found
 
 
 def kept_in(function, path):
     """A cache in a directory of its own."""
-    found = compile.KernelCache(function)
-    found._path = path
-    return found
+    result = KernelCache(function)
+    result.entries.folder = path
+    return result
 
 
 def used(path):
@@ -76,7 +78,7 @@ def altered(raw):
 
 
 def signed(body):
-    return compile.hashlib.sha256(body).digest() + body
+    return hashlib.sha256(body).digest() + body
 
 
 @pytest.mark.parametrize(
@@ -88,7 +90,7 @@ def signed(body):
         lambda raw: b"\x80" * 500,
         lambda raw: signed(b"no pickle"),
         lambda raw: signed(pickle.dumps(3)),
-        lambda raw: signed(pickle.dumps((pickle.loads(raw[compile.DIGEST :])[0], ()))),
+        lambda raw: signed(pickle.dumps((pickle.loads(raw[cache.DIGEST :])[0], ()))),
         lambda raw: signed(b"cno_such_module\nname\n."),
     ],
 )
@@ -124,7 +126,7 @@ def test_a_disk_that_cannot_be_written_is_reported_once_and_left_alone(tmp_path,
         tried.append(path)
         raise OSError(number, "no")
 
-    monkeypatch.setattr(Path, "write_bytes", refuse)
+    monkeypatch.setattr(cache, "write_private_file", refuse)
     assert [used(tmp_path / "kernels") for _ in range(3)] == [False, False, False]
     assert (len(tried), list(troubles)) == (1, ["write"])
 
@@ -154,13 +156,43 @@ def test_many_at_once(tmp_path, troubles):
     assert not troubles
 
 
+def test_the_first_writable_place(monkeypatch, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("not a directory")
+    monkeypatch.setenv("RADARSIM_CACHE_DIR", str(tmp_path / "own"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    assert cache.cache_root() == tmp_path / "own"
+    monkeypatch.setenv("RADARSIM_CACHE_DIR", str(blocked))
+    assert cache.cache_root() == tmp_path / "home" / "radarsim"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
+    monkeypatch.setattr(cache.tempfile, "tempdir", str(tmp_path))
+    shared = cache.cache_root()
+    assert shared.parent == tmp_path
+    assert cache.cache_root() == shared
+    if hasattr(os, "getuid"):
+        assert shared.stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="no such permissions here")
+def test_a_shared_place_that_others_can_write_is_not_trusted(monkeypatch, tmp_path):
+    """The cache holds machine code: in the common temporary directory it must be ours alone."""
+    blocked = tmp_path / "file"
+    blocked.write_text("not a directory")
+    monkeypatch.setenv("RADARSIM_CACHE_DIR", str(blocked))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
+    monkeypatch.setattr(cache.tempfile, "tempdir", str(tmp_path))
+    planted = cache.cache_root()
+    planted.chmod(0o777)
+    assert cache.cache_root() != planted
+
+
 def test_nowhere_to_keep_anything(monkeypatch, tmp_path, troubles):
     blocked = tmp_path / "file"
     blocked.write_text("not a directory")
     monkeypatch.setenv("RADARSIM_CACHE_DIR", str(blocked))
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
-    monkeypatch.setattr(compile.tempfile, "tempdir", str(blocked))
-    assert compile.cache_root() == blocked
+    monkeypatch.setattr(cache.tempfile, "tempdir", str(blocked))
+    assert cache.cache_root() == blocked
     assert "each run compiles again" in troubles["write"]
 
 
@@ -169,7 +201,7 @@ def test_a_function_of_no_file_is_not_kept():
     sys.modules["no_file"] = module = ModuleType("no_file")
     try:
         exec("def thrice(x):\n    return 3 * x\n", names)
-        assert not isinstance(compile.kept(njit(names["thrice"]))._cache, compile.KernelCache)
+        assert not isinstance(compile_kernel(names["thrice"], FLAGS)._cache, KernelCache)
     finally:
         del sys.modules[module.__name__]
 
@@ -186,6 +218,110 @@ def test_the_command_goes_on_and_says_so_in_one_line(tmp_path, libraries):
     assert len(lines) == len(done.stderr.splitlines()) == 1, done.stderr
     assert (tmp_path / "range_doppler" / "run.json").read_text().count("kernel cache: ") == 1
     assert (tmp_path / "range_doppler" / "curves.csv").read_bytes() == doctor.tables("range_doppler")["curves"]
+
+
+by_numbers = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no user numbers here")
+
+
+class Planted:
+    """What creates a folder when it is unpickled."""
+
+    def __init__(self, flag):
+        self.flag = flag
+
+    def __reduce__(self):
+        return os.mkdir, (str(self.flag),)
+
+
+def open_to_all(path):
+    path.chmod(path.stat().st_mode | 0o002)
+
+
+def give_away(path):
+    if os.geteuid() != 0:
+        pytest.skip("only root gives files away")
+    os.chown(path, 4321, 4321)
+
+
+@by_numbers
+@pytest.mark.parametrize("place", ["", "kernels", "kernels/entry"])
+@pytest.mark.parametrize("harm", [open_to_all, give_away])
+def test_what_another_user_could_have_written_is_not_run(tmp_path, troubles, place, harm):
+    """An entry with a correct checksum: it, its folder or the whole cache is open to others, or somebody else's."""
+    root, flag = tmp_path / "cache", tmp_path / "flag"
+    used(root / "kernels")
+    path = entry(root / "kernels")
+    planted = signed(pickle.dumps(Planted(flag)))
+    path.write_bytes(planted)
+    assert not used(root / "kernels")
+    assert flag.is_dir()  # the premise: it runs from a cache that is the user's
+    flag.rmdir()
+    troubles.clear()
+    path.write_bytes(planted)
+    harmed = path if place.endswith("entry") else root / place
+    harm(harmed)
+    for _ in range(2):
+        assert not used(root / "kernels") or place.endswith("entry")  # then it was written anew
+    assert not flag.exists()
+    (line,) = troubles.values()
+    assert str(harmed) in line
+    assert ("can be written by every user" if harm is open_to_all else "belongs to another user (4321)") in line
+    assert (path.read_bytes() == planted) is not place.endswith("entry")
+
+
+@by_numbers
+@pytest.mark.parametrize("variable", ["RADARSIM_CACHE_DIR", "XDG_CACHE_HOME", "HOME", "TMPDIR"])
+def test_a_place_that_others_can_write_is_passed_over(monkeypatch, tmp_path, troubles, variable):
+    """By whatever variable it is named: the next place is used, and one line names both."""
+    blocked, private, shared = tmp_path / "file", tmp_path / "private", tmp_path / "shared"
+    blocked.write_text("not a directory")
+    private.mkdir()
+    shared.mkdir()
+    shared.chmod(0o777)
+    places = {"RADARSIM_CACHE_DIR": blocked, "XDG_CACHE_HOME": blocked, "HOME": blocked, "TMPDIR": private}
+    places[variable] = shared
+    for name, place in places.items():
+        monkeypatch.setenv(name, str(place))
+    if variable == "HOME":
+        monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(cache.tempfile, "tempdir", None)
+    root = cache.cache_root()
+    (line,) = troubles.values()
+    assert f"{shared}" in line
+    assert "can be written by every user" in line
+    if variable == "TMPDIR":
+        assert list(troubles) == ["write"]
+        assert not list(shared.iterdir())
+    else:
+        assert root.parent == private
+        assert line.endswith(f"compiled kernels are kept in {root}")
+
+
+@by_numbers
+@pytest.mark.parametrize("mask", [0, 0o777], ids=oct)
+def test_what_is_kept_is_for_the_user_alone_whatever_the_umask(tmp_path, monkeypatch, mask):
+    monkeypatch.setenv("RADARSIM_CACHE_DIR", str(tmp_path / "a/b"))
+    before = os.umask(mask)
+    try:
+        monkeypatch.setattr(cache, "ROOT", cache.cache_root())
+        used(cache.ROOT / "kernels")
+    finally:
+        os.umask(before)
+    modes = {path.name: path.stat().st_mode & 0o777 for path in (tmp_path / "a").rglob("*")}
+    assert modes == {"b": 0o700, "kernels": 0o700, entry(tmp_path / "a/b/kernels").name: 0o600}
+
+
+@by_numbers
+def test_the_command_passes_over_a_place_that_others_can_write_in_one_line(tmp_path, libraries):
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    shared.chmod(0o777)
+    place = {"RADARSIM_CACHE_DIR": str(shared)}
+    done = libraries.run("run", "rls2", "-n", 200, "--no-figures", "--out", tmp_path / "results", **place)
+    assert done.returncode == 0
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"warning: kernel cache: {shared} is not used, as it can be written by every user")
+    assert not list(shared.iterdir())
 
 
 @pytest.mark.slow

@@ -16,10 +16,11 @@ import pytest
 from numba.core.registry import cpu_target
 from numba.core.typing import Context
 
-from radarsim.kernels import compile
-from radarsim.kernels.compile import resolving
+from radarsim.kernels import compile, numba_internals
+from radarsim.kernels.numba_internals import remembering_context
 
 SOURCES = Path(compile.__file__).parent
+MACHINERY = "algebra.py", "cache.py", "call_graph.py", "compile.py", "numba_internals.py", "numba_options.py"
 
 
 def python(code, **environment):
@@ -37,10 +38,10 @@ def python(code, **environment):
 
 @pytest.fixture
 def house(tmp_path):
-    """A package with copies of compile.py and what it needs, a helper file, a kernel that uses it, and a cache."""
+    """A package with copies of what compiles, a helper file, a kernel that uses it, and a cache."""
     kernels = tmp_path / "copied" / "kernels"
     kernels.mkdir(parents=True)
-    for name in ("compile.py", "algebra.py"):
+    for name in MACHINERY:
         (kernels / name).write_text((SOURCES / name).read_text().replace("radarsim.kernels", "copied.kernels"))
     begin = "from copied.kernels"
     (kernels / "helper.py").write_text(f"{begin}.compile import inline\n@inline\ndef grown(x):\n    return x + 1.0\n")
@@ -77,36 +78,6 @@ def test_an_edited_helper_is_noticed_and_a_file_beside_is_not(house):
     assert Path(edited[2]).parent == house / "cache"
 
 
-def test_the_first_writable_place(monkeypatch, tmp_path):
-    blocked = tmp_path / "file"
-    blocked.write_text("not a directory")
-    monkeypatch.setenv("RADARSIM_CACHE_DIR", str(tmp_path / "own"))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
-    assert compile.cache_root() == tmp_path / "own"
-    monkeypatch.setenv("RADARSIM_CACHE_DIR", str(blocked))
-    assert compile.cache_root() == tmp_path / "home" / "radarsim"
-    monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
-    monkeypatch.setattr(compile.tempfile, "tempdir", str(tmp_path))
-    shared = compile.cache_root()
-    assert shared.parent == tmp_path
-    assert compile.cache_root() == shared
-    if hasattr(os, "getuid"):
-        assert shared.stat().st_mode & 0o777 == 0o700
-
-
-@pytest.mark.skipif(not hasattr(os, "getuid"), reason="no such permissions here")
-def test_a_shared_place_that_others_can_write_is_not_trusted(monkeypatch, tmp_path):
-    """The cache holds machine code: in the common temporary directory it must be ours alone."""
-    blocked = tmp_path / "file"
-    blocked.write_text("not a directory")
-    monkeypatch.setenv("RADARSIM_CACHE_DIR", str(blocked))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
-    monkeypatch.setattr(compile.tempfile, "tempdir", str(tmp_path))
-    planted = compile.cache_root()
-    planted.chmod(0o777)
-    assert compile.cache_root() != planted
-
-
 def test_other_users_of_numba_keep_their_cache():
     before = numba.config.CACHE_DIR
 
@@ -126,7 +97,7 @@ def test_loops_use_wide_registers():
         for i in range(x.size):
             x[i] = 1.5 * x[i]
 
-    options = {"fastmath": set(compile.FLAGS), **compile.COMMON}
+    options = {"fastmath": set(compile.FLAGS), **numba_internals.COMMON}
     function = numba.njit(**options)(scaled)
     function(np.ones(8))
     (assembly,) = function.inspect_asm().values()
@@ -162,7 +133,7 @@ def test_functions_without_an_entry_refuse_python():
 
 def test_a_kernel_that_another_calls_is_compiled_for_it_apart(monkeypatch):
     """Without an entry and machine code of its own, until Python calls it; it gives both the same bytes."""
-    monkeypatch.setattr(compile, "kept", lambda function: function)
+    monkeypatch.setattr(numba_internals, "file_hash", lambda module: "")  # so not from a cache
 
     @compile.kernel
     def total(x):
@@ -186,8 +157,8 @@ def test_a_kernel_that_another_calls_is_compiled_for_it_apart(monkeypatch):
 def test_the_type_of_an_operation_is_found_once(monkeypatch):
     """However often it stands in kernels; what Numba compiles on the way is asked for each time, as it was."""
     asked = []
-    monkeypatch.setattr(compile, "kept", lambda function: function)
-    monkeypatch.setattr(resolving(cpu_target.typing_context), "_known", {})
+    monkeypatch.setattr(numba_internals, "file_hash", lambda module: "")  # so not from a cache
+    monkeypatch.setattr(remembering_context(cpu_target.typing_context), "_signatures", {})
     numba_finds = Context.resolve_function_type
 
     def counted(self, func, args, kws):
@@ -210,8 +181,8 @@ def test_the_type_of_an_operation_is_found_once(monkeypatch):
 def test_numba_takes_a_context_with_a_memory_for_its_own():
     """Else its caches would hold everything twice; and what is added to the one is in the other."""
     context = cpu_target.typing_context
-    found = resolving(context)
-    assert found is resolving(context)
+    found = remembering_context(context)
+    assert found is remembering_context(context)
     assert (found == context, context == found, hash(found)) == (True, True, hash(context))
     assert found.__dict__ is context.__dict__
 

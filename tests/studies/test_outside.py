@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.kernels.compile import ROOT
+from radarsim.kernels.cache import ROOT
 from tests.program import csv_bytes
 from tests.studies import outside
 

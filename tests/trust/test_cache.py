@@ -108,7 +108,7 @@ STUDIES = [
 
 @pytest.mark.slow
 def test_a_process_that_compiles_gives_the_bytes_of_one_that_reads_the_cache(tmp_path):
-    """Each kernel runs its own copies of what it calls, whatever else is in memory; see `compile.SelfContained`."""
+    """Each kernel runs its own copies of what it calls, whatever else is in memory; see `SelfContainedLibrary`."""
     environment = os.environ | {"RADARSIM_CACHE_DIR": str(tmp_path)}
     command = [sys.executable, "-c", SUMS, *STUDIES]
     cold, warm = (subprocess.run(command, env=environment, capture_output=True, check=True).stdout for _ in range(2))
