@@ -268,6 +268,7 @@ class Coded(Outside):
                 code = self._imported()
                 reads = self._reads(code, plots)
             files = {read: digest_of(*read) for read in (*self.known, *reads) if not code.recorder.changes(*read)}
+            reads = {read: before for read, before in reads.items() if read in files}
             if changed := [path for (path, _), before in reads.items() if signature(path) != before]:
                 raise ConfigError(f"{self._title}: {changed[0]} changed while it was read; start again")
             key = digest([self.folder, self.module, sorted((*read, content) for read, content in files.items())])

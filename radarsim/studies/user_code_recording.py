@@ -70,15 +70,17 @@ class Recorder:
             _here.recorder = before
 
     def take(self) -> Reads:
-        """What was read since the last call in the user's folders, except files that were written too."""
+        """What was read since the last call in the user's folders, except what the code itself changes."""
         reads, self.reads = self.reads, {}
-        for (path, kind), before in reads.items():
+        for (path, kind), before in list(reads.items()):  # a thread of the code's may still be reading
             if path in self._shared and kind == "content" and signature(path) != before:
                 self.hidden.add(path)
-        return {read: before for read, before in reads.items() if read[0] not in self.hidden}
+        return {read: before for read, before in list(reads.items()) if not self.changes(*read)}
 
     def changes(self, path: str, kind: Kind) -> bool:
-        """Whether the code itself writes a file."""
+        """Whether the code itself writes a file, or into a folder that it lists."""
+        if kind == "names":
+            return any(os.path.dirname(file) == path for file in self._written)
         return kind == "content" and (path in self._written or path in self.hidden)
 
     def is_users(self, path: str) -> bool:

@@ -368,7 +368,7 @@ def test_a_package_that_is_installed_to_be_edited_counts(place, monkeypatch, tmp
 
 def test_what_it_writes_is_nothing_that_it_depends_on(place):
     write = "os.write(log := os.open('log.txt', os.O_APPEND | os.O_CREAT | os.O_WRONLY), b'a line'); os.close(log)"
-    write += "; Path('scratch').write_text('1'); Path('scratch').read_text()"
+    write += "; Path('scratch').write_text('1'); Path('scratch').read_text(); list(HERE.glob('*.c*'))"
     config = reading_filter(write)
     computed = [radarsim.run(str(config), realisations=50, out="out", figures=False) for _ in range(3)]
     assert [one.facts["realisations_computed"] for one in computed] == [50, 0, 0]
@@ -387,9 +387,13 @@ def test_what_no_file_shows_is_named_once_and_may_be_declared(place, tmp_path_fa
     elsewhere.write_text("1")
     line = f"Path({str(elsewhere)!r}).read_text(); __import__('subprocess').run(['true'])"
     line += "; s = __import__('socket').socket(type=2); s.connect(('127.0.0.1', 9)); s.close()"
+    line += "; Path('__pycache__/my_filter.f-1.py311.nbi').read_text()"
+    Path("__pycache__").mkdir()
+    Path("__pycache__/my_filter.f-1.py311.nbi").write_text("")
     config = str(reading_filter(line))
     told = [one for one in radarsim.run(config, realisations=50).warnings if "stored blocks" in one]
-    places = f"files outside its folders ({elsewhere}), the network (127.0.0.1:9) and processes that it starts"
+    places = f"files outside its folders ({elsewhere}), the network (127.0.0.1:9), processes that it starts and "
+    places += "machine code kept by Numba, which outlives edits of other files"
     assert told == [f"mine: stored blocks do not notice changes of what the filter takes from {places}; when they "
                     "change, change its key `identity`"]  # fmt: skip
     found = set()
