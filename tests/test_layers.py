@@ -62,8 +62,16 @@ ROOMS = {
         *("studies.interface", "studies.noise", "studies.onefile"),
     ),
     "studies.judged": ("errors", "config", *DATA, "report"),  # claims and readings of studies in one file
-    "studies.code": ("errors", "failures", "config", "studies.interface", "studies.outside"),
-    "studies.registry": ("errors", "failures", "config", "report.quantities", "studies.code", "studies.interface"),
+    "studies.code": (
+        *("errors", "failures", "language", "config", "studies.interface", "studies.outside"),
+        *("studies.user_code_recording", "studies.user_code_sources"),
+    ),
+    "studies.user_code_recording": ("studies.user_code_sources",),
+    "studies.user_code_sources": ("errors", "failures", "config.experiment"),
+    "studies.registry": (
+        *("errors", "failures", "config", "report.quantities"),
+        *("studies.code", "studies.interface", "studies.outside"),
+    ),
     "studies.sources": ("config", "module_sources", "studies.registry"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry", "studies.sources"),
     "recorded": ("errors", "threads", "config", "language", "engine", "kernels", "physics", "report", "studies"),

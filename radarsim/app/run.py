@@ -356,7 +356,10 @@ def load_all(sources: Sequence[str | os.PathLike[str]], overrides: Sequence[str]
 def codes(experiments: Sequence[Experiment]) -> list[str]:
     """The user's own code in experiments, a line each; imports it. Raises ConfigError where it cannot be imported."""
     every = [one for experiment in experiments for case in experiment.cases for one in case.outside if one.written]
-    return list({f"{one.made} in {one.file}": one.target for one in every})
+    filters = {f"{one.made} in {one.file}": one for one in every}
+    for one in filters.values():
+        one.target  # noqa: B018  (imports it)
+    return list(filters)
 
 
 def namesakes(experiments: Sequence[Experiment]) -> list[str]:
@@ -455,7 +458,8 @@ def run(
         facts |= {"unmet": [*facts["unmet"], *left], "stop": "; ".join((*facts["unmet"], *left)) or "done"}
     ended_by = None if simulated.stopped or precision is None else (precision, of)
     result = result_of(experiment, simulated, facts, repeated(experiment, simulated.done, overrides, ended_by))
-    result.facts["warnings"] += warned
+    noticed = (line for case in experiment.cases for one in case.outside for line in one.warnings())
+    result.facts["warnings"] += dict.fromkeys((*warned, *noticed))
     if out is None:
         result.check()
     else:

@@ -99,6 +99,10 @@ class Case:
     against: tuple[str, ...] = ()
     outside: tuple[Any, ...] = ()
 
+    def __post_init__(self) -> None:
+        bound = tuple(member.bound_to(self) for member in self.outside)  # what such a filter reads depends on the case
+        object.__setattr__(self, "outside", bound)
+
     def __repr__(self) -> str:
         filters = ", ".join(member.name for member in (*self.spec.members, *self.outside))
         count = f"{self.realisations:,} realisation{'s' * (self.realisations != 1)}"

@@ -50,6 +50,11 @@ class OwnCode(Member):
         "own code", "FILE.py:NAME, of a file beside the config, or MODULE:NAME: a class or a function of yours"
     )
     one_by_one: Flag = key("one by one", "whether the function takes the plots of one realisation at a time", False)
+    identity: Annotated[str, Strict()] | Annotated[int, Strict()] | Annotated[float, Strict()] | None = key(
+        "identity",
+        "text or number that you change when what no file of yours shows has changed: data elsewhere, a network",
+        None,
+    )
 
 
 COMMON_KEYS = tuple(Common.model_fields)

@@ -42,7 +42,7 @@ from numba.core.typing import Context
 from numba.np.arrayobj import make_array
 
 from radarsim.kernels.cache import KernelEntries
-from radarsim.kernels.call_graph import file_hash
+from radarsim.module_sources import module_digest
 
 
 class KernelCache(Cache):
@@ -283,7 +283,7 @@ def compile_kernel(function: Callable, flags: frozenset[str]):
     if numba.config.DISABLE_JIT:  # it is the function itself
         return kernel
     kernel.compile = without_collection(kernel.compile)
-    if file_hash(function.__module__):  # else nobody could notice an edit
+    if module_digest(function.__module__):  # else nobody could notice an edit
         kernel._cache = KernelCache(function)
 
     @functools.cache

@@ -1,119 +1,67 @@
-"""Filters of the user's own code in a config: where their sources are, what these are, and the code itself, run.
+"""Filters of the user's own code in a config: where they are, what names their stored blocks, and the code itself, run.
 
 `python: my_filter.py:MyFilter` is a file beside the config; `python: my_package.my_module:MyFilter` a module that is
-found there, or is installed. What its numbers depend on is known before any of it runs: the syntax trees, without
-comments and docstrings, of the module and of all modules from its folder that it imports (of an installed package from
-that package), and the content of each file that a text in them names from there, or a key of the filter from the
-folder of the config: `weights: net.npz` is given to the class as a path that can be opened."""
+found there, or is installed. `weights: net.npz` is given to the class as a path that can be opened.
 
-import ast
+The identity of such a filter must be known before stored blocks are looked for, and must hold all that its numbers
+depend on. It is made of
+
+* its keys, the texts of its modules, and the files that these and the keys name (`radarsim.studies.user_code_sources`),
+  when the config is read: nothing runs for it;
+* what it reads when its module is imported afresh and it runs on the first realisations of its case
+  (`radarsim.studies.user_code_recording`), when the identity is first asked for. This is done anew for each config that
+  is read, and nothing of it is kept on disk: only a run shows which files are read now that one has been edited, has
+  appeared, or is named by an environment variable;
+* the key `identity`, by which the user declares what no file shows.
+
+All batches are recorded. One that reads a file which the identity does not hold ends the run with an error, so that its
+sums are not stored. A worker process records for itself, and refuses to compute where it finds another identity."""
+
 import contextlib
-import hashlib
 import importlib
 import os
 import sys
 import threading
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from functools import lru_cache, partial
-from importlib.machinery import EXTENSION_SUFFIXES
-from importlib.util import find_spec
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property, partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from radarsim import failures
-from radarsim.config.experiment import digest
+from radarsim.config.experiment import Case, digest
 from radarsim.config.schema import OwnCode
 from radarsim.errors import ConfigError
+from radarsim.language import few, listed, tr
 from radarsim.studies.interface import Study
 from radarsim.studies.outside import Called, Outside, Plots, components_of, made_of
+from radarsim.studies.user_code_recording import Reads, Recorder
+from radarsim.studies.user_code_sources import (
+    Kind,
+    by_relative_path,
+    digest_of,
+    file_of,
+    home_of,
+    is_installed,
+    signature,
+    sources,
+    with_paths,
+)
 
 FORBIDDEN = "RADARSIM_NO_CODE"  # in the environment, so that processes of a run keep to it as well
-INSTALLED = {"site-packages", "dist-packages"}
-LONGEST = 255  # characters of the name of a file
+FIRST = 16  # realisations on which it is recorded what a filter reads
+MAX_NAMED_FILES = 3  # in a message, or one more
 
 _lock = threading.RLock()  # one thread at a time is in code of the user's, which need not know of threads
-_modules: dict[tuple[str, str, str], ModuleType] = {}
+_loaded: dict[str, "LoadedCode"] = {}  # by what is read: an object of the code serves all filters that read the same
+_latest: dict[tuple[str, str, str], "LoadedCode"] = {}  # by folder, name, and hash of the sources
 _taken: set[str] = set()  # names of modules that were imported here: they may be imported anew, and from elsewhere
 
 
-# ---- sources ---------------------------------------------------------------------------------------------------------
-def file_of(folder: str, module: str) -> Path | None:
-    """The file of a module in a folder: of a package before that of a module, as Python has it."""
-    path = Path(folder, *module.split("."))
-    files = (path / "__init__.py", *(path.with_name(path.name + suffix) for suffix in (".py", *EXTENSION_SUFFIXES)))
-    return next((file for file in files if file.is_file()), None)
-
-
-def named(folder: str | Path, text: object) -> Path | None:
-    """The file that a text names from a folder, if it does."""
-    if not isinstance(text, str) or len(text) > LONGEST or not Path(text).suffix or not text.isprintable():
-        return None
-    file = Path(folder, text)
-    return file if file.is_file() and file.suffix != ".py" else None
-
-
-def sources(folder: str, module: str) -> dict[str, str]:
-    """SHA-256 of the user's own modules that a module imports, itself first, and of the files that they name."""
-    first = module.partition(".")[0]
-    only = f"{first}." if INSTALLED & set(Path(folder).parts) else ""
-    found: dict[str, str] = {}
-    waiting = [module]
-    while waiting:
-        name = waiting.pop(0)
-        file = file_of(folder, name) if f"{name}.".startswith(only) and name.split(".")[0] != "radarsim" else None
-        if name in found or file is None:
-            continue
-        stat = file.stat()
-        found[name], imported, texts = _read(file, name, stat.st_mtime_ns, stat.st_size)
-        waiting += [name.rpartition(".")[0], *imported] if "." in name else imported
-        files = filter(None, (named(file.parent, text) for text in texts))
-        found |= {f"{name}: {one.name}": hashlib.sha256(one.read_bytes()).hexdigest() for one in files}
-    return found
-
-
-def home_of(module: str, beside: str) -> str:
-    """The folder from which a module is imported: that of the config if it is there, else where it is installed."""
-    if file_of(beside, module) is None:
-        with contextlib.suppress(ImportError, ValueError):
-            spec = find_spec(module.partition(".")[0])  # of the outermost module, of which nothing runs for it
-            for place in [] if spec is None else spec.submodule_search_locations or [spec.origin or ""]:
-                return os.path.dirname(os.path.abspath(place))
-    return beside
-
-
-@lru_cache(maxsize=1000)
-def _read(file: Path, name: str, changed: int, size: int) -> tuple[str, list[str], list[str]]:
-    """Of a module's file the hash of what it does, the modules that it may import, and its texts."""
-    content = file.read_bytes()
-    if file.suffix != ".py":
-        return hashlib.sha256(content).hexdigest(), [], []
-    try:
-        tree = ast.parse(content, str(file))
-    except (SyntaxError, ValueError) as error:
-        raise ConfigError(f"{file}:{getattr(error, 'lineno', None) or 1}: {failures.words(error)}") from error
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-            node.body = [
-                one for one in node.body if not (isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant))
-            ]
-    package = name if file.name == "__init__.py" else name.rpartition(".")[0]
-    imported, texts = [], []
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            imported += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
-            base = ".".join([*above, *([node.module] if node.module else [])])
-            imported += [base, *(f"{base}.{alias.name}" for alias in node.names)]
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            texts.append(node.value)
-    return hashlib.sha256(ast.unparse(tree).encode()).hexdigest(), imported, texts
-
-
-# ---- filter ----------------------------------------------------------------------------------------------------------
-def coded(keys: OwnCode, place: str, baseline: bool, folder: Path) -> "Coded":
+def coded(
+    keys: OwnCode, place: str, baseline: bool, folder: Path, first_plots: Callable[[Case, int], Plots]
+) -> "Coded":
     """The filter that a config in a folder names at a place. ConfigError where there is none, or none may run."""
     if os.environ.get(FORBIDDEN):
         raise ConfigError(f"is code of yours, and --no-code runs none, got {keys.python!r}")
@@ -128,31 +76,158 @@ def coded(keys: OwnCode, place: str, baseline: bool, folder: Path) -> "Coded":
         missing = f"no such module, neither beside the config nor installed: {where}"
     if file_of(home, module) is None:
         raise ConfigError(missing)
-    given = dict(keys.model_extra or {})
-    files = {key: os.path.abspath(path) for key, one in given.items() if (path := named(folder, one))}
-    contents = {key: hashlib.sha256(Path(file).read_bytes()).hexdigest() for key, file in files.items()}
-    written = digest(own := sources(home, module))
-    identity = digest({"made": made, "one_by_one": keys.one_by_one, "keys": given, "files": contents, "sources": own})
-    return Coded(keys.name, identity, keys, place, home, module, made, given | files, written, baseline)
+    given, named = with_paths(folder, dict(keys.model_extra or {}))
+    own = sources(home, module)
+    return Coded(
+        name=keys.name,
+        keys=keys,
+        place=place,
+        folders=(*own.folders, os.path.abspath(folder)),
+        folder=home,
+        module=module,
+        made=made,
+        given=given,
+        known=(*own.files, *((file, "content") for file in named)),
+        sources=own.digest,
+        first_plots=first_plots,
+        baseline=baseline,
+    )
+
+
+def _span(plots: Plots) -> str:
+    """The realisations of plots, as a slice, and their case."""
+    return f"{plots.first}:{plots.first + plots.n} of {plots.world.case}"
+
+
+class LoadedCode:
+    """A module of the user's as imported afresh, the modules that it imports, and the record of what it reads."""
+
+    def __init__(self, folder: str, recorder: Recorder):
+        self.folder, self.recorder = folder, recorder
+        self.modules: dict[str, ModuleType] = {}
+        self.reads: Reads = {}
+        self.reads_of_import: Reads = {}
+        self._surroundings = self._look_around()
+
+    @contextlib.contextmanager
+    def running(self) -> Iterator[None]:
+        """Python knows the modules by their names and finds others in their folder, and what is read is recorded."""
+        _forget(_taken.difference(self.modules))
+        sys.modules.update(self.modules)
+        sys.path.insert(0, self.folder)
+        kept, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # nothing is written beside the user's files
+        try:
+            with self.recorder.recording():
+                yield
+        finally:
+            sys.dont_write_bytecode = kept
+            with contextlib.suppress(ValueError):  # the code itself may have removed it
+                sys.path.remove(self.folder)
+            if self.recorder.imported:
+                self._keep_modules()
+
+    def take_reads(self) -> Reads:
+        """What was read since the last call."""
+        reads = self.recorder.take()
+        self.reads |= reads
+        return reads
+
+    def is_fresh(self) -> bool:
+        """Whether an import would find the files, folders and variables that this one found."""
+        unchanged = all(signature(path) == before for (path, _), before in self.reads.items())
+        return unchanged and self._surroundings == self._look_around()
+
+    def _look_around(self) -> tuple[Any, ...]:
+        return os.getcwd(), dict(os.environ), [signature(folder) for folder in self.recorder.folders]
+
+    def _keep_modules(self) -> None:
+        for name, module in list(sys.modules.items()):
+            if _file_of_module(module) in self.recorder.imported:
+                names = [name, *(parent for parent in _parents(name) if _is_namespace(parent))]
+                self.modules |= {one: sys.modules[one] for one in names}
+        _taken.update(self.modules)
+        self.recorder.imported.clear()
+
+
+def _file_of_module(module: object) -> str:
+    file = getattr(module, "__dict__", {}).get("__file__")
+    return os.path.abspath(file) if isinstance(file, str) else ""
+
+
+def _forget(names: Iterable[str]) -> None:
+    """Python forgets these modules, so that they are imported afresh; except studies, whose keys must remain the same
+    class."""
+    for name in [name for name in names if name in sys.modules]:
+        if not any(isinstance(value, Study) for value in vars(sys.modules[name]).values()):
+            del sys.modules[name]
+
+
+def _parents(name: str) -> Iterator[str]:
+    while "." in name:
+        yield (name := name.rpartition(".")[0])
+
+
+def _is_namespace(name: str) -> bool:
+    """Whether a name is that of a package without a file, which holds on to the modules within it."""
+    return name in sys.modules and not _file_of_module(sys.modules[name])
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What the identity of a filter holds: SHA-256 of files by path and kind, signatures of those that were read, and
+    by which name its code is loaded."""
+
+    files: Mapping[tuple[str, Kind], str]
+    signatures: Reads
+    code: str
 
 
 @dataclass(frozen=True)
 class Coded(Outside):
-    """A class or function of the user's own, which is imported where it is first asked for estimates.
+    """A class or function of the user's own, which is imported where it is first needed.
 
-    place: where the config names it; folder, module, made: what is imported from where; given: what it is called with;
-    sources: SHA-256 of what the module depends on."""
+    place: where the config names it; folders: the user's, whose files count; folder, module, made: what is imported
+    from where; given: what it is called with; known: the files that its text and its keys name; sources: SHA-256 of the
+    text when the config was read; first_plots: those of a case; case: the one that it belongs to."""
 
     name: str
-    identity: str
     keys: OwnCode
     place: str
+    folders: tuple[str, ...]
     folder: str
     module: str
     made: str
     given: Mapping[str, Any]
+    known: tuple[tuple[str, Kind], ...]
     sources: str
+    first_plots: Callable[[Case, int], Plots]
     baseline: bool = False
+    case: Case | None = field(default=None, compare=False, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is recorded and loaded, which every process does for itself."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}
+
+    def bound_to(self, case: Case) -> "Coded":
+        """The filter as one of a case: the same where the case differs in nothing that the filter may see."""
+        known = self.case
+        if known is None or known.spec is not case.spec or known.noise_of is not case.noise_of:
+            return replace(self, case=case)
+        same = (known.study, known.name, known.seed) == (case.study, case.name, case.seed)
+        return self if same else replace(self, case=case)
+
+    @property
+    def identity(self) -> str:  # type: ignore[override]
+        """SHA-256 of what its numbers depend on. Runs it on the first realisations of its case, where that is to do."""
+        return digest(
+            {
+                "made": self.made,
+                "one_by_one": self.keys.one_by_one,
+                "keys": dict(self.keys.model_extra or {}),
+                "declared": self.keys.identity,
+                "files": by_relative_path(self.folder, self.recording.files),
+            }
+        )
 
     @property
     def written(self) -> dict[str, Any]:  # type: ignore[override]
@@ -167,21 +242,13 @@ class Coded(Outside):
     def components(self) -> tuple[str, ...]:  # type: ignore[override]
         return components_of(self.target)
 
-    def estimates(self, plots: Plots) -> Any:
-        target = self.target
-        with self._running(f"fails in realisations {plots.first}:{plots.first + plots.n} of {plots.world.case}"):
-            of = partial(made_of, self.name, target) if isinstance(target, type) else partial(partial, target)
-            made = of(**self.given)
-            return Called(self.name, made, alone=self.keys.one_by_one).estimates(plots)
-
     @property
     def target(self) -> Any:
         """The class or function. ConfigError where it cannot be imported."""
-        with self._running("cannot be imported"):
-            known = (self.folder, self.module, self.sources)
-            if known not in _modules:
-                _modules[known] = self._imported()
-            module = _modules[known]
+        return self._target_in(self._code())
+
+    def _target_in(self, code: LoadedCode) -> Any:
+        module = code.modules[self.module]
         if not callable(target := getattr(module, self.made, None)):
             made = {name: one for name, one in vars(module).items() if callable(one)}
             own = [name for name, one in made.items() if getattr(one, "__module__", "") == self.module]
@@ -189,31 +256,119 @@ class Coded(Outside):
             raise ConfigError(f"{self.place}: no class or function {self.made} in {self.file}; it has {there}")
         return target
 
-    def _imported(self) -> ModuleType:
+    @cached_property
+    def recording(self) -> Recording:
+        """What it reads on the first realisations of its case; ConfigError where it fails on these."""
+        assert self.case is not None  # a case binds its filters
+        plots = self.first_plots(self.case, FIRST)
+        with _lock:
+            code = self._code()
+            reads = self._reads(code, plots)
+            if reads.keys() != code.reads.keys():  # it may remember what it has read for others
+                code = self._imported()
+                reads = self._reads(code, plots)
+            files = {read: digest_of(*read) for read in (*self.known, *reads) if not code.recorder.changes(*read)}
+            reads = {read: before for read, before in reads.items() if read in files}
+            if changed := [path for (path, _), before in reads.items() if signature(path) != before]:
+                raise ConfigError(f"{self._title}: {changed[0]} changed while it was read; start again")
+            key = digest([self.folder, self.module, sorted((*read, content) for read, content in files.items())])
+            _loaded[key] = code
+        return Recording(files, reads, key)
+
+    def _reads(self, code: LoadedCode, plots: Plots) -> Reads:
+        """What is read where the code is imported and runs on plots."""
+        self._estimates(code, plots)
+        return code.reads_of_import | code.take_reads()
+
+    def estimates(self, plots: Plots) -> Any:
+        recording = self.recording
+        with _lock:
+            code = _loaded[recording.code]
+            given = self._estimates(code, plots)
+            reads = code.take_reads()
+        late = [path for path, kind in reads if (path, kind) not in recording.files]
+        if late and self.keys.identity is None:
+            raise ConfigError(
+                f"{self._title}, reads {few(late, MAX_NAMED_FILES)} in realisations {_span(plots)}, but not in the "
+                f"first {FIRST}, by whose files its stored blocks are named: name it by a text in {self.file} or in a "
+                "key of the filter, or declare what its numbers depend on by the key `identity`"
+            )
+        for read, before in reads.items():
+            same = before == recording.signatures.get(read) == signature(read[0])
+            if not same and digest_of(*read) != recording.files.get(read, digest_of(*read)):
+                raise ConfigError(f"{self._title}: {read[0]} has changed since the run began; start it again")
+        return given
+
+    def warnings(self) -> list[str]:
+        """What its numbers may depend on that its identity does not hold, in one line; none if that is declared."""
+        if self.keys.identity is not None:
+            return []
+        recorder = self._code().recorder
+        places = []
+        if recorder.elsewhere:
+            names = few(sorted(recorder.elsewhere), MAX_NAMED_FILES)
+            places.append(tr("files outside its folders ({files})", files=names))
+        if recorder.hidden:
+            names = few(sorted(recorder.hidden), MAX_NAMED_FILES)
+            places.append(tr("files that it also writes ({files})", files=names))
+        if recorder.hosts:
+            places.append(tr("the network ({hosts})", hosts=few(sorted(recorder.hosts), MAX_NAMED_FILES)))
+        if recorder.starts_processes:
+            places.append(tr("processes that it starts"))
+        if recorder.reads_compiled:
+            places.append(tr("machine code kept by Numba, which outlives edits of other files"))
+        if not places:
+            return []
+        return [
+            tr(
+                "{name}: stored blocks do not notice changes of what the filter takes from {places}; when they change, "
+                "change its key `identity`",
+                name=self.name,
+                places=listed(places),
+            )
+        ]
+
+    @property
+    def _title(self) -> str:
+        return f"{self.place}: filter {self.name}, {self.keys.python}"
+
+    def _code(self) -> LoadedCode:
+        """The code with which it was recorded; before that, the code that was last imported, where it may serve."""
+        with _lock:
+            if "recording" in vars(self):
+                return _loaded[self.recording.code]
+            code = _latest.get((self.folder, self.module, self.sources))
+            return code if code is not None and code.is_fresh() else self._imported()
+
+    def _estimates(self, code: LoadedCode, plots: Plots) -> Any:
+        """What the filter gives for plots, with its code recorded."""
+        target = self._target_in(code)
+        with self._running(f"fails in realisations {_span(plots)}"), code.running():
+            of = partial(made_of, self.name, target) if isinstance(target, type) else partial(partial, target)
+            made = of(**self.given)
+            return Called(self.name, made, alone=self.keys.one_by_one).estimates(plots)
+
+    def _imported(self) -> LoadedCode:
         """The module, imported afresh with all of the user's modules that it imports."""
         own = sources(self.folder, self.module)
-        if digest(own) != self.sources:
+        if own.digest != self.sources:
             raise ConfigError(f"{self.file} is not what it was when the config was read")
-        for name in {self.module, *own}.intersection(sys.modules).difference(_taken):
-            file, at = file_of(self.folder, name), getattr(sys.modules[name], "__file__", None)
-            if file and not (at and os.path.realpath(at) == os.path.realpath(file)):
+        for name in set(own.modules).intersection(sys.modules).difference(_taken):
+            file, at = own.modules[name], getattr(sys.modules[name], "__file__", None)
+            if not (at and os.path.realpath(at) == os.path.realpath(file)):
                 raise ConfigError(
                     f"{self.place}: {file}: give it another name: {name} is {at or 'of Python itself'} here"
                 )
-        for name in own:
-            if not any(isinstance(one, Study) for one in vars(sys.modules.get(name, object)).values()):
-                sys.modules.pop(name, None)  # a study stays: its keys must remain the same class
-        _taken.update(own)
-        importlib.invalidate_caches()
-        sys.path.insert(0, self.folder)
-        kept, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # nothing is written beside the user's files
-        try:
-            return importlib.import_module(self.module)
-        finally:
-            sys.dont_write_bytecode = kept
-            sys.path.remove(self.folder)
-            if self.folder not in sys.path:
-                sys.path.append(self.folder)  # for what is imported within functions
+        code = LoadedCode(self.folder, Recorder(self.folders))
+        with self._running("cannot be imported"):
+            _taken.update(own.modules)
+            _forget({*_taken, *(parent for name in own.modules for parent in _parents(name) if _is_namespace(parent))})
+            importlib.invalidate_caches()
+            with code.running():
+                code.modules[self.module] = importlib.import_module(self.module)
+        code.reads_of_import = code.take_reads()
+        _latest[self.folder, self.module, self.sources] = code
+        return code
 
     @contextlib.contextmanager
     def _running(self, what: str) -> Iterator[None]:
@@ -224,8 +379,8 @@ class Coded(Outside):
             except (ConfigError, KeyboardInterrupt):
                 raise
             except BaseException as error:
-                line = f"{self.place}: filter {self.name}, {self.keys.python}, {what}:"
-                package = self.module.partition(".")[0] if INSTALLED & set(Path(self.folder).parts) else ""
+                line = f"{self._title}, {what}:"
+                package = self.module.partition(".")[0] if is_installed(self.folder) else ""
                 own = os.path.join(self.folder, package)
                 within = f": of a package, it is {Path(self.folder).name}.{self.module}:{self.made}"
                 hint = within if "no known parent package" in failures.words(error) else ""

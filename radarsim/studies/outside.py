@@ -77,6 +77,14 @@ class Outside(ABC):
     def estimates(self, plots: Plots) -> Any:
         """What the filter gives for these plots."""
 
+    def bound_to(self, case: Case) -> "Outside":
+        """The filter as one of a case."""
+        return self
+
+    def warnings(self) -> list[str]:
+        """What a reader of its numbers should know, as far as it has run."""
+        return []
+
 
 @dataclass
 class Called(Outside):
@@ -304,20 +312,11 @@ class Plan:
 
 def prepare(study: "Study", case: Case, inner: Any) -> Plan:
     """The plan beside the study's own. Raises ConfigError for a study whose errors no filter can be paired with."""
-    draw, axes = drawing(study, case), inner.axes
-    if "paired" not in inner.layout.shapes:
-        raise ConfigError(
-            f"{case.name}: its trackers find tracks of their own, in other realisations each: there is no estimate in "
-            "every one that a filter from outside could be paired with"
-        )
+    axes = inner.axes
+    draw, world, scans = setting(study, case, inner)
     names = [member.name for member in case.outside]
     if taken := [name for i, name in enumerate(names) if name in (*axes.filters, *names[:i])]:
         raise ConfigError(f"{case.name}: name: there is a filter {taken[0]!r} already; give another name")
-    first = draw(0, 1)
-    scans = np.asarray(axes.k) - 1
-    if first.several or scans[-1] >= len(first.t_s) or not np.allclose(first.t_s[scans] - first.t_s[0], axes.t_s):
-        raise ConfigError(f"{case.name}: its plots do not stand at the scans of its errors")
-    world = world_of(study, case, first, axes.components)
     G, (F, K, C) = len(names), axes.available.shape
     layout = Layout(
         error=(G, K, C, 4),
@@ -332,6 +331,29 @@ def prepare(study: "Study", case: Case, inner: Any) -> Plan:
     judged_at = next((member.judged_at for member in case.outside if member.judged_at), None)
     own = OutsideAxes(*labels, baselines, tuple(member.identity for member in case.outside), judged_at)
     return Plan(study, inner, draw, world, scans, case.outside, own, layout)
+
+
+def setting(study: "Study", case: Case, inner: Any) -> tuple["Draw", World, np.ndarray]:
+    """What draws the plots of a case, what a filter may know, and the places (K,) of the axes' scans among all scans.
+
+    Raises ConfigError for a study whose errors no filter can be paired with."""
+    draw, axes = drawing(study, case), inner.axes
+    if "paired" not in inner.layout.shapes:
+        raise ConfigError(
+            f"{case.name}: its trackers find tracks of their own, in other realisations each: there is no estimate in "
+            "every one that a filter from outside could be paired with"
+        )
+    first = draw(0, 1)
+    scans = np.asarray(axes.k) - 1
+    if first.several or scans[-1] >= len(first.t_s) or not np.allclose(first.t_s[scans] - first.t_s[0], axes.t_s):
+        raise ConfigError(f"{case.name}: its plots do not stand at the scans of its errors")
+    return draw, world_of(study, case, first, axes.components), scans
+
+
+def first_plots(study: "Study", case: Case, count: int) -> Plots:
+    """What a filter sees of the first realisations of a case, before there is a plan for it."""
+    draw, world, _ = setting(study, case, study.prepare(case))
+    return seen_by_filter(world, draw(0, count))
 
 
 def drawing(study: "Study", case: Case) -> "Draw":
@@ -352,9 +374,14 @@ def world_of(study: "Study", case: Case, drawn: "Drawn", components: tuple[tuple
 
 
 def plots_of(plan: Plan, drawn: "Drawn") -> Plots:
+    """What a filter of a plan sees of plots."""
+    return seen_by_filter(plan.world, drawn)
+
+
+def seen_by_filter(world: World, drawn: "Drawn") -> Plots:
     """What a filter sees of plots: arrays and keys of its own, which it may change."""
     columns = {name: np.array(values, order="C") for name, values in drawn.columns.items()}  # as C code takes them
-    world = replace(plan.world, t_s=np.array(plan.world.t_s), keys=deepcopy(plan.world.keys))
+    world = replace(world, t_s=np.array(world.t_s), keys=deepcopy(world.keys))
     return Plots(np.array(drawn.t_s), columns, world, drawn.first, drawn.n)
 
 

@@ -263,7 +263,14 @@ def coded(keys: Any, place: str, baseline: bool, folder: Path) -> Any:
     """A filter of the user's own code that a config in a folder names at a place. Raises ConfigError."""
     from radarsim.studies import code
 
-    return code.coded(keys, place, baseline, folder)
+    return code.coded(keys, place, baseline, folder, first_plots)
+
+
+def first_plots(case: Case, count: int) -> Any:
+    """What a filter of the user's sees of the first realisations of a case, as in a run."""
+    from radarsim.studies import outside
+
+    return outside.first_plots(study(case.study), case, count)
 
 
 # ---- filters of packages ---------------------------------------------------------------------------------------------

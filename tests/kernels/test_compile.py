@@ -133,7 +133,7 @@ def test_functions_without_an_entry_refuse_python():
 
 def test_a_kernel_that_another_calls_is_compiled_for_it_apart(monkeypatch):
     """Without an entry and machine code of its own, until Python calls it; it gives both the same bytes."""
-    monkeypatch.setattr(numba_internals, "file_hash", lambda module: "")  # so not from a cache
+    monkeypatch.setattr(numba_internals, "module_digest", lambda module: "")  # so not from a cache
 
     @compile.kernel
     def total(x):
@@ -157,7 +157,7 @@ def test_a_kernel_that_another_calls_is_compiled_for_it_apart(monkeypatch):
 def test_the_type_of_an_operation_is_found_once(monkeypatch):
     """However often it stands in kernels; what Numba compiles on the way is asked for each time, as it was."""
     asked = []
-    monkeypatch.setattr(numba_internals, "file_hash", lambda module: "")  # so not from a cache
+    monkeypatch.setattr(numba_internals, "module_digest", lambda module: "")  # so not from a cache
     monkeypatch.setattr(remembering_context(cpu_target.typing_context), "_signatures", {})
     numba_finds = Context.resolve_function_type
 

@@ -1,13 +1,17 @@
 """Filters of the user's own code in the config of any study with plots: `{name: mine, python: my_filter.py:Mine}`."""
 
+import contextlib
 import json
 import os
+import pickle
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -45,7 +49,7 @@ class Mine:
         self.t = plots.t_s
         return np.stack([self.x, self.v], axis=1)
 
-def everything(plots):
+def everything(plots, alpha=None):
     return plots["range_m"][:, :, None]
 
 def single(plots):
@@ -145,7 +149,7 @@ def test_its_identity_is_what_its_numbers_depend_on(place):
     Path("my_filter.py").write_text(FILTER)
     Path("helper.py").write_text("BETA = 0.31\n")
     others.add(identity())
-    Path("helper.py").write_text("import deeper\nBETA = 0.3\n")
+    Path("helper.py").write_text("try:\n    import deeper\nexcept ImportError:\n    pass\nBETA = 0.3\n")
     others.add(identity())
     Path("deeper.py").write_text("ONE = 1\n")
     others.add(identity())
@@ -174,21 +178,258 @@ def test_a_file_among_its_keys_is_given_as_a_path_and_counts_by_its_content(plac
     assert record_of(found[0])["weights"] == "b.txt"
 
 
+READING = """import ctypes, glob, importlib.resources, importlib.util, json, os, pickle, runpy, sqlite3, threading
+from pathlib import Path
+import numpy as np
+HERE = Path(__file__).parent
+class Mine:
+    def __init__(self, **keys):
+        self.keys = keys
+        {reading}
+    def start(self, world):
+        pass
+    def step(self, plots):
+        return plots["range_m"][:, None]
+"""
+BY_PATH = "spec = importlib.util.spec_from_file_location('part', HERE / 'part.' 'py'); "
+DATABASE = "sqlite3.connect(str(HERE / ('base.' + 'db'))).execute('select * from t').fetchall()"
+READINGS = {  # how a filter reads: the file that it reads, of which no text in it is the name
+    "open(HERE / f'{len(HERE.parts) * 0}.txt').read()": "0.txt",
+    "open('sub/' + 'w.npz', 'rb').read(); open('other/' + 'w.npz', 'rb').read()": "other/w.npz",
+    "np.load(HERE.joinpath('sub', 'w' '.npz'))": "sub/w.npz",
+    "np.fromfile(HERE / ('raw.' + 'bin'))": "raw.bin",
+    "np.memmap(HERE / ('raw.' + 'bin'))": "raw.bin",
+    "pickle.load(os.fdopen(os.open(str(HERE / ('p.' + 'pkl')), os.O_RDONLY), 'rb'))": "p.pkl",
+    "[open(json.load(open(HERE / ('list.' + 'json')))[0]).read()]": "0.txt",
+    "[open(path).read() for path in glob.glob('sub/*.t*')]": "sub/a.txt",
+    "[path.read_bytes() for path in (HERE / 'sub').iterdir()]": "sub/a.txt",
+    "[os.listdir('sub')]": "sub/new",
+    "runpy.run_path('part' + '.py')": "part.py",
+    BY_PATH + "spec.loader.exec_module(importlib.util.module_from_spec(spec))": "part.py",
+    "exec(open('part' + '.py').read())": "part.py",
+    "importlib.import_module('pa' + 'rt')": "part.py",
+    "importlib.import_module('sub.' + 'inner')": "sub/inner.py",
+    "importlib.resources.files('pack' + 'age').joinpath('d' + '.txt').read_text()": "package/d.txt",
+    DATABASE: "base.db",
+    "t = threading.Thread(target=lambda: open('0' + '.txt').read()); t.start(); t.join()": "0.txt",
+    "os.path.exists('late' + '.txt') and open('late' + '.txt').read()": "late.txt",
+}
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore::ResourceWarning")
+@pytest.mark.parametrize("reading", READINGS)
+def test_whatever_it_reads_counts(place, reading):
+    for folder in ("sub", "other", "package"):
+        Path(folder).mkdir()
+    for name in ("0.txt", "sub/a.txt", "package/d.txt", "package/__init__.py", "raw.bin"):
+        Path(name).write_text("01234567" if name.endswith("bin") else "")
+    for name in ("sub/w.npz", "other/w.npz"):
+        np.savez(name, w=[1.0])
+    Path("p.pkl").write_bytes(pickle.dumps(1) + b"        ")
+    Path("list.json").write_text('["0.txt"]')
+    for name in ("part.py", "sub/inner.py"):
+        Path(name).write_text("BETA = 0.3  # of mine\n")
+    with contextlib.closing(sqlite3.connect("base.db")) as base:
+        base.execute("create table t (x)")
+    Path("my_filter.py").write_text(READING.replace("{reading}", reading))
+    written("mine", MINE)
+    before, file = identity(), Path(READINGS[reading])
+    if file.suffix == ".py" and "exec(" not in reading:
+        file.write_text("BETA = 0.3\n")  # without the comment
+    assert identity() == before
+    content = file.read_bytes() if file.exists() else None
+    file.write_bytes(b"BETA = 0.4\n" if file.suffix == ".py" else (content or b"")[:-1] + b"8")
+    if file.suffix in (".npz", ".db"):
+        file.write_bytes((content or b"") + b"\0")
+    assert identity() != before
+    if content is None:
+        file.unlink()
+    else:
+        file.write_bytes(content)
+    assert identity() == before
+
+
+def reading_filter(start="pass", step="pass", **keys):
+    """A filter of raw plots that runs a line at the start of each batch, and one in each step."""
+    source = READING.replace("{reading}", "pass").replace(
+        "        pass\n    def step", f"        {start}\n    def step"
+    )
+    Path("my_filter.py").write_text(source.replace("        return plots", f"        {step}\n        return plots"))
+    return written("mine", {"name": "mine", "python": "my_filter.py:Mine", **keys}, scans=4)
+
+
+def test_files_of_one_name_in_two_folders_are_two(place):
+    reading_filter("'a/t.csv', 'b/t.csv'")
+    found = set()
+    for content in ("12", "34", "13", "24"):
+        for folder, text in zip("ab", content, strict=True):
+            Path(folder).mkdir(exist_ok=True)
+            Path(folder, "t.csv").write_text(text)
+        found.add(identity())
+    assert len(found) == 4
+
+
+def test_files_in_lists_mappings_and_folders_of_keys_count_and_are_paths(place):
+    Path("nets/deep").mkdir(parents=True)
+    files = [Path(name) for name in ("a.npz", "b.npz", "c.npz", "nets/deep/d.npz")]
+    for file in files:
+        file.write_text("1")
+    nets = {"first": ["a.npz", {"second": ["b.npz", 0.5, "no.npz"]}], "third": "c.npz", "all": "nets/", "as": "nets"}
+    reading_filter("Path('seen').write_text(repr(self.keys))", nets=nets)
+    found = {identity()}
+    for file in files:
+        file.write_text("2")
+        found.add(identity())
+    assert len(found) == 5
+    a, b, c, _ = (str(place / file) for file in files)
+    seen = {"first": [a, {"second": [b, 0.5, "no.npz"]}], "third": c, "all": str(place / "nets"), "as": "nets"}
+    assert Path("seen").read_text() == repr({"nets": seen})
+
+
+def test_a_library_in_c_counts(place):
+    library = next(Path(os.__file__).with_name("lib-dynload").glob("*.so")).read_bytes()
+    reading_filter("ctypes.CDLL('./' + 'lib' + '.so')")
+    Path("lib.so").write_bytes(library)
+    before = identity()
+    Path("lib.so").unlink()
+    Path("lib.so").write_bytes(library + b" ")
+    assert identity() != before
+
+
+def test_a_file_that_it_first_reads_in_a_later_batch_ends_the_run_with_the_cure(place):
+    Path("late.txt").write_text("1")
+    late = "plots.first >= 4096 and Path('late' + '.txt').read_text()"
+    reading_filter(step=late)
+    said = run("out", code=2).stderr
+    assert (
+        f"filter mine, my_filter.py:Mine, reads {place / 'late.txt'} in realisations 4096:8192 of mine, but not" in said
+    )
+    assert "name it by a text in" in said
+    before = identity()
+    reading_filter(step=late, identity="1 of late.txt")
+    run("out")
+    assert identity() != before
+    reading_filter(step=late, nets=["late.txt"])
+    run("out")
+    assert "identity" not in record(place / "out/mine")["resolved"]["cases"][0]["filters"][2]
+    Path("late.txt").write_text("2")
+    run("out")
+    assert record(place / "out/mine")["realisations_computed"] == N
+
+
+def test_what_it_reads_may_not_change_under_a_run(place):
+    Path("w.txt").write_text("1")
+    reading_filter("Path('w' + '.txt').read_text()")
+    work = CaseWork(load("mine.yaml").cases[0])
+    there = pickle.dumps(work)
+    work.simulate(0, 20)
+    Path("w.txt").write_text("2")
+    with pytest.raises(ConfigError, match=r"w\.txt has changed since the run began"):
+        work.simulate(20, 20)
+    assert pickle.loads(there).identity != work.identity  # where other files are, a worker finds another identity
+
+
+def test_a_case_depends_on_what_it_reads_whatever_ran_before(place):
+    """Code is imported once for all cases, and anew where it may remember what it has read for another case."""
+    Path("w.txt").write_text("1")
+    remember = "remembered = functools.cache(lambda name: Path(name + '.txt').read_text())\n"
+    count = "os.write(file := os.open('imports', os.O_APPEND | os.O_CREAT | os.O_WRONLY), b'1'); os.close(file)\n"
+    for opening, imports in (("Path('w' + '.txt').read_text()", "1"), ("remembered('w')", "11")):
+        reading_filter(opening)
+        source = Path("my_filter.py").read_text()
+        Path("imports").write_text("")
+        Path("my_filter.py").write_text(source.replace("HERE =", f"import functools\n{remember}{count}HERE ="))
+        both = [CaseWork(case).identity for case in load("mine.yaml", ["sweep={scans: [4, 5]}"]).cases]
+        assert Path("imports").read_text() == imports
+        Path("imports").write_text("")
+        alone = [CaseWork(load("mine.yaml", [f"sweep={{scans: [{n}]}}"]).cases[0]).identity for n in (5, 4)]
+        assert alone[::-1] == both
+        Path("w.txt").write_text(f"{imports} more")
+        edited = [CaseWork(case).identity for case in load("mine.yaml", ["sweep={scans: [4, 5]}"]).cases]
+        assert not set(edited) & set(both)
+
+
+def test_a_package_that_is_installed_to_be_edited_counts(place, monkeypatch, tmp_path_factory):
+    package = tmp_path_factory.mktemp("source") / "mylib"
+    package.mkdir()
+    monkeypatch.syspath_prepend(str(package.parent))
+    Path(package, "data.txt").write_text("1")
+    Path("my_filter.py").write_text(FILTER.replace("import helper", "from mylib import helper"))
+    Path(package, "__init__.py").write_text("")
+    found = set()
+    for beta in (0.3, 0.4):
+        Path(package, "helper.py").write_text(
+            f"from pathlib import Path\nPath(__file__).with_name('da' + 'ta.txt').read_text()\nBETA = {beta}\n"
+        )
+        found.add(identity())
+    Path(package, "data.txt").write_text("2")
+    found.add(identity())
+    assert len(found) == 3
+
+
+def test_what_it_writes_is_nothing_that_it_depends_on(place):
+    write = "os.write(log := os.open('log.txt', os.O_APPEND | os.O_CREAT | os.O_WRONLY), b'a line'); os.close(log)"
+    write += "; Path('scratch').write_text('1'); Path('scratch').read_text(); list(HERE.glob('*.c*'))"
+    config = reading_filter(write)
+    computed = [radarsim.run(str(config), realisations=50, out="out", figures=False) for _ in range(3)]
+    assert [one.facts["realisations_computed"] for one in computed] == [50, 0, 0]
+    assert not any("stored blocks" in line for one in computed for line in one.warnings)
+    Path("state").write_text("1")
+    config = reading_filter("Path('state').write_text(Path('state').read_text() + '1')")
+    computed = [radarsim.run(str(config), realisations=50, out="out", figures=False) for _ in range(2)]
+    assert [one.facts["realisations_computed"] for one in computed] == [50, 0]
+    for one in computed:
+        (line,) = [line for line in one.warnings if "stored blocks" in line]
+        assert f"takes from files that it also writes ({place / 'state'})" in line
+
+
+def test_what_no_file_shows_is_named_once_and_may_be_declared(place, tmp_path_factory):
+    elsewhere = tmp_path_factory.mktemp("elsewhere") / "w.txt"
+    elsewhere.write_text("1")
+    line = f"Path({str(elsewhere)!r}).read_text(); __import__('subprocess').run(['true'])"
+    line += "; s = __import__('socket').socket(type=2); s.connect(('127.0.0.1', 9)); s.close()"
+    line += "; Path('__pycache__/my_filter.f-1.py311.nbi').read_text()"
+    Path("__pycache__").mkdir()
+    Path("__pycache__/my_filter.f-1.py311.nbi").write_text("")
+    config = str(reading_filter(line))
+    told = [one for one in radarsim.run(config, realisations=50).warnings if "stored blocks" in one]
+    places = f"files outside its folders ({elsewhere}), the network (127.0.0.1:9), processes that it starts and "
+    places += "machine code kept by Numba, which outlives edits of other files"
+    assert told == [f"mine: stored blocks do not notice changes of what the filter takes from {places}; when they "
+                    "change, change its key `identity`"]  # fmt: skip
+    found = set()
+    for declared in (1, 2, "of May"):
+        reading_filter(line, identity=declared)
+        assert not [one for one in radarsim.run(config, realisations=50).warnings if "stored blocks" in one]
+        found.add(identity())
+    assert len(found) == 3
+
+
 def record_of(result):
     return result.experiment.resolved["cases"][0]["filters"][2]
 
 
-def test_an_edit_counts_at_once_and_begins_anew(place):
-    first = radarsim.run("mine.yaml", realisations=500, out="out", figures=False)
-    Path("helper.py").write_text("BETA = 0.4\n")
-    edited = radarsim.run("mine.yaml", realisations=500, out="out", figures=False)
-    assert edited.facts["realisations_computed"] == 500
-    sigma = [one.curves.query("filter == 'mine' and component == 'r'")["sigma"].iloc[-1] for one in (first, edited)]
+EDITED = {  # the import of a module with the number, its file, what the file holds
+    "import helper": ("helper.py", "BETA = {}"),
+    "from sub import helper": ("sub/helper.py", "BETA = {}"),
+    "import importlib; helper = importlib.import_module('sub.' + 'helper')": ("sub/helper.py", "BETA = {}"),
+    "import pathlib\nclass helper: BETA = float(pathlib.Path('beta' + '.txt').read_text())": ("beta.txt", "{}"),
+}
+
+
+@pytest.mark.parametrize("imports", EDITED)
+def test_an_edit_counts_at_once_and_an_edit_undone_finds_its_blocks(place, imports):
+    name, content = EDITED[imports]
+    Path("sub").mkdir()
+    Path("my_filter.py").write_text(FILTER.replace("import helper", imports))
+    made = []
+    for beta in (0.3, 0.4, 0.3):
+        Path(name).write_text(content.format(beta))
+        made.append(radarsim.run("mine.yaml", realisations=500, out="out", figures=False))
+    assert [one.facts["realisations_computed"] for one in made] == [500, 500, 0]
+    sigma = [one.curves.query("filter == 'mine' and component == 'r'")["sigma"].iloc[-1] for one in made[:2]]
     assert sigma[0] != sigma[1]
-    Path("helper.py").write_text("BETA = 0.3  # as before\n")
-    again = radarsim.run("mine.yaml", realisations=500, out="out", figures=False)
-    assert again.facts["realisations_computed"] == 0
-    assert again.curves.equals(first.curves)
+    assert made[2].curves.equals(made[0].curves)
 
 
 def test_what_changes_between_reading_and_running_is_noticed(place):
