@@ -1,0 +1,158 @@
+"""Files and folders that belong to the user alone: to create them, and to tell which ones another user could have made.
+
+What is read from a trusted path may be believed and run: the file and every folder and link on the way to it belong to
+the user or to root, and nobody else may write to them. Folders such as /tmp, in which everybody may write but nobody
+may replace what others put there (the sticky bit), are allowed on the way. Permission by access lists counts as well:
+Linux shows it in the bits of the group. A group with the name of the user, who is its only member, is nobody else: many
+systems give each user one, and let it write.
+
+Systems without user numbers (Windows) trust every path."""
+
+import errno
+import os
+import stat
+import uuid
+from pathlib import Path
+from typing import BinaryIO
+
+MAX_LINKS = 40  # symbolic links on the way to a file, as many as Linux follows
+ROOT_USER = 0
+
+
+class UntrustedFileError(PermissionError):
+    """A file that another user could have made or changed; `strerror` says how."""
+
+
+def make_private_folder(path: str | os.PathLike) -> None:
+    """Create a folder, and those missing above it, for the user alone (0700) whatever the umask.
+
+    Folders that exist keep their permissions. Raises OSError where one cannot be created."""
+    folder = Path(path)
+    try:
+        folder.mkdir(mode=0o700)
+    except FileNotFoundError:
+        if folder.parent == folder:
+            raise
+        make_private_folder(folder.parent)
+        make_private_folder(folder)
+    except OSError:  # some systems refuse a folder that exists with another error than FileExistsError
+        if not folder.is_dir():
+            raise
+    else:
+        mode = folder.lstat().st_mode
+        if mode & stat.S_IRWXU != stat.S_IRWXU:  # the umask took bits from the user
+            folder.chmod(mode | stat.S_IRWXU)
+
+
+def create_private_file(path: str | os.PathLike) -> BinaryIO:
+    """A new file, open for writing, that the user alone may read and write (0600) whatever the umask.
+
+    Raises FileExistsError where there is anything of that name, a symbolic link included."""
+    file = open(path, "xb", opener=lambda name, flags: os.open(name, flags, 0o600))  # noqa: SIM115 (for the caller)
+    if hasattr(os, "fchmod"):
+        os.fchmod(file.fileno(), 0o600)
+    return file
+
+
+def write_private_file(path: str | os.PathLike, content: bytes) -> None:
+    """Write a file that the user alone may read and write, whole or not at all; it replaces what has its name."""
+    target = Path(path)
+    temporary = target.with_name(f".{target.name}.{uuid.uuid4().hex}.tmp")
+    try:
+        with create_private_file(temporary) as file:
+            file.write(content)
+        os.replace(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def distrust_reason(path: str | os.PathLike) -> str | None:
+    """Why a file or folder may not be trusted, as a phrase that follows its name; None where it may.
+
+    Where it does not exist, the folders that do are judged. Raises OSError where they cannot be looked at."""
+    try:
+        return _follow(path)[1]
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+
+
+def read_trusted(path: str | os.PathLike) -> bytes:
+    """The content of a file that nobody else can have written; raises UntrustedFileError for any other."""
+    place, reason = _follow(path)
+    if reason is None:
+        # By the descriptor once more, and through no link: between the two looks another process may replace the file.
+        flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0)
+        with open(place, "rb", opener=lambda name, given: os.open(name, given | flags)) as file:
+            reason = _fault(place, os.fstat(file.fileno()))
+            if reason is None:
+                return file.read()
+    raise UntrustedFileError(errno.EPERM, reason, os.fspath(path))
+
+
+def _follow(path: str | os.PathLike) -> tuple[Path, str | None]:
+    """The place to which a path leads through its links, and why it, or anything on the way, may not be trusted.
+
+    Raises FileNotFoundError or NotADirectoryError where there is nothing, after the folders that exist."""
+    start = Path(path).absolute()
+    if not hasattr(os, "geteuid"):
+        return start, None
+    place, parts, links = Path(start.anchor), list(reversed(start.parts[1:])), 0
+    while parts:
+        if reason := _fault(place, place.lstat(), on_the_way=True):
+            return place, f"lies in {place}, which {reason}"
+        part = parts.pop()
+        entry = place.parent if part == ".." else place / part
+        status = entry.lstat()
+        if not stat.S_ISLNK(status.st_mode):
+            place = entry
+            continue
+        if reason := _owner_fault(status):
+            return place, f"is reached by the symbolic link {entry}, which {reason}"
+        links += 1
+        if links > MAX_LINKS:
+            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), os.fspath(path))
+        target = Path(os.readlink(entry))
+        parts += reversed(target.parts[1:] if target.is_absolute() else target.parts)
+        place = Path(target.anchor) if target.is_absolute() else place
+    return place, _fault(place, place.lstat())
+
+
+def _fault(place: Path, status: os.stat_result, on_the_way: bool = False) -> str | None:
+    """Why a file or folder may be in another user's hand; on the way to others, a folder with the sticky bit is not."""
+    if not hasattr(os, "geteuid"):
+        return None
+    if reason := _owner_fault(status):
+        return reason
+    if on_the_way and status.st_mode & stat.S_ISVTX:
+        return None
+    if status.st_mode & stat.S_IWOTH:
+        return "can be written by every user"
+    if status.st_mode & stat.S_IWGRP and (_has_access_list(place) or not _is_private_group(status.st_gid)):
+        return f"can be written by other users (group {status.st_gid})"
+    return None
+
+
+def _owner_fault(status: os.stat_result) -> str | None:
+    return None if status.st_uid in (os.geteuid(), ROOT_USER) else f"belongs to another user ({status.st_uid})"
+
+
+def _is_private_group(group: int) -> bool:
+    """Whether a group is the one that the system gave to this user alone: with the same name, and no other member."""
+    if os.geteuid() == ROOT_USER:
+        return False
+    import grp
+    import pwd
+
+    try:
+        user, entry = pwd.getpwuid(os.geteuid()), grp.getgrgid(group)
+    except KeyError:
+        return False
+    return user.pw_gid == group and entry.gr_name == user.pw_name and set(entry.gr_mem) <= {user.pw_name}
+
+
+def _has_access_list(place: Path) -> bool:
+    """Whether Linux keeps an access list beside the permission bits; those of the group then bound the list's."""
+    try:
+        return bool(os.getxattr(place, "system.posix_acl_access"))
+    except (AttributeError, OSError):  # another system, no list, or a file system without lists
+        return False
