@@ -1,10 +1,12 @@
-"""Files and folders that belong to the user alone: to create them, and to tell which ones another user could have made.
+"""Files and folders to which only the user may write: to create them, and to tell what another user could have made.
 
 What is read from a trusted path may be believed and run: the file and every folder and link on the way to it belong to
 the user or to root, and nobody else may write to them. Folders such as /tmp, in which everybody may write but nobody
 may replace what others put there (the sticky bit), are allowed on the way. Permission by access lists counts as well:
 Linux shows it in the bits of the group. A group with the name of the user, who is its only member, is nobody else: many
 systems give each user one, and let it write.
+
+What is made to be handed on, such as results, others may read as the umask lets them, but nobody else may write to it.
 
 Systems without user numbers (Windows) trust every path."""
 
@@ -44,19 +46,6 @@ def make_private_folder(path: str | os.PathLike) -> None:
             folder.chmod(mode | stat.S_IRWXU)
 
 
-def make_readable_folder(path: str | os.PathLike) -> None:
-    """Create a folder, and those missing above it, that others may read as the umask allows, and never write."""
-    folder = Path(path)
-    try:
-        folder.mkdir(mode=0o755)
-    except FileNotFoundError:
-        if folder.parent == folder:
-            raise
-        make_readable_folder(folder.parent)
-        make_readable_folder(folder)
-    except OSError:
-        if not folder.is_dir():
-            raise
 def make_trusted_folder(path: str | os.PathLike) -> None:
     """As `make_private_folder`; raises UntrustedFileError where another user may write to the folder or replace it."""
     _check_trust(path)
@@ -84,6 +73,23 @@ def write_private_file(path: str | os.PathLike, content: bytes) -> None:
         os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def make_readable_folder(path: str | os.PathLike) -> None:
+    """Create a folder, and those missing above it: others may read it if the umask lets them, but never write to it.
+
+    Folders that exist keep their permissions. Raises OSError where one cannot be created."""
+    folder = Path(path)
+    for place in (*reversed(folder.parents), folder):
+        if not place.is_dir():
+            place.mkdir(mode=0o755, exist_ok=True)
+
+
+def create_readable_file(path: str | os.PathLike) -> BinaryIO:
+    """A new file, open for writing: others may read it if the umask lets them, but never write to it.
+
+    Raises FileExistsError where there is anything of that name, a symbolic link included."""
+    return open(path, "xb", opener=lambda name, flags: os.open(name, flags, 0o644))
 
 
 def distrust_reason(path: str | os.PathLike) -> str | None:

@@ -36,7 +36,7 @@ ROOMS = {
     "constants": (),
     "physics": ("constants",),
     "bursts": ("constants", "kernels", "physics"),
-    "report": ("errors", "failures", "config", "language", *DATA),
+    "report": ("errors", "failures", "config", "language", "private_files", *DATA),
     "studies.noise": (*CASE, "kernels.random"),
     "studies.radial": ("errors", "constants", "physics"),
     "studies.floor": (*DATA, "report", "studies.interface"),
@@ -75,7 +75,10 @@ ROOMS = {
     "studies.sources": ("config", "module_sources", "studies.registry"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry", "studies.sources"),
     "recorded": ("errors", "threads", "config", "language", "engine", "kernels", "physics", "report", "studies"),
-    "app": ("errors", "threads", "config", "language", "engine", "kernels", "physics", "report", "studies", "recorded"),
+    "app": (
+        *("errors", "threads", "private_files", "config", "language", "engine", "kernels", "physics", "report"),
+        *("studies", "recorded"),
+    ),
     "cli": (
         *("errors", "config", "language", "engine", "kernels", "physics", "report", "studies", "recorded", "app"),
         *("__init__", "threads"),

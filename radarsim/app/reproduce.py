@@ -30,6 +30,7 @@ from radarsim.app.configs import document as lookup
 from radarsim.config.document import one_line
 from radarsim.engine.run import Signals
 from radarsim.errors import ConfigError, Interrupted, RadarsimError, StoreError
+from radarsim.private_files import create_readable_file, make_readable_folder
 from radarsim.report.wording import clock, plural
 from radarsim.studies import registry
 
@@ -187,7 +188,7 @@ def new_study(name: str, folder: str | os.PathLike = ".", form: str = "linear") 
         raise ConfigError(f"{one_line(name)}: {fault}")
     path = Path(folder) / name
     try:
-        path.mkdir()
+        path.mkdir(mode=0o755)
     except FileExistsError:
         raise ConfigError(f"{path}: already exists and is never overwritten; choose another name") from None
     except OSError as error:
@@ -229,8 +230,8 @@ def renamed(text: str, name: str) -> str:
 
 def _write(path: Path, text: str) -> None:
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(text)
+        make_readable_folder(path.parent)
+        with create_readable_file(path) as file:
+            file.write(text.encode())
     except OSError as error:
         raise StoreError(f"{path}: cannot be written: {error.strerror}") from error

@@ -4,7 +4,8 @@ A task travels as the pickled work (a case: a few kilobytes) and the piece; the 
 it. Workers may come and go: Dask hands the tasks of a dead one to another. They must have the same sources, which the
 identity of the work shows.
 
-A key and its certificate for the processes of one run, by the package `cryptography`."""
+Credentials are Dask's: those of `Security.temporary` for the processes that a run starts, the user's own settings for a
+scheduler. All of it reaches workers as Dask's settings, in their environment, which other users cannot read."""
 
 import contextlib
 import ipaddress
@@ -13,82 +14,36 @@ import os
 import pickle
 import subprocess
 import sys
+import tempfile
 import threading
 import time
-from datetime import UTC, datetime
 from functools import lru_cache
 from itertools import count
 from queue import Empty, SimpleQueue
 from types import ModuleType, TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 from radarsim.engine.blocks import Node, Partial, Work
 from radarsim.engine.run import Outcome, attempted
 from radarsim.errors import ClusterError, ConfigError, Interrupted, argument
+from radarsim.private_files import distrust_reason
 
 if TYPE_CHECKING:
-    from distributed import Future, LocalCluster, Security
+    from distributed import Future, LocalCluster
 
-
-# ---- certificate -----------------------------------------------------------------------------------------------------
-# The certificate ends with the run, which holds the only key; it has no end date. So a clock that is set during the
-# run, or is wrong from the start (1970 with a flat battery), locks nobody out.
-FIRST = datetime(1970, 1, 1, tzinfo=UTC)
-LAST = datetime(9999, 12, 31, 23, 59, 59, tzinfo=UTC)  # RFC 5280, 4.1.2.5: of no well-defined end
-NAME = "radarsim"
-
-
-def self_signed() -> tuple[str, str]:
-    """A new private key and a certificate for it that is its own authority, both as PEM text. Raises ImportError
-    without `cryptography`."""
-    from cryptography import x509
-    from cryptography.hazmat.primitives import hashes, serialization
-    from cryptography.hazmat.primitives.asymmetric import ec
-    from cryptography.x509.oid import NameOID
-
-    key = ec.generate_private_key(ec.SECP256R1())
-    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, NAME)])
-    certificate = (
-        x509.CertificateBuilder()
-        .subject_name(name)
-        .issuer_name(name)
-        .add_extension(x509.SubjectAlternativeName([x509.DNSName(NAME)]), critical=False)
-        .public_key(key.public_key())
-        .serial_number(x509.random_serial_number())
-        .not_valid_before(FIRST)
-        .not_valid_after(LAST)
-        .sign(key, hashes.SHA256())
-    )
-    plain = serialization.NoEncryption()
-    pem = serialization.Encoding.PEM
-    text = key.private_bytes(pem, serialization.PrivateFormat.PKCS8, plain).decode()
-    return text, certificate.public_bytes(pem).decode()
-
-
-# ---- cluster ---------------------------------------------------------------------------------------------------------
 CONNECT_S = 10
 WORKERS_S = 30  # how long a scheduler may have no worker
 DEATHS = 20  # of workers running one task, after which it is taken as their cause
 RESULT_S = 60  # how long the sums of a block may take from a worker
 HOLDER_S = 5  # the same on this machine before checking whether the worker lives
 LOOK_S = 1.0
+STEP_S = 30  # by which the clock of this machine may be set back between two looks
 SCHEMES = ("tcp", "tls")
-ROLES = ("client", "scheduler", "worker")
 LOOPBACK = "127.0.0.1"  # servers started on this machine listen only here
 HINT = "--workers and --scheduler need Dask: pip install 'radarsim[cluster]'"
 QUIET = ("distributed", "distributed.nanny", "distributed.worker", "distributed.scheduler", "distributed.comm")
-# A worker process of this machine, whose options follow.
-WORKER = """
-from radarsim.engine.cluster import steady_clock
-steady_clock()
-from distributed.cli.dask_worker import main
-main()
-"""
-SETTINGS = {
-    "distributed.scheduler.allowed-failures": DEATHS,
-    "distributed.comm.timeouts.connect": f"{CONNECT_S}s",
-    "logging": dict.fromkeys(QUIET, "critical"),
-}
+SETTINGS = {"distributed.scheduler.allowed-failures": DEATHS, "distributed.comm.timeouts.connect": f"{CONNECT_S}s"}
+TLS = "distributed.comm.tls"
 
 
 def _dask() -> ModuleType:
@@ -97,21 +52,6 @@ def _dask() -> ModuleType:
     except ImportError as error:
         raise ConfigError(f"{HINT} ({error})") from error
     return distributed
-
-
-def steady_clock() -> None:
-    """Let messages of this process wait by a clock that nobody sets; to be called before any loop begins. Dask delays
-    outgoing messages until a deadline by the time of day, as Tornado's loops count it: a clock set back by an hour
-    between two messages delayed the second for that hour, and the run waited for it. Neither has a setting."""
-    from distributed import batched
-    from tornado.ioloop import IOLoop
-
-    batched.time = time.monotonic
-
-    def now(self: IOLoop) -> float:
-        return time.monotonic()
-
-    IOLoop.time = now  # type: ignore[method-assign]
 
 
 def trust(address: str) -> str | None:
@@ -136,30 +76,42 @@ def _is_loopback(host: str) -> bool:
         return False
 
 
-def _security(distributed: ModuleType) -> "Security | None":
-    """Keys and certificates of one run, made for it; None without the package `cryptography`, which makes them. Those
-    of `Security.temporary` are valid from now for a year: a clock set back locks workers out."""
+def _temporary(distributed: ModuleType) -> dict[str, object]:
+    """Dask's settings for a certificate and its key that exist for one run, in memory. ConfigError without the package
+    `cryptography`, by which Dask makes them."""
     try:
-        key, certificate = self_signed()
-    except ImportError:
-        return None
-    roles = {f"tls_{role}_{part}": text for role in ROLES for part, text in (("key", key), ("cert", certificate))}
-    return distributed.Security(require_encryption=True, tls_ca_file=certificate, **roles)
+        security = distributed.Security.temporary()
+    except ImportError as error:
+        raise ConfigError(f"{HINT} ({error})") from error
+    parts = [(role, part) for role in ("client", "scheduler", "worker") for part in ("cert", "key")]
+    roles = {f"{TLS}.{role}.{part}": getattr(security, f"tls_{role}_{part}") for role, part in parts}
+    return {"distributed.comm.require-encryption": True, f"{TLS}.ca-file": security.tls_ca_file, **roles}
 
 
-def _configured(distributed: ModuleType, address: str) -> "Security | None":
-    """Dask's own settings for tls://; ConfigError where they name no authority or a file that cannot be read."""
-    if not address.startswith("tls://"):
-        return None
-    hint = "tls:// needs Dask's settings distributed.comm.tls (ca-file, client.cert, client.key), see docs/scale.md"
+def _check_credentials(distributed: ModuleType) -> None:
+    """ConfigError where Dask's own settings for tls:// name no authority, a file that cannot be read, or one in which
+    another user may have a hand."""
+    hint = f"tls:// needs Dask's settings {TLS} (ca-file, client.cert, client.key), see docs/scale.md"
     security = distributed.Security()
+    key = security.tls_client_key or security.tls_client_cert  # a key may stand in the file of its certificate
     try:
+        for text in filter(None, {security.tls_ca_file, security.tls_client_cert, key}):
+            if "\n" not in text and (reason := distrust_reason(text) or (text == key and _exposed(text))):
+                raise ConfigError(f"{argument('scheduler')}: {text}: {reason}")
         context = security.get_connection_args("client").get("ssl_context")
     except (OSError, ValueError, TypeError) as error:
         raise ConfigError(f"{argument('scheduler')}: {hint}: {error}") from error
     if context is None:
         raise ConfigError(f"{argument('scheduler')}: {hint}")
-    return security
+
+
+def _exposed(key: str) -> str | None:
+    """Why a file is no place for a private key, as a phrase that follows its name; None where it is one."""
+    if not hasattr(os, "geteuid"):
+        return None
+    status = os.stat(key)
+    others = 0o077 if status.st_uid == os.geteuid() else 0o007  # root may let a group read its keys
+    return "holds a private key and can be read by other users: chmod 600" if status.st_mode & others else None
 
 
 def _check(distributed: ModuleType, address: str) -> None:
@@ -175,6 +127,8 @@ def _check(distributed: ModuleType, address: str) -> None:
         raise ConfigError(
             f"{argument('scheduler')}: must be an address such as tcp://host:8786, got {address!r}: {error}"
         ) from error
+    if scheme == "tls":
+        _check_credentials(distributed)
 
 
 class Cluster:
@@ -187,7 +141,6 @@ class Cluster:
         """So many worker processes on this machine, or the workers of the scheduler at an address. Raises ConfigError
         where Dask is missing, the address is wrong, or no worker appears within half a minute."""
         distributed = _dask()
-        steady_clock()
         import dask
 
         for name in QUIET:
@@ -198,32 +151,34 @@ class Cluster:
         self._running: set[str] = set()  # after a cancel: those that may finish
         self._numbers = count()
         self._looked = self._seen = time.monotonic()
+        self._time_of_day = time.time()
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._scheduler: LocalCluster | None = None
         self._own: _Processes | None = None
         self._place = scheduler or "this machine"
-        with dask.config.set(SETTINGS):
+        settings = SETTINGS
+        if scheduler is None:
+            # Dask imports from its scratch folders before all others; the usual one may be another user's.
+            self._folder = tempfile.TemporaryDirectory(prefix="radarsim-", ignore_cleanup_errors=True)
+            settings = {**SETTINGS, **_temporary(distributed), "temporary-directory": self._folder.name}
+        with dask.config.set(settings):
             if scheduler is not None:
                 _check(distributed, scheduler)
-                address, security = scheduler, _configured(distributed, scheduler)
+                address = scheduler
             else:
-                security = _security(distributed)
-                options = {
-                    "host": LOOPBACK,
-                    "dashboard_address": f"{LOOPBACK}:0",
-                    "protocol": "tls" if security else "tcp",
-                    "security": security,
-                    "processes": False,
-                }
-                self._scheduler = distributed.LocalCluster(n_workers=0, silence_logs=logging.CRITICAL, **options)
+                options = {"host": LOOPBACK, "protocol": "tls", "dashboard_address": f"{LOOPBACK}:0"}
+                self._scheduler = distributed.LocalCluster(
+                    n_workers=0, processes=False, silence_logs=logging.CRITICAL, **options
+                )
                 address = self._scheduler.scheduler_address
             try:
-                self._client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False, security=security)
+                self._client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
             except OSError as error:
                 raise ConfigError(
                     f"{argument('scheduler')}: no Dask scheduler answers at {scheduler}: {error}"
                 ) from error
         if workers is not None:
-            self._own = _Processes(workers, address, security)
+            self._own = _Processes(workers, address, str(dask.config.serialize(settings)))
         self._wait_for_workers(workers or 1)
 
     def _wait_for_workers(self, wanted: int) -> None:
@@ -245,10 +200,17 @@ class Cluster:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: BaseException | TracebackType | None) -> None:
+        if kind is Interrupted:  # whose process ends at once; an orderly end would take two seconds
+            self._kill()
+        else:
+            self.close()
+
+    def _kill(self) -> None:
+        """End the workers of this machine, with what they wrote."""
         if self._own is not None:
             self._own.kill()
-        if kind is not Interrupted:  # whose process ends at once; an orderly end would take two seconds
-            self.close()
+        if self._folder is not None:
+            self._folder.cleanup()
 
     def submit(self, work: Work, piece: Node | Partial) -> None:
         """Submit a task; returns at once."""
@@ -312,11 +274,18 @@ class Cluster:
         return future.result(timeout=RESULT_S)
 
     def _look(self) -> None:
-        """About once a second: check the scheduler and which workers are connected."""
+        """About once a second: check the clock, the scheduler and which workers are connected."""
         now = time.monotonic()
         if now < self._looked + LOOK_S:
             return
-        self._looked = now
+        time_of_day = time.time()
+        set_back_s = now - self._looked - (time_of_day - self._time_of_day)
+        self._looked, self._time_of_day = now, time_of_day
+        if set_back_s > STEP_S:  # Dask sends no message before the time of day at which it was due
+            raise ClusterError(
+                f"{self._place}: its clock was set back by {set_back_s:.0f} s, for which Dask would wait; what was "
+                "finished is stored, run again to continue"
+            )
         if self._own is not None:
             self._own.replace()
         if self._client.status != "running":
@@ -363,8 +332,7 @@ class Cluster:
 
     def close(self) -> None:
         """Release the workers without waiting for running tasks; those of this machine end."""
-        if self._own is not None:
-            self._own.kill()
+        self._kill()
         logging.disable(logging.CRITICAL)  # complaints of a cluster that is torn down under its tasks
         try:
             with contextlib.suppress(Exception):
@@ -376,29 +344,19 @@ class Cluster:
             logging.disable(logging.NOTSET)
 
 
-def _for_workers(security: Any) -> str:  # whose fields Dask makes at run time
-    """Settings that a worker takes from its environment, which other users of the machine cannot read."""
-    import dask
-
-    given: Any = security  # its attributes are made from a list of names, which its types do not show
-    own = {"cert": given.tls_worker_cert, "key": given.tls_worker_key}
-    comm = {"require-encryption": True, "tls": {"ca-file": given.tls_ca_file, "worker": own}}
-    return str(dask.config.serialize({"distributed": {"comm": comm}}))
-
-
 class _Processes:
     """Worker processes on this machine, in sessions of their own: Ctrl-C in a terminal reaches only the run. They are
     new processes, not forks of a process with live threads. One that dies is replaced; all end when the scheduler, and
     so this process, is gone."""
 
-    def __init__(self, workers: int, address: str, security: "Security | None" = None):
+    def __init__(self, workers: int, address: str, settings: str):
         options = ["--no-nanny", "--nthreads", "1", "--memory-limit", "0", "--death-timeout", "10"]
         # Without the latter a worker serves HTTP to the whole network even with --no-dashboard.
         closed = ["--host", LOOPBACK, "--no-dashboard", "--dashboard-address", f"{LOOPBACK}:0"]
-        self._command = [sys.executable, "-c", WORKER, address, *options, *closed]
-        self._environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-        if security is not None:
-            self._environment["DASK_INTERNAL_INHERIT_CONFIG"] = _for_workers(security)
+        # -P: modules of the working directory, which may be anybody's, are not imported.
+        self._command = [sys.executable, "-P", "-m", "distributed.cli.dask_worker", address, *options, *closed]
+        path = os.pathsep.join(filter(None, sys.path))
+        self._environment = os.environ | {"PYTHONPATH": path, "DASK_INTERNAL_INHERIT_CONFIG": settings}
         self._running = [self._started() for _ in range(workers)]
 
     def _started(self) -> subprocess.Popen[bytes]:

@@ -1,8 +1,9 @@
 """Files are written completely or not at all.
 
 A regular file is written under a temporary name beside it and renamed, so that a reader, a full disk or a kill never
-leaves half of it. It keeps its mode; a new one gets that of the umask. A link stays, and its target is replaced. A
-stream (a terminal, a pipe, /dev/null) is written directly. Directories and disks are refused.
+leaves half of it. Who may read it stays as it was, of a new one as the umask has it; nobody but the user may write to
+it. A link stays, and its target is replaced. A stream (a terminal, a pipe, /dev/null) is written directly. Directories
+and disks are refused.
 
 run.json: the request, the software, and the outcome. Times are here and in the report, never in a CSV."""
 
@@ -29,6 +30,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Self
 from radarsim.config.experiment import Experiment
 from radarsim.errors import ConfigError, StoreError
 from radarsim.language import numeral, plural, tr
+from radarsim.private_files import create_readable_file, make_readable_folder
 
 if TYPE_CHECKING:
     from radarsim.engine.results import CaseResult
@@ -68,8 +70,9 @@ def replace_all(
         try:
             for name, data in contents.items():
                 temporary = written[folder / name] = beside(folder / name)
-                temporary.parent.mkdir(parents=True, exist_ok=True)
-                temporary.write_bytes(data)
+                make_readable_folder(temporary.parent)
+                with create_readable_file(temporary) as file:
+                    file.write(data)
             with locked(folder):
                 gone = set(stale(folder)) - set(contents)
                 for path, temporary in written.items():
@@ -92,9 +95,9 @@ def create(path: Path, data: bytes) -> None:
     temporary = beside(path)
     try:
         try:
-            temporary.write_bytes(data)
-            with open(path, "xb"):  # takes the name, if it is free
-                pass
+            with create_readable_file(temporary) as file:
+                file.write(data)
+            create_readable_file(path).close()  # takes the name, if it is free
             os.replace(temporary, path)
         finally:
             temporary.unlink(missing_ok=True)
@@ -175,13 +178,13 @@ def beside(path: Path) -> Path:
 
 
 def rename(temporary: Path, path: Path) -> None:
-    """Rename a finished temporary file to its destination, keeping the mode of an existing file."""
+    """Rename a finished temporary file to its destination. Of an existing file it keeps who may read it."""
     try:
         mode = stat.S_IMODE(os.stat(path).st_mode)
     except OSError:
         pass
     else:
-        os.chmod(temporary, mode)
+        os.chmod(temporary, mode & ~0o022)
     os.replace(temporary, path)
 
 
@@ -216,7 +219,7 @@ class Writer:
         self._target = Path(os.path.realpath(self.path))
         self._temporary = None if self._stream else beside(self._target)
         try:
-            opened = open(self._temporary or self.path, "xb" if self._temporary else "wb")
+            opened = create_readable_file(self._temporary) if self._temporary else open(self.path, "wb")
         except OSError as error:
             raise self._fault(error) from error
         self._file = io.TextIOWrapper(opened, encoding="utf-8", newline="")

@@ -249,7 +249,7 @@ def test_a_new_config_is_whole_or_not_there(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(files.Path, "write_bytes", full)
+    monkeypatch.setattr(files, "create_readable_file", full)
     with pytest.raises(StoreError, match="No space left"):
         new("other", "rls2", tmp_path)
     assert [one.name for one in tmp_path.iterdir()] == ["mine.yaml"]

@@ -7,6 +7,7 @@ import os
 import pickle
 import random
 import signal
+import stat
 import subprocess
 import sys
 import textwrap
@@ -14,6 +15,7 @@ import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import psutil
 import pytest
@@ -31,10 +33,35 @@ pytestmark = pytest.mark.filterwarnings("ignore")  # Dask's own
 
 
 @pytest.fixture(scope="module")
-def two():
-    """Two worker processes, for all tests of this file."""
-    with Cluster(2) as workers:
+def two(tmp_path_factory):
+    """Two worker processes, for all tests of this file.
+
+    They are started with a umask of 0, in a folder where anybody may have put a module by the name of Dask's."""
+    folder, before, umask = tmp_path_factory.mktemp("anybody"), Path.cwd(), os.umask(0)
+    (folder / "distributed.py").write_text(f"open({str(folder / 'executed')!r}, 'w')")
+    os.chdir(folder)
+    try:
+        workers = Cluster(2)
+    finally:
+        os.umask(umask)
+        os.chdir(before)
+    with workers:
         yield workers
+    assert [path.name for path in folder.iterdir()] == ["distributed.py"]
+    assert not Path(workers._folder.name).exists()
+
+
+def scratch(dask_worker):
+    """The folder in which a worker writes, and from which Dask lets it import."""
+    return dask_worker.local_directory
+
+
+def test_workers_write_where_nobody_else_may(two):
+    private = Path(two._folder.name)
+    assert stat.S_IMODE(private.stat().st_mode) == 0o700
+    folders = [*two._client.run(scratch).values(), two._scheduler.scheduler.local_directory]
+    assert len(folders) == 3
+    assert all(private in Path(folder).parents for folder in folders)
 
 
 def alive(workers):
@@ -204,11 +231,29 @@ def test_a_run_has_certificates_of_its_own(two):
             distributed.Client(stranger, timeout=0.5, set_as_default=False, security=security)
 
 
-def test_without_cryptography_the_run_goes_on_over_loopback(monkeypatch):
-    monkeypatch.setattr(cluster, "_security", lambda distributed: None)
-    with Cluster(1) as one:
-        assert one._client.scheduler.address.startswith("tcp://127.0.0.1:")
-        assert same(collect(WORK, 16, executor=one), 16)
+def test_without_cryptography_no_worker_is_started(monkeypatch):
+    """Every user of this machine could send it programs to run."""
+    monkeypatch.setitem(sys.modules, "cryptography", None)
+    with pytest.raises(ConfigError, match=r"cryptography.*|need Dask: pip install 'radarsim\[cluster\]'"):
+        Cluster(1)
+
+
+def test_a_clock_that_is_set_back_ends_the_run(two, monkeypatch, tmp_path):
+    """Dask sends nothing before the time of day at which it was due, here an hour later."""
+    monkeypatch.setattr(store, "PERIOD_S", 0.1)
+    begun = time.monotonic()
+
+    def time_of_day():
+        return 1.8e9 + time.monotonic() - 3600 * (time.monotonic() > begun + 1)
+
+    monkeypatch.setattr(cluster, "time", SimpleNamespace(monotonic=time.monotonic, time=time_of_day))
+    two._time_of_day = time_of_day()
+    two._looked = time.monotonic()
+    with pytest.raises(ClusterError, match="its clock was set back by 3600 s"):
+        collect(Fake(pause_s=1e-2), 16 * 10_000, executor=two, store=tmp_path)
+    resumed = collect(WORK, N, store=tmp_path)
+    assert same(resumed)
+    assert resumed.from_store > 0
 
 
 @pytest.mark.parametrize(
@@ -268,6 +313,7 @@ def certificates(folder):
     folder.mkdir()
     for name, content in contents.items():
         (folder / name).write_bytes(content)
+        (folder / name).chmod(0o600)
     return [str(folder / name) for name in contents]
 
 
@@ -297,6 +343,31 @@ def settings(authority, own, key):
     comm, client = "distributed.comm", "distributed.comm.tls.client"
     given = {f"{comm}.tls.ca-file": authority, f"{client}.cert": own, f"{client}.key": key}
     return {f"{comm}.require-encryption": True, **given}
+
+
+@pytest.mark.parametrize(
+    ("name", "mode", "words"),
+    [
+        ("own-key.pem", 0o640, "holds a private key and can be read by other users: chmod 600"),
+        ("own-key.pem", 0o604, "holds a private key and can be read by other users: chmod 600"),
+        ("own-key.pem", 0o602, "can be written by every user"),
+        ("own.pem", 0o646, "can be written by every user"),
+        ("authority.pem", 0o666, "can be written by every user"),
+        ("own.pem", 0o644, "no Dask scheduler answers"),
+    ],
+)
+def test_credentials_in_which_others_have_a_hand_are_refused(tmp_path, monkeypatch, name, mode, words):
+    import dask
+    import distributed  # noqa: F401  # whose defaults have to be there before they are set
+
+    monkeypatch.setattr(cluster, "CONNECT_S", 0.1)
+    ours = certificates(tmp_path / "ours")
+    file = tmp_path / "ours" / name
+    file.chmod(mode)
+    with dask.config.set(settings(*ours)), pytest.raises(ConfigError, match=words) as error:
+        Cluster(scheduler="tls://127.0.0.1:9")
+    (line,) = error.value.lines
+    assert line.startswith(f"scheduler: {file}: " if "answers" not in words else "scheduler: ")
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ root and for anybody else.
 import contextlib
 import ctypes
 import os
+import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -174,3 +175,30 @@ def test_a_record_that_may_not_be_read_is_not_taken_for_a_damaged_one(command, m
         done = command("compare", made / "rls2", made / "rls2", "--no-figures", "--out", tmp_path)
     assert done.returncode == 4
     assert done.stderr == f"{record}: cannot be read: Permission denied\n"
+
+
+UNDER = "import os, sys; os.umask(int(os.environ['UMASK'], 8)); from radarsim.cli import main; main()"
+WRITTEN = (
+    ("run", "rls2", "-n", "2000", "--out", "results", "--set", "figures=[gain_r]"),
+    ("new", "mine", "--like", "rls2"),
+    ("new-study", "walk", "--folder"),
+    ("simulate", "rls2", "-o", "plots.csv"),
+)
+
+
+@pytest.mark.parametrize("umask", [0o000, pytest.param(0o077, marks=pytest.mark.slow)], ids=oct)
+def test_what_is_written_others_read_as_the_umask_has_it_and_never_write(command, tmp_path, umask):
+    """Tables, figures, reports, configs, studies, plots; of what was there before the right to write goes as well."""
+    (tmp_path / "results/rls2").mkdir(parents=True)
+    (tmp_path / "plots.csv").touch()
+    (tmp_path / "plots.csv").chmod(0o646)
+    before = {path: path.stat().st_mode for path in tmp_path.rglob("*") if path.is_dir()}
+    for words in WRITTEN:
+        done = command(*words, code=UNDER, cwd=tmp_path, UMASK=oct(umask))
+        assert done.returncode == 0, done.stderr
+    entries = [path for path in tmp_path.rglob("*") if ".blocks" not in path.parts and path not in before]
+    assert {path.suffix for path in entries} >= {".csv", ".svg", ".html", ".json", ".yaml", ".py", ""}
+    readable = 0o755 & ~umask
+    for path in entries:
+        bits = 0o644 if path.name == "plots.csv" else readable & (0o777 if path.is_dir() else 0o666)
+        assert stat.S_IMODE(path.stat().st_mode) == bits, path
