@@ -12,12 +12,15 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.variables import CLEARED
 from tests.warm import Start
 
 TESTS = Path(__file__).parent
 # Folders, in the order in which their groups begin; what is short is left for the end, where processes wait.
 LONG = ("studies", "trust", "cli", "app", "engine", "docs", "report", "language", "kernels", "recorded")
 
+for name in CLEARED:
+    os.environ.pop(name, None)
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does; no module of tests has loaded NumPy yet
 # What Hypothesis tests are laws, which hold on a machine that is busy, too: it looks at no clock.
 settings.register_profile("no clock", deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -1,11 +1,13 @@
-"""The command as a user types it, run in this process, and what it leaves in a folder of results."""
+"""The command as a user types it, and what it leaves in a folder of results."""
 
 import io
 import json
+import os
 
 from click.testing import CliRunner
 
 from radarsim.cli import main
+from radarsim.kernels.compile import cache_root
 
 
 class Terminal(io.StringIO):
@@ -35,3 +37,9 @@ def csv_bytes(folder):
 def record(folder):
     """What run.json of a result folder holds."""
     return json.loads((folder / "run.json").read_text(encoding="utf-8"))
+
+
+def newcomer(home, **more):
+    """The environment of somebody who has set nothing, with an empty home but a filled cache of kernels."""
+    given = {"PATH": os.defpath, "HOME": str(home), "LANG": "C.UTF-8", "RADARSIM_CACHE_DIR": str(cache_root())}
+    return given | more

@@ -29,12 +29,14 @@ LIMIT_S = 300
 class Start:
     """A process that has imported the libraries and, if asked, radarsim; what is given is the surroundings of all."""
 
-    def __init__(self, place: Path, *, radarsim: bool = True, preexec_fn=None, **environment: str):
-        """`place`: where programs leave what they print."""
+    def __init__(
+        self, place: Path, *, radarsim: bool = True, inherit: bool = True, preexec_fn=None, **environment: str
+    ):
+        """`place`: where programs leave what they print. `inherit`: the environment of this process, too."""
         self.printed = place / "stdout", place / "stderr"
         self.process = subprocess.Popen(
             [sys.executable, __file__, *PARTS[: len(PARTS) * radarsim]],
-            env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
+            env=(dict(os.environ) if inherit else {}) | {"PYTHONPATH": str(ROOT)} | environment,
             preexec_fn=preexec_fn,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -58,7 +60,7 @@ class Start:
         asked |= {"environment": environment, "printed": [str(file) for file in self.printed]}
         print(json.dumps(asked), file=self.process.stdin, flush=True)
         ended = int(self.process.stdout.readline())
-        said = [file.read_text(encoding="utf-8") for file in self.printed]
+        said = [file.read_text(encoding="utf-8", errors="surrogateescape") for file in self.printed]
         return subprocess.CompletedProcess([module, *argv], ended, *said)
 
 

@@ -2,10 +2,10 @@
 
 import gc
 import os
-import sys
 
 from radarsim.cli import design, experiments, maintenance, own_data
 from radarsim.cli.group import main
+from radarsim.cli.streams import tolerant_output
 
 # Matrices here are of a few rows: where other processes run too, a second thread of OpenBLAS made a Riccati equation
 # cost 15 times its processor time. It reads this when NumPy loads it, which is not yet.
@@ -15,12 +15,7 @@ __all__ = ["design", "entry", "experiments", "main", "maintenance", "own_data", 
 
 
 def entry() -> None:
-    """The console script: `main` with streams that are there and can hold every character."""
-    for name in ("stdout", "stderr"):
-        stream = getattr(sys, name)
-        if stream is None:
-            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
-        elif hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")
+    """The console script: `main`, whose output may be written anywhere or nowhere."""
     gc.set_threshold(100_000)  # a tenth of a start went into collecting objects of Numba and pandas that stay
-    main()
+    with tolerant_output():
+        main()

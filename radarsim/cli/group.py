@@ -55,19 +55,11 @@ class Commands(click.Group):
         before = ON_COMMAND_LINE.set(True)
         try:
             with stoppable():
-                result = super().invoke(ctx)
-                sys.stdout.flush()
-                return result
+                return super().invoke(ctx)
         except RadarsimError as error:
             fail(error)
-        except BrokenPipeError:
-            # The reader of our output has closed it (`| head`), which is no fault.
-            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
-            sys.exit(0)
         except OSError as error:
-            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
-            what = f"{error.filename}: cannot be read or written" if error.filename else "output: cannot be written"
-            fail(StoreError(f"{what}: {error.strerror or error}"))
+            fail(file_fault(error))
         except OF_AUTHORS as error:
             if error.args == (NO_THREAD,):
                 fail(ConfigError("no thread can be started here; --threads 0 needs none"))
@@ -129,14 +121,18 @@ def fail(error: RadarsimError) -> NoReturn:
     """Report a fault, a line each, and leave with its exit code."""
     from radarsim.cli.console import broken
 
-    with contextlib.suppress(OSError):  # errors that cannot be written either: the exit code remains
-        for line in dict.fromkeys(error.lines):
-            for part in broken(line, sys.stderr):
-                click.echo(part, err=True)
+    for line in dict.fromkeys(error.lines):
+        for part in broken(line, sys.stderr):
+            click.echo(part, err=True)
     if isinstance(error, Interrupted):
         # The interpreter's orderly end takes most of a second, which whoever sent the signal need not wait for.
         os._exit(error.exit_code)
     sys.exit(error.exit_code)
+
+
+def file_fault(error: OSError) -> StoreError:
+    """What a user is told of a file that the system refuses."""
+    return StoreError(f"{error.filename or 'a file'}: cannot be read or written: {error.strerror or error}")
 
 
 class Count(click.ParamType):

@@ -3,7 +3,6 @@
 python -m radarsim.cli.reproduce [OUT [CONFIG…]] [--set KEY=VALUE] [--no-figures]"""
 
 import argparse
-import os
 import sys
 import time
 from collections.abc import Sequence
@@ -12,9 +11,11 @@ from radarsim.app.configs import RESULTS
 from radarsim.app.reproduce import reproduce, summary
 from radarsim.app.run import load_all
 from radarsim.cli import console
+from radarsim.cli.group import file_fault
+from radarsim.cli.streams import tolerant_output
 from radarsim.config import document
 from radarsim.engine.run import Signals
-from radarsim.errors import ON_COMMAND_LINE, RadarsimError, StoreError
+from radarsim.errors import ON_COMMAND_LINE, RadarsimError
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -33,20 +34,14 @@ def main(arguments: Sequence[str]) -> int:
             done = reproduce(stems, asked.out, console.say, stop, asked.set, not asked.no_figures)
             for line in summary(done, asked.out, time.perf_counter() - started):
                 console.say(line)
-            sys.stdout.flush()
-        except RadarsimError as error:
+        except (RadarsimError, OSError) as caught:
+            error = file_fault(caught) if isinstance(caught, OSError) else caught
             sys.stderr.write("".join(f"{line}\n" for line in error.lines))
             return error.exit_code
-        except BrokenPipeError:  # its reader has seen enough
-            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
-            return 0
-        except OSError as error:
-            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
-            sys.stderr.write(f"output: cannot be written: {error.strerror or error}\n")
-            return StoreError.exit_code
     return max((one.code for one in done), default=0)
 
 
 if __name__ == "__main__":
     ON_COMMAND_LINE.set(True)
-    sys.exit(main(sys.argv[1:]))
+    with tolerant_output():
+        sys.exit(main(sys.argv[1:]))

@@ -6,6 +6,7 @@ Reasons to stop a run: a stop condition is called between tasks and gives None o
 
 Executors run tasks: they take (work, piece) and return outcomes in any order."""
 
+import contextlib
 import math
 import os
 import select
@@ -133,7 +134,8 @@ class Signals:
 
     @staticmethod
     def _end(first: int, second: int) -> NoReturn:
-        os.write(2, f"{Interrupted(first)}\n".encode())
+        with contextlib.suppress(OSError):
+            os.write(2, f"{Interrupted(first)}\n".encode())
         os._exit(128 + (second or first))
 
     def _next(self, patience_s: float | None) -> int | None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from radarsim.cli import main
-from tests.program import command, csv_bytes, record
+from tests.program import command, csv_bytes, newcomer, record
 
 CURVES = "case,filter,component,unit,k,t_s,n,sigma,sigma_lo,sigma_hi,bias,bias_se,spread,exact_sigma,exact_bias,n_eff"
 GAINS = "case,filter,baseline,component,k,t_s,gain_percent,gain_lo,gain_hi,exact_percent"
@@ -210,22 +210,21 @@ def process(*arguments, **options):
     return subprocess.run([sys.executable, "-m", "radarsim", *arguments], capture_output=True, check=False, **options)
 
 
-def test_output_that_cannot_be_written_and_output_that_nobody_reads():
-    shell = f"{sys.executable} -m radarsim list"
-    full = subprocess.run(f"{shell} > /dev/full", shell=True, capture_output=True, check=False)
-    assert full.returncode == 4
-    assert b"No space left" in full.stderr
-    closed = subprocess.run(f"{shell} >&-", shell=True, capture_output=True, check=False)
+def test_output_that_cannot_be_written_and_output_that_nobody_reads(tmp_path):
+    """More states of the streams: tests/cli/test_surroundings.py."""
+    shell, options = f"{sys.executable} -m radarsim list", {"capture_output": True, "env": newcomer(tmp_path)}
+    full = subprocess.run(f"{shell} > /dev/full", shell=True, check=False, **options)
+    assert (full.returncode, full.stderr) == (4, b"output: cannot be written: No space left on device\n")
+    closed = subprocess.run(f"{shell} >&-", shell=True, check=False, **options)
     assert (closed.returncode, closed.stderr) == (0, b"")
-    piped = subprocess.run(
-        ["bash", "-c", f"{shell} | head -1; exit ${{PIPESTATUS[0]}}"], capture_output=True, check=False
-    )
+    piped = subprocess.run(["bash", "-c", f"{shell} | head -1; exit ${{PIPESTATUS[0]}}"], check=False, **options)
     assert (piped.returncode, piped.stderr) == (0, b"")
 
 
-def test_errors_that_cannot_be_written_leave_the_exit_code():
-    done = subprocess.run(f"{sys.executable} -m radarsim check nope 2> /dev/full", shell=True, check=False)
-    assert done.returncode == 2
+@pytest.mark.parametrize("variables", [{}, {"PYTHONUNBUFFERED": "1"}], ids=["buffered", "unbuffered"])
+def test_errors_that_cannot_be_written_leave_the_exit_code(tmp_path, variables):
+    shell = f"{sys.executable} -m radarsim check nope 2> /dev/full"
+    assert subprocess.run(shell, shell=True, check=False, env=newcomer(tmp_path, **variables)).returncode == 2
 
 
 def test_a_path_that_is_no_text(tmp_path):

@@ -240,7 +240,7 @@ def test_without_cryptography_no_worker_is_started(monkeypatch):
 
 def test_a_clock_that_is_set_back_ends_the_run(two, monkeypatch, tmp_path):
     """Dask sends nothing before the time of day at which it was due, here an hour later."""
-    monkeypatch.setattr(store, "PERIOD_S", 0.1)
+    monkeypatch.setattr(store_writer, "PERIOD_S", 0.1)
     begun = time.monotonic()
 
     def time_of_day():
