@@ -312,9 +312,19 @@ def burst_condition(plan):
     """How much a relative error of the samples is multiplied in estimates over their potential σ, (F, K, C).
 
     A step adds (Φ + P)⁻¹ g: g, the gradient in turns, is a sum over the window whose terms have the size 2π A²/σ² each.
-    A search that has converged forgets with what rounding it came there, so that the last step counts.
+    A search that has converged forgets with what rounding it came there, so that the last step counts. Block sums are
+    drawn by the root of their covariance: of one that is nearly singular, the least pivot being r² of its variance,
+    the root is off by 1/2r as much, and the errors, of one σ together, are sums over √n σ of normals.
     """
+    from radarsim.bursts.kernels import scoring
+
     physics, size = plan.world.physics, plan.layout.shapes["error"][2]
+    noise = 0.0
+    if physics["mode"] == scoring.BLOCK_SUMS:
+        root = np.zeros((len(plan.world.factor), 4, 4))
+        root[:, *np.tril_indices(4)] = plan.world.factor
+        pivots = np.diagonal(root, axis1=1, axis2=2) / np.linalg.norm(root, axis=2)
+        noise = np.sqrt(pivots.size) / (2 * pivots[pivots > 0].min())
     term = 2 * np.pi * float(physics["amplitude"]) ** 2 / float(physics["sigma"]) ** 2
     condition = np.zeros(plan.potential[..., :size].shape)
     for f, options in enumerate(plan.options):
@@ -322,7 +332,7 @@ def burst_condition(plan):
             root = window["root"][:size, :size]
             gradient = term * window["pulses"] * physics["samples_per_pulse"]
             step = gradient * np.abs(root.T @ root).sum(axis=1) / window["powers"][:size]
-            condition[f, k] = step / plan.potential[f, k, :size]
+            condition[f, k] = step / plan.potential[f, k, :size] + noise
     return condition
 
 
