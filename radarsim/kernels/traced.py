@@ -373,7 +373,8 @@ ATAN = (
 
 
 def atan2(y: Any, x: Any) -> Any:
-    """The angle of the point (x, y) from the axis of x, from -π to π; of lanes to 3 units in the last place, at (0, 0) zero."""
+    """The angle of the point (x, y) from the axis of x, from -π to π, at (0, 0) zero; of lanes to 3 units in the last
+    place."""
     if not isinstance(x, Lane) and not isinstance(y, Lane):
         return np.arctan2(y + 0.0, x + 0.0)  # -0.0 is 0.0, as of lanes
     a, b = abs(x), abs(y)
