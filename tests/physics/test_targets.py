@@ -102,8 +102,8 @@ def test_process_noise_is_what_the_manoeuvre_leads_to(kind):
     from radarsim.physics import process_noise
 
     dt, steps = 3.0, 20_000
-    # A step of the loop leaves out h³/6 of a jerk, 1/steps² of the position, twice that of its square; the midpoint rule
-    # errs by half a 1/steps². The sum of so many terms has as many roundings.
+    # A step of the loop leaves out h³/6 of a jerk, 1/steps² of the position, twice that of its square; the midpoint
+    # rule errs by half a 1/steps². The sum of so many terms has as many roundings.
     allowed = 2 / steps**2 + rounding(operations=steps)
     np.testing.assert_allclose(process_noise(kind, 2.0, dt), 2.0 * numbers_of(kind, dt, steps), rtol=allowed)
     # The acceleration gains the same in all.
