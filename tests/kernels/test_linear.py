@@ -90,9 +90,13 @@ def test_gains_are_the_papers_closed_forms(radar, observes, start, variance):
     expected = naive.gains(observes, start, variance, sigma, dt, K)
     units = np.array([1.0, 1.0 / dt, 1.0 / dt**2])[:, None] / np.array([1.0, 1.0 / dt])
     got = filters.design(observes, start, variance, sigma, dt, K).gains
-    # Gains are up to one in these units; a closed form is a ratio of covariances, which the twin extrapolates.
+    # Gains are up to two in these units. An update leaves of a variance what is not cancelled, P − K H P, and divides
+    # by the innovation's covariance S: ten operations on each of them.
     _, P = naive.kalman(np.zeros((K, 2)), observes, start, variance, sigma, dt)
-    condition = scaled_condition(P[start - 1 :]).max()
+    before, H = naive.transition(dt) @ P[start - 1 : -1] @ naive.transition(dt).T, naive.observation(observes)
+    before = before + naive.manoeuvre(variance, dt)
+    left = (np.diagonal(P[start:], axis1=1, axis2=2) / np.diagonal(before, axis1=1, axis2=2)).min()
+    condition = scaled_condition(H @ before @ H.T + np.diag(sigma[:observes] ** 2)).max() / left
     assert_rounded(got / units, expected / units, np.ones(got.shape), condition, operations=10)
 
 
