@@ -9,7 +9,7 @@ SMOKE := $(VENV)/smoke
 # Drawing takes twice as long as all the rest: `make smoke SMOKE_FLAGS=` draws too.
 SMOKE_FLAGS ?= --no-figures
 
-.PHONY: run environment test slow machines mutants lint smoke reproduce-figures claims-page readings-pages bench schema known docs docs-numbers docs-pictures docs-examples docs-house messages clean
+.PHONY: run environment test slow machines processors mutants lint smoke reproduce-figures claims-page readings-pages bench schema known docs docs-numbers docs-pictures docs-examples docs-house messages clean
 
 # Containers often forbid Python to keep what it compiles: every process of the tests would compile the package anew.
 unexport PYTHONDONTWRITEBYTECODE
@@ -33,9 +33,16 @@ test: $(VENV)/tested
 slow: $(VENV)/tested
 	$(BIN)/python -m pytest -m slow
 
-# Two BLAS kernels, two compiler targets, NumPy with and without AVX; `make slow` tries them all.
+# Two older processors: BLAS kernels, NumPy's loops and the compiler's target are theirs. The self-test, and those tests of
+# numbers that every change has time for.
+PROCESSORS = $(BIN)/python -m tests.trust.processors
 machines: $(VENV)/tested
 	$(BIN)/python -m pytest -n $(JOBS) --maxprocesses 8 -m machines $(call marked,machines)
+	$(PROCESSORS) -n $(JOBS) --maxprocesses 8 --dist loadgroup --no-loadscope-reorder
+
+# All tests of numbers as these processors compute them; before a release.
+processors: $(VENV)/tested
+	$(PROCESSORS) all -n $(JOBS) --maxprocesses 8 --dist loadgroup --no-loadscope-reorder
 
 # Faults of meaning, then a sample of wrong formulas, another each day; nightly, as it takes an hour and more.
 mutants: $(VENV)/tested

@@ -275,7 +275,7 @@ def put(typingctx, pointer, row, value):
 
 @inline
 def exponential(x):
-    """exp x for x from -700 to 700, to 2 units in the last place; below -700 as at -700. 2**n times the Taylor series
+    """exp x for x from -700 to 700, to 3 units in the last place; below -700 as at -700. 2**n times the Taylor series
     of exp on |r| <= ln 2 / 2, with ln 2 in two parts (Cody and Waite)."""
     x = where_greater(x, full(-700.0), x, full(-700.0))
     n = nearest(x * 1.4426950408889634)

@@ -318,7 +318,7 @@ def power_of_two(x: Any) -> Any:
 
 
 def exp(x: Any) -> Any:
-    """exp x for x from -700 to 700; of lanes to 2 units in the last place, below -700 as at -700."""
+    """exp x for x from -700 to 700; of lanes to 3 units in the last place, below -700 as at -700."""
     if not isinstance(x, Lane):
         return np.exp(x)
     from radarsim.kernels.lanes import exponential
@@ -373,7 +373,8 @@ ATAN = (
 
 
 def atan2(y: Any, x: Any) -> Any:
-    """The angle of the point (x, y) from the axis of x, from -π to π; of lanes to 4·10⁻¹⁶ of itself, at (0, 0) zero."""
+    """The angle of the point (x, y) from the axis of x, from -π to π, at (0, 0) zero; of lanes to 3 units in the last
+    place."""
     if not isinstance(x, Lane) and not isinstance(y, Lane):
         return np.arctan2(y + 0.0, x + 0.0)  # -0.0 is 0.0, as of lanes
     a, b = abs(x), abs(y)

@@ -290,10 +290,65 @@ def sums(config, overrides, count, errors=False):
 
 
 def bursts(config, overrides, count):
-    """Errors in potential spreads of each burst by itself, locked or not, (realisation, estimator, time, component)."""
-    one = work(config, overrides)
-    each = [one.plan.layout.unpack(one.simulate(8 + i, 1))["error_all"][..., 0] for i in range(count)]
-    return {"bursts/each": np.stack(each)}
+    """Errors over the potential σ of each burst, (realisation, estimator, window, component), and what they are to.
+
+    Their sums are of bursts that lock and others: see `burst_sums`.
+    """
+    from radarsim.studies.discriminator import study
+
+    plan = work(config, overrides).plan
+    size = plan.layout.shapes["error"][2]
+    arrays = {}
+    if plan.mixture is None:
+        errors, arrays["passes"] = study.estimate(plan, 8, count)
+    else:
+        errors, arrays["passes"], arrays["weights"], _ = study.weighted_estimates(plan, 8, count)
+    arrays["bursts"] = errors[..., :size] / plan.potential[..., :size]
+    arrays["condition"] = burst_condition(plan)
+    return arrays
+
+
+def burst_condition(plan):
+    """How much a relative error of the samples is multiplied in estimates over their potential σ, (F, K, C).
+
+    A step adds (Φ + P)⁻¹ g: g, the gradient in turns, is a sum over the window whose terms have the size 2π A²/σ² each.
+    A search that has converged forgets with what rounding it came there, so that the last step counts. Block sums are
+    drawn by the root of their covariance: of one that is nearly singular, the least pivot being r² of its variance,
+    the root is off by 1/2r as much, and the errors, of one σ together, are sums over √n σ of normals.
+    """
+    from radarsim.bursts.kernels import scoring
+
+    physics, size = plan.world.physics, plan.layout.shapes["error"][2]
+    noise = 0.0
+    if physics["mode"] == scoring.BLOCK_SUMS:
+        root = np.zeros((len(plan.world.factor), 4, 4))
+        root[:, *np.tril_indices(4)] = plan.world.factor
+        pivots = np.diagonal(root, axis1=1, axis2=2) / np.linalg.norm(root, axis=2)
+        noise = np.sqrt(pivots.size) / (2 * pivots[pivots > 0].min())
+    term = 2 * np.pi * float(physics["amplitude"]) ** 2 / float(physics["sigma"]) ** 2
+    condition = np.zeros(plan.potential[..., :size].shape)
+    for f, options in enumerate(plan.options):
+        for k, window in enumerate(plan.windows[f, : options["windows"]]):
+            root = window["root"][:size, :size]
+            gradient = term * window["pulses"] * physics["samples_per_pulse"]
+            step = gradient * np.abs(root.T @ root).sum(axis=1) / window["powers"][:size]
+            condition[f, k] = step / plan.potential[f, k, :size] + noise
+    return condition
+
+
+def burst_sums():
+    """Sums over bursts whose errors are given: locked or not, no search has its end in them."""
+    from radarsim.studies.discriminator import kernels
+
+    plan = work(*RUNS["discriminator on block sums"][:2]).plan
+    draw = np.random.default_rng(5)
+    errors = plan.potential * draw.standard_normal((40, *plan.potential.shape)) * draw.choice([1, 3], (40, 1, 1, 1))
+    weights = draw.uniform(0.1, 2, len(errors))
+    arrays = {name: np.zeros(plan.layout.shapes[name]) for name in kernels.Sums._fields}
+    losses = np.zeros((*plan.potential.shape[:2], len(kernels.LOCKS), 4))
+    kernels.accumulate(errors, plan.options, plan.potential, plan.posterior, kernels.Sums(**arrays))
+    kernels.accumulate_losses(errors, plan.options, plan.potential, plan.posterior, weights, losses)
+    return arrays | {"losses": losses}
 
 
 def tracks():
@@ -413,12 +468,13 @@ def numbers():
     made |= {f"patterns/{name}": array for name, array in alike().items()}
     made |= {f"matrices of {name}": array for name, array in matrices().items()}
     made |= {f"given gains/{name}": array for name, array in given().items()}
-    made |= bursts(*RUNS["discriminator on block sums"])
+    made |= {f"discriminator sums/{name}": array for name, array in burst_sums().items()}
     for run, scans in ERRORS.items():
         config, overrides, _ = RUNS[run]
         made |= {f"{run}/{name}": v for name, v in sums(config, [*overrides, f"scans={scans}"], 1, errors=True).items()}
     for run, arguments in RUNS.items():
-        made |= {f"{run}/{name}": array for name, array in sums(*arguments).items()}
+        calculate = bursts if run.startswith("discriminator") else sums
+        made |= {f"{run}/{name}": array for name, array in calculate(*arguments).items()}
     return made
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import binom
 
 from radarsim.report import statistics
+from tests.tolerances import mean_error, rounding
 
 REPETITIONS, MANY = 2000, 8000  # many: so that the bounds are five standard errors away
 GAUSSIAN, HEAVY = (0.936, 0.964), (0.925, 1.0)
@@ -152,8 +153,10 @@ def test_pairing_narrows_a_gain():
     a, b, cross = moments(own), moments(base), (own**2 * base**2).sum(axis=-1)
     paired = statistics.gain(a[:, 1], a[:, 3], b[:, 1], b[:, 3], cross, n)
     independent = statistics.gain(a[:, 1], a[:, 3], b[:, 1], b[:, 3], a[:, 1] * b[:, 1] / n, n)
-    ratio = np.median((paired.hi - paired.lo) / (independent.hi - independent.lo))
-    assert ratio == pytest.approx(0.6, abs=0.01)
+    ratios = (paired.hi - paired.lo) / (independent.hi - independent.lo)
+    # The spread of a median is √(π/2) that of a mean; what a ratio of estimates is biased by is a few 1/n.
+    allowed = mean_error(len(ratios), math.sqrt(math.pi / 2) * ratios.std()) + 3 / n
+    assert np.median(ratios) == pytest.approx(0.6, abs=allowed)
 
 
 @pytest.mark.parametrize("looks", [1, 15, 400])
@@ -183,8 +186,10 @@ def test_antithetic_pairs_double_the_variance():
     problem = study.prepare(load("rls2", ["scans=8"]).cases[0]).problem
     truth, plots = problem.truth, linear.simulate_plots(problem, 0, 20_000)
     error, mirrored = (linear.estimate(problem, p)[:, :, -1] - truth[-1] for p in (plots, 2 * truth[:, :2] - plots))
-    scale = error.std(axis=0)
-    assert np.abs((error**2 - mirrored**2) / scale**2).max() < 1e-6
+    # Estimates, of ranges of 100 km, are rounded by ten operations a scan; a square's difference is twice the error's.
+    off = rounding(operations=80) * np.abs(truth[:, 0]).max() / problem.dt.max() ** np.arange(3)
+    assert (np.abs(error**2 - mirrored**2) <= 4 * np.abs(error).max(axis=0) * off).all()
     plain = np.square(error).reshape(200, 100, 2, 3).mean(axis=1).var(axis=0)
     paired = ((error**2 + mirrored**2) / 2).reshape(400, 50, 2, 3).mean(axis=1).var(axis=0)
-    np.testing.assert_allclose(paired / plain, 2, rtol=8 / math.sqrt(200))
+    # Variances of 200 and 400 means: relative standard errors √(2/n); six of them.
+    np.testing.assert_allclose(paired / plain, 2, rtol=5 * math.sqrt(2 / 200 + 2 / 400))

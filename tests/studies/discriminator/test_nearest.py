@@ -9,6 +9,7 @@ from radarsim.bursts.kernels.scoring import SIZE
 from radarsim.studies.discriminator import nearest, study
 from tests.studies.discriminator.test_rare import RARELY, lone_window, plan_of
 from tests.studies.discriminator.test_study import BASE
+from tests.tolerances import rounding
 
 HAND_OVERS = (3, 9, 13)  # of the windows of RARELY, of which there are 16
 
@@ -105,7 +106,11 @@ def test_the_conjugate_burst_errs_the_other_way():
     z = np.random.default_rng(2).standard_normal((8, SIZE + 4 * len(plan.world.factor)))
     other = np.array([nearest.mirrored(one) for one in z])
     one, two = room.errors(0, z), room.errors(0, other)
-    assert np.abs(one + two).max() < 1e-6 * np.abs(one).max()
+    # Where they lock: elsewhere the end of a search is not defined by the arithmetic.
+    locked = (np.abs(one) < 5 * plan.potential[0])[..., :5].all(axis=(1, 2))
+    assert locked.sum() > 3
+    tolerance = plan.options[0]["tolerance"]  # scoring ends at a step of so many σ, squared by the next
+    assert (np.abs(one + two)[locked] <= tolerance**2 * plan.potential[0]).all()
     assert np.array_equal(np.array([nearest.mirrored(each) for each in other]), z)
 
 
@@ -139,4 +144,4 @@ def test_a_direction_without_a_loss_has_none(plan, room):
 def test_units_have_length_one(found):
     for _, losses in found.values():
         for loss in losses:
-            assert math.fsum(loss.unit**2) == pytest.approx(1, rel=1e-15)
+            assert math.fsum(loss.unit**2) == pytest.approx(1, rel=rounding(operations=2))

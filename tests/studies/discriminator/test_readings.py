@@ -14,6 +14,7 @@ from radarsim.report.claims.over import Unreadable, under
 from radarsim.studies import registry
 from radarsim.studies.discriminator import study
 from radarsim.studies.discriminator.readings import PRINTED_PRIOR, ExactEvidence, Readings, windows
+from tests.tolerances import rounding, scaled_condition
 
 OF = Readings()
 CLAIMS = {one.id: one for one in registry.study("discriminator").claims().claims}
@@ -39,7 +40,7 @@ def test_exact_windows_are_those_that_a_run_designs(cases):
         axes = registry.study("discriminator").prepare(cases[noise]).axes
         designed = axes.duration_s[0][np.isfinite(axes.duration_s[0])]
         seen = ExactEvidence(OF.reading(**taken))
-        np.testing.assert_allclose(seen.windows("computed"), designed, rtol=1e-12)
+        np.testing.assert_allclose(seen.windows("computed"), designed, rtol=rounding(operations=2))
 
 
 def test_the_probability_of_a_miss_is_that_of_the_prepared_case(cases):
@@ -53,8 +54,11 @@ def test_the_probability_of_a_miss_is_that_of_the_prepared_case(cases):
         designer = model.Designer(burst, axes.prior_sigma, fisher, condition)
         times = burst.pulse_period_s * np.array(axes.pulses[0])
         forms = [designer.handover(before)(after).values for before, after in pairwise(times[:-1])]
+        # Forms are of inverses; a tail of 0.02 changes by some four times the relative change of its weights.
+        known = np.diag(model.phase_prior(axes.prior_sigma))
+        allowed = 4 * rounding(max(scaled_condition(fisher(t) + known) for t in times), 25)
         wanted = max(model.tail_probability(form, condition.threshold) for form in forms)
-        assert ExactEvidence(OF.reading(**taken)).worst_handover("any").value == pytest.approx(wanted, rel=1e-6)
+        assert ExactEvidence(OF.reading(**taken)).worst_handover("any").value == pytest.approx(wanted, rel=allowed)
         assert 0.02 < wanted < 0.025
 
 
@@ -63,8 +67,8 @@ def test_other_windows_go_into_the_config(cases):
     changed = OF.changed(CLAIMS["P4.4"], cases[2.25], reading)
     wanted = np.array(windows(ExactEvidence(reading)._version)) * 1e-5
     of = {one.name: one for one in changed.spec.estimators}
-    np.testing.assert_allclose(of["sequence"].schedule, wanted)
-    np.testing.assert_allclose(of["wide"].schedule, wanted[:1])
+    np.testing.assert_allclose(of["sequence"].schedule, wanted, rtol=rounding(operations=2))
+    np.testing.assert_allclose(of["wide"].schedule, wanted[:1], rtol=rounding(operations=2))
     assert of["narrow"].schedule == (0.3,)
 
 
@@ -86,7 +90,7 @@ def test_what_is_exact_by_reading():
     assert say["9"].shortest_window("any", 1.17).value == pytest.approx(1.315, abs=5e-4)
     for component, printed in (("phi0", 0.061), ("f0", 0.45), ("f1", 12.2)):
         ratio = say["9"].potential("any", component).value / say["2.25"].potential("any", component).value
-        assert ratio == pytest.approx(2.0)
+        assert ratio == pytest.approx(2.0, rel=rounding(2.1e5, 5))  # κ of five powers of time
         assert say["2.25"].potential("any", component).value == pytest.approx(printed, rel=5e-3)
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.errors import ConfigError
+from tests.tolerances import rounding
 
 SENSOR = {"sigma_range_m": 2.5, "sigma_elevation_deg": 0.1, "sigma_azimuth_deg": 0.1, "scan_period_s": 0.05}
 MODEL = {"motion": "uniform", "sigma_acceleration_mps2": 1}
@@ -29,7 +30,7 @@ def imm(transition, models=2, **changes):
 
 def test_defaults_are_the_papers():
     spec = load(config()).cases[0].spec
-    assert np.allclose(spec.sensor.sigma, (2.5, np.radians(0.1), np.radians(0.1)))
+    assert spec.sensor.sigma == pytest.approx((2.5, np.radians(0.1), np.radians(0.1)), rel=rounding(operations=2))
     (f,) = spec.filters
     assert (f.merge, f.output, f.transition, f.covariance_at) == ("combined", "best", ((1.0,),), "plot")
 

@@ -6,23 +6,30 @@ from scipy.linalg import fractional_matrix_power
 
 from radarsim.kernels import algebra
 from radarsim.studies.multimodel import cost, world
+from tests.tolerances import assert_rounded
 
 PRINTED = np.array([[0.996, 0, 0.002], [0, 0.996, 0.002], [0.004, 0.004, 0.996]])
 TWO = np.array([[0.995, 0.01], [0.005, 0.99]])
 
 
 def test_stationary_probabilities():
-    assert np.allclose(world.stationary(PRINTED), [0.25, 0.25, 0.5])
-    assert np.allclose(world.stationary(TWO), [2 / 3, 1 / 3])
-    assert np.allclose(world.stationary(np.eye(4)), 0.25)
-    assert np.allclose(world.stationary(np.array([[0.0, 1], [1, 0]])), 0.5)
-    assert np.allclose(world.stationary(np.ones((1, 1))), 1)
+    """To rounding of what is left of 1 − T where models last long: a thousandth."""
+    for T, wanted in (
+        (PRINTED, [0.25, 0.25, 0.5]),
+        (TWO, [2 / 3, 1 / 3]),
+        (np.eye(4), np.full(4, 0.25)),
+        (np.array([[0.0, 1], [1, 0]]), np.full(2, 0.5)),
+        (np.ones((1, 1)), np.ones(1)),
+    ):
+        assert_rounded(world.stationary(T), wanted, condition=1e3, operations=4)
 
 
 @pytest.mark.parametrize("T", [PRINTED, TWO])
 def test_whole_powers_are_powers(T):
     for m in (1, 2, 20, 1200):
-        assert np.allclose(world.transition_powers(T, np.array([m]))[0], np.linalg.matrix_power(T, m), atol=1e-13)
+        power = np.linalg.matrix_power(T, m)
+        # Probabilities of up to one; each of m steps rounds the sums of T once.
+        assert_rounded(world.transition_powers(T, np.array([m]))[0], power, np.ones(T.shape), operations=3 + m)
 
 
 @pytest.mark.parametrize("T", [PRINTED, TWO])
@@ -30,7 +37,7 @@ def test_fractional_powers_are_probabilities_near_the_real_power(T):
     m = np.array([1e-6, 0.1, 0.5, 0.9, 0.999, 1.3, 7.77])
     powers = world.transition_powers(T, m)
     assert np.all(powers >= 0)
-    assert np.allclose(powers.sum(axis=1), 1, atol=1e-14)
+    assert_rounded(powers.sum(axis=1), np.ones((len(m), len(T))), operations=25)  # products of a few such matrices
     for power, exponent in zip(powers, m, strict=True):
         assert np.abs(power - fractional_matrix_power(T, exponent)).max() < 1e-5
     assert np.abs(powers[0] - np.eye(len(T))).max() < 1e-7
@@ -46,17 +53,21 @@ def test_rates_are_those_of_a_process():
     """The logarithm of the printed matrix has negative rates."""
     Q = world.generator(PRINTED)
     assert (Q - np.diag(np.diag(Q))).min() == 0
-    assert np.abs(Q.sum(axis=0)).max() < 1e-16
+    assert_rounded(Q.sum(axis=0), np.zeros(3), np.abs(Q).sum(axis=0), operations=3)
 
 
 def test_start_is_least_squares_with_its_covariance():
     t, spread = np.array([0.0, 0.9, 2.1]), 30.0
     a, b, g = world.start_weights(t, spread).reshape(3, 3)
     A = np.stack([np.ones(3), t - t[2]], axis=1)
-    assert np.allclose([a, b], np.linalg.pinv(A))
+    # κ of the three times is some two; weights are up to 1/s.
+    inverse = np.linalg.pinv(A)
+    largest = np.full(inverse.shape, np.abs(inverse).max())
+    assert_rounded([a, b], inverse, largest, np.linalg.cond(A) ** 2, operations=9)
     w = 4.0  # of a target that accelerates the estimate errs by g w / spread
     z = 7 + 3 * (t - t[2]) + w * (t - t[2]) ** 2 / 2
-    assert np.allclose([a @ z - 7, b @ z - 3, 0 - w], g * w / spread)
+    size = np.abs([a, b, a]) @ np.abs(z) + 7
+    assert_rounded([a @ z - 7, b @ z - 3, 0 - w], g * w / spread, size, np.linalg.cond(A) ** 2, operations=9)
 
 
 class ExactZero:
