@@ -9,7 +9,7 @@ SMOKE := $(VENV)/smoke
 # Drawing takes twice as long as all the rest: `make smoke SMOKE_FLAGS=` draws too.
 SMOKE_FLAGS ?= --no-figures
 
-.PHONY: run environment test slow machines processors mutants lint smoke reproduce-figures claims-page readings-pages bench schema known docs docs-numbers docs-pictures docs-examples docs-house messages clean
+.PHONY: run environment test slow machines processors mutants version-environments versions lowest lint smoke reproduce-figures claims-page readings-pages bench schema known docs docs-numbers docs-pictures docs-examples docs-house messages clean
 
 # Containers often forbid Python to keep what it compiles: every process of the tests would compile the package anew.
 unexport PYTHONDONTWRITEBYTECODE
@@ -43,6 +43,18 @@ machines: $(VENV)/tested
 # All tests of numbers as these processors compute them; before a release.
 processors: $(VENV)/tested
 	$(PROCESSORS) all -n $(JOBS) --maxprocesses 8 --dist loadgroup --no-loadscope-reorder
+
+# The lowest packages on the oldest Python at hand and the newest on the newest; ALL=1: both on every Python, and every
+# config. The environments need an index of packages, the rest does not.
+ALL ?=
+version-environments: $(VENV)/versions/installed$(ALL)
+
+versions: $(VENV)/versions/installed$(ALL)
+	$(BIN)/python -m tests.trust.versions check $(if $(ALL),--all)
+
+# constraints-lowest.txt, after a change of a lower bound in pyproject.toml; wants `uv` on PATH.
+lowest: $(VENV)/tested
+	$(BIN)/python -m tests.trust.versions lowest
 
 # Faults of meaning, then a sample of wrong formulas, another each day; nightly, as it takes an hour and more.
 mutants: $(VENV)/tested
@@ -131,4 +143,8 @@ $(VENV)/tested: $(VENV)/installed
 
 $(VENV)/documented: $(VENV)/installed
 	$(INSTALL) '.[docs]'
+	touch $@
+
+$(VENV)/versions/installed$(ALL): pyproject.toml constraints-lowest.txt $(VENV)/tested
+	$(BIN)/python -m tests.trust.versions install $(if $(ALL),--all)
 	touch $@

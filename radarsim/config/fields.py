@@ -19,7 +19,7 @@ import typing
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from copy import copy
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cache
 from types import FunctionType
@@ -197,6 +197,18 @@ class Model(BaseModel):
     """A frozen mapping of known keys; `_deg` twins are turned into radians before anything is checked."""
 
     model_config = pydantic.ConfigDict(frozen=True, extra="forbid")
+
+    def __init_subclass__(cls, **settings: Any) -> None:
+        """Give the class keys of its own before pydantic collects them.
+
+        A key object may serve several classes. Before 2.11.7 pydantic adds the marks of each class to that object, so
+        that a class would have the marks of all that were defined before it, and with them another identity."""
+        super().__init_subclass__(**settings)
+        outside = (base for base in reversed(cls.__mro__) if base is cls or not issubclass(base, BaseModel))
+        attributes = {name: value for base in outside for name, value in vars(base).items()}
+        for name, value in attributes.items():
+            if isinstance(value, FieldInfo):
+                setattr(cls, name, deepcopy(value, {id(value.default): value.default}))  # the default is kept as it is
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
@@ -525,7 +537,7 @@ def widened(
     choice: Any = Annotated[
         tagged, pydantic.Discriminator(lambda data: f"kind: {kind_of(data)}"), pydantic.BeforeValidator(known)
     ]
-    members: Any = (tuple[choice, ...], copy(info))
+    members: Any = (tuple[choice, ...], info)
     made: Any = pydantic.create_model(
         keys.__name__, __base__=keys, __module__=keys.__module__, __doc__=keys.__doc__, **{keys.bare_keys: members}
     )

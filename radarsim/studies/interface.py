@@ -188,7 +188,7 @@ class Drawn:
         try:
             import xarray
         except ImportError as error:
-            raise ConfigError("to_xarray needs the package xarray: pip install xarray") from error
+            raise ConfigError("to_xarray needs the package xarray: pip install 'radarsim[xarray]'") from error
         axes = ("realisation", "t_s", "plot")
         units = {true_column(name, unit): {"units": unit} for name, unit in self.components}
         data = {name: (axes[: v.ndim], v, units.get(name, {})) for name, v in self.arrays().items()}

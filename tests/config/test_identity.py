@@ -1,20 +1,26 @@
 """Which keys make another case, and which only another label; which make other noise."""
 
 import hashlib
+import itertools
 import json
 import pickle
+import subprocess
+import sys
+from pathlib import Path
 from typing import Annotated
 
+import pydantic
 import pytest
 from pydantic import Field
 
 from radarsim.app.configs import load
 from radarsim.config.document import SHIPPED
 from radarsim.config.experiment import canonical
-from radarsim.config.fields import DataFile, Model, Study
+from radarsim.config.fields import Added, DataFile, Design, Model, Study, key
 from radarsim.studies import registry
 from radarsim.studies.identity import identity
 from radarsim.studies.noise import noise_key
+from tests.config import case_identities
 
 LABELS = ["radar.name=Something", "radar.band=metre", "filters.0.name=range alone"]
 SAME = [
@@ -165,3 +171,42 @@ def test_a_file_of_data_is_its_content(house, said, recorded):
     assert canonical(there) == canonical(here)
     house("elsewhere.csv", "t_s\n2\n")
     assert canonical(there) != canonical(here)
+
+
+def marks(model):
+    """The kinds of marks on the key `shared` of a model."""
+    return [type(mark) for mark in model.model_fields["shared"].metadata]
+
+
+def test_a_key_that_several_models_share_has_the_marks_of_each():
+    shared = key("key", "a key that several models share", [])
+    first = pydantic.create_model("First", __base__=Model, shared=(Annotated[list[int], Added()], shared))
+    second = pydantic.create_model("Second", __base__=Model, shared=(Annotated[list[str], Design()], shared))
+    third = pydantic.create_model("Third", __base__=Model, shared=(list[str], shared))
+    assert [marks(model) for model in (first, second, third)] == [[Added], [Design], []]
+    assert (first(shared=[1]).shared, second(shared=["1"]).shared, third().shared) == ([1], ["1"], [])
+
+
+class KeysOfAPlainClass:
+    """Keys that models take from a class that is no model."""
+
+    shared: Annotated[float | None, Design()] = key("key", "a key that several models take", None)
+
+
+@pytest.mark.filterwarnings("ignore:Field name:UserWarning")  # of pydantic's earlier versions
+def test_a_key_that_several_models_take_from_a_plain_class_has_its_marks_once():
+    for name in ("First", "Second"):
+        model = type(name, (KeysOfAPlainClass, Model), {"__module__": __name__})
+        assert marks(model) == [Design]
+        assert model(shared=2.0).shared == 2.0
+
+
+def test_the_identity_of_a_case_does_not_depend_on_the_studies_imported_before():
+    cases = {stem: load(stem).cases for stem in case_identities.CONFIGS}
+    by_study = itertools.groupby(
+        sorted(cases, key=lambda stem: cases[stem][0].study), lambda stem: cases[stem][0].study
+    )
+    command = [sys.executable, "-m", case_identities.__name__, *(",".join(stems) for _, stems in by_study)]
+    alone = subprocess.run(command, cwd=Path(__file__).parents[2], capture_output=True, text=True, check=True)
+    here = {f"{stem}: {case.name}": case_identities.case_identity(case) for stem in cases for case in cases[stem]}
+    assert json.loads(alone.stdout) == here

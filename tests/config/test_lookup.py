@@ -10,6 +10,7 @@ from radarsim.app.configs import load
 from radarsim.config import document
 
 SHIPPED = sorted(file.stem for file in (document.SHIPPED / "configs").glob("*.yaml"))
+KINDS = "configs", "scenarios"
 OWN = (document.SHIPPED / "configs/rls2.yaml").read_text()
 
 
@@ -154,15 +155,18 @@ def test_no_stems(name):
     assert not document.is_stem(name)
 
 
-def test_the_shipped_folders_are_those_of_the_checkout():
+def test_what_is_shipped_is_what_lies_beside_the_package():
+    """By links in a checkout, by copies in a source distribution."""
     root = Path(__file__).parents[2]
-    for kind in ("configs", "scenarios"):
-        assert (document.SHIPPED / kind).resolve() == root / kind
+    for kind in KINDS:
+        folders = document.SHIPPED / kind, root / kind
+        shipped, beside = ({file.name: file.read_bytes() for file in folder.iterdir()} for folder in folders)
+        assert shipped == beside
 
 
 def test_a_wheel_holds_every_shipped_file():
     """By the patterns of package-data, which setuptools expands through the links into copies."""
     root = Path(__file__).parents[2]
     patterns = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]["radarsim"]
-    packed = {file.resolve() for pattern in patterns for file in (root / "radarsim").glob(pattern)}
-    assert packed >= {file for kind in ("configs", "scenarios") for file in (root / kind).glob("*")}
+    packed = {file for pattern in patterns for file in (root / "radarsim").glob(pattern)}
+    assert packed >= {document.SHIPPED / kind / file.name for kind in KINDS for file in (root / kind).iterdir()}

@@ -8,9 +8,11 @@ from pathlib import Path
 import jinja2
 import pytest
 import yaml
+from packaging.version import Version
 
 import radarsim
 from radarsim.cli import main
+from tests.trust import versions
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -67,8 +69,22 @@ def test_the_conda_recipe_needs_what_the_package_needs():
     about = made["about"]
     assert (about["summary"], about["license"]) == (project["description"], project["license"])
     assert (ROOT / "recipe" / made["source"]["path"] / about["license_file"]).resolve() == ROOT / "LICENSE"
-    for command in made["test"]["commands"]:
+    check, *commands = made["test"]["commands"]
+    assert check == "pip check"
+    for command in commands:
         runs(command)
+
+
+def test_the_lowest_versions_that_are_tried_are_those_that_are_allowed():
+    """On the oldest Python; on a later one the lowest that has a wheel for it."""
+    pins = re.findall(r"^(\S+)==(\S+) ; python_version == '(\S+)'$", text("constraints-lowest.txt"), re.M)
+    tried = {(python, name): Version(version) for name, version, python in pins}
+    pythons = re.findall(r"Python :: (3\.\d+)", "\n".join(PROJECT["project"]["classifiers"]))
+    assert PROJECT["project"]["requires-python"] == f">={pythons[0]}"
+    for requirement in versions.newest_requirements():
+        name, bound = requirement.split(">=")
+        assert tried[pythons[0], name] == Version(bound), requirement
+        assert all(tried[python, name] >= Version(bound) for python in pythons), requirement
 
 
 def test_the_container_copies_what_a_wheel_is_made_of_and_runs_the_command():
@@ -80,8 +96,8 @@ def test_the_container_copies_what_a_wheel_is_made_of_and_runs_the_command():
     assert tuple(map(int, base.split("."))) >= tuple(map(int, PROJECT["project"]["requires-python"][2:].split(".")))
     copied = {name for word, rest in lines if word == "COPY" for name in rest.split()[:-1]}
     assert all((ROOT / name).exists() for name in copied)
-    links = {link.resolve().relative_to(ROOT).parts[0] for link in (ROOT / "radarsim/shipped").iterdir()}
-    assert copied == {"pyproject.toml", "constraints.txt", "README.md", "LICENSE", "radarsim", *links}
+    shipped = {folder.name for folder in (ROOT / "radarsim/shipped").iterdir()}
+    assert copied == {"pyproject.toml", "constraints.txt", "README.md", "LICENSE", "radarsim", *shipped}
     commands = [rest for word, rest in lines if word == "RUN"]
     for command in re.findall(r"radarsim compile[^&]*", " ".join(commands)):
         runs(command)

@@ -1,14 +1,17 @@
 """What the reference pages are read off: descriptions of keys with units, docstrings, columns of result files."""
 
+import ast
 import inspect
 import re
 from collections import defaultdict
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 from making import commands, generated, keys, modules, tables
 
+import radarsim
 from radarsim.app.judge import judge
 from radarsim.app.run import run
 from radarsim.cli import main
@@ -17,6 +20,7 @@ from radarsim.studies import registry
 from tests.trust.cases import CASES, MORE, Small
 
 ROOT = Path(__file__).parents[2]
+EXAMPLES = sorted(path.relative_to(ROOT) for path in (ROOT / "examples").iterdir() if path.is_dir())
 UNITS = {
     "m": r"\bm\b",
     "s": r"\bs\b",
@@ -180,3 +184,31 @@ def test_files_and_claims_stand_among_the_result_files(tmp_path):
     words = set(re.findall(r"\w+", " ".join(re.findall(r"`[^`]+`", told))))
     assert not [file.name for file in (tmp_path / "rls2").iterdir() if file.is_file() and file.stem not in words]
     assert not set(result.tables["claims"].columns) - words
+
+
+def stable_names():
+    """By module, the names on the page of stable names."""
+    rows = re.findall(
+        r"^\| `([\w.]+)` \| (.+) \|$", (ROOT / "docs/reference/stability.md").read_text(encoding="utf-8"), re.M
+    )
+    return {module: re.findall(r"`(\w+)`", names) for module, names in rows}
+
+
+def test_stable_names_exist_and_are_all_that_the_package_exports():
+    stable = stable_names()
+    missing = [
+        (module, name) for module in stable for name in stable[module] if not hasattr(import_module(module), name)
+    ]
+    assert missing == []
+    assert stable["radarsim"] == sorted(radarsim.__all__)
+
+
+@pytest.mark.parametrize("folder", ["radarsim/app/one_file", "radarsim/app/one_step", *map(str, EXAMPLES)])
+def test_packages_that_users_start_from_import_only_stable_names(folder):
+    stable = stable_names()
+    files = [file for file in sorted((ROOT / folder).rglob("*.py")) if "tests" not in file.parts]
+    imports = [node for file in files for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))]
+    used = {(node.module, name.name) for node in imports if isinstance(node, ast.ImportFrom) for name in node.names}
+    ours = {(module, name) for module, name in used if module and module.split(".")[0] == "radarsim"}
+    assert ours
+    assert [(module, name) for module, name in sorted(ours) if name not in stable.get(module, ())] == []

@@ -1,5 +1,6 @@
 """Plots of many realisations at once: those of one after the other, of every study that has plots."""
 
+import sys
 import tracemalloc
 
 import numpy as np
@@ -153,14 +154,16 @@ def test_a_study_of_one_realisation_at_a_time_has_several_too():
         type("Neither", (RecordedPlots,), {})
 
 
-def test_as_a_dataset_of_xarray_or_the_word_that_it_is_missing():
+def test_as_a_dataset_of_xarray():
     made = radarsim.plots("rls2", n=3, first=4)
-    try:
-        import xarray  # noqa: F401
-    except ImportError:
-        with pytest.raises(radarsim.ConfigError, match="needs the package xarray"):
-            made.to_xarray()
-        return
     data = made.to_xarray()
+    assert (dict(data.sizes)["realisation"], data["realisation"].values.tolist()) == (3, [4, 5, 6])
+    np.testing.assert_array_equal(data["t_s"], made.t_s)
     assert data["true_Vr_mps"].attrs == {"units": "m/s"}
     np.testing.assert_array_equal(data["range_m"].sel(realisation=5), made.columns["range_m"][1])
+
+
+def test_without_xarray_the_error_names_what_adds_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(radarsim.ConfigError, match=r"pip install 'radarsim\[xarray\]'"):
+        radarsim.plots("rls2", n=3).to_xarray()
