@@ -44,6 +44,7 @@ from radarsim.engine.store import (
     platform_name,
 )
 from radarsim.errors import ConfigError, StoreError
+from radarsim.private_files import foreign_owner
 from radarsim.report import files
 from radarsim.studies import registry
 
@@ -114,7 +115,10 @@ def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
         found.pieces += len(audit.pieces)
         found.faults += audit.faults
         found.notes += audit.notes
-        if recompute and not _recomputed(found, audit, recorded_case(record, name), recompute):
+        case = recorded_case(record, name) if recompute else None
+        if case is not None and any(one.written for one in case.outside):
+            _refuse_foreign(found.folder / "run.json")
+        if recompute and not _recomputed(found, audit, case, recompute):
             elsewhere.append(name)
     if elsewhere and not found.faults:
         raise ConfigError(
@@ -122,6 +126,12 @@ def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
             "since; all that is stored is whole"
         )
     return found
+
+
+def _refuse_foreign(record: Path) -> None:
+    """ConfigError for a record of another user: the code that it names could be anybody's."""
+    if (owner := foreign_owner(record)) is not None:
+        raise ConfigError(f"{record}: names code and belongs to another user ({owner}), so nothing is computed again")
 
 
 def _blocks(folder: Path) -> Path:
