@@ -92,6 +92,17 @@ def create_readable_file(path: str | os.PathLike) -> BinaryIO:
     return open(path, "xb", opener=lambda name, flags: os.open(name, flags, 0o644))
 
 
+def foreign_owner(path: str | os.PathLike, named_by: str | os.PathLike | None = None) -> int | None:
+    """The number of the user to whom a file belongs; None for this user, root, and the owner of the file that names it.
+
+    Raises OSError where a file cannot be looked at."""
+    if not hasattr(os, "geteuid"):
+        return None
+    owner = os.stat(path).st_uid
+    known = {os.geteuid(), ROOT_USER} | (set() if named_by is None else {os.stat(named_by).st_uid})
+    return None if owner in known else owner
+
+
 def distrust_reason(path: str | os.PathLike) -> str | None:
     """Why a file or folder may not be trusted, as a phrase that follows its name; None where it may.
 

@@ -27,7 +27,7 @@ ROOMS = {
     "errors": (),
     "failures": ("errors",),
     "language": ("errors",),
-    "config": ("errors", "constants"),
+    "config": ("errors", "constants", "private_files"),
     "threads": (),
     "private_files": (),
     "module_sources": ("errors",),

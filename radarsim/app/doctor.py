@@ -38,6 +38,7 @@ from radarsim.engine.store.audit import Audit, audit_blocks
 from radarsim.engine.store.block_file import block_path, is_directory
 from radarsim.engine.store.store import is_other_source, other_sources
 from radarsim.errors import ConfigError, StoreError
+from radarsim.private_files import foreign_owner
 from radarsim.report import files
 from radarsim.studies import registry
 
@@ -103,7 +104,10 @@ def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
     for name, stored_as in record["identities"].items():
         store = blocks / stored_as
         case = recorded_case(record, name)
-        found.notes += _notes_on_sources(store, name, case)
+        runs_code = case is not None and any(user_filter.written for user_filter in case.outside)
+        if recompute and runs_code:
+            _refuse_foreign(found.folder / "run.json")
+        found.notes += _notes_on_sources(store, name, case if recompute or not runs_code else None)
         if not is_directory(store):
             found.notes.append(f"{store}: no blocks of {name} are stored, so the tables cannot be checked against them")
             continue
@@ -134,6 +138,12 @@ def _notes_on_sources(store: Path, name: str, case: Case | None) -> list[str]:
             "`radarsim clean --other-sources` removes them"
         )
     return notes
+
+
+def _refuse_foreign(record: Path) -> None:
+    """ConfigError for a record of another user: the code that it names could be anybody's."""
+    if (owner := foreign_owner(record)) is not None:
+        raise ConfigError(f"{record}: names code and belongs to another user ({owner}), so nothing is computed again")
 
 
 def _blocks(folder: Path) -> Path:

@@ -30,6 +30,7 @@ from radarsim.config.experiment import DRAWN_FOR_ALL, Case, Experiment, in_name,
 from radarsim.config.fields import DataFile, Model, Scenario, Study, in_degrees, in_radians
 from radarsim.config.schema import COMMON_KEYS, Common, OwnCode, Studies
 from radarsim.errors import ConfigError
+from radarsim.private_files import foreign_owner
 
 # ---- place -----------------------------------------------------------------------------------------------------------
 Read = Callable[[FilePath, Faults], Document | None]
@@ -245,6 +246,13 @@ def is_code(member: object) -> bool:
     return isinstance(member, dict) and PYTHON in member
 
 
+def names_code(value: object) -> bool:
+    """Whether a part of a config, as read, has a key that names code, also one of an included config."""
+    if isinstance(value, dict):
+        return any(str(key).rpartition(".")[2] == PYTHON or names_code(inner) for key, inner in value.items())
+    return isinstance(value, list) and any(map(names_code, value))
+
+
 Coded = Callable[[OwnCode, str, bool, FilePath], Any]
 
 
@@ -278,9 +286,11 @@ def parted(document: Document, model: type[Study], coded: Coded, faults: Faults)
             origin = document.origin((*at, PYTHON))
             folder = FilePath(origin.source).parent if origin.line else FilePath()
             try:
-                found.append(
-                    coded(getattr(read, model.bare_keys)[i], str(origin), one.get("name") in baselines, folder)
-                )
+                code = coded(getattr(read, model.bare_keys)[i], str(origin), one.get("name") in baselines, folder)
+                beside = origin.line and folder.absolute() in FilePath(code.file).parents
+                if beside and (owner := foreign_owner(code.file, origin.source)) is not None:
+                    raise ConfigError(f"must be code of yours or of the config's owner, {code.file} is of user {owner}")
+                found.append(code)
             except ConfigError as error:
                 faults.add(origin, (*at, PYTHON), str(error))
     document = document.with_data((model.bare_keys,), own)
@@ -347,10 +357,16 @@ def no_such_config(name: str, studies: Studies, known: bool = False) -> str:
 
 class Expander:
     """Expands configs into drafts, each config once. `read(file, faults)` returns the document in a file, or notes a
-    fault and returns None."""
+    fault and returns None.
 
-    def __init__(self, read: Read, settings: Iterable[Setting], faults: Faults, studies: Studies):
+    path: of the config, where the user gave it. Of a config that was found by its name, here or by an include, code
+    runs only if it belongs to this user, to root, or to whom the config at the path belongs."""
+
+    def __init__(
+        self, read: Read, settings: Iterable[Setting], faults: Faults, studies: Studies, path: FilePath | None = None
+    ):
         cached: Read = cache(read)
+        self.path = path
         self.read, self.faults, self.studies = cached, faults, studies
         settings = list(settings)
         self.common = [s for s in settings if s.key.split(".")[0] in COMMON_KEYS]
@@ -390,6 +406,11 @@ class Expander:
 
     def _expand(self, document: Document, chain: tuple[FilePath, ...], over: Over) -> tuple[Common, list[Draft]]:
         """The common keys of a config, and its drafts; over is laid over them, the nearest first."""
+        owner = foreign_owner(document.file, self.path) if document.file and names_code(document.data) else None
+        if owner is not None:
+            message = f"names code and belongs to another user ({owner}): to run it, give its path in place of a name"
+            self.faults.add(Origin(str(document.file)), (), message)
+            return Common(), []
         common = self._common(document.only(COMMON_KEYS))
         if "include" in document.data:
             inside = self._included(document, common, chain, over)

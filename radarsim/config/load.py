@@ -56,7 +56,11 @@ def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Override
         document = _from_user(source, studies, faults)
     else:
         faults.add(Origin("config"), (), f"must be a path, a name or a mapping, got {repr(source)[:60]}")
-    experiment = None if document is None else Expander(read, settings, faults, studies).experiment(document)
+    experiment = None
+    if document is not None:
+        by_path = not isinstance(source, Mapping) and document.file == Path(os.fsdecode(source))
+        path = document.file if by_path else None
+        experiment = Expander(read, settings, faults, studies, path).experiment(document)
     if document is not None and changes_included(document):
         faults.beside(document.origin(()).source)
     faults.raise_if_any()

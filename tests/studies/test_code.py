@@ -718,3 +718,49 @@ def test_the_schema_admits_it(place):
     own = definitions["OwnCode"]
     assert own["required"] == ["name", "python"]
     assert own["additionalProperties"] is True
+
+
+OTHER = 4321
+MARK = "        __import__('pathlib').Path('executed').touch()\n"
+MARKING = FILTER.replace("        self.x = None\n", f"        self.x = None\n{MARK}")
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="gives files to another user")
+def test_code_of_another_user_does_not_run_by_mistake(place):
+    """Of a config that is found by its name, itself or by an include, and of a module that lies beside a config."""
+    (place / "configs").mkdir()
+    Path("my_filter.py").write_text(MARKING)
+    taken = [written("rls2", MINE), written("configs/rls1", MINE), Path("my_filter.py")]
+    for file in taken:
+        os.chown(file, OTHER, OTHER)
+    Path("included.yaml").write_text("include: [rls1]\n")
+    Path("around.yaml").write_text("include: [rls2]\n")
+    os.chown("around.yaml", OTHER, OTHER)
+    for config, file in (
+        ("rls2", "rls2.yaml"),
+        ("rls1", "configs/rls1.yaml"),
+        ("included.yaml", "configs/rls1.yaml"),
+        ("around", "rls2.yaml"),
+    ):
+        refused = run("out", config=config, code=2).stderr
+        assert f"{file}: names code and belongs to another user ({OTHER}): to run it, give its path" in refused
+    assert "must be code of yours or of the config's owner" in run("out", code=2).stderr
+    assert not Path("executed").exists()
+    assert "runs code of yours: Mine in" in run("out", config="around.yaml").stderr  # named by its path
+    assert Path("executed").exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="gives files to another user")
+def test_doctor_runs_no_code_that_a_record_of_another_user_names(place):
+    Path("my_filter.py").write_text(MARKING)
+    run("out")
+    Path("executed").unlink()
+    os.chown("out/mine/run.json", OTHER, OTHER)
+    refused = command("doctor", "out/mine", "--recompute", "1", code=2).stderr
+    assert f"out/mine/run.json: names code and belongs to another user ({OTHER})" in refused
+    command("doctor", "out/mine")
+    command("compare", "out/mine", "out/mine", "--no-figures", "--out", "compared")
+    assert not Path("executed").exists()
+    os.chown("out/mine/run.json", os.geteuid(), os.getegid())
+    command("doctor", "out/mine", "--recompute", "1")
+    assert Path("executed").exists()
