@@ -45,7 +45,7 @@ def clean(
         raise ConfigError(f"{blocks}: is a link; clean the directory that it points to")
     cases = None if experiments is None else [case for experiment in experiments for case in experiment.cases]
     if cases is None and other_sources:
-        # The identity of a user's filter is found by running it, which cleaning up does only for a config that is named.
+        # The identity of a user's filter is found by running it, which is done only for a config that is named.
         cases = [case for case in recorded_cases(Path(out)) if not case.outside]
     present = None if cases is None else {identity(case) for case in cases}
     requests = None if present is None else {name[:REQUEST_DIGITS] for name in present}
