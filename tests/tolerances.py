@@ -26,9 +26,12 @@ def scaled_condition(matrix):
     """κ₂ of symmetric positive definite matrices in the units in which their diagonals are 1.
 
     No unit enters what Cholesky's and Kalman's algebra loses (van der Sluis 1969: within a factor n of the best scale).
+    A number that is known exactly, of variance zero, is left out.
     """
-    scale = np.sqrt(np.diagonal(matrix, axis1=-2, axis2=-1))
-    return np.linalg.cond(matrix / (scale[..., :, None] * scale[..., None, :]))
+    variance = np.diagonal(matrix, axis1=-2, axis2=-1)
+    scale = np.sqrt(np.where(variance > 0, variance, 1.0))
+    known = (variance <= 0)[..., None] * np.eye(variance.shape[-1])
+    return np.linalg.cond(matrix / (scale[..., :, None] * scale[..., None, :]) + known)
 
 
 def mean_error(count, spread=1.0, z=Z):

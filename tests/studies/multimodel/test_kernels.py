@@ -163,7 +163,7 @@ def test_covariances_stay_positive_over_1e5_steps(family, rule):
     plots, covariances, x, P = workload(100_000)
     estimates, _, probabilities, cells = run_kernel(family, rule, "best", kinds, T, p, plots, covariances, x, P)
     assert np.isfinite(estimates).all()
-    assert_rounded(probabilities.sum(axis=1), np.ones(1), operations=8)  # shares of a sum of up to three
+    assert_rounded(probabilities.sum(axis=1), np.ones((len(plots), WIDTH)), operations=8)  # shares
     for lane in range(WIDTH):
         eigenvalues = np.linalg.eigvalsh(hypothesis_of(cells, lane)[1])
         assert eigenvalues.min() > rounding(operations=OPERATIONS) * eigenvalues.max()  # what rounding cannot have made

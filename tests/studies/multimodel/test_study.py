@@ -15,6 +15,11 @@ from radarsim.studies.multimodel import study as multimodel
 from radarsim.studies.multimodel import track as multimodel_plots
 from tests.physics.antenna import to_biconical
 from tests.studies.multimodel import naive
+from tests.tolerances import mean_error, rounding
+
+# Of estimates and probabilities, over their size: κ of a plot's covariance, 3·10⁶ of a radar whose range is exact and
+# whose angles are not, and 150 roundings of an update of nine states.
+BANK = rounding(3e6, 150)
 
 SENSOR = {
     "sigma_range_m": 2.5,
@@ -63,7 +68,7 @@ def test_plots_have_the_stated_errors_and_covariances():
     error = np.moveaxis(z - truth[:, :, None], 2, 0)
     mean = np.array([full(R[:, :, i]) for i in range(R.shape[2])])
     nis = np.einsum("nka,nkab,nkb->nk", error, np.linalg.inv(mean), error)
-    assert abs(nis.mean() - 3) < 5 * np.sqrt(6 / nis.size)
+    assert abs(nis.mean() - 3) < mean_error(nis.size, np.sqrt(6))
     antenna = physics.to_antenna(truth, physics.rotation(0, np.radians(30)), 12)
     sigma = np.array([2.5, np.radians(0.1), np.radians(0.1)])
     exact = physics.plot_covariance(to_biconical(antenna), sigma, physics.rotation(0, np.radians(30)))
@@ -99,13 +104,13 @@ def test_sums_equal_the_twin_on_the_same_plots(sensor, conversion):
         found = naive.track(options.family, merge, output, kinds, powers, x, P, p, z[3:], covariance[3:], times[3:])
         error = found[0] - plan.world.truth[3:]
         scale = np.abs(error).max(axis=0)
-        tolerance = 1e-7 if not sensor else 2e-3  # missed and jittered: P(a) P(b) and P(a + b) differ by the generator
+        tolerance = BANK if not sensor else 2e-3  # missed and jittered: P(a) P(b) and P(a + b) differ by the generator
         assert np.max(np.abs(sums["error"][f, :, :, 0] - error) / scale) < tolerance
         assert np.allclose(sums["error"][f, :, :, 1], error**2, rtol=1e-2, atol=2 * tolerance * (scale**2).max())
         assert np.allclose(sums["probability"][f, :, : len(p), 0], found[2], atol=10 * tolerance)
         position = found[1][:, 0::3, 0::3]
         nees = np.einsum("ka,kab,kb->k", error[:, 0::3], np.linalg.inv(position), error[:, 0::3])
-        assert np.allclose(sums["believed"][f, :, 0], nees, rtol=1e-6 if not sensor else 0.05)
+        assert np.allclose(sums["believed"][f, :, 0], nees, rtol=10 * BANK if not sensor else 0.05)
         assert len(t) == len(error)
 
 
@@ -126,20 +131,21 @@ def test_covariance_at_the_prediction_is_computed_there():
     for k in range(3, len(z)):
         at = to_biconical(physics.to_antenna((F @ x)[0::3], turn, 12))
         x, P, *_ = naive.advance(x, P, F, Q, z[k], physics.plot_covariance(at, sigma, turn))
-        assert np.allclose(sums["error"][0, k - 3, :, 0], x - plan.world.truth[k], rtol=1e-7, atol=1e-5)
+        assert np.allclose(sums["error"][0, k - 3, :, 0], x - plan.world.truth[k], rtol=BANK, atol=BANK * 100)
 
 
 def test_stage_sums_are_those_of_the_scans():
     case = work(target={**inline_flight(), "stages": [{"name": "a", "end_s": 20}, {"name": "b"}]})
     plan = case.plan
     sums = plan.layout.unpack(case.simulate(0, 1))
-    square = sums["error"][:, :, :, 0] ** 2
+    square, summed = sums["error"][:, :, :, 0] ** 2, rounding(operations=len(plan.world.stage))
     stage = plan.world.stage[3:]
     for s in (0, 1):
-        assert np.allclose(sums["stage"][:, s, :9, 0], square[:, stage == s].mean(axis=1), rtol=1e-10)
-        assert np.allclose(sums["stage"][:, s, 9, 0], sums["believed"][:, stage == s, 0].mean(axis=1), rtol=1e-10)
-    assert np.allclose(sums["pairs"][0, 1], sums["stage"][0, :, :9, 0] * sums["stage"][1, :, :9, 0])
-    assert np.allclose(sums["stage"][..., 0] ** 2, sums["stage"][..., 1])
+        assert np.allclose(sums["stage"][:, s, :9, 0], square[:, stage == s].mean(axis=1), rtol=summed)
+        assert np.allclose(sums["stage"][:, s, 9, 0], sums["believed"][:, stage == s, 0].mean(axis=1), rtol=summed)
+    product, twice = sums["stage"][0, :, :9, 0] * sums["stage"][1, :, :9, 0], rounding(operations=2)
+    assert np.allclose(sums["pairs"][0, 1], product, rtol=twice, atol=0)
+    assert np.allclose(sums["stage"][..., 0] ** 2, sums["stage"][..., 1], rtol=twice, atol=0)
 
 
 def test_report_every_keeps_some_scans_and_the_same_stages():
@@ -148,8 +154,8 @@ def test_report_every_keeps_some_scans_and_the_same_stages():
     some = sparse.plan.layout.unpack(sparse.simulate(0, 8))
     k = sparse.plan.axes.k
     assert list(k) == [7 * i for i in range(1, 15)] + [100]
-    assert np.allclose(some["error"], every["error"][:, k - 4], rtol=1e-10, atol=1e-6)
-    assert np.allclose(some["stage"][:, :, :9], every["stage"][:, :, :9], rtol=1e-10)
+    np.testing.assert_array_equal(some["error"], every["error"][:, k - 4])
+    np.testing.assert_array_equal(some["stage"][:, :, :9], every["stage"][:, :, :9])
 
 
 def inline_flight(**changes):
@@ -191,7 +197,7 @@ def test_plots_of_the_local_frame():
     sensor = {"sigma_x_m": 5, "sigma_y_m": 10, "sigma_z_m": 20, "scan_period_s": 0.5}
     case = work(sensor=sensor)
     z, R, _ = multimodel.measured(case.plan, 0)
-    assert np.allclose(R[7, :, 2], [25, 0, 0, 100, 0, 400])
+    np.testing.assert_array_equal(R[7, :, 2], [25, 0, 0, 100, 0, 400])
     error = (z - case.plan.world.truth[:, 0::3, None]) / np.array([5, 10, 20])[:, None]
     assert abs(error.std() - 1) < 0.05
     assert np.isfinite(case.simulate(0, 8)).all()
@@ -259,9 +265,9 @@ def test_track_over_recorded_plots_equals_the_experiment():
     track = multimodel_plots.track(case.case, dict(zip(columns, [t + 100, *biconical.T], strict=True)))
     sums = plan.layout.unpack(case.simulate(0, 1))
     assert np.isnan(track.estimate[:, :2]).all()
-    assert np.allclose(track.estimate[:, 3:], sums["error"][..., 0] + plan.world.truth[3:], rtol=1e-7, atol=1e-3)
-    assert np.allclose(track.probability[0, 3:], sums["probability"][0, :, :3, 0], atol=1e-7)
-    assert np.allclose(np.nansum(track.probability, axis=2)[:, 2:], 1)
+    assert np.allclose(track.estimate[:, 3:], sums["error"][..., 0] + plan.world.truth[3:], rtol=BANK, atol=1e-3)
+    assert np.allclose(track.probability[0, 3:], sums["probability"][0, :, :3, 0], rtol=0, atol=10 * BANK)
+    assert np.allclose(np.nansum(track.probability, axis=2)[:, 2:], 1, rtol=0, atol=rounding(operations=6))
 
 
 def test_track_waits_over_gaps_and_plots_beyond_the_edge():

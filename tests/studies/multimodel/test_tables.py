@@ -37,12 +37,8 @@ def test_tables_have_the_contracts_columns(result):
 def test_probabilities_sum_to_one(result):
     rows = result.tables["probabilities"]
     assert set(rows["filter"]) == {"MMA2-122", "MMA2-11"}
-    assert np.allclose(
-        rows.groupby(["filter", "k"])["probability"].sum(),
-        1,
-        rtol=0,
-        atol=rounding(operations=2 * result.cases[0].count),
-    )
+    total = rows.groupby(["filter", "k"])["probability"].sum()
+    assert np.allclose(total, 1, rtol=0, atol=rounding(operations=2 * result.cases[0].count))
     assert (rows["probability_lo"] <= rows["probability"]).all()
 
 

@@ -12,7 +12,8 @@ from radarsim.studies.pulses_to_tracks import kernels as chain
 from radarsim.studies.pulses_to_tracks import study
 from radarsim.studies.pulses_to_tracks.kernels import LISTED, NUMBER, RIGHT, TAKEN, WRONG_FOLD, Sums
 from tests.studies.pulses_to_tracks.conftest import RANGE, SPECTRUM, A, made, summed
-from tests.studies.pulses_to_tracks.test_kernels import SPEC, estimated, normals, samples_of
+from tests.studies.pulses_to_tracks.test_kernels import LOCKED_OFF, SPEC, estimated, normals, samples_of
+from tests.tolerances import sigma_error
 
 N = 2048
 FOLDING = {"repetition_rate_hz": 1e3, "snr_db": 10.0, "pulse_length_s": 1e-9}  # into 15 m/s
@@ -110,7 +111,8 @@ def test_hypotheses_are_the_textbooks_list():
     errors = chain.simulate_block(plan.world, plan.filters, sums, 0, count)
     for f, one in enumerate(LISTS):
         expected, right = textbook(plan, case, f, count)
-        np.testing.assert_allclose(errors[f], expected, rtol=2e-4, atol=2e-4, err_msg=one["name"])
+        # The highest line of a spectrum is defined, of bursts that lose lock too.
+        assert (abs(errors[f] - expected) / np.array([50.0, 1.0, 0.1])).max() <= LOCKED_OFF, one["name"]
         np.testing.assert_array_equal(sums.folds[f, :, RIGHT], right.sum(axis=1))
     assert (sums.folds[:, -1, NUMBER] > 3 * count).all()
     assert 0 < sums.folds[:, :, RIGHT].min() < count
@@ -142,7 +144,7 @@ def test_hypotheses_are_those_of_folded_velocity(wide):
         assert (abs(sums.folds[own, :, RIGHT] / N - right) < 4.5 * error).all()
         assert (abs(sums.folds[own, :, LISTED] / N - found["folds"][f, :, 1] / N) < 4.5 * error).all()
     sigma = np.sqrt(sums.error[2, -1, :, 1] / N), np.sqrt(found["error"][0, -1, :, 1] / N)
-    np.testing.assert_allclose(*sigma, rtol=math.sqrt(2) * 5.85 / math.sqrt(2 * N))
+    np.testing.assert_allclose(*sigma, rtol=math.sqrt(2) * sigma_error(N))  # of two samples
 
 
 def test_the_nearest_fold_is_wrong_as_often_as_calculated(wide):

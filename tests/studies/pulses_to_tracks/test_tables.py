@@ -14,6 +14,7 @@ from radarsim.studies.pulses_to_tracks import study, tables
 from radarsim.studies.pulses_to_tracks.tables import OF_ALL
 from tests.studies.pulses_to_tracks import naive
 from tests.studies.pulses_to_tracks.conftest import CURED, made
+from tests.tolerances import assert_rounded, rounding, sigma_error
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +48,8 @@ def test_locks(found):
 def test_estimates_beside_the_bound(found):
     table = found.tables["estimates"]
     ideal = table[table["filter"] == "ideal"]
-    np.testing.assert_allclose(ideal["sigma_all"], ideal["bound"], rtol=5.85 / (2 * 1500) ** 0.5)
-    assert (table["sigma"] <= table["sigma_all"] * (1 + 1e-12)).all()
+    np.testing.assert_allclose(ideal["sigma_all"], ideal["bound"], rtol=sigma_error(1500))
+    assert (table["sigma"] <= table["sigma_all"] * (1 + rounding(operations=1500))).all()
     assert set(table["component"]) == {"Vr"}
     np.testing.assert_allclose(table["energy_db"], 17.28, atol=0.011)
 
@@ -80,7 +81,7 @@ def test_idealisations(found):
     curves = found.curves.set_index(["filter", "component", "k"])
     row = own[own["k"] == 7].iloc[0]
     ratio = curves.loc[("spectrum", "Vr", 7), "sigma"] / curves.loc[("ideal", "Vr", 7), "exact_sigma"]
-    assert row["over_ideal"] == pytest.approx(ratio)
+    assert_rounded(row["over_ideal"], ratio, operations=4)
 
 
 def test_the_cure_is_the_cheapest_of_the_sequences(found):
@@ -178,4 +179,5 @@ def test_what_a_lost_burst_adds():
     for f, until in ((0, 6), (1, 1)):
         answers = [ends([1.0 if j <= k < j + until else 0.0 for k in range(6)]) for j in range(6)]
         expected = np.square(answers).sum(axis=0) * 300.0**2 / 12
-        np.testing.assert_allclose(plan.axes.losses[f, -1], expected, rtol=1e-6)
+        # Covariances of a track after six scans, whose gains are differences: κ of some thousand at most.
+        np.testing.assert_allclose(plan.axes.losses[f, -1], expected, rtol=rounding(1e3, 60))
