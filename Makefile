@@ -26,9 +26,12 @@ ORDINARY := not slow and not machines
 # The files with tests of a mark: to read all the others takes longer than some of these tests.
 marked = $$(grep -rl --include='test_*.py' 'mark\.$(1)\b' tests)
 
+# Both parts run, and a failure of either is one of `make test`; an interrupt ends both.
 test: $(VENV)/tested
-	$(BIN)/python -m pytest -n $(JOBS) --maxprocesses 8 --dist loadgroup --no-loadscope-reorder -m '$(ORDINARY) and not alone'
-	$(BIN)/python -m pytest -n $(JOBS) --maxprocesses 2 -m '$(ORDINARY) and alone' $(call marked,alone)
+	trap 'exit 130' INT; failed=0; \
+	$(BIN)/python -m pytest -n $(JOBS) --maxprocesses 8 --dist loadscope --no-loadscope-reorder -m '$(ORDINARY) and not alone' || failed=$$?; \
+	$(BIN)/python -m pytest -n $(JOBS) --maxprocesses 2 -m '$(ORDINARY) and alone' $(call marked,alone) || failed=$$?; \
+	exit $$failed
 
 slow: $(VENV)/tested
 	$(BIN)/python -m pytest -m slow

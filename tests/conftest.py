@@ -7,7 +7,6 @@ others read from the cache of kernels.
 
 import gc
 import os
-from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -15,7 +14,6 @@ from hypothesis import HealthCheck, settings
 from tests.variables import CLEARED
 from tests.warm import Start
 
-TESTS = Path(__file__).parent
 # Folders, in the order in which their groups begin; what is short is left for the end, where processes wait.
 LONG = ("studies", "trust", "cli", "app", "engine", "docs", "report", "language", "kernels", "recorded")
 
@@ -29,26 +27,40 @@ os.fsync = lambda descriptor: None  # what it is for no test can try: a power cu
 gc.set_threshold(100_000)  # as the command does; of the suite's time 7 % went into looking through objects that stay
 
 
-def group_of(path: Path) -> tuple[str, ...]:
-    """The folder of a study's tests, or the file."""
-    parts = path.relative_to(TESTS).parts
-    return parts[:2] if parts[0] == "studies" else parts
+def group_of(nodeid: str) -> str:
+    """The folder of a study's tests, or the file: the beginning of a test's name."""
+    folder, *rest = nodeid.partition("::")[0].removeprefix("tests/").split("/")
+    return "/".join([folder, *(rest[:1] if folder == "studies" else rest)])
 
 
-def begins(item: pytest.Item) -> tuple[int, int]:
+def rank_of(item: pytest.Item) -> tuple[int, bool]:
     """Where a group stands in the order: by its folder, in `studies` those of several files first."""
-    folder, *rest = group_of(item.path)
-    return LONG.index(folder) if folder in LONG else len(LONG), bool(rest) and rest[0].endswith(".py")
+    folder, _, rest = group_of(item.nodeid).partition("/")
+    return LONG.index(folder) if folder in LONG else len(LONG), rest.endswith(".py")
 
 
-@pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the names
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Name the groups, and put them in their order."""
-    if not getattr(config.option, "loadgroup", False):  # set in the processes that `--dist loadgroup` starts
-        return
-    items.sort(key=begins)
-    for item in items:
-        item.add_marker(pytest.mark.xdist_group("/".join(group_of(item.path))))
+    """Put the groups in their order, in a process that is given tests by another."""
+    if hasattr(config, "workerinput"):
+        items.sort(key=rank_of)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log):
+    """Give each process whole groups, where `--dist loadscope` asks for it.
+
+    Not by the marks of `--dist loadgroup`: pytest-xdist 3.8 writes them where pytest 9.2 no longer reads, and without a
+    word each process gets a part of each group, makes what its tests share and compiles its kernels.
+    """
+    if config.getvalue("dist") != "loadscope":
+        return None
+    from xdist.scheduler import LoadScopeScheduling
+
+    class GroupScheduling(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return group_of(nodeid)
+
+    return GroupScheduling(config, log)
 
 
 def pytest_collection_finish() -> None:
