@@ -7,7 +7,7 @@ import os
 from click.testing import CliRunner
 
 from radarsim.cli import main
-from radarsim.kernels.compile import cache_root
+from radarsim.kernels.cache import cache_root
 
 
 class Terminal(io.StringIO):

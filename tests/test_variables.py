@@ -10,7 +10,7 @@ from typing import ClassVar
 import pytest
 
 from radarsim.cli import main
-from radarsim.kernels.compile import cache_root
+from radarsim.kernels.cache import cache_root
 from tests.program import Terminal
 from tests.variables import CLEARED, KEPT
 
