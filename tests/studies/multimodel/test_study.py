@@ -19,7 +19,7 @@ from tests.tolerances import mean_error, rounding
 
 # Of estimates and probabilities, over their size: κ of a plot's covariance, 3·10⁶ of a radar whose range is exact and
 # whose angles are not, and 150 roundings of an update of nine states.
-BANK = rounding(3e6, 150)
+PRECISION = rounding(3e6, 150)
 
 SENSOR = {
     "sigma_range_m": 2.5,
@@ -104,13 +104,13 @@ def test_sums_equal_the_twin_on_the_same_plots(sensor, conversion):
         found = naive.track(options.family, merge, output, kinds, powers, x, P, p, z[3:], covariance[3:], times[3:])
         error = found[0] - plan.world.truth[3:]
         scale = np.abs(error).max(axis=0)
-        tolerance = BANK if not sensor else 2e-3  # missed and jittered: P(a) P(b) and P(a + b) differ by the generator
+        tolerance = PRECISION if not sensor else 2e-3  # missed and jittered: P(a) P(b) and P(a + b) differ by the generator
         assert np.max(np.abs(sums["error"][f, :, :, 0] - error) / scale) < tolerance
         assert np.allclose(sums["error"][f, :, :, 1], error**2, rtol=1e-2, atol=2 * tolerance * (scale**2).max())
         assert np.allclose(sums["probability"][f, :, : len(p), 0], found[2], atol=10 * tolerance)
         position = found[1][:, 0::3, 0::3]
         nees = np.einsum("ka,kab,kb->k", error[:, 0::3], np.linalg.inv(position), error[:, 0::3])
-        assert np.allclose(sums["believed"][f, :, 0], nees, rtol=10 * BANK if not sensor else 0.05)
+        assert np.allclose(sums["believed"][f, :, 0], nees, rtol=10 * PRECISION if not sensor else 0.05)
         assert len(t) == len(error)
 
 
@@ -131,7 +131,7 @@ def test_covariance_at_the_prediction_is_computed_there():
     for k in range(3, len(z)):
         at = to_biconical(physics.to_antenna((F @ x)[0::3], turn, 12))
         x, P, *_ = naive.advance(x, P, F, Q, z[k], physics.plot_covariance(at, sigma, turn))
-        assert np.allclose(sums["error"][0, k - 3, :, 0], x - plan.world.truth[k], rtol=BANK, atol=BANK * 100)
+        assert np.allclose(sums["error"][0, k - 3, :, 0], x - plan.world.truth[k], rtol=PRECISION, atol=PRECISION * 100)
 
 
 def test_stage_sums_are_those_of_the_scans():
@@ -265,8 +265,8 @@ def test_track_over_recorded_plots_equals_the_experiment():
     track = multimodel_plots.track(case.case, dict(zip(columns, [t + 100, *biconical.T], strict=True)))
     sums = plan.layout.unpack(case.simulate(0, 1))
     assert np.isnan(track.estimate[:, :2]).all()
-    assert np.allclose(track.estimate[:, 3:], sums["error"][..., 0] + plan.world.truth[3:], rtol=BANK, atol=1e-3)
-    assert np.allclose(track.probability[0, 3:], sums["probability"][0, :, :3, 0], rtol=0, atol=10 * BANK)
+    assert np.allclose(track.estimate[:, 3:], sums["error"][..., 0] + plan.world.truth[3:], rtol=PRECISION, atol=1e-3)
+    assert np.allclose(track.probability[0, 3:], sums["probability"][0, :, :3, 0], rtol=0, atol=10 * PRECISION)
     assert np.allclose(np.nansum(track.probability, axis=2)[:, 2:], 1, rtol=0, atol=rounding(operations=6))
 
 
