@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from collections import defaultdict
@@ -34,7 +35,15 @@ def make_test(tmp_path):
         for name in ("installed", "tested"):
             (tmp_path / name).touch()
         words = ["make", "--silent", "test", f"VENV={tmp_path}"]
-        ended = subprocess.run(words, cwd=ROOT, capture_output=True, start_new_session=True, timeout=60)
+        # A shell that starts the suite in the background has interrupts ignored in all that it starts.
+        ended = subprocess.run(
+            words,
+            cwd=ROOT,
+            capture_output=True,
+            start_new_session=True,
+            timeout=60,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        )
         return ended.returncode, len(calls.read_text().splitlines())
 
     return run

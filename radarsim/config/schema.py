@@ -52,7 +52,7 @@ class OwnCode(Member):
     one_by_one: Flag = key("one by one", "whether the function takes the plots of one realisation at a time", False)
     identity: Annotated[str, Strict()] | Annotated[int, Strict()] | Annotated[float, Strict()] | None = key(
         "identity",
-        "text or number that you change when what no file of yours shows has changed: data elsewhere, a network",
+        "text or number, no unit: change it when what no file of yours shows has changed: data elsewhere, a network",
         None,
     )
 

@@ -78,6 +78,7 @@ def is_installed(folder: str) -> bool:
 
 
 def is_within(path: str, folder: str) -> bool:
+    """Whether a path is that of a folder, or lies in it."""
     return path == folder or path.startswith(folder.rstrip(os.sep) + os.sep)
 
 
