@@ -9,6 +9,7 @@ from radarsim.report.claims.over import Over, joint, under
 from radarsim.studies import registry
 from radarsim.studies.multimodel import cost, measures
 from radarsim.studies.multimodel.readings import Readings
+from tests.tolerances import mean_error
 
 CLAIMS = {one.id: one for one in registry.study("multimodel").claims().claims}
 
@@ -32,7 +33,7 @@ def test_linearisation_of_a_plot_against_noisy_plots():
         plot = (200e3 + sigma_m * noise[0]) * np.cos(angle * noise[1]) * np.cos(angle * noise[2])
         found = np.mean((plot - 200e3) ** 2) / sigma_m**2 - 1
         bend = float(measures.bend(200e3, np.array(sigma_m), np.array(angle)))
-        assert found == pytest.approx(bend, abs=5 * np.sqrt(10 / n) * (1 + bend))
+        assert found == pytest.approx(bend, abs=mean_error(n, np.sqrt(10)) * (1 + bend))
 
 
 def test_most_of_the_printed_accuracies_are_linear_enough(rows):

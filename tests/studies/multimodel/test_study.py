@@ -109,7 +109,7 @@ def test_sums_equal_the_twin_on_the_same_plots(sensor, conversion):
         )  # missed and jittered: P(a) P(b) and P(a + b) differ by the generator
         assert np.max(np.abs(sums["error"][f, :, :, 0] - error) / scale) < tolerance
         assert np.allclose(sums["error"][f, :, :, 1], error**2, rtol=1e-2, atol=2 * tolerance * (scale**2).max())
-        assert np.allclose(sums["probability"][f, :, : len(p), 0], found[2], atol=10 * tolerance)
+        assert np.allclose(sums["probability"][f, :, : len(p), 0], found[2], rtol=0, atol=10 * tolerance)
         position = found[1][:, 0::3, 0::3]
         nees = np.einsum("ka,kab,kb->k", error[:, 0::3], np.linalg.inv(position), error[:, 0::3])
         assert np.allclose(sums["believed"][f, :, 0], nees, rtol=10 * PRECISION if not sensor else 0.05)

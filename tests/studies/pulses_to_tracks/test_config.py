@@ -5,6 +5,7 @@ import pytest
 from radarsim.app.configs import load
 from radarsim.errors import ConfigError
 from radarsim.studies.pulses_to_tracks import words
+from tests.tolerances import rounding
 
 ALL = "[range, velocity, acceleration]"
 FAULTS = [
@@ -48,7 +49,7 @@ def test_defaults_are_written_out():
     assert [one.hypotheses for one in spec.filters] == [None, None, 1, 1, 1, 1, 1]
     many = load("pulses", ["filters.6.hypotheses=9"]).cases[0].spec.filters[6]
     assert (many.hypotheses, many.prune_below, many.estimate) == (9, 1e-6, "mean")
-    assert spec.span_mps == pytest.approx(300.0)
+    assert spec.span_mps == pytest.approx(300.0, rel=rounding(operations=3))
 
 
 def test_pulses_by_their_number_a_second_and_a_duration():
