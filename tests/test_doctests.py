@@ -4,8 +4,6 @@ import doctest
 import pkgutil
 from importlib import import_module
 
-import pytest
-
 import radarsim
 
 MODULES = sorted(
@@ -13,9 +11,8 @@ MODULES = sorted(
 )
 
 
-@pytest.mark.parametrize("name", MODULES)
-def test_examples(name):
-    assert doctest.testmod(import_module(name)).failed == 0
+def test_examples():
+    assert [name for name in MODULES if doctest.testmod(import_module(name)).failed] == []
 
 
 def test_there_are_examples():

@@ -67,7 +67,8 @@ def fill_plots(key, first, scan, mean, sigma, next_word, z, w):
     if scan % 2 == 0:
         fill_words(key, first, scan // 2, word, next_word)
     else:
-        word[:] = next_word
+        for i in range(z.size):
+            word[i] = next_word[i]
     for i in range(z.size):
         a, b = normal_pair(word[i])
         z[i], w[i] = mean_z + sigma_z * a, mean_w + sigma_w * b
@@ -204,7 +205,8 @@ def fill_simulated(x, first, key, truth, sigma, plots):
                 fill_plots(key, first + done, k, truth[k], sigma[k], next_word, to_z, to_w)
             else:
                 fill_plots(key, first + done, k, truth[k], sigma[k], next_word, x[0], x[1])
-                z[k, done:], w[k, done:] = x[0, :n], x[1, :n]
+                for i in range(n):
+                    z[k, done + i], w[k, done + i] = x[0, i], x[1, i]
 
 
 @kernel
@@ -215,11 +217,15 @@ def fill_estimates(x, problem, plots, estimates):
         x[:] = 0.0
         n = min(CHUNK, plots.shape[0] - done)
         for k in range(scans):
-            x[filters, :2, :n] = plots[done : done + n, k].T
+            for m in range(2):
+                for i in range(n):
+                    x[filters, m, i] = plots[done + i, k, m]
             advance(x, k, problem.dt[k], problem.observes, problem.start, problem.weights, problem.gains)
             for f in range(filters):
                 row, known = source(x, f, k, problem.observes, problem.start)
-                estimates[done : done + n, f, k, :known] = x[row, :known, :n].T
+                for i in range(n):
+                    for m in range(known):
+                        estimates[done + i, f, k, m] = x[row, m, i]
 
 
 def plain(array, *shape, dtype=np.float64):

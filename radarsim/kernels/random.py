@@ -154,7 +154,8 @@ def fill_normal_pairs(key, first, pair, a, b):
     x, y = a.view(np.uint64), b.view(np.uint64)
     fill_words(key, first, U(pair) >> U(1), x, y)
     if U(pair) & U(1):
-        x[:] = y
+        for i in range(x.size):
+            x[i] = y[i]
     for i in range(a.size):
         a[i], b[i] = normal_pair(x[i])
 

@@ -3,56 +3,50 @@
 import math
 import re
 
-import pytest
-
 from radarsim.app import configs
 from radarsim.app.run import papers
 from radarsim.report.claims import rule
 
 PAPERS = papers()
-CLAIMS = [pytest.param(claim, id=claim.id) for of in PAPERS for claim in of.claims]
+CLAIMS = [claim for of in PAPERS for claim in of.claims]
 ORIGINAL = re.compile("[А-Яа-я]{3}")  # the papers are in Russian
 SENTENCE = {rule.PRINT, rule.ABOUT, rule.GRID, rule.SAME}  # a range, or a value, of the words
 ONE_SIDED = {rule.LIMIT, rule.MATERIAL}
 
 
-@pytest.mark.parametrize("claim", CLAIMS)
-def test_a_claim_carries_its_sentence_and_its_place(claim):
-    assert claim.statement
-    assert not claim.statement.endswith(".")
-    assert claim.place
-    if not claim.extension:
-        assert ORIGINAL.search(claim.original), claim.original
-    assert claim.parts
-    assert configs.load(claim.config).stem == claim.config
+def test_a_claim_carries_its_sentence_and_its_place():
+    for claim in CLAIMS:
+        assert claim.statement, claim.id
+        assert not claim.statement.endswith("."), claim.id
+        assert claim.place, claim.id
+        assert claim.extension or ORIGINAL.search(claim.original), claim.id
+        assert claim.parts, claim.id
+        assert configs.load(claim.config).stem == claim.config, claim.id
 
 
-@pytest.mark.parametrize("claim", CLAIMS)
-def test_no_expected_value_is_without_a_rule(claim):
-    for part in claim.parts:
-        of = part.expected
-        assert of.kind in SENTENCE | ONE_SIDED
-        assert 0 < of.margin < math.inf
-        assert of.lo <= of.hi
-        assert of.words
-        assert of.strict[0] <= of.strict[1]
+def test_no_expected_value_is_without_a_rule():
+    for name, part in [(claim.id, part) for claim in CLAIMS for part in claim.parts]:
+        of, where = part.expected, (name, part.what)
+        assert of.kind in SENTENCE | ONE_SIDED, where
+        assert 0 < of.margin < math.inf, where
+        assert of.lo <= of.hi, where
+        assert of.words, where
+        assert of.strict[0] <= of.strict[1], where
         bounded = math.isfinite(of.lo) and math.isfinite(of.hi)
-        assert bounded or math.isfinite(of.lo) or math.isfinite(of.hi)
+        assert bounded or math.isfinite(of.lo) or math.isfinite(of.hi), where
         if of.kind in ONE_SIDED:
-            assert not bounded, part.what
+            assert not bounded, where
         elif of.kind != rule.SAME:  # "no loss" is the same or better
-            assert bounded, part.what
+            assert bounded, where
 
 
-@pytest.mark.parametrize("claim", CLAIMS)
-def test_parts_of_a_claim_are_told_apart(claim):
+def test_parts_of_a_claim_are_told_apart():
     """No part twice; variants of a number each with a name, in a claim that is no extension some part asserted."""
-    told = [(part.cases, part.what, part.expected.words, part.statement) for part in claim.parts]
-    assert len(told) == len(set(told))
-    for part in claim.parts:
-        assert bool(part.number) >= bool(part.variant)
-    if not claim.extension:
-        assert any(part.asserted for part in claim.parts)
+    for claim in CLAIMS:
+        told = [(part.cases, part.what, part.expected.words, part.statement) for part in claim.parts]
+        assert len(told) == len(set(told)), claim.id
+        assert all(bool(part.number) >= bool(part.variant) for part in claim.parts), claim.id
+        assert claim.extension or any(part.asserted for part in claim.parts), claim.id
 
 
 def test_no_number_stands_twice_and_all_ids_are_of_their_paper():

@@ -451,7 +451,9 @@ def fill_simulated(made, first, problem, plots, displacement):
                 for i in range(n):
                     plots[m, k, done + i] = made.plots[m, i] if made.detected[i] > 0.0 else np.nan
             if displacement.shape[2] > 0:
-                displacement[:, k, done : done + n] = made.state[:, :n]
+                for m in range(displacement.shape[0]):
+                    for i in range(n):
+                        displacement[m, k, done + i] = made.state[m, i]
 
 
 def add_found(found: np.ndarray, baseline: int, sums: Sums) -> None:

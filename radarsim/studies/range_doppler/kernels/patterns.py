@@ -324,7 +324,8 @@ def wait(room, rows, n, held, world, defect):
         weight, count = old[last], old[last + 1]
         if weight * (1.0 - world.detection) > NEGLIGIBLE_PROBABILITY:
             new = room.following[kept]
-            new[:] = old
+            for c in range(new.size):
+                new[c] = old[c]
             new[last], new[last + 2] = weight * (1.0 - world.detection), 0.0
             kept += 1
         if weight * world.detection > NEGLIGIBLE_PROBABILITY:
@@ -337,9 +338,12 @@ def wait(room, rows, n, held, world, defect):
                 begin(rows, n, old, columns)
                 n += 1
             else:
-                room.following[kept, :] = old
+                for c in range(old.size):
+                    room.following[kept, c] = old[c]
                 kept += 1
-    room.waiting[:kept] = room.following[:kept]
+    for b in range(kept):
+        for c in range(room.waiting.shape[1]):
+            room.waiting[b, c] = room.following[b, c]
     pad(rows, n, height(columns))
     return n, kept
 

@@ -100,7 +100,8 @@ def fill_plots(world, detections, first, what, plots, deviation):
                     to[done + i] = seen[i] if detected[i] > 0.0 else np.nan
                 if moves:
                     for j in range(2):
-                        deviation[c, j, k, done : done + n] = room[c, 2 + j, :n]
+                        for i in range(n):
+                            deviation[c, j, k, done + i] = room[c, 2 + j, i]
 
 
 @kernel
