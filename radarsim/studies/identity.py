@@ -35,5 +35,8 @@ def request_digest(case: Case) -> str:
         names = [member.name for member in case.spec.members]
         request["against"] = [names.index(name) for name in case.against]
     if case.outside:
-        request["user_filters"] = [user_filter.written or user_filter.name for user_filter in case.outside]
+        request["user_filters"] = [
+            {key: value for key, value in (user_filter.written or {}).items() if key != "name"}
+            for user_filter in case.outside
+        ]
     return digest(request)

@@ -379,8 +379,7 @@ def test_what_it_writes_is_nothing_that_it_depends_on(place):
     computed = [radarsim.run(str(config), realisations=50, out="out", figures=False) for _ in range(2)]
     assert [one.facts["realisations_computed"] for one in computed] == [50, 0]
     for one in computed:
-        (line,) = [line for line in one.warnings if "stored blocks" in line]
-        assert f"takes from files that it also writes ({place / 'state'})" in line
+        assert any(f"takes from files that it also writes ({place / 'state'})" in line for line in one.warnings)
 
 
 def test_what_no_file_shows_is_named_once_and_may_be_declared(place, tmp_path_factory):

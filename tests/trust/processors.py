@@ -38,23 +38,23 @@ PROCESSORS = {
 }
 # Folders of tests that compare computed numbers: the others are of texts, files and processes.
 NUMERICAL = ("app", "kernels", "physics", "recorded", "report", "studies", "trust")
-# Of them, what reaches most formulas in least time: primitives, designs, exact values, and kernels beside their twins.
-PRIMITIVES = (
-    "test_algebra.py",
-    "test_hypotheses.py",
-    "test_lanes.py",
-    "test_linear.py",
-    "test_random.py",
-    "test_traced.py",
-)
+# Of them, what reaches most formulas in least time, 100 s of a processor: primitives, designs, exact values, and
+# bursts, in whose searches roundings grow.
+PRIMITIVES = ("test_algebra.py", "test_lanes.py", "test_linear.py", "test_random.py", "test_traced.py")
 DESIGNS = ("test_exact.py", "test_filters.py", "test_closed_form.py", "test_recursion.py")
+BURSTS = ("discriminator/test_kernels.py", "pulses_to_tracks/test_kernels.py")
 
 
 def selection() -> list[Path]:
     """The files that run after every change."""
-    folder = ROOT / "tests"
-    designs = [path for path in sorted((folder / "studies").rglob("test_*.py")) if path.name in DESIGNS]
-    return [*(folder / "kernels" / name for name in PRIMITIVES), folder / "physics", *designs]
+    kernels, studies = ROOT / "tests/kernels", ROOT / "tests/studies"
+    designs = [path for path in sorted(studies.rglob("test_*.py")) if path.name in DESIGNS]
+    return [
+        *(kernels / name for name in PRIMITIVES),
+        ROOT / "tests/physics",
+        *designs,
+        *(studies / name for name in BURSTS),
+    ]
 
 
 def run_tests(name: str, words: list[str]) -> int:
