@@ -37,7 +37,9 @@ def radarsim(place, warm):
 LINES = {"chirp": 120, "bearings": 200, "learned": 260}  # at most, of its file
 
 
-@pytest.mark.parametrize("name", LINES)
+@pytest.mark.parametrize(
+    "name", ["chirp", *(pytest.param(name, marks=pytest.mark.slow) for name in LINES if name != "chirp")]
+)
 def test_its_own_tests_pass(radarsim, name):
     done = radarsim("-q", "-p", "no:cacheprovider", cwd=EXAMPLES / name, module="pytest")
     assert " passed" in done.stdout

@@ -60,8 +60,12 @@ def test_interacting_orders(doppler, detection):
 @pytest.mark.parametrize("detection", [1.0, 0.6])
 @pytest.mark.parametrize(
     ("most", "prune_below", "orders"),
-    [(12, 1e-6, [0, 1, 2]), (40, 1e-4, [0, 1, 2]), (25, 0.0, [1, 2]), (1, 1e-6, [1, 2])],
-    ids=["twelve", "deep", "two orders", "nearest fold"],
+    [
+        pytest.param(12, 1e-6, [0, 1, 2], id="twelve"),
+        pytest.param(40, 1e-4, [0, 1, 2], id="deep", marks=pytest.mark.slow),
+        pytest.param(25, 0.0, [1, 2], id="two orders"),
+        pytest.param(1, 1e-6, [1, 2], id="nearest fold"),
+    ],
 )
 def test_orders_within_remembered_hypotheses(most, prune_below, orders, detection):
     """The IMM over orders and folds is its textbook twin: estimates, the best, what is right, weights of orders."""

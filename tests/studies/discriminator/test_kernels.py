@@ -185,8 +185,15 @@ def test_blocks_keep_the_information_of_the_bend_within_them():
     assert found[1] == pytest.approx(found[0], rel=6e-4)
 
 
-@pytest.mark.parametrize("theta", [THETA, SLOW])
-@pytest.mark.parametrize("complex_samples", [False, True])
+@pytest.mark.parametrize(
+    ("complex_samples", "theta"),
+    [
+        (False, THETA),
+        (True, SLOW),
+        pytest.param(False, SLOW, marks=pytest.mark.slow),
+        pytest.param(True, THETA, marks=pytest.mark.slow),
+    ],
+)
 def test_drawn_sums_have_the_law_of_demodulated_samples(theta, complex_samples):
     """Mean and covariance of drawn sums against those of sums made from drawn samples, block by block."""
     burst = burst_of(pulses=60, complex_samples=complex_samples)

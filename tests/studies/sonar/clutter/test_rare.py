@@ -73,7 +73,10 @@ def uniforms(key, realisation):
     return a[0], b[0]
 
 
-@pytest.mark.parametrize(("density", "rare"), [(0.05, RARE), (2.0, RARE), (0.05, LONG), (0.5, LONG)])
+@pytest.mark.parametrize(
+    ("density", "rare"),
+    [*(pytest.param(*of, marks=pytest.mark.slow) for of in ((0.05, RARE), (0.5, LONG))), (2.0, RARE), (0.05, LONG)],
+)
 def test_weights_and_lives_are_the_twins(density, rare):
     """Nearest plot and PDA, three rules: which tracks are held how long, and their weights, realisation by one."""
     filters = [tracker("near"), tracker("pda", "pda", 3, 5), tracker("wide", m=4, n=6, gate=0.9999)]

@@ -82,7 +82,7 @@ def test_initiation_follows_its_exact_law(m, n):
     assert (sums["ratios"][:, 1, 0] == 0).all()
 
 
-@pytest.mark.parametrize("density", [0.05, 0.5, 3.0])
+@pytest.mark.parametrize("density", [0.05, 0.5, pytest.param(3.0, marks=pytest.mark.slow)])
 def test_pairs_of_false_plots_follow_their_exact_law(density):
     """2 of n among false plots alone, sector's edges and all: by quadrature."""
     filters = [
