@@ -41,11 +41,11 @@ slow: $(VENV)/tested
 PROCESSORS = $(BIN)/python -m tests.trust.processors
 machines: $(VENV)/tested
 	$(BIN)/python -m pytest -n $(JOBS) --maxprocesses 8 -m machines $(call marked,machines)
-	$(PROCESSORS) -n $(JOBS) --maxprocesses 8 --dist loadgroup --no-loadscope-reorder
+	$(PROCESSORS) -n $(JOBS) --maxprocesses 8 --dist loadscope --no-loadscope-reorder
 
 # All tests of numbers as these processors compute them; before a release.
 processors: $(VENV)/tested
-	$(PROCESSORS) all -n $(JOBS) --maxprocesses 8 --dist loadgroup --no-loadscope-reorder
+	$(PROCESSORS) all -n $(JOBS) --maxprocesses 8 --dist loadscope --no-loadscope-reorder
 
 # The lowest packages on the oldest Python at hand and the newest on the newest; ALL=1: both on every Python, and every
 # config. The environments need an index of packages, the rest does not.

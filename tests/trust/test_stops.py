@@ -59,9 +59,9 @@ def held(out, study="range_doppler"):
 
 
 def until_stored(process, out):
-    """Wait until a block is stored; to a precision, the first looks are cut blocks."""
+    """Wait until the first block is stored; to a precision, the first looks are cut blocks."""
     end = time.monotonic() + 60
-    while not list(out.rglob("L*.sums")):
+    while not list(out.rglob("L*-0.sums")):
         assert process.poll() is None
         assert time.monotonic() < end
         time.sleep(0.05)
