@@ -10,6 +10,7 @@ What is made to be handed on, such as results, others may read as the umask lets
 
 Systems without user numbers (Windows) trust every path."""
 
+import contextlib
 import errno
 import os
 import stat
@@ -63,16 +64,25 @@ def create_private_file(path: str | os.PathLike) -> BinaryIO:
     return file
 
 
-def write_private_file(path: str | os.PathLike, content: bytes) -> None:
-    """Write a file that the user alone may read and write, whole or not at all; it replaces what has its name."""
+def write_private_file(path: str | os.PathLike, content: bytes, durable: bool = False) -> None:
+    """Write a file that the user alone may read and write, whole or not at all; it replaces what has its name.
+
+    durable: its content survives a power cut, once its folder is synchronised too. Raises OSError with this path."""
     target = Path(path)
     temporary = target.with_name(f".{target.name}.{uuid.uuid4().hex}.tmp")
     try:
         with create_private_file(temporary) as file:
             file.write(content)
+            if durable:
+                file.flush()
+                os.fsync(file.fileno())
         os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
+    except BaseException as error:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        if isinstance(error, OSError):
+            error.filename, error.filename2 = str(target), None
+        raise
 
 
 def make_readable_folder(path: str | os.PathLike) -> None:
@@ -113,11 +123,22 @@ def distrust_reason(path: str | os.PathLike) -> str | None:
         return None
 
 
-def entry_fault(path: str | os.PathLike, status: os.stat_result) -> str | None:
-    """Why a file or folder of this status may be in another user's hand, whatever the folders on the way; None if not.
+def entry_fault(place: Path, status: os.stat_result, on_the_way: bool = False) -> str | None:
+    """Why a file or folder of this status may be in another user's hand, whatever leads to it; None if it is not.
 
-    For data that is checked when it is read, and run by nobody; what is run needs `distrust_reason`."""
-    return _fault(Path(path), status)
+    On the way to others, a folder with the sticky bit is not. This alone is for data that is checked when it is read,
+    and run by nobody; what is run needs `distrust_reason`."""
+    if not hasattr(os, "geteuid"):
+        return None
+    if reason := _owner_fault(status):
+        return reason
+    if on_the_way and status.st_mode & stat.S_ISVTX:
+        return None
+    if status.st_mode & stat.S_IWOTH:
+        return "can be written by every user"
+    if status.st_mode & stat.S_IWGRP and (_has_access_list(place) or not _is_private_group(status.st_gid)):
+        return f"can be written by other users (group {status.st_gid})"
+    return None
 
 
 def read_trusted(path: str | os.PathLike) -> bytes:
@@ -127,7 +148,7 @@ def read_trusted(path: str | os.PathLike) -> bytes:
         # By the descriptor once more, and through no link: between the two looks another process may replace the file.
         flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0)
         with open(place, "rb", opener=lambda name, given: os.open(name, given | flags)) as file:
-            reason = _fault(place, os.fstat(file.fileno()))
+            reason = entry_fault(place, os.fstat(file.fileno()))
             if reason is None:
                 return file.read()
     raise UntrustedFileError(errno.EPERM, reason, os.fspath(path))
@@ -147,7 +168,7 @@ def _follow(path: str | os.PathLike) -> tuple[Path, str | None]:
         return start, None
     place, parts, links = Path(start.anchor), list(reversed(start.parts[1:])), 0
     while parts:
-        if reason := _fault(place, place.lstat(), on_the_way=True):
+        if reason := entry_fault(place, place.lstat(), on_the_way=True):
             return place, f"lies in {place}, which {reason}"
         part = parts.pop()
         entry = place.parent if part == ".." else place / part
@@ -163,22 +184,7 @@ def _follow(path: str | os.PathLike) -> tuple[Path, str | None]:
         target = Path(os.readlink(entry))
         parts += reversed(target.parts[1:] if target.is_absolute() else target.parts)
         place = Path(target.anchor) if target.is_absolute() else place
-    return place, _fault(place, place.lstat())
-
-
-def _fault(place: Path, status: os.stat_result, on_the_way: bool = False) -> str | None:
-    """Why a file or folder may be in another user's hand; on the way to others, a folder with the sticky bit is not."""
-    if not hasattr(os, "geteuid"):
-        return None
-    if reason := _owner_fault(status):
-        return reason
-    if on_the_way and status.st_mode & stat.S_ISVTX:
-        return None
-    if status.st_mode & stat.S_IWOTH:
-        return "can be written by every user"
-    if status.st_mode & stat.S_IWGRP and (_has_access_list(place) or not _is_private_group(status.st_gid)):
-        return f"can be written by other users (group {status.st_gid})"
-    return None
+    return place, entry_fault(place, place.lstat())
 
 
 def _owner_fault(status: os.stat_result) -> str | None:

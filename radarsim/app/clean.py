@@ -17,7 +17,7 @@ from radarsim.studies.identity import identity
 
 
 @dataclass(frozen=True)
-class Cleaned:
+class RemovedBlocks:
     """The amount dropped, or to be dropped: files and bytes of so many identities."""
 
     path: Path
@@ -31,7 +31,7 @@ def clean(
     experiments: Iterable[Experiment] | None = None,
     dry_run: bool = False,
     other_sources: bool = False,
-) -> Cleaned:
+) -> RemovedBlocks:
     """Drop the stored blocks of all experiments, or of some, below out/.blocks; with dry_run only count them.
 
     This includes a case's blocks from other sources; with other_sources only these are dropped, without experiments
@@ -63,7 +63,7 @@ def clean(
                     folder.rmdir()
     except OSError as error:
         raise StoreError(f"{error.filename or blocks}: cannot be removed: {error.strerror}") from error
-    return Cleaned(blocks, len(folders), len(files), sum(size for _, size in files))
+    return RemovedBlocks(blocks, len(folders), len(files), sum(size for _, size in files))
 
 
 def _is_identity(path: Path) -> bool:

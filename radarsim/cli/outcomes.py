@@ -19,7 +19,7 @@ from radarsim.report.wording import unit as unit_of
 if TYPE_CHECKING:
     import pandas as pd
 
-    from radarsim.app.clean import Cleaned
+    from radarsim.app.clean import RemovedBlocks
     from radarsim.app.compare import Comparison, DopplerChart
     from radarsim.app.configs import Inventory
     from radarsim.app.doctor import Inspection
@@ -261,7 +261,7 @@ def print_inspection(found: "Inspection") -> None:
     )
 
 
-def print_cleaned(cleaned: "Cleaned", dry_run: bool) -> None:
+def print_cleaned(cleaned: "RemovedBlocks", dry_run: bool) -> None:
     """The amount dropped, or to be dropped."""
     told = {
         "files": plural("{count} file", "{count} files", cleaned.files),

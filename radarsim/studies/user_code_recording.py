@@ -223,9 +223,7 @@ EVENTS: dict[str, Callable[..., None]] = {
     "sqlite3.connect": _on_database,
     "socket.connect": _on_connection,
     "socket.sendto": _on_connection,
-    **dict.fromkeys(
-        ("subprocess.Popen", "os.system", "os.posix_spawn", "os.exec", "os.fork", "os.forkpty"), _on_process
-    ),
+    **dict.fromkeys(PROCESSES, _on_process),
 }
 
 

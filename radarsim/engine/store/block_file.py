@@ -9,15 +9,13 @@ import json
 import os
 import re
 import stat
-import uuid
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
 from radarsim.engine.blocks import Node, Partial, Piece, Total
-from radarsim.private_files import UntrustedFileError, create_private_file, entry_fault
+from radarsim.private_files import UntrustedFileError, entry_fault
 
 MAGIC = b"radarsim sums 1\n"  # another number if the same realisations are ever added in another order
 SUFFIX = ".sums"
@@ -96,24 +94,6 @@ def read_file(path: Path) -> bytes:
         if fault := entry_fault(path, status):
             raise UntrustedFileError(errno.EPERM, fault, str(path))
         return file.read()
-
-
-def write_file(path: Path, content: bytes) -> None:
-    """Write a file for the user alone, completely or not at all, durable except for its name; OSError with the file's
-    name."""
-    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
-    try:
-        with create_private_file(temporary) as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except BaseException as error:
-        with suppress(OSError):
-            temporary.unlink()
-        if isinstance(error, OSError):
-            error.filename, error.filename2 = str(path), None
-        raise
 
 
 def is_directory(path: Path) -> bool:

@@ -33,10 +33,15 @@ from radarsim.engine.store.block_file import (
     piece_header,
     piece_named,
     read_file,
-    write_file,
 )
 from radarsim.errors import StoreError
-from radarsim.private_files import UntrustedFileError, entry_fault, make_private_folder, make_readable_folder
+from radarsim.private_files import (
+    UntrustedFileError,
+    entry_fault,
+    make_private_folder,
+    make_readable_folder,
+    write_private_file,
+)
 
 STALE_S = 600  # age from which a temporary file is one of a killed run
 ATTEMPTS = 4  # at reading or writing what another program merges or removes at the same time
@@ -141,7 +146,7 @@ class Store:
         try:
             for piece, sums in pieces.items():
                 header = self._header(piece) | {"platforms": sorted(self.platforms), "versions": versions()}
-                write_file(block_path(self.path, piece), encode(header, sums.values))
+                write_private_file(block_path(self.path, piece), encode(header, sums.values), durable=True)
             self._synchronise()
         except OSError as error:
             if isinstance(error, FileNotFoundError) and not last:
