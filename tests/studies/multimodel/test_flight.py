@@ -54,7 +54,7 @@ def test_drag_is_density_times_speed_squared_over_twice_the_coefficient():
 
 
 def test_velocity_and_acceleration_are_derivatives_of_position():
-    t = np.arange(0, 30, 0.001)
+    t = np.arange(0, 50, 0.001)
     x = fly((1e5, 4e4, 0), (-900, -200, 100), 8e3, 1.0, [Phase(0), Phase(20, lateral=50, normal=20, period_s=8)], t)
     for axis in range(3):
         # Differences over 2 ms: the interpolation between steps is to the order of their errors, which change slowly.

@@ -122,12 +122,12 @@ GRID = [("kalman", "moment", 1)] + [
 
 @pytest.mark.parametrize(("family", "rule", "size"), GRID)
 def test_kernel_equals_its_twin(family, rule, size):
-    compare(family, rule, "best" if rule == "combined" else "moment", size, 60, lanes=(0, 5))
+    compare(family, rule, "best" if rule == "combined" else "moment", size, 120, lanes=(0, 5))
 
 
 @pytest.mark.parametrize("family", ["kalman", "gpb1", "imm", "gpb2"])
 def test_missed_plots_are_one_prediction_over_the_real_interval(family):
-    compare(family, "combined", "best", 1 if family == "kalman" else 3, 100, missing=0.3, lanes=(0, 5, 7))
+    compare(family, "combined", "best", 1 if family == "kalman" else 3, 150, missing=0.3, lanes=range(WIDTH))
 
 
 def hypothesis_of(cells, lane=0):

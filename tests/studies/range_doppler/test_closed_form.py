@@ -17,7 +17,7 @@ def gains(radar, variance, scans=15):
 
 def test_gains_depend_on_the_scan_and_the_two_groups_alone():
     rng = np.random.default_rng(5)
-    for _ in range(80):
+    for _ in range(300):
         sigma_r, sigma_V, dt = 10 ** rng.uniform([0, -1, -1], [3, 2, 2])
         variance = 10 ** rng.uniform(-6, 2)
         of = filters.groups(sigma_r, sigma_V, dt, variance)

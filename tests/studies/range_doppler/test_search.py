@@ -15,7 +15,7 @@ def found():
 def test_numbers_by_a_plain_loop(found):
     rng = np.random.default_rng(3)
     axes = {key: list(values) for key, values in found.axes.items()}
-    for _ in range(12):
+    for _ in range(40):
         place = tuple(int(rng.integers(len(values))) for values in axes.values())
         taken = found.taken(place)
         want = plainly(taken)
