@@ -9,11 +9,11 @@ WIDTH = 110
 
 def markdown() -> str:
     """A heading and the help of the command and of each of its commands, in the order of `radarsim --help`."""
-    context = click.Context(main, info_name="radarsim", max_content_width=WIDTH, terminal_width=WIDTH)
+    context = main.make_context("radarsim", [], resilient_parsing=True, terminal_width=WIDTH)
     parts = ["## radarsim", fenced(main.get_help(context))]
     for name in main.list_commands(context):
         command = main.get_command(context, name)
-        inner = click.Context(command, info_name=name, parent=context, max_content_width=WIDTH, terminal_width=WIDTH)
+        inner = click.Context(command, info_name=name, parent=context, terminal_width=WIDTH)
         parts += [f"## radarsim {name}", fenced(command.get_help(inner))]
     return "\n\n".join(parts)
 
