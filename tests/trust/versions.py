@@ -27,7 +27,7 @@ PLACE = ROOT / ".venv/versions"
 LOWEST = ROOT / "constraints-lowest.txt"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 EXTRAS = "asterix", "ais", "cluster", "parquet", "xarray"
-MINORS = range(11, 20)  # Pythons 3.x that are looked for
+PYTHON_MINORS = range(11, 20)  # Pythons 3.x that are looked for
 HEAD = "# The lowest versions that pyproject.toml allows and that have a wheel, and what they need: `make lowest`."
 TEST_RUNNERS = "pytest>", "hypothesis>"
 # From the unpacked source distribution: what depends on pydantic, on the layout of the files, and on the extras.
@@ -92,25 +92,25 @@ def runner_requirements() -> list[str]:
     return [needed for needed in PROJECT["project"]["optional-dependencies"]["test"] if needed.startswith(TEST_RUNNERS)]
 
 
-def pythons() -> dict[int, str]:
+def find_pythons() -> dict[int, str]:
     """The interpreters of Python 3.x at hand, by x: on PATH, or of pyenv."""
-    found = {}
-    for minor in MINORS:
+    interpreters = {}
+    for minor in PYTHON_MINORS:
         name = f"python3.{minor}"
         in_pyenv = sorted(Path.home().glob(f".pyenv/versions/3.{minor}.*/bin/python3"))
-        for python in filter(None, [shutil.which(name), *map(str, in_pyenv)]):
-            version = subprocess.run([python, "-c", "import sys; print(sys.version_info[1])"], capture_output=True)
+        for path in filter(None, [shutil.which(name), *map(str, in_pyenv)]):  # the first may be pyenv's, and not run
+            version = subprocess.run([path, "-c", "import sys; print(sys.version_info[1])"], capture_output=True)
             if version.stdout.strip() == str(minor).encode():
-                found.setdefault(minor, python)
-    return found | {sys.version_info[1]: sys.executable}
+                interpreters.setdefault(minor, path)
+    return interpreters | {sys.version_info[1]: sys.executable}
 
 
-def chosen(minors: Sequence[int], every: bool) -> list[Environment]:
-    """The environments to try with these Pythons."""
-    with_lowest = [minor for minor in minors if f"python_version == '3.{minor}'" in LOWEST.read_text(encoding="utf-8")]
-    if not every:
-        return [Environment(min(with_lowest), "lowest"), Environment(max(minors), "newest")]
-    return [Environment(minor, "lowest") for minor in with_lowest] + [Environment(minor, "newest") for minor in minors]
+def select_environments(minors: Sequence[int], every: bool) -> list[Environment]:
+    """The environments to try with these Pythons, in ascending order."""
+    pins = LOWEST.read_text(encoding="utf-8")
+    lowest = [Environment(minor, "lowest") for minor in minors if f"python_version == '3.{minor}'" in pins]
+    newest = [Environment(minor, "newest") for minor in minors]
+    return lowest + newest if every else lowest[:1] + newest[-1:]
 
 
 def write_lowest(every: bool) -> None:
@@ -132,11 +132,12 @@ def write_lowest(every: bool) -> None:
 
 def install(every: bool) -> None:
     """Make the environments that are missing or out of date."""
-    at_hand = pythons()
-    builder = {BUILDER: (sys.executable, PROJECT["build-system"]["requires"])}
-    wanted = {one.name: (at_hand[one.minor], one.requirements) for one in chosen(sorted(at_hand), every)}
+    interpreters = find_pythons()
+    plans = {BUILDER: (sys.executable, PROJECT["build-system"]["requires"])}
+    for environment in select_environments(sorted(interpreters), every):
+        plans[environment.name] = interpreters[environment.minor], environment.requirements
     with ThreadPoolExecutor(2) as pool:
-        list(pool.map(lambda name: _install(name, *(builder | wanted)[name]), builder | wanted))
+        list(pool.map(lambda name: _install(name, *plans[name]), plans))
 
 
 def _install(name: str, python: str, requirements: list[str]) -> None:
@@ -152,31 +153,34 @@ def _install(name: str, python: str, requirements: list[str]) -> None:
 
 def run(command: Sequence[object], folder: Path = ROOT, home: Path | None = None) -> str:
     """What a command prints. Raises SystemExit, with all that it said, where it fails."""
-    kept = {name: text for name, text in os.environ.items() if not name.startswith(("PYTHON", "RADARSIM_"))}
-    own = {} if home is None else {"HOME": str(home), "RADARSIM_CACHE_DIR": str(home / "cache")}
+    variables = {name: text for name, text in os.environ.items() if not name.startswith(("PYTHON", "RADARSIM_"))}
+    if home is not None:
+        variables |= {"HOME": str(home), "RADARSIM_CACHE_DIR": str(home / "cache")}
     words = [str(word) for word in command]
-    done = subprocess.run(words, cwd=folder, env=kept | own, capture_output=True, text=True, check=False)
-    if done.returncode != 0 or "Traceback" in done.stderr:
-        raise SystemExit(f"{' '.join(words)}\n{done.stdout}{done.stderr}exit code {done.returncode}")
-    return done.stdout
+    result = subprocess.run(words, cwd=folder, env=variables, capture_output=True, text=True, check=False)
+    if result.returncode != 0 or "Traceback" in result.stderr:
+        raise SystemExit(f"{' '.join(words)}\n{result.stdout}{result.stderr}exit code {result.returncode}")
+    return result.stdout
 
 
 def check(every: bool) -> None:
     """Build the distributions and try them in each environment. Raises SystemExit where anything fails."""
     installed = {int(place.name.split("-")[0][2:]) for place in PLACE.glob("3.*-*")}
-    with tempfile.TemporaryDirectory() as folder:
-        sources, wheel = distributions(Path(folder))
-        identities = case_identities(Path(sys.executable), Path(folder))
-        with ThreadPoolExecutor(2) as pool:
-            done = [
-                pool.submit(_check, one, sources, wheel, Path(folder) / one.name, identities, every)
-                for one in chosen(sorted(installed), every)
-            ]
-            for result in done:
-                sys.stdout.write(result.result() + "\n")
+    environments = select_environments(sorted(installed), every)
+    with tempfile.TemporaryDirectory() as place, ThreadPoolExecutor(2) as pool:
+        folder = Path(place)
+        sources, wheel = build_distributions(folder)
+        identities = case_identities(Path(sys.executable), folder)
+        reports = [
+            pool.submit(_check, environment, sources, wheel, folder / environment.name, identities, every)
+            for environment in environments
+        ]
+        for report in reports:
+            sys.stdout.write(report.result() + "\n")
+            sys.stdout.flush()
 
 
-def distributions(folder: Path) -> tuple[Path, Path]:
+def build_distributions(folder: Path) -> tuple[Path, Path]:
     """The unpacked source distribution, and the wheel that is built from it."""
     build = "import sys; from setuptools import build_meta; getattr(build_meta, sys.argv[1])(sys.argv[2])"
     builder = PLACE / BUILDER / "bin/python"
@@ -195,15 +199,15 @@ def case_identities(python: Path, folder: Path) -> object:
     return json.loads(run([python, ROOT / "tests/config/case_identities.py"], folder))
 
 
-def _check(one: Environment, sources: Path, wheel: Path, folder: Path, identities: object, every: bool) -> str:
+def _check(environment: Environment, sources: Path, wheel: Path, folder: Path, identities: object, every: bool) -> str:
     """Install the wheel and try it in an empty folder, which is its home; returns what was tried."""
-    python, before = PLACE / one.name / "bin/python", time.monotonic()
+    python, before = PLACE / environment.name / "bin/python", time.monotonic()
     folder.mkdir()
     pip = [python, "-m", "pip", *QUIET]
     run([*pip, "install", "--no-index", "--no-deps", "--force-reinstall", wheel])
     run([*pip, "check"])
     if case_identities(python, folder) != identities:
-        raise SystemExit(f"{one.name}: identities of shipped cases are not those of {sys.executable}")
+        raise SystemExit(f"{environment.name}: identities of shipped cases are not those of {sys.executable}")
     for words in COMMANDS:
         run([python, "-m", "radarsim", *words], folder, folder)
     run([python, "-c", "import radarsim; radarsim.plots('rls2', n=10).to_xarray()"], folder, folder)
@@ -211,7 +215,7 @@ def _check(one: Environment, sources: Path, wheel: Path, folder: Path, identitie
         run([python, "-m", "radarsim.cli.reproduce", "all", "--set", "realisations=200"], folder, folder)
     tests = [python, "-m", "pytest", "-p", "no:cacheprovider", "-k", "not spoiled", *TESTS]
     passed = run(tests, sources, folder).splitlines()[-1]
-    return f"{one.name}: {len(COMMANDS)} commands, {passed}; {time.monotonic() - before:.0f} s"
+    return f"{environment.name}: {len(COMMANDS)} commands, {passed}; {time.monotonic() - before:.0f} s"
 
 
 if __name__ == "__main__":
