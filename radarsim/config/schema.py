@@ -87,6 +87,15 @@ TITLE = "radarsim experiment"
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
+# Pydantic's own word for a bound, left where other checks precede it; its keyword, and which of two bounds counts.
+BOUNDS = {
+    "ge": ("minimum", max),
+    "gt": ("exclusiveMinimum", max),
+    "le": ("maximum", min),
+    "lt": ("exclusiveMaximum", min),
+}
+
+
 class OwnTitles(GenerateJsonSchema):
     """A key is called what its schema calls it: no title is made of its name."""
 
@@ -165,12 +174,18 @@ def _scenario(models: dict[str, type[Study]], kinds: dict[str, dict[str, Any]]) 
 
 
 def tidy(part: Any) -> Any:
-    """A schema without keywords that carry no information: names of classes, and null, which means an absent key."""
+    """A schema in JSON Schema's keywords, without those that carry no information.
+
+    These are names of classes, and null, which means an absent key."""
     if isinstance(part, list):
         return [tidy(item) for item in part]
     if not isinstance(part, dict):
         return part
     kept = {key: tidy(value) for key, value in part.items() if not _idle(key, value, part)}
+    for bound, (keyword, tighter) in BOUNDS.items():
+        if isinstance(kept.get(bound), int | float):
+            limit = kept.pop(bound)
+            kept[keyword] = tighter(limit, kept.get(keyword, limit))
     choices = [choice for choice in kept.get("anyOf", ()) if choice != {"type": "null"}]
     if len(choices) == 1:
         del kept["anyOf"]
