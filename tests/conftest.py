@@ -5,8 +5,10 @@ are compiled once. Groups that take long begin first, those of the studies befor
 others read from the cache of kernels.
 """
 
+import fnmatch
 import gc
 import os
+from collections import defaultdict
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -39,10 +41,33 @@ def rank_of(item: pytest.Item) -> tuple[int, bool]:
     return LONG.index(folder) if folder in LONG else len(LONG), rest.endswith(".py")
 
 
+@pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Put the groups in their order, in a process that is given tests by another."""
+    """Mark the slow cases of a test; put groups in their order, in a process that is given tests by another."""
+    mark_slow_cases(items, whole=not any("[" in word for word in config.args))
     if hasattr(config, "workerinput"):
         items.sort(key=rank_of)
+
+
+def mark_slow_cases(items: list[pytest.Item], whole: bool) -> None:
+    """Mark as slow the cases that `slow_cases` names, with * for any text, or all but those of `slow_cases_except`.
+
+    Raises UsageError for a name that no case has, where all cases are there: a renamed one would change its side."""
+    cases = defaultdict(list)
+    for item in items:
+        if hasattr(item, "callspec"):
+            cases[item.nodeid.partition("[")[0]].append(item)
+    for name, group in cases.items():
+        for mark in group[0].iter_markers():
+            if not mark.name.startswith("slow_cases"):
+                continue
+            for pattern in mark.args:
+                if whole and not fnmatch.filter([item.callspec.id for item in group], pattern):
+                    raise pytest.UsageError(f"{name}: no case is named {pattern}")
+            for item in group:
+                is_named = any(fnmatch.fnmatchcase(item.callspec.id, pattern) for pattern in mark.args)
+                if is_named == (mark.name == "slow_cases"):
+                    item.add_marker(pytest.mark.slow)
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -20,6 +20,7 @@ print(json.dumps([name for name in {(*HEAVY, "numpy")} if name in sys.modules]),
 SOLVE = ("solve", "rls2", "radar.sigma_velocity_mps", "--gain", "r", "--filter", "r+Vr", "--at", "60", "--equals", "30")
 
 
+@pytest.mark.slow_cases("check", "schema")
 @pytest.mark.parametrize("words", [("check", "rls2"), SOLVE, *SHOWS], ids=lambda words: words[0])
 def test_what_needs_no_kernel_loads_none(words):
     ended = subprocess.run([sys.executable, "-c", COMMAND, *words], capture_output=True, text=True, check=True)
@@ -27,6 +28,7 @@ def test_what_needs_no_kernel_loads_none(words):
     assert json.loads(ended.stderr) == ([] if words in SHOWS else ["numpy"])
 
 
+@pytest.mark.slow
 def test_a_check_of_what_is_long_loads_the_compiler():
     """So that the test above sees what it looks for."""
     words = "check", "rls2", "-n", "1e7"

@@ -54,7 +54,8 @@ def names_read(source):
 
 def all_read(folder):
     """The variables that the modules of a folder read."""
-    return set().union(*(names_read(path.read_text(encoding="utf-8")) for path in (ROOT / folder).rglob("*.py")))
+    sources = (path.read_text(encoding="utf-8") for path in (ROOT / folder).rglob("*.py"))
+    return set().union(*(names_read(source) for source in sources if re.search("environ|getenv", source)))
 
 
 class Recorder(os._Environ):

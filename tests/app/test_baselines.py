@@ -43,6 +43,7 @@ def both():
     return radarsim.run(THREE)
 
 
+@pytest.mark.slow_cases("sonar_smoothing-None-overrides2")
 @pytest.mark.parametrize(
     ("config", "names", "overrides"),
     [
@@ -68,6 +69,7 @@ def test_rows_are_those_of_each_baseline_alone(config, names, overrides):
     pd.testing.assert_frame_equal(made.curves, radarsim.run(config, realisations=60, overrides=overrides).curves)
 
 
+@pytest.mark.slow
 def test_intervals_against_a_further_baseline_cover(both):
     """In 300 samples of 400 realisations; of 95 % intervals at most 5.85 standard errors fewer hold."""
     case = both.experiment.cases[0]

@@ -21,6 +21,7 @@ def out(tmp_path_factory):
     return made
 
 
+@pytest.mark.slow
 def test_two_radars_side_by_side(out):
     said = command("compare", "rls2", "rls4", "--out", out).output
     exact = -76.9  # per cent: the exact σ_r of RLS 4 at 140 s against that of RLS 2

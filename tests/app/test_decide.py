@@ -2,6 +2,8 @@
 
 import math
 
+import pytest
+
 import radarsim
 from radarsim.app import readings
 from radarsim.report import claims
@@ -9,6 +11,7 @@ from radarsim.report.claims.rule import CONFIRMED, UNDECIDED
 from tests.program import command
 
 
+@pytest.mark.slow
 def test_what_is_known_exactly_is_decided_at_the_first_look(tmp_path):
     seen = []
     keep = {"out": tmp_path, "progress": lambda *of: seen.append(of)}
@@ -41,6 +44,7 @@ def test_a_time_limit_before_all_cases_names_the_claims_that_wait(tmp_path):
     assert done.unmet[1].startswith(f"{len(done.cases)} of 30 cases were done by then, too few to decide P1.1, P1.2,")
 
 
+@pytest.mark.slow
 def test_undecided_at_the_most_is_exit_code_3(tmp_path):
     """Eight bursts leave P4.4 open; a look at the most is made though it is no 2000·2^m."""
     words = ("run", "discriminator_paper", "-n", "60", "--decide", "--no-figures", "-q")

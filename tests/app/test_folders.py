@@ -72,6 +72,7 @@ def test_tables_that_were_altered_are_not_written(tmp_path):
     assert result.curves["sigma"].min() > 0
 
 
+@pytest.mark.slow_cases_except("options1*")
 @pytest.mark.parametrize(
     ("options", "ending"),
     [
@@ -106,6 +107,7 @@ def test_cases_that_a_precision_ends_at_several_numbers_are_repeated_with_it():
     )
 
 
+@pytest.mark.slow
 def test_what_no_command_repeats_says_so(tmp_path):
     looks = iter([None] * 40)
     result = radarsim.run(
@@ -255,6 +257,7 @@ def test_a_new_config_is_whole_or_not_there(tmp_path, monkeypatch):
     assert [one.name for one in tmp_path.iterdir()] == ["mine.yaml"]
 
 
+@pytest.mark.slow_cases("figures1-kinds1")
 @pytest.mark.parametrize(
     ("figures", "kinds"), [("svg", {".svg", ".md"}), (["pdf"], {".pdf", ".md"}), (None, set()), ((), set())]
 )
@@ -275,6 +278,7 @@ def test_without_the_compiler_it_is_told(monkeypatch):
         radarsim.run("rls2", realisations=200)
 
 
+@pytest.mark.slow
 def test_a_config_of_ones_own_is_not_judged_as_the_shipped_one_of_its_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = (SHIPPED / "configs" / "orders.yaml").read_text(encoding="utf-8")

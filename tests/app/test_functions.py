@@ -90,6 +90,7 @@ SIDES = {
 }
 
 
+@pytest.mark.slow_cases_except("range_doppler")
 @pytest.mark.parametrize("study", some(SIDES, "range_doppler", "sonar", "discriminator"))
 def test_compare_of_results_is_that_of_stored_ones(study, tmp_path):
     config, change = SIDES[study]
@@ -114,6 +115,7 @@ def test_compare_of_results_is_that_of_stored_ones(study, tmp_path):
     assert repr(found).startswith(found.sentences[0][:100])
 
 
+@pytest.mark.slow
 def test_compare_names_two_results_of_one_config(tmp_path):
     given = {"realisations": 50, "out": tmp_path, "figures": False}
     one, other = (radarsim.run("rls2", seed=seed, **given) for seed in (1, 2))
@@ -158,6 +160,7 @@ def test_readings(tmp_path):
     pd.testing.assert_frame_equal(found.table, stored[found.table.columns], check_dtype=False)
 
 
+@pytest.mark.slow_cases("range_doppler")
 @pytest.mark.parametrize("config", ["rls2", "range_doppler"])
 def test_check(config):
     outlook = radarsim.check(config, realisations=1000)

@@ -359,6 +359,7 @@ def test_a_filter_that_always_fails_is_not_compared(estimates):
     assert not len(of(result.curves, filter="mine"))
 
 
+@pytest.mark.slow
 def test_a_covariance_that_is_none_does_not_enter_nees(estimates):
     P = np.broadcast_to(np.diag([250.0**2, 15.0**2, 1.0]), (300, 15, 3, 3)).copy()
     P[:30, 14, 0, 0] = -1
@@ -415,6 +416,7 @@ def twin_of(first, count):
     return twin(judging.outside.plots_of(plan, plan.draw(first, count)))
 
 
+@pytest.mark.slow
 def test_threads_change_no_number():
     one, two = (radarsim.judge("rls2", Twin, realisations=9000, threads=threads).tables for threads in (1, 2))
     assert all(one[name].equals(two[name]) for name in one)
@@ -450,6 +452,7 @@ def test_chunks_with_and_without_covariances_keep_those_that_are_there(estimates
     assert set(radarsim.judge("rls2", iter(chunks), realisations=300).tables["nees"]["n"]) == {200}
 
 
+@pytest.mark.slow
 def test_a_function_of_one_realisation(mine):
     def one(plots):
         columns = {name: column[None] for name, column in plots.columns.items()}
@@ -579,6 +582,7 @@ def held(plots):
     return z
 
 
+@pytest.mark.slow_cases("sonar_manoeuvre-overrides2", "sonar_smoothing-overrides1")
 @pytest.mark.parametrize(
     ("config", "overrides"),
     [
@@ -653,6 +657,7 @@ def test_a_planted_loss_is_known_as_well_as_theory_says():
     assert "mine is worse than r+Vr" in result.answer[0]
 
 
+@pytest.mark.slow_cases("500")
 @pytest.mark.parametrize("every", [1, 500])
 def test_rare_differences_are_said_to_decide_where_they_are_rare(every):
     """A filter that differs from one of the config by 1 % of σ in all realisations, or by 1 σ in four of 2000."""
@@ -719,6 +724,7 @@ def test_memory_is_flat_in_the_number_of_realisations():
     assert peaks[1] < 1.2 * peaks[0]
 
 
+@pytest.mark.slow
 def test_errors_are_taken_at_the_scans_that_a_study_reports():
     """multimodel reports from the fourth scan on; σ is that of the noise put on the truth at these scans."""
     plots = radarsim.plots("multimodel_1hz", n=16)

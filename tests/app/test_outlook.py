@@ -40,6 +40,7 @@ def test_what_is_surely_short_is_not_timed(monkeypatch):
     assert document["cases"][0]["seconds"] == pytest.approx(0.015, rel=1e-12)
 
 
+@pytest.mark.slow_cases("words2")
 @pytest.mark.parametrize(
     "words", [("rls2", "-n", 1e7), ("rls2", "-n", 1, "--set", "scans=400"), ("sonar_smoothing", "-n", 1)]
 )

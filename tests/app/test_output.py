@@ -197,6 +197,7 @@ def test_many_long_tables_share_the_room_of_a_page():
     assert len(html._tables({"alone": long})[0]["rows"]) == html.ROWS
 
 
+@pytest.mark.slow
 def test_figures_have_the_width_asked_for_their_captions_and_what_they_were_made_of(tmp_path):
     first = run.run("rls2", realisations=2000, out=tmp_path, overrides=["figures=[sigma_r,gain_r]"])
     folder = tmp_path / "rls2"

@@ -64,6 +64,7 @@ def test_a_run_says_once_that_its_store_was_begun_elsewhere(out):
     assert ELSEWHERE in note
 
 
+@pytest.mark.slow
 def test_cases_that_were_all_begun_elsewhere_are_reported_in_one_line(tmp_path, monkeypatch):
     config = "rls2_manoeuvre_variance"
     with monkeypatch.context() as patch:

@@ -82,6 +82,7 @@ def test_a_notebook_shows_the_answer_and_no_markup_of_a_users():
     assert "exact_sigma" in shown
 
 
+@pytest.mark.slow
 def test_a_value_that_is_not_known_stays_empty_in_a_notebook():
     result = radarsim.run("sonar_missed", realisations=20)
     assert result.last_scan["exact_sigma"].isna().any()

@@ -185,6 +185,7 @@ def test_a_damaged_table_is_reported(tmp_path):
         app.judged(app.asked(["P1.4"]), out=tmp_path, figures=False)
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path):
     run = partial(command, "readings", "--out", tmp_path)
     text = run("P1.7").stdout
@@ -236,6 +237,7 @@ def ran():
     return app.Asked(app.Paper(Velocities(), claims, "range_doppler"), [claim], whole=False)
 
 
+@pytest.mark.slow
 def test_readings_that_are_run(ran, tmp_path, monkeypatch):
     seen = []
     done = app.judged([ran], out=tmp_path, figures=False, progress=lambda *of: seen.append(of))
@@ -266,6 +268,7 @@ def test_readings_that_are_run(ran, tmp_path, monkeypatch):
     assert again[-1][0] > 0.99 * again[-1][1]
 
 
+@pytest.mark.slow
 def test_a_run_is_judged_and_let_go(ran, tmp_path, monkeypatch):
     """Sums and tables of one run at a time are held, however many readings there are."""
     seen, alive = [], []
@@ -285,6 +288,7 @@ def test_a_run_is_judged_and_let_go(ran, tmp_path, monkeypatch):
     assert all(one() is None for one in seen)
 
 
+@pytest.mark.slow
 def test_a_reading_as_shipped_measures_what_a_run_of_the_config_does(ran, tmp_path):
     import radarsim
 
@@ -333,6 +337,7 @@ class Margins(Near):
         return super().evidence(claim, reading, dataclasses.replace(seen, tables=sampled), of)
 
 
+@pytest.mark.slow
 def test_what_is_undecided_runs_on_until_it_is_decided(ran, tmp_path):
     wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, readings=Margins()))
     few = app.judged([wanted], out=tmp_path, figures=False)
@@ -356,6 +361,7 @@ def test_what_is_undecided_runs_on_until_it_is_decided(ran, tmp_path):
     assert {row["over"] for row in table(tmp_path)} == {over.outcome.kind}
 
 
+@pytest.mark.slow
 def test_what_is_left_undecided_is_exit_code_3(tmp_path):
     """Eight bursts a reading leave P4.4 open."""
     words = ("readings", "P4.4", "-n", "8", "--decide", "--no-figures")

@@ -13,6 +13,7 @@ from radarsim.app import doctor, reproduce
 SMALL = ["realisations=100"]
 
 
+@pytest.mark.slow
 def test_a_line_each_a_fault_told_and_a_summary(tmp_path):
     (tmp_path / "rls3").write_text("a file where a folder should be")
     told = []
@@ -51,6 +52,7 @@ def dies(stem):
     return reproduce.Done(stem, 0.0, "")
 
 
+@pytest.mark.slow
 def test_a_config_with_which_its_process_dies_is_told_and_the_others_are_done():
     done = {one.stem: one for one in reproduce._finished(dies, list("abcd"), None)}
     assert "b: its process ended" in done.pop("b").faults[0]

@@ -90,6 +90,7 @@ def test_the_last_scans_time_is_kept_when_the_period_grows():
     assert one["sigma_change_percent"] == pytest.approx(100 * (at / one["sigma"] - 1), abs=1e-7)
 
 
+@pytest.mark.slow
 def test_sampled_changes_are_paired_and_near_the_exact_ones(exact, monkeypatch):
     """With exact values withheld: within four standard errors, and far narrower than two runs of their own."""
     monkeypatch.setattr(finding.quantities, "exact", lambda *_: np.nan)
@@ -181,6 +182,7 @@ def test_where_some_filters_have_no_exact_values_all_are_sampled():
     assert lines
 
 
+@pytest.mark.slow
 def test_items_of_a_list_are_raised_though_the_config_gives_degrees():
     found = sensitivity("sonar_smoothing", overrides=["scans=12"], realisations=40)
     assert not [key for key in found.left_out if "bearing" in key]

@@ -14,6 +14,7 @@ def results():
     return {name: radarsim.run(name, realisations=200) for name in ("rls2", "rls4")}
 
 
+@pytest.mark.slow_cases_except("sonar_clutter-20")
 @pytest.mark.parametrize(("config", "n"), [("range_doppler", 20), ("multimodel", 2), ("sonar_clutter", 20)])
 def test_everything_a_user_meets_has_a_short_text(config, n):
     result = radarsim.run(config, realisations=n, threads=1)

@@ -75,6 +75,7 @@ def test_other_keys_and_quantities_against_the_textbook(key, quantity, equals, s
         assert attained == pytest.approx(equals, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_all_roots_are_those_of_a_dense_grid():
     quantity = Wanted("gain", "r+Vr", "ar", 100.0)
     found = solve("rls2", "manoeuvre_variance", quantity, 0.0, between=(1e-6, 1e-1))
@@ -204,6 +205,7 @@ def test_the_interval_covers_a_known_root(name):
     assert abs(inside - 0.95 * seeds) <= 4 * math.sqrt(seeds * 0.95 * 0.05), (under, over)
 
 
+@pytest.mark.slow_cases("every plot-3")
 @pytest.mark.parametrize(("name", "seeds"), [("every plot", 3), ("missed plots", 1)])
 def test_the_interval_holds_the_root_where_the_quantity_s_own_interval_there_holds_the_target(name, seeds):
     """So the one covers as often as the other; by a margin of the search's residue of a fiftieth of the interval."""
@@ -226,6 +228,7 @@ MOVED = {"overrides": ["duration_s=140"], "between": (5, 9)}  # of the scan peri
 SEEN = Wanted("sigma", "r", "r", at_s=60.0)
 
 
+@pytest.mark.slow
 def test_a_key_that_moves_the_scans_is_said_not_to_be_paired():
     exact = solve("rls2", "radar.scan_period_s", SEEN, 190, **MOVED)
     sampled = {"sampled": True, "realisations": 200, "threads": 1}
@@ -339,6 +342,7 @@ def test_the_command_ends_with_3_where_it_is_not_attainable():
     assert document["limit"] == pytest.approx(56.7, abs=0.05)
 
 
+@pytest.mark.slow
 def test_rates_of_other_studies_are_read_by_the_names_of_their_tables():
     """Folds unfolded rightly: sampled with an interval that holds the config's own rate when that is the target."""
     quantity = Wanted("right", "memory", at_k=4)
@@ -431,6 +435,7 @@ def test_where_the_quantity_jumps_over_the_target_it_is_said():
     assert found.notes == ("the quantity jumps over the target there",)
 
 
+@pytest.mark.slow
 def test_what_takes_long_is_foretold_with_its_time_and_what_it_is(monkeypatch):
     from radarsim.app import solve as solving
     from radarsim.studies.range_doppler import patterns
@@ -481,6 +486,7 @@ def test_a_root_among_many_patterns_takes_few_looks_at_all_of_them(monkeypatch):
     assert 2 + 2 + 2 <= looks.count(True) <= 7  # as it is, with the filter of the range; a root; its slope
 
 
+@pytest.mark.slow
 def test_an_interval_that_rests_on_heavy_tails_says_so():
     """While filters begin, rare patterns of plots decide: where the run's row is marked, so is the answer."""
     given = {"overrides": [*MISSED, "scans=7"], "between": (2, 40), "sampled": True, "realisations": 1000}
@@ -490,6 +496,7 @@ def test_an_interval_that_rests_on_heavy_tails_says_so():
     assert late.notes == ()
 
 
+@pytest.mark.slow
 def test_a_pilot_that_is_far_off_hides_no_root(monkeypatch):
     """Where the first look with few realisations crosses the target elsewhere, all of them are asked everywhere."""
     plain = Curve.simulated

@@ -38,6 +38,7 @@ def matched(monkeypatch):
 
 
 # ---- exact -----------------------------------------------------------------------------------------------------------
+@pytest.mark.slow
 def test_it_finds_the_variance_of_the_matched_world(matched):
     found = tune(matched_world.config(0.1), "sigma r", free={"manoeuvre_variance": None})
     (one,) = found.keys
@@ -53,6 +54,7 @@ def test_a_filter_at_its_best_gains_nothing(matched):
     assert found.answer == "Tuning gains nothing: σ of 0.001 in r is at its best as stated (exact)."
 
 
+@pytest.mark.slow
 def test_it_is_the_nearest_that_solve_attains():
     """Nothing attains σ of nothing: what solve says is nearest is the least."""
     overrides = ["target=turn"]
@@ -72,6 +74,7 @@ def test_it_is_the_best_variance_that_a_config_may_ask_for():
     assert found.all.tuned <= sigma("rls2", *best, at_s=140.0)
 
 
+@pytest.mark.slow
 def test_over_a_family_the_mean_square_is_least():
     found = tune("rls2", **R, over=FAMILY)
     grid = np.geomspace(0.1, 10, 41)
@@ -85,6 +88,7 @@ def test_over_a_family_the_mean_square_is_least():
     assert found.all.gain > 20 > 0 > own["rls2 target=polynomial"].gain
 
 
+@pytest.mark.slow
 def test_the_flat_region_ends_where_it_is_a_thousandth_worse():
     found = tune("rls2", **R, over=["turn", "jerk_pulse"])
     for end in (found.keys[0].lo, found.keys[0].hi):
@@ -92,6 +96,7 @@ def test_the_flat_region_ends_where_it_is_a_thousandth_worse():
         assert at_end / found.all.tuned == pytest.approx(1.001, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_whole_numbers_are_all_tried():
     found = tune("rls2", **R, over=["turn"], free={"initial_scans": (2, 7), "manoeuvre_variance": (1e-4, 10)})
     values = {one.key: one.tuned for one in found.keys}
@@ -201,6 +206,7 @@ def test_columns_of_a_matrix_sum_to_one_and_zeros_stay():
     assert "filters.0.transition=[[" in found.command
 
 
+@pytest.mark.slow
 def test_a_rate_is_the_larger_the_better():
     found = tune("ambiguous_rls2", "right at k 6", filter="nearest fold", free={"manoeuvre_variance": (1, 1e4)},
                  overrides=["filters.2.manoeuvre_variance=1e4"], realisations=400)  # fmt: skip
@@ -216,6 +222,7 @@ def test_a_study_without_a_baseline_is_tuned():
     assert found.all.gain >= 0
 
 
+@pytest.mark.slow
 def test_a_size_that_comes_down_to_nothing_has_an_interval():
     """Ends of tracks in none of some batches."""
     case = "sonar_clutter sensor.false_plots_per_km2=1"
@@ -239,6 +246,7 @@ def rival(variance):
     return made
 
 
+@pytest.mark.slow
 def test_a_filter_is_judged_against_the_tuned_one_too():
     """In a turn a filter of a larger D_M beats the config's, and not the tuned one, which is the best of its kind."""
     found = tune("rls2", "sigma r", filter="r+Vr", overrides=["target=turn"])
@@ -256,6 +264,7 @@ def test_a_filter_is_judged_against_the_tuned_one_too():
     assert own["sigma"].to_numpy() == pytest.approx(plain["sigma"].to_numpy(), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_rival_that_is_the_tuned_filter_gains_nothing_on_it():
     found = tune("rls2", "sigma r at 60 s", filter="r+Vr", overrides=["target=turn"])
     given = {"against": "tuned", "wanted": "sigma r at 60 s", "overrides": ["target=turn"], "realisations": 2000}
@@ -265,6 +274,7 @@ def test_a_rival_that_is_the_tuned_filter_gains_nothing_on_it():
     assert ((rows["gain_lo"] <= 0) & (rows["gain_hi"] >= 0)).all()
 
 
+@pytest.mark.slow
 def test_both_rivals_stand_beside_the_floor():
     result = radarsim.judge("rls2", lambda plots: plots["range_m"], name="raw", against="tuned",
                             realisations=100)  # fmt: skip
@@ -308,6 +318,7 @@ def test_against_is_tuned_or_nothing():
 
 
 # ---- command ---------------------------------------------------------------------------------------------------------
+@pytest.mark.slow
 def test_the_command_prints_and_writes(tmp_path):
     words = ("tune", "rls2", "--filter", "r+Vr", "--for", "sigma r at 60 s", "--over", "turn", "--over", "jerk_pulse")
     told = command(*words).stdout
@@ -363,6 +374,7 @@ def test_what_is_refused(words, said):
     assert said in command("tune", "rls2", "--filter", "r+Vr", *words, code=2).stderr
 
 
+@pytest.mark.slow
 def test_a_key_without_effect_is_called_so():
     """D_M has no part in the first estimate of the range, nor in the second without a measured velocity."""
     found = tune("rls2", "sigma r at k 1", filter="r")
@@ -388,6 +400,7 @@ def test_the_keys_of_a_filter_in_python_are_not_known(tmp_path):
     assert command(*words, code=2).stderr.strip() == said
 
 
+@pytest.mark.slow
 def test_what_is_given_twice_counts_once():
     assert tune("rls2", **R, over=["turn", "turn"]).cases == tune("rls2", **R, over=["turn"]).cases
 
@@ -400,6 +413,7 @@ def test_settings_are_kept_in_what_is_written(tmp_path):
     assert case.spec.target == load("rls2", ["target=turn"]).cases[0].spec.target
 
 
+@pytest.mark.slow
 def test_of_an_included_config_the_tuned_filters_are_written(tmp_path):
     words = ("tune", "rls2_manoeuvres", "--filter", "r+Vr", "--for", "sigma r", "--write", tmp_path / "mine.yaml")
     record = json.loads(command(*words, "--json").stdout)
@@ -411,6 +425,7 @@ def test_of_an_included_config_the_tuned_filters_are_written(tmp_path):
     assert "range_doppler: its cases differ in filters: begin from a config that it includes" in refused
 
 
+@pytest.mark.slow
 def test_a_value_at_the_end_of_the_search_has_no_interval():
     """The least D_M is best here, and any small one is as good."""
     found = tune("ambiguous_rls2", "sigma r", filter="memory", free=["manoeuvre_variance"], realisations=400)

@@ -21,6 +21,7 @@ def out(tmp_path_factory):
     return made
 
 
+@pytest.mark.slow_cases("compare-", "chart-")
 @pytest.mark.parametrize(
     ("words", "folder"),
     [

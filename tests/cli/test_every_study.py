@@ -50,6 +50,7 @@ def words(study, count):
 LONG = ("smoothing", "manoeuvre", "discriminator", "ambiguous_doppler", "pulses_to_tracks")
 
 
+@pytest.mark.slow_cases("clutter", "multimodel")
 @pytest.mark.parametrize("study", [pytest.param(one, marks=pytest.mark.slow) if one in LONG else one for one in SOLVED])
 def test_solve_gives_one_document(study):
     result = CliRunner().invoke(main, [*words(study, 40), "--json"])

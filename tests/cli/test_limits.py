@@ -54,6 +54,7 @@ def test_a_precision_ends_at_the_first_look_that_reaches_it(tmp_path):
     assert record(tmp_path / "more" / "rls2")["realisations_done"] == 8_000
 
 
+@pytest.mark.slow
 def test_an_unmet_precision_names_the_worst_cell_and_writes_what_is_done(tmp_path):
     result = command("run", "rls2", "-n", 5_000, "--precision", 0.1, *PLAIN, "--out", tmp_path, code=3)
     widths = half_widths(tmp_path / "rls2")
@@ -88,6 +89,7 @@ def test_a_precision_of_gains_is_in_points(tmp_path):
     assert ": gain ± " in unmet.stderr
 
 
+@pytest.mark.slow
 def test_a_precision_of_rates_is_relative_and_of_the_last_window(tmp_path):
     fewer = ("--set", "sweep.estimators.0.lock_probability=[0.999]", *PLAIN, "--out", tmp_path)
     command("run", "discriminator_rare", "-n", "1e5", "--precision", 20, "--of", "lost", *fewer)
@@ -103,6 +105,7 @@ def test_a_precision_of_rates_is_relative_and_of_the_last_window(tmp_path):
     assert refused.stderr == f"rls2: study range_doppler measures no 'lock', but {', '.join(measured)}\n"
 
 
+@pytest.mark.slow
 def test_all_cases_count_for_a_precision(tmp_path):
     """A precision that half of the cases meet: what is unmet, and which is worst, is told of all."""
     four = ("--set", "sweep={radar.scan_period_s: [2, 5, 10, 15]}", *PLAIN, "--out", tmp_path)
@@ -136,6 +139,7 @@ def test_a_time_limit_keeps_what_is_done_and_the_same_command_goes_on(tmp_path):
     assert record(tmp_path / "rls2")["realisations_done"] == second["realisations_done"]
 
 
+@pytest.mark.slow
 def test_a_time_limit_within_an_experiment_of_cases_tells_those_that_are_done(tmp_path):
     many = ("range_doppler", "-n", "1e8", "--no-figures", "--out", tmp_path)
     command("run", *many, "--quiet", "--time-limit", 0.6, code=3)
@@ -147,6 +151,7 @@ def test_a_time_limit_within_an_experiment_of_cases_tells_those_that_are_done(tm
     assert {case["done"] for case in json.loads(report.stdout)[0]["cases"].values()} >= {0}
 
 
+@pytest.mark.slow
 def test_a_limit_too_short_for_a_block_says_that_nothing_was_done(tmp_path):
     result = command("run", "rls1", "--time-limit", 1e-9, *PLAIN, "--out", tmp_path, code=3)
     assert result.stderr == "rls1: time limit of 1e-09 s: nothing was finished by then\n"
@@ -191,6 +196,7 @@ def test_a_run_that_ends_in_time_is_done_and_what_was_kept_for_writing_is_told(t
     assert record(tmp_path / "rls2")["stop"] == "done"
 
 
+@pytest.mark.slow_cases("1")
 @pytest.mark.parametrize("of", [1, 3])
 def test_shares_united_by_copying_are_the_whole_run(tmp_path, of):
     for number in range(1, of + 1):
@@ -222,6 +228,7 @@ def united(shares, to, *numbers):
 MISSING = "realisations 32,768 to 65,535; perhaps share 2 of 3 was not copied"
 
 
+@pytest.mark.slow
 def test_a_run_says_which_share_its_store_lacks_and_computes_it(shares, tmp_path):
     run = ("run", "rls2", "--no-figures", "--out", united(shares, tmp_path, 1, 3), "-n")
     line = f"note: rls2: 67,232 of 100,000 realisations are stored; missing: {MISSING}\n"
@@ -274,6 +281,7 @@ def test_check_says_what_is_stored_what_is_missing_and_how_long_it_takes(shares,
     assert "share    1 of 3\ntotal    1 case, 32,768 realisations, under a second on " in command(*empty).stdout
 
 
+@pytest.mark.slow
 def test_of_many_cases_the_first_that_lacks_a_share_is_named(tmp_path):
     config = ("rls2_manoeuvre_variance", "-n", 13_000, "--out", tmp_path)
     for number in (1, 3):
@@ -325,6 +333,7 @@ def test_json_is_one_document_on_stdout(tmp_path):
     assert (share["number"], share["of"]) == (1, 2)
 
 
+@pytest.mark.slow
 def test_a_pilot_and_exact_values_say_about_the_same(tmp_path):
     """The last look that both predict is within a doubling of where the run ends."""
     for config, percent in (("rls2", 1), ("sonar_correlated", 2)):
@@ -336,6 +345,7 @@ def test_a_pilot_and_exact_values_say_about_the_same(tmp_path):
             assert 0.5 <= case["need"]["realisations"] / done[case["name"]]["done"] <= 2
 
 
+@pytest.mark.slow
 def test_a_pilot_that_saw_large_errors_foretells_where_a_run_ends(tmp_path):
     """Tracks whose first plots were missed err by a hundred times σ²: no run ends before such are seen often enough."""
     words = ("rls2", "-n", "1e6", "--precision", 20, "--set", "radar.detection_probability=0.9")
@@ -353,6 +363,7 @@ def test_a_pilot_knows_that_kernels_calculate_chunks(monkeypatch, chunk):
         assert seconds == pytest.approx(0.02 / chunk, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_python_takes_a_precision_and_a_limit():
     result = radarsim.run("rls2", realisations=1e6, precision=2)
     assert result.unmet == []

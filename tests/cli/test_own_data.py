@@ -68,6 +68,7 @@ def test_track_over_a_simulated_file_makes_the_errors_of_the_study(tmp_path, con
     assert np.max(np.abs(np.where(there, (error - sums["error"][..., 0]) / sigma, 0.0))) < tolerance
 
 
+@pytest.mark.slow_cases("multimodel")
 @pytest.mark.parametrize("config", ["rls2", "multimodel"])
 def test_a_file_in_pieces_gives_the_same_track(tmp_path, config):
     one = loaded(config, ("scans=300",))
@@ -141,6 +142,7 @@ def followed(tmp_path, config, overrides, stated=()):
     return follow.follow(loaded(config, (*overrides, *stated)), path)
 
 
+@pytest.mark.slow_cases("*sonar_smoothing*")
 @pytest.mark.parametrize(
     ("config", "overrides", "key", "true"),
     [
@@ -170,6 +172,7 @@ def test_a_right_accuracy_is_called_so(tmp_path):
         assert all(0 <= one.lo < 1 < one.hi for one in few)
 
 
+@pytest.mark.slow
 def test_the_command_tells_gaps_missing_values_and_draws(tmp_path):
     source, track, report = tmp_path / "plots.csv", tmp_path / "track.csv", tmp_path / "report"
     assert "60 rows" in command("simulate", "rls2", "-o", source, "--set", "scans=60").stdout
@@ -203,6 +206,7 @@ def test_the_track_alone_goes_to_the_terminal_and_words_beside_it(tmp_path):
     assert command("track", "rls2", source, "--quiet").stderr == ""
 
 
+@pytest.mark.slow
 def test_plots_may_come_through_a_pipe(tmp_path):
     """`… | radarsim track CONFIG /dev/stdin > TRACK.csv`: the same as from a file and to a file."""
     source, track = tmp_path / "plots.csv", tmp_path / "track.csv"
@@ -333,6 +337,7 @@ def test_the_example_files_are_what_simulate_writes(tmp_path, name):
     np.testing.assert_allclose(*to_numbers, rtol=1e-12, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_page_names_a_config_for_every_example_file(tmp_path):
     page = Path("docs/howto/own_plots.md").read_text(encoding="utf-8")
     named = dict(re.findall(r"^\| `(\w+\.csv)` \| `([^`]+)` \|$", page, re.MULTILINE))
@@ -374,6 +379,7 @@ def test_help_is_grouped_with_one_whole_line_for_each_command():
     assert not any("..." in line or len(line) > 80 for line in lines)
 
 
+@pytest.mark.slow
 def test_no_colour_when_asked(tmp_path):
     shell = ["script", "-qec", f"{sys.executable} -m radarsim claims rls2 --out {tmp_path}", "/dev/null"]
     environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "120", "NO_COLOR": "1"}

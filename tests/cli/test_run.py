@@ -53,6 +53,7 @@ def test_same_bytes_with_more_threads_when_extended_and_of_fewer_realisations_af
     assert record(tmp_path / "at once" / "range_doppler")["realisations_from_store"] >= 5000
 
 
+@pytest.mark.slow
 def test_the_command_that_a_run_names_shows_the_claims_of_that_run(tmp_path):
     """Of any directory of results and a config of one's own, as of the shipped ones."""
     from radarsim.config import document
@@ -69,6 +70,7 @@ def test_the_command_that_a_run_names_shows_the_claims_of_that_run(tmp_path):
     assert shlex.quote(str(out)) in command("claims", "P1.1", "--out", out).output
 
 
+@pytest.mark.slow
 def test_the_command_that_report_names_makes_what_it_lacks(tmp_path):
     """As many realisations as the last run had, whose blocks are gone."""
     command("run", "rls2", "-n", 300, "--out", tmp_path, "--no-figures")
@@ -129,6 +131,7 @@ def test_help_teaches_with_an_example(name):
     assert re.search(rf"Examples?\n( +radarsim .*\n)*? +radarsim {name}\b", command(name, "--help").stdout)
 
 
+@pytest.mark.slow
 def test_runs_from_anywhere_as_a_module_and_to_streams_that_know_no_greek(tmp_path):
     words = ("run", "rls2", "-n", "1000", "--no-figures")
     finished = process(*words, cwd=tmp_path, env=os.environ | {"PYTHONIOENCODING": "latin-1"})
@@ -174,6 +177,7 @@ def test_what_is_written_like_a_claim_and_is_none_is_told_which_there_are(name, 
     assert list(caught.value.lines) == [said.format(all=", ".join(every))]
 
 
+@pytest.mark.slow
 def test_claims_are_shown_by_name_by_paper_and_beside_those_of_a_config(tmp_path):
     from radarsim.app.run import claims
 
@@ -227,6 +231,7 @@ def test_errors_that_cannot_be_written_leave_the_exit_code(tmp_path, variables):
     assert subprocess.run(shell, shell=True, check=False, env=newcomer(tmp_path, **variables)).returncode == 2
 
 
+@pytest.mark.slow
 def test_a_path_that_is_no_text(tmp_path):
     folder = os.fsencode(tmp_path) + b"/d\xe9"
     os.mkdir(folder)

@@ -66,6 +66,7 @@ def ended_by(number, options, folder, after_s):
     assert not [path for path in folder.rglob("*") if path.is_file()]
 
 
+@pytest.mark.slow_cases_except("solve-2", "chart-15")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("name", LONG)
 def test_a_signal_ends_it_with_one_line_and_no_file(name, number, tmp_path):

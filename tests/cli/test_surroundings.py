@@ -95,6 +95,7 @@ def test_an_answer_that_nobody_reads_is_no_fault(start):
         assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.slow
 def test_a_run_ends_its_work_whatever_becomes_of_its_output(start, tmp_path):
     """Of two configs the first prints an answer and a warning, of few realisations; neither stops the second."""
     few = ["run", "rls2", "rls4", "-n", "50", "--no-figures", "--out", tmp_path]
@@ -156,6 +157,7 @@ def expected_files(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_files_are_the_same_in_every_locale(start, tmp_path, expected_files):
     """With the libraries' number formats those of the locale, as a program that has windows sets it."""
     (tmp_path / "table").write_bytes((expected_files / "table").read_bytes())
@@ -170,6 +172,7 @@ def test_files_are_the_same_in_every_locale(start, tmp_path, expected_files):
     assert pages[0].count("\n") == pages[1].count("\n")
 
 
+@pytest.mark.slow
 def test_names_that_an_encoding_does_not_have(start, tmp_path):
     """A config and results in folders of such names; of a file that is not there the fault is told."""
     code = start.run(code="import sys; print(sys.getfilesystemencoding())").stdout.strip()

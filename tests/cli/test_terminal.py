@@ -73,6 +73,7 @@ def results(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", ["en", "ru"])
 def test_every_command_is_whole_at_eighty_columns(results, monkeypatch, language):
     monkeypatch.setenv(VARIABLE, language)

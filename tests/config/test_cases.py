@@ -309,6 +309,7 @@ def test_one_study_a_run(folder, said):
     assert said("both") == ["configs/both.yaml:1:10: include: one study per run; these belong to range_doppler, sonar"]
 
 
+@pytest.mark.slow
 def test_too_many_cases_by_include_alone(folder, said):
     numbers = list(range(1, 81))
     sweep = f"include: [a]\nsweep: {{radar.sigma_range_m: {numbers}, manoeuvre_variance: {numbers}}}\n"

@@ -11,6 +11,7 @@ from radarsim.errors import ConfigError
 STEMS = ("rls2", "multimodel", "sonar_clutter", "sonar_manoeuvre", "discriminator")
 
 
+@pytest.mark.slow_cases("sonar_manoeuvre")
 @pytest.mark.parametrize("stem", STEMS)
 def test_keys_can_be_set_to_their_own_values(stem):
     """What is found is what `--set` understands; only an item of a list that the config gives in degrees, or not at

@@ -73,6 +73,7 @@ def test_bounds_are_in_the_words_of_json_schema():
     assert not re.search(r'"(ge|gt|le|lt)": [-\d]', json.dumps(definitions))
 
 
+@pytest.mark.slow
 def test_json_schema_is_told_without_docstrings_too():
     """PYTHONOPTIMIZE=2 takes the docstrings away that describe the studies."""
     command = [sys.executable, "-OO", "-m", "radarsim", "schema"]

@@ -18,6 +18,15 @@ def check(page, folder, slow):
         assert text == block.text, f"{page.name}:{block.line}"
 
 
+@pytest.mark.slow_cases(
+    "docs/howto/own_radar.md",
+    "docs/howto/is_my_filter_better.md",
+    "docs/howto/s_band.md",
+    "docs/tutorial.md",
+    "docs/sonar_clutter.md",
+    "docs/howto/recording_asterix.md",
+    "docs/reference/python.md",
+)
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_examples(page, tmp_path, without_drawing):
     check(page, tmp_path, slow=False)

@@ -47,6 +47,7 @@ def test_pages_that_are_named_without_a_link_exist():
     assert not missing
 
 
+@pytest.mark.slow
 def test_the_picture_of_the_house_has_every_room():
     """Rooms that the picture lacks would be missing from its arrows, too."""
     drawn = {room for row in house.ROWS for room in row}

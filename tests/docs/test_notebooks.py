@@ -26,6 +26,7 @@ def shown(cell, names):
     return "" if value is None else value._repr_html_() if hasattr(value, "_repr_html_") else repr(value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_runs(notebook, tmp_path, monkeypatch, capsys):
     import matplotlib.pyplot as plt

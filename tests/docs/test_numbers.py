@@ -58,6 +58,7 @@ def run(tmp_path_factory):
     return made
 
 
+@pytest.mark.slow
 def test_range_and_radial_velocity(run):
     for stem, realisations in PARTS.items():
         results = run(stem, realisations)

@@ -73,6 +73,7 @@ def test_public_names_are_seen():
     assert "simulate_block" in dict(modules.public(kernels))  # compiled ones too
 
 
+@pytest.mark.slow
 def test_arrays_are_told_with_their_shapes():
     """Of what is public in the floors that work on arrays: a docstring that names shapes, where arrays come or go."""
     silent = []

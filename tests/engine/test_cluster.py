@@ -90,6 +90,7 @@ def test_nothing_listens_beyond_this_machine(two):
     assert set(listening) == {"127.0.0.1"}
 
 
+@pytest.mark.slow
 def test_a_stop_leaves_the_workers_fit_for_the_next_run(two, tmp_path):
     asked = iter([None] * 20)
     slow = Fake(pause_s=1e-2)
@@ -119,6 +120,7 @@ def test_dead_workers_are_replaced_and_no_byte_is_lost(two):
     assert set(killed).isdisjoint(alive(two))
 
 
+@pytest.mark.slow
 def test_sums_whose_holders_die_before_they_are_asked_for_are_computed_again(two, monkeypatch):
     """All workers at once: while one waits for the sums, new ones have to come."""
     monkeypatch.setattr(cluster, "RESULT_S", 20)
@@ -204,6 +206,7 @@ LOST = """
 """
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_goes_away_is_told_and_what_was_done_is_stored(tmp_path, monkeypatch):
     monkeypatch.setattr(store_writer, "PERIOD_S", 0.1)
     program = [sys.executable, "-c", textwrap.dedent(LOST)]

@@ -60,6 +60,7 @@ def test_every_block_is_simulated_once_and_whole():
     assert sorted(calls) == [(first, min(16, 1_000 - first)) for first in range(0, 1_000, 16)]
 
 
+@pytest.mark.slow
 def test_tasks_grow_until_they_are_worth_handing_over():
     sizes = []
 

@@ -183,6 +183,7 @@ def test_instruction_sets_are_recorded_and_mixing_warns(tmp_path, blocks, monkey
     assert collect(WORK, 2 * N, store=tmp_path).warnings == mixed.warnings
 
 
+@pytest.mark.slow
 def test_what_is_new_is_written_about_once_a_period(tmp_path, monkeypatch):
     monkeypatch.setattr(store_writer, "PERIOD_S", 0.2)
     written = []

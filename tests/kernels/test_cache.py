@@ -206,6 +206,7 @@ def test_a_function_of_no_file_is_not_kept():
         del sys.modules[module.__name__]
 
 
+@pytest.mark.slow
 def test_the_command_goes_on_and_says_so_in_one_line(tmp_path, libraries):
     """A run whose cache cannot be used at all: the same bytes, one line on stderr, and the same in run.json."""
     place = {"RADARSIM_CACHE_DIR": str(tmp_path / "cache")}

@@ -64,6 +64,7 @@ def used(house):
     return float(value), int(hits), directory
 
 
+@pytest.mark.slow
 def test_an_edited_helper_is_noticed_and_a_file_beside_is_not(house):
     """Numba itself would return 2 again: the file of `use` has not changed."""
     first = used(house)

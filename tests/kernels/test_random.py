@@ -149,6 +149,7 @@ def beyond(sigmas, cells, words):
     return found
 
 
+@pytest.mark.slow_cases("6.0-2048")
 @pytest.mark.parametrize(("sigmas", "words"), [(6.0, 2**11), (7.0, 2**18), (8.0, 2**22)])
 def test_tails_of_all_words_are_those_of_a_normal(sigmas, words):
     """Of the 2**64 words those whose radius reaches so far; what is sampled of them errs by 1 / sqrt(found)."""

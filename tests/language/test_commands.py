@@ -77,6 +77,7 @@ def test_the_list_says_what_things_are_and_leaves_their_names():
                 assert tr(row[-1]) != row[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("claim", ["P1.4", "P1.5"])
 def test_readings_of_a_claim_and_their_curve(claim, tmp_path):
     with speaking("ru"):
@@ -121,6 +122,7 @@ def test_reasons_of_claims_that_are_not_judged(why):
     assert re.findall(r"\d+", said.replace(",", ".")) == re.findall(r"\d+", why)
 
 
+@pytest.mark.slow
 def test_every_reason_that_the_sources_give_is_known():
     """What `Missing` and `Unreadable` are raised with stands in the catalogues."""
     found = {text for _, text, _ in messages.found()}

@@ -107,6 +107,7 @@ def test_an_unknown_language_is_one_line_and_exit_2(monkeypatch):
         language.current()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", CODES)
 def test_every_message_is_translated(code):
     """Made by `make messages`, then by hand."""

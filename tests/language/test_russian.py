@@ -124,6 +124,7 @@ def typed(value):
             yield from typed(one)
 
 
+@pytest.mark.slow_cases_except("rls2")
 @pytest.mark.parametrize("stem", QUICK)
 def test_nothing_is_left_in_english(stem, tmp_path):
     check(stem, 8, tmp_path)
@@ -150,6 +151,7 @@ def test_the_check_sees_what_is_latin(said, left):
     assert not UNPARTED.search("12 % [10,5; 21]")
 
 
+@pytest.mark.slow
 def test_all_names_of_shipped_configs_are_in_russian_and_no_others():
     """No config is run: what its cases call things; a name that no config gives any more has no translation."""
     with speaking("ru"):

@@ -58,6 +58,7 @@ def place(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_a_borrowed_part_refuses_keys_that_it_does_not_know(place, warm):
     command = outside.beside(warm, place / "site", place)
     for words in (("track", "mine.yaml", "plots.csv"), ("fit", "mine.yaml", "plots.csv"), ("simulate", "mine.yaml")):

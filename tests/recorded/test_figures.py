@@ -29,6 +29,7 @@ def written(path, columns, **more):
     return path
 
 
+@pytest.mark.slow_cases("sonar_smoothing")
 @pytest.mark.parametrize("config", ["rls2", "sonar_smoothing", "multimodel_1hz", "ambiguous_rls4"])
 def test_residuals_lie_between_their_bounds(tmp_path, config):
     """Over realisations of what the filter is made for: 95.4 % within two σ, by 5.85 standard errors."""
@@ -84,6 +85,7 @@ def test_places_are_thinned():
     assert len(set(np.diff(path.t_s))) == 1
 
 
+@pytest.mark.slow
 def test_the_report_shows_what_the_terminal_says(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     one = loaded("sonar_smoothing")
@@ -133,6 +135,7 @@ def test_the_page_is_in_one_language():
     assert not {"Plots", "Figures", "Config", "Contents", "Answer"} & set(re.findall(r'[>"](\w+)[<"]', page_text))
 
 
+@pytest.mark.slow
 def test_nothing_is_drawn_over_the_plots(tmp_path):
     one = loaded("rls2")
     (tmp_path / "figures").mkdir()

@@ -456,6 +456,7 @@ def test_the_best_filter_of_a_target_that_turns_late_is_that_of_the_turn(tmp_pat
 # ---- outliers and errors that last -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_fit_allows_for_what_is_plain_and_shows_the_plain_answer(tmp_path):
     """Outliers; errors that last; a bias, which is only told; nothing."""
     cases = (({"share": 0.08}, "outliers: "), ({"correlation": 0.6}, f"{fit.CORRELATION_TIME}: "))
@@ -472,6 +473,7 @@ def test_a_fit_allows_for_what_is_plain_and_shows_the_plain_answer(tmp_path):
             assert f"{one['key']}: {beside}" in text or f", plain {beside}" in text
 
 
+@pytest.mark.slow
 def test_both_are_allowed_for_where_both_are_plain():
     """Outliers that do not last, of ten σ, beside errors that do."""
     rng = np.random.default_rng(4)
@@ -678,6 +680,7 @@ EMPTY = {
 }
 
 
+@pytest.mark.slow_cases("rls2-constant0")
 @pytest.mark.parametrize(
     ("config", "name"),
     [

@@ -135,6 +135,7 @@ def covered(seed, runs, biases):
     return np.array(held).reshape(len(WORLDS), runs, len(BIASES))
 
 
+@pytest.mark.slow_cases("biases1")
 @pytest.mark.parametrize("biases", [SOME, NONE])
 def test_intervals_hold_the_biases_of_some_pairs(biases):
     held = covered(3, 3, biases)

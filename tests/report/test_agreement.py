@@ -34,6 +34,7 @@ def test_standard_errors_of_a_rate_are_its_score():
     assert (standard_errors(rate(np.arange(1.0, 30), n), 1e-20) < ERROR_OF_PROGRAM).all()
 
 
+@pytest.mark.slow_cases("1000")
 @pytest.mark.parametrize("n", [200, 1000])
 def test_standard_errors_of_sigma_stray_no_further_than_normal_ones(n):
     """Of 20 000 samples of Gaussian errors: 0.27 % beyond three, within three binomial standard errors or fewer."""
@@ -172,6 +173,7 @@ def test_python_raises_with_the_result(monkeypatch):
     assert "the exact value is wrong" in raised.value.result.warnings[0]
 
 
+@pytest.mark.slow
 def test_one_config_that_disagrees_does_not_stop_the_others(tmp_path, monkeypatch):
     """`run` and `report` of several: all are written, printed as JSON too, and each line names its config."""
     from radarsim.studies.range_doppler import study

@@ -3,6 +3,8 @@
 import math
 import re
 
+import pytest
+
 from radarsim.app import configs
 from radarsim.app.run import papers
 from radarsim.report.claims import rule
@@ -14,6 +16,7 @@ SENTENCE = {rule.PRINT, rule.ABOUT, rule.GRID, rule.SAME}  # a range, or a value
 ONE_SIDED = {rule.LIMIT, rule.MATERIAL}
 
 
+@pytest.mark.slow
 def test_a_claim_carries_its_sentence_and_its_place():
     for claim in CLAIMS:
         assert claim.statement, claim.id

@@ -186,6 +186,7 @@ def test_classes_that_were_worked_out_beside_the_run_count(tmp_path):
         stored_classes(tmp_path)
 
 
+@pytest.mark.slow
 def test_readings_tell_of_runs_that_were_written_with_other_classes(tmp_path):
     asked = ("readings", "P1.9", "P1.8", "--no-figures", "--out", tmp_path)
     assert "radarsim report" not in printed(*asked)

@@ -33,6 +33,7 @@ def test_bounds_from_the_spread_judge_as_the_interval_does(looks):
     assert set(verdicts) == {notes.PESSIMISTIC, notes.CONSISTENT, notes.OPTIMISTIC}
 
 
+@pytest.mark.slow_cases("multimodel-quantities2-False-False")
 @pytest.mark.parametrize(
     ("config", "quantities", "exact", "sigma"),
     [

@@ -70,6 +70,7 @@ def right(experiment, n, seeds):
             assert LOW - 2 * one.error <= one.share <= HIGH + 2 * one.error, (key, one.share, one.error)
 
 
+@pytest.mark.slow
 def test_unmarked_intervals_cover_in_the_first_study():
     right(load("rls2", ["scans=5", f"realisations={N}"]), N, 25)
 

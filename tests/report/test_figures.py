@@ -317,6 +317,7 @@ def shared():
     return replace(of_all_kinds(), panels=of_all_kinds().panels[:2], share_y=True)
 
 
+@pytest.mark.slow_cases_except("narrowed")
 @pytest.mark.parametrize("make", [of_all_kinds, narrowed, shared])
 def test_what_is_remembered_of_axes_changes_no_picture(monkeypatch, make):
     kinds = ("png", "svg") if make is of_all_kinds else ("png", "svg", "pdf")
@@ -343,6 +344,7 @@ def test_a_figure_that_is_handed_out_remembers_nothing():
     assert [tick.get_text() for tick in axes.get_xticklabels()] == ["3"]
 
 
+@pytest.mark.slow
 def test_titles_stand_where_matplotlib_would_place_them(monkeypatch):
     chosen = figures.save(of_all_kinds())
     monkeypatch.setitem(figures.STYLE, "axes.titley", None)

@@ -209,6 +209,7 @@ def check_notes_and_warning(config):
         assert asked is None or float(asked[1]) > FEW
 
 
+@pytest.mark.slow_cases("sonar_missed")
 @pytest.mark.parametrize(
     "config", [pytest.param("ambiguous_missed", marks=pytest.mark.slow), "pulses_rls4", "sonar_missed", "rls2"]
 )

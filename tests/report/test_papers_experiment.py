@@ -90,6 +90,7 @@ def test_only_the_declared_keys_are_for_display(study):
     assert set(marked(registry.keys(study))) == MAY_DIFFER[study] - {"scans"}
 
 
+@pytest.mark.slow_cases_except("discriminator_paper-prior.scale=2")
 @pytest.mark.parametrize(
     ("config", "override"),
     [
@@ -109,6 +110,7 @@ def test_a_changed_experiment_judges_nothing(config, override):
     assert table[["measured", "miss", "old_verdict"]].replace("", float("nan")).isna().all(axis=None)
 
 
+@pytest.mark.slow
 def test_realisations_seed_names_and_further_filters_may_differ():
     further = {"name": "mine", "kind": "window", "degree": 1, "plots": 7}
     source = dict(configs.load("sonar_smoothing").resolved["cases"][0])
@@ -120,6 +122,7 @@ def test_realisations_seed_names_and_further_filters_may_differ():
     assert set(found["claim"]) == set(plain["claim"])
 
 
+@pytest.mark.slow
 def test_a_file_of_the_users_is_no_measure_of_the_paper(tmp_path, monkeypatch):
     """A config of a shipped one's name in the working directory changes neither what is judged nor how."""
     (tmp_path / "scenarios").mkdir()
@@ -141,6 +144,7 @@ HELD_TOO = {stem: ids for of in papers() for stem, ids in of.held_too.items()}
 QUICK = ("rls1", "rls2", "rls3", "manoeuvre_variance", "discriminator_as_printed", "sonar_fluctuating")
 
 
+@pytest.mark.slow_cases("sonar_fluctuating")
 @pytest.mark.parametrize(
     "config",
     [

@@ -68,6 +68,7 @@ def test_every_study_of_tracks_draws_its_sweeps(config, overrides, name):
     assert {mark.name for mark in marks} >= {marks[0].name}
 
 
+@pytest.mark.slow
 def test_several_configs_over_one_key_share_a_figure_and_an_axis():
     _, drawn = swept("manoeuvre_variance", n=50)
     assert [name for name in drawn if name.startswith("sweep")] == ["sweep_manoeuvre_variance"]
@@ -107,6 +108,7 @@ def test_measured_values_are_written_to_two_figures_of_their_half_width():
     assert said(0.53452248, 0.53452248, 0.53452248, "") == "0.5345"
 
 
+@pytest.mark.slow
 def test_two_keys_make_a_panel_a_value_and_a_map_and_leave_nothing_out():
     keys = ("sweep.radar.sigma_velocity_mps=[1, 5, 15]", "sweep.manoeuvre_variance=[1e-4, 1e-3, 1e-2]")
     _, described = swept({"include": ["rls2"]}, *keys, n=50)

@@ -64,6 +64,7 @@ def radarsim(tmp_path_factory, warm):
     return outside.beside(warm, site, folder)
 
 
+@pytest.mark.slow
 def test_all_that_is_whole_is_listed_and_of_the_others_why_they_are_not(radarsim):
     studies = json.loads(radarsim("list", "--json").stdout)["studies"]
     told = {one["name"]: one["paper and question"] for one in studies if "cannot be used" in one["paper and question"]}
@@ -93,6 +94,7 @@ def test_one_line_with_the_packages_name_where_it_is_asked_for(radarsim, tmp_pat
         assert line.startswith(f"study {name}: the package pack-{name} 2.0 {said}")
 
 
+@pytest.mark.slow_cases("packed_slopes")
 @pytest.mark.parametrize("stem", ["shipping", "packed_slopes"])
 def test_a_config_that_a_broken_package_would_have_is_not_merely_missing(radarsim, tmp_path, stem):
     fault = "study shipping: the package pack-shipping 2.0 cannot be loaded: ImportError: no numba here"

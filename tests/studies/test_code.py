@@ -112,6 +112,7 @@ def test_it_stands_in_every_table_and_the_others_are_what_they_are_without_it(pl
     assert not list(place.glob("**/__pycache__"))
 
 
+@pytest.mark.slow
 def test_any_means_of_computing_gives_the_same_bytes(place):
     whole = run("whole", "--threads", 1), csv_bytes(place / "whole/mine")
     run("threads", "--threads", 3)
@@ -367,6 +368,7 @@ def test_a_package_that_is_installed_to_be_edited_counts(place, monkeypatch, tmp
     assert len(found) == 3
 
 
+@pytest.mark.slow
 def test_what_it_writes_is_nothing_that_it_depends_on(place):
     write = "os.write(log := os.open('log.txt', os.O_APPEND | os.O_CREAT | os.O_WRONLY), b'a line'); os.close(log)"
     write += "; Path('scratch').write_text('1'); Path('scratch').read_text(); list(HERE.glob('*.c*'))"
@@ -416,6 +418,7 @@ EDITED = {  # the import of a module with the number, its file, what the file ho
 }
 
 
+@pytest.mark.slow_cases("from sub import helper", "import importlib*")
 @pytest.mark.parametrize("imports", EDITED)
 def test_an_edit_counts_at_once_and_an_edit_undone_finds_its_blocks(place, imports):
     name, content = EDITED[imports]
@@ -590,6 +593,7 @@ def test_one_may_have_processes_of_its_own(place):
     assert subprocess.run(words, env=os.environ | {"PYTHONPATH": str(ROOT)}, timeout=60).returncode == 0
 
 
+@pytest.mark.slow
 def test_one_that_never_returns_is_stopped_by_a_signal(place):
     Path("my_filter.py").write_text(
         FILTER.replace("dt = ", "open('there', 'w')\n            while True: pass\n            dt = ")
@@ -673,6 +677,7 @@ def test_one_that_looks_ahead_or_cannot_be_repeated_is_told(place):
         assert any(line.startswith(said) for line in radarsim.run("mine.yaml", realisations=300).warnings)
 
 
+@pytest.mark.slow
 def test_modules_and_packages_are_found_beside_the_config_or_installed(place, monkeypatch):
     package = Path("site-packages/own_package")
     package.mkdir(parents=True)
@@ -691,6 +696,7 @@ def test_modules_and_packages_are_found_beside_the_config_or_installed(place, mo
     assert not radarsim.run("mine.yaml", realisations=300).curves.equals(want)
 
 
+@pytest.mark.slow_cases("sonar_missed", "multimodel")
 @pytest.mark.parametrize("like", ["multimodel", "sonar_missed", "ambiguous_rls2"])
 def test_any_study_with_plots_takes_it(place, like):
     Path("my_filter.py").write_text("""

@@ -65,6 +65,7 @@ def test_errors_of_realisations_are_those_of_the_sums(works, study):
     np.testing.assert_allclose(error[:, 8:17] / largest, alone / largest, atol=1e-9)
 
 
+@pytest.mark.slow_cases("rare_losses")
 @every
 def test_a_case_is_the_same_elsewhere_and_another_with_another_seed(works, study):
     work = works(study)

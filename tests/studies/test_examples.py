@@ -37,6 +37,7 @@ def radarsim(place, warm):
 LINES = {"chirp": 120, "bearings": 200, "learned": 260}  # at most, of its file
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["chirp", *(pytest.param(name, marks=pytest.mark.slow) for name in LINES if name != "chirp")]
 )
@@ -57,6 +58,7 @@ def test_its_file_is_short(name):
     assert len(text.splitlines()) <= LINES[name]
 
 
+@pytest.mark.slow
 def test_a_filter_whose_column_a_file_lacks_is_named(radarsim, tmp_path):
     radarsim("simulate", "chirp", "-o", "plots.csv", cwd=tmp_path)
     head, *rows = [line.split(",") for line in (tmp_path / "plots.csv").read_text().splitlines()]
@@ -225,6 +227,7 @@ def test_what_the_compiler_refuses_is_its_reason_and_the_line_that_it_names():
     assert "x.nothing" in Path(__file__).read_text(encoding="utf-8").splitlines()[line - 1]
 
 
+@pytest.mark.slow
 def test_what_a_package_is_told_is_of_its_own_configs_and_of_options_that_were_given(radarsim, tmp_path):
     said = radarsim("claims", "chirp", "bearings.1", "--out", tmp_path).stdout
     assert f"`radarsim run chirp --out {tmp_path}` judges chirp.1" in said
@@ -242,6 +245,7 @@ def test_what_a_package_is_told_is_of_its_own_configs_and_of_options_that_were_g
     assert "no effect  radar.detection_probability" in said  # the limit is of plots that all come; 1.1 is not asked
 
 
+@pytest.mark.slow
 def test_claims_and_reports_are_told_to_be_of_before_only_where_they_are_of_the_config_as_it_is(radarsim, tmp_path):
     radarsim("run", "chirp", "-n", 100, "--no-figures", "--out", tmp_path)
     table = tmp_path / "chirp/claims.csv"

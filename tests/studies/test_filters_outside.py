@@ -83,6 +83,7 @@ def rows(folder, table, name):
     return [line for line in (folder / f"{table}.csv").read_text().splitlines() if line.split(",")[1] == name]
 
 
+@pytest.mark.slow
 def test_its_own_tests_pass(place, radarsim):
     assert "7 passed" in radarsim("-q", "-p", "no:cacheprovider", cwd=place / "frozen", module="pytest").stdout
 
@@ -131,6 +132,7 @@ def test_the_others_noise_and_errors_are_what_they_are_without_it(ran, radarsim,
     assert {line.split(",")[2] for line in rows(ran, "gains", "frozen")} == {"r"}  # paired, against the first
 
 
+@pytest.mark.slow
 def test_it_is_solved_and_followed(ran, radarsim, tmp_path):
     asked = ("solve", ran.parents[1] / "frozen.yaml", "radar.sigma_velocity_mps", "--sigma", "r", "--filter", "frozen")
     answer = json.loads(radarsim(*asked, "--equals", 150, "--json", cwd=tmp_path).stdout)
@@ -143,6 +145,7 @@ def test_it_is_solved_and_followed(ran, radarsim, tmp_path):
     assert said.startswith("filter: frozen does not say how likely plots are")
 
 
+@pytest.mark.slow
 def test_an_edit_of_the_package_begins_anew_its_own_cases_alone(ran, place, radarsim, tmp_path):
     program = "import sys\nfrom radarsim.app.configs import load\nfrom radarsim.studies.identity import identity\n"
     program += "import pickle\nfor config in sys.argv[1:]:\n    (case,) = load(config).cases\n"
@@ -211,6 +214,7 @@ def test_others_take_no_harm(beside_broken):
     assert len(filters["items"]["oneOf"]) == 1 + len(FAILING) + 1  # its own, and code of the user's
 
 
+@pytest.mark.slow_cases_except("flat", "fails")
 @pytest.mark.parametrize("kind", FAILING)
 def test_gains_that_fail_end_in_one_line(beside_broken, tmp_path, kind):
     radarsim, site = beside_broken

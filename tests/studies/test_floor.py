@@ -345,6 +345,7 @@ def test_plain_conversion_lies_below_it():
     assert unbiased["sigma_hi"] > unbiased["floor"]
 
 
+@pytest.mark.slow_cases("sonar_manoeuvre")
 @pytest.mark.parametrize(
     "config", ["multimodel", "sonar_manoeuvre", "sonar_clutter", "ambiguous_orders", "discriminator_profile"]
 )

@@ -58,6 +58,7 @@ def test_an_edit_of_late_realisations_adopts_nothing_and_leaves_nothing(edited):
     assert (again[0], again[1], again[2]) == (0, with_edit[1], [])  # an edit that is made again finds its own, too
 
 
+@pytest.mark.slow
 def test_a_comment_in_a_kernel_begins_anew_and_a_sentence_does_not(edited):
     edited(FEW, out="comment")
     assert edited(FEW, "kernels/linear.py", "# a comment\n", out="comment")[0] == FEW
@@ -65,6 +66,7 @@ def test_a_comment_in_a_kernel_begins_anew_and_a_sentence_does_not(edited):
     assert edited(FEW, "report/tables.py", "# a comment\n", out="comment")[0] == 0
 
 
+@pytest.mark.slow
 def test_doctor_names_blocks_of_other_sources_and_clean_removes_only_them(edited):
     edited(FEW, out="several")
     edited(FEW, STUDY, "# a comment\n", out="several")

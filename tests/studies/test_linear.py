@@ -129,6 +129,7 @@ def textbook(study, spec, one, z, t, gains=None):
 FILTERS = ({}, *({"wrong": what} for what in "FQHRx"), {"gain": "half"}, {"gain": "steady"})
 
 
+@pytest.mark.slow_cases("4-2*", "3-2*")
 @pytest.mark.parametrize("probability", [1.0, 0.7])
 @pytest.mark.parametrize(("n", "D"), [(1, 1), (2, 1), (3, 2), (4, 2)])
 def test_the_kernel_is_the_textbooks_filter_over_its_own_plots(n, D, probability):

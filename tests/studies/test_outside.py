@@ -64,6 +64,7 @@ def test_it_is_listed_with_its_configs_and_filters(radarsim):
     assert {"kind: kalman", "kind: fixed_gain"} <= {one["keys"] for one in listed["filters"]}
 
 
+@pytest.mark.slow
 def test_its_keys_are_in_schema_and_check(place, radarsim):
     schema = json.loads(radarsim("schema").stdout)
     assert {"$ref": "#/$defs/fifth"} in schema["oneOf"]
@@ -87,12 +88,14 @@ def test_a_run_leaves_tables_figures_claims_and_report(ran):
     assert "confirmed" in claim
 
 
+@pytest.mark.slow_cases("--workers")
 @pytest.mark.parametrize("means", [("--threads", 3), ("--workers", 2)], ids=lambda means: means[0])
 def test_the_same_bytes_by_any_means(ran, radarsim, tmp_path, means):
     radarsim("run", "fifth", "-n", N, *means, "--no-figures", "--out", tmp_path)
     assert csv_bytes(tmp_path / "fifth") == csv_bytes(ran)
 
 
+@pytest.mark.slow
 def test_the_same_bytes_in_shares_and_continued(ran, radarsim, tmp_path):
     radarsim("run", "fifth", "-n", 5000, "--no-figures", "--out", tmp_path)
     for share in ("1/2", "2/2"):
@@ -101,6 +104,7 @@ def test_the_same_bytes_in_shares_and_continued(ran, radarsim, tmp_path):
     assert csv_bytes(tmp_path / "fifth") == csv_bytes(ran)
 
 
+@pytest.mark.slow
 def test_a_precision_ends_it(radarsim, tmp_path):
     arguments = ("--precision", 2, "--no-figures", "--out", tmp_path, "--json")
     (done,) = json.loads(radarsim("run", "fifth", *arguments).stdout)
@@ -117,6 +121,7 @@ def test_its_claims_are_listed_among_all(ran, radarsim, tmp_path):
     assert "## fifth Kalman 1960" in radarsim("claims", "--markdown").stdout
 
 
+@pytest.mark.slow
 def test_it_speaks_the_language_of_its_catalogue(ran, radarsim, tmp_path):
     radarsim("run", "fifth_step", "-n", 500, "--language", "ru", "--out", tmp_path)
     page = (tmp_path / "fifth_step/report.html").read_text(encoding="utf-8")
@@ -126,6 +131,7 @@ def test_it_speaks_the_language_of_its_catalogue(ran, radarsim, tmp_path):
     assert "How well do the filters" in (ran / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_recorded_plots_and_a_config_of_ones_own(radarsim, tmp_path):
     for arguments in (
         ("new", "own", "--like", "fifth"),
@@ -148,6 +154,7 @@ def test_the_tab_key_completes_its_configs(radarsim, tmp_path):
     assert radarsim(module="tab", cwd=tmp_path).stdout == "fifth_step\n"
 
 
+@pytest.mark.slow
 def test_doctor_and_clean(radarsim, tmp_path):
     radarsim("run", "fifth", "-n", N, "--no-figures", "--out", tmp_path)
     assert "all intact" in radarsim("doctor", tmp_path / "fifth", "--recompute", 2).stdout
@@ -196,12 +203,14 @@ def test_its_own_tests_pass(place, radarsim):
     assert "6 passed" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [(), ("--step",)], ids=["linear", "step"])
 def test_what_new_study_writes_in_one_file_passes_its_own_tests(tmp_path, warm, options):
     command = new_study(warm, tmp_path, "short", *options)
     assert "2 passed" in command("-q", "-p", "no:cacheprovider", module="pytest", cwd=tmp_path / "short").stdout
 
 
+@pytest.mark.slow
 def test_a_wrong_number_in_kernel_or_exact_value_ends_the_run_in_exit_code_4(tmp_path, warm):
     """A walk 5 % longer than the filters are told, in a config without claims; then a bias that there is not."""
     command = new_study(warm, tmp_path, "wrong", "--folder")

@@ -100,6 +100,7 @@ def test_help_lists_them_with_their_units(radarsim):
     assert "--inside NAME Share within 100 m, % (areas)." in said
 
 
+@pytest.mark.slow
 def test_solve_finds_the_root_of_an_exact_one(radarsim):
     """The square of σ is 10⁴ m² where σ is 100 m; the latter by the shipped study."""
     found = solved(radarsim, "--area", "r", "--filter", "r+Vr", "--at-k", 9, "--equals", 1e4)
@@ -109,6 +110,7 @@ def test_solve_finds_the_root_of_an_exact_one(radarsim):
     assert (found["quantity"], found["quantity_unit"]) == ("mean square error of r+Vr in r at k = 9", "m²")
 
 
+@pytest.mark.slow
 def test_solve_takes_one_from_a_table_of_exact_values_alone(radarsim):
     """A limit over all scans: no interval, and no scan to be asked at."""
     least = solved(radarsim, "--limit", "r+Vr", "--equals", 100)
@@ -121,6 +123,7 @@ def test_solve_takes_one_from_a_table_of_exact_values_alone(radarsim):
         assert radarsim(*words, code=2).stderr == refused
 
 
+@pytest.mark.slow
 def test_one_that_is_exact_is_so_where_a_filter_has_no_value(radarsim, tmp_path):
     """`r` has no limit: nothing is simulated for it, and no change of the other's has an interval."""
     said = radarsim("solve", "a.yaml", KEY, "--limit", "r", "--equals", 100, code=2).stderr
@@ -130,6 +133,7 @@ def test_one_that_is_exact_is_so_where_a_filter_has_no_value(radarsim, tmp_path)
     assert "[" not in made
 
 
+@pytest.mark.slow
 def test_solve_samples_one_without_exact_values(radarsim):
     found = solved(radarsim, "--worst-case", "r+Vr", "--equals", 150, "-n", 300, "--between", 5, 60)
     assert not found["exact"]
@@ -139,6 +143,7 @@ def test_solve_samples_one_without_exact_values(radarsim):
     assert share["quantity_unit"] == "%"
 
 
+@pytest.mark.slow
 def test_a_run_ends_at_its_precision(radarsim, tmp_path):
     """A square is known half as well as its root: 4.4 % at 4000 realisations, 3.1 % at 8000."""
     words = ("--no-figures", "--json", "--out", tmp_path)
@@ -179,6 +184,7 @@ def test_sensitivity_is_of_it(radarsim, tmp_path):
     assert (tmp_path / "sensitivity/a/tornado.svg").exists()
 
 
+@pytest.mark.slow
 def test_compare_puts_them_side_by_side(radarsim, tmp_path):
     for name in "ab":
         radarsim("run", f"{name}.yaml", "-n", 400, "--no-figures", "--out", tmp_path)

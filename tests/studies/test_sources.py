@@ -58,6 +58,7 @@ def with_user_filter(config, folder):
     return {"study": case.study, "realisations": 2, **case.keys, "filters": members}
 
 
+@pytest.mark.slow_cases_except("range_doppler", "sonar_missed")
 @pytest.mark.parametrize("study", [*registry.SHIPPED, "rls2", "sonar_missed", "sonar_manoeuvre", "ambiguous_rls4"])
 def test_every_module_that_is_loaded_while_blocks_are_made_counts(study, libraries, tmp_path):
     configs = CONFIGS.get(study) or [with_user_filter(study, tmp_path)]

@@ -51,6 +51,7 @@ def expected():
     return of
 
 
+@pytest.mark.slow_cases("sonar_manoeuvre", "sonar_clutter", "rare_ends", "missed_plots", "rare_losses")
 @pytest.mark.parametrize("study", CASES | MORE)
 def test_threads_and_order(study):
     """In the order in which threads end, and in one that none would take."""

@@ -85,6 +85,7 @@ def untouched():
     return to_csv(radarsim.run("rls2", realisations=300_000).tables["curves"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step_s", [-YEAR_S, *(pytest.param(s, marks=pytest.mark.slow) for s in (-3600, YEAR_S))])
 def test_a_run_and_its_continuation(run, untouched, tmp_path, step_s):
     """A step while it runs, and files of the future when it goes on: the same bytes, nothing computed twice."""

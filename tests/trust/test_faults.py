@@ -23,6 +23,7 @@ def test_every_fault_has_its_function_and_its_test(name):
     assert hasattr(importlib.import_module(path.removesuffix(".py").replace("/", ".")), test or "__file__")
 
 
+@pytest.mark.slow
 def test_a_fault_is_noticed_and_its_absence_is_not(tmp_path):
     one = faults.FAULTS["one_degree_of_freedom_too_many"]
     assert faults.notices("one_degree_of_freedom_too_many", one.test, str(tmp_path))

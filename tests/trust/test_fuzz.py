@@ -208,6 +208,7 @@ def warm(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow_cases("tracked")
 @pytest.mark.parametrize("case", [loaded, tracked])
 def test_spoiled_input(case, warm):
     fuzz(case, warm, range(CASES // 2))

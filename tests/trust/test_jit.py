@@ -87,6 +87,7 @@ def assert_agree(one, other):
     assert_same_bursts(one, other)
 
 
+@pytest.mark.slow
 def test_every_kernel_in_plain_python(tmp_path):
     """Without compiler, registers replaced by plain floats: the same numbers but for fused multiply-adds."""
     found = elsewhere(tmp_path / "plain.npz", NUMBA_DISABLE_JIT="1")

@@ -80,6 +80,7 @@ def outcome(means, n, borders):
     return rule.claim(judged)
 
 
+@pytest.mark.slow_cases("borders0")
 @pytest.mark.parametrize("borders", [(0.0,), (0.0,) * 8])
 def test_runs_that_decide_refute_few_claims_that_are_true_at_the_border(monkeypatch, borders):
     """Through the loop of `--decide` itself, 17 looks: 22 % of one part at 95 % a look."""
@@ -129,6 +130,7 @@ def test_a_rate_keeps_what_is_promised_too():
         assert left.mean() < 0.05 + 3 * math.sqrt(0.05 * 0.95 / runs)
 
 
+@pytest.mark.slow
 def test_a_verdict_is_the_same_however_its_number_came_about(tmp_path):
     """Decided, run in one go, made again from the store: the same table, and verdicts by the interval shown."""
     decided = radarsim.run("orders", realisations=300, decide=True, out=tmp_path, figures=False)
@@ -280,6 +282,7 @@ def at_least(share, seeds):
 SEEDS = 400
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "times"), [pytest.param(1e-3, 10, marks=pytest.mark.slow), (1e-4, 30)])
 def test_sigma_with_rare_large_errors_is_covered_where_a_precision_ends(monkeypatch, share, times):
     """69 and 23 % were covered while runs ended at the first narrow interval; at so many realisations 94 and 92 %."""

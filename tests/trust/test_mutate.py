@@ -99,6 +99,7 @@ def tried(tmp_path, capfd):
     return run
 
 
+@pytest.mark.slow
 def test_what_no_test_notices_is_found(tried):
     code, lines = tried(FORMULAS, TESTS)
     verdicts = {lines[i + 2].split("-> ")[1]: lines[i].split()[0] for i in range(2, 8, 3)}

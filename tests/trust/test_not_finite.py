@@ -46,6 +46,7 @@ def spoil(monkeypatch, name, number):
     monkeypatch.setitem(vars(declared), "simulate", spoiled)  # frozen as it is
 
 
+@pytest.mark.slow_cases("sonar_manoeuvre*")
 @pytest.mark.parametrize("number", [np.nan, np.inf])
 @pytest.mark.parametrize("name", SMALL)
 def test_counted_and_told(name, number, monkeypatch, tmp_path):

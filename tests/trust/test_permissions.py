@@ -103,6 +103,7 @@ def test_results_of_another_user_stay_whole(command, closed, made, part, more):
     assert contents(made / part) == before
 
 
+@pytest.mark.slow
 def test_they_can_be_read(command, closed, made, tmp_path):
     closed(made)
     before = contents(made)
@@ -139,6 +140,7 @@ def unreadable(path):
         path.chmod(mode)
 
 
+@pytest.mark.slow
 def test_results_that_may_not_be_read(command, closed, made):
     """A table closed to everybody is named, not taken for damaged."""
     with unreadable(made / "rls2/curves.csv"):

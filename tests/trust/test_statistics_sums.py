@@ -39,6 +39,7 @@ def test_a_tree_of_sums_is_as_good_as_fsum(signs):
         assert not signs or bound > 0
 
 
+@pytest.mark.slow
 def test_moments_of_a_large_bias_keep_their_spread():
     """σ from Σe² where |bias| is 10⁴ spreads: what is lost is rounding of e², 10⁸ spreads² · 2⁻⁵³."""
     from radarsim.report import statistics

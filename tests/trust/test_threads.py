@@ -49,6 +49,7 @@ def test_run_and_track_without_a_thread_give_the_same_bytes(barred, tmp_path):
     assert tracks[0].read_bytes() == tracks[1].read_bytes()
 
 
+@pytest.mark.slow
 def test_python_runs_without_a_thread_where_updates_are_timed_and_readings_known_exactly(barred):
     """`multimodel` measures an update's cost, and P1's readings take a radar each, in threads where they may."""
     ran = (

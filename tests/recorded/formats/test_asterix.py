@@ -99,6 +99,7 @@ def final(*blocks):
 PLAINLY = [ethernet(ipv4(udp(one))) for one in BLOCKS]
 
 
+@pytest.mark.slow_cases("data0")
 @pytest.mark.parametrize(
     "data",
     [

@@ -113,6 +113,7 @@ def test_a_remainder_is_right_by_hand():
     assert np.allclose(plan.axes.exact_right[0, 1:], expected, atol=1e-12)
 
 
+@pytest.mark.slow_cases_except("RLS 4")
 @pytest.mark.parametrize("radar", ["RLS 2", pytest.param("RLS 3", marks=pytest.mark.slow), "RLS 4", "RLS 5"])
 def test_probabilities_of_the_best_hypothesis_are_calibrated(radar, matched):
     """Where truth and filter agree the best is right as often as its probability says, in every bin, at every scan."""

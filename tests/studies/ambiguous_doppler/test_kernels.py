@@ -49,6 +49,7 @@ def test_filters_of_one_hypothesis(radar, order, detection):
             assert np.array_equal(own[there, records.RIGHT], right[there])
 
 
+@pytest.mark.slow_cases_except("RLS 2-1.0", "RLS 4-0.6")
 @pytest.mark.parametrize("detection", [1.0, 0.6])
 @pytest.mark.parametrize("radar", ["RLS 2", "RLS 4"])
 def test_merging_filter(radar, detection):
@@ -58,6 +59,7 @@ def test_merging_filter(radar, detection):
         assert np.abs((out[0, :, :3] - x) / [1e5, 1e3, 10.0])[started(plots)].max() < 1e-9
 
 
+@pytest.mark.slow_cases("forty*", "many-1.0")
 @pytest.mark.parametrize("detection", [1.0, 0.6])
 @pytest.mark.parametrize(("most", "prune_below"), [(40, 1e-6), (7, 1e-3), (1000, 1e-4)], ids=["forty", "seven", "many"])
 def test_remembering_filter(most, prune_below, detection):

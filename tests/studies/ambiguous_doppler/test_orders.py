@@ -43,6 +43,7 @@ def twins(case):
     ]
 
 
+@pytest.mark.slow_cases("folded-1.0")
 @pytest.mark.parametrize("detection", [1.0, 0.6])
 @pytest.mark.parametrize("doppler", ["none", "unfolded", "folded"])
 def test_interacting_orders(doppler, detection):
@@ -57,6 +58,7 @@ def test_interacting_orders(doppler, detection):
         assert np.abs(out[0, :, records.WEIGHTS :, lane] - mu)[there].max() < 1e-9
 
 
+@pytest.mark.slow_cases("two orders-1.0", "twelve-1.0")
 @pytest.mark.parametrize("detection", [1.0, 0.6])
 @pytest.mark.parametrize(
     ("most", "prune_below", "orders"),

@@ -250,6 +250,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow_cases("memory")
 @pytest.mark.parametrize("name", ["memory", "dropped early", "not of its model"])
 def test_wrong_folds_are_those_of_plain_realisations(name):
     one, keys = CASES[name]

@@ -256,6 +256,7 @@ def test_plots_with_too_many_folds_are_a_fault_of_their_row(tmp_path, change, wo
     assert words in str(error.value)
 
 
+@pytest.mark.slow
 def test_plots_with_too_many_folds_have_no_likelihood():
     case = load("ambiguous_rls4").cases[0]
     t = np.arange(15) * 1e7  # over which a speed may have become anything

@@ -185,6 +185,7 @@ def test_blocks_keep_the_information_of_the_bend_within_them():
     assert found[1] == pytest.approx(found[0], rel=6e-4)
 
 
+@pytest.mark.slow_cases("True-theta1")
 @pytest.mark.parametrize(
     ("complex_samples", "theta"),
     [

@@ -230,6 +230,7 @@ def test_losses_are_those_of_plain_bursts_on_twenty_seeds(probability, bursts):
     assert abs(np.mean(z)) < 3 / math.sqrt(20)
 
 
+@pytest.mark.slow
 def test_a_millionth_is_known_to_a_tenth():
     """From 2000 bursts; the effective events are those that 3·10⁷ plain ones would have."""
     plan = plan_of({**RARELY, "lock_probability": 0.999999})
@@ -281,6 +282,7 @@ def result_of(n, *estimators, **other):
     return radarsim.run(config, realisations=n)
 
 
+@pytest.mark.slow
 def test_tables_tell_the_rate_and_how_well_it_is_known():
     result = result_of(3000, RARELY, {"name": "wide", "first_windows": 1})
     table = result.tables["rare"]
@@ -332,6 +334,7 @@ def test_an_interval_that_few_heavy_weights_make_is_marked():
     assert report.note(drawn, common._replace(weight=common.weight - 1, squared=common.squared - 1)) == ""
 
 
+@pytest.mark.slow
 def test_every_window_is_marked_by_its_own_weights():
     """Shifts lead to the last window: before it a few weights of any size make a rate, and its interval."""
     result = result_of(4000, RARELY)

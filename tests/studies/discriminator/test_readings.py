@@ -35,6 +35,7 @@ def test_the_default_reading_is_the_config_as_printed(cases):
     assert OF.changed(CLAIMS["P4.6"], cases[9.0], OF.reading()) is None  # one case a reading
 
 
+@pytest.mark.slow
 def test_exact_windows_are_those_that_a_run_designs(cases):
     for noise, taken in ((9.0, {}), (2.25, {"noise_variance": "2.25", "threshold": "1", "forecast": "multiples"})):
         axes = registry.study("discriminator").prepare(cases[noise]).axes

@@ -172,6 +172,7 @@ def test_a_case_is_found_by_its_reading(made):
         evidence.case(measures.PRINTED)
 
 
+@pytest.mark.slow
 def test_losses_are_told_beside_the_design_first():
     made = run.run("discriminator_rare", realisations=400)
     rows = made.tables["rare"].query("sought").set_index("case")

@@ -38,6 +38,7 @@ def test_windows_are_those_of_the_designer(version):
     assert found == one_at_a_time(version)
 
 
+@pytest.mark.slow
 def test_versions_do_not_disturb_one_another():
     every = [SHIPPED, COMPUTED, SHIPPED._replace(phase="kept"), COMPUTED._replace(rounding="up")]
     together = search.designed(BURST, every)

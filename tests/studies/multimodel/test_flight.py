@@ -34,6 +34,7 @@ def test_trimmed_flight_is_straight():
     assert_rounded(x[:, 2::3], np.zeros((len(T), 3)), np.full((len(T), 3), 2 * 9.81), operations=8)
 
 
+@pytest.mark.slow
 def test_a_steady_turn_to_the_right_is_a_circle():
     x = fly((0, 1e4, 0), (200, 0, 0), 1e4, 5e-3, [Phase(0, lateral=20, trimmed=True)], T)
     radius = 200**2 / 20
@@ -53,6 +54,7 @@ def test_drag_is_density_times_speed_squared_over_twice_the_coefficient():
     assert_rounded(x[0, 2], -drag, operations=12)
 
 
+@pytest.mark.slow
 def test_velocity_and_acceleration_are_derivatives_of_position():
     t = np.arange(0, 50, 0.001)
     x = fly((1e5, 4e4, 0), (-900, -200, 100), 8e3, 1.0, [Phase(0), Phase(20, lateral=50, normal=20, period_s=8)], t)

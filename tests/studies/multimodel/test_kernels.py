@@ -125,6 +125,7 @@ def test_kernel_equals_its_twin(family, rule, size):
     compare(family, rule, "best" if rule == "combined" else "moment", size, 120, lanes=(0, 5))
 
 
+@pytest.mark.slow_cases("gpb*")
 @pytest.mark.parametrize("family", ["kalman", "gpb1", "imm", "gpb2"])
 def test_missed_plots_are_one_prediction_over_the_real_interval(family):
     compare(family, "combined", "best", 1 if family == "kalman" else 3, 150, missing=0.3, lanes=range(WIDTH))
@@ -157,6 +158,7 @@ def test_imm_equals_the_papers_form_of_n_squared_extrapolations(rule):
         assert np.abs(one - two).max() <= allowed * max(np.abs(two).max(), EXPONENT)
 
 
+@pytest.mark.slow_cases_except("imm-combined")
 @pytest.mark.parametrize(
     ("family", "rule"), [("kalman", "best"), ("gpb1", "moment"), ("imm", "combined"), ("gpb2", "moment")]
 )

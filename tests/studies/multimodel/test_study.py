@@ -75,6 +75,7 @@ def test_plots_have_the_stated_errors_and_covariances():
     assert np.allclose(mean.mean(axis=0), exact, rtol=1e-3, atol=1e-3 * np.abs(exact).max())
 
 
+@pytest.mark.slow_cases("unbiased-sensor1")
 @pytest.mark.parametrize("sensor", [{}, {"detection_probability": 0.7, "jitter_s": 0.1}])
 @pytest.mark.parametrize("conversion", ["plain", "unbiased"])
 def test_sums_equal_the_twin_on_the_same_plots(sensor, conversion):

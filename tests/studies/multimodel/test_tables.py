@@ -78,6 +78,7 @@ def test_claims_of_this_config_are_judged_and_no_others(result):
     assert (rows.loc[rows["claim"] == "P2.11", "verdict"] == claims.CONFIRMED).all()
 
 
+@pytest.mark.slow
 def test_another_flight_is_not_the_papers(result):
     changed = radarsim.run("multimodel", realisations=8, overrides=["target.lag_s=2"])
     table = changed.tables["claims"]
@@ -95,6 +96,7 @@ def test_figures_are_described(result):
         assert tops == [("start", 10), ("ballistic", 72.5), ("manoeuvre", 147.5), ("after", (170 + end) / 2)]
 
 
+@pytest.mark.slow
 def test_names_of_stages_do_not_touch_and_the_caption_has_those_without_room():
     made = radarsim.run("multimodel_recorded", realisations=3)
     with speaking("ru"):
@@ -113,6 +115,7 @@ def test_names_of_stages_do_not_touch_and_the_caption_has_those_without_room():
         assert all(left.x1 < right.x0 for left, right in pairwise(sorted(boxes, key=lambda box: box.x0)))
 
 
+@pytest.mark.slow
 def test_filters_of_as_few_operations_are_named_together():
     made = radarsim.run("multimodel_families_1hz", realisations=3)
     counts = made.tables["operations"].query("stage == 'after'").set_index("filter")["operations"]

@@ -85,6 +85,7 @@ def test_many_radars_at_once_are_as_one_by_one():
         assert gains[:, i] == pytest.approx(100 * (1 - both[1] / both[0]), abs=1e-6)
 
 
+@pytest.mark.slow_cases("30.0")
 @pytest.mark.parametrize("c", [0.3, 3.0, 30.0])
 def test_the_lines_over_time_are_those_of_the_textbook_and_end_in_the_closed_form(c):
     t, gain = drawn.limit_course(c)
@@ -96,6 +97,7 @@ def test_the_lines_over_time_are_those_of_the_textbook_and_end_in_the_closed_for
     assert gain[-1] == pytest.approx(filters.steady_gains(c), abs=0.45)
 
 
+@pytest.mark.slow
 def test_the_papers_radars_lie_where_the_paper_has_them(tmp_path):
     five = chart(out=tmp_path, figures=False)
     rows = pd.read_csv(tmp_path / "chart" / "chart.csv").set_index(["case", "component"])
@@ -204,6 +206,7 @@ def test_a_file_in_the_place_of_the_folder_is_named_and_not_what_is_written_besi
     assert (tmp_path / "file").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_a_config_given_twice_counts_once_and_figures_are_told(tmp_path):
     said = []
     drawn = chart("rls4", "rls4", out=tmp_path, figures="svg", progress=lambda *done: said.append(done))

@@ -15,6 +15,7 @@ def gains(radar, variance, scans=15):
     return search.gain(base.true[0], own.true[0])[2:]
 
 
+@pytest.mark.slow
 def test_gains_depend_on_the_scan_and_the_two_groups_alone():
     rng = np.random.default_rng(5)
     for _ in range(300):

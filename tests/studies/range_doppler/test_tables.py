@@ -161,6 +161,7 @@ def test_settling_figure_draws_the_table(swept):
     np.testing.assert_array_equal(line.x, rows["settling_s"])
 
 
+@pytest.mark.slow
 def test_labels_of_settled_points_do_not_touch(expected_radar):
     radars, variances = ("rls1", "rls2", "rls3", "rls4", "rls5"), (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
     results = [expected_radar(radar, v, f"{radar} D_M={v:g}") for radar in radars for v in variances]

@@ -75,6 +75,7 @@ def settled(size, sigma, variance):
     return K
 
 
+@pytest.mark.slow_cases("sensor1", "sensor3")
 @pytest.mark.parametrize(
     "sensor",
     [

@@ -64,6 +64,7 @@ def deviations(plan, sums):
         return np.sqrt(m2) / plan.axes.exact_sigma - 1, np.sqrt((m4 / m2**2 - 1) / n) / 2
 
 
+@pytest.mark.slow_cases_except("0.6")
 @pytest.mark.parametrize("rho", RHO)
 def test_every_linear_case_is_exact(rho):
     """Both degrees, 3 to 50 plots, a random pattern of misses, white and correlated errors."""
@@ -89,6 +90,7 @@ def test_what_a_filter_says_of_itself_is_as_wrong_as_calculated():
     assert exact[names.index("augmented"), -1, 0] == pytest.approx(2, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rho", "probability"), [(0.0, 0.7), (0.6, 0.9)])
 def test_random_misses_are_exact_as_means_over_patterns(rho, probability):
     plan = STUDY.prepare(load(config(scans=10, error_correlation=rho, detection_probability=probability)).cases[0])
@@ -170,6 +172,7 @@ def test_track_in_the_cartesian_frame(frame):
     assert np.isfinite(track.estimate[0, -1]).all()
 
 
+@pytest.mark.slow
 def test_growing_memory_falls_behind_whatever_the_fluctuation():
     """A smaller one only later: exact σ of the range, first plot at which growing memory is worse (docs/sonar.md)."""
     for size, of_window, of_kalman in (("0.05", 25, 11), ("0.02", 49, 35)):

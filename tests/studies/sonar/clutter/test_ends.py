@@ -127,6 +127,7 @@ def uniform_of(key, realisation, pair):
     return a[0]
 
 
+@pytest.mark.slow_cases("0.05-0.8")
 @pytest.mark.parametrize(
     ("density", "detection"), [pytest.param(0.0, 0.9, marks=pytest.mark.slow), (0.05, 0.8), (2.0, 0.9)]
 )
@@ -182,6 +183,7 @@ def compared(detection, density, gate, misses, scans=20):
     return plan_of(filters, density, detection, scans)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("of", [pytest.param((0.7, 0.03, 0.99, 3), marks=pytest.mark.slow), (0.8, 0.0, 0.9, 4)])
 def test_ends_are_those_of_plain_sampling(of):
     """At 10⁻¹ and 10⁻², by each scan; and the first ends drawn as they are, without weights."""

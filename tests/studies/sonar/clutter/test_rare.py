@@ -73,6 +73,7 @@ def uniforms(key, realisation):
     return a[0], b[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("density", "rare"),
     [*(pytest.param(*of, marks=pytest.mark.slow) for of in ((0.05, RARE), (0.5, LONG))), (2.0, RARE), (0.05, LONG)],
@@ -104,6 +105,7 @@ def test_weights_and_lives_are_the_twins(density, rare):
     assert seen[2] > 20
 
 
+@pytest.mark.slow_cases_except("sector1")
 @pytest.mark.parametrize(
     "sector",
     [
@@ -134,6 +136,7 @@ def test_the_mean_weight_is_one_and_none_is_over_one_by_the_plain_share():
         assert plan.layout.unpack(STUDY.simulate(plan, i, 1))["drawn"][:, 1].max() <= 10.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("density", [0.3, pytest.param(1.5, marks=pytest.mark.slow)])
 def test_false_tracks_are_those_of_plain_sampling(density):
     """3 of 4 and 4 of 6, of nearest plot and PDA, confirmed and held on, against plain tracks of other noise."""
@@ -254,6 +257,7 @@ def test_tables_tell_the_rate_and_how_well_it_is_known():
     assert "note" not in result.tables["tracks"] or not result.tables["tracks"]["note"].str.contains("events").any()
 
 
+@pytest.mark.slow
 def test_solve_takes_the_weighted_rate():
     """The gate at which 4 of 6 has half as many, from 1500 false plots, of which plainly hardly one is confirmed."""
     keys = config([FOUR_OF_SIX], 0.03, 0.9, 8) | {"rare": RARE, "realisations": 1500}

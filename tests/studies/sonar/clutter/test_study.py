@@ -82,6 +82,7 @@ def test_initiation_follows_its_exact_law(m, n):
     assert (sums["ratios"][:, 1, 0] == 0).all()
 
 
+@pytest.mark.slow_cases("0.5")
 @pytest.mark.parametrize("density", [0.05, 0.5, pytest.param(3.0, marks=pytest.mark.slow)])
 def test_pairs_of_false_plots_follow_their_exact_law(density):
     """2 of n among false plots alone, sector's edges and all: by quadrature."""
@@ -95,6 +96,7 @@ def test_pairs_of_false_plots_follow_their_exact_law(density):
     assert_binomial(np.cumsum(found, axis=1), N, np.cumsum(exact, axis=1))
 
 
+@pytest.mark.slow
 def test_scores_of_false_tracks_keep_within_their_bound():
     """exp(score) is a martingale of mean one on false tracks: at most exp(-threshold) of them reach it (Ville)."""
     plan = prepared([tracker("a"), tracker("b", "pda")], density=1.0, detection=0.8, scans=20)
@@ -106,6 +108,7 @@ def test_scores_of_false_tracks_keep_within_their_bound():
     assert (scores[0, :, :-1][:, T == 4] > 0.6 * scores[0, :, -1:]).all()
 
 
+@pytest.mark.slow
 def test_every_track_of_the_target_is_accounted_for():
     """Confirmations less ends are the tracks kept; first confirmations no more than realisations."""
     plan = prepared([tracker("a"), tracker("b", "pda")], density=3.0, detection=0.8, scans=20)
@@ -120,6 +123,7 @@ def test_every_track_of_the_target_is_accounted_for():
     assert (counts[:, :, places.FOUND].sum(axis=1) <= 20_000).all()
 
 
+@pytest.mark.slow
 def test_probabilistic_association_keeps_a_track_longer():
     plan = prepared([tracker("a", manoeuvre_variance=1e-4), tracker("b", "pda", manoeuvre_variance=1e-4)], 2.0, 0.9, 40)
     ratios = simulated(plan, 20_000)["ratios"][:, 0]
@@ -143,6 +147,7 @@ def test_whole_turns_of_the_sector_change_nothing(first):
     assert (np.abs(false / expected - 1) < 3.9 / np.sqrt(expected)).all()
 
 
+@pytest.mark.slow_cases("bearing_deg2")
 @pytest.mark.parametrize("bearing_deg", [[5, 40], [-180, 180], [20, 380]])
 def test_an_open_gate_holds_the_whole_field(bearing_deg):
     """Every false plot of the sector, across the seam of a full circle too, and no likelihood of them is too small."""

@@ -106,6 +106,7 @@ def test_classes_fall_with_the_threshold_and_keep_the_bound(result):
             assert (stats.binom.sf(called - 1, rows["n_false"], rows["bound"]) > 1e-6).all()  # of 124 looks
 
 
+@pytest.mark.slow
 def test_figures_are_those_of_the_experiment(result):
     names = {"track_map", "confirmation", "track_life", "false_tracks", "track_classes", "sigma_r"}
     assert names <= set(result.figures)

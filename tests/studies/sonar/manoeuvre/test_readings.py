@@ -75,6 +75,7 @@ def test_a_part_on_delays_asks_for_the_readings_rate():
     assert {part.statement for part in parts} == {"threshold", "time", "not worth while"}
 
 
+@pytest.mark.slow
 def test_more_plots_can_be_worth_while_under_a_reading(tmp_path, monkeypatch):
     """At 0.01 false alarms eight plots see the weakest manoeuvre sooner than four or five; in %, as the words want."""
     from radarsim.app import readings

@@ -111,6 +111,7 @@ def test_uses_tell_where_the_first_order_holds_and_where_not(tables):
     assert rows.loc[(case(0.8), "growing", "speed", 140.0), "first_order"] == "error larger"
 
 
+@pytest.mark.slow
 def test_figures_draw(result):
     described = output.case_figures(result.cases, result.tables, result.experiment)
     assert set(described) >= OWN
