@@ -4,6 +4,9 @@ import numpy as np
 
 from tests.tolerances import assert_rounded, scaled_condition
 
+# κ of a straight line and of a parabola through plots of equal intervals, at the last: it grows with their number to
+# these, which are (2 + √3)² and 285.
+LINE, PARABOLA = 14, 285
 TERMS = 10  # operations on an element in a scan: two products of three terms each, with the sums that they enter
 
 
