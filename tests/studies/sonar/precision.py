@@ -30,12 +30,17 @@ def assert_covariances_rounded(found, wanted, errors=0.0):
     assert_rounded(np.where(known, found, np.nan), wanted, size)
 
 
-def assert_estimates_rounded(found, wanted, P, z, sigma, errors=0.0):
-    """Estimates (K, n) from plots z (K,) of that σ, where they are known, whose covariances are P (K, n, n).
+def estimate_losses(P, z, sigma, errors=0.0):
+    """Errors (K,), in ε of σ, of estimates from plots z (K,) of that σ, whose covariances are P (K, n, n).
 
     Solutions lose κ of the plots' distances from one another, innovations a rounding of the plots themselves.
     """
     spread, reach = np.nanmax(z) - np.nanmin(z), np.nanmax(np.abs(z))
-    size = losses(P, errors) * (spread / sigma + 1) + TERMS * np.arange(1, len(z) + 1) * reach / sigma
-    unit = np.sqrt(np.diagonal(P, axis1=1, axis2=2))
-    assert_rounded(np.where(np.isfinite(wanted), found, np.nan), wanted, size[:, None] * unit)
+    return losses(P, errors) * (spread / sigma + 1) + TERMS * np.arange(1, len(z) + 1) * reach / sigma
+
+
+def assert_estimates_rounded(found, wanted, P, z, sigma, errors=0.0):
+    """Estimates (K, n), where they are known, within `estimate_losses`; P (K, m, m), m being n at least."""
+    unit = np.sqrt(np.diagonal(P, axis1=1, axis2=2))[:, : wanted.shape[1]]
+    size = estimate_losses(P, z, sigma, errors)[:, None] * unit
+    assert_rounded(np.where(np.isfinite(wanted), found, np.nan), wanted, size)
