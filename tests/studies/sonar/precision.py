@@ -39,8 +39,8 @@ def estimate_losses(P, z, sigma, errors=0.0):
     return losses(P, errors) * (spread / sigma + 1) + TERMS * np.arange(1, len(z) + 1) * reach / sigma
 
 
-def assert_estimates_rounded(found, wanted, P, z, sigma, errors=0.0):
-    """Estimates (K, n), where they are known, within `estimate_losses`; P (K, m, m), m being n at least."""
+def assert_estimates_rounded(found, wanted, P, z, sigma, errors=0.0, factor=1.0):
+    """Estimates (K, n), where they are known, within `factor` times `estimate_losses`; P (K, m, m), m ≥ n."""
     unit = np.sqrt(np.diagonal(P, axis1=1, axis2=2))[:, : wanted.shape[1]]
-    size = estimate_losses(P, z, sigma, errors)[:, None] * unit
+    size = factor * estimate_losses(P, z, sigma, errors)[:, None] * unit
     assert_rounded(np.where(np.isfinite(wanted), found, np.nan), wanted, size)

@@ -74,15 +74,15 @@ def test_growing_memory_kalman_and_closed_forms_agree():
     n = np.arange(2, 51)
     A, B = exact.gains_closed(n)
     P = line.covariance[0, 1:]
-    lost = losses(P[:, :2, :2])
+    loss = losses(P[:, :2, :2])
     for design in (line, kalman):
         for i, closed in enumerate((A, B / PERIOD)):
-            assert_rounded(design.gain[0, 1:, i], closed, lost * closed)
+            assert_rounded(design.gain[0, 1:, i], closed, loss * closed)
         smoothed = SIGMA * exact.sigma_smoothed(n)
-        assert_rounded(np.sqrt(design.covariance[0, 1:, 0, 0]), smoothed, lost * smoothed)
+        assert_rounded(np.sqrt(design.covariance[0, 1:, 0, 0]), smoothed, loss * smoothed)
     ahead = P[:, 0, 0] + 2 * PERIOD * P[:, 0, 1] + PERIOD**2 * P[:, 1, 1]  # all positive
     extrapolated = SIGMA * exact.sigma_extrapolated(n)
-    assert_rounded(np.sqrt(ahead), extrapolated, lost * extrapolated)
+    assert_rounded(np.sqrt(ahead), extrapolated, loss * extrapolated)
     second, n = filters.recursive(everything, 3, 0.0), n[1:]
     kalman = filters.recursive(everything, 3, 0.0, 0.0)
     sigma = SIGMA * exact.sigma_acceleration(n, PERIOD)
@@ -98,9 +98,9 @@ def test_printed_gains_of_unequal_weights_are_wrong_and_ours_right():
     design = filters.recursive(plots(weight, t), 2)
     C = np.diag(SIGMA**2 / weight)
     W, P = exact.generalised_least_squares(t, C, 2)
-    lost = losses(design.covariance[0, 1:, :2, :2])[-1]
-    assert_rounded(design.gain[0, -1, :2], W[:, -1], condition=lost)
-    assert_rounded(design.covariance[0, -1, :2, :2], P, condition=lost)
+    loss = losses(design.covariance[0, 1:, :2, :2])[-1]
+    assert_rounded(design.gain[0, -1, :2], W[:, -1], condition=loss)
+    assert_rounded(design.covariance[0, -1, :2, :2], P, condition=loss)
     assert abs(design.gain[0, -1, 1] * PERIOD / (6 / (12 * 13)) - 1) > 0.05
 
 

@@ -106,14 +106,14 @@ def test_estimates_are_the_twins(sensor):
                 assert (sums["estimates"][f, :, 3 * c : 3 * c + size] == known).all()
                 assert_estimates_rounded(error, x - truth[:, c, :size], P, z, SIGMA[c], errors)
                 believed = sums["believed"][f, :, 3 * c : 3 * c + size]
-                variance, lost = np.diagonal(P, axis1=1, axis2=2), losses(P, errors)
-                assert_rounded(believed[known], variance[known], (lost[:, None] * variance)[known])
+                variance, loss = np.diagonal(P, axis1=1, axis2=2), losses(P, errors)
+                assert_rounded(believed[known], variance[known], (loss[:, None] * variance)[known])
                 full = known.all(axis=1)
                 off, P = (x - truth[:, c, :size])[full], P[full]
                 q = np.array([v @ np.linalg.solve(p, v) for v, p in zip(off, P, strict=True)])
                 # P⁻¹ multiplies by κ what P and the errors have lost, of their squares in units of σ.
                 spread = np.ptp(z[detected]) / SIGMA[c] + (np.abs(off) / np.sqrt(variance[full])).sum(axis=1)
-                assert_rounded(sums["joint"][f, full, c, 0], q, scaled_condition(P) * lost[full] * spread**2)
+                assert_rounded(sums["joint"][f, full, c, 0], q, scaled_condition(P) * loss[full] * spread**2)
 
 
 @pytest.mark.parametrize("frame", ["cartesian", "cartesian_unbiased"])

@@ -160,10 +160,10 @@ def test_track_over_recorded_plots_is_least_squares():
         slope, value = np.polyfit(since[chosen], plots, 1)
         A = np.stack([since[chosen] ** 0, since[chosen]], axis=1)
         P = sigma**2 * np.linalg.inv(A.T @ A)
-        own, kappa = slice(2 * c, 2 * c + 2), scaled_condition(P) * np.abs(plots).max() / sigma
+        state, kappa = slice(2 * c, 2 * c + 2), scaled_condition(P) * np.abs(plots).max() / sigma
         unit = np.sqrt(np.diag(P))
-        assert_rounded(track.estimate[f, -1, own], [value, slope], unit, kappa, operations=6 * TERMS)
-        assert_rounded(track.sigma[f, -1, own], unit, condition=scaled_condition(P), operations=6 * TERMS)
+        assert_rounded(track.estimate[f, -1, state], [value, slope], unit, kappa, operations=6 * TERMS)
+        assert_rounded(track.sigma[f, -1, state], unit, condition=scaled_condition(P), operations=6 * TERMS)
     assert np.isnan(track.estimate[0, 0, 1])
 
 
@@ -172,7 +172,7 @@ def test_track_in_the_cartesian_frame(frame):
     case = load(config(filters=FILTERS[:1], frame=frame)).cases[0]
     track = STUDY.recorded().tracker(case).feed(track_columns())
     assert [name for name, _ in track.components] == ["x", "vx", "y", "vy"]
-    assert track.estimate[0, -1, 0] == pytest.approx(-8890, rel=0, abs=30)  # σ of the plot
+    assert track.estimate[0, -1, 0] == pytest.approx(-8890, abs=30)  # σ of the plot
     assert np.isfinite(track.estimate[0, -1]).all()
 
 

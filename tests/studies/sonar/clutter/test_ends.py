@@ -22,7 +22,7 @@ from radarsim.studies.sonar.kernels.steps import CHUNK
 from tests.studies.sonar.clutter import naive_ends
 from tests.studies.sonar.clutter.test_rare import assert_weights_rounded, words_of
 from tests.studies.sonar.clutter.test_study import config, simulated, tracker
-from tests.tolerances import assert_rounded
+from tests.tolerances import assert_rounded, share_error
 
 RARE = {"events": ["ended_tracks"]}
 SECTOR = ((7e3, 11e3), (math.radians(5), math.radians(40)))
@@ -81,8 +81,8 @@ def test_the_probability_outside_a_gate_is_that_of_a_sum(gate):
                 c = outside(tuple(off), (S[0, 0], S[0, 1], S[1, 1]), gate, tuple(sigma))
                 # What the kernel states of gates up to 60 σ² wide, and each part of the quadrature; 48 nodes have
                 # an error of 2·10⁻¹⁰ at most where a gate is up to 2000 σ² wide.
-                wanted, stated = naive_ends.missing(off, S, gate, sigma), 3e-13 if gate * size <= 60 else 1e-9
-                assert c == pytest.approx(wanted, rel=0, abs=stated)
+                wanted, precision = naive_ends.missing(off, S, gate, sigma), 3e-13 if gate * size <= 60 else 1e-9
+                assert c == pytest.approx(wanted, abs=precision)
     assert outside((1.0, 0.0), (900.0, 0.0, 3e-4), 1e30, tuple(sigma)) == 0.0
 
 
@@ -110,7 +110,7 @@ def test_the_mean_weight_is_one_and_none_is_over_one_by_the_plain_share():
     plain, weight, squared = np.moveaxis(simulated(plan, N)["ended_drawn"], 1, 0)
     error = np.sqrt((squared / N - (weight / N) ** 2) / N)
     assert (np.abs(weight / N - 1) < 4 * error).all()
-    assert (np.abs(plain - 0.1 * N) < 4 * math.sqrt(0.09 * N)).all()
+    assert (np.abs(plain / N - 0.1) < share_error(0.1, N)).all()
     for i in range(50):
         assert plan.layout.unpack(STUDY.simulate(plan, i, 1))["ended_drawn"][:, 1].max() <= 10.0
 

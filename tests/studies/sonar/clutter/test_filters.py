@@ -63,8 +63,8 @@ def test_bearings_may_jump_by_a_turn():
     assert any((b < 0).any() for _, _, b in turned)
     (life,) = charted(choice(), turned)
     (other,) = charted(choice(), scans)
-    apart = life.states[-1][2] - other.states[-1][2]
-    assert_rounded(apart, 2 * np.pi * np.round(apart / (2 * np.pi)), 2 * np.pi, LINE, operations=10 * TERMS)
+    turn = life.states[-1][2] - other.states[-1][2]
+    assert_rounded(turn, 2 * np.pi * np.round(turn / (2 * np.pi)), 2 * np.pi, LINE, operations=10 * TERMS)
 
 
 def test_more_tracks_than_a_chunk_holds():

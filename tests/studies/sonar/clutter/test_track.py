@@ -10,7 +10,7 @@ from radarsim.errors import ConfigError
 from radarsim.recorded import follow
 from tests.recorded import whole
 from tests.studies.sonar.precision import LINE, TERMS
-from tests.tolerances import assert_rounded
+from tests.tolerances import Z, assert_rounded
 
 EXAMPLE = Path(__file__).parents[4] / "docs/examples/sonar_clutter.csv"
 ONE = ("sweep.sensor.false_plots_per_km2=[0.03]",)
@@ -48,7 +48,7 @@ def test_the_target_of_the_example_is_found():
         at = np.flatnonzero(truth["t_s"] == track.t_s[last])[0]
         for c, key in ((0, "true_range_m"), (2, "true_bearing_rad")):
             off = track.estimate[best, last, c] - truth[key][at]
-            assert abs(off) < 5 * track.sigma[best, last, c]
+            assert abs(off) < Z * track.sigma[best, last, c]
 
 
 def test_columns_tell_the_tracks_apart(tmp_path):

@@ -98,7 +98,7 @@ def test_what_the_papers_own_six_plots_give():
         of = exact.switched_window(course(acceleration), SIGMA, DT, 6, 6, stats.chi2.isf(0.01, 1))
         rms = [np.sqrt(np.mean(one**2)) for one in of]
         found += [rms[0] / rms[2], rms[1] / rms[2]]
-    assert found == pytest.approx([0.975, 1.188, 1.867, 1.101], rel=0, abs=5e-4)  # three digits
+    assert found == pytest.approx([0.975, 1.188, 1.867, 1.101], abs=5e-4)  # three digits
 
 
 # ---- course, speed, position ahead, closest approach -----------------------------------------------------------------
@@ -137,14 +137,14 @@ def test_closest_approach_is_the_least_distance():
 def test_gradients_are_derivatives():
     track = exact.flat(POLAR, True)
     found = exact.gradients(track, OWN, 60.0)
-    distance, slow = np.hypot(*(track - OWN).T[:2]), np.minimum(np.hypot(*track.T[2:]), np.hypot(*(track - OWN).T[2:]))
+    distance, speed = np.hypot(*(track - OWN).T[:2]), np.minimum(np.hypot(*track.T[2:]), np.hypot(*(track - OWN).T[2:]))
     reach = np.abs(track[:, :2]).max(axis=1) + 60 * np.abs(track[:, 2:]).max(axis=1)
-    size = np.stack([np.full(2, np.pi), 2 * slow, reach, reach, distance, distance / slow], axis=1)
+    size = np.stack([np.full(2, np.pi), 2 * speed, reach, reach, distance, distance / speed], axis=1)
     for i, step in enumerate((1e-2, 1e-2, 1e-5, 1e-5)):
         shift = step * np.eye(4)[i]
         change = exact.uses(track + shift, OWN, 60.0) - exact.uses(track - shift, OWN, 60.0)
         # Rounding of what is differenced; the third derivative by the speed, of which all are ratios, to the third.
-        allowed = rounding(operations=10) * size / step + (size / slow[:, None] ** 3 * step**2 if i > 1 else 0.0)
+        allowed = rounding(operations=10) * size / step + (size / speed[:, None] ** 3 * step**2 if i > 1 else 0.0)
         assert (np.abs(found[..., i] - change / (2 * step)) <= allowed).all()
 
 
@@ -174,7 +174,7 @@ def test_the_first_order_fails_on_a_collision_course():
     cpa = exact.uses(exact.flat(drawn, True), np.zeros(4), 60.0)[:, 4]
     sigma = np.sqrt(exact.variances(state, spread, True, np.zeros(4), 60.0)[4])
     assert np.sqrt((cpa**2).mean()) == pytest.approx(sigma, rel=sigma_error(n))
-    assert cpa.mean() == pytest.approx(sigma * np.sqrt(2 / np.pi), rel=0, abs=mean_error(n, cpa.std()))
+    assert cpa.mean() == pytest.approx(sigma * np.sqrt(2 / np.pi), abs=mean_error(n, cpa.std()))
 
 
 def test_courses_differ_by_half_a_turn_at_most():

@@ -104,13 +104,15 @@ def test_filters_are_their_twins(probability):
             known = np.cumsum(~np.isnan(z[:, c])) >= size
             x[~known], P[~known] = np.nan, np.nan
             error = sums["error"][f, :, 3 * c : 3 * c + size, 0]
-            assert_estimates_rounded(error, x[:, :size] - truth[:, c, :size], P, z[:, c], SIGMA[c])
-            # Weights of models, and with them what these differ by, are exponentials of innovations, of ten σ at most.
-            lost = 10 * estimate_losses(P, z[:, c], SIGMA[c]) if spec["kind"] == "imm" else losses(P)
-            variance, lost = np.diagonal(P, axis1=1, axis2=2)[known, :size], lost[known]
+            # What models differ by enters with their weights, which are exponentials of innovations of ten σ at most.
+            factor = 10 if spec["kind"] == "imm" else 1
+            wanted = x[:, :size] - truth[:, c, :size]
+            assert_estimates_rounded(error, wanted, P, z[:, c], SIGMA[c], factor=factor)
+            loss = factor * estimate_losses(P, z[:, c], SIGMA[c]) if spec["kind"] == "imm" else losses(P)
+            variance, loss = np.diagonal(P, axis1=1, axis2=2)[known, :size], loss[known]
             believed = sums["believed"][f, known, 3 * c : 3 * c + size]
-            assert_rounded(believed, variance, lost[:, None] * variance)
-            assert_rounded(sums["modes"][f, known, c, 0], mode[known], lost)
+            assert_rounded(believed, variance, loss[:, None] * variance)
+            assert_rounded(sums["modes"][f, known, c, 0], mode[known], loss)
             assert_rounded(sums["modes"][f, :, c, 1], sums["modes"][f, :, c, 0] ** 2)
             if memory is not None:
                 assert (sums["modes"][f, :, c, 2] == memory).all()

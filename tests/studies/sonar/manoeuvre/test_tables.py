@@ -81,12 +81,12 @@ def test_thresholds_are_the_laws(tables):
     rows = tables["thresholds"]
     rows = rows[(rows["case"] == case(0)) & (rows["filter"] == "8 plots") & (rows["component"] == "r")]
     row = rows[np.isclose(rows["false_alarm_probability"], 0.01)].iloc[0]
-    assert row["threshold_k"] == pytest.approx(6.6349, rel=0, abs=5e-5)
+    assert row["threshold_k"] == pytest.approx(6.6349, abs=5e-5)
     k, sigma = row["threshold_k"], 10 * sigma_acceleration(8.0, 5.0)
     assert_rounded(row["sigma_acceleration"], sigma, condition=PARABOLA, operations=8 * TERMS)
     assert_rounded(row["threshold_acceleration"], np.sqrt(k) * row["sigma_acceleration"], operations=4)
     reach = row["acceleration_for_90_percent"] / row["sigma_acceleration"]
-    assert exact.detection(k, reach) == pytest.approx(0.9, rel=0, abs=1e-12)  # the search's precision
+    assert exact.detection(k, reach) == pytest.approx(0.9, abs=1e-12)  # the search's precision
     variance = k * 720 / (5.0**4 * 8 * 63 * 60)
     assert_rounded(row["threshold_to_plot_variance"], variance, condition=PARABOLA, operations=8 * TERMS)
 
@@ -105,7 +105,7 @@ def test_modes_and_memory(tables):
 def test_uses_tell_where_the_first_order_holds_and_where_not(tables):
     rows = tables["uses"].set_index(["case", "filter", "component", "t_s"]).sort_index()
     good = rows.xs((case(0), "growing")).xs(220.0, level="t_s")
-    assert good["ratio"].to_numpy() == pytest.approx(1, rel=0, abs=sigma_error(N))
+    assert good["ratio"].to_numpy() == pytest.approx(1, abs=sigma_error(N))
     assert set(good["first_order"]) == {"holds within 5 %"}
     near = rows.loc[(case(0), "window 5", "cpa", 220.0)]
     assert near["first_order"] == "fails: near zero"
@@ -165,7 +165,7 @@ def test_claims_are_judged(result, tables):
     assert row["lo"] < 0.523 < row["hi"]
     assert row["verdict"] == claims.REFUTED
     ratios = rows[rows["what"].str.startswith("acceleration at the threshold")]["measured"]
-    assert ratios.to_numpy() == pytest.approx([0.5345, 0.2887], rel=0, abs=5e-5)
+    assert ratios.to_numpy() == pytest.approx([0.5345, 0.2887], abs=5e-5)
     strong = result.cases[2]
     delays = tables["delays"]
     own = delays[(delays["case"] == strong.name) & (delays["filter"] == "8 plots") & (delays["component"] == "r")]
