@@ -17,7 +17,10 @@ def Q(dt, size, variance):
 
 
 def batch(t, z, size, sigma, rho=0.0, period=1.0, last=None):
-    """Generalised least squares on all plots so far (or the last few) at every scan, by the normal equations."""
+    """Generalised least squares on all plots so far (or the last few) at every scan, by the normal equations.
+
+    Plots are taken relative to the last one, so that no digits are lost to what they have in common.
+    """
     x, P = np.full((len(t), size), np.nan), np.full((len(t), size, size), np.nan)
     for k in range(len(t)):
         at = [j for j in range(k + 1) if not np.isnan(z[j])][-(last or k + 1) :]
@@ -27,7 +30,8 @@ def batch(t, z, size, sigma, rho=0.0, period=1.0, last=None):
         lags = np.rint(np.abs(s[:, None] - s[None, :]) / period).astype(int)
         inverse = np.linalg.inv(sigma**2 * (rho**lags if rho else np.eye(len(at))))
         P[k, :m, :m] = np.linalg.inv(A.T @ inverse @ A)
-        x[k, :m] = P[k, :m, :m] @ A.T @ inverse @ z[at]
+        x[k, :m] = P[k, :m, :m] @ A.T @ inverse @ (z[at] - z[at[-1]])
+        x[k, 0] += z[at[-1]]
     return x, P
 
 

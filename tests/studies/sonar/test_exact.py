@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from radarsim.studies.sonar import exact, filters, world
+from tests.studies.sonar.precision import TERMS, assert_covariances_rounded
+from tests.tolerances import assert_rounded
 
 
 def test_sigma_formulas_have_the_digests_values():
@@ -26,9 +28,8 @@ def test_table_of_the_digest(rho, n, optimal, naive, believed):
     C = world.error_covariance(np.ones(n), rho, t, 1.0)
     _, P = exact.generalised_least_squares(t, C, 2)
     W, plain = exact.generalised_least_squares(t, np.eye(n), 2)
-    assert np.sqrt(np.diag(P)).round(4) == pytest.approx(optimal)
-    assert np.sqrt(np.diag(W @ C @ W.T)).round(4) == pytest.approx(naive)
-    assert np.sqrt(np.diag(plain)).round(4) == pytest.approx(believed)
+    for covariance, printed in ((P, optimal), (W @ C @ W.T, naive), (plain, believed)):
+        assert tuple(np.sqrt(np.diag(covariance)).round(4)) == printed
 
 
 @pytest.mark.parametrize("rho", [-0.5, 0.0, 0.6, 0.99])
@@ -50,12 +51,13 @@ def test_recursion_of_true_errors_is_that_of_the_weights(rho, size):
     ):
         bias, S = exact.recursive_errors(design.gain, design.carry, t, truth, steps, np.full(12, 30.0), 0.0)
         for m in range(4):
-            W = unit_weights(design, t, m)
+            W = np.array(unit_weights(design, t, m))
             for k in range(size - 1, 12):
                 kept = W[k]
-                expected = kept @ C @ kept.T
-                assert S[m, k] == pytest.approx(expected, rel=1e-8, abs=1e-12)
-                assert bias[m, k] == pytest.approx(kept @ truth[:, 0] - truth[k], rel=1e-7, abs=1e-7)
+                summed = np.abs(kept) @ np.abs(truth[:, 0]) + np.abs(truth[k])
+                assert_rounded(bias[m, k], kept @ truth[:, 0] - truth[k], summed, operations=12 * TERMS)
+            expected = W @ C @ np.swapaxes(W, 1, 2)
+            assert_covariances_rounded(S[m, size - 1 :], expected[size - 1 :], np.linalg.cond(C))
 
 
 def unit_weights(design, t, m):
@@ -82,7 +84,7 @@ def test_walk_of_velocity_by_both_ways_of_reckoning():
     first, W, _ = filters.window_weights(plots, 8, 9, 2)
     C = world.error_covariance(np.full(9, 30.0), 0.0, t, 5.0)
     _, other = exact.weighted_errors(W, first, t, truth, C, walk, first)
-    assert S[0, 8] == pytest.approx(other[0], rel=1e-9)
+    assert_covariances_rounded(S[0, 1:], np.concatenate([S[0, 1:8], other]))
 
 
 @pytest.mark.filterwarnings("error")

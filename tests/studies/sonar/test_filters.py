@@ -5,6 +5,8 @@ import pytest
 
 from radarsim.studies.sonar import exact, filters
 from tests.studies.sonar import naive as naive
+from tests.studies.sonar.precision import assert_covariances_rounded, assert_estimates_rounded, losses
+from tests.tolerances import assert_rounded
 
 PERIOD, SIGMA = 5.0, 30.0
 
@@ -34,17 +36,13 @@ def run(design, t, z):
     return np.array(out)
 
 
-def compare(design, z, twin, relative=1e-9):
-    """Estimates and covariances equal the twin's, each component against its own size of error."""
+def compare(design, z, twin, errors=0.0):
+    """Estimates and covariances equal the twin's; errors: see `losses`."""
     x, P = twin
     size = design.size
     t = np.arange(len(z)) * PERIOD
-    known = ~np.isnan(x)
-    ours, spread = run(design, t, z)[:, :size], np.sqrt(np.diagonal(design.covariance[0], axis1=1, axis2=2))[:, :size]
-    assert np.max(np.abs(ours - x)[known] / np.maximum(spread[known], 1e-12)) < relative
-    full = known.all(axis=1)
-    unit = spread[full][:, :, None] * spread[full][:, None, :]
-    assert np.max(np.abs(design.covariance[0][full][:, :size, :size] - P[full]) / unit) < relative
+    assert_estimates_rounded(run(design, t, z)[:, :size], x, P, z, SIGMA, errors)
+    assert_covariances_rounded(design.covariance[0, :, :size, :size], P, errors)
 
 
 @pytest.fixture(params=[1, 2, 3])
@@ -63,10 +61,11 @@ T = np.arange(40) * PERIOD
 @pytest.mark.parametrize("rho", [-0.5, 0.0, 0.3, 0.6, 0.9, 0.99])
 def test_differenced_and_augmented_are_generalised_least_squares(observed, size, rho):
     seen, z = observed
+    errors = np.linalg.cond(rho ** np.rint(np.abs(T[seen][:, None] - T[seen]) / PERIOD))
     differenced, augmented = (filters.recursive(plots(seen), size, rho, *variance) for variance in ((), (0.0,)))
     for design in (differenced, augmented):
-        compare(design, z, naive.batch(T, z, size, SIGMA, rho, PERIOD))
-    compare(differenced, z, naive.differenced(T, z, size, SIGMA, rho, PERIOD))
+        compare(design, z, naive.batch(T, z, size, SIGMA, rho, PERIOD), errors)
+    compare(differenced, z, naive.differenced(T, z, size, SIGMA, rho, PERIOD), errors)
 
 
 def test_growing_memory_kalman_and_closed_forms_agree():
@@ -74,18 +73,21 @@ def test_growing_memory_kalman_and_closed_forms_agree():
     line, kalman = filters.recursive(everything, 2), filters.recursive(everything, 2, 0.0, 0.0)
     n = np.arange(2, 51)
     A, B = exact.gains_closed(n)
-    for design in (line, kalman):
-        assert design.gain[0, 1:, 0] == pytest.approx(A, rel=1e-10)
-        assert design.gain[0, 1:, 1] * PERIOD == pytest.approx(B, rel=1e-10)
-        assert np.sqrt(design.covariance[0, 1:, 0, 0]) == pytest.approx(SIGMA * exact.sigma_smoothed(n), rel=1e-10)
     P = line.covariance[0, 1:]
-    ahead = P[:, 0, 0] + 2 * PERIOD * P[:, 0, 1] + PERIOD**2 * P[:, 1, 1]
-    assert np.sqrt(ahead) == pytest.approx(SIGMA * exact.sigma_extrapolated(n), rel=1e-10)
+    loss = losses(P[:, :2, :2])
+    for design in (line, kalman):
+        for i, closed in enumerate((A, B / PERIOD)):
+            assert_rounded(design.gain[0, 1:, i], closed, loss * closed)
+        smoothed = SIGMA * exact.sigma_smoothed(n)
+        assert_rounded(np.sqrt(design.covariance[0, 1:, 0, 0]), smoothed, loss * smoothed)
+    ahead = P[:, 0, 0] + 2 * PERIOD * P[:, 0, 1] + PERIOD**2 * P[:, 1, 1]  # all positive
+    extrapolated = SIGMA * exact.sigma_extrapolated(n)
+    assert_rounded(np.sqrt(ahead), extrapolated, loss * extrapolated)
     second, n = filters.recursive(everything, 3, 0.0), n[1:]
     kalman = filters.recursive(everything, 3, 0.0, 0.0)
+    sigma = SIGMA * exact.sigma_acceleration(n, PERIOD)
     for design in (second, kalman):
-        acceleration = np.sqrt(design.covariance[0, 2:, 2, 2])
-        assert acceleration == pytest.approx(SIGMA * exact.sigma_acceleration(n, PERIOD), rel=1e-10)
+        assert_rounded(np.sqrt(design.covariance[0, 2:, 2, 2]), sigma, losses(second.covariance[0, 2:]) * sigma)
 
 
 def test_printed_gains_of_unequal_weights_are_wrong_and_ours_right():
@@ -96,8 +98,9 @@ def test_printed_gains_of_unequal_weights_are_wrong_and_ours_right():
     design = filters.recursive(plots(weight, t), 2)
     C = np.diag(SIGMA**2 / weight)
     W, P = exact.generalised_least_squares(t, C, 2)
-    assert design.gain[0, -1, :2] == pytest.approx(W[:, -1], rel=1e-11)
-    assert design.covariance[0, -1, :2, :2] == pytest.approx(P, rel=1e-11)
+    loss = losses(design.covariance[0, 1:, :2, :2])[-1]
+    assert_rounded(design.gain[0, -1, :2], W[:, -1], condition=loss)
+    assert_rounded(design.covariance[0, -1, :2, :2], P, condition=loss)
     assert abs(design.gain[0, -1, 1] * PERIOD / (6 / (12 * 13)) - 1) > 0.05
 
 
@@ -114,7 +117,7 @@ def test_missed_plot_has_no_gain_and_a_second_plot_at_one_time_averages():
             assert not design.gain[0, 4:6].any()
             assert design.gain[0, 6].any()
     twice = filters.recursive(plots([1, 1, 1], np.array([0.0, 0.0, PERIOD])), 2)
-    assert twice.gain[0, :, 0] == pytest.approx([1, 0.5, 1])
+    assert_rounded(twice.gain[0, :, 0], [1, 0.5, 1], condition=losses(twice.covariance[0, 2:, :2, :2])[-1])
 
 
 def test_a_plot_at_the_time_of_the_last_one_tells_nothing_of_a_correlated_error():

@@ -7,7 +7,9 @@ from radarsim.app.configs import load
 from radarsim.kernels.random import fill_normal_pairs, fill_uniform_pairs
 from radarsim.studies.sonar import STUDY, world
 from tests.studies.sonar import naive as naive
+from tests.studies.sonar.precision import assert_estimates_rounded, losses
 from tests.studies.sonar.test_study import config as configured
+from tests.tolerances import assert_rounded, scaled_condition, sigma_error
 
 T, SCANS = 5.0, 18
 SIGMA = np.array([30.0, np.radians(1)])
@@ -90,7 +92,8 @@ def test_estimates_are_the_twins(sensor):
     plan = STUDY.prepare(case)
     rho, probability = sensor.get("error_correlation", 0.0), sensor.get("detection_probability", 1.0)
     missed = [k - 1 for k in sensor.get("missed_scans", ())]
-    truth = plan.world.truth
+    truth, t = plan.world.truth, np.arange(SCANS) * T
+    errors = np.linalg.cond(world.error_covariance(np.ones(SCANS), rho or 0.6, t, T))
     for realisation in (0, 5, 12345):
         sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
         e, detected = plots(plan, realisation, rho, probability, missed)
@@ -102,16 +105,16 @@ def test_estimates_are_the_twins(sensor):
                 error = sums["error"][f, :, 3 * c : 3 * c + size, 0]
                 known = ~np.isnan(x)
                 assert (sums["estimates"][f, :, 3 * c : 3 * c + size] == known).all()
-                unit = np.sqrt(np.diagonal(P, axis1=1, axis2=2))
-                off = np.abs(error - (x - truth[:, c, :size]))[known] / unit[known]
-                assert off.max() < 1e-8, (spec["name"], c)
+                assert_estimates_rounded(error, x - truth[:, c, :size], P, z, SIGMA[c], errors)
                 believed = sums["believed"][f, :, 3 * c : 3 * c + size]
-                assert believed[known] == pytest.approx((unit**2)[known], rel=1e-8)
+                variance, loss = np.diagonal(P, axis1=1, axis2=2), losses(P, errors)
+                assert_rounded(believed[known], variance[known], (loss[:, None] * variance)[known])
                 full = known.all(axis=1)
-                q = np.array(
-                    [v @ np.linalg.solve(p, v) for v, p in zip((x - truth[:, c, :size])[full], P[full], strict=True)]
-                )
-                assert sums["joint"][f, full, c, 0] == pytest.approx(q, rel=1e-5)
+                off, P = (x - truth[:, c, :size])[full], P[full]
+                q = np.array([v @ np.linalg.solve(p, v) for v, p in zip(off, P, strict=True)])
+                # P⁻¹ multiplies by κ what P and the errors have lost, of their squares in units of σ.
+                spread = np.ptp(z[detected]) / SIGMA[c] + (np.abs(off) / np.sqrt(variance[full])).sum(axis=1)
+                assert_rounded(sums["joint"][f, full, c, 0], q, scaled_condition(P) * loss[full] * spread**2)
 
 
 @pytest.mark.parametrize("frame", ["cartesian", "cartesian_unbiased"])
@@ -130,16 +133,22 @@ def test_converted_plots_and_their_weights(frame):
             xx, _, yy = np.full((3, SCANS), np.nan)
             xx[detected], _, yy[detected] = convert(*world.places(r[detected], b[detected]), *SIGMA)[2]
         for c, (z, variance) in enumerate(((x, xx), (y, yy))):
-            for k in range(2, SCANS):
-                at = np.flatnonzero(detected[: k + 1])
-                if len(at) < 3:
-                    continue
-                for f, size in ((0, 2), (1, 3)):
+            # Of a variance the formula's own rounding is relative to the square of the range.
+            least = variance[detected].min()
+            z = np.where(detected, z, np.nan)
+            for f, size in ((0, 2), (1, 3)):
+                expected, P = np.full((SCANS, size), np.nan), np.full((SCANS, size, size), np.nan)
+                for k in range(2, SCANS):
+                    at = np.flatnonzero(detected[: k + 1])
+                    if len(at) < 3:
+                        continue
                     A = np.vander(t[at] - t[k], size, increasing=True) / np.array([1, 1, 2])[:size]
                     w = 1 / variance[at]
-                    expected = np.linalg.solve((A.T * w) @ A, (A.T * w) @ z[at])
-                    ours = sums["error"][f, k, 3 * c : 3 * c + size, 0] + truth[k, c, :size]
-                    assert ours == pytest.approx(expected, rel=1e-7, abs=1e-7)
+                    P[k] = np.linalg.inv((A.T * w) @ A)
+                    expected[k] = P[k] @ ((A.T * w) @ (z[at] - truth[k, c, 0]))
+                error = sums["error"][f, :, 3 * c : 3 * c + size, 0]
+                expected[:, 1:] -= truth[:, c, 1:size]
+                assert_estimates_rounded(error, expected, P, z, np.sqrt(least), np.max(r) ** 2 / least)
 
 
 def test_third_coordinate_and_walk_of_velocity_leave_the_first_two_alone():
@@ -148,12 +157,12 @@ def test_third_coordinate_and_walk_of_velocity_leave_the_first_two_alone():
     one["target"] |= {"fluctuation_mps2": 0.02}
     plan = STUDY.prepare(load(one).cases[0])
     assert plan.world.walk[0] == 0.02
-    assert plan.world.walk[1] == pytest.approx(0.02 / 9e3)
+    assert_rounded(plan.world.walk[1], 0.02 / 9e3, operations=2)
     other = config(sigma_depth_m=5.0)
     other["target"] |= {"depth_m": [100.0, 0.5]}
     plan = STUDY.prepare(load(other).cases[0])
     sums = plan.layout.unpack(STUDY.simulate(plan, 0, 4096))
     sigma = np.sqrt(sums["error"][..., 1] / 4096)
     known = plan.axes.available
-    assert sigma[known] == pytest.approx(plan.axes.exact_sigma[known], rel=5.5 / np.sqrt(2 * 4096))
+    assert sigma[known] == pytest.approx(plan.axes.exact_sigma[known], rel=sigma_error(4096))
     assert [name for name, _ in plan.axes.components] == ["r", "vr", "ar", "b", "vb", "ab", "d", "vd", "ad"]

@@ -5,10 +5,13 @@ import pytest
 
 from radarsim.app.case_work import CaseWork
 from radarsim.app.configs import load
-from radarsim.studies.sonar import STUDY
+from radarsim.studies.sonar import STUDY, world
+from radarsim.studies.sonar import exact as least_squares
+from tests.studies.sonar.precision import TERMS
+from tests.tolerances import Z, assert_rounded, mean_error, scaled_condition, share_error, sigma_error
 
 N = 100_000
-BOUND = 5.85 / np.sqrt(2 * N)
+BOUND = sigma_error(N)
 RHO = [-0.5, 0.0, 0.3, 0.6, 0.9, 0.99]
 FILTERS = [
     {"name": "line", "kind": "growing_memory", "degree": 1},
@@ -84,10 +87,13 @@ def test_what_a_filter_says_of_itself_is_as_wrong_as_calculated():
     q, qq = sums["joint"][..., 0] / N, sums["joint"][..., 1] / N
     exact = plan.axes.exact_nees
     known = np.isfinite(exact)
-    assert (np.abs(q - exact) / np.sqrt((qq - q**2) / N))[known].max() < 5.85
+    assert (np.abs(q - exact) / np.sqrt((qq - q**2) / N))[known].max() < Z
     names = plan.axes.filters
     assert exact[names.index("naive"), -1, 0] > 3 * 2
-    assert exact[names.index("augmented"), -1, 0] == pytest.approx(2, rel=1e-9)
+    C = world.error_covariance(np.ones(20), 0.9, np.arange(20) * 5.0, 5.0)
+    _, P = least_squares.generalised_least_squares(np.arange(20) * 5.0, C, 2)
+    kappa = scaled_condition(P) * np.linalg.cond(C)
+    assert_rounded(exact[names.index("augmented"), -1, 0], 2.0, condition=kappa, operations=20 * TERMS)
 
 
 @pytest.mark.slow
@@ -97,10 +103,10 @@ def test_random_misses_are_exact_as_means_over_patterns(rho, probability):
     assert np.isfinite(plan.axes.exact_sigma[plan.axes.available]).all()
     sums = simulated(plan)
     off, own = deviations(plan, sums)
-    assert np.nanmax(np.abs(off) / np.maximum(own, 1e-9)) < 5.85
+    assert np.nanmax(np.abs(off) / own) < Z
     assert (sums["estimates"][:, :, 0] == N).all()
     detected = sums["estimates"][0, 1, 1] / N  # a velocity at the second scan: its plot was detected
-    assert abs(detected - probability) < 5 * np.sqrt(probability * (1 - probability) / N)
+    assert abs(detected - probability) < share_error(probability, N)
 
 
 def test_walk_of_velocity_is_exact():
@@ -132,10 +138,10 @@ def test_conversion_bias_and_its_cure():
         plan = STUDY.prepare(load(given).cases[0])
         made[frame] = simulated(plan)["error"][0, :, 0] / N, plan.axes.conversion_bias
     (plain, formula), (mended, _) = made["cartesian"], made["cartesian_unbiased"]
-    assert formula == pytest.approx(np.expm1(-(np.radians(4) ** 2) / 2) * 15e3)
-    assert abs(plain[0, 0] - formula) < 5 * np.sqrt(plain[0, 1] / N)
-    assert abs(mended[0, 0]) < 5 * np.sqrt(mended[0, 1] / N)
-    assert abs(mended[9, 0]) < 0.25 * abs(plain[9, 0]) + 5 * np.sqrt(mended[9, 1] / N)
+    assert_rounded(formula, np.expm1(-(np.radians(4) ** 2) / 2) * 15e3, operations=6)
+    assert abs(plain[0, 0] - formula) < mean_error(N, np.sqrt(plain[0, 1]))
+    assert abs(mended[0, 0]) < mean_error(N, np.sqrt(mended[0, 1]))
+    assert abs(mended[9, 0]) < 0.25 * abs(plain[9, 0]) + mean_error(N, np.sqrt(mended[9, 1]))
 
 
 def track_columns(n=6):
@@ -149,18 +155,18 @@ def test_track_over_recorded_plots_is_least_squares():
     case = load(config(filters=FILTERS[:1] + FILTERS[8:9])).cases[0]
     columns = track_columns()
     track = STUDY.recorded().tracker(case).feed(columns)
-    t, r = columns["t_s"], columns["range_m"]
-    seen = np.isfinite(r)
-    slope, value = np.polyfit(t[seen] - t[-1], r[seen], 1)
-    assert track.estimate[0, -1, :2] == pytest.approx([value, slope])
-    spread = np.sqrt(
-        np.diag(np.linalg.inv(sum(np.outer(a, a) for a in np.stack([t[seen] ** 0, t[seen] - t[-1]], axis=1))))
-    )
-    assert track.sigma[0, -1, :2] == pytest.approx(30 * spread)
-    slope, value = np.polyfit(t[3:] - t[-1], r[3:], 1)
-    assert track.estimate[1, -1, :2] == pytest.approx([value, slope])
+    for f, c, sigma, key in ((0, 0, 30.0, "range_m"), (0, 1, np.radians(1), "bearing_rad"), (1, 0, 30.0, "range_m")):
+        z, since = columns[key], columns["t_s"] - columns["t_s"][-1]
+        chosen = np.flatnonzero(np.isfinite(z))[-3 * f :]  # all, or the last three
+        plots = np.unwrap(z[chosen]) if c else z[chosen]
+        slope, value = np.polyfit(since[chosen], plots, 1)
+        A = np.stack([since[chosen] ** 0, since[chosen]], axis=1)
+        P = sigma**2 * np.linalg.inv(A.T @ A)
+        state, kappa = slice(2 * c, 2 * c + 2), scaled_condition(P) * np.abs(plots).max() / sigma
+        unit = np.sqrt(np.diag(P))
+        assert_rounded(track.estimate[f, -1, state], [value, slope], unit, kappa, operations=6 * TERMS)
+        assert_rounded(track.sigma[f, -1, state], unit, condition=scaled_condition(P), operations=6 * TERMS)
     assert np.isnan(track.estimate[0, 0, 1])
-    assert track.estimate[0, -1, 2] == pytest.approx(2 * np.pi - 3.12, abs=0.02)
 
 
 @pytest.mark.parametrize("frame", ["cartesian", "cartesian_unbiased"])
@@ -168,7 +174,7 @@ def test_track_in_the_cartesian_frame(frame):
     case = load(config(filters=FILTERS[:1], frame=frame)).cases[0]
     track = STUDY.recorded().tracker(case).feed(track_columns())
     assert [name for name, _ in track.components] == ["x", "vx", "y", "vy"]
-    assert track.estimate[0, -1, 0] == pytest.approx(-8890, rel=0.01)
+    assert track.estimate[0, -1, 0] == pytest.approx(-8890, abs=30)  # σ of the plot
     assert np.isfinite(track.estimate[0, -1]).all()
 
 

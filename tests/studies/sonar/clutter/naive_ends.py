@@ -68,22 +68,28 @@ def shortest(t, j, out=3):
 
 
 def missing(off, S, gate, sigma):
-    """The probability that a plot off a gate's centre by `off` (2,) in the mean is outside the gate: an integral."""
+    """The probability that a plot off a gate's centre by `off` (2,) in the mean is outside the gate: an integral.
+
+    Over the angle of which the sine gives the range: with the range itself, roots at the gate's ends cost digits.
+    """
     wide = math.sqrt(gate * S[0, 0])
     low, high = max(-wide, off[0] - 9 * sigma[0]), min(wide, off[0] + 9 * sigma[0])
     if low >= high:
         return 1.0
 
-    def density(r):
+    centre, reach = (low + high) / 2, (high - low) / 2
+
+    def density(angle):
+        r = centre + reach * math.sin(angle)
         half = math.sqrt(max(gate - r**2 / S[0, 0], 0) * (S[1, 1] - S[0, 1] ** 2 / S[0, 0]))
         middle, z = S[0, 1] / S[0, 0] * r - off[1], (r - off[0]) / sigma[0]
         across = special.ndtr((middle + half) / sigma[1]) - special.ndtr((middle - half) / sigma[1])
-        return math.exp(-(z**2) / 2) / sigma[0] / math.sqrt(2 * math.pi) * across
+        return reach * math.cos(angle) * math.exp(-(z**2) / 2) / sigma[0] / math.sqrt(2 * math.pi) * across
 
-    middle = min(max(off[0], low), high)
+    middle = math.asin((min(max(off[0], low), high) - centre) / reach)
     return 1 - sum(
         integrate.quad(density, *ends, epsabs=1e-13, epsrel=1e-12, limit=200)[0]
-        for ends in ((low, middle), (middle, high))
+        for ends in ((-math.pi / 2, middle), (middle, math.pi / 2))
     )
 
 

@@ -7,6 +7,7 @@ from scipy import stats
 from radarsim.app.configs import load
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter.kernels import tracker as places
+from tests.tolerances import Z, assert_rounded, mean_error
 
 N = 100_000
 RATE = 5e-5  # of either tail: 99.99 % bounds
@@ -66,7 +67,7 @@ def test_gates_hold_target_and_false_plots_as_they_should():
     n, truth = np.arange(2, 6), plan.axes.world.truth[2:, 0, 0]
     ahead = 1 + 2 * (2 * n + 1) / (n * (n - 1))
     area = truth * np.pi * -2 * np.log(1 - wanted[:, None]) * 30.0 * np.radians(1) * ahead
-    assert expected == pytest.approx(N * 1e-6 * area, rel=1e-4)
+    assert (np.abs(expected / (N * 1e-6 * area) - 1) < mean_error(N, 30.0 * np.sqrt(ahead) / truth)).all()
 
 
 @pytest.mark.parametrize(("m", "n"), [(2, 2), (3, 4), (3, 5), (4, 6)])
@@ -115,8 +116,8 @@ def test_every_track_of_the_target_is_accounted_for():
     sums = simulated(plan, 20_000)
     counts = sums["counts"]
     ends = counts[:, :, [places.LOST, places.DROPPED]].sum(axis=(1, 2))
-    assert sums["ratios"][:, 0, 0] == pytest.approx(ends)
-    assert sums["ratios"][:, 0, 2] == pytest.approx(counts[:, :, places.KEPT].sum(axis=1))
+    assert (sums["ratios"][:, 0, 0] == ends).all()
+    assert (sums["ratios"][:, 0, 2] == counts[:, :, places.KEPT].sum(axis=1)).all()
     assert (sums["estimates"][:, :, 0] == counts[:, :, places.KEPT]).all()
     assert (counts[:, :, places.KEPT] + counts[:, :, places.TRYING] <= 20_000).all()
     assert (counts[:, :, places.LOST].sum(axis=1) > 100).all()
@@ -144,7 +145,7 @@ def test_whole_turns_of_the_sector_change_nothing(first):
     plan = prepared([tracker("a"), tracker("b", "pda")], density=2.0, sector=sector)
     counts = simulated(plan, 512)["counts"]
     false, expected = (counts[..., place].sum(axis=1) for place in (places.FALSE, places.EXPECTED))
-    assert (np.abs(false / expected - 1) < 3.9 / np.sqrt(expected)).all()
+    assert (np.abs(false / expected - 1) < Z / np.sqrt(expected)).all()
 
 
 @pytest.mark.slow_cases("bearing_deg2")
@@ -157,9 +158,9 @@ def test_an_open_gate_holds_the_whole_field(bearing_deg):
     assert all(np.isfinite(values).all() for values in found.values())
     counts = found["counts"].sum(axis=1)
     area = np.ptp(np.radians(bearing_deg)) * (11e3**2 - 7e3**2) / 2
-    np.testing.assert_allclose(counts[:, places.EXPECTED], counts[:, places.LOOKED] * area * 0.3e-6, rtol=1e-12)
-    expected = counts[:, places.EXPECTED]
-    assert (np.abs(counts[:, places.FALSE] / expected - 1) < 6 / np.sqrt(expected)).all()
+    expected, looked = counts[:, places.EXPECTED], counts[:, places.LOOKED]
+    assert_rounded(expected, looked * area * 0.3e-6, operations=looked.max() + 10)  # a sum of as many
+    assert (np.abs(counts[:, places.FALSE] / expected - 1) < Z / np.sqrt(expected)).all()
 
 
 def test_a_target_that_passes_close_by_the_sonar_leaves_numbers():

@@ -9,12 +9,16 @@ from tests.studies.sonar.naive import F, Q
 
 
 def fit(t, z, at, now, size, sigma):
-    """Least squares of degree size - 1 on the plots `at`, at time now: estimate (3,) and covariance (3, 3)."""
+    """Least squares of degree size - 1 on the plots `at`, at time now: estimate (3,) and covariance (3, 3).
+
+    Plots are taken relative to the last one, so that no digits are lost to what they have in common.
+    """
     x, P = np.zeros(3), np.zeros((3, 3))
     s = t[at] - now
     A = np.stack([s**0, s, s**2 / 2], axis=1)[:, :size]
     P[:size, :size] = sigma**2 * np.linalg.inv(A.T @ A)
-    x[:size] = P[:size, :size] @ A.T @ z[at] / sigma**2
+    x[:size] = P[:size, :size] @ A.T @ (z[at] - z[at[-1]]) / sigma**2
+    x[0] += z[at[-1]]
     return x, P
 
 
