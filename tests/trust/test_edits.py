@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.trust import mutate
+from tests.warm import Start
 
 ROOT = Path(__file__).parents[2]
 SIZES = (900, 9_000, 60_000)  # less than a block of realisations, some blocks, many
@@ -36,6 +37,13 @@ def run(start, tree, store, sizes=SIZES):
     done = start.run(store, json.dumps(sizes), code=RUN, path=[tree], cwd=tree)
     assert done.returncode == 0, done.stderr
     return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+@pytest.fixture
+def libraries(tmp_path):
+    """Processes in which new memory has a content: an edited kernel may read what it has not written."""
+    with Start(tmp_path, radarsim=False, MALLOC_PERTURB_="90") as start:
+        yield start
 
 
 @pytest.mark.slow
