@@ -41,8 +41,9 @@ def run(start, tree, store, sizes=SIZES):
 
 @pytest.fixture
 def libraries(tmp_path):
-    """Processes in which new memory has a content: an edited kernel may read what it has not written."""
-    with Start(tmp_path, radarsim=False, MALLOC_PERTURB_="90") as start:
+    """Processes whose kernels may read what they have not written, and check their indices: an edit may spoil both."""
+    settings = {"MALLOC_PERTURB_": "90", "NUMBA_BOUNDSCHECK": "1", "RADARSIM_CACHE_DIR": str(tmp_path / "kernels")}
+    with Start(tmp_path, radarsim=False, **settings) as start:
         yield start
 
 
