@@ -118,8 +118,8 @@ def test_the_chirps_questions_and_recorded_plots(radarsim, tmp_path):
     last, limit = map(float, up[0].split(",")[-2:])
     assert last == pytest.approx(27, rel=NEAR_ENOUGH)
     ask = ("solve", "chirp", "radar.slope_hz_per_s", "--limit", "r", "--filter", "up", "--equals", 27, "--json")
-    # Long settled: as near as that, times ten where sigma changes by a tenth of what the slope does.
-    settled = pytest.approx(solved["value"], rel=10 * abs(limit / last - 1))
+    # Long settled: as near as that, times twenty where sigma changes by over a twentieth of what the slope does.
+    settled = pytest.approx(solved["value"], rel=20 * abs(limit / last - 1))
     assert json.loads(radarsim(*ask).stdout)["value"] == settled
     assert "radar.slope_hz_per_s" in radarsim("sensitivity", "chirp", "--out", tmp_path).stdout
     for arguments in (
