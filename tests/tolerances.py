@@ -41,7 +41,7 @@ def mean_error(count, spread=1.0, z=Z):
 
 def sigma_error(count, kurtosis=3.0, z=Z):
     """z relative standard errors of σ, from the root mean square of so many independent errors of that kurtosis."""
-    return z * math.sqrt((kurtosis - 1.0) / count) / 2.0
+    return z * np.sqrt((kurtosis - 1.0) / count) / 2.0
 
 
 def share_error(share, count, z=Z):
@@ -71,6 +71,12 @@ def assert_rounded(found, wanted, size=None, condition=1.0, operations=1):
         f"off by up to {(off / np.where(allowed > 0, allowed, EPSILON)).max():.3g} times what rounding allows, "
         f"{np.max(off):.3g} of {np.max(np.abs(wanted)):.3g}"
     )
+
+
+def column_sizes(values, count):
+    """Sizes of what sums of so many numbers add up, by column: of both signs their sums are smaller by about a root."""
+    values = np.abs(np.asarray(values))
+    return math.sqrt(count) * values.max(axis=tuple(range(values.ndim - 1)), keepdims=True, initial=0)
 
 
 def units_off(found, exact):

@@ -12,6 +12,7 @@ from radarsim.app.case_work import CaseWork
 from radarsim.report.drawing import GREY, Line
 from radarsim.studies import registry
 from radarsim.studies.interface import Study
+from tests.tolerances import assert_rounded, column_sizes, rounding
 from tests.trust.cases import CASES, MORE, Small
 
 MISSED = Small("rls2", ("radar.detection_probability=0.8",), 1, 1)
@@ -41,9 +42,7 @@ def test_blocks_add_up_whatever_their_bounds(works, study):
     whole = work.plan.layout.unpack(work.simulate(3, 37))
     parts = [work.plan.layout.unpack(work.simulate(*part)) for part in ((3, 8), (11, 16), (27, 13))]
     for name, values in whole.items():
-        added = sum(part[name] for part in parts)
-        # Sums of large and small numbers in another order: to rounding of the largest of their kind.
-        np.testing.assert_allclose(added, values, rtol=1e-9, atol=1e-11 * np.abs(values).max(initial=0), err_msg=name)
+        assert_rounded(sum(part[name] for part in parts), values, size=column_sizes(values, 37), operations=37)
     assert np.isfinite(work.simulate(3, 37)).all()
 
 
@@ -58,11 +57,10 @@ def test_errors_of_realisations_are_those_of_the_sums(works, study):
     sums = plan.layout.unpack(of.simulate(plan, 3, 37))
     for power in range(1, 5):
         whole = sums["error"][..., power - 1]
-        atol = 1e-11 * np.abs(whole).max((0, 1))
-        assert (np.abs(np.nansum(error**power, axis=1) - whole) <= 1e-9 * np.abs(whole) + atol).all(), power
+        assert_rounded(np.nansum(error**power, axis=1), whole, size=column_sizes(whole, 37), operations=37)
     assert np.array_equal(np.isfinite(error).sum(axis=1), sums.get("estimates", 37 * plan.axes.available))
     largest = np.nanmax(np.abs(error), axis=(0, 1, 2))
-    np.testing.assert_allclose(error[:, 8:17] / largest, alone / largest, atol=1e-9)
+    assert_rounded(error[:, 8:17], alone, size=largest, operations=100)
 
 
 @pytest.mark.slow_cases("rare_losses")
@@ -90,7 +88,7 @@ def drawn_of(mark, part, columns):
 
     def same(values, column, scale):
         there = np.isfinite(values)
-        return np.allclose(values[there], scale * rows[column][there], rtol=1e-12, atol=0)
+        return np.allclose(values[there], scale * rows[column][there], rtol=rounding(operations=3), atol=0)
 
     drawn = [
         (np.asarray(v, float), c)

@@ -7,6 +7,7 @@ import pytest
 
 import radarsim
 from radarsim.app import configs
+from radarsim.app.solve import NEAR_ENOUGH
 from radarsim.config.document import SHIPPED
 from radarsim.config.experiment import Case
 from radarsim.physics import fly_by_in_space, transition
@@ -17,8 +18,9 @@ from radarsim.studies.range_doppler.floor import derivatives
 from radarsim.studies.sonar import world
 from radarsim.studies.sonar.exact import generalised_least_squares
 from radarsim.studies.sonar.floor import to_cartesian, to_polar
+from tests.tolerances import Z, assert_rounded, rounding, scaled_condition, sigma_error
 
-EXACT = 1e-12  # of informations whose condition, in units of their own errors, is about 10⁴
+EXACT = rounding(240, 15)  # κ of a parabola's information over fifteen scans, which are summed up; lines have 14
 
 
 def of_case(config, *overrides: str):
@@ -63,7 +65,9 @@ def test_of_a_polynomial_least_squares_is_on_it():
     for case in configs.load("sonar_correlated").cases[::2]:
         axes, floor = floor_of(case)
         own = axes.available[1]
-        assert known(floor, 1).sigma[own] == pytest.approx(axes.exact_sigma[1][own], rel=1e-11)
+        # Errors correlated by up to 0.9: what is left of a difference is a tenth.
+        tolerance = rounding(14 / (1 - 0.9), 20)
+        assert known(floor, 1).sigma[own] == pytest.approx(axes.exact_sigma[1][own], rel=tolerance)
 
 
 # ---- smoothing -------------------------------------------------------------------------------------------------------
@@ -79,53 +83,61 @@ def test_fixed_lag_and_fixed_interval_are_least_squares_on_more_plots():
     axes, floor = of_case("rls2")
     bound, maps, scans = known(floor, 1), floors.polynomial(axes.t_s, 3), len(axes.t_s)
     rows, sigma = maps[:, :2], np.array([250.0, 15.0])
-    assert bound.smoothed == pytest.approx(batch(rows, sigma, maps, scans), rel=1e-10)
+    assert bound.smoothed == pytest.approx(batch(rows, sigma, maps, scans), rel=EXACT)
     for i, lag in enumerate(LAGS):
         for k in range(2, scans - lag):
-            assert bound.waited[i, k] == pytest.approx(batch(rows, sigma, maps, k + lag + 1)[k], rel=1e-10)
+            assert bound.waited[i, k] == pytest.approx(batch(rows, sigma, maps, k + lag + 1)[k], rel=EXACT)
         assert np.isnan(bound.waited[i, scans - lag :]).all()
     last = scans - 1 - LAGS[-1]  # a lag to the last scan is the whole interval, no lag is the filter
     assert bound.waited[-1, last] == pytest.approx(bound.smoothed[last], rel=EXACT)
     assert bound.smoothed[-1] == pytest.approx(bound.sigma[-1], rel=EXACT)
 
 
-def conditional(F, Q, P, H, R, upto: int) -> np.ndarray:
-    """σ (K, n) of all states given the plots of the first scans, from their joint covariance; H (K, D, n)."""
-    scans, D, n = H.shape
-    reach = [np.linalg.matrix_power(F, k) for k in range(scans)]
-    X = np.zeros((scans, n, scans, n))
-    for i, j in itertools.product(range(scans), repeat=2):
-        common = reach[i] @ P @ reach[j].T
-        for m in range(1, min(i, j) + 1):
-            common = common + reach[i - m] @ Q @ reach[j - m].T
-        X[i, :, j] = common
-    S = X.reshape(scans * n, scans * n)
-    sees = np.zeros((scans * D, scans * n))
+def unit_normals(F, Q, P, scans: int) -> np.ndarray:
+    """States (K, n, K n) by the unit normals that make them: of the start, and of each push; Q and P are diagonal."""
+    n = len(F)
+    states = np.zeros((scans, n, scans * n))
     for k in range(scans):
-        sees[k * D : (k + 1) * D, k * n : (k + 1) * n] = H[k]
-    sees = sees[: upto * D]
-    gain = np.linalg.solve(sees @ S @ sees.T + np.diag(R.ravel()[: upto * D]), sees @ S)
-    return np.sqrt(np.diag(S - S @ sees.T @ gain)).reshape(scans, n)
+        states[k] = F @ states[k - 1]
+        states[k, :, k * n : (k + 1) * n] = np.sqrt(Q if k else P)
+    return states
 
 
-def test_states_that_noise_moves_are_as_their_joint_covariance_says():
+def with_prior(states, H, R, upto: int) -> np.ndarray:
+    """Rows of the least squares for these normals, over unit errors: what they are drawn as, and the first plots."""
+    plots = (H @ states / np.sqrt(R)[:, :, None])[:upto]
+    return np.vstack([np.eye(states.shape[2]), plots.reshape(-1, states.shape[2])])
+
+
+def conditional(states, H, R, upto: int) -> np.ndarray:
+    """σ (K, n) of all states given the plots of the first scans."""
+    return np.linalg.norm(states @ np.linalg.pinv(with_prior(states, H, R, upto)), axis=2)
+
+
+def test_states_that_noise_moves_are_those_of_least_squares_for_all_that_moves_them():
     """The filter, fixed lag, and the Rauch-Tung-Striebel smoother, of a first covariance that is singular."""
     F, Q = transition(2.0, 3), np.diag([0.1, 0.02, 0.003])
     P, H = np.diag([4.0, 0.0, 0.5]), np.tile(np.eye(2, 3), (12, 1, 1))
     R = np.tile([3.0, 0.7], (12, 1))
     F_all, Q_all = (np.broadcast_to(one, (12, 3, 3)) for one in (F, Q))
     bound = floors.driven(P, F_all, Q_all, H, R, 1.0, 3)
+    states = unit_normals(F, Q, P, 12)
+    known = [conditional(states, H, R, upto) for upto in range(1, 13)]
+    tolerance = rounding(np.linalg.cond(with_prior(states, H, R, 12)), 36)  # sums of as many products
     for k in range(12):
-        assert bound.sigma[k] == pytest.approx(conditional(F, Q, P, H, R, k + 1)[k], rel=1e-10)
-        assert bound.smoothed[k] == pytest.approx(conditional(F, Q, P, H, R, 12)[k], rel=1e-10)
+        assert bound.sigma[k] == pytest.approx(known[k][k], rel=tolerance)
+        assert bound.smoothed[k] == pytest.approx(known[11][k], rel=tolerance)
         for i, lag in enumerate(LAGS):
             if k + lag < 12:
-                assert bound.waited[i, k] == pytest.approx(conditional(F, Q, P, H, R, k + lag + 1)[k], rel=1e-10)
+                assert bound.waited[i, k] == pytest.approx(known[k + lag][k], rel=tolerance)
     # as information, from next to nothing known: nearly a flat prior
     wide = np.diag([1e10, 1e8, 1e6])
     gained = np.einsum("kdi,kdj,kd->kij", H, H, 1 / R)
     flat = floors.moving(np.zeros((3, 3)), gained, F_all, Q_all, 3)
-    assert flat.sigma[1:] == pytest.approx(floors.driven(wide, F_all, Q_all, H, R, 1.0, 3).sigma[1:], rel=1e-6)
+    # Half of what the prior adds to the information, in units of what there is: at most its trace.
+    prior = (flat.sigma[1:] ** 2 / np.diag(wide)).sum(axis=1, keepdims=True) / 2
+    apart = floors.driven(wide, F_all, Q_all, H, R, 1.0, 3).sigma[1:] / flat.sigma[1:] - 1
+    assert (np.abs(apart) < prior + EXACT).all()
     assert np.isnan(flat.sigma[0]).tolist() == [False, False, True]
 
 
@@ -143,16 +155,22 @@ def test_a_fluctuating_target_is_generalised_least_squares_with_its_motion_as_no
         since = pushes[: k + 1, :, 0] - np.column_stack([np.ones(k + 1), t[: k + 1] - t[k]]) @ pushes[k].T
         C = sigma**2 * np.eye(k + 1) + since @ since.T  # of the plots about the line through the state at k
         _, P = generalised_least_squares(t[: k + 1], C, 2)
-        assert known(floor, 0).sigma[k, :2] == pytest.approx(np.sqrt(np.diag(P)), rel=1e-10)
+        tolerance = rounding(scaled_condition(P) * np.linalg.cond(C), 9)
+        assert known(floor, 0).sigma[k, :2] == pytest.approx(np.sqrt(np.diag(P)), rel=tolerance)
 
 
 # ---- missed plots ----------------------------------------------------------------------------------------------------
-def histories(scans: int, chance: float, needed: int, rows, sigma, maps, alone) -> np.ndarray:
-    """Root of the mean variance at the last scan over all detection histories in which there is an estimate."""
-    total, share = np.zeros(3), np.zeros(3)
+def histories(scans: int, chance: float, needed: int, rows, sigma, maps, alone) -> tuple[np.ndarray, float]:
+    """Root of the mean variance at the last scan over all detection histories in which there is an estimate.
+
+    And the greatest κ of their informations.
+    """
+    total, share, condition = np.zeros(3), np.zeros(3), 1.0
     for came in itertools.product([False, True], repeat=scans):
         weight = chance ** sum(came) * (1 - chance) ** (scans - sum(came))
         whitened = (rows / sigma[:, None])[list(came)].reshape(-1, 3)
+        if len(whitened) >= 3:
+            condition = max(condition, scaled_condition(whitened.T @ whitened))
         for c in range(3):
             given = sum(came) >= needed or (came[-1] and alone[c])
             if given and len(whitened) >= 3:
@@ -163,7 +181,7 @@ def histories(scans: int, chance: float, needed: int, rows, sigma, maps, alone) 
                 continue
             total[c], share[c] = total[c] + weight * variance, share[c] + weight
     with np.errstate(invalid="ignore"):
-        return np.sqrt(total / share)
+        return np.sqrt(total / share), condition
 
 
 @pytest.mark.parametrize(("f", "start"), [(0, 3), (1, 2), (1, 5)])
@@ -176,11 +194,12 @@ def test_missed_plots_are_averaged_over_detection_histories(f, start, monkeypatc
     bound, maps = known(floor, f), floors.polynomial(axes.t_s, 3)
     rows, sigma = maps[:, : f + 1], np.array([250.0, 15.0])[: f + 1]
     for k in range(1, scans):
-        own = histories(k + 1, chance, start, rows[: k + 1], sigma, maps[: k + 1], (True, f == 1, False))
-        assert bound.sigma[k] == pytest.approx(own, rel=1e-9, nan_ok=True)
+        own, condition = histories(k + 1, chance, start, rows[: k + 1], sigma, maps[: k + 1], (True, f == 1, False))
+        tolerance = rounding(condition, scans)
+        assert bound.sigma[k] == pytest.approx(own, rel=tolerance, nan_ok=True)
     assert set(bound.patterns) == {ENUMERATION}
     there = np.isfinite(axes.exact_sigma[f])
-    assert (bound.sigma[there] <= axes.exact_sigma[f][there] * (1 + 1e-9)).all()
+    assert (bound.sigma[there] <= axes.exact_sigma[f][there] * (1 + tolerance)).all()
     assert np.isnan(bound.smoothed).all()
 
 
@@ -193,7 +212,8 @@ def test_fewer_patterns_and_less_information_are_lower_bounds(monkeypatch, most)
     for f in range(2):
         few, all_of = known(less, f), known(whole, f)
         there = np.isfinite(all_of.sigma)
-        assert (few.sigma[there] <= all_of.sigma[there] * (1 + 1e-9)).all()
+        summed_up = 1 + rounding(operations=1 << 11)  # patterns that are the same
+        assert (few.sigma[there] <= all_of.sigma[there] * summed_up).all()
         assert (few.sigma[-1] < all_of.sigma[-1]).all()
         assert not all_of.reached
     if most == 1:
@@ -207,28 +227,31 @@ def test_patterns_that_do_not_determine_a_component_count_as_nothing(monkeypatch
     missing = "sensor.missed_scans=[]", f"sweep.sensor.detection_probability=[{chance}]", "scans=8"
     axes, floor = of_case("sonar_missed", *missing)
     for k in range(1, 8):
-        total = 0.0
+        total, condition = 0.0, 1.0
         for came in itertools.product([False, True], repeat=k):
             t = axes.t_s[np.flatnonzero((True, *came))] - axes.t_s[k]
             A = np.column_stack([np.ones_like(t), t]) / 30.0
             if len(t) > 1:
+                condition = max(condition, scaled_condition(A.T @ A))
                 total += chance ** sum(came) * (1 - chance) ** (k - sum(came)) * np.linalg.inv(A.T @ A)[0, 0]
-        assert known(floor, 0).sigma[k, 0] == pytest.approx(np.sqrt(total), rel=1e-9)
+        assert known(floor, 0).sigma[k, 0] == pytest.approx(np.sqrt(total), rel=rounding(condition, 8))
 
 
 def test_the_worst_patterns_are_left_out_where_they_are_rare(monkeypatch):
     """One plot alone in six scans, of a target of unknown velocity: once in 10⁵, and three quarters of the mean."""
     given = "ambiguous_rls4", "radar.detection_probability=0.9", "scans=6"
     bound = known(of_case(*given)[1], 1)
+    kept = 1 - floors.RAREST / (0.1 * 0.9 / 0.99) - EXACT  # at the second scan the worst are those of one plot: a tenth
     monkeypatch.setattr(floors, "RAREST", 0.0)
     whole = known(of_case(*given)[1], 1)
     assert (bound.sigma <= whole.sigma).all()
-    assert bound.sigma[:2] == pytest.approx(whole.sigma[:2], rel=1e-3)
+    assert (bound.sigma[:2] ** 2 >= kept * whole.sigma[:2] ** 2).all()
     assert whole.sigma[5, 0] > 1.9 * bound.sigma[5, 0]
     share, variance = np.array([0.5, 0.4999, 6e-5, 4e-5]), np.array([[1.0, 2, 1e3, 1e9]]).T
     monkeypatch.undo()
-    assert floors.over_patterns(share, variance, 1.0) == pytest.approx(0.5 + 0.9998)
-    assert floors.over_patterns(share, variance, 0.5) == pytest.approx(2 * (0.5 + 0.9998 + 0.05))
+    # Of shares that are differences of sums of one, weighted by 1e3.
+    assert_rounded(floors.over_patterns(share, variance, 1.0), [0.5 + 0.9998], size=1e3, operations=5)
+    assert_rounded(floors.over_patterns(share, variance, 0.5), [2 * (0.5 + 0.9998 + 0.05)], size=2e3, operations=5)
 
 
 def test_missed_plots_of_moving_states_are_averaged_too(monkeypatch):
@@ -243,7 +266,7 @@ def test_missed_plots_of_moving_states_are_averaged_too(monkeypatch):
             S = F @ S @ F.T + Q if k else S
             S = S - np.outer(S[:, 0], S[0]) / (S[0, 0] + 3.0) if plot else S
         total += 0.6 ** sum(came) * 0.4 ** (6 - sum(came)) * np.diag(S)
-    assert bound.sigma[-1] == pytest.approx(np.sqrt(total), rel=1e-10)
+    assert_rounded(bound.sigma[-1], np.sqrt(total), condition=scaled_condition(S), operations=60)  # ten a scan
     monkeypatch.setattr(floors, "MOST_PATTERNS", 1)
     less = floors.driven(P, *moves, H, R, 0.6, 2)
     assert (less.sigma[-1] < bound.sigma[-1]).all()
@@ -260,12 +283,18 @@ def test_derivatives_of_a_flight_are_differences():
     path = fly_by_in_space(9e3, 200.0, 20e3, t)
     from radarsim.studies.range_doppler.filters import displaced
 
-    shifts, step = np.array([[300.0, -200, 50, 7, -4, 2], [-100, 150, 20, -5, 9, 1]]), 1e-2
+    shifts = np.array([[300.0, -200, 50, 7, -4, 2], [-100, 150, 20, -5, 9, 1]])
     found = derivatives(path, shifts, t)
     for i in range(6):
-        moved = step * np.eye(6)[i]
-        apart = (displaced(path, shifts + moved, t) - displaced(path, shifts - moved, t)) / (2 * step)
-        assert found[..., i] == pytest.approx(apart, rel=1e-5, abs=1e-7)
+        assert_derivative(found[..., i], lambda moved, i=i: displaced(path, shifts + moved * np.eye(6)[i], t), 1.0)
+
+
+def assert_derivative(found, value, step: float) -> None:
+    """Differences of values (…, C) err by a third of what twice the step changes, and by rounding over the step."""
+    near, far = ((value(h) - value(-h)) / (2 * h) for h in (step, 2 * step))
+    axes = tuple(range(near.ndim - 1))
+    rounded = rounding(operations=10) * np.abs(value(step)).max(axes) / step
+    assert (np.abs(found - near) <= np.abs(far - near).max(axes) + rounded).all()
 
 
 def test_an_estimator_that_knows_the_law_of_drawn_flights_is_just_above_their_floor():
@@ -289,7 +318,7 @@ def test_an_estimator_that_knows_the_law_of_drawn_flights_is_just_above_their_fl
         b = np.einsum("mkdi,mkd->mi", A, rest) - found[:, drawn] * spread[drawn] ** -2.0
         found[:, drawn] += np.linalg.solve(J, b[..., None])[..., 0]
     sigma = np.sqrt(np.mean((displaced(path, found, t) - truth) ** 2, axis=0))
-    least = 1 - 4 / np.sqrt(2 * n)  # four standard errors of a measured σ
+    least = 1 - sigma_error(n)
     assert (sigma[:, :2] / bound.smoothed[:, :2] > least).all()
     assert (sigma[:, :2] / bound.smoothed[:, :2] < 1.1).all()  # noise turns the line of sight little here
     assert (axes.exact_sigma[1, 2:] > bound.sigma[2:]).all()
@@ -310,12 +339,12 @@ def test_derivatives_between_frames_are_differences(there):
     for i in range(4):
         step = np.zeros(4)
         step[i] = [1.0, 1e-3, 1e-5, 1e-8][i] if there is to_cartesian else [1.0, 1e-3, 1.0, 1e-3][i]
-        ends = [
-            np.stack(transform(*world.polynomials((np.ravel(coefficients) + sign * step).reshape(2, 2), t)), axis=1)
-            for sign in (1, -1)
-        ]
-        apart = (ends[0] - ends[1]) / (2 * step[i])
-        assert found[:, :, :2, i] == pytest.approx(apart[:, :, :2], rel=1e-5, abs=1e-9 * np.abs(apart).max())
+
+        def moved(times, step=step / step[i]):
+            at = (np.ravel(coefficients) + times * step).reshape(2, 2)
+            return np.stack(transform(*world.polynomials(at, t)), axis=1)[:, :, :2].reshape(len(t), 4)
+
+        assert_derivative(found[:, :, :2, i].reshape(len(t), 4), moved, step[i])
 
 
 # ---- what may lie below, and where there is none ---------------------------------------------------------------------
@@ -339,9 +368,10 @@ def test_plain_conversion_lies_below_it():
     both = result.tables["floor"].merge(result.curves, on=keys).query("filter == 'growing' and component == 'y'")
     plain, unbiased = (rows.iloc[0] for _, rows in both.groupby("case"))
     spread = np.deg2rad(8)
-    assert plain["floor"] == pytest.approx(15e3 * spread, rel=EXACT)
+    assert_rounded(plain["floor"], 15e3 * spread, operations=10)
     assert plain["sigma_hi"] < plain["floor"]
-    assert plain["sigma"] == pytest.approx(np.hypot(15e3, 30) * np.sqrt(-np.expm1(-2 * spread**2) / 2), rel=0.015)
+    expected, half = np.hypot(15e3, 30) * np.sqrt(-np.expm1(-2 * spread**2) / 2), plain["sigma_hi"] - plain["sigma"]
+    assert plain["sigma"] == pytest.approx(expected, abs=Z / 1.96 * half)
     assert unbiased["sigma_hi"] > unbiased["floor"]
 
 
@@ -370,7 +400,7 @@ def test_solve_answers_what_accuracy_a_floor_takes():
     found = radarsim.solve("rls2", "radar.sigma_velocity_mps", filter="r+Vr", at_s=60, equals=140, floor="r")
     assert found.exact
     _, floor = of_case("rls2", f"radar.sigma_velocity_mps={found.value!r}")
-    assert known(floor, 1).sigma[6, 0] == pytest.approx(140, rel=1e-8)
+    assert known(floor, 1).sigma[6, 0] == pytest.approx(140, rel=NEAR_ENOUGH)
 
 
 def test_a_filter_from_outside_has_the_floor_of_all_plots():
@@ -386,12 +416,13 @@ FEW = {"discriminator": 300, "pulses_to_tracks": 500}
 MISSED = {"ambiguous_missed": 50_000, "sonar_missed": 50_000}  # with fewer, rare patterns of plots are not seen
 STEMS = [path.stem for path in (SHIPPED / "configs").glob("*.yaml")]
 BIASED = {"orders"}  # the filters have a prior about zero: see above
+MIXED = rounding(1e5, 20)  # κ of the worst patterns of missed plots, extrapolated over twenty scans
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stem", sorted(set(STEMS) - BIASED))
 def test_below_every_measured_sigma(stem):
-    """But for chance: six standard errors of σ, of the realisations that count."""
+    """But for chance: Z standard errors of σ, of the realisations that count."""
     experiment = configs.load(stem)
     result = radarsim.run(experiment, realisations=MISSED.get(stem) or FEW.get(experiment.study, 2000))
     rows = result.tables["floor"]
@@ -399,8 +430,8 @@ def test_below_every_measured_sigma(stem):
     both = rows.merge(result.curves, on=keys, suffixes=("", "_of_curves"))
     assert len(both) == len(rows)
     exact = both["exact_sigma"].notna() & (experiment.study != "discriminator")
-    assert (both["exact_sigma"][exact] >= both["floor"][exact] * (1 - 1e-9)).all()
+    assert (both["exact_sigma"][exact] >= both["floor"][exact] * (1 - MIXED)).all()
     counted = both[both["n_eff"].fillna(0) >= 50]
     ratio = counted["sigma"] / counted["floor"]
     assert len(counted) > len(rows) / 2 or not len(rows)
-    assert (ratio > 1 - 6 / np.sqrt(4 * counted["n_eff"])).all(), counted[ratio < 1]
+    assert (ratio > 1 - Z / np.sqrt(4 * counted["n_eff"])).all(), counted[ratio < 1]

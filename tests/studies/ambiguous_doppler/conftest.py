@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from radarsim.config.experiment import Case
-from radarsim.studies.ambiguous_doppler import config, study
+from radarsim.studies.ambiguous_doppler import config, filters, study
+from tests.studies.ambiguous_doppler import naive
 
 RADARS = {  # σ_r, σ_V, Δt, λ of P1's
     "RLS 2": (250.0, 15.0, 10.0, 0.15),
@@ -40,6 +41,20 @@ def made(radar, filters, scans, target=RANDOM, variance=1e-3, seed=1, prior=None
         document["rare"] = rare
     spec = config.Keys.model_validate(document)
     return Case("case", "case", "ambiguous_doppler", spec, (), 1, seed)
+
+
+def tolerances(case, came, size=naive.SIZE):
+    """Rounding of estimates (3,), and of weights, of filters that list or combine: as of ranges alone, of any order."""
+    radar = case.spec.radar
+    sigma = radar.sigma_range_m, radar.sigma_velocity_mps
+    alone = [
+        SimpleNamespace(orders=(one.order,), variances=(one.manoeuvre_variance,), doppler="none")
+        for options in case.spec.filters
+        for one in filters.members(options)
+    ]
+    kalmans = [naive.Kalman(one, case.spec.prior, sigma, radar.scan_period_s) for one in alone]
+    estimates, weights = zip(*(naive.precision(one, came, size) for one in kalmans), strict=True)
+    return np.max(estimates, axis=0), max(weights)
 
 
 def added(plan, n):

@@ -8,6 +8,9 @@ import itertools
 import numpy as np
 
 from radarsim.studies.ambiguous_doppler.filters import model, prior_variances
+from tests.tolerances import Z, rounding, scaled_condition
+
+SIZE = np.array([1e5, 1e3, 10.0])  # of the ranges, velocities and accelerations that are added up
 
 
 def wrapped(x, D):
@@ -44,6 +47,27 @@ class Kalman:
         log_likelihood = -0.5 * (e @ np.linalg.solve(S, e) + np.log(np.linalg.det(S)))
         kept = np.eye(3) - K @ H
         return x + K @ e, kept @ P @ kept.T + K @ R @ K.T, log_likelihood
+
+
+def precision(kalman, came, size=SIZE):
+    """Rounding of estimates (3,) and, relative, of weights, of a filter whose plots came at some scans (K,).
+
+    An update does ten operations on the covariance before it. They are amplified by how much less is left of a number
+    that is not measured, and by κ of what is left; no later scan amplifies them. Innovations are of up to Z σ.
+    """
+    P, started, condition, estimates = kalman.P0, False, 0.0, rounding(operations=10 * len(came)) * size
+    for k in range(len(came)):
+        P = kalman.predicted(np.zeros(3), P)[1] if k else P
+        if came[k]:
+            rows = np.arange(kalman.observes) if started else np.arange(1, kalman.observes)
+            before = P if started else kalman.started(0.0, P)[1]
+            P = kalman.updated(np.zeros(3), before, np.zeros(len(rows)), rows)[1] if len(rows) else before
+            left, had = np.diag(P).copy(), np.diag(before).copy()
+            left[rows], had[rows] = 1.0, 1.0
+            condition += (had[left > 0] / left[left > 0]).max() * scaled_condition(P)
+            spread = rounding(Z * condition, 10) * np.sqrt(np.diag(before))
+            estimates, started = np.maximum(estimates, rounding(operations=10 * len(came)) * size + spread), True
+    return estimates, rounding(Z * condition, 10)
 
 
 def single(kalman, plots, spans, how):

@@ -7,6 +7,7 @@ from radarsim.app.configs import load
 from radarsim.config.load import as_yaml
 from radarsim.errors import ConfigError
 from radarsim.studies.ambiguous_doppler.words import cures
+from tests.tolerances import share_error
 
 RADAR = {
     "wavelength_m": 0.1,
@@ -90,8 +91,7 @@ def test_what_helps_is_what_was_tried():
     for settings, share in found.items():
         overrides = (*FOLDED, *(one for one in settings.replace("--set ", "").split()))
         cured = radarsim.run(MINE, overrides=overrides)
-        # Two independent samples of 400: five standard deviations of their difference at a tenth.
-        assert abs(at_the_end(cured) - share) < 5 * (2 * 0.1 * 0.9 / 400) ** 0.5
+        assert abs(at_the_end(cured) - share) < 2**0.5 * share_error(share, 400)  # two independent samples
 
 
 def test_what_helps_does_not_touch_what_the_config_sweeps():

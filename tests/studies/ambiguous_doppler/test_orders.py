@@ -11,7 +11,8 @@ from radarsim.studies.ambiguous_doppler import filters, study
 from radarsim.studies.ambiguous_doppler.filters import Member
 from radarsim.studies.ambiguous_doppler.kernels import records, sums
 from tests.studies.ambiguous_doppler import naive
-from tests.studies.ambiguous_doppler.conftest import RANGE_ONLY, made, summed
+from tests.studies.ambiguous_doppler.conftest import RANGE_ONLY, made, summed, tolerances
+from tests.tolerances import Z, assert_rounded, rounding
 
 ALL = {"orders": [0, 1, 2], "manoeuvre_variance": [9e4, 4.0, 1e-3]}
 LIKELIHOOD = {"name": "likelihood", "combine": "likelihood"} | ALL
@@ -20,7 +21,6 @@ EXPECTED |= {"manoeuvres": {"acceleration_mps2": 20.0, "duration_s": 30.0}}
 INTERSECTION = {"name": "intersection", "combine": "intersection"} | ALL
 PULSE = {"kind": "acceleration_pulse", "coefficients": [100e3, -250.0], "acceleration_g": 2.0}
 PULSE |= {"start_s": 60.0, "duration_s": 30.0}
-SCALE = np.array([1e5, 1e3, 10.0])
 
 
 def outputs(case):
@@ -54,8 +54,9 @@ def test_interacting_orders(doppler, detection):
         own = plots[:, :, lane]
         x, mu = naive.interacting(twins(case), own, plan.world.spans, 0.95, 40 if doppler == "folded" else 0)
         there = np.cumsum(own[:, 3]) > 0
-        assert np.abs((out[0, :, :3, lane] - x) / SCALE)[there].max() < 1e-9
-        assert np.abs(out[0, :, records.WEIGHTS :, lane] - mu)[there].max() < 1e-9
+        of_estimates, of_weights = tolerances(case, own[:, 3])
+        assert (np.abs(out[0, :, :3, lane] - x)[there] <= of_estimates).all()
+        assert np.abs(out[0, :, records.WEIGHTS :, lane] - mu)[there].max() < of_weights
 
 
 @pytest.mark.slow_cases("two orders-1.0", "twelve-1.0")
@@ -87,10 +88,11 @@ def test_orders_within_remembered_hypotheses(most, prune_below, orders, detectio
         if prune_below > 0:  # beyond twenty-four folds the twin has none
             assert np.array_equal(out[0][there][:, exactly, lane], found[there][:, exactly])
         apart = (out[0, :, : records.WEIGHTS, lane] - found[:, : records.WEIGHTS])[there]
-        assert np.abs(apart[:, :6] / np.tile(SCALE, 2)).max() < 1e-9
-        assert np.abs(apart[:, records.PROBABILITY]).max() < 1e-9
+        of_estimates, of_weights = tolerances(case, own[:, 3])
+        assert (np.abs(apart[:, :6]) <= np.tile(of_estimates, 2)).all()
+        assert np.abs(apart[:, records.PROBABILITY]).max() < of_weights
         mu = out[0, :, records.WEIGHTS :, lane][:, orders]
-        assert np.abs(mu - found[:, records.WEIGHTS :])[there].max() < 1e-9
+        assert np.abs(mu - found[:, records.WEIGHTS :])[there].max() < of_weights
 
 
 def test_combinations_read_what_their_members_estimate():
@@ -129,19 +131,21 @@ def test_expected_error_is_exact_and_never_beats_the_clairvoyant():
     sigma = np.sqrt(found.error[1, :, :, 1] / n)
     known = plan.axes.exact_sigma[1] > 0
     z = (sigma / np.where(known, plan.axes.exact_sigma[1], 1) - 1)[known] * np.sqrt(2 * n)
-    assert np.abs(z).max() < 5.85
-    assert (plan.axes.best_combination[1] <= plan.axes.exact_sigma[1] * (1 + 1e-9)).all()
-    assert (plan.axes.best_combination[1] <= plan.axes.best_order[1] * (1 + 1e-9)).all()
+    assert np.abs(z).max() < Z
+    summed_up = 1 + rounding(operations=100)  # at the first plot, whose range all orders take, errors are equal
+    assert (plan.axes.best_combination[1] <= plan.axes.exact_sigma[1] * summed_up).all()
+    assert (plan.axes.best_combination[1] <= plan.axes.best_order[1] * summed_up).all()
 
 
 def test_shares_of_least_error():
     """Against the solution of the constrained problem by hand: two independent errors of variances 1 and 3."""
     E = np.broadcast_to(np.diag([1.0, 3.0]), (1, 3, 2, 2))
-    assert np.allclose(filters.best_shares(E, np.ones((2, 3), bool)), np.array([0.75, 0.25])[None, :, None])
+    expected = np.broadcast_to(np.array([0.75, 0.25])[None, :, None], (1, 2, 3))
+    assert_rounded(filters.best_shares(E, np.ones((2, 3), bool)), expected, condition=3, operations=5)
     alone = filters.best_shares(E, np.array([[True, False, False], [True, True, False]]))
-    assert np.allclose(alone[0], [[0.75, 0, 0], [0.25, 1, 0]])
+    assert_rounded(alone[0], [[0.75, 0, 0], [0.25, 1, 0]], condition=3, operations=5)
     certain = np.broadcast_to(np.diag([0.0, 3.0]), (1, 3, 2, 2))
-    assert np.allclose(filters.best_shares(certain, np.ones((2, 3), bool))[0, :, 0], [1, 0])
+    assert filters.best_shares(certain, np.ones((2, 3), bool))[0, :, 0].tolist() == [1, 0]
 
 
 def test_published_numbers_of_the_manoeuvre():
@@ -155,7 +159,7 @@ def test_published_numbers_of_the_manoeuvre():
     motion = physics.acceleration_pulse([100e3, -250.0], 20.0, 60.0, 30.0, t)
     bias, noise = filters.errors(of, motion[None], np.array([250.0, 15.0]))
     E = filters.joint(bias, noise, np.ones(1))[-1, 0]
-    assert np.sqrt(np.diag(E)[:2]) == pytest.approx([162, 347], abs=0.5)
+    assert np.sqrt(np.diag(E)[:2]) == pytest.approx([162, 347], abs=0.5)  # as printed
     assert 1 / np.sqrt(np.linalg.inv(E).sum()) == pytest.approx(155, abs=0.5)
     one, two = np.sqrt([noise[-1, i, 0, i, 0] for i in range(2)])
     assert one / two == pytest.approx(1.01, abs=0.005)  # without a manoeuvre
@@ -168,6 +172,6 @@ def test_the_shipped_cases_of_orders():
     for case in load("orders").cases:
         axes = study.prepare(case).axes
         found[case.spec.target.kind] = [axes.exact_sigma[axes.filters.index(name), -1, 0] for name in names]
-    assert found["acceleration_pulse"] == pytest.approx([178.3, 161.5, 341.8], abs=0.1)
+    assert found["acceleration_pulse"] == pytest.approx([178.3, 161.5, 341.8], abs=0.05)  # as printed
     assert found["polynomial"][2] < found["polynomial"][1] < found["polynomial"][0]
     assert found["fly_by"][2] < found["fly_by"][1] < found["fly_by"][0]

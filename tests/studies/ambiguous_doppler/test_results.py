@@ -17,6 +17,8 @@ from radarsim.studies.ambiguous_doppler import figures, study, track
 from radarsim.studies.ambiguous_doppler.kernels import records, rows
 from radarsim.studies.ambiguous_doppler.tables import FEW_FOLDS
 from tests.recorded import whole
+from tests.studies.ambiguous_doppler.conftest import tolerances
+from tests.tolerances import assert_rounded, mean_error
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +33,7 @@ def test_folds(found):
     assert (folds["right"] <= folds["listed"]).all()
     memory = folds[folds["filter"] == "memory"].set_index("k")
     assert memory.loc[8, "right"] > 0.98
-    assert memory.loc[1, "hypotheses"] == pytest.approx(210, abs=5)  # as many as spans fit into the prior
+    assert memory.loc[1, "hypotheses"] == pytest.approx(210, abs=1)  # as many as spans fit into the prior
     nearest = folds[folds["filter"] == "nearest fold"]
     assert (nearest["hypotheses"] == 1).all()
     assert (nearest["right"].diff().dropna() <= 0).all()  # once lost, always lost
@@ -51,7 +53,7 @@ def test_gains_beside_the_oracle(found):
     curves = found.curves.set_index(["filter", "component", "k"])["sigma"]
     row = gains[(gains["filter"] == "memory") & (gains["component"] == "Vr") & (gains["k"] == 5)].iloc[0]
     ratio = curves["memory", "Vr", 5] / curves["oracle", "Vr", 5]
-    assert row["above_oracle_percent"] == pytest.approx(100 * (ratio - 1))
+    assert_rounded(row["above_oracle_percent"], 100 * (ratio - 1), size=100 * ratio, operations=5)
     assert row["above_oracle_lo"] < row["above_oracle_percent"] < row["above_oracle_hi"]
 
 
@@ -67,7 +69,8 @@ def test_sentences_tell_from_which_scan_on_it_is_as_good(found):
 def test_orders_and_their_sentence():
     made = radarsim.run("orders", realisations=1000)
     table = made.tables["orders"]
-    assert table.groupby(["case", "filter", "k"])["weight"].sum().to_numpy() == pytest.approx(1)
+    total = table.groupby(["case", "filter", "k"])["weight"].sum().to_numpy()
+    assert_rounded(total, np.ones(len(total)), operations=1000)  # means of so many
     assert set(table["filter"]) == {"likelihood", "expected error", "intersection"}
     assert len(made.tables["folds"]) == 0
     sentences = registry.study("ambiguous_doppler").answer(made.cases, made.tables)
@@ -131,11 +134,11 @@ def test_fan_holds_what_the_filter_estimates():
     case = load("ambiguous_rls4").cases[0]
     plan = study.prepare(case)
     _, out = study.sums.simulated(plan.world, plan.banks, 0)
-    shown = figures.fan(case, 5, 6)
+    shown, (tolerance, _) = figures.fan(case, 5, 6), tolerances(case, np.ones(15))
     for k, (v, a, p) in enumerate(shown.lists):
         mean = out[plan.banks.bank[5], k, :3, 7]
-        assert p @ v == pytest.approx(mean[1], rel=1e-9, abs=1e-6)
-        assert p @ a == pytest.approx(mean[2], rel=1e-9, abs=1e-6)
+        assert p @ v == pytest.approx(mean[1], rel=0, abs=tolerance[1])
+        assert p @ a == pytest.approx(mean[2], rel=0, abs=tolerance[2])
         assert (np.diff(p) <= 0).all()
 
 
@@ -156,7 +159,8 @@ def test_track_over_simulated_plots_is_the_study(keys):
     assert set(names) - set(made.filters) == {"oracle"}  # recorded velocities are folded
     for f, name in enumerate(made.filters):
         bank, place = (of[names.index(name)] for of in (plan.banks.bank, plan.banks.place))
-        assert np.abs((made.estimate[f] - out[bank, :, place : place + 3, 3])[started] / [1e5, 1e3, 10]).max() < 1e-7
+        apart = np.abs(made.estimate[f] - out[bank, :, place : place + 3, 3])[started]
+        assert (apart <= tolerances(case, seen)[0]).all()
         assert np.isnan(made.estimate[f][~started]).all()
 
 
@@ -190,7 +194,7 @@ def test_track_follows_combined_orders_as_the_study_does(doppler, more):
     for f, name in enumerate(found.filters):
         place = plan.banks.place[f]
         own = out[plan.banks.bank[f], :, place : place + 3, 3]
-        assert np.abs((found.estimate[f] - own) / [1e5, 1e3, 10]).max() < 1e-7, name
+        assert (np.abs(found.estimate[f] - own) <= tolerances(case, np.ones(12))[0]).all(), name
     # The sigma that is given beside is that of an expected error where it is exact.
     sigma = found.sigma[1]
     E = plan.axes.oracle_sigma[1] if doppler == "folded" else plan.axes.exact_sigma[1]
@@ -221,10 +225,12 @@ def test_a_remainder_is_followed_as_the_study_does():
     case = load("ambiguous_rls4", [*keys, f"filters=[{one}]"]).cases[0]
     plan = study.prepare(case)
     _, out = study.sums.simulated(plan.world, plan.banks, 8)
-    made = track.Tracker(case).feed(track.Recorded().simulated(case, 11))
+    columns = track.Recorded().simulated(case, 11)
+    made = track.Tracker(case).feed(columns)
     there = np.isfinite(made.estimate[0, :, 0])
     assert there.sum() > 8
-    assert np.abs((made.estimate[0] - out[0, :, :3, 3])[there] / [1e5, 1e3, 10]).max() < 1e-7
+    apart = np.abs(made.estimate[0] - out[0, :, :3, 3])[there]
+    assert (apart <= tolerances(case, np.isfinite(columns["range_m"]))[0]).all()
 
 
 def test_a_velocity_counts_in_the_remainder_as_it_folds():
@@ -321,7 +327,7 @@ def test_sigma_is_marked_where_few_false_velocities_were_seen():
 
 @pytest.mark.parametrize("name", ["no memory", "best hypothesis", "memory"])
 def test_plots_as_stated_are_found_so_while_folds_are_undecided(name):
-    """NIS of the ranges of 12 realisations of one degree of freedom at each of 29 scans: within 5 standard errors."""
+    """NIS of the ranges of 12 realisations, of one degree of freedom at each of 29 scans: the variance of one is 2."""
     case = load("ambiguous_rls2", ["scans=30"]).cases[0]
     tested = []
     for realisation in range(12):
@@ -332,7 +338,7 @@ def test_plots_as_stated_are_found_so_while_folds_are_undecided(name):
         assert "oracle" not in made.filters  # a recording has no true folds
         tested.append(made.nis[made.filters.index(name), 1:, 0])
     tested = np.concatenate(tested)
-    assert abs(np.nanmean(tested) - 1) < 5 * np.sqrt(2 / np.isfinite(tested).sum())
+    assert abs(np.nanmean(tested) - 1) < mean_error(np.isfinite(tested).sum(), np.sqrt(2))
 
 
 def test_an_infinite_gain_is_judged_without_a_warning():

@@ -14,7 +14,8 @@ from radarsim.report.drawing import Note
 from radarsim.studies.range_doppler import chart as drawn
 from radarsim.studies.range_doppler import filters
 from tests.program import command
-from tests.studies.range_doppler import impulse
+from tests.studies.range_doppler import impulse, naive
+from tests.tolerances import assert_rounded
 
 
 @pytest.fixture(scope="module")
@@ -72,8 +73,9 @@ def test_the_correction_is_of_the_first_order():
     gains = recursion(np.array([steps * c**-0.5, steps]))
     without = filters.steady_gains(c) - gains
     corrected = filters.steady_gains(c, steps) - gains
-    assert without[:2, 0] / without[:2, 1] == pytest.approx([2, 2], rel=0.1)
-    assert corrected[:2, 0] / corrected[:2, 1] == pytest.approx([4, 4], rel=0.15)
+    # Of errors of one order and the next, which is smaller by a factor of the step.
+    assert without[:2, 0] / without[:2, 1] == pytest.approx([2, 2], rel=steps[0])
+    assert corrected[:2, 0] / corrected[:2, 1] == pytest.approx([4, 4], rel=steps[0])
 
 
 def test_many_radars_at_once_are_as_one_by_one():
@@ -81,8 +83,10 @@ def test_many_radars_at_once_are_as_one_by_one():
     gains = recursion(shares)
     for i in range(40):
         sigma, variance = np.array([1.0, shares[0, i]]), shares[1, i] ** 6
-        both = [np.sqrt(np.diag(filters.steady_state(n, variance, sigma, 1.0)[1])) for n in (1, 2)]
-        assert gains[:, i] == pytest.approx(100 * (1 - both[1] / both[0]), abs=1e-6)
+        states = np.array([filters.steady_state(n, variance, sigma, 1.0) for n in (1, 2)])
+        both = np.sqrt(np.diagonal(states[:, 1], axis1=1, axis2=2))
+        allowed = 100 * naive.precision(states, 1 + 1 / shares[1, i])  # of the scans of a memory
+        assert gains[:, i] == pytest.approx(100 * (1 - both[1] / both[0]), abs=allowed)
 
 
 @pytest.mark.slow_cases("30.0")
@@ -93,8 +97,11 @@ def test_the_lines_over_time_are_those_of_the_textbook_and_end_in_the_closed_for
     dt = min(1.0, tau_2) / drawn.FINE
     for i in (0, len(t) // 4):
         scans = round(t[i] / dt) + 1
-        assert gain[i] == pytest.approx(impulse.gains(scans, tau_2**-6, (1.0, 1.0), dt), abs=1e-6)
-    assert gain[-1] == pytest.approx(filters.steady_gains(c), abs=0.45)
+        P = naive.kalman(np.zeros((scans, 2)), 1, 3, tau_2**-6, (1.0, 1.0), dt)[1][2:]  # worse than with the velocity
+        wanted = impulse.gains(scans, tau_2**-6, (1.0, 1.0), dt)
+        assert gain[i] == pytest.approx(wanted, abs=100 * naive.precision(P))
+    # The limit errs by the first order of the period, and by LIMIT_POINTS where it is SMALL.
+    assert gain[-1] == pytest.approx(filters.steady_gains(c), abs=filters.LIMIT_POINTS / drawn.FINE / filters.SMALL)
 
 
 @pytest.mark.slow
@@ -102,8 +109,8 @@ def test_the_papers_radars_lie_where_the_paper_has_them(tmp_path):
     five = chart(out=tmp_path, figures=False)
     rows = pd.read_csv(tmp_path / "chart" / "chart.csv").set_index(["case", "component"])
     assert rows["C_theta"].groupby("case", sort=False).first().round(2).tolist() == [0.25, 2.78, 11.11, 25.0, 100.0]
-    assert rows.loc["rls2", "r"]["c"] == pytest.approx(rows.loc["rls3", "r"]["c"], rel=1e-12)
-    assert rows.loc["rls4", "r"]["steady_gain_percent"] == pytest.approx(52.4, abs=0.05)
+    assert_rounded(rows.loc["rls2", "r"]["c"], rows.loc["rls3", "r"]["c"], operations=10)  # powers of the same numbers
+    assert rows.loc["rls4", "r"]["steady_gain_percent"] == pytest.approx(52.4, abs=0.05)  # as printed
     assert [line.split(":")[0] for line in five.sentences] == ["rls1", "rls2", "rls3", "rls4", "rls5"]
     assert "the acceleration loses 5.8 %" in five.sentences[0]
     assert (rows["c"] == rows["c"]).all()
@@ -117,9 +124,10 @@ def test_ones_own_radar_is_named_and_marked(made):
     rows = pd.read_csv(made.folder / "chart.csv")
     assert rows["case"].unique().tolist() == ["rls2, as set", "rls1", "rls2", "rls3", "rls4", "rls5"]
     own = rows.iloc[0]
-    twin = filters.steady_state(2, 1e-3, np.array([250.0, 5.0]), 10.0)[1][0, 0]
-    base = filters.steady_state(1, 1e-3, np.array([250.0, 5.0]), 10.0)[1][0, 0]
-    assert own["steady_gain_percent"] == pytest.approx(100 * (1 - np.sqrt(twin / base)), rel=1e-9)
+    states = np.array([filters.steady_state(n, 1e-3, np.array([250.0, 5.0]), 10.0) for n in (1, 2)])
+    base, twin = states[:, 1, 0, 0]
+    allowed = 100 * naive.precision(states, 3)  # a memory is of two scans
+    assert own["steady_gain_percent"] == pytest.approx(100 * (1 - np.sqrt(twin / base)), abs=allowed)
 
 
 def test_the_lines_of_the_map_are_crossed_where_they_say():
@@ -128,10 +136,13 @@ def test_the_lines_of_the_map_are_crossed_where_they_say():
     levels = []
     for component, panel in enumerate(found.panels):
         notes = [mark for mark in panel.marks if isinstance(mark, Note)]
+        # Chords between places of the map are an eighth of a second difference off, in each number.
+        rows = drawn.map_gains()[component]
+        chord = sum(np.abs(np.diff(rows, 2, axis=axis)).max() / 8 for axis in (0, 1))
         levels.append([note.text for note in notes])
         for note in notes:
             at = filters.exact_gains(np.array([note.x]), np.array([note.y]))
-            assert at[component, 0] == pytest.approx(float(note.text.removesuffix(" %")), abs=0.4)
+            assert at[component, 0] == pytest.approx(float(note.text.removesuffix(" %")), abs=chord)
     assert levels == [["20 %", "40 %", "60 %", "80 %"]] * 2 + [["0 %", "20 %", "40 %", "60 %", "80 %"]]
 
 
@@ -179,7 +190,7 @@ def test_the_table_on_the_wall_is_the_closed_form():
     rows = re.findall(r"^\| ([\d.]+) \| ([-\d.]+) \| ([-\d.]+) \| ([-\d.]+) \|$", text, re.MULTILINE)
     assert len(rows) == 8
     for c, *gains in rows:
-        assert [float(one) for one in gains] == pytest.approx(filters.steady_gains(float(c)), abs=0.0501)
+        assert [float(one) for one in gains] == pytest.approx(filters.steady_gains(float(c)), abs=0.05)
 
 
 def test_the_command(tmp_path):
