@@ -34,6 +34,12 @@ def scaled_condition(matrix):
     return np.linalg.cond(matrix / (scale[..., :, None] * scale[..., None, :]) + known)
 
 
+def polynomial_condition(times, degree=2):
+    """κ of the covariance of what least squares through plots at these times know at the last: place, speed, …"""
+    powers = np.vander(np.asarray(times, dtype=float) - times[-1], degree + 1)
+    return scaled_condition(np.linalg.inv(powers.T @ powers))
+
+
 def mean_error(count, spread=1.0, z=Z):
     """z standard errors of the mean of so many independent numbers of that spread."""
     return z * spread / math.sqrt(count)
