@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radarsim.app import quantities
-from tests.tolerances import rounding
+from tests.tolerances import assert_rounded, rounding
 
 RANGE = quantities.searched(0.01, 100.0)
 
@@ -92,7 +92,7 @@ def test_where_there_is_no_root_the_limit_is_the_turn(turn, sign):
     assert found.roots == ()
     # The square of the distance is lost beside 0.25.
     assert found.nearest == pytest.approx(turn, rel=math.sqrt(rounding(0.25, 4)))
-    assert found.at_nearest == pytest.approx(sign * 0.25, rel=rounding(operations=4), abs=0)
+    assert_rounded(found.at_nearest, sign * 0.25, operations=4)
 
 
 def test_where_there_is_no_root_the_limit_may_be_an_end():

@@ -411,7 +411,7 @@ def test_a_velocity_whose_error_is_a_span_tells_nothing():
     found, without = one.by_number(values), likelihood(case, "memory", blind).by_number(values)
     assert found["range_m"] == without["range_m"]
     rows = len(columns["t_s"])
-    assert found["velocity_mps"] == pytest.approx(-rows * np.log(15.0), rel=rounding(operations=rows))
+    assert_rounded(found["velocity_mps"], -rows * np.log(15.0), operations=rows)
 
 
 @pytest.mark.parametrize("name", ["memory", "no memory", "nearest fold", "range only"])

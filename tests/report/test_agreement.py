@@ -15,12 +15,12 @@ from radarsim.report import notes, tables
 from radarsim.report.quantities import Quantity
 from radarsim.report.statistics import ERROR_OF_PROGRAM, Z95, Estimate, rate, root_mean_square, standard_errors
 from tests.program import command
-from tests.tolerances import rounding
+from tests.tolerances import assert_rounded
 
 
 def test_standard_errors_of_an_even_interval():
     of = Estimate(2.0, 2.0 - Z95 * 0.5, 2.0 + Z95 * 0.5)
-    assert standard_errors(of, np.array([2.0, 3.0, 0.0])) == pytest.approx([0, 2, 4], rel=rounding(operations=4), abs=0)
+    assert_rounded(standard_errors(of, np.array([2.0, 3.0, 0.0])), [0, 2, 4], operations=4)
     assert np.isnan(standard_errors(of, np.nan))
     assert standard_errors(Estimate(1.0, 1.0, 1.0), 2.0) == np.inf
     assert standard_errors(Estimate(1.0, 0.5, np.inf), 9.0) == 0

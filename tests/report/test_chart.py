@@ -7,7 +7,7 @@ import pytest
 
 from radarsim.report import chart
 from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
-from tests.tolerances import rounding
+from tests.tolerances import assert_rounded, rounding
 
 PAGES = ("#ffffff", "#0f1419")
 
@@ -163,7 +163,7 @@ def test_curves_stand_out_from_both_pages_and_from_each_other_in_grey():
 
 
 def test_contrast_is_that_of_the_standard():
-    assert chart.contrast("#ffffff", "#000000") == pytest.approx(21, rel=rounding(operations=4))
+    assert_rounded(chart.contrast("#ffffff", "#000000"), 21, operations=4)
     assert chart.contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.005)
 
 

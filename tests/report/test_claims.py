@@ -15,7 +15,7 @@ from radarsim.report.statistics import Estimate
 from radarsim.studies import registry
 from radarsim.studies.range_doppler import tables as range_doppler
 from radarsim.studies.range_doppler.study import gains
-from tests.tolerances import assert_rounded, recursion_rounding, rounding
+from tests.tolerances import assert_rounded, recursion_rounding
 
 
 def judged(results, shipped=configs.shipped):
@@ -35,15 +35,15 @@ def test_ranges_from_words():
     assert claims.printed("18")[:2] == (18, 18)
     assert claims.printed("18").margin == 0.5
     assert claims.printed("25", step=5).margin == 2.5
-    assert claims.printed("0.33").strict == pytest.approx((0.325, 0.335), rel=rounding(operations=2))
+    assert_rounded(claims.printed("0.33").strict, (0.325, 0.335), operations=2)
     assert claims.between("7", "15")[:2] == (7, 15)
     assert claims.between("7", "15").strict == (6.5, 15.5)
-    assert claims.about("10").margin == pytest.approx(1, rel=rounding())
+    assert_rounded(claims.about("10").margin, 1)
     assert claims.about("10", margin=5).margin == 5
-    assert claims.about("20", "30").strict == pytest.approx((18, 33), rel=rounding(operations=2))
+    assert_rounded(claims.about("20", "30").strict, (18, 33), operations=2)
     assert claims.above(50).lo > 50
     assert claims.above(50).margin == 0.5
-    assert claims.above(0.99).margin == pytest.approx(0.005, rel=rounding(operations=2))
+    assert_rounded(claims.above(0.99).margin, 0.005, operations=2)
     assert claims.below(10).hi < 10
     assert claims.within(3, 4)[:2] == (3, 4)
 
@@ -100,7 +100,7 @@ def test_series():
 
 def test_ratio_of_estimates():
     of = claims.ratio(Estimate(3.0, 2.7, 3.3), Estimate(2.0, 2.0, 2.0), scale=100)
-    assert of == pytest.approx((150, 135, 165), rel=rounding(operations=2))
+    assert_rounded(of, (150, 135, 165), operations=2)
 
 
 def test_a_ratio_to_what_is_exactly_known_has_no_ends():

@@ -14,7 +14,7 @@ from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Note, Panel,
 from radarsim.report.quantities import Component
 from radarsim.studies.range_doppler import figures as range_doppler_figures
 from radarsim.studies.range_doppler import tables as range_doppler
-from tests.tolerances import assert_rounded, rounding
+from tests.tolerances import assert_rounded
 
 
 def one(*marks, **panel):
@@ -166,7 +166,7 @@ def test_panels_of_one_column_have_their_own_heights():
     short, tall = (Panel(Axis("x"), Axis("y"), (line(),), height_mm=height) for height in (30.0, 90.0))
     canvas = figures.render(Figure("f", "", "", (short, tall)))
     height = 120 + 5.5  # with the legend of the crosses
-    assert canvas.get_size_inches()[1] * 25.4 == pytest.approx(height, rel=rounding(operations=6))
+    assert_rounded(canvas.get_size_inches()[1] * 25.4, height, operations=6)
     low, high = (axes.get_window_extent().height for axes in canvas.axes)
     assert high > 2.5 * low
 
@@ -371,8 +371,8 @@ def test_garbage_is_collected_again_after_a_figure_whatever_comes_of_it():
 def test_size_in_millimetres():
     described = one(replace(line(), exact=None))
     width, height = figures.render(described).get_size_inches() * 25.4
-    assert width == pytest.approx(described.width_mm, rel=rounding(operations=2))
-    assert height == pytest.approx(described.panel_height_mm, rel=rounding(operations=2))
+    assert_rounded(width, described.width_mm, operations=2)
+    assert_rounded(height, described.panel_height_mm, operations=2)
 
 
 def test_long_lines_are_thinned_and_short_ones_are_whole():

@@ -18,7 +18,7 @@ from radarsim.report.quantities import LOCK, LOST, WRONG
 from radarsim.report.statistics import Z95
 from radarsim.report.tables import curves
 from radarsim.studies import registry
-from tests.tolerances import rounding
+from tests.tolerances import assert_rounded
 
 
 @pytest.fixture(scope="module")
@@ -88,8 +88,8 @@ def test_losses_are_what_locks_leave(results):
     (case,) = results["range_doppler"]
     lock, lost = (worst(case, lambda _: table, of) for of in (LOCK, LOST))
     assert (lock.k, lost.k) == (2, 2)  # the last
-    assert lock.percent == pytest.approx(50 * 0.1 / 0.9, rel=rounding(operations=4))
-    assert lost.percent == pytest.approx(50 * 0.1 / 0.1, rel=rounding(0.95 / 0.1, 4))  # a difference
+    assert_rounded(lock.percent, 50 * 0.1 / 0.9, operations=4)
+    assert_rounded(lost.percent, 50 * 0.1 / 0.1, condition=0.95 / 0.1, operations=4)  # a difference
 
 
 def test_what_is_not_known_is_never_reached(results):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radarsim.report import statistics
-from tests.tolerances import mean_error, rounding
+from tests.tolerances import assert_rounded, mean_error, rounding
 
 
 def moments(e):
@@ -20,7 +20,7 @@ def test_by_hand():
     assert of.bias == 2
     assert of.spread == 1
     assert of.bias_se == 1  # sample deviation √2 over √2
-    assert of.sigma.value**2 == pytest.approx(of.bias**2 + of.spread**2, rel=rounding(operations=2))
+    assert_rounded(of.sigma.value**2, of.bias**2 + of.spread**2, operations=2)
 
 
 def test_mean_by_hand():
@@ -98,7 +98,7 @@ def test_effective_realisations():
     found = statistics.effective(np.sum(e**2), np.sum(e**4), e.size)
     assert found == pytest.approx(e.size / 2, rel=mean_error(e.size, math.sqrt(24)) / 2)  # var κ̂ is 24/n
     assert statistics.effective(10.0, 10.0, 10) == np.inf
-    assert statistics.effective(1.0, 1.0, 1000) == pytest.approx(1000 / 999, rel=rounding(operations=3))
+    assert_rounded(statistics.effective(1.0, 1.0, 1000), 1000 / 999, operations=3)
     assert np.isnan(statistics.effective(0.0, 0.0, 0))
 
 
