@@ -34,6 +34,20 @@ def scaled_condition(matrix):
     return np.linalg.cond(matrix / (scale[..., :, None] * scale[..., None, :]) + known)
 
 
+def polynomial_condition(times, degree=2):
+    """κ of the covariance of what least squares through plots at these times know at the last: place, speed, …"""
+    powers = np.vander(np.asarray(times, dtype=float) - times[-1], degree + 1)
+    return scaled_condition(np.linalg.inv(powers.T @ powers))
+
+
+def recursion_rounding(scans=15):
+    """Largest relative difference of σ of the paper's filters by two recursions.
+
+    A scan takes ten operations; κ is that of what the first three ranges tell.
+    """
+    return rounding(polynomial_condition([0, 1, 2]), 10 * scans)
+
+
 def mean_error(count, spread=1.0, z=Z):
     """z standard errors of the mean of so many independent numbers of that spread."""
     return z * spread / math.sqrt(count)

@@ -216,7 +216,7 @@ def test_figures_have_the_width_asked_for_their_captions_and_what_they_were_made
         result.write(tmp_path, ("svg",), width)
         svg = (folder / "figures" / "sigma_r.svg").read_text()
         points = float(re.search(r'<svg[^>]* width="([\d.]+)pt"', svg)[1])
-        assert points / 72 * 25.4 == pytest.approx(width, abs=0.05)
+        assert points / 72 * 25.4 == pytest.approx(width, rel=0, abs=25.4 / 72 * 0.5e-6)  # six decimals
         assert "7.5px" in svg  # as large as at any other width
     assert result.written.removed == ()
     kept = run.stored_result(first.experiment, out=tmp_path).write(tmp_path, ("pdf",))

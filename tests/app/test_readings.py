@@ -125,7 +125,7 @@ def test_one_printed_end_of_two_curves_is_that_of_each_or_of_the_lower(first):
     """18.29 and 19.52 % at the end, 19.74 and 21.73 % at 100 s: 18 ± 1 is that of the lower alone, and at the end."""
     rows = {row["reading"]: row for row in table(first[0]) if row["claim"] == "P1.5" and row["part"] == "1"}
     lower, early = rows["end_of: the lower one"], rows["falls_to: 100 s; end_of: the lower one"]
-    assert [float(one["exact"]) for one in (lower, early)] == pytest.approx([18.29, 19.74], abs=0.006)
+    assert [float(one["exact"]) for one in (lower, early)] == pytest.approx([18.29, 19.74], abs=0.005)
     assert [one["outcome"] for one in (lower, early)] == ["confirmed", "refuted"]
     assert rows["as shipped"]["outcome"] == "refuted"
 
@@ -137,7 +137,7 @@ def test_sentences_on_figures_2a_and_3a_speak_of_their_radar_or_of_each(first):
     steps = over["P1.28"].outcome
     assert (steps.depends_on, steps.holds_in, steps.readings) == (("first_steps_of",), 3, 6)
     each = [row for row in table(out) if (row["claim"], row["reading"]) == ("P1.28", "first_steps_of: each radar")]
-    assert [float(row["exact"]) for row in each[7::2]] == pytest.approx([33, 30], abs=1.5)
+    assert [float(row["exact"]) for row in each[7::2]] == pytest.approx([33, 30], abs=0.5)
     assert [row["verdict"] for row in each[1::2]].count("refuted") == 2
     rows = {row["reading"]: row for row in table(out) if row["claim"] == "P1.27"}
     assert rows["as shipped"]["outcome"] == "refuted"
@@ -153,8 +153,7 @@ def test_the_readings_agree_with_the_stored_run_of_the_shipped_config(first, tmp
     rows = [row for row in table(first[0]) if row["reading"] == "as shipped"]
     last = gains[(gains["t_s"] == 140) & (gains["component"] == "r")].set_index("case")["exact_percent"]
     final = {row["part"]: float(row["exact"]) for row in rows if row["claim"] == "P1.5"}
-    assert final["1"] == pytest.approx(last["rls2"], rel=1e-9)
-    assert final["2"] == pytest.approx(last["rls3"], rel=1e-9)
+    assert [final["1"], final["2"]] == pytest.approx([last["rls2"], last["rls3"]], rel=0.5e-11)  # twelve digits
 
 
 def test_other_claims_keep_their_rows(first):

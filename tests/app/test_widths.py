@@ -35,7 +35,7 @@ def test_the_files_have_the_width_asked_for(words, folder, out):
     command(*words, "--out", out, "--format", "png", "--width", WIDTH)
     drawn = list((out / folder).glob("*.png"))
     assert drawn
-    for path in drawn:
+    for path in drawn:  # whole pixels
         assert Image.open(io.BytesIO(path.read_bytes())).width == pytest.approx(float(WIDTH) * MM * PNG_DPI, abs=1)
 
 

@@ -112,11 +112,16 @@ def test_hovering_shows_the_value_and_its_interval(page, results):
             told = re.search(
                 rf"^{re.escape(row[1])}: ([\d.]+) \[([\d.]+), ([\d.]+)\] m, exact ([\d.]+)$", tip, re.MULTILINE
             )
-            assert [float(v) for v in told.groups()] == pytest.approx(
-                [float(row[i]) for i in (7, 8, 9, 13)], abs=0.051 * (float(row[9]) - float(row[8])) / 2
-            )  # to two figures of the half-width
+            half = (float(row[9]) - float(row[8])) / 2
+            for number, i in zip(told.groups(), (7, 8, 9, 13), strict=True):
+                assert float(number) == pytest.approx(float(row[i]), rel=0, abs=shown(float(row[i]), half))
     page.move(5, 5)
     assert page.evaluate(f"document.querySelector('{SIGMA} .tip').hidden")
+
+
+def shown(value, half):
+    """How far from a value its tip may be: two figures of the half-width are shown, of numbers with five digits."""
+    return 0.05 * half + 0.5e-4 * abs(value)
 
 
 READING = """
@@ -146,7 +151,8 @@ def test_every_value_of_a_tip_is_of_the_time_that_it_names(page, results):
             t_s, stem = float(other or at), name.lower().replace(" ", "")
             row = next(one for one in own if one["case"] == stem and float(one["t_s"]) == t_s)
             half = (float(row["gain_hi"]) - float(row["gain_lo"])) / 2
-            assert float(value.replace("−", "-")) == pytest.approx(float(row["gain_percent"]), abs=0.051 * half)
+            gain = float(row["gain_percent"])
+            assert float(value.replace("−", "-")) == pytest.approx(gain, rel=0, abs=shown(gain, half))
             apart += bool(other)
     assert apart  # else nothing was shown
 
@@ -358,6 +364,8 @@ TICKS = """
   .filter((t) => t.style.display !== 'none' && !t.classList.contains('lab'))
   .map((t) => [t.textContent, Number(t.getAttribute('x')), Number(t.getAttribute('y'))])
 """
+# Two roundings to a tenth, and of numbers to five digits, on less than 200 units.
+REDRAWN = 0.1 + 0.5e-4 * 200
 CURVES = "[...document.querySelectorAll('svg.chart')[0].querySelectorAll('path.l')].map((p) => p.getAttribute('d'))"
 
 
@@ -393,7 +401,7 @@ def test_a_drag_looks_closer_and_a_double_click_at_all_again(page, results, touc
     page.click("svg.chart", times=2)
     assert ticks(page)[0] == [0, 20, 40, 60, 80, 100, 120, 140]
     for own, drawn in zip(before, page.evaluate(CURVES), strict=True):
-        assert points(drawn) == [pytest.approx(point, abs=0.11) for point in points(own)]
+        assert points(drawn) == [pytest.approx(point, rel=0, abs=REDRAWN) for point in points(own)]
     assert page.evaluate("document.querySelector('button.back').hidden")
     assert page.complaints() == []
 
@@ -450,7 +458,7 @@ def test_axes_fit_the_curves_that_are_left(page, results):
         page.click("figure .end text", nth.index(name))
     assert ticks(page) == before
     for own, drawn in zip(whole, page.evaluate(CURVES), strict=True):
-        assert points(drawn) == [pytest.approx(point, abs=0.11) for point in points(own)]
+        assert points(drawn) == [pytest.approx(point, rel=0, abs=REDRAWN) for point in points(own)]
 
 
 def test_axes_are_made_logarithmic_where_that_serves(page, results, tmp_path):
@@ -472,10 +480,12 @@ def test_axes_are_made_logarithmic_where_that_serves(page, results, tmp_path):
     places = [at for _, at in points(page.evaluate(y)[0])]
     slope = (places[-1] - places[0]) / (math.log(values[-1]) - math.log(values[0]))
     for value, at in zip(values, places, strict=True):
-        assert at == pytest.approx(places[0] + slope * (math.log(value) - math.log(values[0])), abs=0.2)
+        # Each place, the first and both that make the slope are at tenths.
+        wanted = places[0] + slope * (math.log(value) - math.log(values[0]))
+        assert at == pytest.approx(wanted, rel=0, abs=4 * 0.05)
     page.click("#axes")
     for own, drawn in zip(linear, page.evaluate(y), strict=True):
-        assert points(drawn) == [pytest.approx(point, abs=0.11) for point in points(own)]
+        assert points(drawn) == [pytest.approx(point, rel=0, abs=REDRAWN) for point in points(own)]
 
 
 @pytest.mark.parametrize("width", [360, 800, 1400])

@@ -1,5 +1,7 @@
 """Keys of a study beside `include`: the included experiment with these changed, and faults where they were written."""
 
+import math
+
 import pytest
 
 from radarsim.app.configs import load
@@ -8,6 +10,7 @@ from radarsim.config.load import new
 from radarsim.errors import ConfigError
 from radarsim.recorded.follow import one_case
 from radarsim.studies import registry
+from tests.tolerances import assert_rounded
 
 MINE = """
 study: range_doppler
@@ -57,7 +60,7 @@ def test_a_mapping_in_python_and_degrees_for_radians(folder):
     assert experiment.cases[0].spec.scans == 20
     sensors = [{"include": ["sonar_manoeuvre"], "sensor": {f"sigma_bearing_{unit}": 0.5}} for unit in ("rad", "deg")]
     rad, deg = (load(one).cases[0].spec.sensor.sigma_bearing_rad for one in sensors)
-    assert deg == pytest.approx(rad * 3.14159265 / 180)
+    assert_rounded(deg, math.radians(rad), operations=2)
 
 
 def test_the_nearer_key_yields_to_the_farther_and_both_to_an_override(folder):

@@ -7,6 +7,7 @@ import pytest
 from radarsim.app.configs import load
 from radarsim.config import fields
 from radarsim.errors import ConfigError
+from tests.tolerances import assert_rounded
 
 STEMS = ("rls2", "multimodel", "sonar_clutter", "sonar_manoeuvre", "discriminator")
 
@@ -53,8 +54,7 @@ def test_a_bare_filter_key_means_every_filter_and_degrees_are_understood():
     assert [key.path for key in both] == ["filters.0.manoeuvre_variance", "filters.1.manoeuvre_variance"]
     (one,) = fields.find(load("sonar_clutter").cases[0].spec, "sensor.sigma_bearing_deg")
     assert one.path == "sensor.sigma_bearing_deg"
-    assert one.value == pytest.approx(1)
-    assert one.high == pytest.approx(math.degrees(0.5))
+    assert_rounded([one.value, one.high], [1, math.degrees(0.5)], operations=3)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import pytest
 
 import radarsim
 from radarsim.studies.interface import RecordedPlots
+from tests.tolerances import rounding
 
 CASES = {  # config and what picks a case of it: every study, missed plots, folds, random targets, several plots a scan
     "rls2": (),
@@ -73,7 +74,9 @@ def test_a_filter_of_numpy_over_the_plots_has_the_errors_of_the_run():
         sigma.append(np.sqrt(((x - made.truth[:, k]) ** 2).mean(axis=0)))
     curves = radarsim.run("rls2", realisations=n).curves.query("filter == 'r+Vr' and k > 1")
     measured = curves.pivot(index="k", columns="component", values="sigma")[["r", "Vr", "ar"]]
-    np.testing.assert_allclose(measured, sigma, rtol=1e-9)
+    # Ten operations a scan on ranges, of errors in the plots' σ.
+    allowed = rounding(np.abs(z[..., 0]).max() / 250.0, 10 * 15)
+    np.testing.assert_allclose(measured, sigma, rtol=allowed)
 
 
 def test_memory_is_that_of_a_chunk():

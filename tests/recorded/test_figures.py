@@ -15,6 +15,7 @@ from radarsim.report.drawing import Line, Note
 from radarsim.report.wording import labelled
 from tests.program import command
 from tests.recorded import whole
+from tests.tolerances import assert_rounded, share_error
 
 
 def loaded(config, *overrides):
@@ -47,7 +48,7 @@ def test_residuals_lie_between_their_bounds(tmp_path, config):
         share = share[np.isfinite(share)]
         inside, count = inside + int((share < 2).sum()), count + share.size
     # Filters of one case share their plots, and neighbouring residuals are not independent: a tenth counts.
-    assert abs(inside / count - 0.954) < 5.85 * np.sqrt(0.954 * 0.046 / (count / 10))
+    assert abs(inside / count - 0.954) < share_error(0.954, count / 10)
 
 
 def test_plan_view_has_equal_units_and_shows_radar_start_and_end():
@@ -58,20 +59,19 @@ def test_plan_view_has_equal_units_and_shows_radar_start_and_end():
     view, over_time = page.plan(track, {"": Places(t, places)}).panels
     assert (view.equal, view.x.label, view.y.label) == (True, "east, km", "north, km")
     lines = {mark.name: mark for mark in view.marks if isinstance(mark, Line)}
-    np.testing.assert_allclose(lines["plots"].x, places[:, 1] / 1e3)
-    np.testing.assert_allclose(lines["plots"].y, places[:, 0] / 1e3)
+    np.testing.assert_array_equal(lines["plots"].x, places[:, 1] / 1e3)
+    np.testing.assert_array_equal(lines["plots"].y, places[:, 0] / 1e3)
     assert (lines["radar"].x.tolist(), lines["radar"].y.tolist()) == ([0], [0])
     assert [mark.text for mark in view.marks if isinstance(mark, Note)] == ["start, 0 s", "end, 390 s"]
-    np.testing.assert_allclose(over_time.marks[0].y, 50)
+    np.testing.assert_array_equal(over_time.marks[0].y, 50)
 
 
 def test_places_of_plots():
     x, y, z = np.array([3.0]), np.array([12.0]), np.array([4.0])
-    np.testing.assert_allclose(in_plane({"x_m": x, "y_m": y, "z_m": z}), [[3, 4, 13]])
+    np.testing.assert_array_equal(in_plane({"x_m": x, "y_m": y, "z_m": z}), [[3, 4, 13]])
     r = np.array([10.0])
-    np.testing.assert_allclose(
-        in_plane({"range_m": r, "bearing_rad": np.array([np.pi / 2])}), [[0, 10, 10]], atol=1e-12
-    )
+    # The angle's cosine is its rounding.
+    assert_rounded(in_plane({"range_m": r, "bearing_rad": np.array([np.pi / 2])}), [[0, 10, 10]], r)
     assert np.isnan(in_plane({"range_m": r})[0, :2]).all()
     assert in_plane({"bearing_rad": r}) is None
 

@@ -6,6 +6,7 @@ import pytest
 from radarsim.recorded import identity
 from radarsim.recorded.formats.importing import Options, import_recording
 from radarsim.recorded.formats.sites import Site
+from tests.tolerances import assert_rounded
 
 T = np.arange(0.0, 100.0, 5.0)
 
@@ -63,8 +64,9 @@ def test_whose_a_plot_is(aircraft, plot, wanted):
         t = T[1:-1] + 1
         fixes = aircraft[path][0]
         places = np.stack([np.interp(t, fixes[:, 0], column) for column in fixes.T[1:]], axis=1)
-        np.testing.assert_allclose(one.states[:, :3], places, atol=1e-9)
-        np.testing.assert_allclose(one.states[:, 3:], [[200, 0, 0]] * len(t), atol=1e-9)
+        assert_rounded(one.states[:, :3], places, np.abs(fixes[:, 1:]).max(), operations=4)
+        moved = np.abs(fixes[:, 1:]).max() / np.diff(fixes[:, 0]).min()
+        assert_rounded(one.states[:, 3:], [[200, 0, 0]] * len(t), moved, operations=2)
     else:
         assert np.isnan(one.states).all()
 

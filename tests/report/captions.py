@@ -14,6 +14,7 @@ from radarsim.language import called, tr
 from radarsim.report import panels, seen
 from radarsim.report.chart import spoken
 from radarsim.report.drawing import Line
+from tests.tolerances import rounding
 
 RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"
 POWER = re.compile(rf"(−?)(?:(\d+(?:[.,]\d+)?)·)?10([{RAISED}]+)")
@@ -147,7 +148,8 @@ def judged(result, figure, caption):
 
     def at(rows, sign):
         end = min(sign * row.last for row in rows)
-        return sign * end, [row for row in rows if np.isclose(sign * row.last, end, rtol=1e-9)]
+        same = rounding(operations=6)  # two gains of equal σ
+        return sign * end, [row for row in rows if np.isclose(sign * row.last, end, rtol=same, atol=0)]
 
     for template in ENDS if cases is not None else ():
         if claim := found(template, caption):

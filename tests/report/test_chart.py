@@ -7,6 +7,7 @@ import pytest
 
 from radarsim.report import chart
 from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
+from tests.tolerances import assert_rounded, rounding
 
 PAGES = ("#ffffff", "#0f1419")
 
@@ -37,11 +38,12 @@ def test_the_curve_lies_where_the_data_says_and_the_pointer_reads_the_data():
     data = panel.data
     x, y = (chart.Scale(bool(a[0]), *a[1:]) for a in (data["x"], data["y"]))
     drawn = points(panel.svg, "l")
-    np.testing.assert_allclose(drawn[:, 0], x.place(mark.x), atol=0.051)
-    np.testing.assert_allclose(drawn[:, 1], y.place(mark.y), atol=0.051)
+    tenth = 0.05 + rounding(drawn.max(), len(drawn))  # corners are at tenths, and their steps are added up here
+    np.testing.assert_allclose(drawn[:, 0], x.place(mark.x), rtol=0, atol=tenth)
+    np.testing.assert_allclose(drawn[:, 1], y.place(mark.y), rtol=0, atol=tenth)
     kept = data["lines"][0]
     for key, values in (("y", mark.y), ("l", mark.lo), ("h", mark.hi), ("e", mark.exact)):
-        np.testing.assert_allclose(kept[key], values, rtol=1e-4)
+        np.testing.assert_allclose(kept[key], values, rtol=0.5e-4)  # five digits
     assert data["xs"] == [mark.x.tolist()]
     assert (kept["n"], data["yl"]) == ("a", "σ of V_r, m/s")
 
@@ -161,8 +163,8 @@ def test_curves_stand_out_from_both_pages_and_from_each_other_in_grey():
 
 
 def test_contrast_is_that_of_the_standard():
-    assert chart.contrast("#ffffff", "#000000") == pytest.approx(21)
-    assert chart.contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.01)
+    assert_rounded(chart.contrast("#ffffff", "#000000"), 21, operations=4)
+    assert chart.contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.005)
 
 
 def test_paths_are_short():

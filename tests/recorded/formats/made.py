@@ -14,6 +14,9 @@ from radarsim.recorded.formats.sites import Site
 
 PLAIN = Options()
 SITE = Site(52.3, 4.76, 12.0)
+EARTH_M = 6.4e6  # places are differences of coordinates of that size; an angle of latitude times it is a way, at most
+PLACE = {"size": EARTH_M, "operations": 12}  # a rotation of such a difference, each coordinate of four operations
+CLOCK_S = np.spacing(1.8e9)  # the last place of a time from 1970
 
 
 def block(category, *records):

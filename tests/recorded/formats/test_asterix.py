@@ -13,6 +13,7 @@ from radarsim.recorded.formats.sites import Site
 from radarsim.recorded.identity import Tracks
 from tests.program import command
 from tests.recorded.formats.made import (
+    EARTH_M,
     SITE,
     block,
     fuzz,
@@ -129,7 +130,7 @@ def test_a_capture_holds_what_the_radar_sent(tmp_path, data):
     assert (done.format, done.rows) == ("asterix", 4)
     assert done.skipped == ["data blocks of category 008 (1)"]
     np.testing.assert_array_equal(columns["t_s"], [0, 1, 2, 4])
-    np.testing.assert_allclose(columns["range_m"], np.array([6001, 6002, 6003, 6100]) * NM / 256)
+    np.testing.assert_array_equal(columns["range_m"], np.array([6001, 6002, 6003, 6100]) * NM / 256)
 
 
 def test_what_a_capture_has_besides_is_counted(tmp_path):
@@ -215,7 +216,7 @@ def test_radars_stand_where_they_say(tmp_path):
             np.full(5, 5000 * 2 * math.pi / 65536),
             np.full(5, 25e3 * 0.3048),
         )
-        np.testing.assert_allclose(at[n::2], Site(*steps, place[2]).local(*polar), rtol=1e-12)
+        np.testing.assert_array_equal(at[n::2], Site(*steps, place[2]).local(*polar))
     assert not any("--at" in note for note in done.notes)
     moved = Site(45.70, 16.01, 100)
     given = {"25/12": moved, "25/14": SITE}
@@ -270,10 +271,17 @@ def test_truth_of_each_of_several_radars(tmp_path):
             plots.append(plot_048(4.0 * k, *own, radar=(25, number), address=0xA1, track=3, level=1200))
     done, columns, _ = imported(tmp_path, truth + block(48, *plots), Options(sites=sites))
     assert done.notes[-1].startswith("truth: of 60 of 60 plots (100 %; by address 60)")
+    # Half a step of each number that the file has: range, bearing, latitude.
+    step = EARTH_M * math.radians(180 / 2**25)
+    along, across = NM / 512 + step / 2, columns["range_m"].max() * math.pi / 65536
     for name in "xyz":
-        np.testing.assert_allclose(columns[f"{name}_m"], columns[f"true_{name}_m"], atol=15)
-    np.testing.assert_allclose(columns["true_r_m"], columns["range_m"], atol=10)
-    np.testing.assert_allclose(np.hypot(columns["true_vx_mps"], columns["true_vz_mps"]), 250, atol=1)
+        np.testing.assert_allclose(columns[f"{name}_m"], columns[f"true_{name}_m"], rtol=0, atol=along + across)
+    np.testing.assert_allclose(columns["true_r_m"], columns["range_m"], rtol=0, atol=along)
+    # A degree has 111.28 km here, and more at that height; 1° away the level is another's.
+    speed, level = 111.28 / 111.25 * 250 * (1 + height / EARTH_M), 250 * math.radians(1.1) ** 2 / 2
+    np.testing.assert_allclose(
+        np.hypot(columns["true_vx_mps"], columns["true_vz_mps"]), speed, rtol=0, atol=step / 4 + level
+    )
     assert (columns["true_vx_mps"] > 200).all()
     assert (columns["true_Vr_mps"][::2] > 200).all()
     assert (columns["true_Vr_mps"][1::2] < -200).all()
@@ -423,7 +431,7 @@ def test_category_021_to_the_last_step(tmp_path):
         "up_mps": 6.25 * climb * 0.3048 / 60,
     }
     for name, column in SITE.seen(given).items():
-        np.testing.assert_allclose(columns[name], column, rtol=1e-9, atol=1e-9)
+        np.testing.assert_array_equal(columns[name], column)
 
 
 def test_category_021_what_else_it_may_say(tmp_path):
@@ -436,7 +444,8 @@ def test_category_021_what_else_it_may_say(tmp_path):
         position_021(4, 52.5, 4.76, items={26: b"\xff\xff\x00\x00"}),
     ]
     _, columns, _ = imported(tmp_path, block(21, *records), Options(site=SITE))
-    np.testing.assert_allclose(columns["range_m"], columns["range_m"][1], atol=2)
+    half = EARTH_M * np.radians(180 / np.array([2**24, 2**31]))  # a step of each kind of latitude
+    np.testing.assert_allclose(columns["range_m"], columns["range_m"][1], rtol=0, atol=half.sum())
     moved = {"latitude_deg": 52.5, "longitude_deg": 4.76, "altitude_m": np.nan, "east_mps": 0.0}
     moved |= {"north_mps": 820 / 2**14 * NM, "up_mps": 2000 * 0.3048 / 60}
     level = moved | {"up_mps": np.nan}
@@ -444,7 +453,8 @@ def test_category_021_what_else_it_may_say(tmp_path):
         SITE.seen({name: np.array([one]) for name, one in own.items()})["velocity_mps"][0] for own in (moved, level)
     ]
     expected = [np.nan, *speeds, np.nan]
-    np.testing.assert_allclose(columns["velocity_mps"], expected, atol=1e-3)
+    turned = speeds[0] * half[1] / columns["range_m"][1]  # by the fine step
+    np.testing.assert_allclose(columns["velocity_mps"], expected, rtol=0, atol=turned)
 
 
 def test_names_of_positions(tmp_path):

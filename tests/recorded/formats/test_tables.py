@@ -7,7 +7,9 @@ import pytest
 
 from radarsim.recorded.formats.importing import Options
 from radarsim.recorded.formats.sites import Site
-from tests.recorded.formats.made import SITE, imported, refused
+from tests.recorded.formats.made import CLOCK_S, EARTH_M, SITE, imported, refused
+from tests.recorded.formats.test_importing import local
+from tests.tolerances import assert_rounded
 
 NM, KN = 1852.0, 1852 / 3600
 SOUTH = Options(site=Site(52.3, 4.76, 0.0))  # of ships, which then leave radially
@@ -20,8 +22,8 @@ def test_ranges_and_angles_without_units_are_asked_for(tmp_path):
         "range_ft, range_nm), --column bearing_deg=THETA (or bearing_rad) states it"
     ]
     _, columns, _ = imported(tmp_path, text, Options(columns={"range_nm": "RHO", "bearing_deg": "THETA"}))
-    np.testing.assert_allclose(columns["range_m"], [18.79 * NM, 18.80 * NM])
-    np.testing.assert_allclose(columns["bearing_rad"], np.radians([350, 351]))
+    assert_rounded(columns["range_m"], [18.79 * NM, 18.80 * NM])
+    assert_rounded(columns["bearing_rad"], np.radians([350, 351]))
 
 
 def test_a_table_in_order_of_time_says_that_its_rows_are_taken_as_one_track(tmp_path):
@@ -47,8 +49,9 @@ def test_units_are_those_of_the_quantity(tmp_path, unit, east):
     """A course in radians is no number of degrees; `ms` is a time and a speed."""
     text = f"time_ms,lat_rad,lon [°],speed_ms,course {unit}\n0,0.9,4,100,1.5\n5000,0.9001,4,100,1.5\n".encode()
     _, columns, _ = imported(tmp_path, text, Options(site=Site(math.degrees(0.9), 3.9, 0.0)))
-    np.testing.assert_allclose(columns["t_s"], [0, 5])
-    assert columns["velocity_mps"][0] == pytest.approx(100 * east, abs=0.1)
+    np.testing.assert_array_equal(columns["t_s"], [0, 5])
+    # To the east but for half the angle between the meridians.
+    assert columns["velocity_mps"][0] == pytest.approx(100 * east, rel=0, abs=100 * math.radians(0.1) / 2)
     (tmp_path / "plots.csv").unlink()
     assert "range [deg]: the unit must be one of m, km" in refused(tmp_path, b"time,range [deg]\n1,2\n")[0]
 
@@ -61,7 +64,7 @@ def test_plots_and_positions_in_one_table_are_both_to_be_had(tmp_path):
     assert columns["range_m"][0] > 35e3
     asked = Options(columns={"track": "TA", "range_km": "RHO", "bearing_deg": "THETA"})
     _, columns, _ = imported(tmp_path, text, asked)
-    np.testing.assert_allclose(columns["range_m"], [20.5e3, 20.6e3])
+    assert_rounded(columns["range_m"], [20.5e3, 20.6e3])
     assert np.isnan(columns["velocity_mps"]).all()  # over ground, not radial
 
 
@@ -73,7 +76,7 @@ def test_plots_and_positions_in_one_table_are_both_to_be_had(tmp_path):
 def test_heights_of_a_transponder(tmp_path, header, height, said):
     text = f"Time,Range [km],{header},track\n1,20,300,a\n5,21,300,a\n"
     done, columns, _ = imported(tmp_path, text.encode())
-    np.testing.assert_allclose(columns["altitude_m"], [height, height])
+    assert_rounded(columns["altitude_m"], [height, height], operations=2)
     assert done.notes == ([f"assumed because the name has no unit: {said}"] if said else [])
 
 
@@ -95,7 +98,7 @@ def test_times_as_programs_write_them(tmp_path, times, expected):
     if expected is None:
         assert len(columns["t_s"]) == 1
     else:
-        assert columns["t_s"][1] == pytest.approx(expected, abs=1e-6)
+        assert columns["t_s"][1] == pytest.approx(expected, rel=0, abs=CLOCK_S)
 
 
 @pytest.mark.parametrize(
@@ -126,7 +129,7 @@ def test_a_date_stands_beside_the_time_of_day_or_once(tmp_path):
         b"Date;Time;Range [km]\n23.11.2026;23:59:58;20\n;23:59:59,5;21\n24.11.2026;00:00:01;22\n25.11.2026;36000;22\n"
     )
     done, columns, _ = imported(tmp_path, text, Options(zero=1_795_392_000.0))  # 2026-11-23
-    np.testing.assert_allclose(columns["t_s"], [86398, 86399.5, 86401, 2 * 86400 + 36000])
+    np.testing.assert_array_equal(columns["t_s"], [86398, 86399.5, 86401, 2 * 86400 + 36000])
     assert not done.notes
 
 
@@ -136,16 +139,20 @@ def test_times_of_day_are_matched_with_those_of_a_truth_of_that_day(tmp_path):
         f"2024-05-01T10:00:{4 * k:02},a1,{52.6 + k / 1000},4.76,0\n" for k in range(10)
     )
     (tmp_path / "truth.csv").write_text(truth)
-    text = b"Time,icao24,range [km],azimuth [deg]\n10:00:06,a1,33.5,0\n10:00:10,a1,33.6,0\n"
-    _, columns, _ = imported(tmp_path, text, Options(site=SITE, truth=str(tmp_path / "truth.csv")))
-    np.testing.assert_allclose(columns["true_r_m"], columns["range_m"], atol=200)
+    seen = [float(np.linalg.norm(local(52.6 + t / 4000, 4.76, 0.0))) for t in (6, 10)]
+    text = "Time,icao24,range [m],azimuth [deg]\n" + "".join(
+        f"10:00:{t:02},a1,{r:.3f},0\n" for t, r in zip((6, 10), seen, strict=True)
+    )
+    _, columns, _ = imported(tmp_path, text.encode(), Options(site=SITE, truth=str(tmp_path / "truth.csv")))
+    # To the millimetre, and to what the chord of 4 s, 111 m, lies below the arc.
+    np.testing.assert_allclose(columns["true_r_m"], columns["range_m"], rtol=0, atol=0.0005 + 112**2 / 8 / EARTH_M)
 
 
 def test_separators_after_the_last_cell_and_words_for_nothing(tmp_path):
     text = b"time;range [km];azimuth [deg];height [ft];\n0;20,5;N/A;;\n4;21,5;45;#N/A;\n8;22,5;46;NULL;;\n"
     _, columns, _ = imported(tmp_path, text)
-    np.testing.assert_allclose(columns["range_m"], [20500, 21500, 22500])
-    np.testing.assert_allclose(columns["bearing_rad"], np.radians([np.nan, 45, 46]))
+    np.testing.assert_array_equal(columns["range_m"], [20500, 21500, 22500])
+    assert_rounded(columns["bearing_rad"], np.radians([np.nan, 45, 46]))
     assert np.isnan(columns["altitude_m"]).all()
 
 
@@ -166,9 +173,11 @@ def test_ships_of_public_archives_need_no_option(tmp_path, header, row):
         rows.append(row.format(t=f"2020-01-14T{clock}", dk=f"14/01/2020 {clock}", lat=lat))
     _, columns, tracks = imported(tmp_path, "\n".join([header, *rows, ""]).encode(), SOUTH)
     assert set(tracks) == {"244660000"}
-    np.testing.assert_allclose(columns["t_s"], [0, 10, 20])
-    np.testing.assert_allclose(columns["velocity_mps"], 12 * KN, rtol=1e-3)
-    np.testing.assert_allclose(np.diff(columns["range_m"]), 120 * KN, rtol=2e-3)
+    np.testing.assert_array_equal(columns["t_s"], [0, 10, 20])
+    dip = math.radians(0.1) ** 2 / 4  # the line dips by half of the angle between the places
+    np.testing.assert_allclose(columns["velocity_mps"], 12 * KN, rtol=dip)
+    # A degree has 111 275 m here, to the metre.
+    np.testing.assert_allclose(np.diff(columns["range_m"]), 120 * KN * 111_275 / 111_260, rtol=1 / 111_260 + dip)
 
 
 def test_a_bow_is_no_course(tmp_path):
