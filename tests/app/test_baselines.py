@@ -21,7 +21,7 @@ from radarsim.report.precision import worst
 from radarsim.report.quantities import GAIN
 from radarsim.studies.identity import identity
 from radarsim.studies.registry import study
-from tests.tolerances import assert_rounded
+from tests.tolerances import assert_rounded, share_error
 
 THREE = {
     "study": "range_doppler",
@@ -82,7 +82,7 @@ def test_intervals_against_a_further_baseline_cover(both):
         held.append((rows["gain_lo"] <= rows["exact_percent"]) & (rows["exact_percent"] <= rows["gain_hi"]))
     share = np.mean(held, axis=0)
     assert share.shape == (6,)
-    assert (share > 0.95 - 5.85 * np.sqrt(0.95 * 0.05 / 300)).all()
+    assert (share > 0.95 - share_error(0.95, 300)).all()
     assert (share < 1).any()
 
 

@@ -33,7 +33,7 @@ def written(path, columns, **more):
 @pytest.mark.slow_cases("sonar_smoothing")
 @pytest.mark.parametrize("config", ["rls2", "sonar_smoothing", "multimodel_1hz", "ambiguous_rls4"])
 def test_residuals_lie_between_their_bounds(tmp_path, config):
-    """Over realisations of what the filter is made for: 95.4 % within two σ, by 5.85 standard errors."""
+    """Over realisations of what the filter is made for: 95.4 % within two σ, by Z standard errors."""
     calm = "filters=[{name: k, family: kalman, models: [{motion: accelerated, sigma_acceleration_mps2: 1}]}]"
     more = {
         "rls2": ("scans=60",),

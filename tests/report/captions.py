@@ -19,7 +19,7 @@ from tests.tolerances import rounding
 RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"
 POWER = re.compile(rf"(−?)(?:(\d+(?:[.,]\d+)?)·)?10([{RAISED}]+)")
 PLAIN = re.compile(r"−?\d+(?:[.,]\d+)?")
-CLOSE = 0.0051  # of a number told to three figures
+CLOSE = 0.005  # of a number told to three figures
 
 LEVEL = "At the end all are within each other's intervals."
 ENDS = (
@@ -88,7 +88,7 @@ def value(words, sign=1):
 
 
 def close(told, true):
-    return abs(told - true) <= CLOSE * abs(true) + 1e-15
+    return abs(told - true) <= CLOSE * abs(true) + rounding(operations=4)  # of a gain of nothing
 
 
 def drawn(result, figure, caption):

@@ -9,7 +9,7 @@ from radarsim.report import compare, statistics, tables
 from radarsim.report.compare import Side
 from radarsim.report.drawing import Line
 from radarsim.report.quantities import SIGMA, Quantity
-from tests.tolerances import assert_rounded
+from tests.tolerances import assert_rounded, share_error
 
 TIMES = 3000  # each is an experiment of its own
 COUNT = 400
@@ -66,7 +66,7 @@ def test_intervals_cover_and_a_common_baseline_makes_them_narrower(errors):
     linked = linked.assign(against_exact=RATIOS["other"])
     assert set(linked["pairing"]) == {compare.LINKED}
     share, width = held(linked)
-    assert share > 0.95 - 5.85 * np.sqrt(0.95 * 0.05 / TIMES)
+    assert share > 0.95 - share_error(0.95, TIMES)
     loose = compare.compared([compare.Pair(own, Side("b", "b", "b", "n", COUNT + 1, renamed))])
     loose = loose[(loose["filter"] == "one") & (loose["quantity"] == "sigma")].assign(against_exact=RATIOS["other"])
     assert set(loose["pairing"]) == {compare.UNLINKED}
@@ -81,7 +81,7 @@ def test_independent_intervals_cover_95_per_cent(errors):
     rows = rows[rows["quantity"] == "sigma"]
     assert set(rows["pairing"]) == {compare.INDEPENDENT}
     assert set(rows["against_filter"]) == {"other"}
-    assert abs(held(rows)[0] - 0.95) < 5.85 * np.sqrt(0.95 * 0.05 / TIMES)
+    assert abs(held(rows)[0] - 0.95) < share_error(0.95, TIMES)
 
 
 def test_the_same_numbers_differ_by_nothing(errors):

@@ -483,7 +483,7 @@ def test_ads_b_is_the_truth_before_the_tracks_of_a_centre(tmp_path):
     (tmp_path / "truth").write_bytes(truth)
     _, columns, _ = imported(tmp_path, data, Options(site=SITE, truth=str(tmp_path / "truth")))
     assert np.isfinite(columns["true_r_m"]).sum() == 29
-    assert np.nanmax(np.abs(columns["true_z_m"])) < 1
+    assert np.nanmax(np.abs(columns["true_z_m"])) < EARTH_M * math.radians(180 / 2**31)  # half a step of longitude
     tested = block(21, *(position_021(4.0 * k, 53.0, 4.76, address=0xA1, kind=b"\x01\x10") for k in range(30)))
     coasted = block(62, *(position_062(4.0 * k, 53.0, 4.76, address=0xA1, track=7, coasted=1) for k in range(30)))
     plots = block(48, *(plot_048(4.0 * k, 10766, 0, address=0xA1, track=3, level=1200) for k in range(30)))
