@@ -624,8 +624,8 @@ def superseded_blocks(cases: Sequence[str]) -> list[str]:
         return []
     return [
         tr(
-            "stored blocks of {cases} were made by other sources and are not used; "
-            "`radarsim clean --other-sources` removes them",
+            "stored blocks of {cases} were made by other sources, as before an edit, and are not used; "
+            "`radarsim clean CONFIG --other-sources` removes them",
             cases=few(list(dict.fromkeys(cases)), MAX_NAMED_CASES),
         )
     ]

@@ -232,7 +232,7 @@ def test_clean_drops_blocks_and_nothing_else(out):
     (out / ".blocks" / "ab12" / "mine.txt").write_text("mine")
     files, size = len(block_files(out)), sum(path.stat().st_size for path in block_files(out))
     dry = command("clean", "--dry-run", "--out", out)
-    assert dry.stdout == f"would drop {files} files of 3 cases, {size / 1e6:.1f} MB in {out / '.blocks'}\n"
+    assert dry.stdout == f"would drop {files} files in 3 folders of {out / '.blocks'}: {size / 1e6:.2f} MB\n"
     assert len(block_files(out)) == files
     command("clean", "rls1", "--out", out)
     assert 0 < len(block_files(out)) < files

@@ -434,6 +434,19 @@ def test_an_edit_counts_at_once_and_an_edit_undone_finds_its_blocks(place, impor
     assert made[2].curves.equals(made[0].curves)
 
 
+def test_clean_runs_it_only_to_tell_blocks_of_other_sources_apart(place):
+    run("out", "-n", "500")
+    Path("helper.py").write_text("BETA = 0.4\n")
+    assert "`radarsim clean CONFIG --other-sources` removes them" in run("out", "-n", "500").stderr
+    unnamed = command("clean", "--other-sources", "--out", "out").stdout
+    assert "dropped 0 files" in unnamed
+    assert "blocks of mine are left" in unnamed
+    assert "dropped 2 files in 1 folder" in command("clean", "mine.yaml", "--other-sources", "--out", "out").stdout
+    Path("helper.py").write_text("raise OSError('not here')\n")
+    assert "not here" in command("clean", "mine.yaml", "--other-sources", "--out", "out", code=2).stderr
+    assert "dropped 2 files in 1 folder" in command("clean", "mine.yaml", "--out", "out").stdout
+
+
 def test_what_changes_between_reading_and_running_is_noticed(place):
     experiment = load("mine.yaml")
     Path("my_filter.py").write_text(FILTER.replace("- 250.0", "- 260.0"))
