@@ -29,6 +29,7 @@ from radarsim.engine.machine import available_cores
 from radarsim.engine.results import CaseResult
 from radarsim.engine.run import Collected, Executor, Shared, Signals, Stop, collect, share, stored
 from radarsim.engine.store.inventory import Inventory, take_inventory
+from radarsim.engine.store.store import Store
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.language import few, tr
 from radarsim.report import files
@@ -536,7 +537,7 @@ def stored_result(
             continue
         collected = stored(work, case.realisations, out)
         if collected is None:
-            missing.append(lack(case.name, take_inventory(work, case.realisations, out), out))
+            missing.append(lack(case.name, take_inventory(work, case.realisations, out), Store(out, work)))
         else:
             held.cases.append((case, work, collected))
     if missing:
@@ -547,10 +548,12 @@ def stored_result(
     return result_of(experiment, held, facts_of(held, 0, 0.0), repeated(asked, held.done, overrides, None))
 
 
-def lack(name: str, held: Inventory, out: str | os.PathLike[str]) -> str:
-    """The line of a case that is not completely stored: how much of it is, and what is missing."""
+def lack(name: str, held: Inventory, store: Store) -> str:
+    """The line of a case that is not completely stored: how much of it is and what is missing, or why nothing is."""
+    out = store.path.parent.parent
     if not held.stored:
-        return f"{name}: {held.asked} realisations are not stored in {out}"
+        reasons = [*store.warnings, *(["those there are of other sources, as before an edit"] * store.superseded())]
+        return "; ".join([f"{name}: {held.asked:,} realisations are not stored in {out}", *reasons])
     from radarsim.app.outlook import missing
 
     return f"{name}: {held.stored:,} of {held.asked:,} realisations are stored in {out}; missing: {missing(held)}"

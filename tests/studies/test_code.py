@@ -434,9 +434,11 @@ def test_an_edit_counts_at_once_and_an_edit_undone_finds_its_blocks(place, impor
     assert made[2].curves.equals(made[0].curves)
 
 
-def test_clean_runs_it_only_to_tell_blocks_of_other_sources_apart(place):
+def test_blocks_from_before_an_edit_are_named_and_clean_runs_it_only_to_tell_them_apart(place):
     run("out", "-n", "500")
     Path("helper.py").write_text("BETA = 0.4\n")
+    lack = "mine: 500 realisations are not stored in out; those there are of other sources, as before an edit"
+    assert lack in command("report", "mine.yaml", "--out", "out", code=2).stderr
     assert "`radarsim clean CONFIG --other-sources` removes them" in run("out", "-n", "500").stderr
     unnamed = command("clean", "--other-sources", "--out", "out").stdout
     assert "dropped 0 files" in unnamed

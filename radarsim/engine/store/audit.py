@@ -21,6 +21,7 @@ from radarsim.engine.store.block_file import (
 )
 from radarsim.engine.store.store import mixture
 from radarsim.errors import StoreError
+from radarsim.private_files import UntrustedFileError
 
 ACROSS_PLATFORMS = 1e-9  # relative: sums made on several platforms agree to this
 
@@ -84,6 +85,8 @@ def _read_piece(audit: Audit, piece: Piece) -> None:
         if not isinstance(block, int) or block < 1:
             raise Damage(f"block: expected a number, got {block}")
         check_block(header, values, piece_header(audit.path, piece, block) | {"size": values.size})
+    except UntrustedFileError as error:
+        audit.faults.append(f"{path}: {error.strerror}: not used")
     except OSError as error:
         audit.faults.append(f"{path}: cannot be read: {error.strerror}")
     except Damage as damage:
