@@ -175,6 +175,8 @@ def test_blocks_that_another_user_may_have_written_are_named_by_doctor_and_repor
     total.chmod(0o666)
     assert f"{total}: can be written by every user: not used" in command("doctor", out / "rls2", code=4).stderr
     (out / ".blocks").chmod(0o777)
+    (line,) = command("doctor", out / "rls2", code=4).stderr.splitlines()
+    assert line == f"{out / '.blocks'}: can be written by every user: blocks in it are not used, and none are kept"
     lack = f"are not stored in {out}; {out / '.blocks'}: can be written by every user"
     assert lack in command("report", "rls2", "--out", out, code=2).stderr
 

@@ -19,7 +19,7 @@ from radarsim.engine.store.block_file import (
     piece_named,
     read_file,
 )
-from radarsim.engine.store.store import mixture
+from radarsim.engine.store.store import folder_fault, mixture
 from radarsim.errors import StoreError
 from radarsim.private_files import UntrustedFileError
 
@@ -48,6 +48,9 @@ class Audit:
 def audit_blocks(path: Path, reported: int | None = None) -> Audit:
     """Check the blocks of one identity, and that the total of `reported` realisations is among them."""
     audit = Audit(path)
+    if fault := folder_fault(path):
+        audit.faults.append(fault)
+        return audit
     for name in _file_names(path):
         piece = piece_named(name)
         if piece is not None:

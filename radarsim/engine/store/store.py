@@ -62,15 +62,10 @@ class Store:
         self.platforms: set[str] = set()
         self._unusable: set[Piece] = set()  # damaged, or of another user
         self._work = work
-        self.trusted = self._is_trusted()
-
-    def _is_trusted(self) -> bool:
-        for folder in (self.path.parent, self.path):
-            with suppress(OSError):  # absent, or reported by whoever reads or writes there
-                if fault := entry_fault(folder, folder.stat()):
-                    self.warnings.append(f"{folder}: {fault}: blocks in it are not used, and none are kept")
-                    return False
-        return True
+        fault = folder_fault(self.path)
+        self.trusted = fault is None
+        if fault is not None:
+            self.warnings.append(fault)
 
     def pieces(self) -> set[Piece]:
         """The stored pieces, by file names; empty if the directory does not exist, or is not trusted."""
@@ -193,6 +188,15 @@ class Store:
             if not lost:
                 break
         return forest
+
+
+def folder_fault(path: Path) -> str | None:
+    """Why the folder of an identity, or the one above it, may be in another user's hand, in a line; None if neither."""
+    for folder in (path.parent, path):
+        with suppress(OSError):  # absent, or reported by whoever reads or writes there
+            if fault := entry_fault(folder, folder.stat()):
+                return f"{folder}: {fault}: blocks in it are not used, and none are kept"
+    return None
 
 
 def other_sources(folder: Path) -> list[Path]:
