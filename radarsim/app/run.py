@@ -357,7 +357,7 @@ def load_all(sources: Sequence[str | os.PathLike[str]], overrides: Sequence[str]
 def codes(experiments: Sequence[Experiment]) -> list[str]:
     """The user's own code in experiments, a line each; imports it. Raises ConfigError where it cannot be imported."""
     every = [one for experiment in experiments for case in experiment.cases for one in case.outside if one.written]
-    filters = {f"{one.made} in {one.file}": one for one in every}
+    filters = {f"{one.object_name} in {one.file}": one for one in every}
     for one in filters.values():
         one.target  # noqa: B018  (imports it)
     return list(filters)

@@ -57,25 +57,25 @@ class Recorder:
         self._read: set[str] = set()
         self._written: set[str] = set()
         self._shared: set[str] = set()
-        self.folders = tuple({one for folder in folders for one in (folder, os.path.realpath(folder))})
+        self.folders = tuple({place for folder in folders for place in (folder, os.path.realpath(folder))})
 
     @contextlib.contextmanager
     def recording(self) -> Iterator[None]:
         """This thread, and threads that it starts, are recorded within."""
         _install()
-        before, _here.recorder = _here.recorder, self
+        outer, _this_thread.recorder = _this_thread.recorder, self
         try:
             yield
         finally:
-            _here.recorder = before
+            _this_thread.recorder = outer
 
     def take(self) -> Reads:
         """What was read since the last call in the user's folders, except what the code itself changes."""
         reads, self.reads = self.reads, {}
-        for (path, kind), before in list(reads.items()):  # a thread of the code's may still be reading
-            if path in self._shared and kind == "content" and signature(path) != before:
+        for (path, kind), seen in list(reads.items()):  # a thread of the code's may still be reading
+            if path in self._shared and kind == "content" and signature(path) != seen:
                 self.hidden.add(path)
-        return {read: before for read, before in list(reads.items()) if not self.changes(*read)}
+        return {read: seen for read, seen in list(reads.items()) if not self.changes(*read)}
 
     def changes(self, path: str, kind: Kind) -> bool:
         """Whether the code itself writes a file, or into a folder that it lists."""
@@ -85,8 +85,9 @@ class Recorder:
 
     def is_users(self, path: str) -> bool:
         """Whether a path is in the user's folders, and not in a folder of programs within these."""
-        home = max((len(one) for one in self.folders if is_within(path, one)), default=-1)
-        if home < 0 or home < max((len(one) for one in folders_of_programs() if is_within(path, one)), default=-1):
+        home = max((len(folder) for folder in self.folders if is_within(path, folder)), default=-1)
+        programs = max((len(folder) for folder in folders_of_programs() if is_within(path, folder)), default=-1)
+        if home < 0 or home < programs:
             return False
         return not (INSTALLED | {"__pycache__"}) & set(path[home:].split(os.sep))
 
@@ -98,13 +99,13 @@ class Recorder:
             self._shared.add(path)
         if path in self._written or (path, kind) in self.reads:
             return  # what the code itself wrote before is nothing that it depends on
-        found = signature(path)
-        if found is None or not (stat.S_ISDIR if kind == "names" else stat.S_ISREG)(found[0]):
+        current = signature(path)
+        if current is None or not (stat.S_ISDIR if kind == "names" else stat.S_ISREG)(current[0]):
             return
         if self.is_users(path):
             if imported:
                 self.imported.add(path)
-            self.reads[path, kind] = found
+            self.reads[path, kind] = current
             self._read.add(path)
         elif kind == "content" and not is_of_programs(path) and self._is_called_by_user(frame):
             self.elsewhere.add(path)
@@ -136,16 +137,16 @@ class Recorder:
         return True  # a thread of the user's code
 
 
-class _Here(threading.local):
+class _ThreadState(threading.local):
     """The recorder of a thread."""
 
     recorder: Recorder | None = None
 
 
-_here = _Here()
+_this_thread = _ThreadState()
 
 
-def _named(path: Any) -> str | None:
+def _absolute_path(path: Any) -> str | None:
     """An absolute path; None for what is none, such as a number of an open file."""
     try:
         return os.path.abspath(os.fsdecode(path))
@@ -158,7 +159,7 @@ def _module_of(frame: FrameType | None) -> str:
 
 
 def _on_open(recorder: Recorder, frame: FrameType | None, path: Any, mode: Any, flags: Any) -> None:
-    file = _named(path)
+    file = _absolute_path(path)
     if file is None or not isinstance(flags, int):
         return
     kind: Kind = "code" if file.endswith(".py") and _module_of(frame) in IMPORTING else "content"
@@ -176,17 +177,17 @@ def _on_open(recorder: Recorder, frame: FrameType | None, path: Any, mode: Any, 
 
 
 def _on_import(recorder: Recorder, frame: FrameType | None, _: Any, file: Any, *__: Any) -> None:
-    if file is not None and (path := _named(file)) is not None:  # an extension, which no `open` tells of
+    if file is not None and (path := _absolute_path(file)) is not None:  # an extension, which no `open` tells of
         recorder.read(path, "content", frame, imported=True)
 
 
 def _on_library(recorder: Recorder, frame: FrameType | None, name: Any) -> None:
-    if name and os.sep in os.fsdecode(name) and (path := _named(name)) is not None:
+    if name and os.sep in os.fsdecode(name) and (path := _absolute_path(name)) is not None:
         recorder.read(path, "content", frame)
 
 
 def _on_listing(recorder: Recorder, frame: FrameType | None, folder: Any = None) -> None:
-    path = _named(os.curdir if folder is None else folder)
+    path = _absolute_path(os.curdir if folder is None else folder)
     if path is not None and _module_of(frame).partition(".")[0] not in LISTING:
         recorder.read(path, "names", frame)
 
@@ -195,7 +196,7 @@ def _on_database(recorder: Recorder, frame: FrameType | None, database: Any) -> 
     text = os.fsdecode(database)
     if text.startswith("file:"):
         text = unquote(text.removeprefix("file:").partition("?")[0])
-    if text and text != ":memory:" and (path := _named(text)) is not None:
+    if text and text != ":memory:" and (path := _absolute_path(text)) is not None:
         recorder.read(path, "content", frame, shared=True)
 
 
@@ -208,7 +209,7 @@ def _on_process(recorder: Recorder, frame: FrameType | None, *_: Any) -> None:
     recorder.note(frame)
 
 
-def _recorded(recorder: Recorder, run: Callable[[], None]) -> None:
+def _run_recorded(recorder: Recorder, run: Callable[[], None]) -> None:
     with recorder.recording():
         run()
 
@@ -227,16 +228,16 @@ EVENTS: dict[str, Callable[..., None]] = {
 }
 
 
-def _hook(event: str, arguments: tuple[Any, ...], here: _Here = _here, events: Any = EVENTS) -> None:
+def _hook(event: str, arguments: tuple[Any, ...], state: _ThreadState = _this_thread, events: Any = EVENTS) -> None:
     """The names are bound here, since the interpreter clears those of the module before its last events."""
-    recorder = here.recorder
+    recorder = state.recorder
     if recorder is None or (handle := events.get(event)) is None:
         return
-    here.recorder = None  # what follows raises events too
+    state.recorder = None  # what follows raises events too
     try:
         handle(recorder, sys._getframe(1), *arguments)
     finally:
-        here.recorder = recorder
+        state.recorder = recorder
 
 
 @cache
@@ -245,8 +246,8 @@ def _install() -> None:
     start = threading.Thread.start
 
     def start_recorded(self: threading.Thread) -> None:
-        if _here.recorder is not None:
-            self.run = partial(_recorded, _here.recorder, self.run)  # type: ignore[method-assign]
+        if _this_thread.recorder is not None:
+            self.run = partial(_run_recorded, _this_thread.recorder, self.run)  # type: ignore[method-assign]
         start(self)
 
     # An event tells of it from Python 3.12 on only.
