@@ -102,8 +102,8 @@ def foreign_owner(path: str | os.PathLike, named_by: str | os.PathLike | None = 
     if not hasattr(os, "geteuid"):
         return None
     owner = os.stat(path).st_uid
-    known = {os.geteuid(), ROOT_USER} | (set() if named_by is None else {os.stat(named_by).st_uid})
-    return None if owner in known else owner
+    trusted = {os.geteuid(), ROOT_USER} | (set() if named_by is None else {os.stat(named_by).st_uid})
+    return None if owner in trusted else owner
 
 
 def distrust_reason(path: str | os.PathLike) -> str | None:

@@ -127,7 +127,7 @@ class LoadedCode:
                 self._keep_modules()
 
     def take_reads(self) -> Reads:
-        """What was read since the last call."""
+        """What was read since the last call; `reads` keeps all of it."""
         reads = self.recorder.take()
         self.reads |= reads
         return reads
@@ -270,7 +270,11 @@ class Coded(Outside):
             if reads.keys() != code.reads.keys():  # it may remember what it has read for others
                 code = self._import_code()
                 reads = self._record_reads(code, plots)
-            files = {read: digest_of(*read) for read in (*self.named_files, *reads) if not code.recorder.changes(*read)}
+            files = {
+                read: digest_of(*read)
+                for read in (*self.named_files, *reads)
+                if not code.recorder.is_changed_by_code(*read)
+            }
             reads = {read: recorded for read, recorded in reads.items() if read in files}
             if changed := [path for (path, _), recorded in reads.items() if signature(path) != recorded]:
                 raise ConfigError(f"{self._title}: {changed[0]} changed while it was read; start again")
@@ -296,8 +300,8 @@ class Coded(Outside):
                 f"first {RECORDED_REALISATIONS}, by whose files its stored blocks are named: name it by a text in "
                 f"{self.file} or in a key of the filter, or declare what its numbers depend on by the key `identity`"
             )
-        for read, seen in reads.items():
-            same = seen == recording.signatures.get(read) == signature(read[0])
+        for read, read_signature in reads.items():
+            same = read_signature == recording.signatures.get(read) == signature(read[0])
             if not same and digest_of(*read) != recording.files.get(read, digest_of(*read)):
                 raise ConfigError(f"{self._title}: {read[0]} has changed since the run began; start it again")
         return estimates

@@ -72,12 +72,12 @@ class Recorder:
     def take(self) -> Reads:
         """What was read since the last call in the user's folders, except what the code itself changes."""
         reads, self.reads = self.reads, {}
-        for (path, kind), seen in list(reads.items()):  # a thread of the code's may still be reading
-            if path in self._shared and kind == "content" and signature(path) != seen:
+        for (path, kind), read_signature in list(reads.items()):  # a thread of the code's may still be reading
+            if path in self._shared and kind == "content" and signature(path) != read_signature:
                 self.hidden.add(path)
-        return {read: seen for read, seen in list(reads.items()) if not self.changes(*read)}
+        return {read: value for read, value in list(reads.items()) if not self.is_changed_by_code(*read)}
 
-    def changes(self, path: str, kind: Kind) -> bool:
+    def is_changed_by_code(self, path: str, kind: Kind) -> bool:
         """Whether the code itself writes a file, or into a folder that it lists."""
         if kind == "names":
             return any(os.path.dirname(file) == path for file in self._written)
@@ -91,7 +91,7 @@ class Recorder:
             return False
         return not (INSTALLED | {"__pycache__"}) & set(path[home:].split(os.sep))
 
-    def read(
+    def note_read(
         self, path: str, kind: Kind, frame: FrameType | None, shared: bool = False, imported: bool = False
     ) -> None:
         """Note that a file or a folder is read; shared: that it may be written too; imported: as a module."""
@@ -110,19 +110,20 @@ class Recorder:
         elif kind == "content" and not is_of_programs(path) and self._is_called_by_user(frame):
             self.elsewhere.add(path)
 
-    def write(self, path: str) -> None:
+    def note_written(self, path: str) -> None:
         """Note that a file is opened to be written."""
         if path in self._read:
             self.hidden.add(path)
         self._written.add(path)
 
-    def note(self, frame: FrameType | None, host: str = "") -> None:
-        """Note that a process is started, or a host connected."""
-        if not self._is_called_by_user(frame):
-            return
-        if host:
+    def note_host(self, frame: FrameType | None, host: str) -> None:
+        """Note that a host is connected."""
+        if self._is_called_by_user(frame):
             self.hosts.add(host)
-        else:
+
+    def note_process(self, frame: FrameType | None) -> None:
+        """Note that a process is started."""
+        if self._is_called_by_user(frame):
             self.starts_processes = True
 
     def _is_called_by_user(self, frame: FrameType | None) -> bool:
@@ -167,29 +168,29 @@ def _on_open(recorder: Recorder, frame: FrameType | None, path: Any, mode: Any, 
     if os.path.basename(os.path.dirname(file)) == "__pycache__":
         recorder.reads_compiled |= file.endswith(COMPILED) and access == os.O_RDONLY
         with contextlib.suppress(ValueError):
-            recorder.read(source_from_cache(file), "code", frame, imported=True)
+            recorder.note_read(source_from_cache(file), "code", frame, imported=True)
         return
     writes, reads = access != os.O_RDONLY, access != os.O_WRONLY and not flags & (os.O_TRUNC | os.O_EXCL)
     if writes and not (reads and os.path.exists(file)):
-        recorder.write(file)
+        recorder.note_written(file)
     else:
-        recorder.read(file, kind, frame, shared=writes, imported=kind == "code")
+        recorder.note_read(file, kind, frame, shared=writes, imported=kind == "code")
 
 
 def _on_import(recorder: Recorder, frame: FrameType | None, _: Any, file: Any, *__: Any) -> None:
     if file is not None and (path := _absolute_path(file)) is not None:  # an extension, which no `open` tells of
-        recorder.read(path, "content", frame, imported=True)
+        recorder.note_read(path, "content", frame, imported=True)
 
 
 def _on_library(recorder: Recorder, frame: FrameType | None, name: Any) -> None:
     if name and os.sep in os.fsdecode(name) and (path := _absolute_path(name)) is not None:
-        recorder.read(path, "content", frame)
+        recorder.note_read(path, "content", frame)
 
 
 def _on_listing(recorder: Recorder, frame: FrameType | None, folder: Any = None) -> None:
     path = _absolute_path(os.curdir if folder is None else folder)
     if path is not None and _module_of(frame).partition(".")[0] not in LISTING:
-        recorder.read(path, "names", frame)
+        recorder.note_read(path, "names", frame)
 
 
 def _on_database(recorder: Recorder, frame: FrameType | None, database: Any) -> None:
@@ -197,16 +198,16 @@ def _on_database(recorder: Recorder, frame: FrameType | None, database: Any) -> 
     if text.startswith("file:"):
         text = unquote(text.removeprefix("file:").partition("?")[0])
     if text and text != ":memory:" and (path := _absolute_path(text)) is not None:
-        recorder.read(path, "content", frame, shared=True)
+        recorder.note_read(path, "content", frame, shared=True)
 
 
 def _on_connection(recorder: Recorder, frame: FrameType | None, _: Any, address: Any) -> None:
     if isinstance(address, tuple):
-        recorder.note(frame, f"{address[0]}:{address[1]}")
+        recorder.note_host(frame, f"{address[0]}:{address[1]}")
 
 
 def _on_process(recorder: Recorder, frame: FrameType | None, *_: Any) -> None:
-    recorder.note(frame)
+    recorder.note_process(frame)
 
 
 def _run_recorded(recorder: Recorder, run: Callable[[], None]) -> None:

@@ -202,10 +202,10 @@ def folder_fault(path: Path) -> str | None:
 def other_sources(folder: Path) -> list[Path]:
     """The folders beside that of an identity which hold sums of the same request by other sources."""
     try:
-        beside = sorted(folder.parent.glob(f"{folder.name[:REQUEST_DIGITS]}*"))
+        candidates = sorted(folder.parent.glob(f"{folder.name[:REQUEST_DIGITS]}*"))
     except OSError:  # reported by whoever reads or writes there
         return []
-    return [path for path in beside if is_other_source(path, folder)]
+    return [path for path in candidates if is_other_source(path, folder)]
 
 
 def is_other_source(folder: Path, reference: Path) -> bool:
@@ -216,9 +216,9 @@ def is_other_source(folder: Path, reference: Path) -> bool:
 
 def mixture(platforms: Collection[str]) -> str:
     """A note on sums from several platforms; the same line for every case of a run."""
-    named = "; ".join(f"({number}) {name}" for number, name in enumerate(sorted(platforms), start=1))
+    names = "; ".join(f"({number}) {name}" for number, name in enumerate(sorted(platforms), start=1))
     return (
-        f"stored sums were made on {len(platforms)} platforms and are equal to rounding, not to the last bit: {named}"
+        f"stored sums were made on {len(platforms)} platforms and are equal to rounding, not to the last bit: {names}"
     )
 
 
