@@ -384,8 +384,10 @@ class Coded(Outside):
         with _lock, contextlib.redirect_stdout(sys.stderr):
             try:
                 yield
-            except (ConfigError, KeyboardInterrupt):
+            except KeyboardInterrupt:
                 raise
+            except ConfigError as error:
+                raise ConfigError(*(f"{self.place}: {line}" for line in error.lines)) from error
             except BaseException as error:
                 line = f"{self._title}, {what}:"
                 package = self.module.partition(".")[0] if is_installed(self.folder) else ""

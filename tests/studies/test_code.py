@@ -501,6 +501,13 @@ def test_its_errors_are_its_own_traceback(place, line):
         radarsim.run("mine.yaml", threads=0)
 
 
+def test_what_it_lacks_is_named_with_its_place_in_the_config(place):
+    Path("my_filter.py").write_text(FILTER.replace("def start", "def begin"))
+    (line,) = command("report", "mine.yaml", "--out", "out", code=2).stderr.splitlines()
+    words = "mine: a filter that is asked scan by scan must have start(world) and step(plots)"
+    assert line == f"mine.yaml:21:11: {words}"
+
+
 LOADING = {  # what stands in the config and in the module: what is said
     (
         "my_filter.py:Mine",
