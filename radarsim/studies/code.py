@@ -379,7 +379,7 @@ class Coded(Outside):
         return code
 
     @contextlib.contextmanager
-    def _running(self, what: str) -> Iterator[None]:
+    def _running(self, failure: str) -> Iterator[None]:
         """The user's code runs within, in one thread: its output goes to stderr, its errors are shown as its own."""
         with _lock, contextlib.redirect_stdout(sys.stderr):
             try:
@@ -389,7 +389,7 @@ class Coded(Outside):
             except ConfigError as error:
                 raise ConfigError(*(f"{self.place}: {line}" for line in error.lines)) from error
             except BaseException as error:
-                line = f"{self._title}, {what}:"
+                line = f"{self._title}, {failure}:"
                 package = self.module.partition(".")[0] if is_installed(self.folder) else ""
                 code_folder = os.path.join(self.folder, package)
                 advice = f": of a package, it is {Path(self.folder).name}.{self.module}:{self.object_name}"

@@ -62,14 +62,14 @@ def file_of(folder: str, module: str) -> Path | None:
     return next((file for file in files if file.is_file()), None)
 
 
-def home_of(module: str, beside: str) -> str:
+def home_of(module: str, config_folder: str) -> str:
     """The folder from which a module is imported: that of the config if it is there, else where it is installed."""
-    if file_of(beside, module) is None:
+    if file_of(config_folder, module) is None:
         with contextlib.suppress(ImportError, ValueError):
             spec = find_spec(module.partition(".")[0])  # of the outermost module, of which nothing runs for it
             for place in [] if spec is None else spec.submodule_search_locations or [spec.origin or ""]:
                 return os.path.dirname(os.path.abspath(place))
-    return beside
+    return config_folder
 
 
 def is_installed(folder: str) -> bool:
