@@ -47,12 +47,12 @@ def module_digest(name: str) -> str:
     """SHA-256 of a module's source, in hexadecimal; empty where it has no file.
 
     Raises ConfigError where the file was edited while this process ran, so that nobody knows which one is loaded."""
-    known, loaded = _digests.get(name), name in sys.modules
-    if known is not None and known.loaded:
-        return known.sha256
+    earlier, loaded = _digests.get(name), name in sys.modules
+    if earlier is not None and earlier.loaded:
+        return earlier.sha256
     content = module_source(name)
     digest = _Digest(hashlib.sha256(content).hexdigest() if content else "", loaded)
-    if known is not None and loaded and digest.sha256 != known.sha256:
+    if earlier is not None and loaded and digest.sha256 != earlier.sha256:
         raise ConfigError(f"{name}: was edited while this process ran; start a new one")
     _digests[name] = digest
     return digest.sha256

@@ -32,19 +32,12 @@ def make_private_folder(path: str | os.PathLike) -> None:
     Folders that exist keep their permissions. Raises OSError where one cannot be created."""
     folder = Path(path)
     try:
-        folder.mkdir(mode=0o700)
+        _make_private_entry(folder)
     except FileNotFoundError:
         if folder.parent == folder:
             raise
         make_private_folder(folder.parent)
-        make_private_folder(folder)
-    except OSError:  # some systems refuse a folder that exists with another error than FileExistsError
-        if not folder.is_dir():
-            raise
-    else:
-        mode = folder.lstat().st_mode
-        if mode & stat.S_IRWXU != stat.S_IRWXU:  # the umask took bits from the user
-            folder.chmod(mode | stat.S_IRWXU)
+        _make_private_entry(folder)  # once: in /proc, or where homes are mounted, a folder that exists takes none
 
 
 def make_trusted_folder(path: str | os.PathLike) -> None:
@@ -109,8 +102,8 @@ def foreign_owner(path: str | os.PathLike, named_by: str | os.PathLike | None = 
     if not hasattr(os, "geteuid"):
         return None
     owner = os.stat(path).st_uid
-    known = {os.geteuid(), ROOT_USER} | (set() if named_by is None else {os.stat(named_by).st_uid})
-    return None if owner in known else owner
+    trusted = {os.geteuid(), ROOT_USER} | (set() if named_by is None else {os.stat(named_by).st_uid})
+    return None if owner in trusted else owner
 
 
 def distrust_reason(path: str | os.PathLike) -> str | None:
@@ -152,6 +145,19 @@ def read_trusted(path: str | os.PathLike) -> bytes:
             if reason is None:
                 return file.read()
     raise UntrustedFileError(errno.EPERM, reason, os.fspath(path))
+
+
+def _make_private_entry(folder: Path) -> None:
+    """Create a folder for the user alone in one that exists."""
+    try:
+        folder.mkdir(mode=0o700)
+    except OSError:  # some systems refuse a folder that exists with another error than FileExistsError
+        if not folder.is_dir():
+            raise
+    else:
+        mode = folder.lstat().st_mode
+        if mode & stat.S_IRWXU != stat.S_IRWXU:  # the umask took bits from the user
+            folder.chmod(mode | stat.S_IRWXU)
 
 
 def _check_trust(path: str | os.PathLike) -> None:

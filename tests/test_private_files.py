@@ -1,7 +1,9 @@
 """Files that belong to the user alone: how they are created, and which ones are trusted, by owner, mode and kind."""
 
+import errno
 import os
 import stat
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -61,6 +63,21 @@ def test_what_exists_is_left_as_it_is(tmp_path):
     with pytest.raises(NotADirectoryError):
         make_private_folder(tmp_path / "file/inner")
     assert not (tmp_path / "nowhere").exists()
+
+
+def test_a_folder_that_exists_and_takes_none_ends_in_an_error(tmp_path, monkeypatch):
+    """As /proc does, and the folder of homes where each is mounted when it is first used."""
+    mkdir = Path.mkdir
+
+    def refuse(path, *arguments, **options):
+        if path.parent == tmp_path:
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
+        mkdir(path, *arguments, **options)
+
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    for name in ("folder", "folder/inner"):
+        with pytest.raises(FileNotFoundError):
+            make_private_folder(tmp_path / name)
 
 
 def test_a_file_that_cannot_be_written_leaves_nothing_behind(tmp_path):

@@ -17,6 +17,7 @@ FAULTS = {  # of sums that are not finite, by the name of the sums
     "error": "not finite",
     "believed": "with a covariance that is not positive and finite",
 }
+MAX_EXPLAINED = 20  # filters and scans, for each of the sums
 
 
 class CaseWork:
@@ -98,5 +99,5 @@ class CaseWork:
             f"{self.case.name}: filter {axes.filters[f]!r}, scan {axes.k[k]}: "
             f"{counts[name][f, k]} of {count} realisations {FAULTS[name]}"
             for name in names
-            for f, k in np.argwhere(counts[name])[:20]
+            for f, k in np.argwhere(counts[name])[:MAX_EXPLAINED]
         ]

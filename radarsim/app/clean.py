@@ -13,17 +13,20 @@ from radarsim.engine.blocks import REQUEST_DIGITS
 from radarsim.engine.store.block_file import is_directory
 from radarsim.engine.store.store import removable_files
 from radarsim.errors import ConfigError, StoreError
-from radarsim.studies.identity import identity
+from radarsim.studies.identity import identity, request_digest
 
 
 @dataclass(frozen=True)
 class RemovedBlocks:
-    """The amount dropped, or to be dropped: files and bytes of so many identities."""
+    """The amount dropped, or to be dropped: files and bytes of so many identities.
+
+    not_judged: cases whose blocks remain, since only a run of the user's filter tells which are of other sources."""
 
     path: Path
     identities: int
     files: int
     size: int
+    not_judged: tuple[str, ...] = ()
 
 
 def clean(
@@ -34,22 +37,23 @@ def clean(
 ) -> RemovedBlocks:
     """Drop the stored blocks of all experiments, or of some, below out/.blocks; with dry_run only count them.
 
-    This includes a case's blocks from other sources; with other_sources only these are dropped, without experiments
-    those of all results below `out`. Links are not followed; files that no store makes remain, and so
-    do their folders. Raises ConfigError if `out` does not exist or its .blocks is a link, StoreError if a file cannot
-    be removed."""
+    This includes a case's blocks from other sources. With other_sources only these are dropped, without experiments
+    those of all results below `out`; a user's filter is run for it, but only where experiments are given. Links are not
+    followed; files that no store makes remain, and so do their folders. Raises ConfigError if `out` does not exist or
+    its .blocks is a link, StoreError if a file cannot be removed."""
     blocks = Path(out) / ".blocks"
     if not is_directory(Path(out)):
         raise ConfigError(f"{out}: no such directory of results")
     if blocks.is_symlink():
         raise ConfigError(f"{blocks}: is a link; clean the directory that it points to")
     cases = None if experiments is None else [case for experiment in experiments for case in experiment.cases]
+    not_judged: list[str] = []
     if cases is None and other_sources:
-        # The identity of a user's filter is found by running it, which is done only for a config that is named.
-        cases = [case for case in recorded_cases(Path(out)) if not case.outside]
-    present = None if cases is None else {identity(case) for case in cases}
-    requests = None if present is None else {name[:REQUEST_DIGITS] for name in present}
-    keep = present if present is not None and other_sources else set()
+        recorded = recorded_cases(Path(out))
+        cases = [case for _, case in recorded if not case.outside]
+        not_judged = [name for name, case in recorded if case.outside]
+    requests = None if cases is None else {request_digest(case)[:REQUEST_DIGITS] for case in cases}
+    keep = {identity(case) for case in cases or ()} if other_sources else set()
     try:
         folders = [path for path in sorted(blocks.iterdir()) if _is_identity(path)] if is_directory(blocks) else []
         folders = [path for path in folders if requests is None or path.name[:REQUEST_DIGITS] in requests]
@@ -63,7 +67,7 @@ def clean(
                     folder.rmdir()
     except OSError as error:
         raise StoreError(f"{error.filename or blocks}: cannot be removed: {error.strerror}") from error
-    return RemovedBlocks(blocks, len(folders), len(files), sum(size for _, size in files))
+    return RemovedBlocks(blocks, len(folders), len(files), sum(size for _, size in files), tuple(not_judged))
 
 
 def _is_identity(path: Path) -> bool:

@@ -120,7 +120,7 @@ def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
     if elsewhere and not found.faults:
         raise ConfigError(
             f"{found.folder}: {', '.join(elsewhere)}: cannot be computed again, the sources that compute have changed "
-            "since; all that is stored is whole"
+            "since; all that is stored is intact"
         )
     return found
 
@@ -130,12 +130,12 @@ def _notes_on_sources(store: Path, name: str, case: Case | None) -> list[str]:
     present = store if case is None else store.with_name(CaseWork(case).identity)
     notes = []
     if is_other_source(present, store):
-        notes.append(f"{store}: blocks of {name} that sources made which have changed since: a run computes anew")
+        notes.append(f"{store}: blocks of {name} were made by sources that have changed since: a run computes anew")
     stale = [path.name for path in other_sources(store) if path != present]
     if stale:
         notes.append(
-            f"{store.parent}: further blocks of {name} by other sources, which no run here uses: {', '.join(stale)}; "
-            "`radarsim clean --other-sources` removes them"
+            f"{store.parent}: further blocks of {name} by other sources, as before an edit: {', '.join(stale)}; "
+            "`radarsim clean CONFIG --other-sources` removes them"
         )
     return notes
 

@@ -23,9 +23,9 @@ def recorded_case(record: Mapping, name: str) -> Case | None:
     return None
 
 
-def recorded_cases(out: Path) -> list[Case]:
-    """The cases of all results in a directory, as far as they read as configs. Raises StoreError for a damaged
-    run.json."""
+def recorded_cases(out: Path) -> list[tuple[str, Case]]:
+    """The cases of all results in a directory with their names there, as far as they read as configs. Raises StoreError
+    for a damaged run.json."""
     records = [read_record(path.parent) for path in sorted(out.glob("*/run.json"))]
-    cases = [recorded_case(record, name) for record in records if record for name in record["cases"]]
-    return [case for case in cases if case is not None]
+    cases = [(name, recorded_case(record, name)) for record in records if record for name in record["cases"]]
+    return [(name, case) for name, case in cases if case is not None]

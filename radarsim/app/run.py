@@ -29,6 +29,7 @@ from radarsim.engine.machine import available_cores
 from radarsim.engine.results import CaseResult
 from radarsim.engine.run import Collected, Executor, Shared, Signals, Stop, collect, share, stored
 from radarsim.engine.store.inventory import Inventory, take_inventory
+from radarsim.engine.store.store import Store
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.language import few, tr
 from radarsim.report import files
@@ -356,7 +357,7 @@ def load_all(sources: Sequence[str | os.PathLike[str]], overrides: Sequence[str]
 def codes(experiments: Sequence[Experiment]) -> list[str]:
     """The user's own code in experiments, a line each; imports it. Raises ConfigError where it cannot be imported."""
     every = [one for experiment in experiments for case in experiment.cases for one in case.outside if one.written]
-    filters = {f"{one.made} in {one.file}": one for one in every}
+    filters = {f"{one.object_name} in {one.file}": one for one in every}
     for one in filters.values():
         one.target  # noqa: B018  (imports it)
     return list(filters)
@@ -536,7 +537,7 @@ def stored_result(
             continue
         collected = stored(work, case.realisations, out)
         if collected is None:
-            missing.append(lack(case.name, take_inventory(work, case.realisations, out), out))
+            missing.append(lack(case.name, take_inventory(work, case.realisations, out), Store(out, work)))
         else:
             held.cases.append((case, work, collected))
     if missing:
@@ -547,10 +548,12 @@ def stored_result(
     return result_of(experiment, held, facts_of(held, 0, 0.0), repeated(asked, held.done, overrides, None))
 
 
-def lack(name: str, held: Inventory, out: str | os.PathLike[str]) -> str:
-    """The line of a case that is not completely stored: how much of it is, and what is missing."""
+def lack(name: str, held: Inventory, store: Store) -> str:
+    """The line of a case that is not completely stored: how much of it is and what is missing, or why nothing is."""
+    out = store.path.parent.parent
     if not held.stored:
-        return f"{name}: {held.asked} realisations are not stored in {out}"
+        reasons = [*store.warnings, *(["those there are of other sources, as before an edit"] * store.superseded())]
+        return "; ".join([f"{name}: {held.asked:,} realisations are not stored in {out}", *reasons])
     from radarsim.app.outlook import missing
 
     return f"{name}: {held.stored:,} of {held.asked:,} realisations are stored in {out}; missing: {missing(held)}"
@@ -624,8 +627,8 @@ def superseded_blocks(cases: Sequence[str]) -> list[str]:
         return []
     return [
         tr(
-            "stored blocks of {cases} were made by other sources and are not used; "
-            "`radarsim clean --other-sources` removes them",
+            "stored blocks of {cases} were made by other sources, as before an edit, and are not used; "
+            "`radarsim clean CONFIG --other-sources` removes them",
             cases=few(list(dict.fromkeys(cases)), MAX_NAMED_CASES),
         )
     ]

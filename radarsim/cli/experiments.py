@@ -55,8 +55,8 @@ def run(
     """Run experiments, or continue stopped ones.
 
     CONFIG is a YAML file, or the name of a shipped experiment (`radarsim list`). Finished blocks are kept under
-    DIR/.blocks: a stopped run and a larger N continue from them, an edited config starts afresh. If a time limit ends
-    the run, or the precision is not reached, tables of the finished part are written and the exit code is 3.
+    DIR/.blocks: a stopped run and a larger N continue from them, an edited config or filter starts afresh. If a time
+    limit ends the run, or the precision is not reached, tables of the finished part are written and the exit code is 3.
 
     \b
     Examples

@@ -139,14 +139,16 @@ def clean(
 ) -> None:
     """Delete stored blocks; tables, figures and reports stay.
 
-    Without CONFIG, deletes all blocks under DIR/.blocks, including those of older configs and versions; with
-    --other-sources those of the results in DIR that this version would compute anew. Nothing else is changed.
+    Without CONFIG, deletes all blocks under DIR/.blocks, including those of older configs and versions. With
+    --other-sources, deletes those that this version would compute anew, as after an edit: without CONFIG of the results
+    in DIR, except where filters of your own code would have to run for it. Nothing else is changed.
 
     \b
     Examples
       radarsim clean --dry-run
       radarsim clean rls2 --out results
       radarsim clean --other-sources
+      radarsim clean mine.yaml --other-sources
     """
     from radarsim.app import clean as cleaning
     from radarsim.app import run, shown

@@ -44,7 +44,7 @@ MARKS = {  # behind intervals that are too narrow
     " *": term("heavy tails: the interval is too narrow"),
     " †": term("the interval is too narrow: the column note of curves.csv or gains.csv says why"),
 }
-DROPPED = term("dropped {files} of {cases}, {size:.1f} MB in {folder}")
+DROPPED = term("dropped {files} in {folders} of {path}: {size:.2f} MB")
 
 
 def print_result(result: "Result") -> None:
@@ -263,14 +263,21 @@ def print_inspection(found: "Inspection") -> None:
 
 def print_cleaned(cleaned: "RemovedBlocks", dry_run: bool) -> None:
     """The amount dropped, or to be dropped."""
-    told = {
+    amount = {
         "files": plural("{count} file", "{count} files", cleaned.files),
-        "cases": counted_cases(cleaned.identities),
+        "folders": plural("{count} folder", "{count} folders", cleaned.identities),
+        "path": str(cleaned.path),
         "size": cleaned.size / 1e6,
-        "folder": str(cleaned.path),
     }
-    would, done = tr("would drop {files} of {cases}, {size:.1f} MB in {folder}", **told), tr(DROPPED, **told)
-    say(would if dry_run else done)
+    would = tr("would drop {files} in {folders} of {path}: {size:.2f} MB", **amount)
+    say(would if dry_run else tr(DROPPED, **amount))
+    if cleaned.not_judged:
+        words = tr(
+            "blocks of {cases} are left: filters of your own code run only where you name the config: "
+            "`radarsim clean CONFIG --other-sources`",
+            cases=few(cleaned.not_judged),
+        )
+        say(tr("note: {words}", words=words))
 
 
 def print_names(inventory: "Inventory") -> None:

@@ -80,8 +80,8 @@ LIBRARIES = ("numba", "llvmlite", "numpy", "scipy")  # that compile and compute
 @functools.cache
 def platform() -> dict[str, str]:
     """All that decides the last bits: processor, instruction set, BLAS, and the versions of compiler and libraries."""
-    here = {"processor": processor(), "instruction_set": instruction_set(), "linear_algebra": linear_algebra()}
-    return here | {name: metadata.version(name) for name in LIBRARIES}
+    hardware = {"processor": processor(), "instruction_set": instruction_set(), "linear_algebra": linear_algebra()}
+    return hardware | {name: metadata.version(name) for name in LIBRARIES}
 
 
 @functools.cache

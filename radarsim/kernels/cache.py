@@ -110,10 +110,12 @@ def add_trouble(kind: str, line: str) -> None:
 def cache_root() -> Path:
     """The first of $RADARSIM_CACHE_DIR, $XDG_CACHE_HOME/radarsim, ~/.cache/radarsim, temporary folder that can be used.
 
-    Passed over are places that cannot be written, and, with a line in `troubles`, those where another user could put
-    code. Where none is left, the first of them: nothing is kept then, which `troubles` says too."""
+    Passed over are places that cannot be written, and those where another user could put code. Of these, and of the
+    variable's place, `troubles` has a line. Where none is left, the first of them: nothing is kept then, which
+    `troubles` says too."""
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    candidates = [*filter(None, [os.environ.get("RADARSIM_CACHE_DIR"), os.path.join(home, "radarsim")])]
+    chosen = os.environ.get("RADARSIM_CACHE_DIR")
+    candidates = [*filter(None, [chosen, os.path.join(home, "radarsim")])]
     refusals: dict[str, str] = {}
     for candidate in candidates:
         try:
@@ -123,8 +125,9 @@ def cache_root() -> Path:
                 break
         except UntrustedFileError as error:
             refusals[candidate] = f"{candidate} is not used, as it {error.strerror}"
-        except OSError:
-            continue
+        except OSError as error:
+            if candidate == chosen:
+                refusals[candidate] = f"{candidate} cannot be written: {error.strerror}"
     else:
         try:
             root = temporary_root()

@@ -50,13 +50,13 @@ from radarsim.studies.user_code_sources import (
 )
 
 FORBIDDEN = "RADARSIM_NO_CODE"  # in the environment, so that processes of a run keep to it as well
-FIRST = 16  # realisations on which it is recorded what a filter reads
+RECORDED_REALISATIONS = 16  # the first ones, on which it is recorded what a filter reads
 MAX_NAMED_FILES = 3  # in a message, or one more
 
 _lock = threading.RLock()  # one thread at a time is in code of the user's, which need not know of threads
 _loaded: dict[str, "LoadedCode"] = {}  # by what is read: an object of the code serves all filters that read the same
 _latest: dict[tuple[str, str, str], "LoadedCode"] = {}  # by folder, name, and hash of the sources
-_taken: set[str] = set()  # names of modules that were imported here: they may be imported anew, and from elsewhere
+_imported_names: set[str] = set()  # of modules that were imported here: they may be imported anew, and from elsewhere
 
 
 def coded(
@@ -65,8 +65,8 @@ def coded(
     """The filter that a config in a folder names at a place. ConfigError where there is none, or none may run."""
     if os.environ.get(FORBIDDEN):
         raise ConfigError(f"is code of yours, and --no-code runs none, got {keys.python!r}")
-    where, _, made = keys.python.rpartition(":")
-    if not where or not made.isidentifier():
+    where, _, object_name = keys.python.rpartition(":")
+    if not where or not object_name.isidentifier():
         raise ConfigError(f"must be FILE.py:NAME or MODULE:NAME, got {keys.python!r}")
     if where.endswith(".py"):
         file = Path(os.path.abspath(folder / where))
@@ -76,19 +76,19 @@ def coded(
         missing = f"no such module, neither beside the config nor installed: {where}"
     if file_of(home, module) is None:
         raise ConfigError(missing)
-    given, named = with_paths(folder, dict(keys.model_extra or {}))
-    own = sources(home, module)
+    arguments, files_of_keys = with_paths(folder, dict(keys.model_extra or {}))
+    module_sources = sources(home, module)
     return Coded(
         name=keys.name,
         keys=keys,
         place=place,
-        folders=(*own.folders, os.path.abspath(folder)),
+        folders=(*module_sources.folders, os.path.abspath(folder)),
         folder=home,
         module=module,
-        made=made,
-        given=given,
-        known=(*own.files, *((file, "content") for file in named)),
-        sources=own.digest,
+        object_name=object_name,
+        arguments=arguments,
+        named_files=(*module_sources.files, *((file, "content") for file in files_of_keys)),
+        sources_digest=module_sources.digest,
         first_plots=first_plots,
         baseline=baseline,
     )
@@ -107,45 +107,47 @@ class LoadedCode:
         self.modules: dict[str, ModuleType] = {}
         self.reads: Reads = {}
         self.reads_of_import: Reads = {}
-        self._surroundings = self._look_around()
+        self._surroundings = self._snapshot_surroundings()
 
     @contextlib.contextmanager
     def running(self) -> Iterator[None]:
         """Python knows the modules by their names and finds others in their folder, and what is read is recorded."""
-        _forget(_taken.difference(self.modules))
+        _forget(_imported_names.difference(self.modules))
         sys.modules.update(self.modules)
         sys.path.insert(0, self.folder)
-        kept, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # nothing is written beside the user's files
+        setting, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # nothing is written beside the user's files
         try:
             with self.recorder.recording():
                 yield
         finally:
-            sys.dont_write_bytecode = kept
+            sys.dont_write_bytecode = setting
             with contextlib.suppress(ValueError):  # the code itself may have removed it
                 sys.path.remove(self.folder)
             if self.recorder.imported:
                 self._keep_modules()
 
     def take_reads(self) -> Reads:
-        """What was read since the last call."""
+        """What was read since the last call; `reads` keeps all of it."""
         reads = self.recorder.take()
         self.reads |= reads
         return reads
 
     def is_fresh(self) -> bool:
         """Whether an import would find the files, folders and variables that this one found."""
-        unchanged = all(signature(path) == before for (path, _), before in self.reads.items())
-        return unchanged and self._surroundings == self._look_around()
+        unchanged = all(signature(path) == recorded for (path, _), recorded in self.reads.items())
+        return unchanged and self._surroundings == self._snapshot_surroundings()
 
-    def _look_around(self) -> tuple[Any, ...]:
+    def _snapshot_surroundings(self) -> tuple[Any, ...]:
+        """What else decides what an import finds: working directory, environment, folders."""
         return os.getcwd(), dict(os.environ), [signature(folder) for folder in self.recorder.folders]
 
     def _keep_modules(self) -> None:
+        """Note the user's modules that were imported since, with the packages without a file that they lie in."""
         for name, module in list(sys.modules.items()):
             if _file_of_module(module) in self.recorder.imported:
                 names = [name, *(parent for parent in _parents(name) if _is_namespace(parent))]
-                self.modules |= {one: sys.modules[one] for one in names}
-        _taken.update(self.modules)
+                self.modules |= {name: sys.modules[name] for name in names}
+        _imported_names.update(self.modules)
         self.recorder.imported.clear()
 
 
@@ -186,9 +188,10 @@ class Recording:
 class Coded(Outside):
     """A class or function of the user's own, which is imported where it is first needed.
 
-    place: where the config names it; folders: the user's, whose files count; folder, module, made: what is imported
-    from where; given: what it is called with; known: the files that its text and its keys name; sources: SHA-256 of the
-    text when the config was read; first_plots: those of a case; case: the one that it belongs to."""
+    place: where the config names it; folders: the user's, whose files count; folder, module, object_name: what is
+    imported from where; arguments: what it is called with; named_files: those that its text and its keys name;
+    sources_digest: SHA-256 of the text when the config was read; first_plots: those of a case; case: the one that it
+    belongs to."""
 
     name: str
     keys: OwnCode
@@ -196,32 +199,32 @@ class Coded(Outside):
     folders: tuple[str, ...]
     folder: str
     module: str
-    made: str
-    given: Mapping[str, Any]
-    known: tuple[tuple[str, Kind], ...]
-    sources: str
+    object_name: str
+    arguments: Mapping[str, Any]
+    named_files: tuple[tuple[str, Kind], ...]
+    sources_digest: str
     first_plots: Callable[[Case, int], Plots]
     baseline: bool = False
     case: Case | None = field(default=None, compare=False, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what is recorded and loaded, which every process does for itself."""
-        return {one.name: getattr(self, one.name) for one in fields(self)}
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     def bound_to(self, case: Case) -> "Coded":
         """The filter as one of a case: the same where the case differs in nothing that the filter may see."""
-        known = self.case
-        if known is None or known.spec is not case.spec or known.noise_of is not case.noise_of:
+        bound = self.case
+        if bound is None or bound.spec is not case.spec or bound.noise_of is not case.noise_of:
             return replace(self, case=case)
-        same = (known.study, known.name, known.seed) == (case.study, case.name, case.seed)
+        same = (bound.study, bound.name, bound.seed) == (case.study, case.name, case.seed)
         return self if same else replace(self, case=case)
 
     @property
     def identity(self) -> str:  # type: ignore[override]
-        """SHA-256 of what its numbers depend on. Runs it on the first realisations of its case, where that is to do."""
+        """SHA-256 of what its numbers depend on. Runs it on the first realisations of its case, unless it has been."""
         return digest(
             {
-                "made": self.made,
+                "object": self.object_name,
                 "one_by_one": self.keys.one_by_one,
                 "keys": dict(self.keys.model_extra or {}),
                 "declared": self.keys.identity,
@@ -245,37 +248,41 @@ class Coded(Outside):
     @property
     def target(self) -> Any:
         """The class or function. ConfigError where it cannot be imported."""
-        return self._target_in(self._code())
+        return self._target_in(self._loaded_code())
 
     def _target_in(self, code: LoadedCode) -> Any:
         module = code.modules[self.module]
-        if not callable(target := getattr(module, self.made, None)):
-            made = {name: one for name, one in vars(module).items() if callable(one)}
-            own = [name for name, one in made.items() if getattr(one, "__module__", "") == self.module]
-            there = ", ".join(own) or "none"
-            raise ConfigError(f"{self.place}: no class or function {self.made} in {self.file}; it has {there}")
+        if not callable(target := getattr(module, self.object_name, None)):
+            objects = {name: value for name, value in vars(module).items() if callable(value)}
+            defined = [name for name, value in objects.items() if getattr(value, "__module__", "") == self.module]
+            names = ", ".join(defined) or "none"
+            raise ConfigError(f"{self.place}: no class or function {self.object_name} in {self.file}; it has {names}")
         return target
 
     @cached_property
     def recording(self) -> Recording:
         """What it reads on the first realisations of its case; ConfigError where it fails on these."""
         assert self.case is not None  # a case binds its filters
-        plots = self.first_plots(self.case, FIRST)
+        plots = self.first_plots(self.case, RECORDED_REALISATIONS)
         with _lock:
-            code = self._code()
-            reads = self._reads(code, plots)
+            code = self._loaded_code()
+            reads = self._record_reads(code, plots)
             if reads.keys() != code.reads.keys():  # it may remember what it has read for others
-                code = self._imported()
-                reads = self._reads(code, plots)
-            files = {read: digest_of(*read) for read in (*self.known, *reads) if not code.recorder.changes(*read)}
-            reads = {read: before for read, before in reads.items() if read in files}
-            if changed := [path for (path, _), before in reads.items() if signature(path) != before]:
+                code = self._import_code()
+                reads = self._record_reads(code, plots)
+            files = {
+                read: digest_of(*read)
+                for read in (*self.named_files, *reads)
+                if not code.recorder.is_changed_by_code(*read)
+            }
+            reads = {read: recorded for read, recorded in reads.items() if read in files}
+            if changed := [path for (path, _), recorded in reads.items() if signature(path) != recorded]:
                 raise ConfigError(f"{self._title}: {changed[0]} changed while it was read; start again")
             key = digest([self.folder, self.module, sorted((*read, content) for read, content in files.items())])
             _loaded[key] = code
         return Recording(files, reads, key)
 
-    def _reads(self, code: LoadedCode, plots: Plots) -> Reads:
+    def _record_reads(self, code: LoadedCode, plots: Plots) -> Reads:
         """What is read where the code is imported and runs on plots."""
         self._estimates(code, plots)
         return code.reads_of_import | code.take_reads()
@@ -284,26 +291,26 @@ class Coded(Outside):
         recording = self.recording
         with _lock:
             code = _loaded[recording.code]
-            given = self._estimates(code, plots)
+            estimates = self._estimates(code, plots)
             reads = code.take_reads()
         late = [path for path, kind in reads if (path, kind) not in recording.files]
         if late and self.keys.identity is None:
             raise ConfigError(
                 f"{self._title}, reads {few(late, MAX_NAMED_FILES)} in realisations {_span(plots)}, but not in the "
-                f"first {FIRST}, by whose files its stored blocks are named: name it by a text in {self.file} or in a "
-                "key of the filter, or declare what its numbers depend on by the key `identity`"
+                f"first {RECORDED_REALISATIONS}, by whose files its stored blocks are named: name it by a text in "
+                f"{self.file} or in a key of the filter, or declare what its numbers depend on by the key `identity`"
             )
-        for read, before in reads.items():
-            same = before == recording.signatures.get(read) == signature(read[0])
+        for read, read_signature in reads.items():
+            same = read_signature == recording.signatures.get(read) == signature(read[0])
             if not same and digest_of(*read) != recording.files.get(read, digest_of(*read)):
                 raise ConfigError(f"{self._title}: {read[0]} has changed since the run began; start it again")
-        return given
+        return estimates
 
     def warnings(self) -> list[str]:
         """What its numbers may depend on that its identity does not hold, in one line; none if that is declared."""
         if self.keys.identity is not None:
             return []
-        recorder = self._code().recorder
+        recorder = self._loaded_code().recorder
         places = []
         if recorder.elsewhere:
             names = few(sorted(recorder.elsewhere), MAX_NAMED_FILES)
@@ -332,56 +339,59 @@ class Coded(Outside):
     def _title(self) -> str:
         return f"{self.place}: filter {self.name}, {self.keys.python}"
 
-    def _code(self) -> LoadedCode:
+    def _loaded_code(self) -> LoadedCode:
         """The code with which it was recorded; before that, the code that was last imported, where it may serve."""
         with _lock:
             if "recording" in vars(self):
                 return _loaded[self.recording.code]
-            code = _latest.get((self.folder, self.module, self.sources))
-            return code if code is not None and code.is_fresh() else self._imported()
+            code = _latest.get((self.folder, self.module, self.sources_digest))
+            return code if code is not None and code.is_fresh() else self._import_code()
 
     def _estimates(self, code: LoadedCode, plots: Plots) -> Any:
         """What the filter gives for plots, with its code recorded."""
         target = self._target_in(code)
         with self._running(f"fails in realisations {_span(plots)}"), code.running():
-            of = partial(made_of, self.name, target) if isinstance(target, type) else partial(partial, target)
-            made = of(**self.given)
-            return Called(self.name, made, alone=self.keys.one_by_one).estimates(plots)
+            build = partial(made_of, self.name, target) if isinstance(target, type) else partial(partial, target)
+            user_filter = Called(self.name, build(**self.arguments), alone=self.keys.one_by_one)
+            return user_filter.estimates(plots)
 
-    def _imported(self) -> LoadedCode:
+    def _import_code(self) -> LoadedCode:
         """The module, imported afresh with all of the user's modules that it imports."""
-        own = sources(self.folder, self.module)
-        if own.digest != self.sources:
+        module_sources = sources(self.folder, self.module)
+        if module_sources.digest != self.sources_digest:
             raise ConfigError(f"{self.file} is not what it was when the config was read")
-        for name in set(own.modules).intersection(sys.modules).difference(_taken):
-            file, at = own.modules[name], getattr(sys.modules[name], "__file__", None)
-            if not (at and os.path.realpath(at) == os.path.realpath(file)):
+        for name in set(module_sources.modules).intersection(sys.modules).difference(_imported_names):
+            file, loaded = module_sources.modules[name], getattr(sys.modules[name], "__file__", None)
+            if not (loaded and os.path.realpath(loaded) == os.path.realpath(file)):
                 raise ConfigError(
-                    f"{self.place}: {file}: give it another name: {name} is {at or 'of Python itself'} here"
+                    f"{self.place}: {file}: give it another name: {name} is {loaded or 'of Python itself'} here"
                 )
         code = LoadedCode(self.folder, Recorder(self.folders))
         with self._running("cannot be imported"):
-            _taken.update(own.modules)
-            _forget({*_taken, *(parent for name in own.modules for parent in _parents(name) if _is_namespace(parent))})
+            _imported_names.update(module_sources.modules)
+            parents = {parent for name in module_sources.modules for parent in _parents(name)}
+            _forget({*_imported_names, *(name for name in parents if _is_namespace(name))})
             importlib.invalidate_caches()
             with code.running():
                 code.modules[self.module] = importlib.import_module(self.module)
         code.reads_of_import = code.take_reads()
-        _latest[self.folder, self.module, self.sources] = code
+        _latest[self.folder, self.module, self.sources_digest] = code
         return code
 
     @contextlib.contextmanager
-    def _running(self, what: str) -> Iterator[None]:
+    def _running(self, failure: str) -> Iterator[None]:
         """The user's code runs within, in one thread: its output goes to stderr, its errors are shown as its own."""
         with _lock, contextlib.redirect_stdout(sys.stderr):
             try:
                 yield
-            except (ConfigError, KeyboardInterrupt):
+            except KeyboardInterrupt:
                 raise
+            except ConfigError as error:
+                raise ConfigError(*(f"{self.place}: {line}" for line in error.lines)) from error
             except BaseException as error:
-                line = f"{self._title}, {what}:"
+                line = f"{self._title}, {failure}:"
                 package = self.module.partition(".")[0] if is_installed(self.folder) else ""
-                own = os.path.join(self.folder, package)
-                within = f": of a package, it is {Path(self.folder).name}.{self.module}:{self.made}"
-                hint = within if "no known parent package" in failures.words(error) else ""
-                raise ConfigError(line, *failures.frames(error, own), failures.words(error) + hint) from error
+                code_folder = os.path.join(self.folder, package)
+                advice = f": of a package, it is {Path(self.folder).name}.{self.module}:{self.object_name}"
+                hint = advice if "no known parent package" in failures.words(error) else ""
+                raise ConfigError(line, *failures.frames(error, code_folder), failures.words(error) + hint) from error

@@ -2,7 +2,7 @@
 
 The list follows the imports, from the modules that a study names (`Study.computing_modules`), those of the filters'
 keys, and those that take a case through the engine. Imports within functions count; those for a type checker alone do
-not, nor does what only shows results. A package from outside counts with its files of data, and as a whole where it
+not, nor does what only shows results. A package of a user counts with its files of data, and as a whole where it
 imports by names that are computed; the versions of all installed packages count then as well, as it may use any."""
 
 import hashlib
@@ -37,10 +37,10 @@ def sources_digest(case: Case) -> str:
     """SHA-256 of the sources that compute a case's numbers, in hexadecimal."""
     note_loaded_modules(RADARSIM)
     digests = {name: module_digest(name) for name in computing_modules(_first_modules(case))}
-    outside = sorted({name.partition(".")[0] for name in digests} - {RADARSIM})
-    for top in outside:
+    user_packages = sorted({name.partition(".")[0] for name in digests} - {RADARSIM})
+    for top in user_packages:
         digests |= {f"{top}: {name}": digest for name, digest in _data_digests(top).items()}
-    versions = _installed_versions() if outside else []
+    versions = _installed_versions() if user_packages else []
     return hashlib.sha256(repr((sorted(digests.items()), versions)).encode()).hexdigest()
 
 
@@ -69,10 +69,10 @@ def computing_modules(first: tuple[str, ...]) -> frozenset[str]:
         if top != RADARSIM and _COMPUTED_IMPORT.search(source):
             waiting += _all_modules(top)
         parent = name.rpartition(".")[0]
-        # A package of radarsim is mostly passed on the way to a module in it: what its functions would import is not.
-        passed = is_package and top == RADARSIM and name not in first
+        # Importing a module runs the packages that it lies in, but none of their functions.
+        runs_functions = not is_package or top != RADARSIM or name in first
         text = source.decode(errors="replace")
-        waiting += imported_modules(text, name if is_package else parent, within_functions=not passed)
+        waiting += imported_modules(text, name if is_package else parent, within_functions=runs_functions)
         waiting += [parent] if parent else []
     return frozenset(modules)
 

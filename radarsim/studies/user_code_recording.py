@@ -57,27 +57,27 @@ class Recorder:
         self._read: set[str] = set()
         self._written: set[str] = set()
         self._shared: set[str] = set()
-        self.folders = tuple({one for folder in folders for one in (folder, os.path.realpath(folder))})
+        self.folders = tuple({place for folder in folders for place in (folder, os.path.realpath(folder))})
 
     @contextlib.contextmanager
     def recording(self) -> Iterator[None]:
         """This thread, and threads that it starts, are recorded within."""
         _install()
-        before, _here.recorder = _here.recorder, self
+        outer, _this_thread.recorder = _this_thread.recorder, self
         try:
             yield
         finally:
-            _here.recorder = before
+            _this_thread.recorder = outer
 
     def take(self) -> Reads:
         """What was read since the last call in the user's folders, except what the code itself changes."""
         reads, self.reads = self.reads, {}
-        for (path, kind), before in list(reads.items()):  # a thread of the code's may still be reading
-            if path in self._shared and kind == "content" and signature(path) != before:
+        for (path, kind), read_signature in list(reads.items()):  # a thread of the code's may still be reading
+            if path in self._shared and kind == "content" and signature(path) != read_signature:
                 self.hidden.add(path)
-        return {read: before for read, before in list(reads.items()) if not self.changes(*read)}
+        return {read: value for read, value in list(reads.items()) if not self.is_changed_by_code(*read)}
 
-    def changes(self, path: str, kind: Kind) -> bool:
+    def is_changed_by_code(self, path: str, kind: Kind) -> bool:
         """Whether the code itself writes a file, or into a folder that it lists."""
         if kind == "names":
             return any(os.path.dirname(file) == path for file in self._written)
@@ -85,12 +85,13 @@ class Recorder:
 
     def is_users(self, path: str) -> bool:
         """Whether a path is in the user's folders, and not in a folder of programs within these."""
-        home = max((len(one) for one in self.folders if is_within(path, one)), default=-1)
-        if home < 0 or home < max((len(one) for one in folders_of_programs() if is_within(path, one)), default=-1):
+        home = max((len(folder) for folder in self.folders if is_within(path, folder)), default=-1)
+        programs = max((len(folder) for folder in folders_of_programs() if is_within(path, folder)), default=-1)
+        if home < 0 or home < programs:
             return False
         return not (INSTALLED | {"__pycache__"}) & set(path[home:].split(os.sep))
 
-    def read(
+    def note_read(
         self, path: str, kind: Kind, frame: FrameType | None, shared: bool = False, imported: bool = False
     ) -> None:
         """Note that a file or a folder is read; shared: that it may be written too; imported: as a module."""
@@ -98,30 +99,31 @@ class Recorder:
             self._shared.add(path)
         if path in self._written or (path, kind) in self.reads:
             return  # what the code itself wrote before is nothing that it depends on
-        found = signature(path)
-        if found is None or not (stat.S_ISDIR if kind == "names" else stat.S_ISREG)(found[0]):
+        current = signature(path)
+        if current is None or not (stat.S_ISDIR if kind == "names" else stat.S_ISREG)(current[0]):
             return
         if self.is_users(path):
             if imported:
                 self.imported.add(path)
-            self.reads[path, kind] = found
+            self.reads[path, kind] = current
             self._read.add(path)
         elif kind == "content" and not is_of_programs(path) and self._is_called_by_user(frame):
             self.elsewhere.add(path)
 
-    def write(self, path: str) -> None:
+    def note_written(self, path: str) -> None:
         """Note that a file is opened to be written."""
         if path in self._read:
             self.hidden.add(path)
         self._written.add(path)
 
-    def note(self, frame: FrameType | None, host: str = "") -> None:
-        """Note that a process is started, or a host connected."""
-        if not self._is_called_by_user(frame):
-            return
-        if host:
+    def note_host(self, frame: FrameType | None, host: str) -> None:
+        """Note that a host is connected."""
+        if self._is_called_by_user(frame):
             self.hosts.add(host)
-        else:
+
+    def note_process(self, frame: FrameType | None) -> None:
+        """Note that a process is started."""
+        if self._is_called_by_user(frame):
             self.starts_processes = True
 
     def _is_called_by_user(self, frame: FrameType | None) -> bool:
@@ -136,16 +138,16 @@ class Recorder:
         return True  # a thread of the user's code
 
 
-class _Here(threading.local):
+class _ThreadState(threading.local):
     """The recorder of a thread."""
 
     recorder: Recorder | None = None
 
 
-_here = _Here()
+_this_thread = _ThreadState()
 
 
-def _named(path: Any) -> str | None:
+def _absolute_path(path: Any) -> str | None:
     """An absolute path; None for what is none, such as a number of an open file."""
     try:
         return os.path.abspath(os.fsdecode(path))
@@ -158,7 +160,7 @@ def _module_of(frame: FrameType | None) -> str:
 
 
 def _on_open(recorder: Recorder, frame: FrameType | None, path: Any, mode: Any, flags: Any) -> None:
-    file = _named(path)
+    file = _absolute_path(path)
     if file is None or not isinstance(flags, int):
         return
     kind: Kind = "code" if file.endswith(".py") and _module_of(frame) in IMPORTING else "content"
@@ -166,49 +168,49 @@ def _on_open(recorder: Recorder, frame: FrameType | None, path: Any, mode: Any, 
     if os.path.basename(os.path.dirname(file)) == "__pycache__":
         recorder.reads_compiled |= file.endswith(COMPILED) and access == os.O_RDONLY
         with contextlib.suppress(ValueError):
-            recorder.read(source_from_cache(file), "code", frame, imported=True)
+            recorder.note_read(source_from_cache(file), "code", frame, imported=True)
         return
     writes, reads = access != os.O_RDONLY, access != os.O_WRONLY and not flags & (os.O_TRUNC | os.O_EXCL)
     if writes and not (reads and os.path.exists(file)):
-        recorder.write(file)
+        recorder.note_written(file)
     else:
-        recorder.read(file, kind, frame, shared=writes, imported=kind == "code")
+        recorder.note_read(file, kind, frame, shared=writes, imported=kind == "code")
 
 
 def _on_import(recorder: Recorder, frame: FrameType | None, _: Any, file: Any, *__: Any) -> None:
-    if file is not None and (path := _named(file)) is not None:  # an extension, which no `open` tells of
-        recorder.read(path, "content", frame, imported=True)
+    if file is not None and (path := _absolute_path(file)) is not None:  # an extension, which no `open` tells of
+        recorder.note_read(path, "content", frame, imported=True)
 
 
 def _on_library(recorder: Recorder, frame: FrameType | None, name: Any) -> None:
-    if name and os.sep in os.fsdecode(name) and (path := _named(name)) is not None:
-        recorder.read(path, "content", frame)
+    if name and os.sep in os.fsdecode(name) and (path := _absolute_path(name)) is not None:
+        recorder.note_read(path, "content", frame)
 
 
 def _on_listing(recorder: Recorder, frame: FrameType | None, folder: Any = None) -> None:
-    path = _named(os.curdir if folder is None else folder)
+    path = _absolute_path(os.curdir if folder is None else folder)
     if path is not None and _module_of(frame).partition(".")[0] not in LISTING:
-        recorder.read(path, "names", frame)
+        recorder.note_read(path, "names", frame)
 
 
 def _on_database(recorder: Recorder, frame: FrameType | None, database: Any) -> None:
     text = os.fsdecode(database)
     if text.startswith("file:"):
         text = unquote(text.removeprefix("file:").partition("?")[0])
-    if text and text != ":memory:" and (path := _named(text)) is not None:
-        recorder.read(path, "content", frame, shared=True)
+    if text and text != ":memory:" and (path := _absolute_path(text)) is not None:
+        recorder.note_read(path, "content", frame, shared=True)
 
 
 def _on_connection(recorder: Recorder, frame: FrameType | None, _: Any, address: Any) -> None:
     if isinstance(address, tuple):
-        recorder.note(frame, f"{address[0]}:{address[1]}")
+        recorder.note_host(frame, f"{address[0]}:{address[1]}")
 
 
 def _on_process(recorder: Recorder, frame: FrameType | None, *_: Any) -> None:
-    recorder.note(frame)
+    recorder.note_process(frame)
 
 
-def _recorded(recorder: Recorder, run: Callable[[], None]) -> None:
+def _run_recorded(recorder: Recorder, run: Callable[[], None]) -> None:
     with recorder.recording():
         run()
 
@@ -227,16 +229,16 @@ EVENTS: dict[str, Callable[..., None]] = {
 }
 
 
-def _hook(event: str, arguments: tuple[Any, ...], here: _Here = _here, events: Any = EVENTS) -> None:
+def _hook(event: str, arguments: tuple[Any, ...], state: _ThreadState = _this_thread, events: Any = EVENTS) -> None:
     """The names are bound here, since the interpreter clears those of the module before its last events."""
-    recorder = here.recorder
+    recorder = state.recorder
     if recorder is None or (handle := events.get(event)) is None:
         return
-    here.recorder = None  # what follows raises events too
+    state.recorder = None  # what follows raises events too
     try:
         handle(recorder, sys._getframe(1), *arguments)
     finally:
-        here.recorder = recorder
+        state.recorder = recorder
 
 
 @cache
@@ -245,8 +247,8 @@ def _install() -> None:
     start = threading.Thread.start
 
     def start_recorded(self: threading.Thread) -> None:
-        if _here.recorder is not None:
-            self.run = partial(_recorded, _here.recorder, self.run)  # type: ignore[method-assign]
+        if _this_thread.recorder is not None:
+            self.run = partial(_run_recorded, _this_thread.recorder, self.run)  # type: ignore[method-assign]
         start(self)
 
     # An event tells of it from Python 3.12 on only.

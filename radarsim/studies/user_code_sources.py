@@ -26,7 +26,7 @@ from radarsim.config.experiment import digest
 from radarsim.errors import ConfigError
 
 PACKAGE = str(Path(__file__).parents[1])
-OF_PROGRAMS = ("/proc", "/sys", "/dev", "/etc", "/usr", "/lib", "/lib64", "/bin", "/sbin", "/System", "/Library")
+PROGRAM_FOLDERS = ("/proc", "/sys", "/dev", "/etc", "/usr", "/lib", "/lib64", "/bin", "/sbin", "/System", "/Library")
 INSTALLED = {"site-packages", "dist-packages"}
 MAX_NAME = 255  # characters of the name of a file
 MIN_AGE_NS = 100_000_000  # file systems count in steps of milliseconds: of two writes in one step the times are equal
@@ -62,14 +62,14 @@ def file_of(folder: str, module: str) -> Path | None:
     return next((file for file in files if file.is_file()), None)
 
 
-def home_of(module: str, beside: str) -> str:
+def home_of(module: str, config_folder: str) -> str:
     """The folder from which a module is imported: that of the config if it is there, else where it is installed."""
-    if file_of(beside, module) is None:
+    if file_of(config_folder, module) is None:
         with contextlib.suppress(ImportError, ValueError):
             spec = find_spec(module.partition(".")[0])  # of the outermost module, of which nothing runs for it
             for place in [] if spec is None else spec.submodule_search_locations or [spec.origin or ""]:
                 return os.path.dirname(os.path.abspath(place))
-    return beside
+    return config_folder
 
 
 def is_installed(folder: str) -> bool:
@@ -86,13 +86,13 @@ def is_within(path: str, folder: str) -> bool:
 def folders_of_programs() -> tuple[str, ...]:
     """Folders of Python, of libraries and of radarsim, whose files are no data of the user's."""
     paths = {PACKAGE, sys.prefix, sys.base_prefix, *sysconfig.get_paths().values()}
-    return tuple({one for path in paths for one in (path, os.path.realpath(path)) if one != os.sep})
+    return tuple({place for path in paths for place in (path, os.path.realpath(path)) if place != os.sep})
 
 
 def is_of_programs(path: str) -> bool:
     """Whether a file outside the user's folders is one that programs come with or keep for themselves."""
     caches = [value for name, value in os.environ.items() if "CACHE" in name and os.path.isabs(value)]
-    if any(is_within(path, one) for one in (*folders_of_programs(), *OF_PROGRAMS, *caches)):
+    if any(is_within(path, folder) for folder in (*folders_of_programs(), *PROGRAM_FOLDERS, *caches)):
         return True
     hidden = os.path.join(os.path.expanduser("~"), ".")
     return path.startswith(hidden) or bool((INSTALLED | {"__pycache__"}) & set(path.split(os.sep)))
@@ -101,7 +101,7 @@ def is_of_programs(path: str) -> bool:
 def sources(folder: str, module: str) -> Sources:
     """What a module depends on, by its text alone. Raises ConfigError for a module that is no Python."""
     homes: dict[str, str] = {module.partition(".")[0]: folder}
-    only = is_installed(folder)  # its package counts, and not what is beside
+    installed = is_installed(folder)  # its package counts, and not what is beside
     modules: dict[str, str] = {}
     files: dict[tuple[str, Kind], None] = {}
     waiting = [module]
@@ -118,8 +118,8 @@ def sources(folder: str, module: str) -> Sources:
         imported, texts = _names_in(file, name)
         waiting += [name.rpartition(".")[0], *imported] if "." in name else imported
         files |= {(os.path.abspath(data), "content"): None for text in texts if (data := data_file(file.parent, text))}
-    folders = {os.path.join(home, first) for first, home in homes.items() if home and (home != folder or only)}
-    return Sources(modules, tuple(files), tuple(sorted(folders if only else {folder, *folders})))
+    folders = {os.path.join(home, first) for first, home in homes.items() if home and (home != folder or installed)}
+    return Sources(modules, tuple(files), tuple(sorted(folders if installed else {folder, *folders})))
 
 
 def _home_of_users(first: str, folder: str) -> str:
@@ -164,8 +164,8 @@ def with_paths(folder: Path, value: Any) -> tuple[Any, list[str]]:
         return type(value)(item for item, _ in pairs), [file for _, files in pairs for file in files]
     if (file := named_file(folder, value)) is not None:
         return os.path.abspath(file), [os.path.abspath(file)]
-    if (inner := named_folder(folder, value)) is not None:
-        return os.path.abspath(inner), [os.path.abspath(file) for file in _files_below(inner)]
+    if (data_folder := named_folder(folder, value)) is not None:
+        return os.path.abspath(data_folder), [os.path.abspath(file) for file in _files_below(data_folder)]
     return value, []
 
 
@@ -224,24 +224,24 @@ def signature(path: str) -> Signature | None:
 def digest_of(path: str, kind: Kind) -> str:
     """SHA-256 of what counts of a file or a folder; empty where it is gone."""
     if kind == "names":
-        return _of_names(path)
-    found = signature(path)
-    if found is None:
+        return _names_digest(path)
+    current = signature(path)
+    if current is None:
         return ""
-    settled = time.time_ns() - found[MODIFIED] > MIN_AGE_NS
-    return (_of_file if settled else _of_file.__wrapped__)(path, kind, found)
+    settled = time.time_ns() - current[MODIFIED] > MIN_AGE_NS
+    return (_file_digest if settled else _file_digest.__wrapped__)(path, kind, current)
 
 
 @lru_cache(maxsize=10_000)
-def _of_file(path: str, kind: Kind, _: Signature) -> str:
-    content = Path(path)
+def _file_digest(path: str, kind: Kind, _: Signature) -> str:
+    """Of a file, kept as long as its signature is the same."""
     if kind == "code":
-        return hashlib.sha256(ast.unparse(_syntax(content.read_bytes(), path)).encode()).hexdigest()
-    with content.open("rb") as file:
+        return hashlib.sha256(ast.unparse(_syntax(Path(path).read_bytes(), path)).encode()).hexdigest()
+    with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _of_names(folder: str) -> str:
+def _names_digest(folder: str) -> str:
     """Of the names in a folder, except hidden ones, bytecode, copies of editors, and folders of results."""
     try:
         names = sorted(os.listdir(folder))

@@ -169,6 +169,18 @@ def test_outputs_that_a_run_is_writing_are_looked_at_again(out, monkeypatch):
     assert "all intact" in command("doctor", out / "rls2").stdout
 
 
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no user numbers here")
+def test_blocks_that_another_user_may_have_written_are_named_by_doctor_and_report(out):
+    total = next((out / ".blocks" / record(out / "rls2")["identities"]["rls2"]).glob("T*.sums"))
+    total.chmod(0o666)
+    assert f"{total}: can be written by every user: not used" in command("doctor", out / "rls2", code=4).stderr
+    (out / ".blocks").chmod(0o777)
+    (line,) = command("doctor", out / "rls2", code=4).stderr.splitlines()
+    assert line == f"{out / '.blocks'}: can be written by every user: blocks in it are not used, and none are kept"
+    lack = f"are not stored in {out}; {out / '.blocks'}: can be written by every user"
+    assert lack in command("report", "rls2", "--out", out, code=2).stderr
+
+
 def test_blocks_of_other_sources_cannot_be_computed_again(out, monkeypatch):
     monkeypatch.setattr(doctor.CaseWork, "identity", "ab12")
     command("doctor", out / "rls2")
@@ -232,7 +244,7 @@ def test_clean_drops_blocks_and_nothing_else(out):
     (out / ".blocks" / "ab12" / "mine.txt").write_text("mine")
     files, size = len(block_files(out)), sum(path.stat().st_size for path in block_files(out))
     dry = command("clean", "--dry-run", "--out", out)
-    assert dry.stdout == f"would drop {files} files of 3 cases, {size / 1e6:.1f} MB in {out / '.blocks'}\n"
+    assert dry.stdout == f"would drop {files} files in 3 folders of {out / '.blocks'}: {size / 1e6:.2f} MB\n"
     assert len(block_files(out)) == files
     command("clean", "rls1", "--out", out)
     assert 0 < len(block_files(out)) < files

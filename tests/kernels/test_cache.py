@@ -156,14 +156,16 @@ def test_many_at_once(tmp_path, troubles):
     assert not troubles
 
 
-def test_the_first_writable_place(monkeypatch, tmp_path):
+def test_the_first_writable_place(monkeypatch, tmp_path, troubles):
     blocked = tmp_path / "file"
     blocked.write_text("not a directory")
     monkeypatch.setenv("RADARSIM_CACHE_DIR", str(tmp_path / "own"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
     assert cache.cache_root() == tmp_path / "own"
     monkeypatch.setenv("RADARSIM_CACHE_DIR", str(blocked))
+    assert not troubles
     assert cache.cache_root() == tmp_path / "home" / "radarsim"
+    assert f"{blocked} cannot be written" in troubles["trust"]  # a place that is named is not passed over in silence
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
     monkeypatch.setattr(cache.tempfile, "tempdir", str(tmp_path))
     shared = cache.cache_root()

@@ -435,6 +435,21 @@ def test_an_edit_counts_at_once_and_an_edit_undone_finds_its_blocks(place, impor
     assert made[2].curves.equals(made[0].curves)
 
 
+def test_blocks_from_before_an_edit_are_named_and_clean_runs_it_only_to_tell_them_apart(place):
+    run("out", "-n", "500")
+    Path("helper.py").write_text("BETA = 0.4\n")
+    lack = "mine: 500 realisations are not stored in out; those there are of other sources, as before an edit"
+    assert lack in command("report", "mine.yaml", "--out", "out", code=2).stderr
+    assert "`radarsim clean CONFIG --other-sources` removes them" in run("out", "-n", "500").stderr
+    unnamed = command("clean", "--other-sources", "--out", "out").stdout
+    assert "dropped 0 files" in unnamed
+    assert "blocks of mine are left" in unnamed
+    assert "dropped 2 files in 1 folder" in command("clean", "mine.yaml", "--other-sources", "--out", "out").stdout
+    Path("helper.py").write_text("raise OSError('not here')\n")
+    assert "not here" in command("clean", "mine.yaml", "--other-sources", "--out", "out", code=2).stderr
+    assert "dropped 2 files in 1 folder" in command("clean", "mine.yaml", "--out", "out").stdout
+
+
 def test_what_changes_between_reading_and_running_is_noticed(place):
     experiment = load("mine.yaml")
     Path("my_filter.py").write_text(FILTER.replace("- 250.0", "- 260.0"))
@@ -485,6 +500,13 @@ def test_its_errors_are_its_own_traceback(place, line):
     assert all(frame.startswith(f"  {place}") for frame in frames)
     with pytest.raises(ConfigError, match="fails in realisations 4096:8192 of mine:"):
         radarsim.run("mine.yaml", threads=0)
+
+
+def test_what_it_lacks_is_named_with_its_place_in_the_config(place):
+    Path("my_filter.py").write_text(FILTER.replace("def start", "def begin"))
+    (line,) = command("report", "mine.yaml", "--out", "out", code=2).stderr.splitlines()
+    words = "mine: a filter that is asked scan by scan must have start(world) and step(plots)"
+    assert line == f"mine.yaml:21:11: {words}"
 
 
 LOADING = {  # what stands in the config and in the module: what is said

@@ -77,13 +77,13 @@ def test_doctor_names_blocks_of_other_sources_and_clean_removes_only_them(edited
         return done.stdout
 
     said = command("doctor", "several/rls2")
-    assert "that sources made which have changed since" in said
+    assert "were made by sources that have changed since" in said
     edited(FEW, out="several")
     stale, present = sorted((edited.folder / "several/.blocks").iterdir(), key=lambda path: path.stat().st_mtime)[::-1]
     said = command("doctor", "several/rls2")
     assert stale.name in said
     assert "all intact" in said
-    assert "of 1 case" in command("clean", "--other-sources", "--dry-run", "--out", "several")
+    assert "in 1 folder" in command("clean", "--other-sources", "--dry-run", "--out", "several")
     command("clean", "--other-sources", "--out", "several")
     assert list((edited.folder / "several/.blocks").iterdir()) == [present]
     assert "other sources" not in command("doctor", "several/rls2")

@@ -19,8 +19,9 @@ from radarsim.engine.store.block_file import (
     piece_named,
     read_file,
 )
-from radarsim.engine.store.store import mixture
+from radarsim.engine.store.store import folder_fault, mixture
 from radarsim.errors import StoreError
+from radarsim.private_files import UntrustedFileError
 
 ACROSS_PLATFORMS = 1e-9  # relative: sums made on several platforms agree to this
 
@@ -47,6 +48,9 @@ class Audit:
 def audit_blocks(path: Path, reported: int | None = None) -> Audit:
     """Check the blocks of one identity, and that the total of `reported` realisations is among them."""
     audit = Audit(path)
+    if fault := folder_fault(path):
+        audit.faults.append(fault)
+        return audit
     for name in _file_names(path):
         piece = piece_named(name)
         if piece is not None:
@@ -84,6 +88,8 @@ def _read_piece(audit: Audit, piece: Piece) -> None:
         if not isinstance(block, int) or block < 1:
             raise Damage(f"block: expected a number, got {block}")
         check_block(header, values, piece_header(audit.path, piece, block) | {"size": values.size})
+    except UntrustedFileError as error:
+        audit.faults.append(f"{path}: {error.strerror}: not used")
     except OSError as error:
         audit.faults.append(f"{path}: cannot be read: {error.strerror}")
     except Damage as damage:

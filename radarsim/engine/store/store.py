@@ -62,15 +62,10 @@ class Store:
         self.platforms: set[str] = set()
         self._unusable: set[Piece] = set()  # damaged, or of another user
         self._work = work
-        self.trusted = self._is_trusted()
-
-    def _is_trusted(self) -> bool:
-        for folder in (self.path.parent, self.path):
-            with suppress(OSError):  # absent, or reported by whoever reads or writes there
-                if fault := entry_fault(folder, folder.stat()):
-                    self.warnings.append(f"{folder}: {fault}: blocks in it are not used, and none are kept")
-                    return False
-        return True
+        fault = folder_fault(self.path)
+        self.trusted = fault is None
+        if fault is not None:
+            self.warnings.append(fault)
 
     def pieces(self) -> set[Piece]:
         """The stored pieces, by file names; empty if the directory does not exist, or is not trusted."""
@@ -195,13 +190,22 @@ class Store:
         return forest
 
 
+def folder_fault(path: Path) -> str | None:
+    """Why the folder of an identity, or the one above it, may be in another user's hand, in a line; None if neither."""
+    for folder in (path.parent, path):
+        with suppress(OSError):  # absent, or reported by whoever reads or writes there
+            if fault := entry_fault(folder, folder.stat()):
+                return f"{folder}: {fault}: blocks in it are not used, and none are kept"
+    return None
+
+
 def other_sources(folder: Path) -> list[Path]:
     """The folders beside that of an identity which hold sums of the same request by other sources."""
     try:
-        beside = sorted(folder.parent.glob(f"{folder.name[:REQUEST_DIGITS]}*"))
+        candidates = sorted(folder.parent.glob(f"{folder.name[:REQUEST_DIGITS]}*"))
     except OSError:  # reported by whoever reads or writes there
         return []
-    return [path for path in beside if is_other_source(path, folder)]
+    return [path for path in candidates if is_other_source(path, folder)]
 
 
 def is_other_source(folder: Path, reference: Path) -> bool:
@@ -212,9 +216,9 @@ def is_other_source(folder: Path, reference: Path) -> bool:
 
 def mixture(platforms: Collection[str]) -> str:
     """A note on sums from several platforms; the same line for every case of a run."""
-    named = "; ".join(f"({number}) {name}" for number, name in enumerate(sorted(platforms), start=1))
+    names = "; ".join(f"({number}) {name}" for number, name in enumerate(sorted(platforms), start=1))
     return (
-        f"stored sums were made on {len(platforms)} platforms and are equal to rounding, not to the last bit: {named}"
+        f"stored sums were made on {len(platforms)} platforms and are equal to rounding, not to the last bit: {names}"
     )
 
 
