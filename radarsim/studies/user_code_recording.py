@@ -17,15 +17,8 @@ from types import FrameType
 from typing import Any
 from urllib.parse import unquote
 
-from radarsim.studies.user_code_sources import (
-    INSTALLED,
-    Kind,
-    Signature,
-    folders_of_programs,
-    is_of_programs,
-    is_within,
-    signature,
-)
+from radarsim.module_sources import INSTALLED, folders_of_programs, is_of_programs, is_within
+from radarsim.studies.user_code_sources import Kind, Signature, signature
 
 Reads = dict[tuple[str, Kind], Signature | None]
 
