@@ -125,7 +125,6 @@ def test_an_import_is_seen_however_it_is_written(text, modules):
 def package(tmp_path, monkeypatch):
     """A package of a user's: `package(text, …)` writes its modules and gives those that compute."""
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(module_sources, "_digests", {})
     top = f"user_package_{tmp_path.name.replace('-', '_')}"
 
     def write(**files):
@@ -157,6 +156,34 @@ def test_a_package_that_computes_the_names_of_its_imports_counts_as_a_whole(pack
     assert package(study=text, other="", deep__words="") == {"study", "other", "deep", "deep.words"}
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "import numpy as np; from .kernel import f",
+        "from.kernel import f",
+        "from .import kernel",
+        "from . import \\\n    kernel",
+        "colour = '#fff'; from . import kernel",
+        "def f():\n    from . import (  # (a comment)\n        kernel,\n    )",
+        "import importlib as il\nil.import_module",
+        "from .kernel import *",
+    ],
+)
+def test_a_users_package_may_write_its_imports_in_any_way(package, text):
+    assert package(study=text, kernel="") >= {"study", "kernel"}
+
+
+def test_packages_of_the_users_that_a_package_imports_count(package, tmp_path):
+    (tmp_path / "user_tools_a.py").write_text("import numpy.linalg, json.decoder, user_tools_b.deep")
+    (tmp_path / "user_tools_b").mkdir()  # without __init__.py
+    (tmp_path / "user_tools_b/deep.py").write_text("")
+    package(study="from user_tools_a import f")
+    first = (f"{package.folder.name}.study",)
+    found = {name for name in sources.computing_modules(first) if not name.startswith(("radarsim", first[0][:12]))}
+    assert found == {"user_tools_a", "user_tools_b.deep"}
+    del sys.modules["user_tools_b"]
+
+
 def test_files_of_data_count_by_their_paths_and_contents(package):
     package(study="")
     top = package.folder.name
@@ -174,7 +201,6 @@ def test_files_of_data_count_by_their_paths_and_contents(package):
 
 def test_a_loaded_module_keeps_the_hash_of_what_was_loaded(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(module_sources, "_digests", {})
     for name in ("loaded_before", "loaded_later"):
         (tmp_path / f"{name}.py").write_text("x = 1")
     __import__("loaded_before")
@@ -191,3 +217,6 @@ def test_a_loaded_module_keeps_the_hash_of_what_was_loaded(tmp_path, monkeypatch
         module_sources.module_digest("loaded_later")
     for name in first:
         del sys.modules[name]
+    __import__("loaded_before")  # as the modules of a user's filter are, after an edit
+    assert module_sources.module_digest("loaded_before") == edited
+    del sys.modules["loaded_before"]
