@@ -64,7 +64,7 @@ ROOMS = {
     "studies.judged": ("errors", "config", *DATA, "report"),  # claims and readings of studies in one file
     "studies.code": (
         *("errors", "failures", "language", "config", "studies.interface", "studies.outside"),
-        *("studies.user_code_recording", "studies.user_code_sources"),
+        *("module_sources", "studies.user_code_recording", "studies.user_code_sources"),
     ),
     "studies.user_code_recording": ("module_sources", "studies.user_code_sources"),
     "studies.user_code_sources": ("errors", "failures", "module_sources", "config.experiment"),

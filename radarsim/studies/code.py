@@ -34,6 +34,7 @@ from radarsim.config.experiment import Case, digest
 from radarsim.config.schema import OwnCode
 from radarsim.errors import ConfigError
 from radarsim.language import few, listed, tr
+from radarsim.module_sources import check_bytecode
 from radarsim.studies.interface import Study
 from radarsim.studies.outside import Called, Outside, Plots, components_of, made_of
 from radarsim.studies.user_code_recording import Reads, Recorder
@@ -143,6 +144,7 @@ class LoadedCode:
     def _keep_modules(self) -> None:
         for name, module in list(sys.modules.items()):
             if _file_of_module(module) in self.recorder.imported:
+                check_bytecode(module)
                 names = [name, *(parent for parent in _parents(name) if _is_namespace(parent))]
                 self.modules |= {one: sys.modules[one] for one in names}
         _taken.update(self.modules)

@@ -4,6 +4,8 @@ import contextlib
 import json
 import os
 import pickle
+import py_compile
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -432,6 +434,19 @@ def test_an_edit_counts_at_once_and_an_edit_undone_finds_its_blocks(place, impor
     sigma = [one.curves.query("filter == 'mine' and component == 'r'")["sigma"].iloc[-1] for one in made[:2]]
     assert sigma[0] != sigma[1]
     assert made[2].curves.equals(made[0].curves)
+
+
+def test_bytecode_of_another_text_ends_a_run(place):
+    """Python takes it for that of the text where size and second are the same."""
+    source = Path("helper.py")
+    py_compile.compile("helper.py")
+    time = source.stat().st_mtime
+    source.write_text("BETA = 0.4\n")
+    os.utime(source, (time, time))
+    with pytest.raises(ConfigError, match=r"helper\.py: Python runs bytecode of another text: delete .*\.pyc"):
+        identity()
+    shutil.rmtree("__pycache__")
+    assert identity()
 
 
 def test_what_changes_between_reading_and_running_is_noticed(place):

@@ -2,8 +2,11 @@
 
 import ast
 import json
+import os
+import py_compile
 import sys
 from pathlib import Path
+from py_compile import PycInvalidationMode
 
 import pytest
 
@@ -220,3 +223,40 @@ def test_a_loaded_module_keeps_the_hash_of_what_was_loaded(tmp_path, monkeypatch
     __import__("loaded_before")  # as the modules of a user's filter are, after an edit
     assert module_sources.module_digest("loaded_before") == edited
     del sys.modules["loaded_before"]
+
+
+@pytest.mark.parametrize("mode", [PycInvalidationMode.TIMESTAMP, PycInvalidationMode.UNCHECKED_HASH])
+def test_bytecode_of_another_text_is_noticed(tmp_path, monkeypatch, mode):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    name = f"compiled_{mode.name.lower()}"
+    source = tmp_path / f"{name}.py"
+    source.write_text("x = 1\n")
+    bytecode = Path(py_compile.compile(str(source), invalidation_mode=mode))
+    time = source.stat().st_mtime
+    source.write_text("x = 2\n")
+    os.utime(source, (time, time))  # as of an edit within a second, or of files that are unpacked with one time
+    assert __import__(name).x == 1
+    with pytest.raises(ConfigError, match=rf"{name}\.py: Python runs bytecode of another text: delete {bytecode}"):
+        module_sources.module_digest(name)
+    del sys.modules[name]
+    bytecode.unlink()
+    assert __import__(name).x == 2
+    assert module_sources.module_digest(name)
+    del sys.modules[name]
+
+
+def test_bytecode_that_python_does_not_load_or_that_is_of_the_text_is_no_fault(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    source = tmp_path / "compiled_well.py"
+    source.write_text("x = 1\n")
+    py_compile.compile(str(source))
+    source.chmod(0o600)  # the source has changed since, though not its text
+    assert __import__("compiled_well").x == 1
+    assert module_sources.module_digest("compiled_well")
+    del sys.modules["compiled_well"]
+    source.write_text("x = 20\n")
+    assert __import__("compiled_well").x == 20
+    assert module_sources.module_digest("compiled_well")
+    del sys.modules["compiled_well"]
