@@ -94,7 +94,7 @@ class Recorder:
         found = signature(path)
         if found is None or not (stat.S_ISDIR if kind == "names" else stat.S_ISREG)(found[0]):
             return
-        if self.is_users(path):
+        if self.is_users(path) or (imported and not is_of_programs(path)):
             if imported:
                 self.imported.add(path)
             self.reads[path, kind] = found

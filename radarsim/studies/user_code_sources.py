@@ -145,10 +145,12 @@ def with_paths(folder: Path, value: Any) -> tuple[Any, list[str]]:
 
 
 def _files_below(folder: Path) -> Iterator[Path]:
-    """The files in a folder and below, except hidden ones and bytecode."""
+    """The files in a folder and below, except hidden ones, bytecode, and those in folders of results."""
+    results = {path.parent for path in folder.rglob(".blocks")} - {folder}
     for path in sorted(folder.rglob("*")):
         parts = path.relative_to(folder).parts
-        if path.is_file() and not any(part.startswith(".") or part == "__pycache__" for part in parts):
+        hidden = any(part.startswith(".") or part == "__pycache__" for part in parts)
+        if path.is_file() and not hidden and results.isdisjoint(path.parents):
             yield path
 
 

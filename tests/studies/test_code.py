@@ -436,6 +436,27 @@ def test_an_edit_counts_at_once_and_an_edit_undone_finds_its_blocks(place, impor
     assert made[2].curves.equals(made[0].curves)
 
 
+def test_a_module_that_it_imports_from_elsewhere_counts(place, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("elsewhere")
+    text = f"import sys\nsys.path.insert(0, {str(folder)!r})\nimport tools_elsewhere as helper"
+    Path("my_filter.py").write_text(FILTER.replace("import helper", text))
+    found = []
+    for beta in (0.3, 0.4, 0.3):
+        (folder / "tools_elsewhere.py").write_text(f"BETA = {beta}\n")
+        found.append(identity())
+    assert found[0] == found[2] != found[1]
+
+
+def test_results_in_a_folder_of_its_keys_do_not_count(place):
+    reading_filter(nets="./")
+    before = identity()
+    Path("out/.blocks").mkdir(parents=True)
+    Path("out/report.html").write_text("")
+    assert identity() == before
+    Path("nets.npz").write_text("")
+    assert identity() != before
+
+
 def test_bytecode_of_another_text_ends_a_run(place):
     """Python takes it for that of the text where size and second are the same."""
     source = Path("helper.py")
