@@ -117,9 +117,16 @@ class LoadedCode:
         sys.modules.update(self.modules)
         sys.path.insert(0, self.folder)
         kept, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # nothing is written beside the user's files
+        working = os.getcwd()
         try:
             with self.recorder.recording():
                 yield
+            if (other := os.getcwd()) != working:
+                os.chdir(working)
+                raise OSError(
+                    f"it changed the working directory to {other}, where results would be written: open files by "
+                    "Path(__file__).parent, or change it back"
+                )
         finally:
             sys.dont_write_bytecode = kept
             with contextlib.suppress(ValueError):  # the code itself may have removed it

@@ -457,6 +457,19 @@ def test_results_in_a_folder_of_its_keys_do_not_count(place):
     assert identity() != before
 
 
+def test_one_that_leaves_the_working_directory_is_refused(place):
+    """Results would be written to where it went."""
+    Path("sub").mkdir()
+    reading_filter("os.chdir(HERE / 'sub'); os.chdir(HERE)")
+    assert identity()
+    for start in ("os.chdir(HERE / 'sub')", "os.chdir('/')"):
+        reading_filter(start)
+        said = run("out", code=2).stderr
+        assert "filter mine, my_filter.py:Mine, fails in realisations 0:16 of mine" in said
+        assert "it changed the working directory to /" in said
+    assert not list(place.rglob(".blocks"))
+
+
 def test_bytecode_of_another_text_ends_a_run(place):
     """Python takes it for that of the text where size and second are the same."""
     source = Path("helper.py")
