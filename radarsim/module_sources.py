@@ -1,26 +1,33 @@
-"""SHA-256 of a module's source as this process has loaded it.
+"""SHA-256 of a module's source as this process has loaded it, and which modules are the user's.
 
 A hash must name the code that runs, not what an editor has written since: stored blocks and compiled kernels are kept
 by it. So a module that is loaded keeps the hash that was taken first, and is hashed as early as possible; one that is
-not loaded yet is read again each time."""
+not loaded yet is read again each time. A module that is imported anew, as those of a user's filter are, is another."""
 
+import contextlib
 import hashlib
+import marshal
+import os
 import sys
-from importlib.machinery import ModuleSpec
-from importlib.util import find_spec
-from typing import Any, NamedTuple
+import sysconfig
+import weakref
+from functools import cache
+from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.util import MAGIC_NUMBER, find_spec
+from pathlib import Path
+from types import CodeType, ModuleType
+from typing import Any
 
 from radarsim.errors import ConfigError
 
+PACKAGE = str(Path(__file__).parent)
+PROGRAM_FOLDERS = ("/proc", "/sys", "/dev", "/etc", "/usr", "/lib", "/lib64", "/bin", "/sbin", "/System", "/Library")
+INSTALLED = {"site-packages", "dist-packages"}
 
-class _Digest(NamedTuple):
-    """A hash of a source, and whether its module was loaded by then."""
+BYTECODE_HEADER = 16  # bytes: the number of Python's version, flags, time and size of the source
 
-    sha256: str
-    loaded: bool
-
-
-_digests: dict[str, _Digest] = {}
+_loaded: weakref.WeakKeyDictionary[ModuleType, str] = weakref.WeakKeyDictionary()  # hashes of modules as they run
+_expected: dict[str, str] = {}  # hashes that were taken before the module was loaded
 
 
 def module_spec(name: str) -> ModuleSpec | None:
@@ -46,19 +53,87 @@ def module_source(name: str) -> bytes:
 def module_digest(name: str) -> str:
     """SHA-256 of a module's source, in hexadecimal; empty where it has no file.
 
-    Raises ConfigError where the file was edited while this process ran, so that nobody knows which one is loaded."""
-    earlier, loaded = _digests.get(name), name in sys.modules
-    if earlier is not None and earlier.loaded:
-        return earlier.sha256
+    Raises ConfigError where the file was edited while this process ran, so that nobody knows which one is loaded, and
+    where Python has loaded bytecode of another text."""
+    module = sys.modules.get(name)
+    if module is not None and module in _loaded:
+        return _loaded[module]
     content = module_source(name)
-    digest = _Digest(hashlib.sha256(content).hexdigest() if content else "", loaded)
-    if earlier is not None and loaded and digest.sha256 != earlier.sha256:
+    digest = hashlib.sha256(content).hexdigest() if content else ""
+    if module is None:
+        _expected[name] = digest
+        return digest
+    if digest != _expected.get(name, digest):
         raise ConfigError(f"{name}: was edited while this process ran; start a new one")
-    _digests[name] = digest
-    return digest.sha256
+    _expected.pop(name, None)
+    check_bytecode(module)
+    _loaded[module] = digest
+    return digest
+
+
+def check_bytecode(module: ModuleType) -> None:
+    """Raise ConfigError where a module that was just loaded does not run the text of its file.
+
+    Python takes bytecode for that of a source by its size and the whole seconds of its time. An edit within a second,
+    or sources that are all unpacked with one time, may leave it to run bytecode of another text."""
+    spec = getattr(module, "__spec__", None)
+    if spec is None or type(spec.loader) is not SourceFileLoader or not spec.origin or not spec.cached:
+        return
+    if INSTALLED & set(Path(spec.origin).parts):
+        return  # nobody edits it, and to compile all of radarsim takes half a second
+    with contextlib.suppress(OSError, ValueError, EOFError, TypeError):  # none, or none that Python would load
+        source, bytecode = os.stat(spec.origin), os.stat(spec.cached)
+        if bytecode.st_mtime_ns > source.st_ctime_ns:
+            return  # written after the last change of the source
+        content = Path(spec.cached).read_bytes()
+        flags = int.from_bytes(content[4:8], "little")  # 0: by time and size; 1: unchecked; 3: by a hash of the source
+        numbers = int(source.st_mtime) & 0xFFFFFFFF, source.st_size & 0xFFFFFFFF
+        times = b"".join(number.to_bytes(4, "little") for number in numbers)
+        if content[:4] != MAGIC_NUMBER or flags == 3 or (flags == 0 and content[8:BYTECODE_HEADER] != times):
+            return
+        if marshal.loads(content[BYTECODE_HEADER:]) != _compiled(spec.origin):
+            raise ConfigError(f"{spec.origin}: Python runs bytecode of another text: delete {spec.cached}")
+
+
+def _compiled(source: str) -> CodeType | None:
+    """The bytecode of a source; None where it is no Python."""
+    try:
+        return compile(Path(source).read_bytes(), source, "exec", dont_inherit=True)
+    except (SyntaxError, ValueError):
+        return None
 
 
 def note_loaded_modules(top: str) -> None:
     """Take the hashes of the modules of a top-level package that are loaded by now."""
     for name in [name for name in sys.modules if name.partition(".")[0] == top]:
         module_digest(name)
+
+
+def is_users_module(top: str) -> bool:
+    """Whether a top-level module is the user's: neither a library nor a part of Python or of radarsim."""
+    spec = module_spec(top)
+    if spec is None:
+        return False
+    places = [spec.origin] if spec.has_location and spec.origin else list(spec.submodule_search_locations or [])
+    return any(not is_of_programs(place) for place in places)
+
+
+def is_within(path: str, folder: str) -> bool:
+    """Whether a path is that of a folder, or lies in it."""
+    return path == folder or path.startswith(folder.rstrip(os.sep) + os.sep)
+
+
+@cache
+def folders_of_programs() -> tuple[str, ...]:
+    """Folders of Python, of libraries and of radarsim, whose files are no data of the user's."""
+    paths = {PACKAGE, sys.prefix, sys.base_prefix, *sysconfig.get_paths().values()}
+    return tuple({place for path in paths for place in (path, os.path.realpath(path)) if place != os.sep})
+
+
+def is_of_programs(path: str) -> bool:
+    """Whether a file outside the user's folders is one that programs come with or keep for themselves."""
+    caches = [value for name, value in os.environ.items() if "CACHE" in name and os.path.isabs(value)]
+    if any(is_within(path, folder) for folder in (*folders_of_programs(), *PROGRAM_FOLDERS, *caches)):
+        return True
+    hidden = os.path.join(os.path.expanduser("~"), ".")
+    return path.startswith(hidden) or bool((INSTALLED | {"__pycache__"}) & set(path.split(os.sep)))

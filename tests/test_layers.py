@@ -64,15 +64,15 @@ ROOMS = {
     "studies.judged": ("errors", "config", *DATA, "report"),  # claims and readings of studies in one file
     "studies.code": (
         *("errors", "failures", "language", "config", "studies.interface", "studies.outside"),
-        *("studies.user_code_recording", "studies.user_code_sources"),
+        *("module_sources", "studies.user_code_recording", "studies.user_code_sources"),
     ),
-    "studies.user_code_recording": ("studies.user_code_sources",),
-    "studies.user_code_sources": ("errors", "failures", "config.experiment"),
+    "studies.user_code_recording": ("module_sources", "studies.user_code_sources"),
+    "studies.user_code_sources": ("errors", "failures", "module_sources", "config.experiment"),
     "studies.registry": (
         *("errors", "failures", "config", "report.quantities"),
         *("studies.code", "studies.interface", "studies.outside"),
     ),
-    "studies.sources": ("config", "module_sources", "studies.registry"),
+    "studies.sources": ("config", "module_sources", "studies.registry", "studies.user_code_sources"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry", "studies.sources"),
     "recorded": ("errors", "threads", "config", "language", "engine", "kernels", "physics", "report", "studies"),
     "app": (

@@ -1,25 +1,26 @@
 """What a kernel is made from: one hash over the modules, numbers and closures that its code can reach.
 
 Numba's cache on disk looks at the file of the compiled function alone: an edit of a function that it calls, in another
-file, goes unnoticed and gives silently wrong results. Here the modules of ours that its globals come from count,
-directly or not. An edit in one study's kernels leaves those of the others as they are."""
+file, goes unnoticed and gives silently wrong results. Here the modules of ours and of the user's that its globals come
+from count, directly or not. An edit in one study's kernels leaves those of the others as they are."""
 
 import hashlib
 import sys
 from collections.abc import Callable
+from enum import Enum
 from types import FunctionType, ModuleType
 
 import numpy as np
 
-from radarsim.module_sources import module_digest
+from radarsim.module_sources import is_users_module, module_digest
 
 
 def source_hash(function: Callable) -> str:
-    """SHA-256 of all that a kernel is compiled from: the files of the modules of ours that its globals come from,
-    directly or not, numbers in these, and what a function made by another takes from it."""
+    """SHA-256 of all that a kernel is compiled from: the files of the modules that its globals come from, directly or
+    not, other than libraries, numbers in these, and what a function made by another takes from it."""
     texts: dict[str, str] = {}
     waiting: list[object] = [function]
-    packages = {"radarsim", function.__module__.partition(".")[0]}
+    counts = dict.fromkeys(("radarsim", function.__module__.partition(".")[0]), True)
     while waiting:
         value = waiting.pop()
         value = getattr(value, "__wrapped__", value)  # compiled, or a formula
@@ -31,7 +32,10 @@ def source_hash(function: Callable) -> str:
             waiting += contents if text not in texts else []
             texts[text] = ""
         name = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
-        if not isinstance(name, str) or name in texts or name.partition(".")[0] not in packages:
+        if not isinstance(name, str) or name in texts:
+            continue
+        top = name.partition(".")[0]
+        if not counts.setdefault(top, counts.get(top) or is_users_module(top)):
             continue
         texts[name] = module_digest(name)
         module = sys.modules.get(name)
@@ -43,7 +47,9 @@ def source_hash(function: Callable) -> str:
 
 
 def value_text(value: object) -> str:
-    """Numbers and texts of a value as they are, functions and programs by their names; of anything else nothing."""
+    """Numbers and texts of a value as they are, types, functions and programs by their names; of others nothing."""
+    if isinstance(value, type) and issubclass(value, Enum):
+        value = [(member.name, member.value) for member in value]
     if isinstance(value, list | tuple):
         return f"({', '.join(map(value_text, value))})"
     if isinstance(value, np.ndarray):
@@ -53,4 +59,11 @@ def value_text(value: object) -> str:
     value = getattr(value, "__wrapped__", value)
     if isinstance(value, FunctionType):
         return f"{value.__module__}.{value.__qualname__}"
-    return repr(value) if isinstance(value, int | float | complex | str | bytes) else ""
+    if isinstance(value, type):
+        return f"{value.__module__}.{value.__qualname__}"
+    if isinstance(value, np.generic):
+        return f"{value.dtype} {value!r}"
+    if isinstance(value, Enum):
+        return f"{value_text(type(value))} {value.name}"
+    is_constant = isinstance(value, int | float | complex | str | bytes | np.dtype | range | slice | None)
+    return repr(value) if is_constant or type(value).__module__.startswith("numba.core.types") else ""

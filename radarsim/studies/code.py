@@ -34,6 +34,7 @@ from radarsim.config.experiment import Case, digest
 from radarsim.config.schema import OwnCode
 from radarsim.errors import ConfigError
 from radarsim.language import few, listed, tr
+from radarsim.module_sources import check_bytecode
 from radarsim.studies.interface import Study
 from radarsim.studies.outside import Called, Outside, Plots, components_of, made_of
 from radarsim.studies.user_code_recording import Reads, Recorder
@@ -116,9 +117,16 @@ class LoadedCode:
         sys.modules.update(self.modules)
         sys.path.insert(0, self.folder)
         setting, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # nothing is written beside the user's files
+        working = os.getcwd()
         try:
             with self.recorder.recording():
                 yield
+            if (other := os.getcwd()) != working:
+                os.chdir(working)
+                raise OSError(
+                    f"it changed the working directory to {other}, where results would be written: open files by "
+                    "Path(__file__).parent, or change it back"
+                )
         finally:
             sys.dont_write_bytecode = setting
             with contextlib.suppress(ValueError):  # the code itself may have removed it
@@ -145,6 +153,7 @@ class LoadedCode:
         """Note the user's modules that were imported since, with the packages without a file that they lie in."""
         for name, module in list(sys.modules.items()):
             if _file_of_module(module) in self.recorder.imported:
+                check_bytecode(module)
                 names = [name, *(parent for parent in _parents(name) if _is_namespace(parent))]
                 self.modules |= {name: sys.modules[name] for name in names}
         _imported_names.update(self.modules)

@@ -2,9 +2,12 @@
 
 The list follows the imports, from the modules that a study names (`Study.computing_modules`), those of the filters'
 keys, and those that take a case through the engine. Imports within functions count; those for a type checker alone do
-not, nor does what only shows results. A package of a user counts with its files of data, and as a whole where it
-imports by names that are computed; the versions of all installed packages count then as well, as it may use any."""
+not, nor does what only shows results. A user's package counts with its files of data, with the packages of the user's
+that it imports, and as a whole where it imports by names that are computed; the versions of all installed packages
+count then as well, as it may use any."""
 
+import ast
+import contextlib
 import hashlib
 import re
 from collections.abc import Iterator
@@ -14,8 +17,9 @@ from pathlib import Path
 
 from radarsim.config.experiment import Case
 from radarsim.config.fields import Model
-from radarsim.module_sources import module_digest, module_source, module_spec, note_loaded_modules
+from radarsim.module_sources import is_users_module, module_digest, module_source, module_spec, note_loaded_modules
 from radarsim.studies.registry import study
+from radarsim.studies.user_code_sources import imports_in
 
 RADARSIM = __package__.partition(".")[0]
 ENGINE = "radarsim.app.case_work", "radarsim.engine.run"  # what takes a case through the engine
@@ -30,7 +34,9 @@ _IMPORT = re.compile(
     re.MULTILINE,
 )
 _NAME = re.compile(r"(\w[\w.]*)(?:\s+as\s+\w+)?")
-_COMPUTED_IMPORT = re.compile(rb"\b(?:import_module|__import__|runpy|spec_from_file_location|exec)\b")
+_COMPUTED_IMPORT = re.compile(
+    rb"\b(?:importlib|import_module|__import__|pkgutil|runpy|lazy_loader|exec|eval)\b|\bimport[ \t]*\*"
+)
 
 
 def sources_digest(case: Case) -> str:
@@ -55,30 +61,38 @@ def _first_modules(case: Case) -> tuple[str, ...]:
 def computing_modules(first: tuple[str, ...]) -> frozenset[str]:
     """These modules, and all of radarsim and of their own packages that they import, directly or not."""
     tops = {RADARSIM, *(name.partition(".")[0] for name in first)}
+    libraries: set[str] = set()
     modules: set[str] = set()
     waiting = list(first)
     while waiting:
         name = waiting.pop()
-        if name in modules or name.partition(".")[0] not in tops or _is_within(name, SHOW_RESULTS):
+        top = name.partition(".")[0]
+        if top not in tops | libraries:
+            (tops if is_users_module(top) else libraries).add(top)
+        if name in modules or top in libraries or _is_within(name, SHOW_RESULTS):
             continue
         if (spec := module_spec(name)) is None or not spec.has_location:
             continue
         modules.add(name)
         source = module_source(name)
-        top, is_package = name.partition(".")[0], spec.submodule_search_locations is not None
-        if top != RADARSIM and _COMPUTED_IMPORT.search(source):
-            waiting += _all_modules(top)
-        parent = name.rpartition(".")[0]
-        # Importing a module runs the packages that it lies in, but none of their functions.
-        runs_functions = not is_package or top != RADARSIM or name in first
-        text = source.decode(errors="replace")
-        waiting += imported_modules(text, name if is_package else parent, within_functions=runs_functions)
+        is_package, parent = spec.submodule_search_locations is not None, name.rpartition(".")[0]
+        package = name if is_package else parent
         waiting += [parent] if parent else []
+        if top == RADARSIM:
+            # Importing a module runs the packages that it lies in, but none of their functions.
+            runs_functions = not is_package or name in first
+            waiting += imported_modules(source.decode(), package, within_functions=runs_functions)
+            continue
+        waiting += _all_modules(top) if _COMPUTED_IMPORT.search(source) else []
+        with contextlib.suppress(SyntaxError, ValueError):  # no Python: an extension, a template
+            waiting += imports_in(ast.parse(source), package)
     return frozenset(modules)
 
 
 def imported_modules(text: str, package: str, within_functions: bool = True) -> list[str]:
-    """The names of modules that a source in a package imports, and names in them that may be modules."""
+    """The names of modules that a source of radarsim imports, and names in them that may be modules.
+
+    Takes 0.02 s where syntax trees take 0.2 s. It reads imports as our formatter writes them, which a test holds."""
     modules = []
     for match in _IMPORT.finditer(_TYPE_CHECKING.sub("\n", _COMMENT.sub("", text))):
         if match["before"][:1] in (" ", "\t") and not within_functions:

@@ -17,15 +17,8 @@ from types import FrameType
 from typing import Any
 from urllib.parse import unquote
 
-from radarsim.studies.user_code_sources import (
-    INSTALLED,
-    Kind,
-    Signature,
-    folders_of_programs,
-    is_of_programs,
-    is_within,
-    signature,
-)
+from radarsim.module_sources import INSTALLED, folders_of_programs, is_of_programs, is_within
+from radarsim.studies.user_code_sources import Kind, Signature, signature
 
 Reads = dict[tuple[str, Kind], Signature | None]
 
@@ -102,7 +95,7 @@ class Recorder:
         current = signature(path)
         if current is None or not (stat.S_ISDIR if kind == "names" else stat.S_ISREG)(current[0]):
             return
-        if self.is_users(path):
+        if self.is_users(path) or (imported and not is_of_programs(path)):
             if imported:
                 self.imported.add(path)
             self.reads[path, kind] = current

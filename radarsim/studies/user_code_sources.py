@@ -10,12 +10,10 @@ import contextlib
 import hashlib
 import os
 import stat
-import sys
-import sysconfig
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.util import find_spec
 from pathlib import Path
@@ -24,10 +22,8 @@ from typing import Any, Literal
 from radarsim import failures
 from radarsim.config.experiment import digest
 from radarsim.errors import ConfigError
+from radarsim.module_sources import INSTALLED, is_of_programs
 
-PACKAGE = str(Path(__file__).parents[1])
-PROGRAM_FOLDERS = ("/proc", "/sys", "/dev", "/etc", "/usr", "/lib", "/lib64", "/bin", "/sbin", "/System", "/Library")
-INSTALLED = {"site-packages", "dist-packages"}
 MAX_NAME = 255  # characters of the name of a file
 MIN_AGE_NS = 100_000_000  # file systems count in steps of milliseconds: of two writes in one step the times are equal
 MODIFIED = 4  # the place of the time of the last write in a signature
@@ -75,27 +71,6 @@ def home_of(module: str, config_folder: str) -> str:
 def is_installed(folder: str) -> bool:
     """Whether a folder is one of installed packages."""
     return bool(INSTALLED & set(Path(folder).parts))
-
-
-def is_within(path: str, folder: str) -> bool:
-    """Whether a path is that of a folder, or lies in it."""
-    return path == folder or path.startswith(folder.rstrip(os.sep) + os.sep)
-
-
-@cache
-def folders_of_programs() -> tuple[str, ...]:
-    """Folders of Python, of libraries and of radarsim, whose files are no data of the user's."""
-    paths = {PACKAGE, sys.prefix, sys.base_prefix, *sysconfig.get_paths().values()}
-    return tuple({place for path in paths for place in (path, os.path.realpath(path)) if place != os.sep})
-
-
-def is_of_programs(path: str) -> bool:
-    """Whether a file outside the user's folders is one that programs come with or keep for themselves."""
-    caches = [value for name, value in os.environ.items() if "CACHE" in name and os.path.isabs(value)]
-    if any(is_within(path, folder) for folder in (*folders_of_programs(), *PROGRAM_FOLDERS, *caches)):
-        return True
-    hidden = os.path.join(os.path.expanduser("~"), ".")
-    return path.startswith(hidden) or bool((INSTALLED | {"__pycache__"}) & set(path.split(os.sep)))
 
 
 def sources(folder: str, module: str) -> Sources:
@@ -170,10 +145,12 @@ def with_paths(folder: Path, value: Any) -> tuple[Any, list[str]]:
 
 
 def _files_below(folder: Path) -> Iterator[Path]:
-    """The files in a folder and below, except hidden ones and bytecode."""
+    """The files in a folder and below, except hidden ones, bytecode, and those in folders of results."""
+    results = {path.parent for path in folder.rglob(".blocks")} - {folder}
     for path in sorted(folder.rglob("*")):
         parts = path.relative_to(folder).parts
-        if path.is_file() and not any(part.startswith(".") or part == "__pycache__" for part in parts):
+        hidden = any(part.startswith(".") or part == "__pycache__" for part in parts)
+        if path.is_file() and not hidden and results.isdisjoint(path.parents):
             yield path
 
 
@@ -183,17 +160,21 @@ def _names_in(file: Path, name: str) -> tuple[list[str], list[str]]:
         return [], []
     tree = _syntax(file.read_bytes(), str(file))
     package = name if file.name == "__init__.py" else name.rpartition(".")[0]
-    imported, texts = [], []
+    constants = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)]
+    return imports_in(tree, package), [value for value in constants if isinstance(value, str)]
+
+
+def imports_in(tree: ast.Module, package: str) -> list[str]:
+    """The names of modules that a module in a package imports, and names in them that may be modules."""
+    modules = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            imported += [alias.name for alias in node.names]
+            modules += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
             base = ".".join([*above, *([node.module] if node.module else [])])
-            imported += [base, *(f"{base}.{alias.name}" for alias in node.names)]
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            texts.append(node.value)
-    return imported, texts
+            modules += [base, *(f"{base}.{alias.name}" for alias in node.names)]
+    return modules
 
 
 @lru_cache(maxsize=200)

@@ -4,6 +4,8 @@ import contextlib
 import json
 import os
 import pickle
+import py_compile
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -448,6 +450,53 @@ def test_blocks_from_before_an_edit_are_named_and_clean_runs_it_only_to_tell_the
     Path("helper.py").write_text("raise OSError('not here')\n")
     assert "not here" in command("clean", "mine.yaml", "--other-sources", "--out", "out", code=2).stderr
     assert "dropped 2 files in 1 folder" in command("clean", "mine.yaml", "--out", "out").stdout
+
+
+def test_a_module_that_it_imports_from_elsewhere_counts(place, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("elsewhere")
+    text = f"import sys\nsys.path.insert(0, {str(folder)!r})\nimport tools_elsewhere as helper"
+    Path("my_filter.py").write_text(FILTER.replace("import helper", text))
+    found = []
+    for beta in (0.3, 0.4, 0.3):
+        (folder / "tools_elsewhere.py").write_text(f"BETA = {beta}\n")
+        found.append(identity())
+    assert found[0] == found[2] != found[1]
+
+
+def test_results_in_a_folder_of_its_keys_do_not_count(place):
+    reading_filter(nets="./")
+    before = identity()
+    Path("out/.blocks").mkdir(parents=True)
+    Path("out/report.html").write_text("")
+    assert identity() == before
+    Path("nets.npz").write_text("")
+    assert identity() != before
+
+
+def test_one_that_leaves_the_working_directory_is_refused(place):
+    """Results would be written to where it went."""
+    Path("sub").mkdir()
+    reading_filter("os.chdir(HERE / 'sub'); os.chdir(HERE)")
+    assert identity()
+    for start in ("os.chdir(HERE / 'sub')", "os.chdir('/')"):
+        reading_filter(start)
+        said = run("out", code=2).stderr
+        assert "filter mine, my_filter.py:Mine, fails in realisations 0:16 of mine" in said
+        assert "it changed the working directory to /" in said
+    assert not list(place.rglob(".blocks"))
+
+
+def test_bytecode_of_another_text_ends_a_run(place):
+    """Python takes it for that of the text where size and second are the same."""
+    source = Path("helper.py")
+    py_compile.compile("helper.py")
+    time = source.stat().st_mtime
+    source.write_text("BETA = 0.4\n")
+    os.utime(source, (time, time))
+    with pytest.raises(ConfigError, match=r"helper\.py: Python runs bytecode of another text: delete .*\.pyc"):
+        identity()
+    shutil.rmtree("__pycache__")
+    assert identity()
 
 
 def test_what_changes_between_reading_and_running_is_noticed(place):

@@ -2,8 +2,11 @@
 
 import ast
 import json
+import os
+import py_compile
 import sys
 from pathlib import Path
+from py_compile import PycInvalidationMode
 
 import pytest
 
@@ -125,7 +128,6 @@ def test_an_import_is_seen_however_it_is_written(text, modules):
 def package(tmp_path, monkeypatch):
     """A package of a user's: `package(text, …)` writes its modules and gives those that compute."""
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(module_sources, "_digests", {})
     top = f"user_package_{tmp_path.name.replace('-', '_')}"
 
     def write(**files):
@@ -157,6 +159,34 @@ def test_a_package_that_computes_the_names_of_its_imports_counts_as_a_whole(pack
     assert package(study=text, other="", deep__words="") == {"study", "other", "deep", "deep.words"}
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "import numpy as np; from .kernel import f",
+        "from.kernel import f",
+        "from .import kernel",
+        "from . import \\\n    kernel",
+        "colour = '#fff'; from . import kernel",
+        "def f():\n    from . import (  # (a comment)\n        kernel,\n    )",
+        "import importlib as il\nil.import_module",
+        "from .kernel import *",
+    ],
+)
+def test_a_users_package_may_write_its_imports_in_any_way(package, text):
+    assert package(study=text, kernel="") >= {"study", "kernel"}
+
+
+def test_packages_of_the_users_that_a_package_imports_count(package, tmp_path):
+    (tmp_path / "user_tools_a.py").write_text("import numpy.linalg, json.decoder, user_tools_b.deep")
+    (tmp_path / "user_tools_b").mkdir()  # without __init__.py
+    (tmp_path / "user_tools_b/deep.py").write_text("")
+    package(study="from user_tools_a import f")
+    first = (f"{package.folder.name}.study",)
+    found = {name for name in sources.computing_modules(first) if not name.startswith(("radarsim", first[0][:12]))}
+    assert found == {"user_tools_a", "user_tools_b.deep"}
+    del sys.modules["user_tools_b"]
+
+
 def test_files_of_data_count_by_their_paths_and_contents(package):
     package(study="")
     top = package.folder.name
@@ -174,7 +204,6 @@ def test_files_of_data_count_by_their_paths_and_contents(package):
 
 def test_a_loaded_module_keeps_the_hash_of_what_was_loaded(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(module_sources, "_digests", {})
     for name in ("loaded_before", "loaded_later"):
         (tmp_path / f"{name}.py").write_text("x = 1")
     __import__("loaded_before")
@@ -191,3 +220,43 @@ def test_a_loaded_module_keeps_the_hash_of_what_was_loaded(tmp_path, monkeypatch
         module_sources.module_digest("loaded_later")
     for name in first:
         del sys.modules[name]
+    __import__("loaded_before")  # as the modules of a user's filter are, after an edit
+    assert module_sources.module_digest("loaded_before") == edited
+    del sys.modules["loaded_before"]
+
+
+@pytest.mark.parametrize("mode", [PycInvalidationMode.TIMESTAMP, PycInvalidationMode.UNCHECKED_HASH])
+def test_bytecode_of_another_text_is_noticed(tmp_path, monkeypatch, mode):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    name = f"compiled_{mode.name.lower()}"
+    source = tmp_path / f"{name}.py"
+    source.write_text("x = 1\n")
+    bytecode = Path(py_compile.compile(str(source), invalidation_mode=mode))
+    time = source.stat().st_mtime
+    source.write_text("x = 2\n")
+    os.utime(source, (time, time))  # as of an edit within a second, or of files that are unpacked with one time
+    assert __import__(name).x == 1
+    with pytest.raises(ConfigError, match=rf"{name}\.py: Python runs bytecode of another text: delete {bytecode}"):
+        module_sources.module_digest(name)
+    del sys.modules[name]
+    bytecode.unlink()
+    assert __import__(name).x == 2
+    assert module_sources.module_digest(name)
+    del sys.modules[name]
+
+
+def test_bytecode_that_python_does_not_load_or_that_is_of_the_text_is_no_fault(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    source = tmp_path / "compiled_well.py"
+    source.write_text("x = 1\n")
+    py_compile.compile(str(source))
+    source.chmod(0o600)  # the source has changed since, though not its text
+    assert __import__("compiled_well").x == 1
+    assert module_sources.module_digest("compiled_well")
+    del sys.modules["compiled_well"]
+    source.write_text("x = 20\n")
+    assert __import__("compiled_well").x == 20
+    assert module_sources.module_digest("compiled_well")
+    del sys.modules["compiled_well"]
