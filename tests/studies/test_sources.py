@@ -210,11 +210,11 @@ def test_a_loaded_module_keeps_the_hash_of_what_was_loaded(tmp_path, monkeypatch
     first = {name: module_sources.module_digest(name) for name in ("loaded_before", "loaded_later")}
     assert len(set(first.values())) == 1
     for name in first:
-        (tmp_path / f"{name}.py").write_text("x = 2")
+        (tmp_path / f"{name}.py").write_text("x = 22")
     assert module_sources.module_digest("loaded_before") == first["loaded_before"]  # the code that runs
     edited = module_sources.module_digest("loaded_later")
     assert edited != first["loaded_later"]  # the code that would be loaded
-    (tmp_path / "loaded_later.py").write_text("x = 3")
+    (tmp_path / "loaded_later.py").write_text("x = 333")
     __import__("loaded_later")
     with pytest.raises(ConfigError, match=r"loaded_later: was edited while this process ran; start a new one"):
         module_sources.module_digest("loaded_later")
