@@ -100,11 +100,10 @@ def final(*blocks):
 PLAINLY = [ethernet(ipv4(udp(one))) for one in BLOCKS]
 
 
-@pytest.mark.slow_cases("data0")
 @pytest.mark.parametrize(
     "data",
     [
-        pcap(PLAINLY),
+        pytest.param(pcap(PLAINLY), marks=pytest.mark.slow),
         pcap(PLAINLY, ">"),
         pcap(PLAINLY, "<", 0xA1B23C4D),  # nanoseconds
         pcapng(PLAINLY),
