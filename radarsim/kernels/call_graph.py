@@ -35,7 +35,9 @@ def source_hash(function: Callable) -> str:
         if not isinstance(name, str) or name in texts:
             continue
         top = name.partition(".")[0]
-        if not counts.setdefault(top, counts.get(top) or is_users_module(top)):
+        if top not in counts:
+            counts[top] = is_users_module(top)
+        if not counts[top]:
             continue
         texts[name] = module_digest(name)
         module = sys.modules.get(name)

@@ -60,16 +60,15 @@ def _first_modules(case: Case) -> tuple[str, ...]:
 @cache
 def computing_modules(first: tuple[str, ...]) -> frozenset[str]:
     """These modules, and all of radarsim and of their own packages that they import, directly or not."""
-    tops = {RADARSIM, *(name.partition(".")[0] for name in first)}
-    libraries: set[str] = set()
+    counts = dict.fromkeys((RADARSIM, *(name.partition(".")[0] for name in first)), True)
     modules: set[str] = set()
     waiting = list(first)
     while waiting:
         name = waiting.pop()
         top = name.partition(".")[0]
-        if top not in tops | libraries:
-            (tops if is_users_module(top) else libraries).add(top)
-        if name in modules or top in libraries or _is_within(name, SHOW_RESULTS):
+        if top not in counts:
+            counts[top] = is_users_module(top)
+        if name in modules or not counts[top] or _is_within(name, SHOW_RESULTS):
             continue
         if (spec := module_spec(name)) is None or not spec.has_location:
             continue
