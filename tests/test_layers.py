@@ -93,7 +93,7 @@ KEYS = ("errors", "constants", "config.document", "config.fields", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
 SHOWN = (*SUMS, "cost", "tables", "figures")
-READ = (*SHOWN, "words", "measures", "readings", "search")
+READ = (*SHOWN, "words", "measures", "readings")
 ROLES = {
     "kernels": (("kernels", "bursts.kernels"), ("kernels",)),
     "config": (KEYS, ("config",)),
@@ -109,7 +109,6 @@ ROLES = {
     "words": ((*GROUND, *DATA, "report", "language"), READ),
     "measures": ((*GROUND, *DATA, "report"), READ),
     "readings": ((*GROUND, *DATA, "report"), READ),  # what the paper leaves open
-    "search": ((*GROUND, *DATA, "report"), READ),  # its printed numbers under many readings
     "chart": ((*GROUND, *DATA, "report", "language"), READ),
     "track": ((*GROUND, *DATA, "studies.noise", "studies.interface"), (*SUMS, "track")),
     "__init__": (

@@ -20,8 +20,6 @@ from radarsim.config.schema import Common
 from radarsim.language import ANY, NUMBERS, catalogue
 from radarsim.report.claims import judge, over, rule
 from radarsim.studies import registry
-from radarsim.studies.discriminator import search as discriminator
-from radarsim.studies.range_doppler import search as range_doppler
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "radarsim"
@@ -118,7 +116,7 @@ def in_claims() -> Iterator[tuple[str, str, str]]:
 
 
 def in_readings() -> Iterator[tuple[str, str, str]]:
-    """What the papers leave open, its alternatives, why, and the numbers of their joint searches."""
+    """What the papers leave open, its alternatives, and why."""
     for name in registry.SHIPPED:
         of = registry.study(name).readings()
         if of is None:
@@ -130,12 +128,6 @@ def in_readings() -> Iterator[tuple[str, str, str]]:
                 yield text, "", place
             if choice.original == choice.english:  # the paper is silent
                 yield choice.original, "", place
-    for number in (*range_doppler.PRINTED, *discriminator.PRINTED):
-        yield number.what, "", "radarsim/studies"
-        yield number.unit, "", "radarsim/studies"
-    for module in (range_doppler, discriminator):
-        for text in (*module.ASKS.values(), module.READ_AS):
-            yield text, "", "radarsim/studies"
 
 
 def in_inventory() -> Iterator[tuple[str, str, str]]:

@@ -1,7 +1,6 @@
 """The pages of readings, made while building: what a paper leaves open, and its claims over all that it allows.
 
-The classes are those that radarsim ships. Where `make readings-pages` has left its pages in results/readings they are
-shown whole: with the printed numbers by reading, and where each of them comes out.
+The classes are those that radarsim ships, or those of the pages that `make readings-pages` left in results/readings.
 """
 
 from pathlib import Path
@@ -12,9 +11,8 @@ from radarsim.report.claims import page, readings_page
 PAPERS = ("P1", "P2", "P3", "P4")
 RESULTS = Path(__file__).parents[2] / "results"
 HERE = (
-    "The printed numbers by reading, and where each of them comes out, are what `radarsim readings {paper} --markdown` "
-    "adds, from stored runs or new ones; every number under every reading is then in `results/readings/readings.csv`, "
-    "and beside it a specification curve a claim."
+    "`radarsim readings {paper} --markdown` judges them anew, from stored runs or new ones; every number under every "
+    "reading is then in `results/readings/readings.csv`, and beside it a specification curve a claim."
 )
 
 

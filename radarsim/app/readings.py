@@ -33,20 +33,7 @@ from radarsim.report import files
 from radarsim.report.claims import PaperClaims, page
 from radarsim.report.claims.declared import Claim
 from radarsim.report.claims.judge import NOT_JUDGED
-from radarsim.report.claims.over import (
-    Joint,
-    Over,
-    PaperReadings,
-    Reading,
-    Search,
-    Seen,
-    Under,
-    Unreadable,
-    columns,
-    joint,
-    rows,
-    under,
-)
+from radarsim.report.claims.over import Over, PaperReadings, Reading, Seen, Under, Unreadable, columns, rows, under
 from radarsim.report.claims.rule import UNDECIDED, roughly
 from radarsim.report.drawing import Figure
 from radarsim.report.precision import looks
@@ -70,15 +57,14 @@ class Paper:
 
 @dataclass(frozen=True)
 class Asked:
-    """The part of a paper to judge: its claims, and whether the whole paper was requested."""
+    """The part of a paper to judge: its claims."""
 
     paper: Paper
     claims: list[Claim]
-    whole: bool
 
 
-# Expected seconds of judging a run, of an exact verdict, of a joint search and of a figure, until some are measured.
-RUN_JUDGED_S, VERDICT_S, SEARCH_S, FIGURE_S = 0.05, 0.001, 1.0, 0.13
+# Expected seconds of judging a run, of an exact verdict and of a figure, until some are measured.
+RUN_JUDGED_S, VERDICT_S, FIGURE_S = 0.05, 0.001, 0.13
 LOOK_PART = 0.5  # of the time of all first runs, expected of each later look: fewer of them, and longer
 
 
@@ -122,13 +108,12 @@ class Plan:
         return self._experiments[config]
 
     def expect(self, ahead: Ahead, most: int) -> None:
-        """Add the runs, verdicts, search, and looks up to so many realisations that are ahead."""
+        """Add the runs, verdicts, and looks up to so many realisations that are ahead."""
         self._looks = sum(n > self._n for n in looks(most))
         self._expect_runs(ahead, self._jobs)
         for claim in self._wanted.claims:
             own = self._paper.readings.of_claim(claim.id)
             ahead.add(f"verdict of {claim.id}", VERDICT_S, sum((claim.id, one) not in self._key for one in own))
-        ahead.add("search", SEARCH_S, self._wanted.whole)
 
     def _expect_runs(self, ahead: Ahead, keys: Iterable[tuple[str, ...]]) -> None:
         self._open = dict.fromkeys(keys)
@@ -356,11 +341,10 @@ def undecided(rows: Sequence[dict[str, Any]]) -> list[str]:
 
 @dataclass(frozen=True)
 class Read:
-    """Verdicts over the readings of a paper, and its joint search if the whole paper was requested."""
+    """Verdicts over the readings of a paper."""
 
     paper: Paper
     over: list[Over]
-    counted: Search | Joint | None = None
 
 
 @dataclass(repr=False)
@@ -394,8 +378,7 @@ class Readings(Shown):
         return {over.claim.id: page.specification(over) for over in several}
 
     def _said(self) -> list[str]:
-        lines = [f"{over.claim.id} {tr(over.outcome.kind)}: {over.sentence()}" for over in self.over if over.outcome]
-        return lines + [read.counted.sentence() for read in self.read if read.counted is not None]
+        return [f"{over.claim.id} {tr(over.outcome.kind)}: {over.sentence()}" for over in self.over if over.outcome]
 
 
 def papers(keys: Collection[str] = ()) -> dict[str, Paper]:
@@ -422,7 +405,7 @@ def asked(names: Sequence[str] = ()) -> list[Asked]:
         whole = not names or key in names
         claims = [one for one in paper.claims.claims if (whole or one.id in names) and paper.readings.open(one)]
         if claims:
-            found.append(Asked(paper, claims, whole))
+            found.append(Asked(paper, claims))
     return found
 
 
@@ -487,11 +470,7 @@ def judged(
         if decide:
             over = plan.decided(over, realisations or one.paper.readings.most, options, ahead, stop)
             left += [line for each in over if (line := _left(each))]
-        counted = None
-        if one.whole:
-            with ahead.doing("search"):
-                counted = _counted(one.paper, over)
-        read.append(Read(one.paper, over, counted))
+        read.append(Read(one.paper, over))
     made = Readings(read, Path(out) / PLACE.parent, left=tuple(left))
     if write:
         made.files = _write(made, figures, ahead)
@@ -553,12 +532,6 @@ def _left(over: Over) -> str:
     )
     open_, n = len(over.undecided), over.looked
     return f"{over.claim.id} not yet decided under {open_} readings at {n:,} realisations; {would}"
-
-
-def _counted(paper: Paper, over: list[Over]) -> Search | Joint:
-    """The joint search of a paper: over all readings that are computed at once, else over its declared ones."""
-    found = paper.readings.search()
-    return joint(paper.readings, over) if found is None else replace(found, asks={**found.asks, **paper.readings.asks})
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
@@ -625,12 +598,7 @@ def pages(done: Readings) -> str:
     """The page of each paper, one after the other."""
     from radarsim.report.claims import readings_page
 
-    return "\n".join(
-        readings_page.page(
-            read.paper.readings, read.paper.claims.paper, read.over, read.counted or _counted(read.paper, read.over)
-        )
-        for read in done.read
-    )
+    return "\n".join(readings_page.page(read.paper.readings, read.paper.claims.paper, read.over) for read in done.read)
 
 
 def documents(done: Readings) -> list[dict[str, Any]]:

@@ -629,7 +629,7 @@ def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
 
 
 def print_readings(done: "Readings", detailed: bool) -> None:
-    """A line for each claim, for single claims one for each reading too, and the joint search."""
+    """A line for each claim, for single claims one for each reading too."""
     from radarsim.report.claims import rule
 
     for read in done.read:
@@ -643,8 +643,6 @@ def print_readings(done: "Readings", detailed: bool) -> None:
             found = over.outcome
             words = tr(found.kind) if found else tr("not judged")  # on what it depends, the sentence says
             say(f"{over.claim.id:<6} {words:<28} {over.sentence()}")
-        if read.counted is not None:
-            say(f"{read.paper.readings.paper}: {read.counted.sentence()}")
     if done.files:
         curves = sum(name.endswith(".svg") for name in done.files)
         drawn = plural("{count} curve", "{count} curves", curves)

@@ -1,28 +1,11 @@
-"""Readings as data, the rule over them, the joint search and the page, on a small paper of our own."""
+"""Readings as data, the rule over them and the page, on a small paper of our own."""
 
 import dataclasses
-import re
 
-import numpy as np
-import pytest
-
-from radarsim.report.claims import Claim, Part, about, certain, printed, rule
+from radarsim.report.claims import Claim, Part, certain, printed, rule
 from radarsim.report.claims import over as data
 from radarsim.report.claims.declared import Missing
-from radarsim.report.claims.over import (
-    Alternative,
-    Choice,
-    Fine,
-    Over,
-    PaperReadings,
-    Printed,
-    Search,
-    columns,
-    depth,
-    joint,
-    rows,
-    under,
-)
+from radarsim.report.claims.over import Alternative, Choice, Over, PaperReadings, columns, depth, rows, under
 from radarsim.report.claims.readings_page import page
 from radarsim.report.claims.rule import AGAINST, CONFIRMED, DEPENDS, EQUIVALENT, REFUTED, UNDECIDED, UNSTATED
 from radarsim.report.statistics import Estimate
@@ -149,38 +132,6 @@ def test_depth_is_in_margins_with_its_sign():
     assert depth(over(of, claim(2, "1")).under[0])[0] == 0
 
 
-def test_printed_numbers_together():
-    """P9.1 prints 1 and 1.6, and may be of a square form; P9.2 prints 2. One reading cannot be done for P9.1."""
-    of = Small()
-    found = joint(of, [over(of, claim(1, "1", "1.6")), over(of, claim(2, "2"))])
-    by_name = {one.name: one for one in found.every}
-    assert [one.what for one in found.numbers.values()] == ["number 1", "number 1.6", "number 2"]
-    assert by_name["as shipped"].held == ()
-    assert by_name["as shipped"].count(granular=False) == by_name["as shipped"].count(granular=True) == 1
-    assert by_name["how large it is: two"].held == ("P9.2",)
-    assert len(by_name["how large it is: two"].outcomes) == 3
-    assert by_name["how large it is: two; its form: square"].judged == ("P9.2",)  # the form does not bear on it
-    assert found.every[0].count(granular=False) == 1
-    assert found.best(granular=False) is found.shipped  # of several with one, none nearer the shipped
-    windows = found.windows("scale")
-    assert list(windows.values()) == ["one", "none", "two"]
-
-
-def test_a_number_comes_out_by_its_interval():
-    """To the print, within its margin, undecided, beyond: by the whole interval, not by its middle."""
-    part = Part((), "number", "m", lambda seen: Estimate(*seen), about("10"))  # 9 … 11, the margin 1 too
-    coarse = dataclasses.replace(part, expected=about("10", margin=3.0))
-    one = Claim("P9.3", "somewhere", "about ten", (part, coarse))
-    came = {}
-    for name, seen in {"in": (10, 9.5, 10.5), "wide": (10, 8.7, 11), "beyond": (15, 14, 16)}.items():
-        found = under(Sampled(), one, Sampled().reading(), Ends(*seen))
-        own = joint(Sampled(), [Over(Sampled(), one, (found,))]).shipped
-        came[name] = [(number.strict, number.granular, number.open) for number in own.outcomes.values()]
-    assert came["in"] == [(True, True, False), (True, True, False)]
-    assert came["wide"] == [(False, False, True), (False, True, False)]
-    assert came["beyond"] == [(False, False, False), (False, False, False)]
-
-
 def test_what_is_open_says_what_would_decide_it():
     """Two readings of three are open: the harder one says how many it takes; the one against the print is not asked."""
     of, one = Sampled(), claim(2, "1")
@@ -197,64 +148,14 @@ def test_what_is_open_says_what_would_decide_it():
     assert (found.outcome.kind, found.outcome.needed, found.looked) == (UNDECIDED, needed, 1000)
     assert f"1 open at 1,000 realisations, about {rule.roughly(needed):,} would decide" in found.sentence()
     assert {row["needed"] for each in every[1:2] for row in rows(each, columns([of]))} == {needed}
-    assert found.still_open() in page(of, "Nobody 1900", [found], joint(of, [found]))
+    assert found.still_open() in page(of, "Nobody 1900", [found])
     assert over(Small(), claim(2, "1")).still_open() == ""
 
 
-def test_of_variants_one_suffices_and_void_parts_count_for_nothing():
-    parts = tuple(
-        Part((), text, "m", lambda seen: certain(seen), printed(text), number="one", variant=text)
-        for text in ("1", "2")
-    )
-    void = Part((), "void", "m", lambda seen: certain(seen), printed("5"), ceiling=lambda seen: 1.0)
-    ours = Part((), "ours", "m", lambda seen: certain(seen), printed("1"), asserted=False)
-    one = Claim("P9.4", "somewhere", "one or two", (*parts, void, ours))
-    found = under(Small(), one, Small().reading(), 2.0)
-    own = joint(Small(), [Over(Small(), one, (found,))]).shipped
-    ((number, came),) = own.outcomes.items()
-    assert number == ("P9.4", ": one")
-    assert (came.value, came.strict) == (2.0, True)
-
-
-@pytest.fixture
-def search():
-    """Two numbers over a grid of 3 by 2: what comes out is written down."""
-    strict = np.array([[[1, 0], [0, 1], [0, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=bool)
-    granular = strict | np.array([[[0, 0], [0, 0], [0, 0]], [[1, 0], [0, 0], [0, 0]]], dtype=bool)
-    numbers = [Printed("P9.1", f"number {i}", "m", str(i), (i, i), (i, i)) for i in range(2)]
-    axes = {"scale": ("1", "2", "3"), "form": ("round", "square")}
-    fine = {"scale": Fine([1.0, 1.5, 2.0, 2.5], np.array([[1, 1, 0, 0], [0, 1, 0, 1]], dtype=bool))}
-    values = np.arange(12.0).reshape(2, 3, 2)
-    asks = {"scale": "how large it is"}
-    return Search(numbers, axes, {"scale": "1", "form": "round"}, strict, granular, values, fine, asks=asks)
-
-
-def test_the_best_combination(search):
-    assert search.readings == 6
-    assert search.place == (0, 0)
-    assert search.count(granular=False).tolist() == [[1, 0], [1, 2], [0, 2]]
-    assert search.best(granular=False) == (1, 1)  # of two with two, none nearer the shipped: the first
-    assert search.words((1, 1)) == "how large it is: 2; form: square"
-    assert "6 readings" in search.sentence()
-    assert "as shipped 1 of 2 match to the printed digit, 2 with how large it is: 2; form: square" in search.sentence()
-
-
-def test_windows(search):
-    assert search.windows("scale") == ["1 … 1.5", "1.5, 2.5"]
-    assert search.windows("form") == ["round", "none"]
-
-
-def test_the_page_holds_it_all(search):
+def test_page_lists_claims_impossible_readings_and_open_choices():
     of = Small()
-    text = page(of, "Nobody 1900", [over(of, claim(1, "1")), over(of, claim(2, "10"))], search)
+    text = page(of, "Nobody 1900", [over(of, claim(1, "1")), over(of, claim(2, "10"))])
     assert "| P9.1 |" in text
     assert "no square is so large" in text
     assert "> nichts" in text
     assert "| ten | N | not as printed |" in text
-    table = re.findall(r"^\| P9.1 \| number 0 \|.*$", text, flags=re.MULTILINE)
-    assert table
-    every = [over(of, claim(2, "1"))]
-    without = page(of, "Nobody 1900", every, joint(of, every))
-    assert "3 readings: as shipped 1 of 1 numbers match the print, and no reading" in without
-    assert re.search(r"^\| as shipped \| E \| 1 of 1 \|", without, flags=re.MULTILINE)
-    assert "| P9.2 | number 1 | 1 ± 0.5 m | **1** |" in without

@@ -4,11 +4,6 @@ An alternative is equivalent to the print in every respect (E), one of what the 
 print (N). The first alternative of a choice is what the shipped configs take. A verdict is robust if it is the same
 in all E and U readings; N shows what would have to be changed.
 
-The joint search: which readings of a paper give most of the numbers that it prints.
-
-Every number is computed under every combination of the choices' values. A number comes out under the strict rule if it
-rounds to what is printed, and under the granular one if it is as near as the print's own steps allow.
-
 Claims as they are written in YAML beside a study: statement, place, and what is measured by which function.
 
     - id: 4
@@ -24,13 +19,7 @@ cases under `of`, and the arguments that are given by name. `expected` names a f
 a value of `names:`, or of `each:`, which makes a part of every combination of its values; `"a, b":` takes several at
 once. An argument that is none of the function's is a fault with file and line, as in a config.
 
-Verdicts on a claim under every reading of its paper: the table readings.csv, and what the claim depends on.
-
-The joint search over declared readings: under which of them most of what a paper prints comes out.
-
-What is counted is every number, limit or comparison that the claims assert, once each: of variants of a number one
-suffices. Under the strict rule it comes out if its interval, or its exact value, lies in the range that the print
-rounds to, under the granular one if it lies within the margin of its words."""
+Verdicts on a claim under every reading of its paper: the table readings.csv, and what the claim depends on."""
 
 import inspect
 import itertools
@@ -45,8 +34,6 @@ from pathlib import Path
 from string import Template
 from types import ModuleType, UnionType
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin
-
-import numpy as np
 
 from radarsim import failures
 from radarsim.config.check import check
@@ -242,10 +229,6 @@ class PaperReadings(ABC):
         """Whether the evidence for a claim is exact under a reading, so that nothing is run. Default: no."""
         return False
 
-    def search(self) -> "Search | None":
-        """The printed numbers of the paper under many readings at once. Default: none."""
-        return None
-
 
 def in_words(taken: Mapping[str, str], asks: Mapping[str, str]) -> str:
     """What is taken of choices in place of the default, for people."""
@@ -274,129 +257,6 @@ class Seen:
     ran: Sequence[CaseResult]
     tables: Mapping[str, Any]
     places: Mapping[str, Mapping[str, set[int]]]
-
-
-# ---- search ----------------------------------------------------------------------------------------------------------
-TO_THE_DIGIT = term("as shipped {count} of {of} match to the printed digit")
-TO_THE_STEPS = term("as shipped {count} of {of} match to the steps of the print")
-
-
-@dataclass(frozen=True)
-class Printed:
-    """A number that a paper prints: its claim, its description, and the values that count as equal to it."""
-
-    claim: str
-    what: str
-    unit: str
-    printed: str
-    strict: tuple[float, float]
-    granular: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Fine:
-    """The strict rule on a finer grid of one choice, all others as shipped: values (m) and strict (n, m)."""
-
-    values: Sequence[float]
-    strict: np.ndarray
-
-
-@dataclass(frozen=True)
-class Search:
-    """Printed numbers (n) under all combinations of the values of some choices.
-
-    axes: key of a choice → its values, the shipped one given by `shipped`. strict and granular (n, *lengths of axes):
-    whether a number is reproduced; `values`: the numbers. fine: for choices whose values are numbers without steps.
-    read_as: strict and granular in words. asks: the choices in words, by key; of a study, its further ones."""
-
-    printed: Sequence[Printed]
-    axes: Mapping[str, Sequence[str]]
-    shipped: Mapping[str, str]
-    strict: np.ndarray
-    granular: np.ndarray
-    values: np.ndarray
-    fine: Mapping[str, Fine] = field(default_factory=dict)
-    read_as: str = ""
-    asks: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def readings(self) -> int:
-        """The number of combinations."""
-        return int(self.strict[0].size)
-
-    @cached_property
-    def place(self) -> tuple[int, ...]:
-        """The index of the shipped combination."""
-        return tuple(list(values).index(self.shipped[key]) for key, values in self.axes.items())
-
-    def count(self, granular: bool) -> np.ndarray:
-        """How many printed numbers are reproduced, for every combination."""
-        return (self.granular if granular else self.strict).sum(axis=0)
-
-    def best(self, granular: bool) -> tuple[int, ...]:
-        """The combination with most numbers; of several, most under the other rule, then nearest the shipped."""
-        own, other = self.count(granular), self.count(not granular)
-        score = own.astype(np.int64) * (len(self.printed) + 1) + other
-        tied = np.argwhere(score == score.max())
-        changed = (tied != np.array(self.place)).sum(axis=1)
-        return tuple(int(i) for i in tied[np.argmin(changed)])
-
-    def taken(self, place: tuple[int, ...]) -> dict[str, str]:
-        """The values of the choices in a combination."""
-        return {key: values[i] for (key, values), i in zip(self.axes.items(), place, strict=True)}
-
-    def measured(self, place: tuple[int, ...]) -> np.ndarray:
-        """The numbers (n,) in a combination."""
-        return np.moveaxis(self.values, 0, -1)[place]
-
-    def sentence(self) -> str:
-        """The result of the search."""
-        of, place = len(self.printed), self.place
-        parts = []
-        for granular, sentence in ((False, TO_THE_DIGIT), (True, TO_THE_STEPS)):
-            count = self.count(granular)
-            best = int(count.max())
-            own = int(count[place])
-            words = tr(sentence, count=own, of=of)
-            if best > own:
-                words += tr(", {count} with {name}", count=best, name=self.words(self.best(granular)))
-            else:
-                words += tr(", and no reading gives more")
-            parts.append(words)
-        return tr("{count:,} readings: {said}.", count=self.readings, said="; ".join(parts))
-
-    def words(self, place: tuple[int, ...]) -> str:
-        """How a combination differs from the shipped one."""
-        other = {key: value for key, value in self.taken(place).items() if value != self.shipped[key]}
-        return in_words(other, self.asks)
-
-    def windows(self, key: str) -> list[str]:
-        """The values of one choice, all others as shipped, at which each number equals the printed digits."""
-        if key in self.fine:
-            fine = self.fine[key]
-            return [_intervals(fine.values, row) for row in fine.strict]
-        axis = list(self.axes).index(key)
-        place: list[int | slice] = list(self.place)
-        place[axis] = slice(None)
-        values = self.axes[key]
-        rows = self.strict[(slice(None), *place)]
-        return [_listed_numbers(values, row) for row in rows]
-
-
-def _intervals(values: Sequence[float], held: np.ndarray) -> str:
-    """Runs of a grid in which something holds: `0.00083 … 0.001`."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], held.astype(int), [0]])))
-    runs = [(values[a], values[b - 1]) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    return ", ".join(f"{a:.3g}" if a == b else f"{a:.3g} … {b:.3g}" for a, b in runs) or "none"
-
-
-def _listed_numbers(values: Sequence[str], held: np.ndarray) -> str:
-    if held.all():
-        return "all"
-    try:
-        return _intervals([float(value) for value in values], held)
-    except ValueError:
-        return ", ".join(value for value, holds in zip(values, held, strict=True) if holds) or "none"
 
 
 # ---- written ---------------------------------------------------------------------------------------------------------
@@ -978,187 +838,3 @@ def _depth(judged: Judged) -> tuple[float, float, float]:
     ends = rule.ends(judged)
     every = [of(value) for value in (*ends, judged.value)]
     return of(judged.value), min(every), max(every)
-
-
-# ---- joint -----------------------------------------------------------------------------------------------------------
-Key = tuple[str, str]  # the claim, and the number within it
-
-TO_THE_PRINT = term("as shipped {count} of {of} numbers match the print")
-WITHIN = term("as shipped {count} of {of} numbers are within the margins of the words")
-
-
-@dataclass(frozen=True)
-class JointOutcome:
-    """A printed number under a reading: its value, and by which rule it is reproduced.
-
-    open: its interval is too wide to tell whether it lies within the margin."""
-
-    value: float
-    strict: bool
-    granular: bool
-    open: bool
-
-
-@dataclass(frozen=True)
-class Asserted:
-    """A number that a paper prints: claim, description, words and unit."""
-
-    claim: str
-    what: str
-    words: str
-    unit: str
-
-
-@dataclass(frozen=True)
-class Together:
-    """A reading with the claims that hold and were judged under it, and the outcome of every number."""
-
-    reading: Reading
-    name: str
-    kind: str
-    held: tuple[str, ...]
-    judged: tuple[str, ...]
-    outcomes: Mapping[Key, JointOutcome]
-
-    def count(self, granular: bool) -> int:
-        """How many numbers are reproduced."""
-        return sum(one.granular if granular else one.strict for one in self.outcomes.values())
-
-    @property
-    def open(self) -> int:
-        """How many numbers are not known to lie within their margin."""
-        return sum(one.open for one in self.outcomes.values())
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A paper's printed numbers under all declared readings: the readings, and the numbers by key."""
-
-    of: PaperReadings
-    every: tuple[Together, ...]
-    numbers: Mapping[Key, Asserted]
-
-    @property
-    def shipped(self) -> Together:
-        """The reading of the shipped configs."""
-        return self._of(self.of.reading())
-
-    def best(self, granular: bool) -> Together:
-        """The reading with most numbers; of several, most under the other rule, then nearest the shipped."""
-        allowed = [one for one in self.every if one.kind != rule.AGAINST]
-        return max(
-            allowed, key=lambda one: (one.count(granular), one.count(not granular), -changed(self.of, one.reading))
-        )
-
-    def _of(self, reading: Reading) -> Together:
-        return next(one for one in self.every if one.reading == reading)
-
-    def sentence(self) -> str:
-        """The result of the search."""
-        said = []
-        for granular, words in ((False, TO_THE_PRINT), (True, WITHIN)):
-            own, best = self.shipped, self.best(granular)
-            text = tr(words, count=own.count(granular), of=len(own.outcomes))
-            if best.count(granular) > own.count(granular):
-                text += tr(
-                    ", {count} of {of} with {name}", count=best.count(granular), of=len(best.outcomes), name=best.name
-                )
-            else:
-                text += tr(", and no reading that the paper allows gives more")
-            said.append(text)
-        return tr("{count:,} readings: {said}.", count=len(self.every), said="; ".join(said))
-
-    def windows(self, key: str) -> dict[Key, str]:
-        """The alternatives of a choice, all others as shipped, under which each number is reproduced as printed."""
-        choice = next(one for one in self.of.choices if one.key == key)
-        names = [one.name for one in choice.alternatives]
-        alone = {name: self.of.reading(**{key: name}) for name in names}
-        known = {one.reading: one for one in self.every}
-        found = {}
-        for number in self.numbers:
-            tried = {name: known[of].outcomes.get(number) for name, of in alone.items() if of in known}
-            found[number] = _listed_readings(
-                {name: outcomes.strict for name, outcomes in tried.items() if outcomes is not None}
-            )
-        return found
-
-
-def _listed_readings(held: Mapping[str, bool]) -> str:
-    yes = [name for name, holds in held.items() if holds]
-    no = [name for name, holds in held.items() if not holds]
-    if not no:
-        return "all"
-    if not yes:
-        return "none"
-    return f"all but {', '.join(no)}" if len(no) < len(yes) else ", ".join(yes)
-
-
-def joint(of: PaperReadings, over: Sequence[Over]) -> Joint:
-    """The joint search of a paper over its claims' readings, those with most numbers first.
-
-    The readings are the declared ones of a claim, and all combinations of E and U under which every claim was judged:
-    with the verdict of the reading restricted to the choices that affect it."""
-    over = [one for one in over if one.claim.counted]
-    claims = [{one.reading: _Own(one) for one in claim.under if one.outcome is not None} for claim in over]
-    declared = dict.fromkeys(one.reading for claim in over for one in claim.under)
-    varied = [choice for choice in of.choices if any(choice.bears_on(claim.claim.id) for claim in over)]
-    found = []
-    for reading in dict.fromkeys([*declared, *of.combined(varied)]):
-        at = [own.get(of.bearing(reading, claim.claim.id)) for claim, own in zip(over, claims, strict=True)]
-        own = [one for one in at if one is not None]
-        if len(own) < len(at) and reading not in declared:
-            continue
-        held = tuple(one.under.claim.id for one in own if one.held)
-        outcomes = {key: value for one in own for key, value in one.outcomes.items()}
-        judged = tuple(one.under.claim.id for one in own)
-        found.append(Together(reading, of.said(reading), of.kind(reading), held, judged, outcomes))
-    found.sort(key=lambda one: (-one.count(False), -one.count(True), -len(one.held), changed(of, one.reading)))
-    numbers: dict[Key, Asserted] = {}
-    for key, asserted in (item for own in claims for one in own.values() for item in one.numbers.items()):
-        numbers.setdefault(key, asserted)  # a number is named as in the first reading, the shipped one
-    return Joint(of, tuple(found), numbers)
-
-
-def changed(of: PaperReadings, reading: Reading) -> int:
-    """In how many choices a reading differs from the shipped configs."""
-    return sum(reading[choice.key] != choice.default for choice in of.choices)
-
-
-class _Own:
-    """A claim under one reading: whether it holds, its numbers, and their outcome."""
-
-    def __init__(self, under: Under):
-        self.under = under
-        self.held = under.outcome is not None and under.outcome.kind == rule.CONFIRMED
-        parts = _numbers(under)
-        self.outcomes = {key: _outcome(under, own) for key, own in parts.items()}
-        self.numbers = {
-            key: Asserted(under.claim.id, part.what, part.expected.words, part.unit)
-            for key, ((part, _), *_) in parts.items()
-        }
-
-
-def _numbers(one: Under) -> dict[Key, list[tuple[Part, Judged]]]:
-    """The parts that the paper asserts, by their number; a void one tests nothing."""
-    found: dict[Key, list[tuple[Part, Judged]]] = {}
-    for place, (part, judged) in enumerate(one.parts):
-        if part.asserted and not judged.void:
-            number = f"{part.statement}: {part.number}" if part.number else f"#{place}"
-            found.setdefault((one.claim.id, number), []).append((part, judged))
-    return found
-
-
-def _outcome(one: Under, parts: Sequence[tuple[Part, Judged]]) -> JointOutcome:
-    many = sum(judged.sampled for _, judged in one.parts)
-    return max(
-        (_one(part, judged, many) for part, judged in parts), key=lambda outcomes: (outcomes.strict, outcomes.granular)
-    )
-
-
-def _one(part: Part, judged: Judged, many: int) -> JointOutcome:
-    lo, hi = rule.ends(judged, many)
-    low, high = judged.expected_lo - judged.margin, judged.expected_hi + judged.margin
-    slack = rule.ROUNDING * judged.margin
-    strict = part.expected.strict[0] - slack <= lo and hi <= part.expected.strict[1] + slack
-    granular = low - slack <= lo and hi <= high + slack
-    return JointOutcome(judged.value, strict, granular, not granular and not (hi < low or lo > high))

@@ -16,12 +16,12 @@ from radarsim.bursts import burst
 from radarsim.config.experiment import Case
 from radarsim.report.claims import Evidence, certain
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
-from radarsim.report.claims.over import PaperReadings, Reading, Search, Seen, Unreadable, choices_in
+from radarsim.report.claims.over import PaperReadings, Reading, Seen, Unreadable, choices_in
 from radarsim.report.claims.rule import AGAINST
 from radarsim.report.statistics import Estimate
-from radarsim.studies.discriminator import measures, search
+from radarsim.studies.discriminator import burst_versions, measures
+from radarsim.studies.discriminator.burst_versions import BURST, LEAST_RATIO, PRINTED_PRIOR, Version
 from radarsim.studies.discriminator.measures import COMPONENTS, COMPUTED, PRINTED
-from radarsim.studies.discriminator.search import BURST, LEAST_RATIO, PRINTED_PRIOR, Version
 
 SHIPPED_NOISE = measures.READINGS[COMPUTED][0]
 OTHER_THRESHOLD = {0.5: 1.0, 1.0: 0.5}
@@ -81,9 +81,6 @@ class Readings(PaperReadings):
             return ExactEvidence(reading)
         return super().evidence(claim, reading, seen, of)
 
-    def search(self) -> Search:
-        return search.search()
-
 
 def _is_swept(case: Case, key: str, value: float) -> bool:
     """Whether a case varies this key alone, and takes this value."""
@@ -120,11 +117,11 @@ def version(reading: Reading) -> Version:
         float(reading["threshold"]),
         float(reading["factor"]),
         PRINTED_PRIOR if reading["forecast"] == "numbers" else None,
-        cast(search.Phase, reading["first_phase"]),
-        cast(search.Rounding, reading["rounding"]),
-        cast(search.Curvature, reading["curvature"]),
+        cast(burst_versions.Phase, reading["first_phase"]),
+        cast(burst_versions.Rounding, reading["rounding"]),
+        cast(burst_versions.Curvature, reading["curvature"]),
         int(reading["pulses"]),
-        cast(search.Sum, reading["sum"]),
+        cast(burst_versions.Sum, reading["sum"]),
     )
 
 
@@ -136,7 +133,7 @@ def _designed() -> Mapping[Version, tuple[np.ndarray, list[int] | None]]:
     """Spreads and windows of every version that a declared reading asks for, all at once."""
     of = Readings()
     plain = {version(one) for claim in ("P4.1", *WINDOWS) for one in of.of_claim(claim)}
-    found = search.designed(BURST, every := list(plain))
+    found = burst_versions.designed(BURST, every := list(plain))
     return {one: (spreads, own) for one, spreads, own in zip(every, found.spreads, found.windows, strict=True)}
 
 
@@ -149,14 +146,14 @@ def _scaled() -> Mapping[tuple[Version, float], int | None]:
     for one, scale in every:
         sigma = one.sigma or tuple(np.array(BURST.multiples) * _designed()[one][0])
         asked.append(one._replace(sigma=tuple(scale * float(value) for value in sigma)))
-    first = search.first_windows(BURST, asked)
+    first = burst_versions.first_windows(BURST, asked)
     return {key: int(n) or None for key, n in zip(every, first, strict=True)}
 
 
 def windows(own: Version) -> list[int]:
     """The windows of a version in pulses; raises Unreadable where there are none."""
     known = _designed()
-    found = known[own][1] if own in known else search.designed(BURST, [own]).windows[0]
+    found = known[own][1] if own in known else burst_versions.designed(BURST, [own]).windows[0]
     if found is None:
         raise Unreadable(NO_ROOT)
     return found
@@ -185,11 +182,11 @@ class ExactEvidence(measures.Evidence):
 
     def worst_handover(self, key: Any) -> Estimate:
         """The largest probability over the hand-overs that Z passes c, by its own law; the last one is cut short."""
-        weights = search.handovers(BURST, self._version, windows(self._version)[:-1])
+        weights = burst_versions.handovers(BURST, self._version, windows(self._version)[:-1])
         return certain(max(burst.tail_probability(one, self._lobe) for one in weights))
 
     def phase_offsets(self, key: Any) -> np.ndarray:
-        return search.phase_offsets(BURST, self._version, windows(self._version))
+        return burst_versions.phase_offsets(BURST, self._version, windows(self._version))
 
     def shortest_window(self, key: Any, amplitude: float) -> Estimate:
         """T_min (17), ms: one sample a pulse."""

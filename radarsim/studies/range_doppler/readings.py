@@ -11,11 +11,11 @@ import numpy as np
 
 from radarsim.report.claims import Series, same
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
-from radarsim.report.claims.over import PaperReadings, Reading, Search, Seen, choices_in, of_other_cases
+from radarsim.report.claims.over import PaperReadings, Reading, Seen, choices_in, of_other_cases
 from radarsim.report.statistics import Estimate
-from radarsim.studies.range_doppler import measures, search
+from radarsim.studies.range_doppler import filter_versions, measures
+from radarsim.studies.range_doppler.filter_versions import Form, Start, Version
 from radarsim.studies.range_doppler.measures import RADARS
-from radarsim.studies.range_doppler.search import Form, Start, Version
 from radarsim.threads import mapping
 
 ENDS = "P1.5"
@@ -56,9 +56,6 @@ class Readings(PaperReadings):
     def evidence(self, claim: Claim, reading: Reading, seen: Seen | None, of: PaperClaims) -> "ExactEvidence":
         return _evidence(reading)
 
-    def search(self) -> Search:
-        return search.search()
-
     def versions(self) -> list[Version]:
         """Every version of the filters that a declared reading asks for, with the D_M of the shipped sweep."""
         found: dict[Version, None] = {}
@@ -86,7 +83,7 @@ def _table() -> Mapping[int, Mapping[Version, "_Sigmas"]]:
     versions = Readings().versions()
 
     def of_radar(number: int) -> dict[Version, _Sigmas]:
-        found = search.both(RADARS[number], versions, LONG)
+        found = filter_versions.both(RADARS[number], versions, LONG)
         return {
             one: _Sigmas(*(tuple(e.true[i] for e in found), tuple(e.believed[i] for e in found)))
             for i, one in enumerate(versions)
@@ -152,8 +149,8 @@ class ExactEvidence(measures.Evidence):
         """Relative gain of the filter with velocity, %, from the scan at which it has filtered."""
         place = key, "", component
         if place not in self._curves:
-            gain = search.gain(*self._sigma(key, component))
-            gain[: search.first_scan(self._start, 2) - 1] = np.nan
+            gain = filter_versions.gain(*self._sigma(key, component))
+            gain[: filter_versions.first_scan(self._start, 2) - 1] = np.nan
             self._curves[place] = self._cut(key, gain)
         return self._curves[place]
 

@@ -1,4 +1,4 @@
-"""The windows of many readings at once against the designer of one, and the joint search's finding."""
+"""The windows of many readings at once against the designer of one."""
 
 import math
 
@@ -7,9 +7,9 @@ import pytest
 
 from radarsim.bursts import burst as model
 from radarsim.bursts.burst import Condition, Designer
-from radarsim.studies.discriminator import search
+from radarsim.studies.discriminator import burst_versions
+from radarsim.studies.discriminator.burst_versions import Version
 from radarsim.studies.discriminator.readings import BURST, PRINTED_PRIOR
-from radarsim.studies.discriminator.search import Version
 from tests.tolerances import rounding, scaled_condition
 
 POWERS = 2.1e5  # κ of five powers of time, each in its own unit
@@ -34,22 +34,22 @@ def one_at_a_time(version, pulses=30000):
     ids=["as printed", "computed", "c = 1", "little noise"],
 )
 def test_windows_are_those_of_the_designer(version):
-    (found,) = search.designed(BURST, [version]).windows
+    (found,) = burst_versions.designed(BURST, [version]).windows
     assert found == one_at_a_time(version)
 
 
 @pytest.mark.slow
 def test_versions_do_not_disturb_one_another():
     every = [SHIPPED, COMPUTED, SHIPPED._replace(phase="kept"), COMPUTED._replace(rounding="up")]
-    together = search.designed(BURST, every)
+    together = burst_versions.designed(BURST, every)
     for i, one in enumerate(every):
-        alone = search.designed(BURST, [one])
+        alone = burst_versions.designed(BURST, [one])
         assert alone.windows[0] == together.windows[i]
         np.testing.assert_allclose(alone.spreads[0], together.spreads[i], rtol=rounding(POWERS, 5))
 
 
 def test_the_sum_pulse_by_pulse_is_the_sum():
-    found = search.designed(BURST, [COMPUTED._replace(pulses=n, sum="pulse by pulse") for n in (29999, 777)])
+    found = burst_versions.designed(BURST, [COMPUTED._replace(pulses=n, sum="pulse by pulse") for n in (29999, 777)])
     for n, spreads in zip((29999, 777), found.spreads, strict=True):
         t = 1e-5 * np.arange(n)
         rows = np.stack([np.ones(n), *(2 * np.pi * t**j / math.factorial(j) for j in range(1, 5))])
@@ -59,20 +59,20 @@ def test_the_sum_pulse_by_pulse_is_the_sum():
 
 
 def test_with_the_phase_in_it_the_first_problem_has_no_root():
-    assert search.designed(BURST, [SHIPPED._replace(phase="kept")]).windows == [None]
-    assert search.first_windows(BURST, [SHIPPED._replace(phase="kept"), SHIPPED]).tolist() == [0, 179]
+    assert burst_versions.designed(BURST, [SHIPPED._replace(phase="kept")]).windows == [None]
+    assert burst_versions.first_windows(BURST, [SHIPPED._replace(phase="kept"), SHIPPED]).tolist() == [0, 179]
 
 
 def test_rounding_up_and_down_are_one_pulse_apart():
-    up, down = search.first_windows(BURST, [COMPUTED._replace(rounding=name) for name in ("up", "down")])
-    nearest = search.first_windows(BURST, [COMPUTED])[0]
+    up, down = burst_versions.first_windows(BURST, [COMPUTED._replace(rounding=name) for name in ("up", "down")])
+    nearest = burst_versions.first_windows(BURST, [COMPUTED])[0]
     assert up == down + 1
     assert nearest in (up, down)
 
 
 def test_one_reading_gives_spreads_first_window_and_twelve():
-    joint = Version(2.25, 1.0, 3.0, PRINTED_PRIOR, "left out of the problem", "up", "next", 29999, "pulse by pulse")
-    found = search.designed(BURST, [joint, joint._replace(curvature="as printed")])
+    version = Version(2.25, 1.0, 3.0, PRINTED_PRIOR, "left out of the problem", "up", "next", 29999, "pulse by pulse")
+    found = burst_versions.designed(BURST, [version, version._replace(curvature="as printed")])
     printed = ("0.061", "0.45", "12.2", "183.38", "1213.04")
     for text, value in zip(printed, found.spreads[0], strict=True):
         assert f"{value:.{len(text.partition('.')[2])}f}" == text
@@ -80,18 +80,3 @@ def test_one_reading_gives_spreads_first_window_and_twelve():
     assert defined[0] == as_printed[0] == 179  # 1.79 ms
     assert len(defined) - 1 == 12  # after the first
     assert len(as_printed) == 12  # in all
-
-
-@pytest.mark.slow
-def test_the_search_says_so():
-    found = search.search()
-    assert found.readings > 500
-    assert found.count(granular=False)[found.place] == 2
-    best = found.best(granular=False)
-    assert found.count(granular=False)[best] == 7 == found.count(granular=False).max()
-    taken = found.taken(best)
-    assert (taken["noise_variance"], taken["threshold"], taken["pulses"]) == ("2.25", "1", "29999")
-    missed = [
-        one.what for one, holds in zip(found.printed, found.strict[(slice(None), *best)], strict=True) if not holds
-    ]
-    assert missed == ["shortest window"]  # which needs the noise that is printed

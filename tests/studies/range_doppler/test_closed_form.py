@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from radarsim.studies.range_doppler import filters, search
+from radarsim.studies.range_doppler import filter_versions, filters
 from radarsim.studies.range_doppler.measures import RADARS
 from tests.tolerances import assert_rounded, rounding, scaled_condition
 
@@ -12,8 +12,8 @@ VERSION = [("random_jerk", 1e-3, "weighted")]
 
 
 def gains(radar, variance, scans=15):
-    base, own = search.both(radar, [("random_jerk", variance, "weighted")], scans)
-    return search.gain(base.true[0], own.true[0])[2:]
+    base, own = filter_versions.both(radar, [("random_jerk", variance, "weighted")], scans)
+    return filter_versions.gain(base.true[0], own.true[0])[2:]
 
 
 @pytest.mark.slow
@@ -85,7 +85,7 @@ def test_the_limit_is_that_of_the_recursion_for_fast_scans(c):
     for share in (0.02, 0.01):
         both = [filters.steady_state(observes, variance, sigma, share * memory)[1] for observes in (1, 2)]
         base, own = (np.sqrt(np.diag(S)) for S in both)
-        away.append(search.gain(base, own) - filters.steady_gains(c))
+        away.append(filter_versions.gain(base, own) - filters.steady_gains(c))
     # Of first order in Δt; the next is smaller by the step in memories of the fastest root, √2 c^(1/4)/τ₂.
     step = np.sqrt(2) * max(c, 1) ** 0.25 * share
     assert np.abs(2 * away[1] - away[0]).max() < 2 * step * np.abs(away[0]).max()
@@ -104,12 +104,12 @@ def test_a_target_that_moves_as_believed_never_loses_by_the_velocity():
     variances = (1e-4, 1e-3, 1e-2)
     for radar in RADARS.values():
         for start, from_scan in (("process_noise", 0), ("weighted", 40)):
-            base, own = search.both(radar, [("random_jerk", v, start) for v in variances], 120)
-            least = np.nanmin(search.gain(base.believed, own.believed)[:, from_scan:])
+            base, own = filter_versions.both(radar, [("random_jerk", v, start) for v in variances], 120)
+            least = np.nanmin(filter_versions.gain(base.believed, own.believed)[:, from_scan:])
             assert least > -100 * rounding(operations=4)  # it is 0 at the first plot
     # Two that ignore the manoeuvre while they start, one over two scans and one over three, are not comparable.
-    base, own = search.both(RADARS[1], [("random_jerk", 1e-2, "weighted")], 60)
-    assert np.nanmin(search.gain(base.believed, own.believed)) < -1
+    base, own = filter_versions.both(RADARS[1], [("random_jerk", 1e-2, "weighted")], 60)
+    assert np.nanmin(filter_versions.gain(base.believed, own.believed)) < -1
     # And the same filters lose on a truth that does not manoeuvre, where c is small.
-    base, own = search.both(RADARS[1], VERSION, 60)
-    assert np.nanmin(search.gain(base.true, own.true)[:, 40:]) < -1
+    base, own = filter_versions.both(RADARS[1], VERSION, 60)
+    assert np.nanmin(filter_versions.gain(base.true, own.true)[:, 40:]) < -1

@@ -1,23 +1,17 @@
-"""Which choices give most of the numbers that P4 prints: spreads and windows of thousands of readings, exactly.
-
-The windows of many readings of the paper at once: (14)–(16) for arrays of noise, threshold, prior and the rest.
+"""The windows of many versions of a burst and of (14)–(16) at once: arrays of noise, threshold, prior and the rest.
 
 `bursts/burst.py` does it for one burst, in every option of a config; this does it for real samples, one a pulse, in the
 options that the paper leaves open. The tests hold the one against the other."""
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from radarsim.bursts.burst import MOST_WINDOWS
-from radarsim.report.claims.over import Printed, Search
-from radarsim.studies.discriminator.measures import ESTIMATE, SPREADS
 
-# ---- versions --------------------------------------------------------------------------------------------------------
 Phase = Literal["left out of the form", "left out of the problem", "kept"]
 Curvature = Literal["next", "as printed", "before"]
 Rounding = Literal["nearest", "up", "down"]
@@ -29,7 +23,7 @@ CLOSE = 1e-7  # pulses
 
 
 class Version(NamedTuple):
-    """One reading of the burst and of (14)–(16).
+    """One way to take the burst and (14)–(16).
 
     sigma: the forecast's spreads, (size,), rad, Hz, …; None: `multiples` of the potential ones. curvature: which window
     H of (16) belongs to. The phase is that of the first window's problem (15)."""
@@ -56,6 +50,11 @@ class Burst:
     @property
     def size(self) -> int:
         return len(self.multiples)
+
+
+BURST = Burst(1e-5, (100.0, 150.0, 500.0, 1000.0, 2000.0))  # of the paper's example
+PRINTED_PRIOR = (6.1, 67.5, 6.1e3, 183.38e3, 2.426e6)  # rad, Hz, Hz/s, Hz/s², Hz/s³
+LEAST_RATIO = 5.0  # μ_min
 
 
 def first_windows(burst: Burst, versions: Sequence[Version]) -> np.ndarray:
@@ -257,77 +256,3 @@ def _inverse(A: np.ndarray) -> np.ndarray:
     scale = 1 / np.sqrt(np.diagonal(A, axis1=1, axis2=2))
     balance = scale[:, :, None] * scale[:, None, :]
     return np.linalg.inv(A * balance) * balance
-
-
-# ---- search ----------------------------------------------------------------------------------------------------------
-BURST = Burst(1e-5, (100.0, 150.0, 500.0, 1000.0, 2000.0))
-PRINTED_PRIOR = (6.1, 67.5, 6.1e3, 183.38e3, 2.426e6)  # rad, Hz, Hz/s, Hz/s², Hz/s³
-LEAST_RATIO = 5.0  # μ_min
-NOISES, THRESHOLDS, FACTORS = ("9", "2.25"), ("0.5", "1"), ("3", "2.326")
-FORECASTS = {"numbers": PRINTED_PRIOR, "multiples": None}
-AMPLITUDES = {"1.17": ESTIMATE, "1": 1.0}
-COUNTED = ("after the first", "in all")
-AXES: dict[str, tuple[str, ...]] = {
-    **{"noise_variance": NOISES, "threshold": THRESHOLDS, "factor": FACTORS, "forecast": tuple(FORECASTS)},
-    **{"first_phase": get_args(Phase), "rounding": get_args(Rounding)},
-    **{"curvature": get_args(Curvature), "pulses": ("30000", "29999"), "sum": get_args(Sum)},
-}
-FURTHER = {"counted": COUNTED, "amplitude": tuple(AMPLITUDES)}
-ASKS = {"amplitude": "the amplitude"}
-SHARE = 0.01  # of a number, under the granular rule
-READ_AS = "To the digit: what rounds to the print. To the steps of the print: within 1 % of it."
-
-
-def _printed(claim: str, what: str, unit: str, text: str) -> Printed:
-    value, half = float(text), 0.5 * 10.0 ** -len(text.partition(".")[2])
-    wide = max(half, SHARE * value)
-    return Printed(claim, what, unit, text, (value - half, value + half), (value - wide, value + wide))
-
-
-PRINTED = (
-    *(_printed("P4.1", f"potential spread of {name}", unit, text) for name, (text, unit) in SPREADS.items()),
-    _printed("P4.2", "first window", "ms", "1.79"),
-    _printed("P4.2", "shortest window", "ms", "1.31"),
-    _printed("P4.3", "iterations", "", "12"),
-)
-
-
-def search() -> Search:
-    """The eight printed numbers under every combination of the choices."""
-    every = [_version(*names) for names in itertools.product(*AXES.values())]
-    found = designed(BURST, every)
-    first = np.array([own[0] if own else np.nan for own in found.windows])
-    count = np.array([len(own) if own else np.nan for own in found.windows])
-    noise = np.array([one.noise_variance for one in every])
-    shape = tuple(len(values) for values in (*AXES.values(), *FURTHER.values()))
-    values = np.empty((len(PRINTED), len(every), len(COUNTED), len(AMPLITUDES)), dtype=np.float64)
-    values[:5] = found.spreads.T[:, :, None, None]
-    values[5] = 1e3 * BURST.period_s * first[:, None, None]
-    shortest = [4 * LEAST_RATIO * 1e3 * BURST.period_s * noise / amplitude**2 for amplitude in AMPLITUDES.values()]
-    values[6] = np.array(shortest).T[:, None, :]
-    values[7] = np.stack([count - 1, count], axis=1)[:, :, None]
-    values = values.reshape(len(PRINTED), *shape)
-    strict, granular = (_inside(values, [getattr(one, rule) for one in PRINTED]) for rule in ("strict", "granular"))
-    axes = AXES | FURTHER
-    shipped = {key: own[0] for key, own in axes.items()}
-    return Search(PRINTED, axes, shipped, strict, granular, values, read_as=READ_AS, asks=ASKS)
-
-
-def _version(*names: str) -> Version:
-    of: Any = dict(zip(AXES, names, strict=True))
-    return Version(
-        float(of["noise_variance"]),
-        float(of["threshold"]),
-        float(of["factor"]),
-        FORECASTS[of["forecast"]],
-        of["first_phase"],
-        of["rounding"],
-        of["curvature"],
-        int(of["pulses"]),
-        of["sum"],
-    )
-
-
-def _inside(values: np.ndarray, ends: list[tuple[float, float]]) -> np.ndarray:
-    low, high = (np.array(part).reshape(-1, *(1,) * (values.ndim - 1)) for part in zip(*ends, strict=True))
-    return (values >= low * (1 - 1e-12)) & (values <= high * (1 + 1e-12))
