@@ -9,7 +9,7 @@ SMOKE := $(VENV)/smoke
 # Drawing takes twice as long as all the rest: `make smoke SMOKE_FLAGS=` draws too.
 SMOKE_FLAGS ?= --no-figures
 
-.PHONY: run environment test slow machines processors mutants version-environments versions lowest lint smoke reproduce-figures claims-page readings-pages bench schema known docs docs-numbers docs-pictures docs-examples docs-house messages clean
+.PHONY: run environment test slow machines processors mutants version-environments versions lowest lint smoke reproduce-figures claims-page interpretations-pages bench schema known docs docs-numbers docs-pictures docs-examples docs-house messages clean
 
 # Containers often forbid Python to keep what it compiles: every process of the tests would compile the package anew.
 unexport PYTHONDONTWRITEBYTECODE
@@ -77,15 +77,15 @@ smoke: $(VENV)/installed
 reproduce-figures: $(VENV)/installed
 	$(BIN)/python -m radarsim.cli.reproduce results
 
-# Every claim under every reading: from stored blocks where they are there, else run. READINGS=--decide: longer, until
+# Every claim under every interpretation: from stored blocks where they are there, else run. INTERPRETATIONS=--decide: longer, until
 # claims are decided; some that are left (exit code 3) are no fault. The built pages show what is left in results, and
 # the classes are what radarsim ships, and says of a claim wherever it speaks of it.
-READINGS ?=
-readings-pages: $(VENV)/installed
-	mkdir -p results/readings
-	for p in P1 P2 P3 P4; do $(RADARSIM) readings $$p $(READINGS) --out results --markdown > results/readings/$$p.new; \
-	code=$$?; test $$code -eq 0 -o $$code -eq 3 && mv results/readings/$$p.new results/readings/$$p.md || exit 1; done
-	cp results/readings/classes.csv radarsim/app/classes.csv
+INTERPRETATIONS ?=
+interpretations-pages: $(VENV)/installed
+	mkdir -p results/interpretations
+	for p in P1 P2 P3 P4; do $(RADARSIM) interpretations $$p $(INTERPRETATIONS) --out results --markdown > results/interpretations/$$p.new; \
+	code=$$?; test $$code -eq 0 -o $$code -eq 3 && mv results/interpretations/$$p.new results/interpretations/$$p.md || exit 1; done
+	cp results/interpretations/classes.csv radarsim/app/classes.csv
 
 # What each claim came to, from what reproduce-figures left: the data of the page of claims that `make docs` builds.
 claims-page: $(VENV)/installed

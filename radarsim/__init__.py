@@ -8,20 +8,20 @@
 <Figure size ...>
 
 In a notebook a result shows its answer and first figure; `radarsim.load("rls2")` gives one that was run before.
-`check`, `solve`, `tune`, `sensitivity`, `compare`, `chart`, `claims` and `readings` do what the commands of these names
-do; `plots` gives those of many realisations as arrays; `simulate`, `read_plots`, `track`, `fit` and `register` are for
-recorded plots.
-"""
+`check`, `solve`, `tune`, `sensitivity`, `compare`, `chart`, `claims` and `interpretations` do what the commands of
+these names do; `plots` gives those of many realisations as arrays; `simulate`, `read_plots`, `track`, `fit` and
+`register` are for recorded plots."""
 
+import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from radarsim.app.compare import chart, compare
+    from radarsim.app.interpretations import interpretations
     from radarsim.app.judge import judge
     from radarsim.app.outlook import check
     from radarsim.app.own_data import fit, plots, read_plots, register, simulate, track
-    from radarsim.app.readings import readings
     from radarsim.app.result import Result
     from radarsim.app.run import claims, run
     from radarsim.app.run import stored_result as load
@@ -41,11 +41,11 @@ __all__ = [
     "claims",
     "compare",
     "fit",
+    "interpretations",
     "judge",
     "load",
     "plots",
     "read_plots",
-    "readings",
     "register",
     "run",
     "sensitivity",
@@ -59,14 +59,20 @@ _HOMES = {
     **{"judge": "app.judge:judge", "tune": "app.tune:tune", "run": "app.run:run", "Result": "app.result:Result"},
     **{name: f"app.own_data:{name}" for name in ("fit", "plots", "read_plots", "register", "simulate", "track")},
     **{"chart": "app.compare:chart", "check": "app.outlook:check", "claims": "app.run:claims"},
-    **{"compare": "app.compare:compare", "load": "app.run:stored_result", "readings": "app.readings:readings"},
+    **{"compare": "app.compare:compare", "load": "app.run:stored_result"},
+    **{"interpretations": "app.interpretations:interpretations"},
     **{"sensitivity": "app.sensitivity:sensitivity", "solve": "app.solve:solve"},
     **{"ConfigError": "errors:ConfigError", "RadarsimError": "errors:RadarsimError"},
 }
+_OLD_NAMES = {"readings": "interpretations"}
 
 
 def __getattr__(name: str) -> object:
     # Imported on first use, so that `radarsim --help` loads neither NumPy nor Numba.
+    if name in _OLD_NAMES:
+        new = _OLD_NAMES[name]
+        warnings.warn(f"radarsim.{name} is called radarsim.{new}", DeprecationWarning, stacklevel=2)
+        name = new
     if name in _HOMES:
         module, _, attribute = _HOMES[name].partition(":")
         return getattr(import_module(f"radarsim.{module}"), attribute)
@@ -74,4 +80,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__} - {"TYPE_CHECKING", "_HOMES", "import_module"})
+    return sorted({*globals(), *__all__} - {"TYPE_CHECKING", "_HOMES", "_OLD_NAMES", "import_module", "warnings"})

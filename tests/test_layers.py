@@ -61,7 +61,7 @@ ROOMS = {
         *("errors", "failures", *CASE, *DATA, "kernels", "report"),
         *("studies.interface", "studies.noise", "studies.onefile"),
     ),
-    "studies.judged": ("errors", "config", *DATA, "report"),  # claims and readings of studies in one file
+    "studies.judged": ("errors", "config", *DATA, "report"),  # claims and interpretations of studies in one file
     "studies.code": (
         *("errors", "failures", "language", "config", "studies.interface", "studies.outside"),
         *("module_sources", "studies.user_code_recording", "studies.user_code_sources"),
@@ -93,7 +93,7 @@ KEYS = ("errors", "constants", "config.document", "config.fields", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
 SHOWN = (*SUMS, "cost", "tables", "figures")
-READ = (*SHOWN, "words", "measures", "readings")
+READ = (*SHOWN, "words", "measures", "interpretations")
 ROLES = {
     "kernels": (("kernels", "bursts.kernels"), ("kernels",)),
     "config": (KEYS, ("config",)),
@@ -108,7 +108,7 @@ ROLES = {
     "figures": ((*GROUND, *DATA, "report", "language"), (*SHOWN, "track")),  # of one realisation, followed as a record
     "words": ((*GROUND, *DATA, "report", "language"), READ),
     "measures": ((*GROUND, *DATA, "report"), READ),
-    "readings": ((*GROUND, *DATA, "report"), READ),  # what the paper leaves open
+    "interpretations": ((*GROUND, *DATA, "report"), READ),  # what the paper leaves open
     "chart": ((*GROUND, *DATA, "report", "language"), READ),
     "track": ((*GROUND, *DATA, "studies.noise", "studies.interface"), (*SUMS, "track")),
     "__init__": (

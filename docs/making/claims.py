@@ -1,9 +1,8 @@
 """The page of claims, made while building, and claims.csv beside this module: what each claim came to at full size.
 
 `make claims-page` writes claims.csv from what `make reproduce-figures` left in results/: of each claim the part that is
-furthest from its words. Words and places are the claims' own, classes over all readings those that radarsim ships.
-Where results/ holds a full reproduction the page is made from that, with every part.
-"""
+furthest from its words. Words and places are the claims' own, classes over all interpretations those that radarsim
+ships. Where results/ holds a full reproduction the page is made from that, with every part."""
 
 import csv
 import io
@@ -11,7 +10,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from radarsim.app import readings, run, stored
+from radarsim.app import interpretations, run, stored
 from radarsim.errors import StoreError
 from radarsim.report.claims import NUMBERS, judge, page
 
@@ -38,7 +37,9 @@ def kept() -> list[dict]:
                 one = judge.blank(claim, of.paper) | row | numbers
                 one |= {"class": row["as_shipped"], "overall": row["as_shipped"]}
                 found.setdefault(claim.config, []).append(one)
-    classes = stored.classes_of([(paper.readings, paper.claims) for paper in readings.papers().values()], None)
+    classes = stored.classes_of(
+        [(paper.interpretations, paper.claims) for paper in interpretations.papers().values()], None
+    )
     return page.with_classes(judge.listed(run.papers(), found), classes)
 
 
@@ -54,7 +55,7 @@ def rows(results: Path = RESULTS) -> tuple[list[dict], bool]:
 def markdown(results: Path = RESULTS) -> str:
     """The page without its title."""
     found, whole = rows(results)
-    found = page.in_words(found, (of.readings for of in readings.papers().values()))
+    found = page.in_words(found, (of.interpretations for of in interpretations.papers().values()))
     text = page.page(found, {of.paper: of.page for of in run.papers()}, whole).removeprefix(page.TITLE).strip()
     return text.replace("\n\n## ", f"\n\n{PICTURE}\n\n## ", 1)
 

@@ -4,7 +4,7 @@ import re
 from functools import partial
 from pathlib import Path
 
-from making import claims, commands, keys, modules, readings, tables
+from making import claims, commands, interpretations, keys, modules, tables
 from radarsim.studies import registry
 
 MARK = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
@@ -12,7 +12,9 @@ PARTS = {
     **{"claims": claims.markdown, "commands": commands.markdown, "keys": keys.markdown},
     **{"modules": modules.markdown, "tables": tables.common_tables},
     **{f"tables_{study}": partial(tables.own_tables, study) for study in registry.SHIPPED},
-    **{f"readings_{paper.lower()}": partial(readings.markdown, paper) for paper in readings.PAPERS},
+    **{
+        f"interpretations_{paper.lower()}": partial(interpretations.markdown, paper) for paper in interpretations.PAPERS
+    },
 }
 
 

@@ -36,7 +36,7 @@ def found() -> dict[tuple[str, str, str], list[str]]:
     """Context, text and plural of every message, with the places that say it."""
     said: dict[tuple[str, str, str], list[str]] = {}
     for text, plural, place in (
-        *(*in_sources(), *in_templates(), *in_schemas(), *in_claims(), *in_readings()),
+        *(*in_sources(), *in_templates(), *in_schemas(), *in_claims(), *in_interpretations()),
         *(*in_scenarios(), *in_inventory()),
     ):
         if re.search("[A-Za-zσ]", text):
@@ -108,20 +108,20 @@ def in_claims() -> Iterator[tuple[str, str, str]]:
             place = f"radarsim/studies/{name}/claims.yaml"
             yield paper.paper, "", place
             for claim in paper.claims:
-                for text in (claim.statement, claim.place, claim.reading, claim.unstated):
+                for text in (claim.statement, claim.place, claim.interpretation, claim.unstated):
                     yield text, "", place
                 for part in claim.parts:
                     yield part.what, "", place
                     yield part.unit, "", place
 
 
-def in_readings() -> Iterator[tuple[str, str, str]]:
+def in_interpretations() -> Iterator[tuple[str, str, str]]:
     """What the papers leave open, its alternatives, and why."""
     for name in registry.SHIPPED:
-        of = registry.study(name).readings()
+        of = registry.study(name).interpretations()
         if of is None:
             continue
-        place = f"radarsim/studies/{name}/readings.yaml"
+        place = f"radarsim/studies/{name}/interpretations.yaml"
         for choice in of.choices:
             own = ((one.reason, over.spaced(one.name)) for one in choice.alternatives)
             for text in (choice.asks, *(text for both in own for text in both)):

@@ -145,7 +145,7 @@ class Result(Shown):
 
         configs.check(out=out, figures=figures, width_mm=width_mm)
         folder = Path(out) / self.experiment.stem
-        self._tables["claims"] = over_readings(self._tables["claims"], self.experiment.study, Path(out))
+        self._tables["claims"] = over_interpretations(self._tables["claims"], self.experiment.study, Path(out))
         formats = configs.formats(figures)
         self.facts["warnings"] = [*self.facts["warnings"], *files.replaced(folder, self.experiment)]
         facts = self.facts | {"finished": datetime.now(UTC).isoformat("T", "seconds")}
@@ -179,8 +179,8 @@ class Result(Shown):
             raise unmeasured
 
     def verdicts(self, column: str = "class") -> dict[str, list[str]]:
-        """The claims by class over all readings that their papers allow, or `as_shipped`; empty if there are none.
-        Extensions are listed separately."""
+        """The claims by class over all interpretations that their papers allow, or `as_shipped`; empty if there are
+        none. Extensions are listed separately."""
         found: dict[str, list[str]] = {}
         grouped = page.grouped(self._tables["claims"].to_dict("records"))
         for parts in sorted(grouped, key=lambda parts: page.ORDER.index(parts[0][column])):
@@ -199,7 +199,7 @@ class Result(Shown):
         return found
 
     def as_shipped(self) -> list[str]:
-        """Claims judged only under the shipped reading although they depend on an open choice of their paper."""
+        """Claims judged only under the shipped interpretation although they depend on an open choice of their paper."""
         rows = claims.first_rows(self._tables["claims"].to_dict("records"))
         return [row["claim"] for row in rows if page.alone(row)]
 
@@ -228,20 +228,20 @@ def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
     of = study(results[0].study)
     made, from_outside = measured(results), outside.measured(results)
     verdicts = claims.judged(of.claims(), results, outside.for_claims(made, from_outside), configs.shipped, stem)
-    made["claims"] = over_readings(verdicts, results[0].study)
+    made["claims"] = over_interpretations(verdicts, results[0].study)
     made["floor"] = of.floors(results)
     made = notes.noted(made, results, of.exact_errors, quantities(results[0].study, results[0].spec))
     return outside.added(made, results, from_outside)
 
 
-def over_readings(verdicts: "pd.DataFrame", name: str, out: Path | None = None) -> "pd.DataFrame":
-    """claims.csv of a study with the classes over all readings: those under `out`, else the shipped ones."""
+def over_interpretations(verdicts: "pd.DataFrame", name: str, out: Path | None = None) -> "pd.DataFrame":
+    """claims.csv of a study with the classes over all interpretations: those under `out`, else the shipped ones."""
     of = study(name)
-    readings, papers = of.readings(), of.claims()
-    if readings is None or papers is None or not len(verdicts):
+    interpretations, papers = of.interpretations(), of.claims()
+    if interpretations is None or papers is None or not len(verdicts):
         return verdicts
     own: Any = verdicts.to_dict("records")
-    rows = with_classes(own, classes_of([(readings, papers)], out))
+    rows = with_classes(own, classes_of([(interpretations, papers)], out))
     return verdicts.assign(**{column: [row[column] for row in rows] for column in OVER})
 
 
@@ -456,7 +456,7 @@ def write_files(
         cost=own.cost(outside.without(made, results), run),
         agreement=notes.agreement(made["curves"]) if own.exact_errors else None,
         drawn_from=own.drawn_from(),
-        readings=own.readings(),
+        interpretations=own.interpretations(),
     )
     contents["report.html"] = report.encode()
     contents["run.json"] = files.to_json(files.with_output(record, "report.html", contents["report.html"]))

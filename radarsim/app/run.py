@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
     from radarsim.app.result import Result
     from radarsim.report.claims import PaperClaims
-    from radarsim.report.claims.over import PaperReadings
+    from radarsim.report.claims.over import PaperInterpretations
     from radarsim.report.drawing import Figure
     from radarsim.report.precision import Cell, Table
 
@@ -420,7 +420,7 @@ def run(
     >>> len(result.curves) > 50
     True
     """
-    from radarsim.app import readings  # with it the parts that judge and draw, which `check` does without
+    from radarsim.app import interpretations  # with it the parts that judge and draw, which `check` does without
 
     checked: dict[str, Any] = {"threads": threads, "workers": workers, "precision": precision, "time_limit": time_limit}
     checked |= {"executor": executor, "out": out, "figures": figures, "width_mm": width_mm}
@@ -429,7 +429,7 @@ def run(
     if precision is not None:
         check_precision([experiment], precision, of)
     if decide:
-        readings.check(experiment)
+        interpretations.check(experiment)
     limit = time_limit if time_limit is None or callable(time_limit) else stopping.TimeLimit(time_limit)
     started, kept, warned = time.perf_counter(), None, list[str]()
     if codes([experiment]):
@@ -443,7 +443,7 @@ def run(
         threads = pool.workers if pool else available_cores() if threads is None else int(threads)
         options = RunOptions(out, threads, stopping.Either(stop, limit), pool)
         if decide:
-            simulated = readings.simulated(experiment, options, progress)
+            simulated = interpretations.simulated(experiment, options, progress)
         else:
             simulated = simulate(experiment, options, progress=progress, precision=precision, of=of)
         if stop is not None:
@@ -455,7 +455,7 @@ def run(
     if kept is not None:
         facts["seconds_kept_for_writing"] = kept
     if decide:
-        left = readings.left(experiment, simulated)
+        left = interpretations.left(experiment, simulated)
         facts |= {"unmet": [*facts["unmet"], *left], "stop": "; ".join((*facts["unmet"], *left)) or "done"}
     ended_by = None if simulated.stopped or precision is None else (precision, of)
     result = result_of(experiment, simulated, facts, repeated(experiment, simulated.done, overrides, ended_by))
@@ -695,15 +695,15 @@ def _keys(ids: Iterable[str]) -> list[str]:
 class Claims(Shown):
     """Claims of papers and their verdicts; one row for each measured part of a claim."""
 
-    def __init__(self, rows: Sequence[dict[str, Any]], readings: "Iterable[PaperReadings]" = ()):
-        self.rows, self._readings = tuple(rows), tuple(readings)
+    def __init__(self, rows: Sequence[dict[str, Any]], interpretations: "Iterable[PaperInterpretations]" = ()):
+        self.rows, self._interpretations = tuple(rows), tuple(interpretations)
 
     @property
     def in_words(self) -> list[dict[str, Any]]:
         """The rows for people: what a claim depends on is in words, not in keys."""
         from radarsim.report.claims import page
 
-        return page.in_words(self.rows, self._readings)
+        return page.in_words(self.rows, self._interpretations)
 
     @property
     def table(self) -> "pd.DataFrame":
@@ -752,7 +752,7 @@ def claims(*names: str, out: str | os.PathLike[str] = configs.RESULTS) -> Claims
     >>> found.table["verdict"].tolist()
     ['not run']
     """
-    from radarsim.app import readings
+    from radarsim.app import interpretations
     from radarsim.app import stored as kept
     from radarsim.report.claims.judge import listed, unstored
     from radarsim.report.claims.page import with_classes
@@ -780,5 +780,5 @@ def claims(*names: str, out: str | os.PathLike[str] = configs.RESULTS) -> Claims
     there = {(row["claim"], row["config"]) for row in rows}
     own = [row for row in listed(every, held) if row["claim"] in shown]
     rows += [row for row in own if (row["claim"], row["config"]) not in there]
-    open_ = [(paper.readings, paper.claims) for paper in readings.papers(keys).values()]
+    open_ = [(paper.interpretations, paper.claims) for paper in interpretations.papers(keys).values()]
     return Claims(with_classes(rows, kept.classes_of(open_, Path(out))), [one for one, _ in open_])

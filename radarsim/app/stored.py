@@ -1,8 +1,8 @@
 """Stored results: run.json and its tables, read only if they are the ones that it records.
 
-Stored results of `radarsim readings`: rows of its tables under a directory, and the shipped classes. classes.csv beside
-this module is that of the shipped configs, copied by `make readings-pages`; a claim judged in a directory of results
-takes its class from there."""
+Stored results of `radarsim interpretations`: rows of its tables under a directory, and the shipped classes. classes.csv
+beside this module is that of the shipped configs, copied by `make interpretations-pages`; a claim judged in a directory
+of results takes its class from there."""
 
 import csv
 import hashlib
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from radarsim.errors import StoreError
 from radarsim.report import files, tables
 from radarsim.report.claims.declared import PaperClaims
-from radarsim.report.claims.over import PaperReadings
+from radarsim.report.claims.over import PaperInterpretations
 from radarsim.report.claims.page import COLUMNS, Class, Known, declared
 
 if TYPE_CHECKING:
@@ -46,7 +46,8 @@ def rows(
     file."""
     try:
         table = csv.DictReader(io.StringIO(text.decode("utf-8"), newline=""), strict=True)
-        read, names = list(table), set(table.fieldnames or ())
+        table.fieldnames = [OLD_COLUMNS.get(name, name) for name in table.fieldnames or ()]
+        read, names = list(table), set(table.fieldnames)
     except (ValueError, csv.Error) as error:
         raise StoreError(f"{path}: cannot be read: {error}") from error
     try:
@@ -125,20 +126,32 @@ def _recorded(path: Path) -> str | None:
         raise StoreError(f"{record}: is no record of a run; {AGAIN}") from error
 
 
-# ---- stored readings -------------------------------------------------------------------------------------------------
-PLACE, CLASSES = Path("readings", "readings.csv"), Path("readings", "classes.csv")
-NEEDED = {"claim", "reading", "kind", "outcome"}
+# ---- stored interpretations
+# -------------------------------------------------------------------------------------------------
+PLACE, CLASSES = Path("interpretations", "interpretations.csv"), Path("interpretations", "classes.csv")
+NEEDED = {"claim", "interpretation", "kind", "outcome"}
+OLD_FILES = {  # names in results of earlier versions, read where the new file is not there
+    PLACE: Path("readings", "readings.csv"),
+    CLASSES: Path("readings", "classes.csv"),
+}
+OLD_COLUMNS = {"reading": "interpretation"}
 SHIPPED = Path(__file__).with_name("classes.csv")
 
 
-def stored_readings(out: Path) -> list[dict[str, Any]]:
-    """The rows of readings.csv under `out`; none where there is no such file. Raises StoreError for a damaged one."""
-    return _rows(out / PLACE, NEEDED, dict)
+def stored_interpretations(out: Path) -> list[dict[str, Any]]:
+    """The rows of interpretations.csv under `out`; none where there is no such file. Raises StoreError for a damaged
+    one."""
+    return _rows(_existing(out, PLACE), NEEDED, dict)
 
 
 def stored_classes(out: Path | None) -> list[Class]:
     """The classes of claims judged under `out`. Raises StoreError for a damaged file."""
-    return _rows(out / CLASSES, set(COLUMNS), Class.of_row) if out else []
+    return _rows(_existing(out, CLASSES), set(COLUMNS), Class.of_row) if out else []
+
+
+def _existing(out: Path, file: Path) -> Path:
+    """The path of a file under `out`, by its name in earlier versions where only that one is there."""
+    return out / file if (out / file).exists() or not (out / OLD_FILES[file]).exists() else out / OLD_FILES[file]
 
 
 @cache
@@ -147,21 +160,21 @@ def shipped_classes() -> tuple[Class, ...]:
     return tuple(_rows(SHIPPED, set(COLUMNS), Class.of_row))
 
 
-def classes_of(papers: Iterable[tuple[PaperReadings, PaperClaims]], out: Path | None) -> Known:
-    """The class over all readings of each claim that depends on an open choice of its paper; None where it is not
-    known.
+def classes_of(papers: Iterable[tuple[PaperInterpretations, PaperClaims]], out: Path | None) -> Known:
+    """The class over all interpretations of each claim that depends on an open choice of its paper; None where it is
+    not known.
 
     A class from other words, numbers or choices than the claim has now does not count."""
     found = {(one.claim, one.declared): one for one in (*shipped_classes(), *stored_classes(out))}
     return {
-        claim.id: found.get((claim.id, declared(readings, claim)))
-        for readings, claims in papers
+        claim.id: found.get((claim.id, declared(interpretations, claim)))
+        for interpretations, claims in papers
         for claim in claims.claims
-        if readings.open(claim)
+        if interpretations.open(claim)
     }
 
 
 def _rows(path: Path, needed: set[str], made: Callable[[dict[str, Any]], Row]) -> list[Row]:
     text = content(path)
-    kind = "table of readings; remove it, `radarsim readings` makes it again"
+    kind = "table of interpretations; remove it, `radarsim interpretations` makes it again"
     return [] if text is None else rows(path, text, needed, made, kind)

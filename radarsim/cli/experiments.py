@@ -118,14 +118,14 @@ def _loaded(
     configs: tuple[str, ...], overrides: tuple[str, ...], precision: tuple[float, str] | None, decide: bool
 ) -> "list[Experiment]":
     """The experiments, all checked, with the quantities that their claims and a precision need."""
-    from radarsim.app import readings
+    from radarsim.app import interpretations
     from radarsim.app import run as simulation
 
     loaded = simulation.load_all(configs, overrides)
     if precision is not None:
         simulation.check_precision(loaded, *precision)
     for one in loaded if decide else ():
-        readings.check(one)
+        interpretations.check(one)
     return loaded
 
 
@@ -388,8 +388,8 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
     CONFIG that is not a paper's experiment, lists the claims that it cannot judge, and why.
 
     How they are judged stands in docs/verdicts.md: exact values first, each number with a margin, and over every
-    reading that the paper allows. "refuted as shipped; depends on how the filter starts": false with the choices that
-    the config takes where the paper leaves them open, and true with another start.
+    interpretation that the paper allows. "refuted as shipped; depends on how the filter starts": false with the choices
+    that the config takes where the paper leaves them open, and true with another start.
 
     \b
     Examples
@@ -456,7 +456,7 @@ def compare(sources: tuple[str, ...], out: str, drawing: group.Drawing, as_json:
 @click.option(
     "--decide",
     is_flag=True,
-    help="Extend the runs, up to N realisations, until each claim is decided over all readings.",
+    help="Extend the runs, up to N realisations, until each claim is decided over all interpretations.",
 )
 @group.threads_option
 @group.time_limit_option
@@ -464,8 +464,10 @@ def compare(sources: tuple[str, ...], out: str, drawing: group.Drawing, as_json:
 @group.figures_option
 @click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
 @group.json_option
-@click.option("--markdown", is_flag=True, help="Print the pages docs/readings_….md of these papers instead of text.")
-def readings(
+@click.option(
+    "--markdown", is_flag=True, help="Print the pages docs/interpretations_….md of these papers instead of text."
+)
+def interpretations(
     names: tuple[str, ...],
     time_limit: float | None,
     no_figures: bool,
@@ -474,39 +476,39 @@ def readings(
     markdown: bool,
     **asked: Any,
 ) -> None:
-    """Judge claims under every reading that the paper allows.
+    """Judge claims under every interpretation that the paper allows.
 
     A paper leaves choices open: how a filter starts, which flight, which of two printed numbers. Each claim is judged
     under all of them: exactly where possible, otherwise by small runs, which are stored and can be continued. E and U
-    readings (equivalent, unstated) decide how robust a verdict is; N (against the print) shows what would have to
-    change. PAPER is P1, P2, P3 or P4; default: all. Writes DIR/readings/readings.csv and a specification curve for each
-    claim. For whole papers it also searches for the choices that reproduce most of the printed numbers.
+    interpretations (equivalent, unstated) decide how robust a verdict is; N (against the print) shows what would have
+    to change. PAPER is P1, P2, P3 or P4; default: all. Writes DIR/interpretations/interpretations.csv and a
+    specification curve for each claim.
 
     \b
     Examples
-      radarsim readings P1
-      radarsim readings P1.4                          with every reading of this claim
-      radarsim readings P2 -n 200 --threads 2         a quick look; a larger N continues it
-      radarsim readings P2 --decide -n 3.2e4          up to 32 000 realisations; undecided claims: exit code 3
-      radarsim readings P1 --json | jq '.[] | select(.depends_on != [])'
+      radarsim interpretations P1
+      radarsim interpretations P1.4                          with every interpretation of this claim
+      radarsim interpretations P2 -n 200 --threads 2         a quick look; a larger N continues it
+      radarsim interpretations P2 --decide -n 3.2e4          up to 32 000 realisations; undecided claims: exit code 3
+      radarsim interpretations P1 --json | jq '.[] | select(.depends_on != [])'
     """
     from radarsim.engine import run
     from radarsim.errors import TargetUnmet
 
     limit = run.TimeLimit(time_limit) if time_limit else None
     with run.Signals() as stop:
-        from radarsim.app import readings as app
+        from radarsim.app import interpretations as app
         from radarsim.app import shown
         from radarsim.cli import console, outcomes
 
         asked |= {"time_limit": limit, "figures": not no_figures, "stop": stop}
-        with console.Foretold("readings", quiet=quiet or as_json or markdown) as progress:
-            done = app.readings(*names, progress=progress.update, **asked)
+        with console.Foretold("interpretations", quiet=quiet or as_json or markdown) as progress:
+            done = app.interpretations(*names, progress=progress.update, **asked)
         if as_json:
             click.echo(shown.text(app.documents(done)))
         elif markdown:
             click.echo(app.pages(done), nl=False)
         elif not quiet:
-            outcomes.print_readings(done, detailed=any("." in name for name in names))
+            outcomes.print_interpretations(done, detailed=any("." in name for name in names))
         if done.left:
             raise TargetUnmet(*done.left)

@@ -25,9 +25,10 @@ SECTIONS = {
     "A question": ("list", "check", "run", "report", "compare"),
     "Your own radar": ("new", "solve", "tune", "sensitivity", "chart", "new-study"),
     "Your own data": ("import", "register", "simulate", "track", "fit", "judge"),
-    "The papers": ("claims", "readings"),
+    "The papers": ("claims", "interpretations"),
     "Upkeep": ("schema", "compile", "doctor", "clean"),
 }
+OLD_NAMES = {"readings": "interpretations"}  # names of commands in earlier versions, which still work
 ORDER = tuple(name for names in SECTIONS.values() for name in names)
 NO_THREAD = "can't start new thread"  # in Python's words
 PATIENCE_S = 1.0  # from a signal to the end of whatever a command is doing
@@ -40,6 +41,12 @@ class Commands(click.Group):
     def add_command(self, cmd: click.Command, name: str | None = None) -> None:
         """Every command takes the language, as the group does."""
         super().add_command(language_option(cmd), name)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if (new_name := OLD_NAMES.get(cmd_name)) is not None:
+            click.echo(f"note: `radarsim {cmd_name}` is called `radarsim {new_name}`", err=True)
+            cmd_name = new_name
+        return super().get_command(ctx, cmd_name)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return sorted(self.commands, key=ORDER.index)

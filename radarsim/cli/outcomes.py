@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from radarsim.app.compare import Comparison, DopplerChart
     from radarsim.app.configs import Inventory
     from radarsim.app.doctor import Inspection
+    from radarsim.app.interpretations import Interpretations
     from radarsim.app.outlook import CaseOutlook, Need, Outlook
-    from radarsim.app.readings import Readings
     from radarsim.app.result import Result
     from radarsim.app.run import Shares
     from radarsim.app.sensitivity import Sensitivity
@@ -513,7 +513,7 @@ NOTHING_OF_ALL = term(
 
 
 def print_verdicts(result: "Result") -> None:
-    """The claims of a run by their class over all readings, with those that differ here."""
+    """The claims of a run by their class over all interpretations, with those that differ here."""
     from radarsim.report.claims import page, rule
 
     verdicts, shipped = result.verdicts(), result.verdicts("as_shipped")
@@ -527,7 +527,7 @@ def print_verdicts(result: "Result") -> None:
     if alone := result.as_shipped():
         told = {"names": page.in_a_row(alone), "paper": alone[0].partition(".")[0]}
         words = tr(
-            "only as shipped: {names}; `radarsim readings {paper}` judges under every reading that the paper allows",
+            "only as shipped: {names}; `radarsim interpretations {paper}` judges under every one that the paper allows",
             **told,
         )
         field("", words)
@@ -628,8 +628,8 @@ def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
         say(f"       {tr(row['verdict']):<20} {'; '.join(said)}")
 
 
-def print_readings(done: "Readings", detailed: bool) -> None:
-    """A line for each claim, for single claims one for each reading too."""
+def print_interpretations(done: "Interpretations", detailed: bool) -> None:
+    """A line for each claim, for single claims one for each interpretation too."""
     from radarsim.report.claims import rule
 
     for read in done.read:
@@ -639,14 +639,14 @@ def print_readings(done: "Readings", detailed: bool) -> None:
                 width = max(map(len, outcomes))
                 for one, outcome in zip(over.under, outcomes, strict=True):
                     why = f" ({rule.said(one.why)})" if one.why else ""
-                    say(f"       {one.kind}  {outcome:<{width}}  {over.of.said(one.reading)}{why}")
+                    say(f"       {one.kind}  {outcome:<{width}}  {over.of.said(one.interpretation)}{why}")
             found = over.outcome
             words = tr(found.kind) if found else tr("not judged")  # on what it depends, the sentence says
             say(f"{over.claim.id:<6} {words:<28} {over.sentence()}")
     if done.files:
         curves = sum(name.endswith(".svg") for name in done.files)
         drawn = plural("{count} curve", "{count} curves", curves)
-        file = str(done.folder / "readings.csv")
+        file = str(done.folder / "interpretations.csv")
         field("table", tr("{file}, {curves} beside it", file=file, curves=drawn) if curves else file)
     if done.outdated:
         command = f"radarsim report {shlex.join(done.outdated)}{configs.into(done.folder.parent)}"

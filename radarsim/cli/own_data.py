@@ -48,10 +48,10 @@ def new(name: str, like: str) -> None:
 def new_study(name: str, step: bool, folder: bool) -> None:
     """Write a package with a small study, to make your own: ./NAME.
 
-    It compares two filters on a random walk: one file with keys, matrices, claims and a reading, from which kernel,
-    exact values, tables, figures and recorded plots follow; a config; a test. With --step the filters are functions of
-    one plot and may be nonlinear. With --folder each part is a separate file. Comments `Yours: …` mark the places to
-    edit. Once installed, the study works like the shipped ones. Nothing is ever overwritten.
+    It compares two filters on a random walk: one file with keys, matrices, claims and an interpretation, from which
+    kernel, exact values, tables, figures and recorded plots follow; a config; a test. With --step the filters are
+    functions of one plot and may be nonlinear. With --folder each part is a separate file. Comments `Yours: …` mark the
+    places to edit. Once installed, the study works like the shipped ones. Nothing is ever overwritten.
 
     \b
     Example

@@ -33,7 +33,7 @@ from radarsim.report.chart import spoken
 from radarsim.report.claims import page as claims_page
 from radarsim.report.claims import rule
 from radarsim.report.claims.judge import LOOKED
-from radarsim.report.claims.over import PaperReadings
+from radarsim.report.claims.over import PaperInterpretations
 from radarsim.report.drawing import Figure, Line
 from radarsim.report.wording import number
 
@@ -189,16 +189,16 @@ def report_page(
     agreement: "pd.DataFrame | None" = None,
     cost: "pd.DataFrame | None" = None,
     drawn_from: Mapping[str, Sequence[str]] = MappingProxyType({}),
-    readings: PaperReadings | None = None,
+    interpretations: PaperInterpretations | None = None,
 ) -> str:
     """The page of an experiment: question, answer, request, figures, claims, exact values, tables, provenance.
 
     figures are described ones (none with --no-figures); record is run.json's; inputs, agreement and cost (against
-    accuracy) are tables, or None. drawn_from and readings: of the study, see `Study`."""
+    accuracy) are tables, or None. drawn_from and interpretations: of the study, see `Study`."""
     figures = [one for one in figures if one.name != "claims"]  # the page has them in a table, a line each
     written = {name for name, table in made.items() if f"{name}.csv" in record["outputs"] and len(table)}
     sources = {one.name: tables_of(one.name, drawn_from, written) for one in figures}
-    claims = _claims(made["claims"], sources, written, readings)
+    claims = _claims(made["claims"], sources, written, interpretations)
     answer = in_clauses(answer)
     return whole(
         "report.html.j2",
@@ -401,7 +401,7 @@ def _claims(
     table: "pd.DataFrame",
     sources: Mapping[str, Sequence[str]],
     written: Collection[str],
-    readings: PaperReadings | None,
+    interpretations: PaperInterpretations | None,
 ) -> list[dict[str, Any]]:
     """Claims with their parts, from claims.csv's rows, with the figures and tables behind each.
 
@@ -410,9 +410,10 @@ def _claims(
     looked = table.attrs.get(LOOKED, [()] * len(table))
     records: Any = table.to_dict("records")
     rows = [row | {LOOKED: own} for row, own in zip(records, looked, strict=True)]
-    for parts in claims_page.grouped(claims_page.in_words(rows, [readings])):
+    for parts in claims_page.grouped(claims_page.in_words(rows, [interpretations])):
         same = {
-            key: parts[0][key] for key in ("statement", "paper", "place", "reading", "original", "overall", "class")
+            key: parts[0][key]
+            for key in ("statement", "paper", "place", "interpretation", "original", "overall", "class")
         }
         found.append({"id": parts[0]["claim"], **same, "said": claims_page.verdict_of(parts), "parts": parts})
         found[-1]["said"] = str(found[-1]["said"]).replace("*", "")

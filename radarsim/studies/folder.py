@@ -23,7 +23,7 @@ A study that follows this declares an object and writes no class:
 | `claims`, if there is a paper | those of `claims.yaml`, or `claims.CLAIMS`, judged by `measures.Evidence` |
 | `seconds_per_update`, `seconds_at_most`, if offered | functions of `cost` |
 | `errors`, `shortened`, `exact_but_for`, `costly`, if offered | functions of `study` |
-| `readings`, if offered | an object of the class `readings.Readings` |
+| `interpretations`, if offered | an object of the class `interpretations.Interpretations` |
 | `recorded`, if offered | an object of the class `track.Recorded` |
 | `chart`, if offered | the function of `chart` |
 | `own_filters`, if offered | the function of `given` |
@@ -118,7 +118,7 @@ class StudyFolder(Study):
     figures, chart = part("figures"), part("chart")
     question, answer, warnings = part("words"), part("words"), part("words")
     own_filters, floor = part("given"), part("floor")
-    readings, recorded = part("readings", "Readings"), part("track", "Recorded")
+    interpretations, recorded = part("interpretations", "Interpretations"), part("track", "Recorded")
 
     def shown(self) -> Sequence[Component]:
         return getattr(self.file("figures"), "COMPONENTS", ())

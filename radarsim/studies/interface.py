@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from radarsim.engine.results import Axes, CaseResult, Layout, Track
     from radarsim.report.claims import PaperClaims
     from radarsim.report.claims.declared import Shipped
-    from radarsim.report.claims.over import PaperReadings
+    from radarsim.report.claims.over import PaperInterpretations
     from radarsim.report.drawing import Chart, Figure
     from radarsim.report.quantities import Component, Quantity
     from radarsim.studies.floor import Floor
@@ -371,7 +371,7 @@ def paper_in(claims: str) -> str:
     return found[1] if found else ""
 
 
-Beside = Literal["readings", "recorded", "shipped", "chart", "shortened", "own_filters", "floor"]
+Beside = Literal["interpretations", "recorded", "shipped", "chart", "shortened", "own_filters", "floor"]
 Costs = Literal["cost", "seconds_per_update", "seconds_at_most"]
 OptionalPart = Literal["curves", "gains", "inputs", Costs, "warnings", "errors", "exact_but_for", "costly", Beside]
 
@@ -536,7 +536,8 @@ class Study(ABC):
         return None
 
     def claim_faults(self, shipped: "Shipped") -> Sequence[str]:
-        """Names in its claims and readings that no shipped config has, a line each. `shipped` as of `claims.judged`."""
+        """Names in its claims and interpretations that no shipped config has, a line each. `shipped` as of
+        `claims.judged`."""
         return ()
 
     def paper_key(self) -> str:
@@ -547,8 +548,8 @@ class Study(ABC):
         """The paper's claims. Default: none."""
         return None
 
-    def readings(self) -> "PaperReadings | None":
-        """The paper's open choices, and its claims under each reading. Default: nothing."""
+    def interpretations(self) -> "PaperInterpretations | None":
+        """The paper's open choices, and its claims under each interpretation. Default: nothing."""
         return None
 
     # ---- beside --------------------------------------------------------------------------------------------------

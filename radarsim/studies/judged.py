@@ -1,4 +1,4 @@
-"""Measures of claims, and readings, of a study in one file: a case is found by its keys.
+"""Measures of claims, and interpretations, of a study in one file: a case is found by its keys.
 
 A claim says `of: [{radar.scan_period_s: 2}]`: the case with these keys, or properties, by their dotted names; `of:
 [{}]` is the first one. The functions here whose first argument is `seen` may be its `measure`; `at` is a scan, by
@@ -20,7 +20,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.report import claims
 from radarsim.report.claims.declared import Claim, Series, Shipped
-from radarsim.report.claims.over import Call, Choice, PaperReadings, Reading, Unreadable
+from radarsim.report.claims.over import Call, Choice, Interpretation, PaperInterpretations, Unreadable
 from radarsim.report.statistics import Estimate, difference, mean
 from radarsim.report.tables import realisations
 
@@ -121,15 +121,16 @@ def _at(series: Series, at: int | None) -> Estimate:
     return series.last() if at is None else series.at(at)
 
 
-# ---- readings --------------------------------------------------------------------------------------------------------
-class Readings(PaperReadings):
-    """Readings whose alternatives set keys of a case, by dotted names; a bare name applies to every filter."""
+# ---- interpretations
+# --------------------------------------------------------------------------------------------------------
+class Interpretations(PaperInterpretations):
+    """Interpretations whose alternatives set keys of a case, by dotted names; a bare name applies to every filter."""
 
     def __init__(self, paper: str, choices: tuple[Choice, ...]):
         self.paper, self.choices = paper, choices
 
-    def changed(self, claim: Claim, case: Case, reading: Reading) -> Case | None:
-        return replace(case, spec=_with(case.spec, self.sets(reading)))
+    def changed(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
+        return replace(case, spec=_with(case.spec, self.sets(interpretation)))
 
 
 # ---- faults ----------------------------------------------------------------------------------------------------------
@@ -201,7 +202,7 @@ def _kept_from(spec: Model, values: Mapping[str, Any]) -> str:
 
 def _with(spec: Any, values: Mapping[str, Any]) -> Any:
     """A config's keys with some values changed; raises Unreadable where they are incompatible."""
-    origin, faults = Origin("reading"), Faults()
+    origin, faults = Origin("interpretation"), Faults()
     data: Any = from_python(spec.model_dump(exclude_none=True), (), origin, faults)
     for path, value in values.items():
         *above, last = path.split(".")
@@ -215,7 +216,7 @@ def _with(spec: Any, values: Mapping[str, Any]) -> Any:
                 place[last] = value
         except (LookupError, TypeError, ValueError, AttributeError):
             raise Unreadable(f"{path}: there is no such key") from None
-    changed = check(type(spec), Document(data, "reading", None, {(): origin}), faults)
+    changed = check(type(spec), Document(data, "interpretation", None, {(): origin}), faults)
     try:
         faults.raise_if_any()
     except ConfigError as error:

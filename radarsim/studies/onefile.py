@@ -21,13 +21,13 @@
 | `parts`, `Filter` | the keys: by name the model of each part, and of a filter, a subclass of `Member` |
 | `scan_period` | the key of the time between two plots |
 | `measured` | the numbers of a recorded plot, where there is such |
-| `paper`, `claims_yaml` | whose claims are judged: a text as claims.yaml, and under `choices` as readings.yaml |
+| `paper`, `claims_yaml` | whose claims are judged: a text as claims.yaml, and under `choices` as interpretations.yaml |
 
 `filters`, `baseline` and `scans` are added to the keys, with their marks. Made are the tables curves, gains and `last`,
-the figures, the question and the answer, claims and readings, and what is done with recorded plots; `shipped/` beside
-the file holds configs. Claims find a case by its keys, `of: [{radar.scan_period_s: 2}]`, and are measured by functions
-of the file whose first argument is `seen`, or by those of `radarsim.studies.judged`. The alternatives of a choice set
-keys, `sets: {radar.scan_period_s: 2}`.
+the figures, the question and the answer, claims and interpretations, and what is done with recorded plots; `shipped/`
+beside the file holds configs. Claims find a case by its keys, `of: [{radar.scan_period_s: 2}]`, and are measured by
+functions of the file whose first argument is `seen`, or by those of `radarsim.studies.judged`. The alternatives of a
+choice set keys, `sets: {radar.scan_period_s: 2}`.
 
 A base for a kind of model derives from `OneFile` and gives `prepare`, with `axes` and `sums` from here, `simulate`, and
 if it can `limits`, `drawing`, `tracker` and `likelihood`. `radarsim.studies.linear` is one.
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from radarsim.engine.results import Axes, CaseResult, Layout
     from radarsim.report.claims import PaperClaims
     from radarsim.report.claims.declared import Claim, Shipped
-    from radarsim.report.claims.over import Choice, PaperReadings
+    from radarsim.report.claims.over import Choice, PaperInterpretations
     from radarsim.report.drawing import Figure
 
 
@@ -355,12 +355,12 @@ class OneFile(Study):
         components = [one.name for one in self.components]
         return tuple(judged.faults(*self._written, components, shipped, configs))
 
-    def readings(self) -> "PaperReadings | None":
+    def interpretations(self) -> "PaperInterpretations | None":
         if self.paper is None or not self.claims_yaml or not self._written[1]:
             return None
-        from radarsim.studies.judged import Readings
+        from radarsim.studies.judged import Interpretations
 
-        return Readings(self._written[0][0].paper, self._written[1])
+        return Interpretations(self._written[0][0].paper, self._written[1])
 
     # ---- beside --------------------------------------------------------------------------------------------------
     def columns(self, spec: Any, one: Any) -> tuple[str, ...]:

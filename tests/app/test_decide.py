@@ -5,7 +5,7 @@ import math
 import pytest
 
 import radarsim
-from radarsim.app import readings
+from radarsim.app import interpretations
 from radarsim.report import claims
 from radarsim.report.claims.rule import CONFIRMED, UNDECIDED
 from tests.program import command
@@ -25,11 +25,11 @@ def test_what_is_known_exactly_is_decided_at_the_first_look(tmp_path):
 
 def test_what_is_left_says_what_it_would_take():
     row = {"paper": "p", "claim": "P9.1", "as_shipped": UNDECIDED, "extension": False, "n": 4000, "needed": 12345.0}
-    assert readings.undecided([row]) == ["P9.1 not yet decided at 4,000 realisations; about 13,000 would"]
-    assert "more realisations would not decide" in readings.undecided([row | {"needed": math.nan}])[0]
-    assert readings.undecided([row | {"as_shipped": CONFIRMED}]) == []
-    assert readings.undecided([row | {"extension": True}]) == []
-    assert readings.undecided([row | {"class": CONFIRMED}])  # over all readings, by other runs than this
+    assert interpretations.undecided([row]) == ["P9.1 not yet decided at 4,000 realisations; about 13,000 would"]
+    assert "more realisations would not decide" in interpretations.undecided([row | {"needed": math.nan}])[0]
+    assert interpretations.undecided([row | {"as_shipped": CONFIRMED}]) == []
+    assert interpretations.undecided([row | {"extension": True}]) == []
+    assert interpretations.undecided([row | {"class": CONFIRMED}])  # over all interpretations, by other runs than this
 
 
 def test_a_time_limit_before_all_cases_names_the_claims_that_wait(tmp_path):

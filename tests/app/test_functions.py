@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 import radarsim
-from radarsim.app import readings as reading
+from radarsim.app import interpretations as interpretation
 from radarsim.app import shown as documents
 from radarsim.cli import main
 from radarsim.report import tables
@@ -145,13 +145,15 @@ def test_claims(tmp_path):
         radarsim.claims("P9", out=tmp_path)
 
 
-def test_readings(tmp_path):
-    found = radarsim.readings("P1.4")
-    assert document(reading.documents(found)) == printed("readings", "P1.4", "--out", tmp_path, "--no-figures")
+def test_interpretations(tmp_path):
+    found = radarsim.interpretations("P1.4")
+    assert document(interpretation.documents(found)) == printed(
+        "interpretations", "P1.4", "--out", tmp_path, "--no-figures"
+    )
     assert found.files == ()
     assert found.figures == ("P1.4",)
     assert repr(found).startswith("P1.4 ")
-    stored = tables.from_csv((tmp_path / "readings" / "readings.csv").read_bytes())
+    stored = tables.from_csv((tmp_path / "interpretations" / "interpretations.csv").read_bytes())
     assert found.table.columns.isin(stored.columns).all()
     assert tables.to_csv(found.table) == tables.to_csv(stored[found.table.columns])
 
@@ -220,7 +222,7 @@ def endless():
             lambda: radarsim.run("rls2", overrides={"radar.sigma_range_m": 3, "radar": 4}),
             "overrides['radar']: overwrites radar.sigma_range_m, given before it",
         ),
-        (lambda: radarsim.readings("P1.4", realisations=0), "realisations: must be >= 1, got 0"),
+        (lambda: radarsim.interpretations("P1.4", realisations=0), "realisations: must be >= 1, got 0"),
         (lambda: radarsim.check("rls2", precision=0), "precision: must be > 0 and ≤ 100 %, got 0"),
     ],
 )

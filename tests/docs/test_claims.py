@@ -1,10 +1,11 @@
-"""The built pages of claims and readings: every claim, its class as shipped, and what it came to at full size."""
+"""The built pages of claims and interpretations: every claim, its class as shipped, and what it came to at full
+size."""
 
 import csv
 import re
 
 import pytest
-from making import claims, readings
+from making import claims, interpretations
 
 from radarsim.app.run import papers
 from radarsim.app.stored import shipped_classes
@@ -80,15 +81,15 @@ def test_the_figure_is_drawn_beside_the_page():
     }
 
 
-@pytest.mark.parametrize("paper", readings.PAPERS)
-def test_the_page_of_readings_has_every_class_and_choice(paper, tmp_path):
-    made = readings.markdown(paper, tmp_path)
+@pytest.mark.parametrize("paper", interpretations.PAPERS)
+def test_the_page_of_interpretations_has_every_class_and_choice(paper, tmp_path):
+    made = interpretations.markdown(paper, tmp_path)
     for one in shipped_classes():
         if one.claim.startswith(f"{paper}."):
             assert re.search(rf"^\| {re.escape(one.claim)} \| .* \| {one.holds} of {one.of} \|$", made, re.M), one.claim
-    choices = readings.readings.papers()[paper].readings.choices
+    choices = interpretations.interpretations.papers()[paper].interpretations.choices
     assert [f"### `{choice.key}`: {choice.asks}" for choice in choices] == re.findall("^### .*$", made, re.M)
-    whole = tmp_path / "readings" / f"{paper}.md"
+    whole = tmp_path / "interpretations" / f"{paper}.md"
     whole.parent.mkdir()
     whole.write_text("# Title\n\nEverything.\n")
-    assert readings.markdown(paper, tmp_path) == "Everything."
+    assert interpretations.markdown(paper, tmp_path) == "Everything."

@@ -1,4 +1,5 @@
-"""What commands say in Russian beside a run: the chart and its page, lists, readings, reasons of claims not judged."""
+"""What commands say in Russian beside a run: the chart and its page, lists, interpretations, reasons of claims not
+judged."""
 
 import json
 import re
@@ -6,7 +7,7 @@ import re
 import pytest
 from making import messages
 
-from radarsim.app import configs, readings, solve
+from radarsim.app import configs, interpretations, solve
 from radarsim.app.compare import chart, described
 from radarsim.app.configs import load
 from radarsim.app.quantities import Asked
@@ -79,20 +80,20 @@ def test_the_list_says_what_things_are_and_leaves_their_names():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("claim", ["P1.4", "P1.5"])
-def test_readings_of_a_claim_and_their_curve(claim, tmp_path):
+def test_interpretations_of_a_claim_and_their_curve(claim, tmp_path):
     with speaking("ru"):
-        done = readings.judged(readings.asked([claim]), out=tmp_path, figures=False)
-        page = readings.pages(done)
+        done = interpretations.judged(interpretations.asked([claim]), out=tmp_path, figures=False)
+        page = interpretations.pages(done)
         over = done.read[0].over[0]
         texts = shown(curve.specification(over))
     every = [one.name for choice in over.of.choices for one in choice.alternatives]  # the page has them as keys
     typed = {part for name in every for part in re.findall("[A-Za-z]+", name)} | {"same", "time"}
-    names = NAMES | typed | {"readings", "markdown", "results", "verdicts"}
+    names = NAMES | typed | {"interpretations", "markdown", "results", "verdicts"}
     assert {text: found for text in [*texts, *page.splitlines()] if (found := untranslated(text, names))} == {}
 
 
 def test_what_papers_leave_open_is_said_in_the_language():
-    choices = [choice for paper in readings.papers().values() for choice in paper.readings.choices]
+    choices = [choice for paper in interpretations.papers().values() for choice in paper.interpretations.choices]
     names = {one.name for choice in choices for one in choice.alternatives}
     with speaking("ru"):
         said = {name: alternative(name) for name in names}

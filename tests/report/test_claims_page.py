@@ -10,7 +10,15 @@ from radarsim.report.drawing import Line, Note
 def row(claim="P9.1", kind=REFUTED, **more):
     numbers = {"measured": 3.0, "lo": 2.5, "hi": 3.5, "judged_lo": 2.0, "judged_hi": 4.0}
     numbers |= {"expected_lo": 5.0, "expected_hi": "", "margin": 1.0}
-    words = {"paper": "Someone", "statement": "s", "place": "p", "original": "", "reading": "", "number": "", "why": ""}
+    words = {
+        "paper": "Someone",
+        "statement": "s",
+        "place": "p",
+        "original": "",
+        "interpretation": "",
+        "number": "",
+        "why": "",
+    }
     classes = {"class": kind, "overall": kind, "as_shipped": kind, "verdict": kind, "extension": False, "needed": ""}
     beside = {
         "exact": "",
@@ -44,11 +52,11 @@ def test_headline_counts_classes_and_leaves_extensions_out():
 def test_a_claim_says_how_far_it_stands():
     flips = {"overall": "", "holds": 1, "of": 2, "depends_on": "flight, start", "as_shipped": REFUTED}
     said = page.verdict_of([row(kind=DEPENDS, **flips)])
-    assert said == "refuted as shipped; depends on flight, start (true under 1 of 2 readings)"
+    assert said == "refuted as shipped; depends on flight, start (true under 1 of 2 interpretations)"
     assert page.verdict_of([row(kind=DEPENDS, **flips | {"as_shipped": DEPENDS})]).startswith("depends on flight")
     few = row(kind=CONFIRMED, overall="", holds=3, of=3, as_shipped=UNDECIDED, needed=8123)
-    words = "not yet decided as shipped; confirmed over all readings"
-    assert page.verdict_of([few]) == f"{words} (8,200 realisations would decide; true under all 3 readings)"
+    words = "not yet decided as shipped; confirmed over all interpretations"
+    assert page.verdict_of([few]) == f"{words} (8,200 realisations would decide; true under all 3 interpretations)"
     assert page.verdict_of([row()]) == "**refuted**"  # by how much stands with its parts
 
 

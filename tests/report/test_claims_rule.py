@@ -20,8 +20,8 @@ from radarsim.report.claims.rule import (
     UNDECIDED,
     UNJUDGEABLE,
     VOID,
+    Interpretation,
     Judged,
-    Reading,
 )
 
 INF = math.inf
@@ -147,7 +147,7 @@ def test_variants_of_a_number_one_suffices():
     assert rule.claim([replace(wrong, against_print=True), right]).kind == CONFIRMED
 
 
-def test_a_joint_reading():
+def test_a_joint_interpretation():
     def of(first, second):
         return [
             at(NUMBER, 25 if ok else 50, number=number, variant=variant)
@@ -167,41 +167,55 @@ def test_extensions_and_what_is_not_stated():
     assert rule.claim([NUMBER], unstated=True).kind == UNJUDGEABLE
 
 
-def reading(outcome, kind="U", **choices):
-    return Reading(str(choices), kind, choices, outcome)
+def interpretation(outcome, kind="U", **choices):
+    return Interpretation(str(choices), kind, choices, outcome)
 
 
-def test_over_readings():
+def test_over_interpretations():
     own = rule.claim([at(NUMBER, 50)])
-    assert rule.over_readings(own, []) == own
-    false = [reading(REFUTED, a="1"), reading(REFUTED, a="2")]
-    assert rule.over_readings(own, false).kind == REFUTED
-    mixed = rule.over_readings(own, [*false, reading(CONFIRMED, a="3"), reading(CONFIRMED, "N", a="4")])
+    assert rule.over_interpretations(own, []) == own
+    false = [interpretation(REFUTED, a="1"), interpretation(REFUTED, a="2")]
+    assert rule.over_interpretations(own, false).kind == REFUTED
+    mixed = rule.over_interpretations(
+        own, [*false, interpretation(CONFIRMED, a="3"), interpretation(CONFIRMED, "N", a="4")]
+    )
     assert (mixed.kind, mixed.words) == (DEPENDS, "depends on a")
-    assert (mixed.holds_in, mixed.readings) == (1, 3)
-    assert rule.over_readings(own, [reading(CONFIRMED, a="1"), reading("", a="2")]).kind == CONFIRMED
-    assert rule.over_readings(own, [reading(CONFIRMED, a="1"), reading(UNDECIDED, a="2")]).kind == UNDECIDED
-    assert rule.over_readings(own, [reading(REFUTED, a="1"), reading(UNDECIDED, a="2")]).kind == UNDECIDED
-    never = rule.over_readings(own, [reading(REFUTED, a="1"), reading(IMMATERIAL, a="2")])
+    assert (mixed.holds_in, mixed.interpretations) == (1, 3)
+    assert (
+        rule.over_interpretations(own, [interpretation(CONFIRMED, a="1"), interpretation("", a="2")]).kind == CONFIRMED
+    )
+    assert (
+        rule.over_interpretations(own, [interpretation(CONFIRMED, a="1"), interpretation(UNDECIDED, a="2")]).kind
+        == UNDECIDED
+    )
+    assert (
+        rule.over_interpretations(own, [interpretation(REFUTED, a="1"), interpretation(UNDECIDED, a="2")]).kind
+        == UNDECIDED
+    )
+    never = rule.over_interpretations(own, [interpretation(REFUTED, a="1"), interpretation(IMMATERIAL, a="2")])
     assert (never.kind, never.depends_on, never.holds_in) == (DEPENDS, ("a",), 0)
-    assert rule.over_readings(own, [*false, reading(CONFIRMED, "N", a="4")]).kind == REFUTED
+    assert rule.over_interpretations(own, [*false, interpretation(CONFIRMED, "N", a="4")]).kind == REFUTED
 
 
 def test_the_choice_that_flips():
     grid = [
-        reading(CONFIRMED if flight == "weave" else REFUTED, flight=flight, start=start)
+        interpretation(CONFIRMED if flight == "weave" else REFUTED, flight=flight, start=start)
         for flight in ("weave", "pull", "turn")
         for start in ("plots", "truth")
     ]
     assert rule.flips(grid) == ("flight",)
-    apart = [reading(CONFIRMED, a="1", b="1"), reading(REFUTED, a="2", b="2"), reading(CONFIRMED, a="1", b="2")]
+    apart = [
+        interpretation(CONFIRMED, a="1", b="1"),
+        interpretation(REFUTED, a="2", b="2"),
+        interpretation(CONFIRMED, a="1", b="2"),
+    ]
     assert rule.flips(apart) == ("a",)
 
 
-def pairwise_flips(readings):
-    """How often two readings that differ in one choice alone come out differently, by looking at every pair."""
+def pairwise_flips(interpretations):
+    """How often two interpretations that differ in one choice alone come out differently, by looking at every pair."""
     found = Counter()
-    for one, other in itertools.combinations(readings, 2):
+    for one, other in itertools.combinations(interpretations, 2):
         differ = [key for key in ("a", "b", "c", "d") if one.choices.get(key) != other.choices.get(key)]
         if len(differ) == 1 and (one.outcome == CONFIRMED) != (other.outcome == CONFIRMED):
             found[differ[0]] += 1
@@ -210,12 +224,12 @@ def pairwise_flips(readings):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_the_choices_that_flip_are_those_of_every_pair(seed):
-    """The strongest first, equal ones as they are declared; choices left out and readings met twice included."""
+    """The strongest first, equal ones as they are declared; choices left out and interpretations met twice included."""
     draw = np.random.default_rng(seed)
-    readings = []
+    interpretations = []
     for values in itertools.product("123", "12", "1234", "12"):
         choices = {key: value for key, value in zip("abcd", values, strict=True) if (key, value) != ("d", "2")}
         true = values[0] == "2" or (values[2] == "4" and draw.random() < 0.5)
-        readings += [reading(CONFIRMED if true else REFUTED, **choices)] * (draw.random() < 0.8) * 2
-    found = pairwise_flips(readings)
-    assert rule.flips(readings) == tuple(sorted(found, key=lambda key: (-found[key], key)))
+        interpretations += [interpretation(CONFIRMED if true else REFUTED, **choices)] * (draw.random() < 0.8) * 2
+    found = pairwise_flips(interpretations)
+    assert rule.flips(interpretations) == tuple(sorted(found, key=lambda key: (-found[key], key)))

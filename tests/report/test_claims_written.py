@@ -36,6 +36,12 @@ def exact_gain(seen: Evidence, key: int, pick: str, scan: int = 1) -> float:
     return 10.0 * key
 
 
+@pytest.mark.parametrize("key", ["interpretation", "reading"])
+def test_interpretation_may_be_given_under_its_earlier_name(claims, key):
+    (claim,) = claims(f"{HEAD}{CLAIM}{PART}".replace("  parts:", f"  {key}: at the end\n  parts:"))
+    assert claim.interpretation == "at the end"
+
+
 @pytest.fixture
 def claims(tmp_path):
     """A function that reads claims of this text."""
@@ -160,7 +166,7 @@ def test_a_list_reads_no_claims():
 
 
 def test_what_a_paper_leaves_open_is_what_is_written(tmp_path):
-    file = tmp_path / "readings.yaml"
+    file = tmp_path / "interpretations.yaml"
     file.write_text(
         "paper: P9\nnames: {FAST: [1, 3]}\nchoices:\n- key: start\n  asks: how it starts\n  original: nothing\n"
         "  claims: [$FAST, 5t]\n  alternatives:\n  - {name: slow, kind: U, reason: none, sets: {rate: 2}}\n"
@@ -170,15 +176,15 @@ def test_what_a_paper_leaves_open_is_what_is_written(tmp_path):
     assert choice.claims == ("P9.1", "P9.3", "P9.5t")
     assert (choice.default, choice["slow"].sets, choice.contradicts) == ("slow", {"rate": 2}, False)
     file.write_text(file.read_text().replace("kind: U", "kind: X").replace("$FAST", "$SLOW"))
-    with pytest.raises(ConfigError, match=r"readings.yaml:9:24: .*kind: must be one of E, U, N, got 'X'"):
+    with pytest.raises(ConfigError, match=r"interpretations.yaml:9:24: .*kind: must be one of E, U, N, got 'X'"):
         choices_in(file)
 
 
 def test_a_choice_bears_on_claims_that_there_are():
     for name in registry.SHIPPED:
-        readings = registry.study(name).readings()
-        known = {claim.id for claim in registry.study(name).claims().claims} if readings else set()
-        assert readings is None or {one for choice in readings.choices for one in choice.claims} <= known
+        interpretations = registry.study(name).interpretations()
+        known = {claim.id for claim in registry.study(name).claims().claims} if interpretations else set()
+        assert interpretations is None or {one for choice in interpretations.choices for one in choice.claims} <= known
 
 
 @pytest.mark.parametrize("language", ["en", "ru"])
@@ -186,14 +192,17 @@ def test_a_choice_is_named_by_few_words_within_a_sentence(language):
     """In a list of several, and beside a figure."""
     with speaking(language):
         said = [
-            tr(one.asks) for name in registry.SHIPPED if (of := registry.study(name).readings()) for one in of.choices
+            tr(one.asks)
+            for name in registry.SHIPPED
+            if (of := registry.study(name).interpretations())
+            for one in of.choices
         ]
     assert [words for words in said if len(words) > 36 or ", " in words or re.match("[A-ZА-Я][a-zа-я ]", words)] == []
 
 
 def test_how_long_fast_radars_are_watched_bears_on_all_claims_that_look_at_one():
     study = registry.study("range_doppler")
-    points = next(one for one in study.readings().choices if one.key == "points")
+    points = next(one for one in study.interpretations().choices if one.key == "points")
     looked = {}
     for claim in study.claims().claims:
         cases = [case for part in claim.parts if part.asserted for case in part.cases]

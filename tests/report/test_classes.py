@@ -1,4 +1,5 @@
-"""One class a claim: `readings`, a run, its report, figure and tables, `claims` and the page say the same of it."""
+"""One class a claim: `interpretations`, a run, its report, figure and tables, `claims` and the page say the same of
+it."""
 
 import csv
 import dataclasses
@@ -9,8 +10,8 @@ from html import unescape
 import pytest
 
 import radarsim
-from radarsim.app import readings, reproduce, run
-from radarsim.app import stored as stored_readings
+from radarsim.app import interpretations, reproduce, run
+from radarsim.app import stored as stored_interpretations
 from radarsim.app.stored import CLASSES, classes_of, shipped_classes, stored_classes
 from radarsim.config import document as lookup
 from radarsim.errors import StoreError
@@ -19,7 +20,7 @@ from radarsim.report.claims import CLAIMED, NOT_JUDGED, judge, page, rule
 from tests.program import printed
 
 PAPERS = {claim.id: (of, claim) for of in run.papers() for claim in of.claims}
-OPEN = [(paper.readings, paper.claims) for paper in readings.papers().values()]
+OPEN = [(paper.interpretations, paper.claims) for paper in interpretations.papers().values()]
 
 
 def as_runs_would_store(out, own):
@@ -48,7 +49,7 @@ def told(row):
 def agree(out):
     """Hold every rendering of the stored claims under `out` against the class in claims.csv; gives the classes."""
     every = json.loads(printed("claims", "--json", "--out", out))
-    worded = {row["claim"]: row for row in page.in_words(every, [readings for readings, _ in OPEN])}
+    worded = {row["claim"]: row for row in page.in_words(every, [interpretations for interpretations, _ in OPEN])}
     rows = {parts[0]["claim"]: parts[0] for parts in page.grouped(every)}
     lines = {line.split()[0]: line for line in printed("claims", "--out", out).splitlines() if line[:1] == "P"}
     made = printed("claims", "--markdown", "--out", out)
@@ -119,7 +120,7 @@ def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
     assert document["claims"] == {"confirmed": ["P1.23"], "depends on": ["P1.18", "P1.28"]}
     assert document["claims_as_shipped"] == {"confirmed": ["P1.23", "P1.28"], "refuted": ["P1.18"]}
     said = "refuted as shipped; depends on D_M of figure 1a in (m/s³)² and how the filter starts"
-    phrase = f"{said} (true under 1 of 15 readings)"
+    phrase = f"{said} (true under 1 of 15 interpretations)"
     assert reported(tmp_path / "rls2")["P1.18"] == phrase
     assert "P1.18  depends    RLS 2" in printed("claims", "rls2", "--out", tmp_path)
     assert f"P1.18  {phrase}: RLS 2" in printed("claims", "rls2", "--parts", "--out", tmp_path)
@@ -137,7 +138,7 @@ def test_a_result_that_is_not_written_has_the_class_and_a_radar_of_ones_own_none
 
 
 def test_claims_as_they_are_declared_have_a_shipped_class():
-    """Where one has none `make readings-pages` was not called since its parts or choices were changed."""
+    """Where one has none `make interpretations-pages` was not called since its parts or choices were changed."""
     assert [claim for claim, found in classes_of(OPEN, None).items() if found is None] == []
 
 
@@ -152,25 +153,25 @@ def test_what_was_judged_of_other_words_is_no_class():
     assert known == {claim.id: None}
     row = {"claim": claim.id, "class": rule.REFUTED, "as_shipped": rule.REFUTED, "depends_on": ""}
     (alone,) = page.with_classes([row], known)
-    assert (alone["class"], alone["overall"]) == (rule.REFUTED, "refuted as shipped; other readings not judged")
+    assert (alone["class"], alone["overall"]) == (rule.REFUTED, "refuted as shipped; other interpretations not judged")
     assert page.verdict_words(alone) == alone["overall"]
-    (torn,) = page.with_classes([row | {"as_shipped": rule.CONTRADICTORY}], known)  # no reading mends it
+    (torn,) = page.with_classes([row | {"as_shipped": rule.CONTRADICTORY}], known)  # no interpretation mends it
     assert torn["overall"] == rule.CONTRADICTORY
 
 
 def test_a_run_without_any_class_says_that_it_is_judged_as_shipped_alone(monkeypatch, tmp_path):
-    monkeypatch.setattr(stored_readings, "shipped_classes", lambda: ())
+    monkeypatch.setattr(stored_interpretations, "shipped_classes", lambda: ())
     text = printed("run", "rls2", "-n", 60, "--no-figures", "--out", tmp_path)
-    assert "only as shipped: P1.18, P1.23, P1.28; `radarsim readings P1` judges" in text
+    assert "only as shipped: P1.18, P1.23, P1.28; `radarsim interpretations P1` judges" in text
     assert "P1.18  refuted as shipped    RLS" in printed("claims", "rls2", "--out", tmp_path)
-    assert "P1.18  refuted as shipped; other readings not judged: RLS" in printed(
+    assert "P1.18  refuted as shipped; other interpretations not judged: RLS" in printed(
         "claims", "rls2", "--parts", "--out", tmp_path
     )
 
 
 def test_classes_that_were_worked_out_beside_the_run_count(tmp_path):
     printed("run", "rls2", "-n", 300, "--no-figures", "--out", tmp_path)
-    assert "note" not in printed("readings", "P1.23", "--no-figures", "--out", tmp_path)
+    assert "note" not in printed("interpretations", "P1.23", "--no-figures", "--out", tmp_path)
     (own,) = stored_classes(tmp_path)
     path = tmp_path / CLASSES
     path.write_text(path.read_text().replace(f",{rule.CONFIRMED},", f",{rule.IMMATERIAL},"))
@@ -182,13 +183,13 @@ def test_classes_that_were_worked_out_beside_the_run_count(tmp_path):
     rows = csv.DictReader((tmp_path / "rls2/claims.csv").read_text(encoding="utf-8").splitlines())
     assert {row["class"] for row in rows if row["claim"] == "P1.23"} == {rule.IMMATERIAL}
     path.write_text("claim,class\nP1.23,certain\n")
-    with pytest.raises(StoreError, match="is no table of readings"):
+    with pytest.raises(StoreError, match="is no table of interpretations"):
         stored_classes(tmp_path)
 
 
 @pytest.mark.slow
-def test_readings_tell_of_runs_that_were_written_with_other_classes(tmp_path):
-    asked = ("readings", "P1.9", "P1.8", "--no-figures", "--out", tmp_path)
+def test_interpretations_tell_of_runs_that_were_written_with_other_classes(tmp_path):
+    asked = ("interpretations", "P1.9", "P1.8", "--no-figures", "--out", tmp_path)
     assert "radarsim report" not in printed(*asked)
     classes = tmp_path / CLASSES
     classes.write_text(classes.read_text().replace(f",{rule.CONFIRMED},", f",{rule.REFUTED},"))
@@ -199,9 +200,9 @@ def test_readings_tell_of_runs_that_were_written_with_other_classes(tmp_path):
 
 
 @pytest.mark.slow
-def test_shipped_classes_are_what_readings_give(tmp_path):
+def test_shipped_classes_are_what_interpretations_give(tmp_path):
     """All of P1, P3 and P4, and what of P2 takes under a minute; what few realisations leave open may be decided."""
-    done = readings.judged(readings.asked(["P1", "P3", "P4", "P2.4"]), out=tmp_path, figures=False)
+    done = interpretations.judged(interpretations.asked(["P1", "P3", "P4", "P2.4"]), out=tmp_path, figures=False)
     shipped, own = ({one.claim: one for one in every} for every in (shipped_classes(), stored_classes(tmp_path)))
     for over in (over for read in done.read for over in read.over):
         claim = over.claim.id

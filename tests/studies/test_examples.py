@@ -98,14 +98,14 @@ def test_an_examples_run_is_the_same_by_any_means(radarsim, tmp_path, name, n, f
 
 
 @pytest.mark.slow
-def test_the_chirps_missed_plots_readings_and_precision(radarsim, tmp_path):
+def test_the_chirps_missed_plots_interpretations_and_precision(radarsim, tmp_path):
     run = ("run", "chirp_missed", "-n", 2000, "--no-figures", "--out", tmp_path)
     radarsim(*run)
     (row,) = [one for one in (tmp_path / "chirp_missed/last.csv").read_text().splitlines() if ",up,r," in one]
     assert row.endswith(",,")  # neither an exact value nor a limit
-    said = radarsim("readings", "chirp", "-n", 2000, "--out", tmp_path).stdout
-    assert "chirp.4 confirmed                    holds in 4 of 4 readings" in said
-    assert "chirp.5 confirmed                    holds in 2 of 2 readings" in said
+    said = radarsim("interpretations", "chirp", "-n", 2000, "--out", tmp_path).stdout
+    assert "chirp.4 confirmed                    holds in 4 of 4 interpretations" in said
+    assert "chirp.5 confirmed                    holds in 2 of 2 interpretations" in said
     done = json.loads(radarsim("run", "chirp", "--precision", 3, "--no-figures", "--out", tmp_path, "--json").stdout)
     assert 2000 <= done[0]["cases"]["chirp"]["done"] <= 100_000
 
@@ -239,9 +239,10 @@ def test_what_a_package_is_told_is_of_its_own_configs_and_of_options_that_were_g
     assert "is no claim of bearings; its claims: bearings.1," in radarsim("claims", "bearings.9", code=2).stderr
     for name in ("bearings", "bearings.1"):
         words = (
-            f"readings: {name}: its study declares no choices that bearings leaves open: there are no other readings\n"
+            f"interpretations: {name}: its study declares no choices that bearings leaves open: "
+            "there are no other interpretations\n"
         )
-        assert radarsim("readings", name, code=2).stderr == words
+        assert radarsim("interpretations", name, code=2).stderr == words
     ask = ("solve", "chirp", "radar.detection_probability", "--sigma", "r", "--filter", "up", "--equals", 27)
     said = radarsim(*ask, "--between", 2, 4, code=2).stderr
     assert said == "radar.detection_probability: must be <= 1, got 2\n"
@@ -258,9 +259,9 @@ def test_claims_and_reports_are_told_to_be_of_before_only_where_they_are_of_the_
     facts = json.loads(record.read_text())
     facts["outputs"]["claims.csv"] = hashlib.sha256(table.read_bytes()).hexdigest()
     record.write_text(json.dumps(facts))
-    readings = ("readings", "chirp.1", "-n", 100, "--no-figures", "--out", tmp_path)
+    interpretations = ("interpretations", "chirp.1", "-n", 100, "--no-figures", "--out", tmp_path)
     words = f"claims.csv and report.html of chirp hold older verdicts: `radarsim report chirp --out {tmp_path}`"
-    assert words in " ".join(radarsim(*readings).stdout.split())
+    assert words in " ".join(radarsim(*interpretations).stdout.split())
     facts["resolved"]["cases"][0]["radar"]["sigma_range_m"] = 51.0  # run before the config was changed
     record.write_text(json.dumps(facts))
-    assert "verdicts of before" not in " ".join(radarsim(*readings).stdout.split())
+    assert "verdicts of before" not in " ".join(radarsim(*interpretations).stdout.split())

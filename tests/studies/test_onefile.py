@@ -175,7 +175,7 @@ def test_question_answer_and_figures(made):
     assert "position" in drawn["sigma_x"].title
 
 
-def test_claims_find_a_case_by_its_keys_and_readings_set_keys(made):
+def test_claims_find_a_case_by_its_keys_and_interpretations_set_keys(made):
     study, results, every = made
     papers = study.claims()
     (claim,) = papers.claims
@@ -188,9 +188,12 @@ def test_claims_find_a_case_by_its_keys_and_readings_set_keys(made):
     assert seen.case({"scans": 40}) is results[0]
     with pytest.raises(ConfigError, match=r"target\.step: there is no such key"):
         seen.case({"target.step": 2})
-    readings = study.readings()
-    assert [readings.name(one) for one in readings.of_claim("walk.1")] == ["as shipped", "noise: a half of it"]
-    changed = readings.changed(claim, case_of(study), readings.reading(noise="a half of it")).spec
+    interpretations = study.interpretations()
+    assert [interpretations.name(one) for one in interpretations.of_claim("walk.1")] == [
+        "as shipped",
+        "noise: a half of it",
+    ]
+    changed = interpretations.changed(claim, case_of(study), interpretations.interpretation(noise="a half of it")).spec
     assert (changed.sensor.sigma_x_m, [one.gain for one in changed.filters]) == (0.5, [0.3, 0.3])
     assert changed.target == case_of(study).spec.target
 
@@ -243,7 +246,7 @@ def test_a_time_between_plots_is_a_time():
         Wrong().scan_period_s(SimpleNamespace(sensor=SimpleNamespace(about="often")))
 
 
-def test_a_key_that_no_reading_can_set_is_one_line():
+def test_a_key_that_no_interpretation_can_set_is_one_line():
     text = Walk.claims_yaml.replace("sensor.sigma_x_m: 0.5", "sensor.sigma: 1")
     with pytest.raises(ConfigError, match=r"choices: sets: there is no key sensor\.sigma"):
         type("Wrong", (Walk,), {"claims_yaml": text, "__module__": __name__})().keys()
@@ -258,7 +261,10 @@ UNKNOWN = {  # in the text: what stands there instead, and what is said of it
     "target.sigma_step_m: 2": ("target.step: 2", "of: target.step: there is no such key"),
     "{target.sigma_step_m: 2}": ("{target.sigma_step_m: 7}", "of: no case has target.sigma_step_m 7"),
     "config: walk": ("config: walkk", "config: no such config 'walkk' is shipped; there are none"),
-    "gain: 0.3": ("gain: -1", "choices: noise: 'a half of it' cannot be set: reading: filters.0.gain: must be > 0"),
+    "gain: 0.3": (
+        "gain: -1",
+        "choices: noise: 'a half of it' cannot be set: interpretation: filters.0.gain: must be > 0",
+    ),
     "sensor.sigma_x_m: 0.5": ("filters.7.gain: 1", "'a half of it' cannot be set: filters.7.gain: there is no such"),
 }
 

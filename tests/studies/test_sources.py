@@ -78,7 +78,7 @@ def test_no_module_that_only_shows_results_counts(study):
         modules = sources.computing_modules(sources._first_modules(load(config).cases[0]))
         of_study = {name.rpartition(".")[2] for name in modules if is_within(name, [registry.SHIPPED[study]])}
         assert "study" in of_study
-        assert not of_study & {"tables", "figures", "words", "measures", "readings", "track", "chart", "search"}
+        assert not of_study & {"tables", "figures", "words", "measures", "interpretations", "track", "chart", "search"}
 
 
 def imports_by_syntax(path):

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app import readings, run
+from radarsim.app import interpretations, run
 from radarsim.app.configs import load
 from radarsim.app.run import RunOptions, SimulatedCases
 from radarsim.engine.results import Axes, Layout
@@ -54,7 +54,7 @@ def test_the_recursion_gives_what_is_known_of_equal_steps(count, known):
 
 @pytest.mark.parametrize("most", [2000, 8000, 100_000, 128_000, 10**6, 10**8, MOST])
 def test_however_often_one_looks_at_most_5_per_cent_of_true_claims_fall(most):
-    """At 95 % a look it would be 5, 8, 20 … 65 %; the looks are those that `--decide` and `readings` take."""
+    """At 95 % a look it would be 5, 8, 20 … 65 %; the looks are those that `--decide` and `interpretations` take."""
     places = np.array([1000.0, *looks(most)])
     assert crossed(places, Z) <= 0.05
     assert crossed(places, rule.Z95) > 0.07
@@ -101,11 +101,11 @@ def test_runs_that_decide_refute_few_claims_that_are_true_at_the_border(monkeypa
             {"paper": "p", "claim": "P9.1", "as_shipped": said.kind, "extension": False, "n": 1.0, "needed": needed}
         ]
 
-    monkeypatch.setattr(readings.run, "simulate", simulated)
-    monkeypatch.setattr(readings, "rows_of", rows_of)
+    monkeypatch.setattr(interpretations.run, "simulate", simulated)
+    monkeypatch.setattr(interpretations, "rows_of", rows_of)
     for _ in range(runs):
         means = walk(rng, most, len(borders))
-        ended = readings.simulated(experiment, RunOptions(out="nowhere"))
+        ended = interpretations.simulated(experiment, RunOptions(out="nowhere"))
         refuted += outcome(means, ended.done["rls2"], borders).kind == rule.REFUTED
     assert refuted / runs < 0.025 + 3 * math.sqrt(0.025 * 0.975 / runs)
 

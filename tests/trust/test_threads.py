@@ -50,10 +50,11 @@ def test_run_and_track_without_a_thread_give_the_same_bytes(barred, tmp_path):
 
 
 @pytest.mark.slow
-def test_python_runs_without_a_thread_where_updates_are_timed_and_readings_known_exactly(barred):
-    """`multimodel` measures an update's cost, and P1's readings take a radar each, in threads where they may."""
+def test_python_runs_without_a_thread_where_updates_are_timed_and_interpretations_known_exactly(barred):
+    """`multimodel` measures an update's cost, and P1's interpretations take a radar each, in threads where they may."""
     ran = (
-        "import radarsim; radarsim.run('multimodel', realisations=20, threads=0); radarsim.readings('P1.4', threads=0)"
+        "import radarsim; radarsim.run('multimodel', realisations=20, threads=0); "
+        "radarsim.interpretations('P1.4', threads=0)"
     )
     told, code = barred(f"{ran}\n{NATIVE}")
     before, _ = barred(f"import pandas\n{NATIVE}")  # pandas imports pyarrow where it is there, which starts one

@@ -57,7 +57,7 @@ COMMANDS = (
     ("track", "rls2", "plots.csv", "-o", "track.csv", "--report", "report"),
     ("fit", "mine", "plots.csv"),
     ("claims", "P1"),
-    ("readings", "P1.4", "--no-figures"),
+    ("interpretations", "P1.4", "--no-figures"),
     ("schema",),
     ("clean", "rls4"),
 )

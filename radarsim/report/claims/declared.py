@@ -444,7 +444,7 @@ class Claim:
     """A statement of a paper: its place, its interpretation, the parts that judge it, the config that holds them.
 
     original is the sentence in the paper's language. An extension is ours, and not counted. reported: the paper reports
-    an assertion of others: judged under every reading, and not counted. unstated: what the paper omits and the
+    an assertion of others: judged under every interpretation, and not counted. unstated: what the paper omits and the
     statement cannot be judged without; joint: one variant has to give every number; internal: both sides are printed,
     so that a disagreement is within the print."""
 
@@ -452,7 +452,7 @@ class Claim:
     place: str
     statement: str
     parts: tuple[Part, ...]
-    reading: str = ""
+    interpretation: str = ""
     config: str = ""
     original: str = ""
     extension: bool = False

@@ -48,7 +48,7 @@ def verdict(of: Estimate, strict: tuple[float, float]) -> str:
 
 CLAIMED = (
     *("claim", "paper", "statement", "case", "measured", "lo", "hi", "expected", "verdict"),
-    *("expected_lo", "expected_hi", "what", "unit", "place", "reading", "overall"),
+    *("expected_lo", "expected_hi", "what", "unit", "place", "interpretation", "overall"),
     *("exact", "margin", "miss", "class", "holds", "of", "depends_on", "old_verdict", "original"),
     *("margin_kind", "ceiling", "n", "worst_miss", "needed", "extension", "number", "why", "as_shipped"),
     *("judged_lo", "judged_hi"),
@@ -279,7 +279,7 @@ def blank(claim: Claim, paper: str) -> dict[str, Any]:
     empty: dict[str, Any] = dict.fromkeys(CLAIMED, "") | dict.fromkeys(NUMBERS, math.nan)
     return empty | {
         **{"claim": claim.id, "paper": paper, "extension": not claim.counted},
-        **{name: getattr(claim, name) for name in ("statement", "place", "reading", "original")},
+        **{name: getattr(claim, name) for name in ("statement", "place", "interpretation", "original")},
         "why": claim.unstated,
     }
 

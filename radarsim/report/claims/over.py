@@ -1,8 +1,8 @@
-"""What a paper leaves open, as data: choices with their alternatives, and readings, which take one of each.
+"""What a paper leaves open, as data: choices with their alternatives, and interpretations, which take one of each.
 
 An alternative is equivalent to the print in every respect (E), one of what the paper does not say (U), or against its
 print (N). The first alternative of a choice is what the shipped configs take. A verdict is robust if it is the same
-in all E and U readings; N shows what would have to be changed.
+in all E and U interpretations; N shows what would have to be changed.
 
 Claims as they are written in YAML beside a study: statement, place, and what is measured by which function.
 
@@ -19,7 +19,8 @@ cases under `of`, and the arguments that are given by name. `expected` names a f
 a value of `names:`, or of `each:`, which makes a part of every combination of its values; `"a, b":` takes several at
 once. An argument that is none of the function's is a fault with file and line, as in a config.
 
-Verdicts on a claim under every reading of its paper: the table readings.csv, and what the claim depends on."""
+Verdicts on a claim under every interpretation of its paper: the table interpretations.csv, and what the claim depends
+on."""
 
 import inspect
 import itertools
@@ -64,13 +65,14 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case
 
 
-# ---- readings --------------------------------------------------------------------------------------------------------
-KINDS = (EQUIVALENT, UNSTATED, AGAINST)  # a reading is of the last kind among its alternatives
+# ---- interpretations
+# --------------------------------------------------------------------------------------------------------
+KINDS = (EQUIVALENT, UNSTATED, AGAINST)  # an interpretation is of the last kind among its alternatives
 DEFAULT = "as shipped"
 
 
 class Unreadable(Exception):
-    """A reading that is impossible to fly or design, and why."""
+    """An interpretation that is impossible to fly or design, and why."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Reading:
+class Interpretation:
     """One alternative of each choice of a paper, by the choice's key, in the order of the choices."""
 
     taken: tuple[tuple[str, str], ...]
@@ -124,10 +126,10 @@ class Reading:
         return dict(self.taken)[key]
 
 
-class PaperReadings(ABC):
-    """The readings of a paper, and how its claims are measured under one. A study with exact numbers gives evidence
-    without a run; any other changes the cases of a claim's config, which are then run, and reads their sums like those
-    of the paper's own."""
+class PaperInterpretations(ABC):
+    """The interpretations of a paper, and how its claims are measured under one. A study with exact numbers gives
+    evidence without a run; any other changes the cases of a claim's config, which are then run, and reads their sums
+    like those of the paper's own."""
 
     paper: str  # P1
     choices: tuple[Choice, ...]
@@ -138,59 +140,60 @@ class PaperReadings(ABC):
         """Whether the paper leaves anything open that affects a claim of its own."""
         return not claim.extension and any(choice.bears_on(claim.id) for choice in self.choices)
 
-    # ---- the readings --------------------------------------------------------------------------------------------
-    def declared(self) -> Sequence[Reading]:
-        """The readings to judge, the default first: all combinations of E and U, and each N alone."""
+    # ---- the interpretations
+    # --------------------------------------------------------------------------------------------
+    def declared(self) -> Sequence[Interpretation]:
+        """The interpretations to judge, the default first: all combinations of E and U, and each N alone."""
         return list(dict.fromkeys([*self.combined(self.choices), *self.against_print()]))
 
-    def combined(self, choices: Iterable[Choice]) -> Iterator[Reading]:
+    def combined(self, choices: Iterable[Choice]) -> Iterator[Interpretation]:
         """All combinations of the E and U alternatives of these choices, all others at their default."""
         varied = list(choices)
         allowed = [[one.name for one in choice.alternatives if one.kind != AGAINST] for choice in varied]
         for names in itertools.product(*allowed):
-            yield self.reading(**dict(zip((choice.key for choice in varied), names, strict=True)))
+            yield self.interpretation(**dict(zip((choice.key for choice in varied), names, strict=True)))
 
-    def against_print(self) -> Iterator[Reading]:
+    def against_print(self) -> Iterator[Interpretation]:
         """Each alternative against the print, all else at its default."""
         for choice in self.choices:
             for one in choice.alternatives:
                 if one.kind == AGAINST:
-                    yield self.reading(**{choice.key: one.name})
+                    yield self.interpretation(**{choice.key: one.name})
 
-    def reading(self, **taken: str) -> Reading:
-        """The reading of these alternatives, the others at their default."""
-        return Reading(tuple((choice.key, taken.get(choice.key, choice.default)) for choice in self.choices))
+    def interpretation(self, **taken: str) -> Interpretation:
+        """The interpretation of these alternatives, the others at their default."""
+        return Interpretation(tuple((choice.key, taken.get(choice.key, choice.default)) for choice in self.choices))
 
-    def of_claim(self, claim: str) -> list[Reading]:
-        """The declared readings that differ for a claim: choices that do not affect it stay at their default."""
+    def of_claim(self, claim: str) -> list[Interpretation]:
+        """The declared interpretations that differ for a claim: choices that do not affect it stay at their default."""
         bears = [choice.bears_on(claim) for choice in self.choices]
-        firsts: dict[tuple[tuple[str, str], ...], Reading] = {}
+        firsts: dict[tuple[tuple[str, str], ...], Interpretation] = {}
         for one in self._declared:
             firsts.setdefault(tuple(itertools.compress(one.taken, bears)), one)
         return [self.bearing(one, claim) for one in firsts.values()]
 
     @cached_property
-    def _declared(self) -> Sequence[Reading]:
+    def _declared(self) -> Sequence[Interpretation]:
         return self.declared()
 
-    def bearing(self, reading: Reading, claim: str) -> Reading:
-        """A reading with the choices that do not affect a claim at their default."""
-        pairs = zip(reading.taken, self.choices, strict=True)
-        return Reading(tuple((key, name if one.bears_on(claim) else one.default) for (key, name), one in pairs))
+    def bearing(self, interpretation: Interpretation, claim: str) -> Interpretation:
+        """An interpretation with the choices that do not affect a claim at their default."""
+        pairs = zip(interpretation.taken, self.choices, strict=True)
+        return Interpretation(tuple((key, name if one.bears_on(claim) else one.default) for (key, name), one in pairs))
 
-    def kind(self, reading: Reading) -> str:
+    def kind(self, interpretation: Interpretation) -> str:
         """E, U or N: the last of the kinds of its alternatives that are not the default; E for the default itself."""
-        kinds = [choice[reading[choice.key]].kind for choice in self._other(reading)]
+        kinds = [choice[interpretation[choice.key]].kind for choice in self._other(interpretation)]
         return max(kinds, key=KINDS.index, default=EQUIVALENT)
 
-    def name(self, reading: Reading) -> str:
-        """How a reading differs from the shipped configs."""
-        words = [f"{choice.key}: {reading[choice.key]}" for choice in self._other(reading)]
+    def name(self, interpretation: Interpretation) -> str:
+        """How an interpretation differs from the shipped configs."""
+        words = [f"{choice.key}: {interpretation[choice.key]}" for choice in self._other(interpretation)]
         return "; ".join(words) or DEFAULT
 
-    def said(self, reading: Reading) -> str:
-        """How a reading differs from the shipped configs, for people."""
-        return in_words({choice.key: reading[choice.key] for choice in self._other(reading)}, self.asks)
+    def said(self, interpretation: Interpretation) -> str:
+        """How an interpretation differs from the shipped configs, for people."""
+        return in_words({choice.key: interpretation[choice.key] for choice in self._other(interpretation)}, self.asks)
 
     @cached_property
     def asks(self) -> Mapping[str, str]:
@@ -201,32 +204,35 @@ class PaperReadings(ABC):
         """Choices within a sentence."""
         return listed([tr(self.asks[key]) for key in keys])
 
-    def sets(self, reading: Reading) -> dict[str, Any]:
-        """The settings of a reading's alternatives."""
-        return {key: value for one in self.choices for key, value in one[reading[one.key]].sets.items()}
+    def sets(self, interpretation: Interpretation) -> dict[str, Any]:
+        """The settings of an interpretation's alternatives."""
+        return {key: value for one in self.choices for key, value in one[interpretation[one.key]].sets.items()}
 
-    def _other(self, reading: Reading) -> list[Choice]:
-        return [choice for choice in self.choices if reading[choice.key] != choice.default]
+    def _other(self, interpretation: Interpretation) -> list[Choice]:
+        return [choice for choice in self.choices if interpretation[choice.key] != choice.default]
 
-    # ---- a claim under a reading -----------------------------------------------------------------------------------
-    def parts(self, claim: Claim, reading: Reading) -> Sequence[Part]:
-        """The parts of a claim to judge under a reading. Default: all."""
+    # ---- a claim under an interpretation
+    # -----------------------------------------------------------------------------------
+    def parts(self, claim: Claim, interpretation: Interpretation) -> Sequence[Part]:
+        """The parts of a claim to judge under an interpretation. Default: all."""
         return claim.parts
 
-    def changed(self, claim: Claim, case: "Case", reading: Reading) -> "Case | None":
-        """A case of a claim's config changed for a reading; None where the claim does not need it. Raises Unreadable
-        where it is impossible to fly or design."""
+    def changed(self, claim: Claim, case: "Case", interpretation: Interpretation) -> "Case | None":
+        """A case of a claim's config changed for an interpretation; None where the claim does not need it. Raises
+        Unreadable where it is impossible to fly or design."""
         return None
 
-    def evidence(self, claim: Claim, reading: Reading, seen: "Seen | None", of: PaperClaims) -> "Evidence":
-        """The evidence for a claim under a reading; seen: the results of its cases, None where all is exact.
+    def evidence(
+        self, claim: Claim, interpretation: Interpretation, seen: "Seen | None", of: PaperClaims
+    ) -> "Evidence":
+        """The evidence for a claim under an interpretation; seen: the results of its cases, None where all is exact.
 
         of: the paper's claims. Default: their evidence, over `seen`."""
         assert seen is not None  # a paper with exact values gives its own evidence
         return of.evidence(seen.results, seen.tables, seen.places)
 
-    def exact(self, claim: Claim, reading: Reading) -> bool:
-        """Whether the evidence for a claim is exact under a reading, so that nothing is run. Default: no."""
+    def exact(self, claim: Claim, interpretation: Interpretation) -> bool:
+        """Whether the evidence for a claim is exact under an interpretation, so that nothing is run. Default: no."""
         return False
 
 
@@ -293,7 +299,8 @@ class ClaimKeys(Model):
     id: Anything
     place: str
     statement: str
-    reading: str = ""
+    interpretation: str = ""
+    reading: str = ""  # the key's name in earlier versions
     config: Stem | None = None
     original: str = ""
     extension: Flag = False
@@ -327,7 +334,7 @@ class ChoiceKeys(Model):
 
 
 class ChoicesKeys(Model):
-    """The open points of a paper, the file readings.yaml."""
+    """The open points of a paper, the file interpretations.yaml."""
 
     paper: Name
     names: dict[str, Anything] = {}  # noqa: RUF012
@@ -335,7 +342,7 @@ class ChoicesKeys(Model):
 
 
 class FileKeys(Model):
-    """The claims of a paper in one file; config: of those that name none. choices: as in readings.yaml."""
+    """The claims of a paper in one file; config: of those that name none. choices: as in interpretations.yaml."""
 
     paper: Name
     config: Stem
@@ -411,7 +418,7 @@ def written_in(text: str, source: str, *measures: ModuleType) -> tuple[tuple[Cla
 
 
 def choices_in(file: Path) -> tuple[Choice, ...]:
-    """The open points of a paper, from a file readings.yaml; raises ConfigError, one line for each fault."""
+    """The open points of a paper, from a file interpretations.yaml; raises ConfigError, one line for each fault."""
     faults = Faults()
     return _made(read(file, faults), faults, ChoicesKeys, lambda keys, reader: reader.choices(keys))
 
@@ -474,7 +481,8 @@ class _Reader:
             ]
             for j, part in enumerate(one.parts):
                 own += self._parts(part, names, ("claims", i, "parts", j))
-            given = one.model_dump(exclude={"id", "config", "parts", "parts_of"})
+            given = one.model_dump(exclude={"id", "config", "parts", "parts_of", "reading"})
+            given["interpretation"] = one.interpretation or one.reading
             given["source"] = self._source(("claims", i, "config") if one.config else ("config",))
             yield Claim(f"{keys.paper}.{one.id}", parts=tuple(own), config=one.config or keys.config, **given)
 
@@ -637,7 +645,7 @@ def _misfit(annotation: Any, value: Any) -> str:
 # ---- over ------------------------------------------------------------------------------------------------------------
 DEPENDS_ON = term("depends on {choices}")
 NOTHING = "there is nothing to measure it with"
-FIRST = ("claim", "part", "reading", "kind")
+FIRST = ("claim", "part", "interpretation", "kind")
 LAST = (
     *("measured", "lo", "hi", "exact", "expected_lo", "expected_hi", "margin", "verdict"),
     *("unit", "what", "outcome", "miss", "n", "needed", "reason", "over"),
@@ -646,12 +654,12 @@ LAST = (
 
 @dataclass(frozen=True)
 class Under:
-    """A claim under one reading: its parts with their numbers, in the order of the claim, and the verdict.
+    """A claim under one interpretation: its parts with their numbers, in the order of the claim, and the verdict.
 
     why: the reason if it was not judged: impossible to fly or design, or nothing to measure."""
 
     claim: Claim
-    reading: Reading
+    interpretation: Interpretation
     name: str
     kind: str
     parts: tuple[tuple[Part, Judged], ...] = ()
@@ -660,38 +668,40 @@ class Under:
 
     @property
     def counted(self) -> bool:
-        """Whether the paper allows the reading."""
+        """Whether the paper allows the interpretation."""
         return self.kind != rule.AGAINST and self.outcome is not None
 
-    def as_rule(self) -> rule.Reading:
+    def as_rule(self) -> rule.Interpretation:
         """The input of the rule."""
         outcome = self.outcome.kind if self.outcome else ""
-        return rule.Reading(self.name, self.kind, dict(self.reading.taken), outcome)
+        return rule.Interpretation(self.name, self.kind, dict(self.interpretation.taken), outcome)
 
 
-def under(of: PaperReadings, claim: Claim, reading: Reading, evidence: Evidence, n: int = 0) -> Under:
-    """Judge a claim by the evidence of a reading with n realisations; 0 where nothing was run."""
-    name, kind = of.name(reading), of.kind(reading)
+def under(
+    of: PaperInterpretations, claim: Claim, interpretation: Interpretation, evidence: Evidence, n: int = 0
+) -> Under:
+    """Judge a claim by the evidence of an interpretation with n realisations; 0 where nothing was run."""
+    name, kind = of.name(interpretation), of.kind(interpretation)
     try:
         parts = tuple(
-            (part, _judged(part, evidence, of.exact(claim, reading), n, name == DEFAULT))
-            for part in of.parts(claim, reading)
+            (part, _judged(part, evidence, of.exact(claim, interpretation), n, name == DEFAULT))
+            for part in of.parts(claim, interpretation)
         )
     except Missing as missing:
-        return Under(claim, reading, name, kind, why=missing.why or NOTHING)
+        return Under(claim, interpretation, name, kind, why=missing.why or NOTHING)
     except MeasureError as error:
-        if name == DEFAULT or not isinstance(error.__cause__, NoSuchScans):  # a reading may have fewer scans
+        if name == DEFAULT or not isinstance(error.__cause__, NoSuchScans):  # an interpretation may have fewer scans
             raise
-        return Under(claim, reading, name, kind, why=error.__cause__.why)
+        return Under(claim, interpretation, name, kind, why=error.__cause__.why)
     outcome = rule.claim([judged for _, judged in parts], **claim.how)
-    return Under(claim, reading, name, kind, parts, outcome)
+    return Under(claim, interpretation, name, kind, parts, outcome)
 
 
 def _judged(part: Part, seen: Evidence, exact: bool, n: int, shipped: bool) -> Judged:
-    """A part with its numbers; the reading gives its variant and whether that is against the print.
+    """A part with its numbers; the interpretation gives its variant and whether that is against the print.
 
     exact: whether all evidence is exact. Otherwise the exact value is known where the run knows it; a part's own
-    formula is of the shipped reading."""
+    formula is of the shipped interpretation."""
     found, nothing = part.measure(seen), Estimate(*(math.nan,) * 3)
     own = replace(part, variant="", against_print=False)
     value = found.value if exact else known(part if shipped else replace(part, exact=None), seen, found)
@@ -700,19 +710,19 @@ def _judged(part: Part, seen: Evidence, exact: bool, n: int, shipped: bool) -> J
 
 @dataclass(frozen=True)
 class Over:
-    """A claim over all readings of its paper, the default one first."""
+    """A claim over all interpretations of its paper, the default one first."""
 
-    of: PaperReadings
+    of: PaperInterpretations
     claim: Claim
     under: tuple[Under, ...]
 
     @cached_property
     def outcome(self) -> Outcome | None:
-        """The verdict of the rule; None where the default reading was not judged."""
+        """The verdict of the rule; None where the default interpretation was not judged."""
         own = self.under[0].outcome
         if own is None:
             return None
-        found = rule.over_readings(own, [one.as_rule() for one in self.under])
+        found = rule.over_interpretations(own, [one.as_rule() for one in self.under])
         printed_twice = any(part.against_print for part in self.claim.parts)
         torn = printed_twice and any(one.contradicts and one.key in found.depends_on for one in self.of.choices)
         torn = torn or (self.claim.joint and self._each_somewhere())
@@ -721,11 +731,12 @@ class Over:
         return replace(found, needed=self._needed() if found.kind == rule.UNDECIDED else None)
 
     def _needed(self) -> int | None:
-        """Realisations that would decide every undecided reading; None where a value lies on a border."""
+        """Realisations that would decide every undecided interpretation; None where a value lies on a border."""
         return rule.most_needed(one.outcome.needed for one in self.undecided if one.outcome)
 
     def _each_somewhere(self) -> bool:
-        """Whether every number of a joint claim is reproduced under some reading, though no reading gives all."""
+        """Whether every number of a joint claim is reproduced under some interpretation, though no interpretation gives
+        all."""
         counted = [one for one in self.under if one.counted]
         held = {part.number for one in counted for part, judged in one.parts if rule.verdict(judged) == rule.CONFIRMED}
         every = {part.number for one in counted for part, _ in one.parts}
@@ -733,46 +744,49 @@ class Over:
 
     @property
     def against_print(self) -> list[Under]:
-        """The readings against the print with another verdict than the default one."""
+        """The interpretations against the print with another verdict than the default one."""
         own = self.under[0].outcome
         judged = [one for one in self.under if one.kind == rule.AGAINST and one.outcome]
         return [one for one in judged if own and one.outcome and one.outcome.kind != own.kind]
 
     @property
     def undecided(self) -> list[Under]:
-        """The readings that the paper allows and that are undecided."""
+        """The interpretations that the paper allows and that are undecided."""
         return [one for one in self.under if one.counted and one.outcome and one.outcome.kind == rule.UNDECIDED]
 
     @property
     def looked(self) -> int:
-        """The fewest realisations of an undecided reading; 0 where all are decided."""
+        """The fewest realisations of an undecided interpretation; 0 where all are decided."""
         return min((judged.n for one in self.undecided for _, judged in one.parts), default=0)
 
     @property
     def impossible(self) -> list[Under]:
-        """The readings that were not judged, with their reasons."""
+        """The interpretations that were not judged, with their reasons."""
         return [one for one in self.under if one.outcome is None]
 
     def sentence(self) -> str:
-        """One line: in how many readings it holds, on what it depends, what would have to be changed."""
+        """One line: in how many interpretations it holds, on what it depends, what would have to be changed."""
         found = self.outcome
         if found is None:
             return tr("not judged: {why}", why=rule.said(self.under[0].why))
-        words = [tr("holds in {holds} of {of} readings", holds=found.holds_in or 0, of=found.readings or 0)]
+        words = [
+            tr("holds in {holds} of {of} interpretations", holds=found.holds_in or 0, of=found.interpretations or 0)
+        ]
         if self.still_open():
             words.append(self.still_open())
         if found.depends_on:
             words.append(tr(DEPENDS_ON, choices=self.of.asked(found.depends_on)))
         held = [one for one in self.against_print if one.outcome and one.outcome.kind == rule.CONFIRMED]
         if held and found.holds_in == 0:
-            names = " | ".join(self.of.said(one.reading) for one in held)
-            words.append(tr("it holds, against the print, with {readings}", readings=names))
+            names = " | ".join(self.of.said(one.interpretation) for one in held)
+            words.append(tr("it holds, against the print, with {interpretations}", interpretations=names))
         if self.impossible:
             words.append(tr("{count} not possible", count=len(self.impossible)))
         return "; ".join(words)
 
     def still_open(self) -> str:
-        """For an undecided claim, how many readings are undecided, and the realisations they need; else nothing."""
+        """For an undecided claim, how many interpretations are undecided, and the realisations they need; else
+        nothing."""
         if self.outcome is None or self.outcome.kind != rule.UNDECIDED:
             return ""
         told, needed = {"count": len(self.undecided), "n": f"{self.looked:,}"}, self.outcome.needed
@@ -786,18 +800,22 @@ class Over:
         )
 
 
-def columns(every: Iterable[PaperReadings]) -> tuple[str, ...]:
-    """The columns of readings.csv: one for each choice of these papers."""
+def columns(every: Iterable[PaperInterpretations]) -> tuple[str, ...]:
+    """The columns of interpretations.csv: one for each choice of these papers."""
     choices = dict.fromkeys(choice.key for of in every for choice in of.choices)
     return (*FIRST, *choices, *LAST)
 
 
 def rows(one: Under, names: Sequence[str], over: Outcome | None = None) -> list[dict[str, Any]]:
-    """Rows of readings.csv: one for each part; a single one with the reason where it was not judged.
+    """Rows of interpretations.csv: one for each part; a single one with the reason where it was not judged.
 
-    over: the result over all readings, whose class is in each row."""
-    choices = dict(one.reading.taken)
-    blank: dict[str, Any] = dict.fromkeys(names, "") | {"claim": one.claim.id, "reading": one.name, "kind": one.kind}
+    over: the result over all interpretations, whose class is in each row."""
+    choices = dict(one.interpretation.taken)
+    blank: dict[str, Any] = dict.fromkeys(names, "") | {
+        "claim": one.claim.id,
+        "interpretation": one.name,
+        "kind": one.kind,
+    }
     blank |= {key: value for key, value in choices.items() if key in names}
     blank["over"] = over.kind if over else ""
     if one.outcome is None:

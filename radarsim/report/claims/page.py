@@ -2,11 +2,12 @@
 
 The forest plot of claims: the worst part of each, its interval and exact value, in margins of the words.
 
-Specification curves: a claim under every reading, sorted by outcome, and below the alternatives of each reading.
+Specification curves: a claim under every interpretation, sorted by outcome, and below the alternatives of each
+interpretation.
 
-The class of a claim over all readings that its paper allows, beside its class as shipped. It is computed in one place,
-`over.Over.outcome`, when `radarsim readings` judges a claim under each of them, and kept as a row of classes.csv.
-Everything else that shows a class looks it up."""
+The class of a claim over all interpretations that its paper allows, beside its class as shipped. It is computed in one
+place, `over.Over.outcome`, when `radarsim interpretations` judges a claim under each of them, and kept as a row of
+classes.csv. Everything else that shows a class looks it up."""
 
 import math
 import re
@@ -23,7 +24,16 @@ from radarsim.language import numeral, plural, term, tr
 from radarsim.report.claims import rule
 from radarsim.report.claims.declared import Claim
 from radarsim.report.claims.judge import NOT_JUDGED, NOT_RUN
-from radarsim.report.claims.over import DEFAULT, DEPENDS_ON, Choice, Over, PaperReadings, Under, alternative, depth
+from radarsim.report.claims.over import (
+    DEFAULT,
+    DEPENDS_ON,
+    Choice,
+    Over,
+    PaperInterpretations,
+    Under,
+    alternative,
+    depth,
+)
 from radarsim.report.claims.rule import (
     CLASSES,
     CONFIRMED,
@@ -43,7 +53,7 @@ from radarsim.report.wording import formulas, interval
 FURTHEST = 5.0  # margins: larger distances are drawn there
 LETTERS = 44  # of an alternative beside the panel
 HEADING = 1.5  # lines that the name of a choice takes above its alternatives
-BESIDE = 0.02  # of all readings: room left of the first one, which may be as shipped
+BESIDE = 0.02  # of all interpretations: room left of the first one, which may be as shipped
 ROW_MM, AXIS_MM = 3.6, 14.0  # of a panel of rows: each, and its title and axis
 KINDS = {
     rule.EQUIVALENT: (term("as shipped, or equivalent"), Style(colour=0, dash=None, marker=0)),
@@ -59,25 +69,25 @@ def specification(over: Over) -> Figure:
     every = [one for one, _ in judged]
     where = np.arange(1, len(every) + 1)
     ends = np.clip(np.array([found for _, found in judged]), -FURTHEST, FURTHEST)
-    varied = [choice for choice in over.of.choices if len({one.reading[choice.key] for one in every}) > 1]
+    varied = [choice for choice in over.of.choices if len({one.interpretation[choice.key] for one in every}) > 1]
     caption = tr(
         "{statement}. {outcome}. Above: distance of the claim's worst part from the paper's words, in "
         "margins of that part, cut at ± {furthest:g}; below 0 it holds, above 1 it fails beyond the "
-        "margin. Below: the choices of each reading.",
+        "margin. Below: the choices of each interpretation.",
         statement=tr(over.claim.statement),
         outcome=over.sentence().capitalize(),
         furthest=FURTHEST,
     )
     if gone := len(over.impossible):
         left = plural(
-            "{count} reading that cannot be flown, designed or measured is left out.",
-            "{count} readings that cannot be flown, designed or measured are left out.",
+            "{count} interpretation that cannot be flown, designed or measured is left out.",
+            "{count} interpretations that cannot be flown, designed or measured are left out.",
             gone,
         )
         caption = f"{caption} {left}"
     return Figure(
         name=over.claim.id,
-        title=tr("{claim} under every reading", claim=over.claim.id),
+        title=tr("{claim} under every interpretation", claim=over.claim.id),
         caption=caption,
         headline=f"{over.claim.id}: {over.sentence()}",
         panels=(_above(every, where, ends), *([_below(varied, every, where)] if varied else [])),
@@ -93,7 +103,7 @@ def _above(every: list[Under], where: np.ndarray, ends: np.ndarray) -> Panel:
             value, lo, hi = ends[of].T
             marks.append(Line(where[of], value, tr(label), style, lo, hi))
     return Panel(
-        Axis(tr("reading, sorted"), limits=(-BESIDE * len(every), len(every) + 1)),
+        Axis(tr("interpretation, sorted"), limits=(-BESIDE * len(every), len(every) + 1)),
         Axis(tr("distance of the worst part, margins (cut at ± {furthest:g})", furthest=FURTHEST)),
         (
             *marks,
@@ -106,7 +116,7 @@ def _above(every: list[Under], where: np.ndarray, ends: np.ndarray) -> Panel:
 
 
 def _shipped(every: list[Under], words: str) -> list[Reference]:
-    """A line at the reading of the shipped configs."""
+    """A line at the interpretation of the shipped configs."""
     return [Reference(float(n), "x", words) for n, one in enumerate(every, 1) if one.name == DEFAULT]
 
 
@@ -118,14 +128,14 @@ def _below(varied: list[Choice], every: list[Under], where: np.ndarray) -> Panel
         for one in choice.alternatives:
             height -= 1
             ticks.append((float(height), _short(alternative(one.name))))
-            taken = np.array([reading.reading[choice.key] == one.name for reading in every])
+            taken = np.array([interpretation.interpretation[choice.key] == one.name for interpretation in every])
             if taken.any():
                 style = Style(
                     colour=KINDS[one.kind][1].colour, dash=None, marker=KINDS[one.kind][1].marker, size_pt=2.6
                 )
                 marks.append(Line(where[taken], np.full(taken.sum(), float(height)), "", style))
     return Panel(
-        Axis(tr("reading, sorted"), limits=(-BESIDE * len(every), len(every) + 1)),
+        Axis(tr("interpretation, sorted"), limits=(-BESIDE * len(every), len(every) + 1)),
         Axis("", limits=(height - 1.0, 0.0), ticks=tuple(reversed(ticks))),
         (*marks, *_shipped(every, "")),
         legend="none",
@@ -141,13 +151,14 @@ def _short(text: str) -> str:
 COLUMNS = ("claim", "class", "holds", "of", "depends_on", "needed", "declared")
 OVER = ("class", "overall", "holds", "of", "depends_on", "needed")  # columns of claims.csv
 BOTH = term("{own} as shipped; {over}")
-OVER_ALL = term("{kind} over all readings")
-ALONE = term("{own} as shipped; other readings not judged")
+OVER_ALL = term("{kind} over all interpretations")
+ALONE = term("{own} as shipped; other interpretations not judged")
 
 
 @dataclass(frozen=True)
 class Class:
-    """A claim over all its readings: its class, in how many readings it is true, the choices that flip it.
+    """A claim over all its interpretations: its class, in how many interpretations it is true, the choices that flip
+    it.
 
     needed: realisations that would decide it if undecided, else NaN. declared: a mark of its declaration."""
 
@@ -175,11 +186,11 @@ class Class:
         return cls(row["claim"], row["class"], holds, of, row["depends_on"], needed, row["declared"])
 
 
-# For each claim that depends on an open choice: its class over all readings, None where unknown.
+# For each claim that depends on an open choice: its class over all interpretations, None where unknown.
 Known = Mapping[str, Class | None]
 
 
-def declared(of: PaperReadings, claim: Claim) -> str:
+def declared(of: PaperInterpretations, claim: Claim) -> str:
     """A mark of a claim's assertions and of the open choices that affect it: a changed mark means another claim."""
     parts = [
         [
@@ -198,17 +209,19 @@ def declared(of: PaperReadings, claim: Claim) -> str:
 
 
 def of_over(over: Over) -> Class | None:
-    """The class of a claim over its readings; None where it could not be judged."""
+    """The class of a claim over its interpretations; None where it could not be judged."""
     found = over.outcome
-    if found is None or found.readings is None or found.holds_in is None:
+    if found is None or found.interpretations is None or found.holds_in is None:
         return None
     needed, on = float(found.needed or math.nan), ", ".join(found.depends_on)
-    return Class(over.claim.id, found.kind, found.holds_in, found.readings, on, needed, declared(over.of, over.claim))
+    return Class(
+        over.claim.id, found.kind, found.holds_in, found.interpretations, on, needed, declared(over.of, over.claim)
+    )
 
 
 def with_classes(rows: Sequence[Mapping[str, Any]], known: Known) -> list[dict[str, Any]]:
-    """Rows of claims.csv with the class over all readings in place of that as shipped, which moves to `as_shipped`.
-    Rows that were not judged stay as they are."""
+    """Rows of claims.csv with the class over all interpretations in place of that as shipped, which moves to
+    `as_shipped`. Rows that were not judged stay as they are."""
     return [dict(row) | _over(row, known) for row in rows]
 
 
@@ -226,8 +239,8 @@ def _over(row: Mapping[str, Any], known: Known) -> dict[str, Any]:
     return every | needed | {"overall": words(found.kind, own, found.depends_on)}
 
 
-def in_words(rows: Iterable[Mapping[str, Any]], every: Iterable[PaperReadings | None]) -> list[dict[str, Any]]:
-    """Rows of claims.csv for people: what a claim depends on is in the words of its paper's readings."""
+def in_words(rows: Iterable[Mapping[str, Any]], every: Iterable[PaperInterpretations | None]) -> list[dict[str, Any]]:
+    """Rows of claims.csv for people: what a claim depends on is in the words of its paper's interpretations."""
     of = {one.paper: one for one in every if one is not None}
     found = [dict(row) for row in rows]
     for row in found:
@@ -264,12 +277,11 @@ def words(kind: str, own: str, depends_on: str = "", say: Callable[..., str] = s
 TITLE = "# The papers' claims"
 HEAD = """One row for each claim: the paper's statement, the verdict, and the config that shows it (`radarsim run
 CONFIG`, then `radarsim claims CONFIG`). All are judged by [one rule](verdicts.md), written before anything was
-measured. Where the paper leaves a choice open, the verdict covers all readings that it allows (`radarsim readings`):
-"refuted as shipped; depends on …" is false with the config's choice, and true with another one. Open a claim for its
-original words, their interpretation, and the part furthest from them: its exact value, or the measured one with its
-interval, and the expected range. Extensions are ours, or statements that a paper reports from others, and are not
-counted.
-"""
+measured. Where the paper leaves a choice open, the verdict covers all interpretations that it allows (`radarsim
+interpretations`): "refuted as shipped; depends on …" is false with the config's choice, and true with another one. Open
+a claim for its original words, their interpretation, and the part furthest from them: its exact value, or the measured
+one with its interval, and the expected range. Extensions are ours, or statements that a paper reports from others, and
+are not counted."""
 MARKS = (CONFIRMED, REFUTED)  # in bold
 ORDER = (*CLASSES, NOT_JUDGED, NOT_RUN)
 NOT_COUNTED = term("extension, not counted")  # a claim, or a part of one, that is not the paper's own
@@ -371,7 +383,8 @@ def counted(rows: Sequence[Mapping]) -> str:
 
 
 def verdict_of(parts: Sequence[Mapping]) -> str:
-    """The verdict on a claim, with the readings under which it is true, and what would decide an undecided one."""
+    """The verdict on a claim, with the interpretations under which it is true, and what would decide an undecided
+    one."""
     first, notes = parts[0], []
     text = verdict_words(first)
     if first["overall"] in MARKS:
@@ -382,9 +395,9 @@ def verdict_of(parts: Sequence[Mapping]) -> str:
     if of := number(first["of"]):
         holds = number(first["holds"])
         notes.append(
-            tr("true under all {of:.0f} readings", of=of)
+            tr("true under all {of:.0f} interpretations", of=of)
             if holds == of
-            else tr("true under {holds:.0f} of {of:.0f} readings", holds=holds, of=of)
+            else tr("true under {holds:.0f} of {of:.0f} interpretations", holds=holds, of=of)
         )
     if first["class"] in (UNJUDGEABLE, NOT_JUDGED) and first["why"]:
         notes.append(rule.said(first["why"]))
@@ -405,8 +418,8 @@ def _line(parts: Sequence[Mapping]) -> str:
     first, found = parts[0], worst(parts)
     original = f"«{first['original']}»" if first["original"] else ""
     inner = [" ".join(filter(None, (original, f"({first['place']})")))]
-    if first["reading"]:
-        inner.append(f"Read as: {first['reading']}.")
+    if first["interpretation"]:
+        inner.append(f"Read as: {first['interpretation']}.")
     if found is not None:
         inner.append(f"Result: {named(found, parts)}: {shown(found)}; expected {_expected(found)}.")
     said = f"<details><summary>{_cell(first['statement'])}</summary>{'<br>'.join(map(_cell, inner))}</details>"
@@ -567,7 +580,7 @@ def figure(rows: Sequence[Mapping]) -> Figure | None:
             "For each claim, the part furthest from the paper's words: the measured value with the judged "
             "interval, and the exact value, in margins of that part; beside it the value itself. What lies beyond "
             "± {furthest:g} is drawn there, with an arrow. Below 0 it agrees with the words, up to 1 it is within "
-            "their margin. The marker shows the claim's class over all readings that its paper allows.",
+            "their margin. The marker shows the claim's class over all interpretations that its paper allows.",
             furthest=FURTHEST_IN_FOREST,
         ),
         panels=tuple(panels),

@@ -2,11 +2,11 @@
 
 docs/verdicts.md gives it in words. A judged part holds the measured value, the exact value where known, the range that
 the paper's words allow and the margin of these words. `verdict` judges one part, `claim` all parts of a claim,
-`over_readings` a claim under all readings that its paper allows.
+`over_interpretations` a claim under all interpretations that its paper allows.
 
 Ranges and margins from a paper's words; these functions see the words alone, never a measurement.
 
-Reasons why a claim is not judged, in the current language: claims.csv and readings.csv have them in English."""
+Reasons why a claim is not judged, in the current language: claims.csv and interpretations.csv have them in English."""
 
 import math
 import re
@@ -32,7 +32,7 @@ LIMIT = "limit"  # "more than 50 %": just outside, within the margin, is no mate
 MATERIAL = "material"  # "better": within the margin of equality, on either side, is no material difference
 INCLUSIVE = (PRINT, ABOUT, GRID, SAME)
 
-EQUIVALENT, UNSTATED, AGAINST = "E", "U", "N"  # kinds of readings; the last contradicts the print
+EQUIVALENT, UNSTATED, AGAINST = "E", "U", "N"  # kinds of interpretations; the last contradicts the print
 Z95 = NormalDist().inv_cdf(0.975)
 ROUNDING = 1e-12  # of a margin
 # A verdict is the same however its number of realisations came about: by one run, by `--decide`, or by a person who
@@ -104,7 +104,7 @@ class Outcome:
     needed: int | None = None
     depends_on: tuple[str, ...] = ()
     holds_in: int | None = None
-    readings: int | None = None
+    interpretations: int | None = None
 
     @property
     def words(self) -> str:
@@ -322,12 +322,13 @@ def _joint(parts: Sequence[Judged], many: int) -> Outcome:
     return Outcome(kind, held[best], len(by_number) - held[best], len(by_number), worst)
 
 
-# ---- over readings ------------------------------------------------------------------------------------------------
+# ---- over interpretations
+# ------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
-class Reading:
-    """A claim under one reading: its kind (E, U or N), its alternatives, and the class of the claim under it.
+class Interpretation:
+    """A claim under one interpretation: its kind (E, U or N), its alternatives, and the class of the claim under it.
 
-    outcome is empty where the reading is impossible to fly or design."""
+    outcome is empty where the interpretation is impossible to fly or design."""
 
     name: str
     kind: str
@@ -335,11 +336,11 @@ class Reading:
     outcome: str = ""
 
 
-def over_readings(own: Outcome, readings: Sequence[Reading]) -> Outcome:
-    """The outcome of a claim from that of the default reading and those of all: only E and U count. Confirmed only if
-    true in all of them, refuted only if false in all, else it depends on the choices. Some outcomes hold under every
-    reading: a print that contradicts itself, a statement that cannot be judged."""
-    counted = [one for one in readings if one.kind in (EQUIVALENT, UNSTATED) and one.outcome]
+def over_interpretations(own: Outcome, interpretations: Sequence[Interpretation]) -> Outcome:
+    """The outcome of a claim from that of the default interpretation and those of all: only E and U count. Confirmed
+    only if true in all of them, refuted only if false in all, else it depends on the choices. Some outcomes hold under
+    every interpretation: a print that contradicts itself, a statement that cannot be judged."""
+    counted = [one for one in interpretations if one.kind in (EQUIVALENT, UNSTATED) and one.outcome]
     if not counted:
         return own
     said = Counter(one.outcome for one in counted)
@@ -355,47 +356,47 @@ def over_readings(own: Outcome, readings: Sequence[Reading]) -> Outcome:
             kind = UNDECIDED
         else:
             kind, on = DEPENDS, flips(counted)
-    return replace(own, kind=kind, depends_on=on, holds_in=holds, readings=len(counted))
+    return replace(own, kind=kind, depends_on=on, holds_in=holds, interpretations=len(counted))
 
 
-def flips(readings: Sequence[Reading]) -> tuple[str, ...]:
+def flips(interpretations: Sequence[Interpretation]) -> tuple[str, ...]:
     """The choices that change the outcome, the strongest first, equal ones in their order.
 
-    A choice is one of them if two readings that differ in it alone have different outcomes. Where no two readings
-    differ in one choice alone: those by whose values the readings differ most in the share that holds; where none
-    holds, in the share that is refuted."""
-    asked = CONFIRMED if any(one.outcome == CONFIRMED for one in readings) else REFUTED
-    choices = list(dict.fromkeys(key for one in readings for key in one.choices))
+    A choice is one of them if two interpretations that differ in it alone have different outcomes. Where no two
+    interpretations differ in one choice alone: those by whose values the interpretations differ most in the share that
+    holds; where none holds, in the share that is refuted."""
+    asked = CONFIRMED if any(one.outcome == CONFIRMED for one in interpretations) else REFUTED
+    choices = list(dict.fromkeys(key for one in interpretations for key in one.choices))
     found: Counter[str] = Counter()
     alone = False
     for choice in choices:
-        for own in _alike_but(choice, choices, readings).values():
+        for own in _alike_but(choice, choices, interpretations).values():
             held = [sum(one.outcome == asked for one in alike) for alike in own.values()]
             missed = [len(alike) - count for alike, count in zip(own.values(), held, strict=True)]
             found[choice] += sum(held) * sum(missed) - sum(a * b for a, b in zip(held, missed, strict=True))
             alone = alone or len(own) > 1
     if alone and +found:
         return tuple(name for name, _ in (+found).most_common())
-    spread = {name: _spread(name, readings, asked) for name in choices}
+    spread = {name: _spread(name, interpretations, asked) for name in choices}
     most = max(spread.values(), default=0.0)
     return tuple(name for name, one in spread.items() if one and math.isclose(one, most))
 
 
 def _alike_but(
-    choice: str, choices: Sequence[str], readings: Sequence[Reading]
-) -> dict[tuple[str | None, ...], dict[str | None, list[Reading]]]:
-    """Readings grouped by all their other choices, then by their alternative of this one."""
-    found: dict[tuple[str | None, ...], dict[str | None, list[Reading]]] = {}
-    for one in readings:
+    choice: str, choices: Sequence[str], interpretations: Sequence[Interpretation]
+) -> dict[tuple[str | None, ...], dict[str | None, list[Interpretation]]]:
+    """Interpretations grouped by all their other choices, then by their alternative of this one."""
+    found: dict[tuple[str | None, ...], dict[str | None, list[Interpretation]]] = {}
+    for one in interpretations:
         rest = tuple(one.choices.get(key) for key in choices if key != choice)
         found.setdefault(rest, {}).setdefault(one.choices.get(choice), []).append(one)
     return found
 
 
-def _spread(choice: str, readings: Sequence[Reading], asked: str) -> float:
-    """Largest less least share of readings with this outcome, over the values of a choice."""
+def _spread(choice: str, interpretations: Sequence[Interpretation], asked: str) -> float:
+    """Largest less least share of interpretations with this outcome, over the values of a choice."""
     shares: dict[str, list[bool]] = {}
-    for one in readings:
+    for one in interpretations:
         shares.setdefault(one.choices.get(choice, ""), []).append(one.outcome == asked)
     held = [sum(own) / len(own) for own in shares.values()]
     return max(held) - min(held)

@@ -228,7 +228,7 @@ class Panel {
     this.svg.setPointerCapture(event.pointerId);
   }
 
-  // A click or a touch keeps the reading until the next one, on whatever panel, or Escape; a drag looks closer.
+  // A click or a touch keeps the interpretation until the next one, on whatever panel, or Escape; a drag looks closer.
   up(event) {
     if (!this.from) return;
     const at = this.at(event), marked = this.dragging && this.draw ? this.marked(at, event.pointerType !== "mouse") : null;
@@ -292,7 +292,7 @@ class Panel {
     else if (way && event.shiftKey) { event.preventDefault(); this.shift(Math.sign(way) / 4); } else if (way) this.go(event, way);
   }
 
-  // The reading one point further, the view with it.
+  // The interpretation one point further, the view with it.
   go(event, way) {
     const line = this.lines.find((one) => !this.off.has(one.g));
     if (!line) return;
@@ -308,7 +308,7 @@ class Panel {
     this.point({ x: place(this.x, xs[this.step]), y: place(this.y, line.y[this.step]) });
   }
 
-  // Closer by a factor about the reading, or about the middle.
+  // Closer by a factor about the interpretation, or about the middle.
   magnify(factor) {
     const line = this.lines.find((one) => !this.off.has(one.g));
     const read = line && this.step >= 0 ? place(this.x, this.xs[line.x][this.step]) : NaN;

@@ -23,7 +23,7 @@ STUDY = StudyFolder(
             "discriminator_forecast": ("P4.10",),
         },
     ),
-    offers=("curves", "readings", "floor"),
+    offers=("curves", "interpretations", "floor"),
     exact_errors=False,  # exact_sigma is the bound, which an estimator reaches or does not
     draws_sweeps=True,  # lock is what is swept for, and has figures of its own
     own_quantities=(LOCK, LOST, FLOOR),

@@ -1,8 +1,8 @@
-"""How P4's claims are measured: which case is which reading of the paper, which estimator which discriminator.
+"""How P4's claims are measured: which case is which interpretation of the paper, which estimator which discriminator.
 
 The paper's numbers do not belong together: its potential spreads follow from a noise variance of 2.25, a quarter of the
 one it states, and then its threshold c is the 1 of (14); its first window follows from the stated 9, and then c is the
-0.5 of (11). Both readings are judged: "computed" and "printed"."""
+0.5 of (11). Both interpretations are judged: "computed" and "printed"."""
 
 import math
 from functools import partial
@@ -21,31 +21,32 @@ from radarsim.studies.discriminator import nearest, study
 from radarsim.studies.discriminator.kernels import LOCKS
 
 COMPUTED, PRINTED = "computed", "printed"
-READINGS = {COMPUTED: (2.25, 1.0), PRINTED: (9.0, 0.5)}  # noise variance, threshold c
+INTERPRETATIONS = {COMPUTED: (2.25, 1.0), PRINTED: (9.0, 0.5)}  # noise variance, threshold c
 DOPPLER = (10e3, 180e3, -750e3, 1000e3)
 COMPONENTS = ("phi0", "f0", "f1", "f2", "f3")
-Key = str | tuple[str, float]  # a reading, or a swept key and its value
+Key = str | tuple[str, float]  # an interpretation, or a swept key and its value
 PER_HANDOVER = 0.99  # P_Δ
 ESTIMATE = 1.17  # the paper's own estimate of the amplitude, which it puts into (17)
 
 
 class Evidence(claims.Evidence):
-    """Finds the paper's experiment in its two readings, its swept variants, and the estimators, by their settings."""
+    """Finds the paper's experiment in its two interpretations, its swept variants, and the estimators, by their
+    settings."""
 
     def case(self, key: Any) -> CaseResult:
-        """key: a reading, or (swept key, value) of the maps."""
+        """key: an interpretation, or (swept key, value) of the maps."""
         for result in self.results:
             swept = [(name, float(str(value))) for name, value in result.swept]
             if isinstance(key, tuple):
                 if len(swept) == 1 and swept[0][0] == key[0] and math.isclose(swept[0][1], key[1]):
                     return result
-            elif not swept and result.spec.burst.noise_variance == READINGS[key][0]:
+            elif not swept and result.spec.burst.noise_variance == INTERPRETATIONS[key][0]:
                 return result
         raise Missing(key)
 
     def estimator(self, key: Key, kind: str) -> int:
         """Index of an estimator of a case by its kind: sequence, narrow, wide, cured, truth."""
-        threshold = READINGS.get(key, (0, 1.0))[1] if not isinstance(key, tuple) else 1.0
+        threshold = INTERPRETATIONS.get(key, (0, 1.0))[1] if not isinstance(key, tuple) else 1.0
         for i, e in self.members(self.case(key), "estimators"):
             if kind_of(e, threshold) == kind:
                 return i
@@ -132,7 +133,7 @@ class Evidence(claims.Evidence):
     def _designer(self, key: str) -> tuple[model.Designer, np.ndarray]:
         """What designed the sequence, and its windows in s."""
         result, i = self.case(key), self.estimator(key, "sequence")
-        burst, condition = study.burst_of(result.spec), model.Condition(threshold=READINGS[key][1])
+        burst, condition = study.burst_of(result.spec), model.Condition(threshold=INTERPRETATIONS[key][1])
         fisher = partial(model.fisher, burst, len(COMPONENTS))
         times = burst.pulse_period_s * np.array(result.axes.pulses[i])
         return model.Designer(burst, result.axes.prior_sigma, fisher, condition), times
@@ -212,7 +213,7 @@ FACTORS = {"phi0": 100, "f0": 150, "f1": 500, "f2": 1000, "f3": 2000}
 
 
 def kind_of(estimator: Any, threshold: float) -> str:
-    """What an estimator is, at the reading's threshold c; "other" for variants."""
+    """What an estimator is, at the interpretation's threshold c; "other" for variants."""
     e = estimator
     plain = e.method == "sequence" and e.amplitude == "known" and e.density == 1 and e.tail == "gaussian"
     if not plain or e.steps < 40 or e.phases:

@@ -21,7 +21,7 @@ STUDY = StudyFolder(
         may_grow=("filters",),
         held_too={"multimodel_families": ("P2.8", "P2.9")},
     ),
-    offers=("cost", "readings", "seconds_per_update", "recorded", "errors"),
+    offers=("cost", "interpretations", "seconds_per_update", "recorded", "errors"),
     own_quantities=(
         Quantity("probability", term("probability"), "probabilities", "probability", per=term("model"), kind="share"),
     ),

@@ -26,7 +26,7 @@ STUDY = StudyFolder(
     offers=(
         "gains",
         "inputs",
-        "readings",
+        "interpretations",
         "recorded",
         "chart",
         "shortened",

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import CaseResult
     from radarsim.report.claims import PaperClaims
-    from radarsim.report.claims.over import PaperReadings
+    from radarsim.report.claims.over import PaperInterpretations
     from radarsim.report.drawing import Figure
     from radarsim.studies.floor import Floor
     from radarsim.studies.sonar.config import Keys
@@ -129,10 +129,10 @@ class Sonar(Study):
         held_too = {"sonar_fluctuating": of_smoothing}  # which includes its cases
         return PaperClaims(claims, Evidence, "Butyrskiy", page="sonar", may_grow=("filters",), held_too=held_too)
 
-    def readings(self) -> "PaperReadings":
-        from radarsim.studies.sonar.manoeuvre.readings import Readings
+    def interpretations(self) -> "PaperInterpretations":
+        from radarsim.studies.sonar.manoeuvre.interpretations import Interpretations
 
-        return Readings()
+        return Interpretations()
 
     def recorded(self) -> RecordedPlots:
         from radarsim.studies.sonar.track import Recorded

@@ -165,7 +165,7 @@ def replace_estimator(estimator, **change):
     return estimator.model_copy(update=change)
 
 
-def test_a_case_is_found_by_its_reading(made):
+def test_a_case_is_found_by_its_interpretation(made):
     evidence = measures.Evidence(made.cases, made.tables, {})
     assert evidence.case(measures.COMPUTED) is made.cases[0]
     with pytest.raises(measures.Missing):

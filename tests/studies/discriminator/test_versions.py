@@ -1,4 +1,4 @@
-"""The windows of many readings at once against the designer of one."""
+"""The windows of many interpretations at once against the designer of one."""
 
 import math
 
@@ -9,7 +9,7 @@ from radarsim.bursts import burst as model
 from radarsim.bursts.burst import Condition, Designer
 from radarsim.studies.discriminator import burst_versions
 from radarsim.studies.discriminator.burst_versions import Version
-from radarsim.studies.discriminator.readings import BURST, PRINTED_PRIOR
+from radarsim.studies.discriminator.interpretations import BURST, PRINTED_PRIOR
 from tests.tolerances import rounding, scaled_condition
 
 POWERS = 2.1e5  # κ of five powers of time, each in its own unit
@@ -70,7 +70,7 @@ def test_rounding_up_and_down_are_one_pulse_apart():
     assert nearest in (up, down)
 
 
-def test_one_reading_gives_spreads_first_window_and_twelve():
+def test_one_interpretation_gives_spreads_first_window_and_twelve():
     version = Version(2.25, 1.0, 3.0, PRINTED_PRIOR, "left out of the problem", "up", "next", 29999, "pulse by pulse")
     found = burst_versions.designed(BURST, [version, version._replace(curvature="as printed")])
     printed = ("0.061", "0.45", "12.2", "183.38", "1213.04")

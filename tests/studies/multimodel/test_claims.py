@@ -8,7 +8,7 @@ from radarsim.report.claims import CONFIRMED, REFUTED, page
 from radarsim.report.claims.over import Over, joint, under
 from radarsim.studies import registry
 from radarsim.studies.multimodel import cost, measures
-from radarsim.studies.multimodel.readings import Readings
+from radarsim.studies.multimodel.interpretations import Interpretations
 from tests.tolerances import mean_error
 
 CLAIMS = {one.id: one for one in registry.study("multimodel").claims().claims}
@@ -62,12 +62,12 @@ def test_what_the_paper_reports_of_others_is_judged_and_not_counted(transition):
     own = [row for row in parts if row["claim"] == "P2.12"]
     assert {row["class"] for row in own} == {REFUTED}
     assert page.extension(own)
-    assert "P2.12" in [claim for claim in CLAIMS if Readings().of_claim(claim)]
+    assert "P2.12" in [claim for claim in CLAIMS if Interpretations().of_claim(claim)]
     assert page.counts(own) == ({}, 1)
 
 
 def test_what_the_paper_reports_of_others_is_no_number_of_its_own(transition):
-    of, seen = Readings(), transition
+    of, seen = Interpretations(), transition
     evidence = (
         registry.study("multimodel")
         .claims()
@@ -75,6 +75,6 @@ def test_what_the_paper_reports_of_others_is_no_number_of_its_own(transition):
             seen.cases, seen.tables, {one.name: {"filters": set(range(len(one.spec.filters)))} for one in seen.cases}
         )
     )
-    over = [Over(of, CLAIMS["P2.12"], (under(of, CLAIMS["P2.12"], of.reading(), evidence, 64),))]
+    over = [Over(of, CLAIMS["P2.12"], (under(of, CLAIMS["P2.12"], of.interpretation(), evidence, 64),))]
     assert over[0].outcome.kind == REFUTED
     assert not joint(of, over).numbers

@@ -1,10 +1,11 @@
-"""The flights of the readings: within the printed axes, ballistic at first, vertical and lateral ones among them."""
+"""The flights of the interpretations: within the printed axes, ballistic at first, vertical and lateral ones among
+them."""
 
 import numpy as np
 import pytest
 
 from radarsim.studies.multimodel import world
-from radarsim.studies.multimodel.readings import Readings
+from radarsim.studies.multimodel.interpretations import Interpretations
 from radarsim.studies.multimodel.world import FLIGHTS
 
 T = np.arange(0, 186.2, 0.5)
@@ -51,7 +52,7 @@ def test_when_the_manoeuvre_begins_is_varied():
 
 
 def test_there_are_enough_of_both_kinds():
-    of = Readings.choices[0]
+    of = Interpretations.choices[0]
     assert of.key == "flight"
     begins = {
         name: f"within the printed axes, ballistic to {one.phases[1].start_s:g} s" for name, one in FLIGHTS.items()

@@ -74,14 +74,14 @@ claims:
 - id: 1
   place: section 1
   statement: The Kalman filter's error is more than 10 % below that of the fixed gain
-  reading: of the root-mean-square error at the last scan
+  interpretation: of the root-mean-square error at the last scan
   parts:
   - {of: [{target.sigma_step_m: 0.5}], what: gain in σ at the last scan, unit: "%",
      measure: {gain: {filter: kalman, component: x}}, expected: {above: 10}}
 - id: 2
   place: section 2
   statement: and has settled by then
-  reading: its σ is within 1 % of its limit
+  interpretation: its σ is within 1 % of its limit
   parts:
   - {of: [{target.sigma_step_m: 0.5}], what: σ over its limit, measure: {settled: {filter: kalman}},
      expected: {same: [1, 0.01]}}

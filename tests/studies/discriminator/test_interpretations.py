@@ -1,4 +1,4 @@
-"""P4's readings: the shipped one is the config as printed; what is exact is what a prepared case has."""
+"""P4's interpretations: the shipped one is the config as printed; what is exact is what a prepared case has."""
 
 from functools import partial
 from itertools import chain, pairwise
@@ -13,10 +13,10 @@ from radarsim.report.claims import rule
 from radarsim.report.claims.over import Unreadable, under
 from radarsim.studies import registry
 from radarsim.studies.discriminator import study
-from radarsim.studies.discriminator.readings import PRINTED_PRIOR, ExactEvidence, Readings, windows
+from radarsim.studies.discriminator.interpretations import PRINTED_PRIOR, ExactEvidence, Interpretations, windows
 from tests.tolerances import rounding, scaled_condition
 
-OF = Readings()
+OF = Interpretations()
 CLAIMS = {one.id: one for one in registry.study("discriminator").claims().claims}
 
 
@@ -25,14 +25,14 @@ def cases():
     return {case.spec.burst.noise_variance: case for case in load("discriminator_paper").cases}
 
 
-def test_the_default_reading_is_the_config_as_printed(cases):
-    changed = OF.changed(CLAIMS["P4.6"], cases[2.25], OF.reading())
+def test_the_default_interpretation_is_the_config_as_printed(cases):
+    changed = OF.changed(CLAIMS["P4.6"], cases[2.25], OF.interpretation())
     printed = cases[9.0].spec
     assert changed.spec.burst == printed.burst
     assert changed.spec.prior == printed.prior
     thresholds = [one.main_lobe_threshold for one in changed.spec.estimators if one.name in ("sequence", "wide")]
     assert thresholds == [0.5, 0.5]
-    assert OF.changed(CLAIMS["P4.6"], cases[9.0], OF.reading()) is None  # one case a reading
+    assert OF.changed(CLAIMS["P4.6"], cases[9.0], OF.interpretation()) is None  # one case an interpretation
 
 
 @pytest.mark.slow
@@ -40,7 +40,7 @@ def test_exact_windows_are_those_that_a_run_designs(cases):
     for noise, taken in ((9.0, {}), (2.25, {"noise_variance": "2.25", "threshold": "1", "forecast": "multiples"})):
         axes = registry.study("discriminator").prepare(cases[noise]).axes
         designed = axes.duration_s[0][np.isfinite(axes.duration_s[0])]
-        seen = ExactEvidence(OF.reading(**taken))
+        seen = ExactEvidence(OF.interpretation(**taken))
         np.testing.assert_allclose(seen.windows("computed"), designed, rtol=rounding(operations=2))
 
 
@@ -59,14 +59,16 @@ def test_the_probability_of_a_miss_is_that_of_the_prepared_case(cases):
         known = np.diag(model.phase_prior(axes.prior_sigma))
         allowed = 4 * rounding(max(scaled_condition(fisher(t) + known) for t in times), 25)
         wanted = max(model.tail_probability(form, condition.threshold) for form in forms)
-        assert ExactEvidence(OF.reading(**taken)).worst_handover("any").value == pytest.approx(wanted, rel=allowed)
+        assert ExactEvidence(OF.interpretation(**taken)).worst_handover("any").value == pytest.approx(
+            wanted, rel=allowed
+        )
         assert 0.02 < wanted < 0.025
 
 
 def test_other_windows_go_into_the_config(cases):
-    reading = OF.reading(curvature="as printed")
-    changed = OF.changed(CLAIMS["P4.4"], cases[2.25], reading)
-    wanted = np.array(windows(ExactEvidence(reading)._version)) * 1e-5
+    interpretation = OF.interpretation(curvature="as printed")
+    changed = OF.changed(CLAIMS["P4.4"], cases[2.25], interpretation)
+    wanted = np.array(windows(ExactEvidence(interpretation)._version)) * 1e-5
     of = {one.name: one for one in changed.spec.estimators}
     np.testing.assert_allclose(of["sequence"].schedule, wanted, rtol=rounding(operations=2))
     np.testing.assert_allclose(of["wide"].schedule, wanted[:1], rtol=rounding(operations=2))
@@ -75,19 +77,19 @@ def test_other_windows_go_into_the_config(cases):
 
 def test_a_window_that_does_not_exist_says_why():
     with pytest.raises(Unreadable, match="no root"):
-        ExactEvidence(OF.reading(first_phase="kept")).windows("computed")
+        ExactEvidence(OF.interpretation(first_phase="kept")).windows("computed")
 
 
-def test_the_sweeps_follow_the_readings_noise():
+def test_the_sweeps_follow_the_interpretations_noise():
     cases = load("discriminator_maps").cases
-    kept = [OF.changed(CLAIMS["P4.9"], case, OF.reading()) for case in cases]
+    kept = [OF.changed(CLAIMS["P4.9"], case, OF.interpretation()) for case in cases]
     noises = sorted(case.spec.burst.noise_variance for case in kept if case is not None)
     assert noises == [9.0, 288.0]  # 2.25 and 72, four times
     assert all(case.spec.prior.sigma == PRINTED_PRIOR for case in kept if case is not None)
 
 
-def test_what_is_exact_by_reading():
-    say = {name: ExactEvidence(OF.reading(noise_variance=name)) for name in ("9", "2.25")}
+def test_what_is_exact_by_interpretation():
+    say = {name: ExactEvidence(OF.interpretation(noise_variance=name)) for name in ("9", "2.25")}
     assert say["9"].shortest_window("any", 1.17).value == pytest.approx(1.315, abs=5e-4)
     for component, printed in (("phi0", 0.061), ("f0", 0.45), ("f1", 12.2)):
         ratio = say["9"].potential("any", component).value / say["2.25"].potential("any", component).value
@@ -99,9 +101,9 @@ def classes(claim):
     """The outcomes of an exact claim by threshold and lobe, over noise and forecast."""
     found = {}
     varied = [choice for choice in OF.choices if choice.key in ("noise_variance", "threshold", "lobe", "forecast")]
-    for reading in OF.combined(varied):
-        seen = under(OF, CLAIMS[claim], reading, ExactEvidence(reading))
-        found.setdefault((reading["threshold"], reading["lobe"]), set()).add(seen.outcome.kind)
+    for interpretation in OF.combined(varied):
+        seen = under(OF, CLAIMS[claim], interpretation, ExactEvidence(interpretation))
+        found.setdefault((interpretation["threshold"], interpretation["lobe"]), set()).add(seen.outcome.kind)
     return found
 
 
@@ -113,7 +115,7 @@ def test_a_design_by_11_for_the_lobe_of_10_keeps_its_promise():
         ("0.5", "two"): {rule.CONFIRMED},
         ("1", "two"): {rule.REFUTED},
     }
-    worst = {name: ExactEvidence(OF.reading(lobe=name)).worst_handover("any").value for name in ("one c", "two")}
+    worst = {name: ExactEvidence(OF.interpretation(lobe=name)).worst_handover("any").value for name in ("one c", "two")}
     # By another program, with 400 000 draws of the form.
     assert worst["one c"] == pytest.approx(0.0224, abs=5e-4)
     assert worst["two"] == pytest.approx(0.00125, abs=1e-4)
@@ -123,7 +125,7 @@ def test_the_phase_is_searched_for_once():
     """The forecast's phase is anywhere; at the hand-overs it is as near as the form's rank-one error leaves it."""
     assert set(chain(*classes("P4.20").values())) == {rule.CONFIRMED}
     for noise, c in (("9", "0.5"), ("2.25", "1")):
-        offsets = ExactEvidence(OF.reading(noise_variance=noise, threshold=c)).phase_offsets("any")
+        offsets = ExactEvidence(OF.interpretation(noise_variance=noise, threshold=c)).phase_offsets("any")
         assert offsets[0] > np.pi / 2
         assert 0.1 < offsets[1:].max() < 0.5
 
@@ -139,5 +141,5 @@ def test_offsets_of_the_phase_are_those_of_the_prepared_case(cases):
         )
         wanted = seen.phase_offsets("printed" if noise == 9 else "computed")
         np.testing.assert_allclose(
-            ExactEvidence(OF.reading(**taken)).phase_offsets("any"), wanted, rtol=rounding(2.1e5, 100)
+            ExactEvidence(OF.interpretation(**taken)).phase_offsets("any"), wanted, rtol=rounding(2.1e5, 100)
         )

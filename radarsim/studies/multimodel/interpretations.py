@@ -1,5 +1,5 @@
-"""What P2 leaves open, and its claims under each reading: small runs of the shipped configs with another flight, σ_A,
-output, start or bank."""
+"""What P2 leaves open, and its claims under each interpretation: small runs of the shipped configs with another flight,
+σ_A, output, start or bank."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,47 +8,51 @@ from typing import Any
 from radarsim.config.experiment import Case
 from radarsim.report.claims import Evidence
 from radarsim.report.claims.declared import Claim, PaperClaims
-from radarsim.report.claims.over import PaperReadings, Reading, Seen, choices_in
+from radarsim.report.claims.over import Interpretation, PaperInterpretations, Seen, choices_in
 from radarsim.studies.multimodel import measures, tables
 from radarsim.studies.multimodel.world import FLIGHTS
 
 AERODYNAMIC = "P2.4"  # speaks of another target than the lost flight
 
 
-class Readings(PaperReadings):
-    """P2's readings."""
+class Interpretations(PaperInterpretations):
+    """P2's interpretations."""
 
     paper = "P2"
-    choices = choices_in(Path(__file__).with_name("readings.yaml"))
+    choices = choices_in(Path(__file__).with_name("interpretations.yaml"))
 
-    def changed(self, claim: Claim, case: Case, reading: Reading) -> Case | None:
-        """The case with the flight, the banks, the output and the start of a reading."""
+    def changed(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
+        """The case with the flight, the banks, the output and the start of an interpretation."""
         spec = case.spec
         if claim.id == AERODYNAMIC and not measures.is_flight(spec.target, "airliner"):
             return None
-        changes = self.sets(reading)
+        changes = self.sets(interpretation)
         if claim.id != AERODYNAMIC:
-            changes["target"] = FLIGHTS.get(reading["flight"], spec.target)
+            changes["target"] = FLIGHTS.get(interpretation["flight"], spec.target)
         period = spec.sensor.scan_period_s
-        reading = self.bearing(reading, claim.id)
-        changes["filters"] = tuple(_changed(one, reading, period) for one in spec.filters)
+        interpretation = self.bearing(interpretation, claim.id)
+        changes["filters"] = tuple(_changed(one, interpretation, period) for one in spec.filters)
         return replace(case, spec=spec.model_copy(update=changes))
 
-    def evidence(self, claim: Claim, reading: Reading, seen: Seen | None, of: PaperClaims) -> Evidence:
+    def evidence(self, claim: Claim, interpretation: Interpretation, seen: Seen | None, of: PaperClaims) -> Evidence:
         assert seen is not None  # nothing of P2 is exact
         return Flown(seen)
 
 
-def _changed(one: Any, reading: Reading, period_s: float) -> Any:
-    """A filter as a reading has it."""
+def _changed(one: Any, interpretation: Interpretation, period_s: float) -> Any:
+    """A filter as an interpretation has it."""
     changes: dict[str, Any] = {}
     if one.family != "kalman" and one.output == "best":
-        changes["output"] = reading["output"]
+        changes["output"] = interpretation["output"]
     models = one.models
-    if reading["bank"] == "accelerated" and len(models) == 2 and len({m.sigma_acceleration_mps2 for m in models}) == 1:
+    if (
+        interpretation["bank"] == "accelerated"
+        and len(models) == 2
+        and len({m.sigma_acceleration_mps2 for m in models}) == 1
+    ):
         halved = models[1].model_copy(update={"sigma_acceleration_mps2": models[1].sigma_acceleration_mps2 / 2})
         models = (halved, models[1])
-    per = reading["sigma_acceleration"]
+    per = interpretation["sigma_acceleration"]
     if per != "per step":
         models = tuple(
             m.model_copy(update={"sigma_acceleration_mps2": m.sigma_acceleration_mps2 * period_s})
@@ -60,7 +64,8 @@ def _changed(one: Any, reading: Reading, period_s: float) -> Any:
 
 
 class Flown(measures.Evidence):
-    """The flights under a reading, found by the settings of the shipped filters; stages are those of the flights."""
+    """The flights under an interpretation, found by the settings of the shipped filters; stages are those of the
+    flights."""
 
     def __init__(self, seen: Seen):
         super().__init__(seen.results, seen.tables, seen.places)

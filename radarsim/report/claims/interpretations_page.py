@@ -1,37 +1,37 @@
-"""The page of a paper's readings: open choices, and claims over all readings."""
+"""The page of a paper's interpretations: open choices, and claims over all interpretations."""
 
 from collections.abc import Sequence
 
 from radarsim.language import Term, current, term, tr
-from radarsim.report.claims.over import Choice, Over, PaperReadings
+from radarsim.report.claims.over import Choice, Over, PaperInterpretations
 from radarsim.report.claims.page import words
 from radarsim.report.claims.rule import said
 
 PAPERS = "ru"  # the language of the quoted papers
 KINDS = term("E: equivalent in every respect; U: the paper does not say; N: against its print.")
 INTRODUCTION = term(
-    "Written by `radarsim readings {paper} --markdown`; every number by reading is in "
-    "`results/readings/readings.csv`, beside a specification curve for each claim. The rule: [how a "
+    "Written by `radarsim interpretations {paper} --markdown`; every number by interpretation is in "
+    "`results/interpretations/interpretations.csv`, beside a specification curve for each claim. The rule: [how a "
     "claim is judged](verdicts.md)."
 )
 
 
-def page(of: PaperReadings, cited: str, over: Sequence[Over]) -> str:
+def page(of: PaperInterpretations, cited: str, over: Sequence[Over]) -> str:
     """The page as Markdown."""
-    parts = [tr("# {paper} by reading", paper=of.paper), f"{tr(cited)}. {tr(INTRODUCTION, paper=of.paper)}"]
-    parts += [tr("## Claims over all readings"), _claims(over)]
+    parts = [tr("# {paper} by interpretation", paper=of.paper), f"{tr(cited)}. {tr(INTRODUCTION, paper=of.paper)}"]
+    parts += [tr("## Claims over all interpretations"), _claims(over)]
     changed = _changed(over)
     if changed:
-        words = tr("What would have to change: readings against the print that give a claim another verdict.")
+        words = tr("What would have to change: interpretations against the print that give a claim another verdict.")
         parts += [words, changed]
     impossible = _impossible(over)
     if impossible:
-        parts += [tr("Readings that cannot be flown, designed or measured:"), impossible]
+        parts += [tr("Interpretations that cannot be flown, designed or measured:"), impossible]
     parts += [*left_open(of)]
     return "\n\n".join(parts) + "\n"
 
 
-def left_open(of: PaperReadings) -> list[str]:
+def left_open(of: PaperInterpretations) -> list[str]:
     """The open choices of the paper, each with its alternatives and their reasons: paragraphs of Markdown."""
     return [tr("## What the paper leaves open"), tr(KINDS), *map(_choice, of.choices)]
 
@@ -53,7 +53,7 @@ def _claims(over: Sequence[Over]) -> str:
     rows = []
     for one in over:
         found = one.outcome
-        holds = tr("{count} of {of}", count=found.holds_in or 0, of=found.readings or 0) if found else ""
+        holds = tr("{count} of {of}", count=found.holds_in or 0, of=found.interpretations or 0) if found else ""
         said = words(found.kind, found.kind, one.of.asked(found.depends_on), tr) if found else tr("not judged")
         verdict = "; ".join(filter(None, (said, one.still_open())))
         rows.append((one.claim.id, tr(one.claim.statement), verdict, holds))
@@ -62,21 +62,23 @@ def _claims(over: Sequence[Over]) -> str:
 
 def _changed(over: Sequence[Over]) -> str:
     rows = [
-        (one.claim.id, one.of.said(reading.reading), tr(reading.outcome.kind))
+        (one.claim.id, one.of.said(interpretation.interpretation), tr(interpretation.outcome.kind))
         for one in over
-        for reading in one.against_print
-        if reading.outcome is not None
+        for interpretation in one.against_print
+        if interpretation.outcome is not None
     ]
-    return table((term("claim"), term("reading"), term("matches")), rows) if rows else ""
+    return table((term("claim"), term("interpretation"), term("matches")), rows) if rows else ""
 
 
 def _impossible(over: Sequence[Over]) -> str:
     reasons: dict[tuple[str, str], list[str]] = {}
     for one in over:
-        for reading in one.impossible:
-            reasons.setdefault((one.claim.id, reading.why), []).append(one.of.said(reading.reading))
+        for interpretation in one.impossible:
+            reasons.setdefault((one.claim.id, interpretation.why), []).append(
+                one.of.said(interpretation.interpretation)
+            )
     rows = [(claim, str(len(names)), names[0], said(why)) for (claim, why), names in reasons.items()]
-    return table((term("claim"), term("readings"), term("such as"), term("why not")), rows) if rows else ""
+    return table((term("claim"), term("interpretations"), term("such as"), term("why not")), rows) if rows else ""
 
 
 def _choice(choice: Choice) -> str:

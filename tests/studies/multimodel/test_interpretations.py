@@ -1,4 +1,4 @@
-"""P2's readings: which cases they change, and how; what is flown is looked up by what the shipped case is."""
+"""P2's interpretations: which cases they change, and how; what is flown is looked up by what the shipped case is."""
 
 from pathlib import Path
 
@@ -6,11 +6,11 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.studies import registry
-from radarsim.studies.multimodel.readings import Readings
+from radarsim.studies.multimodel.interpretations import Interpretations
 from radarsim.studies.multimodel.world import FLIGHTS
 from tests.tolerances import rounding
 
-OF = Readings()
+OF = Interpretations()
 CLAIMS = {one.id: one for one in registry.study("multimodel").claims().claims}
 
 
@@ -23,13 +23,13 @@ def sigmas(spec):
     return {f.name: [(m.motion, m.sigma_acceleration_mps2) for m in f.models] for f in spec.filters}
 
 
-def test_the_default_reading_changes_nothing(case):
-    assert OF.changed(CLAIMS["P2.1"], case, OF.reading()).spec == case.spec
+def test_the_default_interpretation_changes_nothing(case):
+    assert OF.changed(CLAIMS["P2.1"], case, OF.interpretation()).spec == case.spec
 
 
-def test_there_are_two_dozen_readings_of_the_main_claim():
+def test_there_are_two_dozen_interpretations_of_the_main_claim():
     every = OF.of_claim("P2.1")
-    assert every[0] == OF.reading()
+    assert every[0] == OF.interpretation()
     assert len(every) >= 24
     assert {one["flight"] for one in every} == {"aeroballistic", *FLIGHTS}
     assert {OF.kind(one) for one in every} == {"E", "U", "N"}
@@ -51,46 +51,48 @@ def test_the_printed_output_is_the_default():
 
 
 def test_a_flight_takes_the_place_of_the_lost_one_alone(case):
-    changed = OF.changed(CLAIMS["P2.1"], case, OF.reading(flight="pull-up 250"))
+    changed = OF.changed(CLAIMS["P2.1"], case, OF.interpretation(flight="pull-up 250"))
     assert changed.spec.target == FLIGHTS["pull-up 250"]
     assert changed.spec.filters == case.spec.filters
     others = load("multimodel_trajectories").cases
-    kept = [OF.changed(CLAIMS["P2.4"], one, OF.reading()) for one in others]
+    kept = [OF.changed(CLAIMS["P2.4"], one, OF.interpretation()) for one in others]
     assert [one.name for one in kept if one is not None] == [one.name for one in others if "airliner" in one.name]
 
 
 def test_sigma_per_second_is_a_twentieth_at_20_hz(case):
     shipped = sigmas(case.spec)
-    second = sigmas(OF.changed(CLAIMS["P2.1"], case, OF.reading(sigma_acceleration="per second")).spec)
+    second = sigmas(OF.changed(CLAIMS["P2.1"], case, OF.interpretation(sigma_acceleration="per second")).spec)
     for name, models in shipped.items():
         for (motion, own), (_, other) in zip(models, second[name], strict=True):
             assert other == pytest.approx(own * (0.05 if motion == "accelerated" else 1), rel=rounding(operations=3))
-    both = sigmas(OF.changed(CLAIMS["P2.1"], case, OF.reading(sigma_acceleration="per second, both motions")).spec)
+    both = sigmas(
+        OF.changed(CLAIMS["P2.1"], case, OF.interpretation(sigma_acceleration="per second, both motions")).spec
+    )
     assert both["Kalman-1 20"] == [("uniform", pytest.approx(1.0, rel=rounding(operations=3)))]
 
 
 def test_the_output_start_and_bank(case):
-    moment = OF.changed(CLAIMS["P2.1"], case, OF.reading(output="moment")).spec
+    moment = OF.changed(CLAIMS["P2.1"], case, OF.interpretation(output="moment")).spec
     assert {f.name: f.output for f in moment.filters if f.family == "imm"} == {
         "MMA2-122": "moment",
         "MMA2-11": "moment",
     }
-    assert OF.changed(CLAIMS["P2.1"], case, OF.reading(start_acceleration="3")).spec.start_acceleration_mps2 == 3
+    assert OF.changed(CLAIMS["P2.1"], case, OF.interpretation(start_acceleration="3")).spec.start_acceleration_mps2 == 3
     banks = load("multimodel_banks").cases[0]
-    changed = OF.changed(CLAIMS["P2.13"], banks, OF.reading(bank="accelerated")).spec
+    changed = OF.changed(CLAIMS["P2.13"], banks, OF.interpretation(bank="accelerated")).spec
     pairs = [own for own in sigmas(changed).values() if len(own) == 2]
     assert [("accelerated", 0.025), ("accelerated", 0.05)] in pairs
     assert [("accelerated", 15.0), ("accelerated", 30.0)] in pairs
 
 
 @pytest.mark.slow
-def test_a_flown_reading_is_measured_over_its_own_stages(tmp_path):
-    from radarsim.app import readings
+def test_a_flown_interpretation_is_measured_over_its_own_stages(tmp_path):
+    from radarsim.app import interpretations
 
-    of = next(one for one in readings.asked(["P2.3"]))
-    wanted = readings.Asked(of.paper, of.claims, whole=False)
-    done = readings.judged([wanted], out=tmp_path, realisations=16, figures=False)
-    flown = [one for one in done.read[0].over[0].under if one.reading["flight"] == "pull-up 250"]
+    of = next(one for one in interpretations.asked(["P2.3"]))
+    wanted = interpretations.Asked(of.paper, of.claims, whole=False)
+    done = interpretations.judged([wanted], out=tmp_path, realisations=16, figures=False)
+    flown = [one for one in done.read[0].over[0].under if one.interpretation["flight"] == "pull-up 250"]
     assert flown
     assert all(one.outcome is not None for one in flown)
     # Over the stages of what was flown, 125 to 129 s, and not over the shipped flight's, which end at 170 s.
@@ -104,7 +106,7 @@ def test_a_flown_reading_is_measured_over_its_own_stages(tmp_path):
     own = rows[(rows["filter"] == "MMA2-122") & (rows["t_s"] >= 125) & (rows["t_s"] < 129)]
     mean = own.groupby("model")["probability"].mean()
     expected = mean[3] - max(mean[1], mean[2])
-    shipped = next(one for one in flown if one.reading["sigma_acceleration"] == "per step")
+    shipped = next(one for one in flown if one.interpretation["sigma_acceleration"] == "per step")
     size = mean[3] + max(mean[1], mean[2])  # means of so many probabilities, and their difference
     assert shipped.parts[0][1].measured == pytest.approx(expected, rel=0, abs=rounding(size, len(own)))
 

@@ -1,18 +1,18 @@
-"""Readings as data, the rule over them and the page, on a small paper of our own."""
+"""Interpretations as data, the rule over them and the page, on a small paper of our own."""
 
 import dataclasses
 
 from radarsim.report.claims import Claim, Part, certain, printed, rule
 from radarsim.report.claims import over as data
 from radarsim.report.claims.declared import Missing
-from radarsim.report.claims.over import Alternative, Choice, Over, PaperReadings, columns, depth, rows, under
-from radarsim.report.claims.readings_page import page
+from radarsim.report.claims.interpretations_page import page
+from radarsim.report.claims.over import Alternative, Choice, Over, PaperInterpretations, columns, depth, rows, under
 from radarsim.report.claims.rule import AGAINST, CONFIRMED, DEPENDS, EQUIVALENT, REFUTED, UNDECIDED, UNSTATED
 from radarsim.report.statistics import Estimate
 from tests.tolerances import assert_rounded
 
 
-class Small(PaperReadings):
+class Small(PaperInterpretations):
     """Two numbers that depend on two choices, of which one bears on the first claim alone."""
 
     paper = "P9"
@@ -32,19 +32,19 @@ class Small(PaperReadings):
         ),
     )
 
-    def exact(self, claim, reading):
+    def exact(self, claim, interpretation):
         return True
 
-    def evidence(self, claim, reading, seen, of):
-        if reading["form"] == "square" and reading["scale"] == "two":
+    def evidence(self, claim, interpretation, seen, of):
+        if interpretation["form"] == "square" and interpretation["scale"] == "two":
             raise Missing("no square is so large")
-        return {"one": 1.0, "two": 2.0, "ten": 10.0}[reading["scale"]]
+        return {"one": 1.0, "two": 2.0, "ten": 10.0}[interpretation["scale"]]
 
 
 class Sampled(Small):
     """The same, of numbers with an interval."""
 
-    def exact(self, claim, reading):
+    def exact(self, claim, interpretation):
         return False
 
 
@@ -62,16 +62,16 @@ def claim(number, *values):
 
 def over(of, one):
     every = []
-    for reading in of.of_claim(one.id):
+    for interpretation in of.of_claim(one.id):
         try:
-            every.append(under(of, one, reading, of.evidence(one, reading, None, None)))
+            every.append(under(of, one, interpretation, of.evidence(one, interpretation, None, None)))
         except Missing as missing:
-            every.append(under(of, dataclasses.replace(one, parts=()), reading, None))
+            every.append(under(of, dataclasses.replace(one, parts=()), interpretation, None))
             every[-1] = dataclasses.replace(every[-1], claim=one, outcome=None, why=missing.args[0])
     return Over(of, one, tuple(every))
 
 
-def test_readings_of_a_claim_leave_out_what_does_not_bear_on_it():
+def test_interpretations_of_a_claim_leave_out_what_does_not_bear_on_it():
     of = Small()
     assert len(of.declared()) == 5  # two by two of E and U, and one against the print
     assert len(of.of_claim("P9.1")) == 5
@@ -81,31 +81,33 @@ def test_readings_of_a_claim_leave_out_what_does_not_bear_on_it():
 
 def test_names_and_kinds():
     of = Small()
-    assert of.name(of.reading()) == data.DEFAULT
-    assert of.name(of.reading(scale="two", form="square")) == "scale: two; form: square"
-    assert [of.kind(of.reading(**taken)) for taken in ({}, {"form": "square"}, {"scale": "two"}, {"scale": "ten"})] == [
-        *(EQUIVALENT, EQUIVALENT, UNSTATED, AGAINST)
-    ]
-    assert of.kind(of.reading(scale="ten", form="square")) == AGAINST
+    assert of.name(of.interpretation()) == data.DEFAULT
+    assert of.name(of.interpretation(scale="two", form="square")) == "scale: two; form: square"
+    assert [
+        of.kind(of.interpretation(**taken)) for taken in ({}, {"form": "square"}, {"scale": "two"}, {"scale": "ten"})
+    ] == [*(EQUIVALENT, EQUIVALENT, UNSTATED, AGAINST)]
+    assert of.kind(of.interpretation(scale="ten", form="square")) == AGAINST
 
 
-def test_a_claim_over_its_readings():
+def test_a_claim_over_its_interpretations():
     of = Small()
     one = over(of, claim(2, "1"))
     assert [each.outcome.kind for each in one.under] == [CONFIRMED, REFUTED, REFUTED]
     assert one.outcome.kind == DEPENDS
-    assert (one.outcome.holds_in, one.outcome.readings, one.outcome.depends_on) == (1, 2, ("scale",))
-    assert one.sentence() == "holds in 1 of 2 readings; depends on how large it is"
+    assert (one.outcome.holds_in, one.outcome.interpretations, one.outcome.depends_on) == (1, 2, ("scale",))
+    assert one.sentence() == "holds in 1 of 2 interpretations; depends on how large it is"
     never = over(of, claim(2, "10"))
     assert never.outcome.kind == REFUTED
     assert "it holds, against the print, with how large it is: ten" in never.sentence()
 
 
-def test_the_rule_looks_at_all_readings_once(monkeypatch):
-    """A row each asks for the class: of 768 readings, each looking at all the others, that took ten minutes."""
+def test_the_rule_looks_at_all_interpretations_once(monkeypatch):
+    """A row each asks for the class: of 768 interpretations, each looking at all the others, that took ten minutes."""
     asked = []
     monkeypatch.setattr(
-        rule, "over_readings", lambda own, every, true=rule.over_readings: asked.append(1) or true(own, every)
+        rule,
+        "over_interpretations",
+        lambda own, every, true=rule.over_interpretations: asked.append(1) or true(own, every),
     )
     one = over(Small(), claim(1, "1"))
     names = columns([Small()])
@@ -114,12 +116,12 @@ def test_the_rule_looks_at_all_readings_once(monkeypatch):
     assert len(asked) == 1
 
 
-def test_a_reading_that_cannot_be_done_is_listed():
+def test_a_interpretation_that_cannot_be_done_is_listed():
     one = over(Small(), claim(1, "1"))
     (impossible,) = one.impossible
     assert impossible.why == "no square is so large"
     assert "1 not possible" in one.sentence()
-    assert one.outcome.readings == 3  # of four that the paper allows
+    assert one.outcome.interpretations == 3  # of four that the paper allows
     names = columns([Small()])
     (row,) = rows(impossible, names)
     assert (row["verdict"], row["reason"], row["scale"]) == ("not possible", "no square is so large", "two")
@@ -133,13 +135,14 @@ def test_depth_is_in_margins_with_its_sign():
 
 
 def test_what_is_open_says_what_would_decide_it():
-    """Two readings of three are open: the harder one says how many it takes; the one against the print is not asked."""
+    """Two interpretations of three are open: the harder one says how many it takes; the one against the print is not
+    asked."""
     of, one = Sampled(), claim(2, "1")
     part = Part((), "number", "m", lambda seen: Estimate(*seen), printed("1.0"))
     ends = {"one": (1.0, 0.99, 1.01), "two": (1.04, 1.0, 1.08), "ten": (1.0, 0.0, 2.0)}
     every = [
-        under(of, dataclasses.replace(one, parts=(part,)), reading, Ends(*ends[reading["scale"]]), 1000)
-        for reading in of.of_claim(one.id)
+        under(of, dataclasses.replace(one, parts=(part,)), interpretation, Ends(*ends[interpretation["scale"]]), 1000)
+        for interpretation in of.of_claim(one.id)
     ]
     found = Over(of, one, tuple(every))
     assert [each.outcome.kind for each in every] == [CONFIRMED, UNDECIDED, UNDECIDED]
@@ -152,7 +155,7 @@ def test_what_is_open_says_what_would_decide_it():
     assert over(Small(), claim(2, "1")).still_open() == ""
 
 
-def test_page_lists_claims_impossible_readings_and_open_choices():
+def test_page_lists_claims_impossible_interpretations_and_open_choices():
     of = Small()
     text = page(of, "Nobody 1900", [over(of, claim(1, "1")), over(of, claim(2, "10"))])
     assert "| P9.1 |" in text

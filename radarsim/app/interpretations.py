@@ -1,5 +1,5 @@
-"""The runs that a paper's readings need, each once, judged as they finish; verdicts under every reading, computed
-exactly or by small stored runs, and their files.
+"""The runs that a paper's interpretations need, each once, judged as they finish; verdicts under every interpretation,
+computed exactly or by small stored runs, and their files.
 
 `radarsim run --decide`: as many realisations as it takes until each claim of the config is decided. It looks at
 declared numbers of realisations only, 2000·2^m, as a precision does, and each verdict accounts for all these looks
@@ -23,7 +23,7 @@ from radarsim.app.ahead import Ahead, Progress, estimated
 from radarsim.app.case_work import CaseWork
 from radarsim.app.run import RunOptions, SimulatedCases
 from radarsim.app.shown import Shown
-from radarsim.app.stored import CLASSES, PLACE, stored_classes, stored_readings
+from radarsim.app.stored import CLASSES, PLACE, stored_classes, stored_interpretations
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.machine import available_cores
 from radarsim.engine.run import Either, Signals, Stop, TimeLimit
@@ -33,7 +33,17 @@ from radarsim.report import files
 from radarsim.report.claims import PaperClaims, page
 from radarsim.report.claims.declared import Claim
 from radarsim.report.claims.judge import NOT_JUDGED
-from radarsim.report.claims.over import Over, PaperReadings, Reading, Seen, Under, Unreadable, columns, rows, under
+from radarsim.report.claims.over import (
+    Interpretation,
+    Over,
+    PaperInterpretations,
+    Seen,
+    Under,
+    Unreadable,
+    columns,
+    rows,
+    under,
+)
 from radarsim.report.claims.rule import UNDECIDED, roughly
 from radarsim.report.drawing import Figure
 from radarsim.report.precision import looks
@@ -45,12 +55,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-# ---- reading runs ----------------------------------------------------------------------------------------------------
+# ---- interpretation runs
+# ----------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Paper:
-    """A paper with readings: its open choices, its claims, and the study that judges them."""
+    """A paper with interpretations: its open choices, its claims, and the study that judges them."""
 
-    readings: PaperReadings
+    interpretations: PaperInterpretations
     claims: PaperClaims
     study: str
 
@@ -69,37 +80,37 @@ LOOK_PART = 0.5  # of the time of all first runs, expected of each later look: f
 
 
 class Plan:
-    """The runs that a paper's readings need, each once, and the verdicts from them. A run is judged as soon as it is
-    done and then dropped: memory is that of one run, however many readings there are."""
+    """The runs that a paper's interpretations need, each once, and the verdicts from them. A run is judged as soon as
+    it is done and then dropped: memory is that of one run, however many interpretations there are."""
 
     def __init__(self, wanted: Asked, realisations: int):
         self._wanted, self._paper, self._n = wanted, wanted.paper, realisations
         self._experiments: dict[str, Experiment] = {}
         self._jobs: dict[tuple[str, ...], list[tuple[Case, Case]]] = {}  # key: original and changed cases
-        self._key: dict[tuple[str, Reading], tuple[str, ...]] = {}
-        self._impossible: dict[tuple[str, Reading], str] = {}
-        self._judged: dict[tuple[str, Reading], Under] = {}
+        self._key: dict[tuple[str, Interpretation], tuple[str, ...]] = {}
+        self._impossible: dict[tuple[str, Interpretation], str] = {}
+        self._judged: dict[tuple[str, Interpretation], Under] = {}
         self._claims = {claim.id: claim for claim in wanted.claims}
         self._seconds: dict[tuple[str, str], float] = {}  # of a realisation, by config and case
         self._open: dict[tuple[str, ...], None] = {}  # keys of the runs ahead
         self._looks, self._look_s = 0, 0.0  # later looks ahead, and the expected seconds of each
         for claim in wanted.claims:
-            for reading in self._paper.readings.of_claim(claim.id):
-                if not self._paper.readings.exact(claim, reading):
-                    self._add(claim, reading)
+            for interpretation in self._paper.interpretations.of_claim(claim.id):
+                if not self._paper.interpretations.exact(claim, interpretation):
+                    self._add(claim, interpretation)
 
-    def _add(self, claim: Claim, reading: Reading) -> None:
+    def _add(self, claim: Claim, interpretation: Interpretation) -> None:
         try:
             pairs = [
                 (case, replace(changed, realisations=self._n))
                 for case in self._experiment(claim.config).cases
-                if (changed := self._paper.readings.changed(claim, case, reading)) is not None
+                if (changed := self._paper.interpretations.changed(claim, case, interpretation)) is not None
             ]
             key = (claim.config, *(f"{case.name}: {changed.spec!r}" for case, changed in pairs))
         except Unreadable as error:
-            self._impossible[claim.id, reading] = str(error)
+            self._impossible[claim.id, interpretation] = str(error)
             return
-        self._key[claim.id, reading] = key
+        self._key[claim.id, interpretation] = key
         self._jobs[key] = pairs
 
     def _experiment(self, config: str) -> Experiment:
@@ -112,7 +123,7 @@ class Plan:
         self._looks = sum(n > self._n for n in looks(most))
         self._expect_runs(ahead, self._jobs)
         for claim in self._wanted.claims:
-            own = self._paper.readings.of_claim(claim.id)
+            own = self._paper.interpretations.of_claim(claim.id)
             ahead.add(f"verdict of {claim.id}", VERDICT_S, sum((claim.id, one) not in self._key for one in own))
 
     def _expect_runs(self, ahead: Ahead, keys: Iterable[tuple[str, ...]]) -> None:
@@ -136,7 +147,7 @@ class Plan:
         ahead.add("later looks", 1.0, self._look_s * count)
 
     def _kind(self, key: tuple[str, ...]) -> str:
-        """What is foretold together: a reading may change what a case takes, but hardly that of other cases."""
+        """What is foretold together: an interpretation may change what a case takes, but hardly that of other cases."""
         return ", ".join(("run of", key[0], *(case.name for case, _ in self._jobs[key])))
 
     def _expected(self, key: tuple[str, ...]) -> float:
@@ -144,7 +155,7 @@ class Plan:
         return sum(self._seconds.get((key[0], case.name), 0.0) for case, _ in self._jobs[key]) * self._n
 
     def judged(self, options: RunOptions, ahead: Ahead, stop: Signals | None) -> list[Over]:
-        """Every claim under every reading."""
+        """Every claim under every interpretation."""
         for key, pairs in self._jobs.items():
             try:
                 self._see(key, pairs, options, ahead, stop)
@@ -154,22 +165,22 @@ class Plan:
         found = list[Over]()
         for claim in self._wanted.claims:
             verdicts = []
-            for reading in self._paper.readings.of_claim(claim.id):
-                run_for = (claim.id, reading) in self._key
+            for interpretation in self._paper.interpretations.of_claim(claim.id):
+                run_for = (claim.id, interpretation) in self._key
                 with nullcontext() if run_for else ahead.doing(f"verdict of {claim.id}"):
-                    verdicts.append(self._under(claim, reading))
-            found.append(Over(self._paper.readings, claim, tuple(verdicts)))
+                    verdicts.append(self._under(claim, interpretation))
+            found.append(Over(self._paper.interpretations, claim, tuple(verdicts)))
         return found
 
     def decided(
         self, over: list[Over], most: int, options: RunOptions, ahead: Ahead, stop: Signals | None
     ) -> list[Over]:
-        """The claims again, undecided ones after longer runs of the readings that leave them undecided. Looks are at
-        declared numbers only, as in `run --decide`; each claim is judged at its own last look, so that other requests
-        change nothing."""
+        """The claims again, undecided ones after longer runs of the interpretations that leave them undecided. Looks
+        are at declared numbers only, as in `run --decide`; each claim is judged at its own last look, so that other
+        requests change nothing."""
         for n in (n for n in looks(most) if n > self._n):
             open_ = {
-                (one.claim.id, each.reading)
+                (one.claim.id, each.interpretation)
                 for one in over
                 if one.outcome is not None and one.outcome.kind == UNDECIDED
                 for each in one.undecided
@@ -184,7 +195,10 @@ class Plan:
             for key in keys:
                 pairs = [(case, replace(changed, realisations=n)) for case, changed in self._jobs[key]]
                 self._see(key, pairs, options, ahead, stop, open_)
-            over = [replace(one, under=tuple(self._under(one.claim, own.reading) for own in one.under)) for one in over]
+            over = [
+                replace(one, under=tuple(self._under(one.claim, own.interpretation) for own in one.under))
+                for one in over
+            ]
         self._expect_looks(ahead, -self._looks)
         self._looks = 0
         return over
@@ -196,7 +210,7 @@ class Plan:
         options: RunOptions,
         ahead: Ahead,
         stop: Signals | None,
-        only: Collection[tuple[str, Reading]] | None = None,
+        only: Collection[tuple[str, Interpretation]] | None = None,
     ) -> None:
         """Run or continue the cases of a key, and judge what they show; `only`: for these places."""
         progress = ahead.running(self._kind(key), partial(self._expected, key))
@@ -223,7 +237,7 @@ class Plan:
         experiment = replace(self._experiment(key[0]), cases=changed, realisations=self._n)
         simulated = run.simulate(experiment, options, progress=progress)
         if simulated.stopped:
-            raise TargetUnmet(f"readings: {simulated.stopped}: the same command continues")
+            raise TargetUnmet(f"interpretations: {simulated.stopped}: the same command continues")
         return simulated
 
     def _seen(self, pairs: Sequence[tuple[Case, Case]], simulated: SimulatedCases) -> Seen:
@@ -240,23 +254,23 @@ class Plan:
             if own == key:
                 self._impossible[place] = why
 
-    def _under(self, claim: Claim, reading: Reading) -> Under:
-        """A claim under a reading: the verdict of its run, or the exact one, or why there is none."""
-        place = claim.id, reading
+    def _under(self, claim: Claim, interpretation: Interpretation) -> Under:
+        """A claim under an interpretation: the verdict of its run, or the exact one, or why there is none."""
+        place = claim.id, interpretation
         if place not in self._judged:
-            self._judged[place] = self._judge(claim, reading, None)
+            self._judged[place] = self._judge(claim, interpretation, None)
         return self._judged[place]
 
-    def _judge(self, claim: Claim, reading: Reading, seen: Seen | None) -> Under:
-        of = self._paper.readings
-        why = self._impossible.get((claim.id, reading))
+    def _judge(self, claim: Claim, interpretation: Interpretation, seen: Seen | None) -> Under:
+        of = self._paper.interpretations
+        why = self._impossible.get((claim.id, interpretation))
         if why is None:
             try:
-                evidence = of.evidence(claim, reading, seen, self._paper.claims)
-                return under(of, claim, reading, evidence, min(one.count for one in seen.ran) if seen else 0)
+                evidence = of.evidence(claim, interpretation, seen, self._paper.claims)
+                return under(of, claim, interpretation, evidence, min(one.count for one in seen.ran) if seen else 0)
             except Unreadable as error:
                 why = str(error)
-        return Under(claim, reading, of.name(reading), of.kind(reading), why=why)
+        return Under(claim, interpretation, of.name(interpretation), of.kind(interpretation), why=why)
 
 
 # ---- decide ----------------------------------------------------------------------------------------------------------
@@ -336,20 +350,21 @@ def undecided(rows: Sequence[dict[str, Any]]) -> list[str]:
     return lines
 
 
-# ---- readings --------------------------------------------------------------------------------------------------------
+# ---- interpretations
+# --------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Read:
-    """Verdicts over the readings of a paper."""
+    """Verdicts over the interpretations of a paper."""
 
     paper: Paper
     over: list[Over]
 
 
 @dataclass(repr=False)
-class Readings(Shown):
-    """Result of `readings`: for each paper, and the files written, by their path under `folder`.
+class Interpretations(Shown):
+    """Result of `interpretations`: for each paper, and the files written, by their path under `folder`.
 
     left: a line for each claim that stayed undecided although `decide` was set. outdated: configs whose stored claims
     have another class."""
@@ -367,8 +382,8 @@ class Readings(Shown):
 
     @property
     def table(self) -> "pd.DataFrame":
-        """The rows of readings.csv for these claims: one for each claim, reading and part."""
-        names = columns(read.paper.readings for read in self.read)
+        """The rows of interpretations.csv for these claims: one for each claim, interpretation and part."""
+        names = columns(read.paper.interpretations for read in self.read)
         made = [row for over in self.over for one in over.under for row in rows(one, names, over.outcome)]
         return read_rows(made, names)
 
@@ -382,9 +397,9 @@ class Readings(Shown):
 
 
 def papers(keys: Collection[str] = ()) -> dict[str, Paper]:
-    """The papers with readings, by key (P1); `keys` adds or restricts papers."""
+    """The papers with interpretations, by key (P1); `keys` adds or restricts papers."""
     found = {}
-    for name, of in registry.papers(lambda study: study.readings(), keys).items():
+    for name, of in registry.papers(lambda study: study.interpretations(), keys).items():
         claims = None if of is None else registry.study(name).claims()
         if of is not None and claims is not None:
             found[of.paper] = Paper(of, claims, name)
@@ -403,7 +418,7 @@ def asked(names: Sequence[str] = ()) -> list[Asked]:
     found = []
     for key, paper in every.items():
         whole = not names or key in names
-        claims = [one for one in paper.claims.claims if (whole or one.id in names) and paper.readings.open(one)]
+        claims = [one for one in paper.claims.claims if (whole or one.id in names) and paper.interpretations.open(one)]
         if claims:
             found.append(Asked(paper, claims))
     return found
@@ -411,9 +426,9 @@ def asked(names: Sequence[str] = ()) -> list[Asked]:
 
 def _closed(paper: Paper, names: Sequence[str]) -> list[str]:
     """Faults of requested claims that depend on nothing that the paper leaves open."""
-    kept = [one.id for one in paper.claims.claims if paper.readings.open(one)]
+    kept = [one.id for one in paper.claims.claims if paper.interpretations.open(one)]
     return [
-        f"readings: {one.id} depends on nothing that its paper leaves open; claims that do: {', '.join(kept)}"
+        f"interpretations: {one.id} depends on nothing that its paper leaves open; claims that do: {', '.join(kept)}"
         for one in paper.claims.claims
         if one.id in names and one.id not in kept
     ]
@@ -423,12 +438,15 @@ def _unknown(name: str, every: Mapping[str, Paper], owner: Mapping[str, str]) ->
     paper = name.partition(".")[0]
     judged = {claim.id for of in run.papers([paper]) for claim in of.claims}
     if paper not in every and any(claim.partition(".")[0] == paper for claim in judged):
-        return f"readings: {name}: its study declares no choices that {paper} leaves open: there are no other readings"
+        return (
+            f"interpretations: {name}: its study declares no choices that {paper} leaves open: "
+            "there are no other interpretations"
+        )
     if name in judged:
-        return f"readings: {name} is an extension of ours: no paper leaves anything open in it"
+        return f"interpretations: {name} is an extension of ours: no paper leaves anything open in it"
     ids = [claim for claim, key in owner.items() if key == paper]
     allowed = f"its claims: {', '.join(ids)}" if ids else f"papers: {', '.join(every)}; claims as P1.4"
-    return f"readings: no paper or claim {name!r}; {allowed}"
+    return f"interpretations: no paper or claim {name!r}; {allowed}"
 
 
 def judged(
@@ -442,17 +460,18 @@ def judged(
     figures: bool = True,
     stop: Signals | None = None,
     write: bool = True,
-) -> Readings:
-    """Judge claims under every reading and, unless disabled, write table and specification curves into out/readings.
+) -> Interpretations:
+    """Judge claims under every interpretation and, unless disabled, write table and specification curves into
+    out/interpretations.
 
     wanted: of `asked`. realisations of each run, where runs are needed; default: the number declared by the paper's
-    readings. decide: runs behind undecided claims are extended, up to 2000·2^m realisations, until each claim is
+    interpretations. decide: runs behind undecided claims are extended, up to 2000·2^m realisations, until each claim is
     decided; `realisations` is then the limit. Runs go through the store of blocks under out, so that a second call
     continues. Raises TargetUnmet where a time limit left something undone, Interrupted on a signal seen by `stop`."""
     if realisations is not None and realisations < 1:
         raise ConfigError(f"{argument('realisations')}: must be >= 1, got {realisations}")
     options = replace(options or RunOptions(), out=out)
-    plans = [Plan(one, _first(one.paper.readings, realisations, decide)) for one in wanted]
+    plans = [Plan(one, _first(one.paper.interpretations, realisations, decide)) for one in wanted]
 
     def estimate() -> None:
         for plan in plans:
@@ -460,25 +479,27 @@ def judged(
 
     ahead = Ahead(progress, estimate)
     for plan, one in zip(plans, wanted, strict=True):
-        plan.expect(ahead, realisations or one.paper.readings.most if decide else 0)
+        plan.expect(ahead, realisations or one.paper.interpretations.most if decide else 0)
     if write and figures:
-        several = [claim for one in wanted for claim in one.claims if len(one.paper.readings.of_claim(claim.id)) > 1]
+        several = [
+            claim for one in wanted for claim in one.claims if len(one.paper.interpretations.of_claim(claim.id)) > 1
+        ]
         ahead.add("figure", FIGURE_S, len(several))
     read, left = [], []
     for plan, one in zip(plans, wanted, strict=True):
         over = plan.judged(options, ahead, stop)
         if decide:
-            over = plan.decided(over, realisations or one.paper.readings.most, options, ahead, stop)
+            over = plan.decided(over, realisations or one.paper.interpretations.most, options, ahead, stop)
             left += [line for each in over if (line := _left(each))]
         read.append(Read(one.paper, over))
-    made = Readings(read, Path(out) / PLACE.parent, left=tuple(left))
+    made = Interpretations(read, Path(out) / PLACE.parent, left=tuple(left))
     if write:
         made.files = _write(made, figures, ahead)
         made.outdated = _outdated(made)
     return made
 
 
-def readings(
+def interpretations(
     *names: str,
     realisations: float | None = None,
     decide: bool = False,
@@ -488,19 +509,19 @@ def readings(
     figures: bool = True,
     progress: Progress | None = None,
     stop: Signals | None = None,
-) -> Readings:
-    """Judge claims (P1.4) or whole papers (P1) under every reading that the papers allow; default: all.
+) -> Interpretations:
+    """Judge claims (P1.4) or whole papers (P1) under every interpretation that the papers allow; default: all.
 
-    Readings are judged exactly where possible, otherwise by runs of `realisations`, by default the number that the
-    paper's readings declare. decide: extend the runs, up to `realisations`, until each claim is decided. time_limit is
-    in seconds. out: directory for readings.csv, a figure for each claim, and the stored runs.
+    Interpretations are judged exactly where possible, otherwise by runs of `realisations`, by default the number that
+    the paper's interpretations declare. decide: extend the runs, up to `realisations`, until each claim is decided.
+    time_limit is in seconds. out: directory for interpretations.csv, a figure for each claim, and the stored runs.
 
-    `table` is readings.csv: a row for each claim, reading and part. Raises ConfigError for unknown names, TargetUnmet
-    if the time did not suffice. progress is called with the milliseconds that have passed, those that all is expected
-    to take, and 0.
+    `table` is interpretations.csv: a row for each claim, interpretation and part. Raises ConfigError for unknown names,
+    TargetUnmet if the time did not suffice. progress is called with the milliseconds that have passed, those that all
+    is expected to take, and 0.
 
-    >>> readings("P1.4")
-    P1.4 depends on: holds in 4 of 6 readings; depends on how the filter starts
+    >>> interpretations("P1.4")
+    P1.4 depends on: holds in 4 of 6 interpretations; depends on how the filter starts
     """
     configs.check(threads=threads, time_limit=time_limit, out=out, figures=figures)
     configs.texts(names)
@@ -513,7 +534,7 @@ def readings(
         return judged(wanted, out=Path(folder if out is None else out), options=means, **options)
 
 
-def _first(of: PaperReadings, realisations: int | None, decide: bool) -> int:
+def _first(of: PaperInterpretations, realisations: int | None, decide: bool) -> int:
     """Realisations of the first runs: those requested, or declared; with `decide`, at most those requested."""
     if realisations is None:
         return of.realisations
@@ -521,7 +542,7 @@ def _first(of: PaperReadings, realisations: int | None, decide: bool) -> int:
 
 
 def _left(over: Over) -> str:
-    """The line on an undecided claim: under how many readings, and what it would take."""
+    """The line on an undecided claim: under how many interpretations, and what it would take."""
     if over.outcome is None or over.outcome.kind != UNDECIDED:
         return ""
     needed = over.outcome.needed
@@ -531,11 +552,11 @@ def _left(over: Over) -> str:
         else f"about {roughly(needed):,} would"
     )
     open_, n = len(over.undecided), over.looked
-    return f"{over.claim.id} not yet decided under {open_} readings at {n:,} realisations; {would}"
+    return f"{over.claim.id} not yet decided under {open_} interpretations at {n:,} realisations; {would}"
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
-def _write(done: Readings, figures: bool, ahead: Ahead) -> tuple[str, ...]:
+def _write(done: Interpretations, figures: bool, ahead: Ahead) -> tuple[str, ...]:
     """Write the table, with the stored rows of other claims, and a curve for each claim."""
     contents = {PLACE.name: _table(done).encode(), CLASSES.name: _classes(done).encode()}
     described = done._described if figures else {}
@@ -548,22 +569,22 @@ def _write(done: Readings, figures: bool, ahead: Ahead) -> tuple[str, ...]:
     return tuple(sorted(contents))
 
 
-def _table(done: Readings) -> str:
-    names = columns(paper.readings for paper in papers().values())
+def _table(done: Interpretations) -> str:
+    names = columns(paper.interpretations for paper in papers().values())
     new = [row for over in done.over for one in over.under for row in rows(one, names, over.outcome)]
-    return _with(names, stored_readings(done.folder.parent), new, {over.claim.id for over in done.over})
+    return _with(names, stored_interpretations(done.folder.parent), new, {over.claim.id for over in done.over})
 
 
-def _classes(done: Readings) -> str:
-    """The class of each claim over its readings."""
+def _classes(done: Interpretations) -> str:
+    """The class of each claim over its interpretations."""
     new = [found.as_row() for over in done.over if (found := page.of_over(over)) is not None]
     kept = [one.as_row() for one in stored_classes(done.folder.parent)]
     return _with(page.COLUMNS, kept, new, {over.claim.id for over in done.over})
 
 
-def _outdated(done: Readings) -> tuple[str, ...]:
-    """Configs whose stored claims differ in class from their readings now. Except configs that have changed since their
-    run: their stored results make no report."""
+def _outdated(done: Interpretations) -> tuple[str, ...]:
+    """Configs whose stored claims differ in class from their interpretations now. Except configs that have changed
+    since their run: their stored results make no report."""
     new = {over.claim.id: over for over in done.over if over.outcome}
     found = []
     for config in dict.fromkeys(over.claim.config for over in new.values()):
@@ -594,15 +615,17 @@ def _order(claim: str) -> tuple[str, float, str]:
     return paper, float(digits) if digits.isdigit() else 0.0, number
 
 
-def pages(done: Readings) -> str:
+def pages(done: Interpretations) -> str:
     """The page of each paper, one after the other."""
-    from radarsim.report.claims import readings_page
+    from radarsim.report.claims import interpretations_page
 
-    return "\n".join(readings_page.page(read.paper.readings, read.paper.claims.paper, read.over) for read in done.read)
+    return "\n".join(
+        interpretations_page.page(read.paper.interpretations, read.paper.claims.paper, read.over) for read in done.read
+    )
 
 
-def documents(done: Readings) -> list[dict[str, Any]]:
-    """The documents of --json: one for each claim, with every reading."""
+def documents(done: Interpretations) -> list[dict[str, Any]]:
+    """The documents of --json: one for each claim, with every interpretation."""
     found = []
     for over in done.over:
         outcome = over.outcome
@@ -610,9 +633,9 @@ def documents(done: Readings) -> list[dict[str, Any]]:
             {
                 "claim": over.claim.id,
                 "verdict": outcome.words if outcome else "not judged",
-                **{"holds": outcome and outcome.holds_in, "of": outcome and outcome.readings},
+                **{"holds": outcome and outcome.holds_in, "of": outcome and outcome.interpretations},
                 "depends_on": list(outcome.depends_on) if outcome else [],
-                "readings": [_document(one) for one in over.under],
+                "interpretations": [_document(one) for one in over.under],
             }
         )
     return found
@@ -620,9 +643,9 @@ def documents(done: Readings) -> list[dict[str, Any]]:
 
 def _document(one: Under) -> dict[str, Any]:
     return {
-        "reading": one.name,
+        "interpretation": one.name,
         "kind": one.kind,
-        "choices": dict(one.reading.taken),
+        "choices": dict(one.interpretation.taken),
         "verdict": one.outcome.kind if one.outcome else None,
         "miss": one.outcome.miss if one.outcome else None,
         "reason": one.why or None,

@@ -1,21 +1,21 @@
-"""P3's readings about manoeuvres: single tests and short memories exactly, the rest by changed cases."""
+"""P3's interpretations about manoeuvres: single tests and short memories exactly, the rest by changed cases."""
 
 import pytest
 
 from radarsim.app.configs import load
 from radarsim.studies import registry
-from radarsim.studies.sonar.manoeuvre.readings import Readings
+from radarsim.studies.sonar.manoeuvre.interpretations import Interpretations
 
-OF = Readings()
+OF = Interpretations()
 STUDY = registry.study("sonar")
 CLAIMS = {one.id: one for one in STUDY.claims().claims}
 
 
 def values(claim, **taken):
-    reading = OF.reading(**taken)
-    assert OF.exact(CLAIMS[claim], reading)
-    seen = OF.evidence(CLAIMS[claim], reading, None, STUDY.claims())
-    return [part.measure(seen).value for part in OF.parts(CLAIMS[claim], reading)]
+    interpretation = OF.interpretation(**taken)
+    assert OF.exact(CLAIMS[claim], interpretation)
+    seen = OF.evidence(CLAIMS[claim], interpretation, None, STUDY.claims())
+    return [part.measure(seen).value for part in OF.parts(CLAIMS[claim], interpretation)]
 
 
 def test_the_probability_of_a_single_test_hangs_on_the_manoeuvre():
@@ -32,9 +32,9 @@ def test_how_many_plots_are_enough_hangs_on_what_is_enough():
     assert values("P3.3", high_accuracy="under 5 % more") == [8]  # 0.6146 at nine plots
 
 
-def test_a_part_is_called_what_it_is_under_its_reading():
+def test_a_part_is_called_what_it_is_under_its_interpretation():
     def named(claim, **taken):
-        return [part.what for part in OF.parts(CLAIMS[claim], OF.reading(**taken))]
+        return [part.what for part in OF.parts(CLAIMS[claim], OF.interpretation(**taken))]
 
     for claim in ("P3.3", "P3.8", "P3.9", "P3.10"):
         assert named(claim) == [part.what for part in CLAIMS[claim].parts if part.asserted]
@@ -53,10 +53,10 @@ def test_switching_within_the_papers_own_six_plots():
     assert found == pytest.approx([0.975, 1.188, 1.867, 1.101], abs=5e-4)
 
 
-def test_cases_are_changed_as_a_reading_says():
+def test_cases_are_changed_as_a_interpretation_says():
     cases = load("sonar_manoeuvre").cases
-    assert not OF.exact(CLAIMS["P3.8"], OF.reading())
-    taken = OF.reading(tests="batches", manoeuvre="80 s")
+    assert not OF.exact(CLAIMS["P3.8"], OF.interpretation())
+    taken = OF.interpretation(tests="batches", manoeuvre="80 s")
     changed = [one for one in (OF.changed(CLAIMS["P3.8"], case, taken) for case in cases) if one is not None]
     assert sorted(abs(one.spec.target.acceleration_mps2) for one in changed) == [0.1, 0.8]
     for one in changed:
@@ -64,25 +64,25 @@ def test_cases_are_changed_as_a_reading_says():
         own = [d for d in one.spec.detectors if d.name == f"{d.plots} plots"]
         assert own
         assert all(d.test_every == d.plots for d in own)
-    faster = OF.changed(CLAIMS["P3.10"], cases[-1], OF.reading(switching_false_alarms="0.1"))
+    faster = OF.changed(CLAIMS["P3.10"], cases[-1], OF.interpretation(switching_false_alarms="0.1"))
     rates = {f.name: f.detector.false_alarm_probability for f in faster.spec.filters if f.detector}
     assert set(rates.values()) == {0.1}
 
 
-def test_a_part_on_delays_asks_for_the_readings_rate():
-    parts = OF.parts(CLAIMS["P3.8"], OF.reading(false_alarms="0.01", seen="beginning"))
+def test_a_part_on_delays_asks_for_the_interpretations_rate():
+    parts = OF.parts(CLAIMS["P3.8"], OF.interpretation(false_alarms="0.01", seen="beginning"))
     assert all(part.asserted for part in parts)
     assert {part.statement for part in parts} == {"threshold", "time", "not worth while"}
 
 
 @pytest.mark.slow
-def test_more_plots_can_be_worth_while_under_a_reading(tmp_path, monkeypatch):
+def test_more_plots_can_be_worth_while_under_a_interpretation(tmp_path, monkeypatch):
     """At 0.01 false alarms eight plots see the weakest manoeuvre sooner than four or five; in %, as the words want."""
-    from radarsim.app import readings
+    from radarsim.app import interpretations
 
-    taken = OF.reading(false_alarms="0.01", manoeuvre="80 s", seen="beginning", tests="sliding")
-    monkeypatch.setattr(type(OF), "of_claim", lambda self, claim: [self.reading(), taken])
-    done = readings.judged(readings.asked(["P3.8"]), out=tmp_path, realisations=200, figures=False)
+    taken = OF.interpretation(false_alarms="0.01", manoeuvre="80 s", seen="beginning", tests="sliding")
+    monkeypatch.setattr(type(OF), "of_claim", lambda self, claim: [self.interpretation(), taken])
+    done = interpretations.judged(interpretations.asked(["P3.8"]), out=tmp_path, realisations=200, figures=False)
     shipped, other = done.read[0].over[0].under
     weak = [one.parts[4][1] for one in (shipped, other)]
     assert all(one.parts[4][0].unit == "%" for one in (shipped, other))
@@ -91,10 +91,10 @@ def test_more_plots_can_be_worth_while_under_a_reading(tmp_path, monkeypatch):
 
 
 def test_the_joint_search_names_numbers_as_shipped_in_the_order_of_the_claims(tmp_path):
-    from radarsim.app import readings
+    from radarsim.app import interpretations
     from radarsim.report.claims.over import joint
 
-    done = readings.judged(readings.asked(["P3.3", "P3.9"]), out=tmp_path, figures=False)
+    done = interpretations.judged(interpretations.asked(["P3.3", "P3.9"]), out=tmp_path, figures=False)
     numbers = joint(OF, done.read[0].over).numbers.values()
     shipped = [part.what for claim in ("P3.3", "P3.9") for part in CLAIMS[claim].parts]
     assert [number.what for number in numbers] == shipped

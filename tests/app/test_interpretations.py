@@ -1,4 +1,5 @@
-"""Readings as a whole: names, table, curves, what is said of a claim, what cannot be done; small runs that continue."""
+"""Interpretations as a whole: names, table, curves, what is said of a claim, what cannot be done; small runs that
+continue."""
 
 import csv
 import dataclasses
@@ -10,13 +11,14 @@ from functools import partial
 
 import pytest
 
-from radarsim.app import readings as app
-from radarsim.app.readings import Plan
+import radarsim
+from radarsim.app import interpretations as app
+from radarsim.app.interpretations import Plan
 from radarsim.app.run import RunOptions
-from radarsim.app.stored import shipped_classes, stored_classes
+from radarsim.app.stored import shipped_classes, stored_classes, stored_interpretations
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.report.claims import rule
-from radarsim.report.claims.over import Alternative, Choice, PaperReadings, Unreadable
+from radarsim.report.claims.over import Alternative, Choice, PaperInterpretations, Unreadable
 from radarsim.studies import registry
 from tests.program import command
 
@@ -24,33 +26,35 @@ COLUMNS = "measured,lo,hi,exact,expected_lo,expected_hi,margin,verdict"
 
 
 def table(out):
-    with (out / "readings/readings.csv").open(encoding="utf-8", newline="") as file:
+    with (out / "interpretations/interpretations.csv").open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
 
 @pytest.fixture(scope="module")
 def first(tmp_path_factory):
-    """The first paper under all its readings."""
+    """The first paper under all its interpretations."""
     out = tmp_path_factory.mktemp("results")
     return out, app.judged(app.asked(["P1"]), out=out, figures=False)
 
 
 def test_the_table_has_a_column_a_choice_and_a_row_a_part(first):
     out, _done = first
-    text = (out / "readings/readings.csv").read_text(encoding="utf-8")
+    text = (out / "interpretations/interpretations.csv").read_text(encoding="utf-8")
     header = text.split("\n", 1)[0]
-    assert header.startswith("claim,part,reading,kind,")
+    assert header.startswith("claim,part,interpretation,kind,")
     assert COLUMNS in header
-    assert set(dict.fromkeys(c.key for p in app.papers().values() for c in p.readings.choices)) < set(header.split(","))
+    assert set(dict.fromkeys(c.key for p in app.papers().values() for c in p.interpretations.choices)) < set(
+        header.split(",")
+    )
     rows = table(out)
     paper = app.papers()["P1"]
-    open_claims = [one for one in paper.claims.claims if any(c.bears_on(one.id) for c in paper.readings.choices)]
+    open_claims = [one for one in paper.claims.claims if any(c.bears_on(one.id) for c in paper.interpretations.choices)]
     assert {row["claim"] for row in rows} == {one.id for one in open_claims}
     for claim in open_claims:
         own = [row for row in rows if row["claim"] == claim.id]
-        readings = paper.readings.of_claim(claim.id)
-        assert {row["reading"] for row in own} == {paper.readings.name(one) for one in readings}
-        shipped = [row for row in own if row["reading"] == "as shipped"]
+        interpretations = paper.interpretations.of_claim(claim.id)
+        assert {row["interpretation"] for row in own} == {paper.interpretations.name(one) for one in interpretations}
+        shipped = [row for row in own if row["interpretation"] == "as shipped"]
         assert len(shipped) == len(claim.parts)
         assert all(row["exact"] and not row["measured"] for row in shipped if row["verdict"] != "not possible")
 
@@ -61,17 +65,17 @@ def test_a_verdict_is_that_of_the_rule_on_the_table(first):
     rows = table(out)
     for over in done.read[0].over:
         own = [row for row in rows if row["claim"] == over.claim.id and row["kind"] in "EU" and row["outcome"]]
-        by_reading = {row["reading"]: row["outcome"] for row in own}
+        by_interpretation = {row["interpretation"]: row["outcome"] for row in own}
         found = over.outcome
-        assert found.readings == len(by_reading)
-        assert found.holds_in == sum(one == rule.CONFIRMED for one in by_reading.values())
-        assert over.sentence().startswith(f"holds in {found.holds_in} of {found.readings} readings")
+        assert found.interpretations == len(by_interpretation)
+        assert found.holds_in == sum(one == rule.CONFIRMED for one in by_interpretation.values())
+        assert over.sentence().startswith(f"holds in {found.holds_in} of {found.interpretations} interpretations")
         if found.depends_on:
             assert f"depends on {over.of.asked(found.depends_on)}" in over.sentence()
 
 
 def test_the_classes_of_the_first_paper_are_those_that_are_shipped(first):
-    """All of it is exact, so that it takes a second: what a run says of P1 is what its readings give."""
+    """All of it is exact, so that it takes a second: what a run says of P1 is what its interpretations give."""
     out, done = first
     shipped = {one.claim: one for one in shipped_classes()}
     own = stored_classes(out)
@@ -84,8 +88,8 @@ def test_what_is_known_of_the_first_paper(first):
     _, done = first
     said = {over.claim.id: over.outcome for over in done.read[0].over}
     assert said["P1.5"].words == "depends on end_of, falls_to"
-    assert (said["P1.5"].holds_in, said["P1.5"].readings) == (6, 18)
-    assert said["P1.17"].kind == rule.REFUTED  # in every reading: robust
+    assert (said["P1.5"].holds_in, said["P1.5"].interpretations) == (6, 18)
+    assert said["P1.17"].kind == rule.REFUTED  # in every interpretation: robust
     assert said["P1.17"].holds_in == 0
     assert said["P1.9"].kind == said["P1.25"].kind == rule.CONFIRMED
     assert said["P1.6"].depends_on == ("falls_to",)
@@ -97,8 +101,8 @@ def test_figure_1a_is_of_several_variances(first):
     """P1.18 fails in all but one of fifteen: unweighted start and a large D_M, where the difference does stabilise."""
     out, done = first
     outcome = next(one.outcome for one in done.read[0].over if one.claim.id == "P1.18")
-    assert (outcome.words, outcome.holds_in, outcome.readings) == ("depends on shown_variance, start", 1, 15)
-    rows = {row["reading"]: row for row in table(out) if row["claim"] == "P1.18" and row["kind"] in "EU"}
+    assert (outcome.words, outcome.holds_in, outcome.interpretations) == ("depends on shown_variance, start", 1, 15)
+    rows = {row["interpretation"]: row for row in table(out) if row["claim"] == "P1.18" and row["kind"] in "EU"}
     held = rows.pop("start: unweighted; shown_variance: 0.1")
     assert float(held["exact"]) == pytest.approx(96.41, abs=0.005)
     assert max(float(row["exact"]) for row in rows.values()) < 90
@@ -107,12 +111,14 @@ def test_figure_1a_is_of_several_variances(first):
 
 def test_a_run_that_is_over_before_the_time_asked_about_is_not_judged(first):
     out, _ = first
-    said = {(row["claim"], row["reading"]): row["reason"] for row in table(out) if row["verdict"] == "not possible"}
+    said = {
+        (row["claim"], row["interpretation"]): row["reason"] for row in table(out) if row["verdict"] == "not possible"
+    }
     assert said["P1.7", "points: fifteen each"] == "the run of RLS 3 ends at 70 s, before 90 s"
     assert said["P1.6", "points: fifteen each; falls_to: 100 s"] == "the run of RLS 3 ends at 70 s, before 100 s"
 
 
-def test_what_falls_may_rise_by_the_tolerance_of_the_reading(first):
+def test_what_falls_may_rise_by_the_tolerance_of_the_interpretation(first):
     out, done = first
     rows = [row for row in table(out) if row["claim"] == "P1.27" and row["kind"] in "EU"]
     assert {(row["settled_within"], float(row["margin"])) for row in rows} == {("5 %", 5), ("2 %", 2), ("10 %", 10)}
@@ -121,7 +127,7 @@ def test_what_falls_may_rise_by_the_tolerance_of_the_reading(first):
 
 def test_one_printed_end_of_two_curves_is_that_of_each_or_of_the_lower(first):
     """18.29 and 19.52 % at the end, 19.74 and 21.73 % at 100 s: 18 ± 1 is that of the lower alone, and at the end."""
-    rows = {row["reading"]: row for row in table(first[0]) if row["claim"] == "P1.5" and row["part"] == "1"}
+    rows = {row["interpretation"]: row for row in table(first[0]) if row["claim"] == "P1.5" and row["part"] == "1"}
     lower, early = rows["end_of: the lower one"], rows["falls_to: 100 s; end_of: the lower one"]
     assert [float(one["exact"]) for one in (lower, early)] == pytest.approx([18.29, 19.74], abs=0.005)
     assert [one["outcome"] for one in (lower, early)] == ["confirmed", "refuted"]
@@ -133,22 +139,24 @@ def test_sentences_on_figures_2a_and_3a_speak_of_their_radar_or_of_each(first):
     out, done = first
     over = {one.claim.id: one for one in done.read[0].over}
     steps = over["P1.28"].outcome
-    assert (steps.depends_on, steps.holds_in, steps.readings) == (("first_steps_of",), 3, 6)
-    each = [row for row in table(out) if (row["claim"], row["reading"]) == ("P1.28", "first_steps_of: each radar")]
+    assert (steps.depends_on, steps.holds_in, steps.interpretations) == (("first_steps_of",), 3, 6)
+    each = [
+        row for row in table(out) if (row["claim"], row["interpretation"]) == ("P1.28", "first_steps_of: each radar")
+    ]
     assert [float(row["exact"]) for row in each[7::2]] == pytest.approx([33, 30], abs=0.5)
     assert [row["verdict"] for row in each[1::2]].count("refuted") == 2
-    rows = {row["reading"]: row for row in table(out) if row["claim"] == "P1.27"}
+    rows = {row["interpretation"]: row for row in table(out) if row["claim"] == "P1.27"}
     assert rows["as shipped"]["outcome"] == "refuted"
     assert rows["curves_of: RLS 2"]["outcome"] == "confirmed"
     assert rows["settled_within: 2 %; curves_of: RLS 2"]["outcome"] == "refuted"
 
 
-def test_the_readings_agree_with_the_stored_run_of_the_shipped_config(first, tmp_path):
+def test_the_interpretations_agree_with_the_stored_run_of_the_shipped_config(first, tmp_path):
     """Exact values as shipped against the exact columns of a run: the two recursions are apart."""
     import radarsim
 
     gains = radarsim.run("range_doppler", realisations=64).gains
-    rows = [row for row in table(first[0]) if row["reading"] == "as shipped"]
+    rows = [row for row in table(first[0]) if row["interpretation"] == "as shipped"]
     last = gains[(gains["t_s"] == 140) & (gains["component"] == "r")].set_index("case")["exact_percent"]
     final = {row["part"]: float(row["exact"]) for row in rows if row["claim"] == "P1.5"}
     assert [final["1"], final["2"]] == pytest.approx([last["rls2"], last["rls3"]], rel=0.5e-11)  # twelve digits
@@ -164,7 +172,7 @@ def test_other_claims_keep_their_rows(first):
 def test_unknown_names_say_what_is_allowed():
     with pytest.raises(ConfigError) as caught:
         app.asked(["P9", "P1.99"])
-    assert caught.value.lines[0].startswith("readings: no paper or claim 'P9'; papers: P1, ")
+    assert caught.value.lines[0].startswith("interpretations: no paper or claim 'P9'; papers: P1, ")
     assert "its claims: P1.1, P1.2" in caught.value.lines[1]
     with pytest.raises(ConfigError, match=r"P1\.E1 is an extension of ours"):
         app.asked(["P1.E1"])
@@ -176,30 +184,31 @@ def test_no_realisations_are_refused(tmp_path):
 
 
 def test_a_damaged_table_is_reported(tmp_path):
-    (tmp_path / "readings").mkdir()
-    (tmp_path / "readings/readings.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(StoreError, match="is no table of readings"):
+    (tmp_path / "interpretations").mkdir()
+    (tmp_path / "interpretations/interpretations.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(StoreError, match="is no table of interpretations"):
         app.judged(app.asked(["P1.4"]), out=tmp_path, figures=False)
 
 
 @pytest.mark.slow
 def test_the_command(tmp_path):
-    run = partial(command, "readings", "--out", tmp_path)
+    run = partial(command, "interpretations", "--out", tmp_path)
     text = run("P1.7").stdout
     assert re.search(
-        r"^P1\.7 +depends on +holds in 2 of 3 readings; depends on how the filter starts", text, re.MULTILINE
+        r"^P1\.7 +depends on +holds in 2 of 3 interpretations; depends on how the filter starts", text, re.MULTILINE
     )
-    assert (tmp_path / "readings/P1.7.svg").stat().st_size > 10_000
+    assert (tmp_path / "interpretations/P1.7.svg").stat().st_size > 10_000
     (document,) = json.loads(run("P1.7", "--json").stdout)
-    assert set(document) == {"claim", "verdict", "holds", "of", "depends_on", "readings"}
+    assert set(document) == {"claim", "verdict", "holds", "of", "depends_on", "interpretations"}
     assert document["verdict"] == "depends on start"
-    assert document["readings"][0]["reading"] == "as shipped"
-    assert "# P1 by reading" in run("P1.7", "--markdown").stdout
+    assert document["interpretations"][0]["interpretation"] == "as shipped"
+    assert "# P1 by interpretation" in run("P1.7", "--markdown").stdout
     assert "papers: P1" in run("P0", code=2).stderr
 
 
-# ---- readings that are run: a small paper of our own ---------------------------------------------------------------
-class Velocities(PaperReadings):
+# ---- interpretations that are run: a small paper of our own
+# ---------------------------------------------------------------
+class Velocities(PaperInterpretations):
     """P1's claim on the final range gain, with other radars: runs of the shipped config."""
 
     paper = "P1"
@@ -218,8 +227,8 @@ class Velocities(PaperReadings):
         ),
     )
 
-    def changed(self, claim, case, reading):
-        factor = {"shipped": 1.0, "useless": 1e2}.get(reading["sigma_velocity"])
+    def changed(self, claim, case, interpretation):
+        factor = {"shipped": 1.0, "useless": 1e2}.get(interpretation["sigma_velocity"])
         if factor is None:
             raise Unreadable("there is no such radar")
         radar = case.spec.radar.model_copy(update={"sigma_velocity_mps": factor * case.spec.radar.sigma_velocity_mps})
@@ -235,17 +244,17 @@ def ran():
 
 
 @pytest.mark.slow
-def test_readings_that_are_run(ran, tmp_path, monkeypatch):
+def test_interpretations_that_are_run(ran, tmp_path, monkeypatch):
     seen = []
     done = app.judged([ran], out=tmp_path, figures=False, progress=lambda *of: seen.append(of))
     (over,) = done.read[0].over
-    by_name = {one.reading["sigma_velocity"]: one for one in over.under}
+    by_name = {one.interpretation["sigma_velocity"]: one for one in over.under}
     assert by_name["shipped"].outcome.kind == rule.CONFIRMED
     assert by_name["useless"].outcome.kind == rule.REFUTED
     assert by_name["none"].outcome is None
     assert by_name["none"].why == "there is no such radar"
     assert over.outcome.words == "depends on sigma_velocity"
-    assert (over.outcome.holds_in, over.outcome.readings) == (1, 2)
+    assert (over.outcome.holds_in, over.outcome.interpretations) == (1, 2)
     assert "not possible" in over.sentence()
     _part, judged = by_name["shipped"].parts[0]
     assert judged.lo < judged.measured < judged.hi
@@ -267,7 +276,7 @@ def test_readings_that_are_run(ran, tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_a_run_is_judged_and_let_go(ran, tmp_path, monkeypatch):
-    """Sums and tables of one run at a time are held, however many readings there are."""
+    """Sums and tables of one run at a time are held, however many interpretations there are."""
     seen, alive = [], []
     run = Plan._run
 
@@ -278,7 +287,7 @@ def test_a_run_is_judged_and_let_go(ran, tmp_path, monkeypatch):
         return found
 
     monkeypatch.setattr(Plan, "_run", counted)
-    wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, readings=Margins()))
+    wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, interpretations=Margins()))
     app.judged([wanted], out=tmp_path, realisations=4000, decide=True, figures=False)
     assert len(alive) > 2
     assert max(alive) == 0
@@ -286,7 +295,7 @@ def test_a_run_is_judged_and_let_go(ran, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_reading_as_shipped_measures_what_a_run_of_the_config_does(ran, tmp_path):
+def test_a_interpretation_as_shipped_measures_what_a_run_of_the_config_does(ran, tmp_path):
     import radarsim
 
     result = radarsim.run("range_doppler", realisations=2000, out=tmp_path, figures=False)
@@ -296,9 +305,10 @@ def test_a_reading_as_shipped_measures_what_a_run_of_the_config_does(ran, tmp_pa
         assert (judged.measured, judged.exact) == tuple(stored.loc["P1.8", part.what, f"rls{part.cases[0]}"])
 
 
-def test_exact_values_decide_under_a_reading_as_in_a_run(ran, tmp_path):
-    """Of 60 realisations: what a run knows exactly is undecided neither in the shipped reading nor in a changed one."""
-    wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, readings=Near()))
+def test_exact_values_decide_under_a_interpretation_as_in_a_run(ran, tmp_path):
+    """Of 60 realisations: what a run knows exactly is undecided neither in the shipped interpretation nor in a changed
+    one."""
+    wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, interpretations=Near()))
     (over,) = app.judged([wanted], out=tmp_path, realisations=60, figures=False).read[0].over
     assert all(judged.known and judged.n == 60 for one in over.under for _, judged in one.parts)
     assert over.outcome.kind != rule.UNDECIDED
@@ -317,8 +327,8 @@ class Near(Velocities):
         ),
     )
 
-    def changed(self, claim, case, reading):
-        factor = {"shipped": 1.0, "worse": 1.1}[reading["sigma_velocity"]]
+    def changed(self, claim, case, interpretation):
+        factor = {"shipped": 1.0, "worse": 1.1}[interpretation["sigma_velocity"]]
         radar = case.spec.radar.model_copy(update={"sigma_velocity_mps": factor * case.spec.radar.sigma_velocity_mps})
         return dataclasses.replace(case, spec=case.spec.model_copy(update={"radar": radar}))
 
@@ -326,17 +336,17 @@ class Near(Velocities):
 class Margins(Near):
     """The same of a study that knows nothing exactly."""
 
-    def evidence(self, claim, reading, seen, of):
+    def evidence(self, claim, interpretation, seen, of):
         sampled = {
             name: made.assign(**{key: math.nan for key in made if key.startswith("exact")})
             for name, made in seen.tables.items()
         }
-        return super().evidence(claim, reading, dataclasses.replace(seen, tables=sampled), of)
+        return super().evidence(claim, interpretation, dataclasses.replace(seen, tables=sampled), of)
 
 
 @pytest.mark.slow
 def test_what_is_undecided_runs_on_until_it_is_decided(ran, tmp_path):
-    wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, readings=Margins()))
+    wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, interpretations=Margins()))
     few = app.judged([wanted], out=tmp_path, figures=False)
     before = few.read[0].over[0]
     assert before.outcome.kind == rule.UNDECIDED
@@ -344,24 +354,24 @@ def test_what_is_undecided_runs_on_until_it_is_decided(ran, tmp_path):
     assert not few.left
     little = app.judged([wanted], out=tmp_path, realisations=60, decide=True, figures=False)
     assert little.read[0].over[0].outcome == before.outcome  # the most is what it began with
-    assert f"P1.8 not yet decided under {len(before.undecided)} readings at 60 realisations; " in little.left[0]
+    assert f"P1.8 not yet decided under {len(before.undecided)} interpretations at 60 realisations; " in little.left[0]
     decided = app.judged([wanted], out=tmp_path, realisations=64_000, decide=True, figures=False)
     (over,) = decided.read[0].over
     assert over.outcome.kind != rule.UNDECIDED
     assert not decided.left
     counts = {judged.n for one in over.under for _, judged in one.parts}
     assert counts - {60} <= {2000 * 2**m for m in range(6)}
-    open_ = {one.reading for one in before.undecided}
+    open_ = {one.interpretation for one in before.undecided}
     for one in over.under:  # those that were decided are left as they were
-        assert ({judged.n for _, judged in one.parts} == {60}) == (one.reading not in open_)
+        assert ({judged.n for _, judged in one.parts} == {60}) == (one.interpretation not in open_)
     assert {int(row["n"]) for row in table(tmp_path)} == counts
     assert {row["over"] for row in table(tmp_path)} == {over.outcome.kind}
 
 
 @pytest.mark.slow
 def test_what_is_left_undecided_is_exit_code_3(tmp_path):
-    """Eight bursts a reading leave P4.4 open."""
-    words = ("readings", "P4.4", "-n", "8", "--decide", "--no-figures")
+    """Eight bursts an interpretation leave P4.4 open."""
+    words = ("interpretations", "P4.4", "-n", "8", "--decide", "--no-figures")
     done = command(*words, "--out", tmp_path, code=3)
     assert "P4.4 not yet decided under " in done.stderr
 
@@ -369,3 +379,17 @@ def test_what_is_left_undecided_is_exit_code_3(tmp_path):
 def test_a_time_limit_stops_cleanly(ran, tmp_path):
     with pytest.raises(TargetUnmet, match="the same command continues"):
         app.judged([ran], out=tmp_path, options=RunOptions(stop=lambda: "time limit reached"), figures=False)
+
+
+def test_names_of_earlier_versions_still_work(tmp_path):
+    """The command, the Python function, and the files under results with their columns."""
+    ran = command("readings", "P1.3", "--no-figures", "--out", tmp_path)
+    assert ran.stderr == "note: `radarsim readings` is called `radarsim interpretations`\n"
+    stored = stored_interpretations(tmp_path), stored_classes(tmp_path)
+    (tmp_path / "interpretations").rename(tmp_path / "readings")
+    file = tmp_path / "readings/interpretations.csv"
+    file.write_text(file.read_text().replace("claim,part,interpretation,", "claim,part,reading,"))
+    file.rename(tmp_path / "readings/readings.csv")
+    assert (stored_interpretations(tmp_path), stored_classes(tmp_path)) == stored
+    with pytest.warns(DeprecationWarning, match="radarsim.interpretations"):
+        assert radarsim.readings is radarsim.interpretations

@@ -1,7 +1,7 @@
-"""What P4 leaves open, and its claims under each reading.
+"""What P4 leaves open, and its claims under each interpretation.
 
 Spreads and windows are exact. Locks and accuracies are small runs of the shipped configs whose noise, forecast and
-windows are those of the reading."""
+windows are those of the interpretation."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -16,14 +16,14 @@ from radarsim.bursts import burst
 from radarsim.config.experiment import Case
 from radarsim.report.claims import Evidence, certain
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
-from radarsim.report.claims.over import PaperReadings, Reading, Seen, Unreadable, choices_in
+from radarsim.report.claims.over import Interpretation, PaperInterpretations, Seen, Unreadable, choices_in
 from radarsim.report.claims.rule import AGAINST
 from radarsim.report.statistics import Estimate
 from radarsim.studies.discriminator import burst_versions, measures
 from radarsim.studies.discriminator.burst_versions import BURST, LEAST_RATIO, PRINTED_PRIOR, Version
 from radarsim.studies.discriminator.measures import COMPONENTS, COMPUTED, PRINTED
 
-SHIPPED_NOISE = measures.READINGS[COMPUTED][0]
+SHIPPED_NOISE = measures.INTERPRETATIONS[COMPUTED][0]
 OTHER_THRESHOLD = {0.5: 1.0, 1.0: 0.5}
 ITERATIONS = "12"  # the number of the part that counts windows
 EXACT = ("P4.1", "P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13", "P4.20")
@@ -31,43 +31,45 @@ WINDOWS = ("P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13", "P4.20")
 NO_ROOT = "(15) has no root: with the phase in it, its left side exceeds c at every length"
 
 
-class Readings(PaperReadings):
-    """P4's readings."""
+class Interpretations(PaperInterpretations):
+    """P4's interpretations."""
 
     paper = "P4"
-    choices = choices_in(Path(__file__).with_name("readings.yaml"))
+    choices = choices_in(Path(__file__).with_name("interpretations.yaml"))
     realisations = 4000  # with 500 the interval of P4.6 reaches over its limit, though not over the margin
     most = 1_024_000  # P4.4: σ of the locked bursts is up to 0.6 % off, of the 1 % that it may be
 
-    def exact(self, claim: Claim, reading: Reading) -> bool:
+    def exact(self, claim: Claim, interpretation: Interpretation) -> bool:
         return claim.id in EXACT
 
-    def of_claim(self, claim: str) -> list[Reading]:
+    def of_claim(self, claim: str) -> list[Interpretation]:
         """All combinations of E and U for exact claims; for claims that need runs, of the choices that bear on them."""
         own = [choice for choice in self.choices if choice.bears_on(claim)]
         singly = [
-            self.reading(**{choice.key: one.name})
+            self.interpretation(**{choice.key: one.name})
             for choice in own
             for one in choice.alternatives
             if one.kind == AGAINST
         ]
         return list(dict.fromkeys([*self.combined(own), *singly]))
 
-    def parts(self, claim: Claim, reading: Reading) -> Sequence[Part]:
-        """Of parts that stand there in both shipped readings, those of one: the reading takes its place."""
+    def parts(self, claim: Claim, interpretation: Interpretation) -> Sequence[Part]:
+        """Of parts that stand there in both shipped interpretations, those of one: the interpretation takes its
+        place."""
         asserted = [part for part in claim.parts if part.asserted]
         both = {COMPUTED, PRINTED} <= {part.cases[0] for part in asserted}
-        return [_counted(part, reading) for part in asserted if not both or part.cases[0] != PRINTED]
+        return [_counted(part, interpretation) for part in asserted if not both or part.cases[0] != PRINTED]
 
-    def changed(self, claim: Claim, case: Case, reading: Reading) -> Case | None:
-        """The case with the noise and forecast of a reading, and its windows in place of those of its estimators. One
-        of the two shipped readings takes the place of any; of the sweeps, those that a part asks for."""
+    def changed(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
+        """The case with the noise and forecast of an interpretation, and its windows in place of those of its
+        estimators. One of the two shipped interpretations takes the place of any; of the sweeps, those that a part asks
+        for."""
         keys = {key for part in claim.parts for key in part.cases if isinstance(key, tuple)}
         noise = case.spec.burst.noise_variance
         wanted = any(_is_swept(case, *key) for key in keys) if case.swept else noise == SHIPPED_NOISE
         if not wanted:
             return None
-        own = version(reading)
+        own = version(interpretation)
         given = {"sigma": own.sigma, "spread_over_potential": None if own.sigma else BURST.multiples}
         changes = {
             "burst": case.spec.burst.model_copy(update={"noise_variance": noise * own.noise_variance / SHIPPED_NOISE}),
@@ -76,10 +78,10 @@ class Readings(PaperReadings):
         }
         return replace(case, spec=case.spec.model_copy(update=changes))
 
-    def evidence(self, claim: Claim, reading: Reading, seen: Seen | None, of: PaperClaims) -> Evidence:
+    def evidence(self, claim: Claim, interpretation: Interpretation, seen: Seen | None, of: PaperClaims) -> Evidence:
         if seen is None:
-            return ExactEvidence(reading)
-        return super().evidence(claim, reading, seen, of)
+            return ExactEvidence(interpretation)
+        return super().evidence(claim, interpretation, seen, of)
 
 
 def _is_swept(case: Case, key: str, value: float) -> bool:
@@ -88,10 +90,10 @@ def _is_swept(case: Case, key: str, value: float) -> bool:
 
 
 def _changed(estimator: Any, own: Version) -> Any:
-    """An estimator as a reading has it: its threshold, and the windows that no key of a config asks for.
+    """An estimator as an interpretation has it: its threshold, and the windows that no key of a config asks for.
 
     Those of which no claim speaks are cut to one window: they are not looked at."""
-    kind = measures.kind_of(estimator, measures.READINGS[COMPUTED][1])
+    kind = measures.kind_of(estimator, measures.INTERPRETATIONS[COMPUTED][1])
     if kind == "other":
         return estimator.model_copy(update={"first_windows": 1, "phases": 0, "steps": 5, "density": 1})
     if estimator.schedule != "designed":
@@ -103,25 +105,25 @@ def _changed(estimator: Any, own: Version) -> Any:
     return estimator.model_copy(update=changes)
 
 
-def _counted(part: Part, reading: Reading) -> Part:
-    """A part that counts windows, of all of them where a reading counts the first too."""
-    if part.number != ITERATIONS or reading["counted"] != "in all":
+def _counted(part: Part, interpretation: Interpretation) -> Part:
+    """A part that counts windows, of all of them where an interpretation counts the first too."""
+    if part.number != ITERATIONS or interpretation["counted"] != "in all":
         return part
     return replace(part, measure=lambda seen: certain(len(seen.windows(COMPUTED))))
 
 
-def version(reading: Reading) -> Version:
-    """What the readings' names mean for (14) to (16)."""
+def version(interpretation: Interpretation) -> Version:
+    """What the interpretations' names mean for (14) to (16)."""
     return Version(
-        float(reading["noise_variance"]),
-        float(reading["threshold"]),
-        float(reading["factor"]),
-        PRINTED_PRIOR if reading["forecast"] == "numbers" else None,
-        cast(burst_versions.Phase, reading["first_phase"]),
-        cast(burst_versions.Rounding, reading["rounding"]),
-        cast(burst_versions.Curvature, reading["curvature"]),
-        int(reading["pulses"]),
-        cast(burst_versions.Sum, reading["sum"]),
+        float(interpretation["noise_variance"]),
+        float(interpretation["threshold"]),
+        float(interpretation["factor"]),
+        PRINTED_PRIOR if interpretation["forecast"] == "numbers" else None,
+        cast(burst_versions.Phase, interpretation["first_phase"]),
+        cast(burst_versions.Rounding, interpretation["rounding"]),
+        cast(burst_versions.Curvature, interpretation["curvature"]),
+        int(interpretation["pulses"]),
+        cast(burst_versions.Sum, interpretation["sum"]),
     )
 
 
@@ -130,8 +132,8 @@ SCALES = (10.0, 1.0, 0.1, 0.01, 0.001)  # of the forecast, in P4.8
 
 @cache
 def _designed() -> Mapping[Version, tuple[np.ndarray, list[int] | None]]:
-    """Spreads and windows of every version that a declared reading asks for, all at once."""
-    of = Readings()
+    """Spreads and windows of every version that a declared interpretation asks for, all at once."""
+    of = Interpretations()
     plain = {version(one) for claim in ("P4.1", *WINDOWS) for one in of.of_claim(claim)}
     found = burst_versions.designed(BURST, every := list(plain))
     return {one: (spreads, own) for one, spreads, own in zip(every, found.spreads, found.windows, strict=True)}
@@ -140,7 +142,7 @@ def _designed() -> Mapping[Version, tuple[np.ndarray, list[int] | None]]:
 @cache
 def _scaled() -> Mapping[tuple[Version, float], int | None]:
     """The first windows with the forecast's spreads times each of SCALES."""
-    plain = {version(one) for one in Readings().of_claim("P4.8")}
+    plain = {version(one) for one in Interpretations().of_claim("P4.8")}
     every = [(one, scale) for one in plain for scale in SCALES]
     asked = []
     for one, scale in every:
@@ -160,13 +162,13 @@ def windows(own: Version) -> list[int]:
 
 
 class ExactEvidence(measures.Evidence):
-    """P4's spreads and windows under a reading, whatever reading of the shipped ones a part asks for."""
+    """P4's spreads and windows under an interpretation, whatever interpretation of the shipped ones a part asks for."""
 
-    def __init__(self, reading: Reading):
+    def __init__(self, interpretation: Interpretation):
         super().__init__((), {}, {})
-        self._version = version(reading)
+        self._version = version(interpretation)
         c = self._version.threshold
-        self._lobe = c if reading["lobe"] == "one c" else OTHER_THRESHOLD[c]
+        self._lobe = c if interpretation["lobe"] == "one c" else OTHER_THRESHOLD[c]
 
     def windows(self, key: Any, kind: str = "sequence") -> np.ndarray:
         """Window lengths in s; of a forecast with the scale that a key of a sweep names, the first alone."""

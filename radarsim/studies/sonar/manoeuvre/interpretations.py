@@ -1,4 +1,4 @@
-"""What P3 leaves open about manoeuvres, and its claims on them under each reading.
+"""What P3 leaves open about manoeuvres, and its claims on them under each interpretation.
 
 Times to see a manoeuvre are runs of the shipped config. Switching the degree of a window of a few plots is exact, and
 so is a single test. What P3 says of smoothing is formulas, which leave nothing open but what a high accuracy is."""
@@ -13,7 +13,7 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.report.claims import Evidence, certain
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
-from radarsim.report.claims.over import PaperReadings, Reading, Seen, choices_in, with_arguments
+from radarsim.report.claims.over import Interpretation, PaperInterpretations, Seen, choices_in, with_arguments
 from radarsim.report.statistics import Estimate
 from radarsim.studies.sonar.manoeuvre import exact, measures
 from radarsim.studies.sonar.manoeuvre.exact import switched_window
@@ -22,26 +22,26 @@ from radarsim.studies.sonar.measures import Evidence as SonarEvidence
 ENOUGH, DETECTS, SINGLE, SWITCHES = "P3.3", "P3.8", "P3.9", "P3.10"
 
 
-class Readings(PaperReadings):
-    """P3's readings."""
+class Interpretations(PaperInterpretations):
+    """P3's interpretations."""
 
     paper = "P3"
-    choices = choices_in(Path(__file__).with_name("readings.yaml"))
+    choices = choices_in(Path(__file__).with_name("interpretations.yaml"))
     realisations = 5000
 
-    def exact(self, claim: Claim, reading: Reading) -> bool:
-        return claim.id in (ENOUGH, SINGLE) or "plots" in self.sets(reading)
+    def exact(self, claim: Claim, interpretation: Interpretation) -> bool:
+        return claim.id in (ENOUGH, SINGLE) or "plots" in self.sets(interpretation)
 
-    def of_claim(self, claim: str) -> list[Reading]:
+    def of_claim(self, claim: str) -> list[Interpretation]:
         """All combinations of the choices that bear on a claim."""
         return list(self.combined([choice for choice in self.choices if choice.bears_on(claim)]))
 
-    def parts(self, claim: Claim, reading: Reading) -> Sequence[Part]:
+    def parts(self, claim: Claim, interpretation: Interpretation) -> Sequence[Part]:
         if claim.id == ENOUGH:
-            plots, criterion = _enough(reading["high_accuracy"])
+            plots, criterion = _enough(interpretation["high_accuracy"])
             return [replace(part, what=criterion, measure=lambda seen: certain(plots)) for part in claim.parts]
         if claim.id == SINGLE:
-            strength = self.sets(reading)["shift"]
+            strength = self.sets(interpretation)["shift"]
             probability = float(exact.detection(1.0, strength))
             what = f"alarms a test at k = 1, five plots, acceleration of {strength:g} σ_a"
             if strength == 1:
@@ -49,23 +49,23 @@ class Readings(PaperReadings):
             return [
                 replace(part, what=what, measure=lambda seen: certain(probability), exact=None) for part in claim.parts
             ]
-        if claim.id == SWITCHES and "plots" in self.sets(reading):
-            return [_switched(part, reading["memory"], **self.sets(reading)) for part in claim.parts]
+        if claim.id == SWITCHES and "plots" in self.sets(interpretation):
+            return [_switched(part, interpretation["memory"], **self.sets(interpretation)) for part in claim.parts]
         asserted = [part for part in claim.parts if part.asserted]
         return (
-            [_delay(part, reading["seen"], self.sets(reading)["rate"]) for part in asserted]
+            [_delay(part, interpretation["seen"], self.sets(interpretation)["rate"]) for part in asserted]
             if claim.id == DETECTS
             else asserted
         )
 
-    def changed(self, claim: Claim, case: Case, reading: Reading) -> Case | None:
-        """The weakest and the strongest manoeuvre of the sweep, tested and followed as a reading says."""
+    def changed(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
+        """The weakest and the strongest manoeuvre of the sweep, tested and followed as an interpretation says."""
         target = case.spec.target
         if abs(target.acceleration_mps2) not in STRENGTHS:
             return None
-        taken = self.sets(reading)
+        taken = self.sets(interpretation)
         changes: dict[str, Any] = {"target": target.model_copy(update={"end_s": target.start_s + taken["lasts_s"]})}
-        if reading["tests"] == "batches":
+        if interpretation["tests"] == "batches":
             changes["detectors"] = tuple(
                 one.model_copy(update={"test_every": one.plots}) if one.test_every == 1 else one
                 for one in case.spec.detectors
@@ -73,10 +73,10 @@ class Readings(PaperReadings):
         changes["filters"] = tuple(_with_rate(one, taken["switching_rate"]) for one in case.spec.filters)
         return replace(case, spec=case.spec.model_copy(update=changes))
 
-    def evidence(self, claim: Claim, reading: Reading, seen: Seen | None, of: PaperClaims) -> Evidence:
+    def evidence(self, claim: Claim, interpretation: Interpretation, seen: Seen | None, of: PaperClaims) -> Evidence:
         if seen is None:
             return SonarEvidence((), {}, {})
-        return super().evidence(claim, reading, seen, of)
+        return super().evidence(claim, interpretation, seen, of)
 
 
 def _enough(criterion: str) -> tuple[int, str]:
@@ -100,14 +100,14 @@ STRENGTHS = (0.1, 0.8)  # m/s²: the weakest and the strongest manoeuvre of the 
 
 
 def _with_rate(one: Any, rate: float) -> Any:
-    """An adaptive filter with the reading's rate of false alarms."""
+    """An adaptive filter with the interpretation's rate of false alarms."""
     if one.detector is None or rate == measures.USUAL or one.detector.false_alarm_probability is None:
         return one
     return one.model_copy(update={"detector": one.detector.model_copy(update={"false_alarm_probability": rate})})
 
 
 def _delay(part: Part, until: str, rate: float) -> Part:
-    """A part on times to see a manoeuvre, at the reading's rate and of what it wants to be seen."""
+    """A part on times to see a manoeuvre, at the interpretation's rate and of what it wants to be seen."""
     at = "k = 1" if rate == measures.AT_ONE else f"{rate:g} false alarms a test"
     seen = f"mean time to detect {'the beginning' if until == 'beginning' else until} of the {part.cases[0]} at {at}"
     if part.statement == "time":

@@ -1,4 +1,4 @@
-"""What P1 leaves open, and its claims under each reading: all by the exact recursion, nothing is run."""
+"""What P1 leaves open, and its claims under each interpretation: all by the exact recursion, nothing is run."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,7 +11,7 @@ import numpy as np
 
 from radarsim.report.claims import Series, same
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
-from radarsim.report.claims.over import PaperReadings, Reading, Seen, choices_in, of_other_cases
+from radarsim.report.claims.over import Interpretation, PaperInterpretations, Seen, choices_in, of_other_cases
 from radarsim.report.statistics import Estimate
 from radarsim.studies.range_doppler import filter_versions, measures
 from radarsim.studies.range_doppler.filter_versions import Form, Start, Version
@@ -30,34 +30,36 @@ WAVELENGTH_M = {1: 1.8, 2: 0.15, 3: 0.15, 4: 0.03, 5: 0.03}
 REPETITION_HZ = 1e3
 
 
-class Readings(PaperReadings):
-    """P1's readings."""
+class Interpretations(PaperInterpretations):
+    """P1's interpretations."""
 
     paper = "P1"
-    choices = choices_in(Path(__file__).with_name("readings.yaml"))
+    choices = choices_in(Path(__file__).with_name("interpretations.yaml"))
 
-    def exact(self, claim: Claim, reading: Reading) -> bool:
+    def exact(self, claim: Claim, interpretation: Interpretation) -> bool:
         return True
 
-    def parts(self, claim: Claim, reading: Reading) -> Sequence[Part]:
-        """Those of the radars that the reading means; what falls to a steady value may rise by its tolerance."""
-        if claim.id == FIRST_STEPS and reading["first_steps_of"] == EACH:
+    def parts(self, claim: Claim, interpretation: Interpretation) -> Sequence[Part]:
+        """Those of the radars that the interpretation means; what falls to a steady value may rise by its tolerance."""
+        if claim.id == FIRST_STEPS and interpretation["first_steps_of"] == EACH:
             return [of_other_cases(part, radar) for radar in RADARS for part in claim.parts]
-        if claim.id == ENDS and reading["end_of"] == LOWER:
+        if claim.id == ENDS and interpretation["end_of"] == LOWER:
             return [
                 replace(claim.parts[0], cases=(2, 3), what="the lower of the final range gains", measure=_lower_end)
             ]
         if claim.id not in FALLING:
             return claim.parts
-        wide = same(0, 100 * self.sets(reading)["within"])
-        meant = [part for part in claim.parts if reading["curves_of"] == EACH or part.cases == (2,)]
+        wide = same(0, 100 * self.sets(interpretation)["within"])
+        meant = [part for part in claim.parts if interpretation["curves_of"] == EACH or part.cases == (2,)]
         return [replace(part, expected=wide) for part in meant]
 
-    def evidence(self, claim: Claim, reading: Reading, seen: Seen | None, of: PaperClaims) -> "ExactEvidence":
-        return _evidence(reading)
+    def evidence(
+        self, claim: Claim, interpretation: Interpretation, seen: Seen | None, of: PaperClaims
+    ) -> "ExactEvidence":
+        return _evidence(interpretation)
 
     def versions(self) -> list[Version]:
-        """Every version of the filters that a declared reading asks for, with the D_M of the shipped sweep."""
+        """Every version of the filters that a declared interpretation asks for, with the D_M of the shipped sweep."""
         found: dict[Version, None] = {}
         for one in self.declared():
             form, start = cast(Form, one["process_noise"]), cast(Start, one["start"])
@@ -72,15 +74,15 @@ def _lower_end(seen: measures.Evidence) -> Estimate:
 
 
 @cache
-def _evidence(reading: Reading) -> "ExactEvidence":
-    """That of a reading, which many claims share."""
-    return ExactEvidence(reading)
+def _evidence(interpretation: Interpretation) -> "ExactEvidence":
+    """That of an interpretation, which many claims share."""
+    return ExactEvidence(interpretation)
 
 
 @cache
 def _table() -> Mapping[int, Mapping[Version, "_Sigmas"]]:
     """σ over LONG scans by radar and version, all by one recursion a radar."""
-    versions = Readings().versions()
+    versions = Interpretations().versions()
 
     def of_radar(number: int) -> dict[Version, _Sigmas]:
         found = filter_versions.both(RADARS[number], versions, LONG)
@@ -111,23 +113,23 @@ def _case(number: int, variance: float) -> SimpleNamespace:
 
 
 class ExactEvidence(measures.Evidence):
-    """P1's curves and gains by the exact recursion, under a reading; series end at limit_s."""
+    """P1's curves and gains by the exact recursion, under an interpretation; series end at limit_s."""
 
-    def __init__(self, reading: Reading):
+    def __init__(self, interpretation: Interpretation):
         super().__init__((), {}, {})
-        self._reading, self._sets = reading, Readings().sets(reading)
+        self._interpretation, self._sets = interpretation, Interpretations().sets(interpretation)
         self._limit_s: float = self._sets.get("limit_s", np.inf)
         self.extremum = self._sets["extremum"]
-        shown = reading["shown_variance"]
-        self._own = float(shown if shown != SHIPPED else reading["manoeuvre_variance"])
+        shown = interpretation["shown_variance"]
+        self._own = float(shown if shown != SHIPPED else interpretation["manoeuvre_variance"])
         self._curves: dict[tuple[Any, ...], Series] = {}
 
     def case(self, key: Any) -> Any:
-        """key: the number of a radar (at the reading's D_M), or (number, D_M)."""
+        """key: the number of a radar (at the interpretation's D_M), or (number, D_M)."""
         return _case(*key) if isinstance(key, tuple) else _case(key, self._own)
 
     def marked(self, series: Series, key: Any) -> Series:
-        """As it is: where a run ends is a choice of the reading."""
+        """As it is: where a run ends is a choice of the interpretation."""
         return series
 
     def exactly(self) -> "ExactEvidence":
@@ -170,14 +172,14 @@ class ExactEvidence(measures.Evidence):
 
     @property
     def _start(self) -> Start:
-        return cast(Start, self._reading["start"])
+        return cast(Start, self._interpretation["start"])
 
     def _sigma(self, key: Any, component: str) -> tuple[np.ndarray, np.ndarray]:
         """σ (LONG,) of the two filters."""
         radar = self.case(key)
-        version = cast(Form, self._reading["process_noise"]), radar.variance, self._start
+        version = cast(Form, self._interpretation["process_noise"]), radar.variance, self._start
         of = _table()[radar.number][version]
-        alone, both = of.believed if self._reading["truth"] == "as believed" else of.true
+        alone, both = of.believed if self._interpretation["truth"] == "as believed" else of.true
         c = tuple(measures.COMPONENTS).index(component)
         return alone[:, c], both[:, c]
 
