@@ -5,7 +5,6 @@ import pytest
 
 import radarsim
 from radarsim.report.claims import CONFIRMED, REFUTED, page
-from radarsim.report.claims.over import Over, joint, under
 from radarsim.studies import registry
 from radarsim.studies.multimodel import cost, measures
 from radarsim.studies.multimodel.interpretations import Interpretations
@@ -64,17 +63,3 @@ def test_what_the_paper_reports_of_others_is_judged_and_not_counted(transition):
     assert page.extension(own)
     assert "P2.12" in [claim for claim in CLAIMS if Interpretations().of_claim(claim)]
     assert page.counts(own) == ({}, 1)
-
-
-def test_what_the_paper_reports_of_others_is_no_number_of_its_own(transition):
-    of, seen = Interpretations(), transition
-    evidence = (
-        registry.study("multimodel")
-        .claims()
-        .evidence(
-            seen.cases, seen.tables, {one.name: {"filters": set(range(len(one.spec.filters)))} for one in seen.cases}
-        )
-    )
-    over = [Over(of, CLAIMS["P2.12"], (under(of, CLAIMS["P2.12"], of.interpretation(), evidence, 64),))]
-    assert over[0].outcome.kind == REFUTED
-    assert not joint(of, over).numbers

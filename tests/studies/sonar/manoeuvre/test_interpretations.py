@@ -88,13 +88,3 @@ def test_more_plots_can_be_worth_while_under_a_interpretation(tmp_path, monkeypa
     assert all(one.parts[4][0].unit == "%" for one in (shipped, other))
     assert -100 < weak[1].measured < -10 < weak[0].measured < 100
     assert other.outcome.kind == "refuted"
-
-
-def test_the_joint_search_names_numbers_as_shipped_in_the_order_of_the_claims(tmp_path):
-    from radarsim.app import interpretations
-    from radarsim.report.claims.over import joint
-
-    done = interpretations.judged(interpretations.asked(["P3.3", "P3.9"]), out=tmp_path, figures=False)
-    numbers = joint(OF, done.read[0].over).numbers.values()
-    shipped = [part.what for claim in ("P3.3", "P3.9") for part in CLAIMS[claim].parts]
-    assert [number.what for number in numbers] == shipped
