@@ -85,7 +85,7 @@ interpretations-pages: $(VENV)/installed
 	mkdir -p results/interpretations
 	for p in P1 P2 P3 P4; do $(RADARSIM) interpretations $$p $(INTERPRETATIONS) --out results --markdown > results/interpretations/$$p.new; \
 	code=$$?; test $$code -eq 0 -o $$code -eq 3 && mv results/interpretations/$$p.new results/interpretations/$$p.md || exit 1; done
-	cp results/interpretations/classes.csv radarsim/app/classes.csv
+	cp results/interpretations/classes.csv radarsim/papers/classes.csv
 
 # What each claim came to, from what reproduce-figures left: the data of the page of claims that `make docs` builds.
 claims-page: $(VENV)/installed

@@ -27,7 +27,8 @@ ROOMS = {
     "errors": (),
     "failures": ("errors",),
     "language": ("errors",),
-    "config": ("errors", "constants", "private_files"),
+    "config": ("errors", "constants", "extensions", "private_files"),
+    "extensions": ("app", "config", "engine", "report"),  # for a type checker alone
     "threads": (),
     "private_files": (),
     "module_sources": ("errors",),
@@ -36,22 +37,13 @@ ROOMS = {
     "constants": (),
     "physics": ("constants",),
     "bursts": ("constants", "kernels", "physics"),
-    "report": ("errors", "failures", "config", "language", "private_files", *DATA),
+    "report": ("errors", "extensions", "failures", "config", "language", "private_files", *DATA),
     "studies.noise": (*CASE, "kernels.random"),
     "studies.radial": ("errors", "constants", "physics"),
     "studies.floor": (*DATA, "report", "studies.interface"),
     "studies.interface": ("errors", *CASE, *DATA, "report", "studies.floor"),
-    "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "report.quantities", "studies.interface"),
-    "studies.onefile": (
-        "errors",
-        "failures",
-        "language",
-        *CASE,
-        *DATA,
-        "report",
-        "studies.interface",
-        "studies.judged",
-    ),
+    "studies.folder": (*CASE, *DATA, "report.drawing", "report.quantities", "studies.interface"),
+    "studies.onefile": ("errors", "failures", "language", *CASE, *DATA, "report", "studies.interface"),
     "studies.linear": (
         *("errors", "kernels", "physics", *CASE, *DATA),
         *("report.quantities", "studies.floor", "studies.interface", "studies.noise", "studies.onefile"),
@@ -61,7 +53,6 @@ ROOMS = {
         *("errors", "failures", *CASE, *DATA, "kernels", "report"),
         *("studies.interface", "studies.noise", "studies.onefile"),
     ),
-    "studies.judged": ("errors", "config", *DATA, "report"),  # claims and interpretations of studies in one file
     "studies.code": (
         *("errors", "failures", "language", "config", "studies.interface", "studies.outside"),
         *("module_sources", "studies.user_code_recording", "studies.user_code_sources"),
@@ -69,21 +60,48 @@ ROOMS = {
     "studies.user_code_recording": ("module_sources", "studies.user_code_sources"),
     "studies.user_code_sources": ("errors", "failures", "module_sources", "config.experiment"),
     "studies.registry": (
-        *("errors", "failures", "config", "report.quantities"),
+        *("errors", "extensions", "failures", "config", "report.quantities"),
         *("studies.code", "studies.interface", "studies.outside"),
     ),
     "studies.sources": ("config", "module_sources", "studies.registry", "studies.user_code_sources"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry", "studies.sources"),
     "recorded": ("errors", "threads", "config", "language", "engine", "kernels", "physics", "report", "studies"),
     "app": (
-        *("errors", "threads", "private_files", "config", "language", "engine", "kernels", "physics", "report"),
-        *("studies", "recorded"),
+        *("errors", "extensions", "threads", "private_files", "config", "language", "engine", "kernels", "physics"),
+        *("report", "studies", "recorded"),
+    ),
+    "papers": (  # above all others: it adds itself by `extensions`, and none imports it
+        *(
+            "errors",
+            "extensions",
+            "failures",
+            "threads",
+            "bursts",
+            "config",
+            "language",
+            "engine",
+            "kernels",
+            "physics",
+        ),
+        *("report", "studies", "app", "cli"),
     ),
     "cli": (
-        *("errors", "config", "language", "engine", "kernels", "physics", "report", "studies", "recorded", "app"),
+        *(
+            "errors",
+            "extensions",
+            "config",
+            "language",
+            "engine",
+            "kernels",
+            "physics",
+            "report",
+            "studies",
+            "recorded",
+            "app",
+        ),
         *("__init__", "threads"),
     ),
-    "__init__": ("errors", "app"),
+    "__init__": ("errors", "app", "papers"),  # the names that users import
     "__main__": ("cli",),
 }
 
@@ -93,7 +111,7 @@ KEYS = ("errors", "constants", "config.document", "config.fields", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
 SHOWN = (*SUMS, "cost", "tables", "figures")
-READ = (*SHOWN, "words", "measures", "interpretations")
+READ = (*SHOWN, "words")
 ROLES = {
     "kernels": (("kernels", "bursts.kernels"), ("kernels",)),
     "config": (KEYS, ("config",)),
@@ -107,8 +125,7 @@ ROLES = {
     "tables": ((*GROUND, *DATA, "report"), SHOWN),
     "figures": ((*GROUND, *DATA, "report", "language"), (*SHOWN, "track")),  # of one realisation, followed as a record
     "words": ((*GROUND, *DATA, "report", "language"), READ),
-    "measures": ((*GROUND, *DATA, "report"), READ),
-    "interpretations": ((*GROUND, *DATA, "report"), READ),  # what the paper leaves open
+    "measures": ((*GROUND, *DATA, "report", "papers"), READ),  # of a package; those shipped lie in the papers
     "chart": ((*GROUND, *DATA, "report", "language"), READ),
     "track": ((*GROUND, *DATA, "studies.noise", "studies.interface"), (*SUMS, "track")),
     "__init__": (
@@ -119,7 +136,6 @@ ROLES = {
             "studies.folder",
             "studies.floor",
             "language",
-            "report.claims",
             "report.drawing",
             "report.quantities",
         ),
@@ -132,7 +148,7 @@ LIBRARIES = {  # library: the files and rooms that may import it
     "matplotlib": {"report/figures.py"},
     "dask": {"engine/cluster.py"},
     "distributed": {"engine/cluster.py"},
-    "click": {"cli"},
+    "click": {"cli", "papers/commands.py"},
     "rich": {"cli/console.py"},
     "jinja2": {"report/html.py"},
     "numba": {"kernels/compile.py", "kernels/lanes.py", "kernels/numba_internals.py", "kernels/numba_options.py"},
@@ -180,6 +196,10 @@ def under(module: str, homes) -> bool:
 def fault(importing: str, imported: str) -> str:
     """What is wrong with an import between modules of ours; nothing, if it is allowed."""
     here, there = place(importing), place(imported)
+    if there.room == "papers" and here.room not in ("papers", "__init__") and not importing.startswith("template."):
+        return "the core knows no papers"
+    if here.room == "papers" and there.room == "study":
+        return "" if paper_study(importing) == there.study else "a paper knows its own study alone"
     if here.room != "study":
         if there.room == "study":
             return "no shared room knows a study"
@@ -194,6 +214,11 @@ def fault(importing: str, imported: str) -> str:
     if there.variant and here.variant != there.variant and importing not in CHOOSE:
         return "a variant is known to itself and where it is chosen"
     return "" if there.role in own else f"a study's {here.role} stands on its {', '.join(own)}"
+
+
+def paper_study(module: str) -> str:
+    """The study whose claims a module of the papers has; empty for one that all papers share."""
+    return module.split(".")[1] if len(module.split(".")) > 2 or module.split(".")[-1] in STUDIES else ""
 
 
 CHOOSE = {"studies.sonar"}  # where the variants of a study are chosen
@@ -284,6 +309,10 @@ PLANTED = [
     ("kernels.linear", "radarsim.physics"),
     ("report.panels", "radarsim.studies.sonar.study"),
     ("recorded.follow", "radarsim.cli.console"),
+    ("app.result", "radarsim.papers.claims_table"),
+    ("studies.interface", "radarsim.papers.claim"),
+    ("papers.sonar.measures", "radarsim.studies.range_doppler.tables"),
+    ("papers.claim", "radarsim.studies.sonar.tables"),
     ("studies.range_doppler.kernels.missed", "radarsim.studies.range_doppler.filters"),
     ("kernels.traced", "radarsim.failures"),
     ("studies.range_doppler.config", "radarsim.studies.range_doppler.filters"),

@@ -10,9 +10,16 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from radarsim.app import interpretations, run, stored
+from radarsim.app import run
 from radarsim.errors import StoreError
-from radarsim.report.claims import NUMBERS, judge, page
+from radarsim.papers import list_claims
+from radarsim.papers.claim_rows import cell_number, group_by_claim, part_name, worst_part
+from radarsim.papers.claims_page import TITLE, claims_page
+from radarsim.papers.claims_table import NOT_RUN, NUMBER_COLUMNS, claim_rows, empty_row
+from radarsim.papers.open_papers import open_papers
+from radarsim.papers.stored_verdicts import known_classes
+from radarsim.papers.study_claims import paper_claims
+from radarsim.papers.verdict_classes import add_classes, rows_in_words
 
 FILE = Path(__file__).with_name("claims.csv")
 RESULTS = Path(__file__).parents[2] / "results"
@@ -30,24 +37,22 @@ def kept() -> list[dict]:
     with FILE.open(encoding="utf-8", newline="") as file:
         read = {row["claim"]: row for row in csv.DictReader(file)}
     found: dict[str, list[dict]] = {}
-    for of in run.papers():
+    for of in paper_claims():
         for claim in of.claims:
             if row := read.get(claim.id):
-                numbers = {name: float(row[name]) if row.get(name) else "" for name in NUMBERS}
-                one = judge.blank(claim, of.paper) | row | numbers
+                numbers = {name: float(row[name]) if row.get(name) else "" for name in NUMBER_COLUMNS}
+                one = empty_row(claim, of.paper) | row | numbers
                 one |= {"class": row["as_shipped"], "overall": row["as_shipped"]}
                 found.setdefault(claim.config, []).append(one)
-    classes = stored.classes_of(
-        [(paper.interpretations, paper.claims) for paper in interpretations.papers().values()], None
-    )
-    return page.with_classes(judge.listed(run.papers(), found), classes)
+    classes = known_classes([(paper.interpretations, paper.claims) for paper in open_papers().values()], None)
+    return add_classes(claim_rows(paper_claims(), found), classes)
 
 
 def rows(results: Path = RESULTS) -> tuple[list[dict], bool]:
     """Rows of all claims, and whether they are those of a full reproduction, with every part of each."""
     with suppress(StoreError):  # of another version, or damaged: no full reproduction
-        full = run.claims(out=results).rows
-        if all(row["class"] != judge.NOT_RUN for row in full):
+        full = list_claims.claims(out=results).rows
+        if all(row["class"] != NOT_RUN for row in full):
             return full, True
     return kept(), False
 
@@ -55,8 +60,8 @@ def rows(results: Path = RESULTS) -> tuple[list[dict], bool]:
 def markdown(results: Path = RESULTS) -> str:
     """The page without its title."""
     found, whole = rows(results)
-    found = page.in_words(found, (of.interpretations for of in interpretations.papers().values()))
-    text = page.page(found, {of.paper: of.page for of in run.papers()}, whole).removeprefix(page.TITLE).strip()
+    found = rows_in_words(found, (of.interpretations for of in open_papers().values()))
+    text = claims_page(found, {of.paper: of.page for of in paper_claims()}, whole).removeprefix(TITLE).strip()
     return text.replace("\n\n## ", f"\n\n{PICTURE}\n\n## ", 1)
 
 
@@ -72,10 +77,10 @@ def main(results: str) -> None:
     if not whole:
         sys.exit(f"{results}: holds no full reproduction of this version; `make reproduce-figures` makes it")
     lines = []
-    for parts in page.grouped(found):
-        row = dict(page.worst(parts) or parts[0])
-        row |= {name: parts[0][name] for name in ("needed", "as_shipped", "why")} | {"what": page.named(row, parts)}
-        numbers = {name: page.number(row[name]) for name in MEASURED}
+    for parts in group_by_claim(found):
+        row = dict(worst_part(parts) or parts[0])
+        row |= {name: parts[0][name] for name in ("needed", "as_shipped", "why")} | {"what": part_name(row, parts)}
+        numbers = {name: cell_number(row[name]) for name in MEASURED}
         row |= {name: "" if value is None else f"{value:.9g}" for name, value in numbers.items()}
         lines.append({name: row[name] for name in COLUMNS})
     text = io.StringIO(newline="")

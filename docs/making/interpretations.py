@@ -5,8 +5,10 @@ results/interpretations."""
 
 from pathlib import Path
 
-from radarsim.app import interpretations, stored
-from radarsim.report.claims import interpretations_page, page
+from radarsim.papers.interpretations_page import markdown_table, open_choices
+from radarsim.papers.open_papers import open_papers
+from radarsim.papers.stored_verdicts import known_classes
+from radarsim.papers.verdict_classes import class_words
 
 PAPERS = ("P1", "P2", "P3", "P4")
 RESULTS = Path(__file__).parents[2] / "results"
@@ -24,19 +26,19 @@ def markdown(paper: str, results: Path = RESULTS) -> str:
 
 def shipped(paper: str) -> str:
     """The claims of a paper with their classes over all interpretations, and what the paper leaves open."""
-    of = interpretations.papers()[paper]
-    known = stored.classes_of([(of.interpretations, of.claims)], None)
+    of = open_papers()[paper]
+    known = known_classes([(of.interpretations, of.claims)], None)
     rows = []
     for claim in of.claims.claims:
         if (found := known.get(claim.id)) is not None:
-            said = page.words(
+            said = class_words(
                 found.kind, found.kind, of.interpretations.asked(filter(None, found.depends_on.split(", ")))
             )
             rows.append((claim.id, claim.statement, said, f"{found.holds} of {found.of}"))
     parts = [
         f"{of.claims.paper}. {HERE.format(paper=paper)}",
         "## Claims over all interpretations",
-        interpretations_page.table(("claim", "statement", "verdict", "holds in"), rows),
-        *interpretations_page.left_open(of.interpretations),
+        markdown_table(("claim", "statement", "verdict", "holds in"), rows),
+        *open_choices(of.interpretations),
     ]
     return "\n\n".join(parts)

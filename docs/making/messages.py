@@ -18,7 +18,10 @@ from radarsim.config.check import models_in
 from radarsim.config.fields import Model
 from radarsim.config.schema import Common
 from radarsim.language import ANY, NUMBERS, catalogue
-from radarsim.report.claims import judge, over, rule
+from radarsim.papers.claims_table import NOT_JUDGED, NOT_RUN, UNCLEAR
+from radarsim.papers.interpretations import with_spaces
+from radarsim.papers.study_claims import claims_of, interpretations_of
+from radarsim.papers.verdict_rule import CLASSES, VOID
 from radarsim.studies import registry
 
 ROOT = Path(__file__).parents[2]
@@ -101,11 +104,11 @@ def in_schemas() -> Iterator[tuple[str, str, str]]:
 
 def in_claims() -> Iterator[tuple[str, str, str]]:
     """What the claims of all papers say, and the classes that they come out in."""
-    for text in (*rule.CLASSES, rule.VOID, judge.NOT_JUDGED, judge.NOT_RUN, judge.UNCLEAR):
-        yield text, "", "radarsim/report/claims/rule.py"
+    for text in (*CLASSES, VOID, NOT_JUDGED, NOT_RUN, UNCLEAR):
+        yield text, "", "radarsim/papers/verdict_rule.py"
     for name in registry.SHIPPED:
-        for paper in filter(None, [registry.study(name).claims()]):
-            place = f"radarsim/studies/{name}/claims.yaml"
+        for paper in filter(None, [claims_of(registry.study(name))]):
+            place = f"radarsim/papers/{name}/claims.yaml"
             yield paper.paper, "", place
             for claim in paper.claims:
                 for text in (claim.statement, claim.place, claim.interpretation, claim.unstated):
@@ -118,12 +121,12 @@ def in_claims() -> Iterator[tuple[str, str, str]]:
 def in_interpretations() -> Iterator[tuple[str, str, str]]:
     """What the papers leave open, its alternatives, and why."""
     for name in registry.SHIPPED:
-        of = registry.study(name).interpretations()
+        of = interpretations_of(registry.study(name))
         if of is None:
             continue
-        place = f"radarsim/studies/{name}/interpretations.yaml"
+        place = f"radarsim/papers/{name}/interpretations.yaml"
         for choice in of.choices:
-            own = ((one.reason, over.spaced(one.name)) for one in choice.alternatives)
+            own = ((one.reason, with_spaces(one.name)) for one in choice.alternatives)
             for text in (choice.asks, *(text for both in own for text in both)):
                 yield text, "", place
             if choice.original == choice.english:  # the paper is silent

@@ -8,7 +8,7 @@ import os
 import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex, TypeGuard
@@ -18,12 +18,13 @@ from radarsim.config import document
 from radarsim.config import load as reading
 from radarsim.config.experiment import Case, Experiment
 from radarsim.errors import ConfigError, argument
+from radarsim.extensions import extensions
 from radarsim.language import term, tr
 from radarsim.report import files
 from radarsim.studies import registry
 
 if TYPE_CHECKING:
-    pass
+    from radarsim.studies.interface import Study
 
 
 # ---- configs ---------------------------------------------------------------------------------------------------------
@@ -42,15 +43,16 @@ def load(source: Config, overrides: Overrides = ()) -> Experiment:
     if isinstance(source, Experiment):
         return source
     experiment = reading.load(source, overrides, registry)
-    if experiment.study not in registry.SHIPPED and (faults := _claim_faults(experiment.study)):
+    if experiment.study not in registry.SHIPPED and (faults := _extension_faults(experiment.study)):
         raise ConfigError(*faults)
     return experiment
 
 
 @cache
-def _claim_faults(name: str) -> Sequence[str]:
-    """Names in the claims of a package's study that nothing has."""
-    return registry.part(name, lambda one: tuple(dict.fromkeys(one.claim_faults(shipped))))
+def _extension_faults(name: str) -> Sequence[str]:
+    """Faults in what a package's study declares for extensions, such as names in its claims that nothing has."""
+    faults = (registry.part(name, partial(extension.study_faults, shipped=shipped)) for extension in extensions())
+    return tuple(dict.fromkeys(line for lines in faults for line in lines))
 
 
 @cache
@@ -148,9 +150,14 @@ def described(text: str) -> str:
     return ""
 
 
+def _study_label(study: "Study") -> str:
+    """A short label of a study, such as its paper's; empty if it has none."""
+    return next(filter(None, (extension.study_label(study) for extension in extensions())), "")
+
+
 def _configs() -> list[tuple[str, str, str]]:
     """Name, paper (P1; or the study's name) and line of each config, in the order of the studies."""
-    papers = {name: key or name for name, key in registry.parts(lambda one: one.paper_key()).items()}
+    papers = {name: key or name for name, key in registry.parts(_study_label).items()}
     texts = {stem: _text(document.config_file(stem)) for stem in document.stems("configs")}
     found = []
     for stem, text in texts.items():

@@ -30,6 +30,7 @@ from radarsim.app.configs import document as lookup
 from radarsim.config.document import one_line
 from radarsim.engine.run import Signals
 from radarsim.errors import ConfigError, Interrupted, RadarsimError, StoreError
+from radarsim.extensions import extensions
 from radarsim.private_files import create_readable_file, make_readable_folder
 from radarsim.report.wording import clock, plural
 from radarsim.studies import registry
@@ -116,8 +117,6 @@ def _follow(parent: int) -> None:
 
 
 def _run(out: str, overrides: Sequence[str], figures: bool, stem: str) -> Done:
-    from radarsim.report.claims import page
-
     started = time.perf_counter()
     faults: tuple[str, ...] = ()
     code = 0
@@ -125,10 +124,9 @@ def _run(out: str, overrides: Sequence[str], figures: bool, stem: str) -> Done:
     try:
         with Signals() as stop:
             result = experiment.run(stem, overrides=overrides, out=out, stop=stop, figures=figures)
-        verdicts = ", ".join(page.of_class(kind, len(names)) for kind, names in result.verdicts().items())
         drawn = sum(name.endswith(".svg") for name in result.written.files) if result.written else 0
         made = [plural(drawn, "figure")] if figures else []
-        made += [f"claims: {verdicts}"] if verdicts else []
+        made += [line for extension in extensions() if (line := extension.result_summary(result))]
         stages = {"simulation": result.facts["seconds"]} | dict(result.written.seconds if result.written else {})
     except Interrupted as ended:
         os._exit(ended.exit_code)  # as the command does: the sender of the signal need not wait for an orderly end
@@ -138,20 +136,17 @@ def _run(out: str, overrides: Sequence[str], figures: bool, stem: str) -> Done:
 
 
 def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
-    """The closing lines: claims by verdict, time, where the results are."""
+    """The closing lines: what extensions say, time, where the results are."""
     from radarsim.report import html
-    from radarsim.report.claims import page
 
     html.write(Path(out))  # two processes may have written it at once, one without the other's run
-    rows = experiment.claims(out=out).rows
-    classes, _ = page.counts(rows)
     longest = max(done, key=lambda one: one.seconds)
     failed = [one.stem for one in done if one.faults]
     guide = Path(out) / "README.md"
     hint = f"; {guide} says what lies where" if guide.is_file() else ""
     return [
         "",
-        f"claims   {sum(classes.values())}: {page.counted(rows)}",
+        *(line for extension in extensions() for line in extension.overall_summary(out)),
         f"time     {clock(seconds)} for {plural(len(done), 'config')}, "
         f"the longest {longest.stem}, {longest.seconds:.0f} s",
         *_stages(done),

@@ -1,4 +1,4 @@
-"""The result of a finished experiment: tables, figures, claims, run.json and report.html, in memory and as files."""
+"""The result of a finished experiment: tables, figures, run.json and report.html, in memory and as files."""
 
 import os
 import re
@@ -12,16 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.app import configs
 from radarsim.app.shown import Several, Shown
-from radarsim.app.stored import classes_of
 from radarsim.config.experiment import DRAWN_FOR_ALL, Case, Experiment, matches
 from radarsim.engine.machine import machine_facts
 from radarsim.engine.results import CaseResult
 from radarsim.errors import OF_AUTHORS, DisagreementError, MeasureError, RadarsimError
+from radarsim.extensions import extension_figures, extension_tables, extensions
 from radarsim.language import ENGLISH, called, current, plural, tr
-from radarsim.report import claims, files, notes, outside, panels, seen
+from radarsim.report import files, notes, outside, panels, seen
 from radarsim.report import tables as common
-from radarsim.report.claims import page
-from radarsim.report.claims.page import OVER, with_classes
 from radarsim.report.drawing import Figure, reworded
 from radarsim.report.wording import estimate, spoken
 from radarsim.studies.interface import Study
@@ -85,7 +83,7 @@ class Result(Shown):
 
     @property
     def tables(self) -> dict:
-        """Every table by the stem of its file: `curves`, `gains`, `claims`, and the study's own.
+        """Every table by the stem of its file: `curves`, `gains`, the study's own, and those of extensions.
 
         They are copies, like `curves` and `gains`: `write` always writes the numbers of the run.
 
@@ -137,7 +135,7 @@ class Result(Shown):
     def write(
         self, out: str | os.PathLike[str], figures: bool | str | Sequence[str] = True, width_mm: float | None = None
     ) -> "Written":
-        """Write tables, figures, claims, run.json and report.html into out/<stem>/, and update out/index.html.
+        """Write tables, figures, run.json and report.html into out/<stem>/, and update out/index.html.
 
         figures may name the formats of their files: svg, png, pdf; width_mm overrides their width. Returns the files
         written. Raises DisagreementError, after writing, if there are `faults`."""
@@ -145,7 +143,8 @@ class Result(Shown):
 
         configs.check(out=out, figures=figures, width_mm=width_mm)
         folder = Path(out) / self.experiment.stem
-        self._tables["claims"] = over_interpretations(self._tables["claims"], self.experiment.study, Path(out))
+        for extension in extensions():
+            self._tables.update(extension.updated_tables(self._tables, self.experiment.study, Path(out)))
         formats = configs.formats(figures)
         self.facts["warnings"] = [*self.facts["warnings"], *files.replaced(folder, self.experiment)]
         facts = self.facts | {"finished": datetime.now(UTC).isoformat("T", "seconds")}
@@ -161,47 +160,22 @@ class Result(Shown):
         """Differences between exact and measured values that chance does not explain, a line for each."""
         own, made = study(self.experiment.study), self._tables
         nearly = [case.name for case in self.experiment.cases if own.exact_but_for(case)]
-        bounds = ("claims",) if own.exact_errors else ("claims", "curves", "gains")
+        bounds = (*extension_tables(), *(() if own.exact_errors else ("curves", "gains")))
         return (
             *notes.faults(made, nearly, bounds, quantities(own.name, self.cases[0].spec)),
-            *claims.errors(made["claims"]),
+            *(line for extension in extensions() for line in extension.disagreements(made)),
         )
 
     def check(self) -> None:
-        """Raises DisagreementError if there are `faults`, or MeasureError if the measure of a claim failed."""
+        """Raises DisagreementError if there are `faults`, or MeasureError for errors of a study's author."""
         if self.faults:
             error = DisagreementError(*self.faults)
             error.result = self
             raise error
-        if failed := claims.failed(self._tables["claims"]):
-            unmeasured = MeasureError(*failed)
+        if errors := [line for extension in extensions() for line in extension.author_errors(self._tables)]:
+            unmeasured = MeasureError(*errors)
             unmeasured.result = self
             raise unmeasured
-
-    def verdicts(self, column: str = "class") -> dict[str, list[str]]:
-        """The claims by class over all interpretations that their papers allow, or `as_shipped`; empty if there are
-        none. Extensions are listed separately."""
-        found: dict[str, list[str]] = {}
-        grouped = page.grouped(self._tables["claims"].to_dict("records"))
-        for parts in sorted(grouped, key=lambda parts: page.ORDER.index(parts[0][column])):
-            said = parts[0][column] + (", extension" if page.extension(parts) else "")
-            found.setdefault(said, []).append(parts[0]["claim"])
-        return found
-
-    def unjudged(self) -> dict[str, list[str]]:
-        """Claims of this config that it no longer judges, or not in every part, by reason."""
-        table = self._tables["claims"]
-        found: dict[str, list[str]] = {}
-        for row in table[table["verdict"] == claims.NOT_JUDGED].to_dict("records"):
-            names = found.setdefault(row["why"], [])
-            if row["claim"] not in names:
-                names.append(row["claim"])
-        return found
-
-    def as_shipped(self) -> list[str]:
-        """Claims judged only under the shipped interpretation although they depend on an open choice of their paper."""
-        rows = claims.first_rows(self._tables["claims"].to_dict("records"))
-        return [row["claim"] for row in rows if page.alone(row)]
 
     @property
     def unmet(self) -> list[str]:
@@ -222,27 +196,16 @@ class Result(Shown):
 
 # ---- output ----------------------------------------------------------------------------------------------------------
 def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
-    """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims. A study whose
+    """All tables of an experiment by the stem of their file: curves, gains, the study's own, extensions'. A study whose
     errors are not of all realisations at common scans makes its own curves and gains. stem is the shipped config's: all
     its claims are in the table, also those that it can no longer judge."""
     of = study(results[0].study)
     made, from_outside = measured(results), outside.measured(results)
-    verdicts = claims.judged(of.claims(), results, outside.for_claims(made, from_outside), configs.shipped, stem)
-    made["claims"] = over_interpretations(verdicts, results[0].study)
+    for extension in extensions():
+        made |= extension.tables(results, made, from_outside, stem)
     made["floor"] = of.floors(results)
     made = notes.noted(made, results, of.exact_errors, quantities(results[0].study, results[0].spec))
     return outside.added(made, results, from_outside)
-
-
-def over_interpretations(verdicts: "pd.DataFrame", name: str, out: Path | None = None) -> "pd.DataFrame":
-    """claims.csv of a study with the classes over all interpretations: those under `out`, else the shipped ones."""
-    of = study(name)
-    interpretations, papers = of.interpretations(), of.claims()
-    if interpretations is None or papers is None or not len(verdicts):
-        return verdicts
-    own: Any = verdicts.to_dict("records")
-    rows = with_classes(own, classes_of([(interpretations, papers)], out))
-    return verdicts.assign(**{column: [row[column] for row in rows] for column in OVER})
 
 
 def measured(results: Sequence[CaseResult]) -> dict:
@@ -336,9 +299,6 @@ def _gained(result: CaseResult, made: Mapping[str, "pd.DataFrame"]) -> list[str]
     return [tr("{case}, gain in {component} against {base} at {t} s: {filters}.", **told)]
 
 
-FEW_CLAIMS = 3  # whose verdicts are clearer than a figure
-
-
 def case_figures(
     results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"], experiment: Experiment
 ) -> dict[str, Figure]:
@@ -355,8 +315,8 @@ def case_figures(
         drawn |= {f"{name}_{n + 2}": figure for name, figure in found.items() if name.startswith("gain_")}
     of_outside = outside.figures(results, banded, experiment, drawn, own.shown())  # first: the answer is about them
     drawn = of_outside | {name: figure for name, figure in drawn.items() if name not in of_outside}
-    if made["claims"]["claim"].nunique() > FEW_CLAIMS and (judged := page.figure(made["claims"].to_dict("records"))):
-        drawn["claims"] = judged
+    for extension in extensions():
+        drawn |= extension.figures(made)
     if not own.draws_sweeps:
         from radarsim.report import sweeps
 
@@ -456,7 +416,6 @@ def write_files(
         cost=own.cost(outside.without(made, results), run),
         agreement=notes.agreement(made["curves"]) if own.exact_errors else None,
         drawn_from=own.drawn_from(),
-        interpretations=own.interpretations(),
     )
     contents["report.html"] = report.encode()
     contents["run.json"] = files.to_json(files.with_output(record, "report.html", contents["report.html"]))
@@ -472,7 +431,7 @@ def unnamed(own: Study, described: Iterable[str]) -> list[str]:
     known = own.keys().figure_names
     if known is None:
         return []
-    every = (*known, *DRAWN_FOR_ALL)
+    every = (*known, *extension_figures(), *DRAWN_FOR_ALL)
     found = [name for name in described if not any(matches(name, one) or name.startswith(f"{one}_") for one in every)]
     names = ", ".join(found)
     return [f"study {own.name}: draws {names}, which its `figure_names` lacks: {', '.join(known)}"] if found else []

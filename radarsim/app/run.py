@@ -6,12 +6,11 @@ The time that tables, figures and report of an experiment take, measured on a fe
 import json
 import math
 import os
-import re
 import sys
 import tempfile
 import time
 import unicodedata
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
@@ -21,8 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from radarsim.app import configs
 from radarsim.app.ahead import Progress, Weighed
 from radarsim.app.case_work import CaseWork
-from radarsim.app.configs import Config, Overrides, command, load, repeated, shipped
-from radarsim.app.shown import Shown
+from radarsim.app.configs import Config, Overrides, command, load, repeated
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine import run as stopping
 from radarsim.engine.machine import available_cores
@@ -31,6 +29,7 @@ from radarsim.engine.run import Collected, Executor, Shared, Signals, Stop, coll
 from radarsim.engine.store.inventory import Inventory, take_inventory
 from radarsim.engine.store.store import Store
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
+from radarsim.extensions import StopRule, stop_rule
 from radarsim.language import few, tr
 from radarsim.report import files
 from radarsim.report.quantities import GAIN, SIGMA, Quantity
@@ -39,12 +38,7 @@ from radarsim.studies.registry import study
 from radarsim.threads import limited
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from radarsim.app.result import Result
-    from radarsim.report.claims import PaperClaims
-    from radarsim.report.claims.over import PaperInterpretations
-    from radarsim.report.drawing import Figure
     from radarsim.report.precision import Cell, Table
 
 
@@ -420,7 +414,6 @@ def run(
     >>> len(result.curves) > 50
     True
     """
-    from radarsim.app import interpretations  # with it the parts that judge and draw, which `check` does without
 
     checked: dict[str, Any] = {"threads": threads, "workers": workers, "precision": precision, "time_limit": time_limit}
     checked |= {"executor": executor, "out": out, "figures": figures, "width_mm": width_mm}
@@ -428,8 +421,9 @@ def run(
     experiment = load(config, overrides)
     if precision is not None:
         check_precision([experiment], precision, of)
-    if decide:
-        interpretations.check(experiment)
+    rule = required_stop_rule() if decide else None
+    if rule is not None:
+        rule.check(experiment)
     limit = time_limit if time_limit is None or callable(time_limit) else stopping.TimeLimit(time_limit)
     started, kept, warned = time.perf_counter(), None, list[str]()
     if codes([experiment]):
@@ -442,8 +436,8 @@ def run(
     with cluster(workers, scheduler) if executor is None else nullcontext(executor) as pool:
         threads = pool.workers if pool else available_cores() if threads is None else int(threads)
         options = RunOptions(out, threads, stopping.Either(stop, limit), pool)
-        if decide:
-            simulated = interpretations.simulated(experiment, options, progress)
+        if rule is not None:
+            simulated = rule.simulate(experiment, options, progress)
         else:
             simulated = simulate(experiment, options, progress=progress, precision=precision, of=of)
         if stop is not None:
@@ -454,8 +448,8 @@ def run(
         facts = facts_of(simulated, threads, time.perf_counter() - started)
     if kept is not None:
         facts["seconds_kept_for_writing"] = kept
-    if decide:
-        left = interpretations.left(experiment, simulated)
+    if rule is not None:
+        left = rule.unmet(experiment, simulated)
         facts |= {"unmet": [*facts["unmet"], *left], "stop": "; ".join((*facts["unmet"], *left)) or "done"}
     ended_by = None if simulated.stopped or precision is None else (precision, of)
     result = result_of(experiment, simulated, facts, repeated(experiment, simulated.done, overrides, ended_by))
@@ -466,6 +460,13 @@ def run(
     else:
         result.write(out, figures, width_mm)
     return result
+
+
+def required_stop_rule() -> StopRule:
+    """The rule of `decide`. Raises ConfigError where no extension has one."""
+    if (rule := stop_rule()) is None:
+        raise ConfigError("decide: no installed part of radarsim has a rule that ends a run")
+    return rule
 
 
 def run_share(
@@ -650,135 +651,3 @@ def seconds_per_update(works: Iterable[CaseWork]) -> dict[str, dict[str, float]]
 def finite(value: float) -> float | None:
     """The number, or None where JSON cannot hold it."""
     return value if math.isfinite(value) else None
-
-
-def papers(keys: Collection[str] = ()) -> "list[PaperClaims]":
-    """The claims of every paper, or of those with these keys (P1) and others, in the order of the studies."""
-    return [of for of in registry.papers(lambda study: study.claims(), keys).values() if of is not None]
-
-
-# P1.3 and P4, known or not; lower case and names joined by commas are understood.
-LIKE_A_CLAIM = re.compile(r"P\d+(\.\w*)?|[Pp]\d+(\.[Ee]?\d+\w?)?(,.+)?")
-
-
-def _meant_as_a_claim(name: str) -> bool:
-    """Whether a name has the form of a claim or a paper; a package's claim begins with the key of its paper."""
-    if Path(name).is_file():
-        return False
-    paper, _, number = name.partition(".")
-    own = paper and number and paper in registry.parts(lambda one: one.paper_key()).values()
-    return bool(own or LIKE_A_CLAIM.fullmatch(name))
-
-
-def _unknown_claims(names: Sequence[str], known: Collection[str]) -> list[str]:
-    """A line for each name that has the form of a claim or a paper, but is unknown."""
-    found, every = [], _keys(known)
-    for name in names:
-        paper = name.partition(".")[0]
-        if name in known or name in every:
-            continue
-        if (meant := name.rstrip(".").upper()) in (*known, *every):
-            found.append(f"claims: {name} is no claim and no paper; did you mean {meant}?")
-        elif paper in every:
-            own = [claim for claim in known if claim.startswith(f"{paper}.")]
-            found.append(f"claims: {name} is no claim of {paper}; its claims: {', '.join(own)}")
-        else:
-            found.append(f"claims: {name} is no claim and no paper; papers: {', '.join(every)}")
-    return found
-
-
-def _keys(ids: Iterable[str]) -> list[str]:
-    """The papers of claims: P1 of P1.4."""
-    return sorted({claim.partition(".")[0] for claim in ids})
-
-
-class Claims(Shown):
-    """Claims of papers and their verdicts; one row for each measured part of a claim."""
-
-    def __init__(self, rows: Sequence[dict[str, Any]], interpretations: "Iterable[PaperInterpretations]" = ()):
-        self.rows, self._interpretations = tuple(rows), tuple(interpretations)
-
-    @property
-    def in_words(self) -> list[dict[str, Any]]:
-        """The rows for people: what a claim depends on is in words, not in keys."""
-        from radarsim.report.claims import page
-
-        return page.in_words(self.rows, self._interpretations)
-
-    @property
-    def table(self) -> "pd.DataFrame":
-        """The columns of claims.csv, and `config`, which judges the claim."""
-        from radarsim.report.tables import read_rows
-
-        return read_rows(self.rows, self.rows[0] if self.rows else ())
-
-    @property
-    def _described(self) -> "Mapping[str, Figure]":
-        from radarsim.report.claims import page
-
-        drawn = page.figure(self.rows)
-        return {} if drawn is None else {"claims": drawn}
-
-    def _said(self) -> list[str]:
-        from radarsim.report.claims import page
-
-        lines = [page.counted(self.rows)] if self.rows else []
-        for parts in page.grouped(self.in_words):
-            verdict = page.verdict_of(parts).replace("*", "")
-            lines.append(f"{parts[0]['claim']} {verdict}: {tr(parts[0]['statement'])}")
-        return lines
-
-    def draw(self, path: str | os.PathLike[str]) -> None:
-        """Write the figure to a file. Raises ConfigError if the name has no known format or no claim is judged."""
-        from radarsim.report.figures import save
-
-        kind, drawn = Path(path).suffix[1:].lower(), self._described
-        if kind not in configs.FORMATS:
-            raise ConfigError(f"{path}: must end in {', '.join(f'.{one}' for one in configs.FORMATS)}")
-        if not drawn:
-            raise ConfigError(f"{path}: no claim is judged here, so there is nothing to draw")
-        files.replace_all(Path(path).parent, {Path(path).name: save(drawn["claims"], (kind,))[kind]})
-
-
-def claims(*names: str, out: str | os.PathLike[str] = configs.RESULTS) -> Claims:
-    """List the papers' claims with verdicts from the results stored in `out`; computes nothing.
-
-    names are claims (P1.3), papers (P1) or configs; default: all claims of all papers. `table` has a row for each
-    measured part of a claim: measured value, 95 % interval, expected value, verdict. Claims without stored results are
-    listed as not run; for a config that judges none, those of its study's paper, with the reason why it does not judge
-    each. Raises ConfigError for unknown names.
-
-    >>> found = claims("P1.3", out="/nowhere")
-    >>> found.table["verdict"].tolist()
-    ['not run']
-    """
-    from radarsim.app import interpretations
-    from radarsim.app import stored as kept
-    from radarsim.report.claims.judge import listed, unstored
-    from radarsim.report.claims.page import with_classes
-
-    configs.check(out=out)
-    configs.texts(names)
-    wanted = [name for name in names if _meant_as_a_claim(name)]
-    known = [claim.id for paper in papers(_keys(wanted)) for claim in paper.claims] if wanted else []
-    if _unknown_claims(wanted, known):  # with the list of all claims
-        raise ConfigError(*_unknown_claims(wanted, [claim.id for paper in papers() for claim in paper.claims]))
-    asked = load_all([name for name in names if name not in wanted])
-    keys = _keys(wanted) + [registry.study(one.study).paper_key() for one in asked]
-    every = papers(keys)
-    of = {claim.id: claim.config for paper in every for claim in paper.claims}
-    shown = [claim for claim in of if not names or claim in wanted or claim.partition(".")[0] in wanted]
-    stems = dict.fromkeys([*(one.stem for one in asked), *(of[claim] for claim in shown)])
-    held = {stem: rows for stem in stems if (rows := kept.stored(Path(out) / stem / "claims.csv")) is not None}
-    rows = []
-    for one in asked:
-        shipped_as = configs.shipped_stem(one)
-        own = held.get(one.stem) or [row for row in listed(every, {}) if row["config"] == shipped_as]
-        if not own and one.cases and (paper := registry.study(one.cases[0].study).claims()) is not None:
-            own = unstored(paper, one.cases, shipped, shipped_as)
-        rows += [row | {"config": one.stem} for row in own]
-    there = {(row["claim"], row["config"]) for row in rows}
-    own = [row for row in listed(every, held) if row["claim"] in shown]
-    rows += [row for row in own if (row["claim"], row["config"]) not in there]
-    open_ = [(paper.interpretations, paper.claims) for paper in interpretations.papers(keys).values()]
-    return Claims(with_classes(rows, kept.classes_of(open_, Path(out))), [one for one, _ in open_])

@@ -10,6 +10,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from radarsim.extensions import extensions
+
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
@@ -163,8 +165,7 @@ def result(one: "Result") -> dict[str, Any]:
         "precision": one.facts.get("precision"),
         "answer": list(written.answer),
         "last_scan": one.last_scan.to_dict("records"),
-        "claims": one.verdicts(),
-        "claims_as_shipped": one.verdicts("as_shipped"),
+        **{key: value for extension in extensions() for key, value in extension.result_document(one).items()},
         "folder": str(written.folder),
         "files": list(written.files),
         "warnings": one.warnings,

@@ -9,12 +9,16 @@ import click
 
 from radarsim.cli import group
 from radarsim.errors import ClusterError, DisagreementError, MeasureError, TargetUnmet
+from radarsim.extensions import stop_rule
 from radarsim.language import tr
 
 if TYPE_CHECKING:
     from radarsim.app.result import Result
     from radarsim.app.run import Shares
     from radarsim.config.experiment import Experiment
+
+
+STOP_RULE = stop_rule()
 
 
 @group.main.command()
@@ -24,7 +28,7 @@ if TYPE_CHECKING:
 @group.set_option
 @group.precision_option
 @group.of_option
-@click.option("--decide", is_flag=True, help="Run until each claim of the config is decided, at most N realisations.")
+@click.option("--decide", is_flag=True, help=STOP_RULE.help if STOP_RULE else None, hidden=STOP_RULE is None)
 @group.time_limit_option
 @click.option("--shard", type=group.Share(), metavar="i/n", help="Compute only this share of the blocks; no tables.")
 @group.threads_option
@@ -118,14 +122,13 @@ def _loaded(
     configs: tuple[str, ...], overrides: tuple[str, ...], precision: tuple[float, str] | None, decide: bool
 ) -> "list[Experiment]":
     """The experiments, all checked, with the quantities that their claims and a precision need."""
-    from radarsim.app import interpretations
     from radarsim.app import run as simulation
 
     loaded = simulation.load_all(configs, overrides)
     if precision is not None:
         simulation.check_precision(loaded, *precision)
     for one in loaded if decide else ():
-        interpretations.check(one)
+        simulation.required_stop_rule().check(one)
     return loaded
 
 
@@ -370,55 +373,6 @@ def report(
 
 
 @group.main.command()
-@click.argument("names", nargs=-1, metavar="[CONFIG | CLAIM | PAPER …]", shell_complete=group.completed)
-@group.out_option
-@group.json_option
-@click.option("--markdown", is_flag=True, help="Print the page of claims in Markdown instead of text.")
-@click.option("--parts", is_flag=True, help="Also print what was measured for each claim.")
-@click.option(
-    "--figure",
-    metavar="FILE",
-    help="Also draw the claims to this file, as distances from the papers' words in margins.",
-)
-def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figure: str | None, parts: bool) -> None:
-    """List the papers' claims with their verdicts.
-
-    Computes nothing. For a CLAIM (P1.3), prints its full text and what was measured. PAPER is P1, P2, P3 or P4; without
-    an argument, all claims are listed. For claims without results, prints the command that would judge them. For a
-    CONFIG that is not a paper's experiment, lists the claims that it cannot judge, and why.
-
-    How they are judged stands in docs/verdicts.md: exact values first, each number with a margin, and over every
-    interpretation that the paper allows. "refuted as shipped; depends on how the filter starts": false with the choices
-    that the config takes where the paper leaves them open, and true with another start.
-
-    \b
-    Examples
-      radarsim claims range_doppler
-      radarsim claims P1                      a line each
-      radarsim claims P1.3                    in full, with what was measured
-      radarsim claims --json
-      radarsim claims --figure claims.svg
-    """
-    from radarsim.app import run as simulation
-    from radarsim.app import shown
-    from radarsim.cli import outcomes
-
-    found = simulation.claims(*names, out=out)
-    rows = found.rows
-    if figure is not None:
-        found.draw(figure)
-    if as_json:
-        click.echo(shown.text(rows))
-    elif markdown:
-        from radarsim.report.claims import page
-
-        click.echo(page.page(found.in_words, {of.paper: of.page for of in simulation.papers()}), nl=False)
-    else:
-        detailed = {row["claim"] for row in rows if parts or row["claim"] in names}
-        outcomes.print_claims(found.in_words, detailed, out, names)
-
-
-@group.main.command()
 @click.argument("sources", nargs=-1, required=True, metavar="A B…", shell_complete=group.completed)
 @group.out_option
 @group.drawing_options
@@ -448,67 +402,3 @@ def compare(sources: tuple[str, ...], out: str, drawing: group.Drawing, as_json:
         click.echo(shown.text(shown.compared(compared)))
     else:
         outcomes.print_comparison(compared)
-
-
-@group.main.command()
-@click.argument("names", nargs=-1, metavar="[CLAIM | PAPER …]")
-@group.realisations_option
-@click.option(
-    "--decide",
-    is_flag=True,
-    help="Extend the runs, up to N realisations, until each claim is decided over all interpretations.",
-)
-@group.threads_option
-@group.time_limit_option
-@group.out_option
-@group.figures_option
-@click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
-@group.json_option
-@click.option(
-    "--markdown", is_flag=True, help="Print the pages docs/interpretations_….md of these papers instead of text."
-)
-def interpretations(
-    names: tuple[str, ...],
-    time_limit: float | None,
-    no_figures: bool,
-    quiet: bool,
-    as_json: bool,
-    markdown: bool,
-    **asked: Any,
-) -> None:
-    """Judge claims under every interpretation that the paper allows.
-
-    A paper leaves choices open: how a filter starts, which flight, which of two printed numbers. Each claim is judged
-    under all of them: exactly where possible, otherwise by small runs, which are stored and can be continued. E and U
-    interpretations (equivalent, unstated) decide how robust a verdict is; N (against the print) shows what would have
-    to change. PAPER is P1, P2, P3 or P4; default: all. Writes DIR/interpretations/interpretations.csv and a
-    specification curve for each claim.
-
-    \b
-    Examples
-      radarsim interpretations P1
-      radarsim interpretations P1.4                          with every interpretation of this claim
-      radarsim interpretations P2 -n 200 --threads 2         a quick look; a larger N continues it
-      radarsim interpretations P2 --decide -n 3.2e4          up to 32 000 realisations; undecided claims: exit code 3
-      radarsim interpretations P1 --json | jq '.[] | select(.depends_on != [])'
-    """
-    from radarsim.engine import run
-    from radarsim.errors import TargetUnmet
-
-    limit = run.TimeLimit(time_limit) if time_limit else None
-    with run.Signals() as stop:
-        from radarsim.app import interpretations as app
-        from radarsim.app import shown
-        from radarsim.cli import console, outcomes
-
-        asked |= {"time_limit": limit, "figures": not no_figures, "stop": stop}
-        with console.Foretold("interpretations", quiet=quiet or as_json or markdown) as progress:
-            done = app.interpretations(*names, progress=progress.update, **asked)
-        if as_json:
-            click.echo(shown.text(app.documents(done)))
-        elif markdown:
-            click.echo(app.pages(done), nl=False)
-        elif not quiet:
-            outcomes.print_interpretations(done, detailed=any("." in name for name in names))
-        if done.left:
-            raise TargetUnmet(*done.left)

@@ -16,6 +16,7 @@ import click
 import radarsim
 from radarsim import language
 from radarsim.errors import OF_AUTHORS, ON_COMMAND_LINE, ConfigError, Interrupted, RadarsimError, StoreError
+from radarsim.extensions import extensions
 from radarsim.threads import limited
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ SECTIONS = {
     "A question": ("list", "check", "run", "report", "compare"),
     "Your own radar": ("new", "solve", "tune", "sensitivity", "chart", "new-study"),
     "Your own data": ("import", "register", "simulate", "track", "fit", "judge"),
-    "The papers": ("claims", "interpretations"),
+    **{title: names for extension in extensions() for title, names in extension.command_sections.items()},
     "Upkeep": ("schema", "compile", "doctor", "clean"),
 }
 OLD_NAMES = {"readings": "interpretations"}  # names of commands in earlier versions, which still work

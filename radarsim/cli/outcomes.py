@@ -2,16 +2,13 @@
 
 import math
 import os
-import shlex
-import shutil
 import sys
-from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
-from textwrap import shorten
 from typing import TYPE_CHECKING, Any, TextIO
 
-from radarsim.app import configs
-from radarsim.cli.console import PIPED_WIDTH, broken, command, counted_cases, field, print_warnings, say, show
+from radarsim.cli.console import broken, command, counted_cases, field, print_warnings, say, show
+from radarsim.extensions import extensions
 from radarsim.language import few, listed, numeral, plural, term, tr
 from radarsim.report.wording import interval, known, labelled, printable, shown, significant_digits, with_unit
 from radarsim.report.wording import unit as unit_of
@@ -23,7 +20,6 @@ if TYPE_CHECKING:
     from radarsim.app.compare import Comparison, DopplerChart
     from radarsim.app.configs import Inventory
     from radarsim.app.doctor import Inspection
-    from radarsim.app.interpretations import Interpretations
     from radarsim.app.outlook import CaseOutlook, Need, Outlook
     from radarsim.app.result import Result
     from radarsim.app.run import Shares
@@ -55,8 +51,8 @@ def print_result(result: "Result") -> None:
     for line in written.answer:
         say(line)
     show_last_scan(result)
-    if not any(case.outside for case in result.cases):  # the paper's claims are none of such a filter
-        print_verdicts(result)
+    for label, text in (line for extension in extensions() for line in extension.result_lines(result)):
+        field(label, text)
     drawn = [Path(name) for name in written.files if name.startswith("figures/") and not name.endswith(".md")]
     others = sum(name.endswith(".csv") for name in written.files) - 1
     field("tables", tr("{file} and {count} more there", file=str(written.folder / "curves.csv"), count=others))
@@ -501,155 +497,3 @@ def report_registration(found: "Registration", other: str) -> None:
     lines += register.lines(found)
     for line in lines:
         write(sys.stdout, line)
-
-
-# ---- verdicts --------------------------------------------------------------------------------------------------------
-SHORT = 12  # words of a claim in a list
-MOST_CONFIGS = 6  # from which on it is said what runs them all
-NOTHING_OF_ALL = term(
-    "nothing is run here: `make reproduce-figures` runs all configs of the four papers; "
-    "docs/claims.md, which `make docs` builds, has their results at full size"
-)
-
-
-def print_verdicts(result: "Result") -> None:
-    """The claims of a run by their class over all interpretations, with those that differ here."""
-    from radarsim.report.claims import page, rule
-
-    verdicts, shipped = result.verdicts(), result.verdicts("as_shipped")
-    for kind, names in verdicts.items():
-        field("claims", f"{page.of_class(kind, len(names))}: {page.in_a_row(names)}")
-        here = {own: [name for name in every if name in names] for own, every in shipped.items() if own != kind}
-        if said := "; ".join(f"{tr(own)}: {page.in_a_row(few)}" for own, few in here.items() if few):
-            field("", tr("as shipped {claims}", claims=said))
-    for reason, names in result.unjudged().items():
-        field("", tr("not judged: {names}: {reason}", names=", ".join(names), reason=rule.said(reason)))
-    if alone := result.as_shipped():
-        told = {"names": page.in_a_row(alone), "paper": alone[0].partition(".")[0]}
-        words = tr(
-            "only as shipped: {names}; `radarsim interpretations {paper}` judges under every one that the paper allows",
-            **told,
-        )
-        field("", words)
-    if verdicts and result.written is not None:
-        told = {"command": configs.command(result.experiment, (), result.written.folder.parent, verb="claims")}
-        field("", tr("`{command}` describes each of them", **told))
-
-
-def print_claims(
-    rows: Sequence[dict[str, Any]],
-    detailed: Collection[str] = (),
-    out: str = configs.RESULTS,
-    names: Sequence[str] = (),
-) -> None:
-    """A line for each claim: number, class, first words; for detailed ones all of it with measured values. The commands
-    it shows are for the directory `out`, and for the requested names.
-
-    For experiments other than the paper's a line for each reason, with the claims that cannot be judged."""
-    from radarsim.report.claims import NOT_JUDGED, NOT_RUN, page, rule
-
-    stated: list[dict[str, Any]] = []
-    foreign: dict[tuple[str, str], list[str]] = {}
-    for row in rows:
-        if row["class"] == NOT_JUDGED and not row["what"]:
-            foreign.setdefault((row["config"], row["why"]), []).append(row["claim"])
-        else:
-            stated.append(row)
-    every = page.grouped(stated)
-    width = max((len(_standing(own)) for own in every if own[0]["claim"] not in detailed), default=0)
-    room = (shutil.get_terminal_size().columns if sys.stdout.isatty() else PIPED_WIDTH) - width - 9
-    for own in every:
-        if own[0]["claim"] in detailed:
-            _print_claim(own)
-        else:
-            words = tr(own[0]["statement"]).split()
-            begun = " ".join([*words[:SHORT], *["…"] * (len(words) > SHORT)])
-            begun = shorten(begun, room, placeholder=" …", break_on_hyphens=False)
-            say(f"{own[0]['claim']:<6} {_standing(own):<{width}}  {begun}")
-    for (stem, why), foreigners in foreign.items():
-        told = {"stem": stem, "names": page.in_a_row(foreigners), "reason": rule.said(why)}
-        say(tr("{stem}: not judged: {names}: {reason}", **told))
-    missing: dict[str, dict[str, None]] = {}
-    for row in stated:
-        if row["class"] == NOT_RUN:
-            missing.setdefault(str(row["config"]), {})[row["claim"]] = None
-    for stem, lacking in missing.items():
-        command = f"radarsim run {shlex.quote(stem)}{configs.into(out)}"
-        say(tr("`{command}` judges {names}", command=command, names=page.in_a_row(list(lacking))))
-    bracketed = any(page.extension(own) and own[0]["claim"] not in detailed for own in every)
-    say((page.counted(stated) or tr("this experiment judges no claims")) + bracketed * tr(" (in brackets)"))
-    if len(missing) > MOST_CONFIGS and all(row["class"] == NOT_RUN for row in stated):
-        say(tr(NOTHING_OF_ALL))
-    elif any(row["class"] != NOT_RUN and row["claim"] not in detailed for row in stated):
-        if names:
-            command = f"radarsim claims {shlex.join(names)} --parts{configs.into(out)}"
-            say(tr("`{command}` shows what was measured", command=command))
-        else:
-            command = f"radarsim claims {stated[0]['claim']}{configs.into(out)}"
-            say(tr("`{command}` shows what was measured; --parts shows it for all of them", command=command))
-
-
-def _named(row: Mapping[str, Any]) -> str:
-    """A part of a claim and its case."""
-    return ": ".join(filter(None, (str(row["case"]), tr(str(row["what"])))))
-
-
-def _standing(parts: Sequence[Mapping[str, Any]]) -> str:
-    """The class of a claim in a few words; in brackets if it is not counted."""
-    from radarsim.report.claims import page, rule
-
-    own = parts[0]["class"]
-    kind = tr("depends") if own == rule.DEPENDS else tr(own)
-    kind = tr("{own} as shipped", own=kind) if page.alone(parts[0]) else kind
-    return f"({kind})" if page.extension(parts) else kind
-
-
-def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
-    """A claim with its place, config, original sentence and a line for each part."""
-    from radarsim.report.claims import NOT_JUDGED, NOT_RUN, page, rule
-
-    first = parts[0]
-    verdict, place = page.verdict_of(parts).replace("*", ""), f"{tr(first['paper'])}, {tr(first['place'])}"
-    say(f"{first['claim']:<6} {verdict}: {tr(first['statement'])} [{place}; {first['config']}]")
-    if first["original"]:
-        say(f"       «{first['original']}»")
-    for row in parts if first["class"] != NOT_RUN else ():
-        said = [_named(row)]
-        if page.number(row["measured"]) is not None:
-            said.append(page.measured(row) + tr("; expected {words}", words=page.expected(row["expected"])))
-        if (exact := page.number(row["exact"])) is not None:
-            said.append(tr("exactly {value}", value=page.plain(exact) if exact == round(exact) else known(exact)))
-        if (missed := page.number(row["miss"])) is not None and missed:
-            said.append(tr("off by {miss:.3g} margins", miss=missed))
-        if row["verdict"] == NOT_JUDGED:
-            said.append(rule.said(row["why"]))
-        if page.extension([row]) and not page.extension(parts):
-            said.append(tr(page.NOT_COUNTED))
-        say(f"       {tr(row['verdict']):<20} {'; '.join(said)}")
-
-
-def print_interpretations(done: "Interpretations", detailed: bool) -> None:
-    """A line for each claim, for single claims one for each interpretation too."""
-    from radarsim.report.claims import rule
-
-    for read in done.read:
-        for over in read.over:
-            if detailed:
-                outcomes = [tr(one.outcome.kind) if one.outcome else tr("not possible") for one in over.under]
-                width = max(map(len, outcomes))
-                for one, outcome in zip(over.under, outcomes, strict=True):
-                    why = f" ({rule.said(one.why)})" if one.why else ""
-                    say(f"       {one.kind}  {outcome:<{width}}  {over.of.said(one.interpretation)}{why}")
-            found = over.outcome
-            words = tr(found.kind) if found else tr("not judged")  # on what it depends, the sentence says
-            say(f"{over.claim.id:<6} {words:<28} {over.sentence()}")
-    if done.files:
-        curves = sum(name.endswith(".svg") for name in done.files)
-        drawn = plural("{count} curve", "{count} curves", curves)
-        file = str(done.folder / "interpretations.csv")
-        field("table", tr("{file}, {curves} beside it", file=file, curves=drawn) if curves else file)
-    if done.outdated:
-        command = f"radarsim report {shlex.join(done.outdated)}{configs.into(done.folder.parent)}"
-        told = {"configs": listed(done.outdated), "command": command}
-        words = tr("claims.csv and report.html of {configs} hold older verdicts: `{command}` updates them", **told)
-        field("note", words)

@@ -30,6 +30,7 @@ from radarsim.config.experiment import DRAWN_FOR_ALL, Case, Experiment, in_name,
 from radarsim.config.fields import DataFile, Model, Scenario, Study, in_degrees, in_radians
 from radarsim.config.schema import COMMON_KEYS, Common, OwnCode, Studies
 from radarsim.errors import ConfigError
+from radarsim.extensions import extension_figures
 from radarsim.private_files import foreign_owner
 
 # ---- place -----------------------------------------------------------------------------------------------------------
@@ -635,7 +636,7 @@ class Expander:
         known = [self.studies.keys(study).figure_names for study in {draft.study for draft in drafts}]
         if len(known) != 1 or known[0] is None:
             return
-        every = (*known[0], *DRAWN_FOR_ALL)
+        every = (*known[0], *extension_figures(), *DRAWN_FOR_ALL)
         for n, figure in enumerate(common.figures):
             if not any(matches(figure, name) or matches(name, figure) for name in every):
                 named = isinstance(common.figures, dict)

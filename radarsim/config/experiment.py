@@ -175,7 +175,7 @@ class Experiment:
         return list(dict.fromkeys(wanted)) if self.figures else every
 
 
-DRAWN_FOR_ALL = ("claims", "sweep_*")  # figures that no study names
+DRAWN_FOR_ALL = ("sweep_*",)  # figures that no study names
 
 
 def matches(name: str, pattern: str) -> bool:

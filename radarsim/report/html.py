@@ -1,14 +1,12 @@
 """report.html: one self-contained page of an experiment; the template escapes all text from configs and tables.
 
-Its links: the tables behind a figure, and for a claim its figures and tables. Its request: every key of the cases with
+Its links: the tables behind a figure. Its request: every key of the cases with
 its value and the schema's description.
 
-results/index.html: all runs of a folder by paper, newest first, each with its answer in one line."""
+results/index.html: all runs of a folder by group, newest first, each with its answer in one line."""
 
 import base64
-import csv
 import hashlib
-import io
 import json
 import math
 import re
@@ -26,28 +24,22 @@ from urllib.parse import quote
 from radarsim.config.experiment import Case, Experiment
 from radarsim.config.fields import Model
 from radarsim.config.load import as_yaml
+from radarsim.extensions import ReportSection, extension_figures, extension_tables, extensions
 from radarsim.language import called, current, numeral, plural, speaking, term, tr
 from radarsim.report import chart, files, wording
 from radarsim.report import tables as common
 from radarsim.report.chart import spoken
-from radarsim.report.claims import page as claims_page
-from radarsim.report.claims import rule
-from radarsim.report.claims.judge import LOOKED
-from radarsim.report.claims.over import PaperInterpretations
 from radarsim.report.drawing import Figure, Line
 from radarsim.report.wording import number
 
 if TYPE_CHECKING:
     import pandas as pd
-    from jinja2 import Template
+    from jinja2 import Environment, Template
     from markupsafe import Markup
 
 
 # ---- links -----------------------------------------------------------------------------------------------------------
 COMMON = {"sigma": ("curves",), "sweep": ("curves",), "dynamic": ("curves",), "gain": ("gains",)}
-MOST = 3  # figures linked from one claim
-
-Looked = Sequence[tuple[str, str]]  # tables, with the component that was looked at or nothing
 
 
 def tables_of(figure: str, declared: Mapping[str, Sequence[str]], made: Collection[str]) -> tuple[str, ...]:
@@ -60,16 +52,6 @@ def tables_of(figure: str, declared: Mapping[str, Sequence[str]], made: Collecti
     else:
         found = COMMON.get(figure.partition("_")[0], ())
     return tuple(name for name in found if name in made)
-
-
-def figures_of(looked: Looked, drawn_from: Mapping[str, Sequence[str]]) -> list[str]:
-    """The figures that show the tables read by a claim, and of these its component's own if there is one."""
-    found: list[str] = []
-    for table, component in looked:
-        own = [name for name, tables in drawn_from.items() if table in tables]
-        exact = [name for name in own if component and name.endswith(f"_{component}")]
-        found += exact or own
-    return list(dict.fromkeys(found))[:MOST]
 
 
 # ---- asked -----------------------------------------------------------------------------------------------------------
@@ -189,16 +171,17 @@ def report_page(
     agreement: "pd.DataFrame | None" = None,
     cost: "pd.DataFrame | None" = None,
     drawn_from: Mapping[str, Sequence[str]] = MappingProxyType({}),
-    interpretations: PaperInterpretations | None = None,
 ) -> str:
-    """The page of an experiment: question, answer, request, figures, claims, exact values, tables, provenance.
+    """The page of an experiment: question, answer, request, figures, exact values, tables, provenance, and the sections
+    of extensions.
 
     figures are described ones (none with --no-figures); record is run.json's; inputs, agreement and cost (against
-    accuracy) are tables, or None. drawn_from and interpretations: of the study, see `Study`."""
-    figures = [one for one in figures if one.name != "claims"]  # the page has them in a table, a line each
+    accuracy) are tables, or None. drawn_from: of the study, see `Study`."""
+    figures = [one for one in figures if one.name not in extension_figures()]  # their sections say it in other ways
     written = {name for name, table in made.items() if f"{name}.csv" in record["outputs"] and len(table)}
     sources = {one.name: tables_of(one.name, drawn_from, written) for one in figures}
-    claims = _claims(made["claims"], sources, written, interpretations)
+    titles = {one.name: spoken(one.title) for one in figures}
+    sections = _sections(made, titles, sources, written, experiment.study)
     answer = in_clauses(answer)
     return whole(
         "report.html.j2",
@@ -213,18 +196,35 @@ def report_page(
         yaml=yaml_of(record["resolved"]),
         record=record,
         extent=files.extent(record),
-        claims=claims,
-        verdicts=claims_page.counted(made["claims"].to_dict("records")),
+        sections=sections,
         figures=_figures(figures),
         first=_first(figures),
         files=_files(figures, record["outputs"]),
         sources=sources,
-        titles={one.name: spoken(one.title) for one in figures},
-        judged={name: [one["id"] for one in claims if name in one["figures"]] for name in sources},
-        tables=_tables({name: table for name, table in made.items() if name != "claims" and len(table)}),
+        links={name: _joined_links(name, sections) for name in sources},
+        tables=_tables({name: table for name, table in made.items() if name not in extension_tables() and len(table)}),
         facts=[(name.replace("_", " "), cell(record[name])) for name in SHOWN_FACTS if name in record],
         command=command(experiment, record),
     )
+
+
+def _sections(
+    tables: "Mapping[str, pd.DataFrame]",
+    titles: Mapping[str, str],
+    sources: Mapping[str, Sequence[str]],
+    written: Collection[str],
+    study_name: str,
+) -> list[ReportSection]:
+    """The sections of extensions."""
+    sections = (extension.report_section(tables, titles, sources, written, study_name) for extension in extensions())
+    return [section for section in sections if section is not None]
+
+
+def _joined_links(figure: str, sections: Sequence[ReportSection]) -> "Markup":
+    """What the sections of extensions link to a figure."""
+    from markupsafe import Markup
+
+    return Markup("").join(section.links.get(figure, Markup("")) for section in sections)
 
 
 def _first(figures: Sequence[Figure]) -> int:
@@ -353,74 +353,38 @@ def cell(value: object) -> str:
     return numeral(str(value)) if isinstance(value, int) else wording.number(value)
 
 
-@cache
+def fragment(package: str, template: str, filters: Mapping[str, Callable[..., str]], **content: object) -> "Markup":
+    """A part of a page from a template of another package, with filters of its own."""
+    from markupsafe import Markup
+
+    environment = _environment(package)
+    environment.filters.update(filters)
+    return Markup(environment.get_template(template).render(**content))
+
+
 def _template(name: str) -> "Template":
+    return _environment("radarsim.report").get_template(name)
+
+
+@cache
+def _environment(package: str) -> "Environment":
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    loader = PackageLoader("radarsim.report")
+    loader = PackageLoader(package)
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     own: dict[str, Callable[..., str]] = {
         "number": cell,
         "unit": lambda name: tr(wording.unit(name)),
-        "expected": claims_page.expected,
-        "css": _css,
         "kept": _sentence,
-        "reason": rule.said,
-        "measured": _measured,
-        "bounds": _bounds,
     }
     environment.filters.update(own)
     environment.globals.update(tr=tr, plural=plural)
-    return environment.get_template(name)
+    return environment
 
 
 def _sentence(words: str) -> "Markup":
     """A sentence in which numbers stay with their units, and with ± before them; letters with an index as formulas."""
     return chart.html(wording.formulas(wording.unbroken(words)))
-
-
-def _measured(part: Mapping[str, Any]) -> str:
-    """The measured value of a part of a claim; an infinite settling time as text."""
-    if math.isinf(part["measured"]) and "settling" in part["what"]:
-        return tr(NOT_SETTLED)
-    return cell(part["measured"])
-
-
-def _bounds(part: Mapping[str, Any]) -> str:
-    """The interval of a part of a claim; a dash without a sampling error."""
-    lo, hi = claims_page.bounds(part)
-    return "–" if lo == hi else f"{cell(lo)} … {cell(hi)}"
-
-
-def _css(verdict: str) -> str:
-    known = ("confirmed", "refuted")
-    return next((one for one in known if verdict.startswith(one)), "unclear")
-
-
-def _claims(
-    table: "pd.DataFrame",
-    sources: Mapping[str, Sequence[str]],
-    written: Collection[str],
-    interpretations: PaperInterpretations | None,
-) -> list[dict[str, Any]]:
-    """Claims with their parts, from claims.csv's rows, with the figures and tables behind each.
-
-    sources: the tables of each figure; written: the tables that are files."""
-    found = []
-    looked = table.attrs.get(LOOKED, [()] * len(table))
-    records: Any = table.to_dict("records")
-    rows = [row | {LOOKED: own} for row, own in zip(records, looked, strict=True)]
-    for parts in claims_page.grouped(claims_page.in_words(rows, [interpretations])):
-        same = {
-            key: parts[0][key]
-            for key in ("statement", "paper", "place", "interpretation", "original", "overall", "class")
-        }
-        found.append({"id": parts[0]["claim"], **same, "said": claims_page.verdict_of(parts), "parts": parts})
-        found[-1]["said"] = str(found[-1]["said"]).replace("*", "")
-        own = list(dict.fromkeys(one for part in parts for one in part[LOOKED]))
-        found[-1]["figures"] = figures_of(own, sources)
-        found[-1]["tables"] = list(dict.fromkeys(name for name, _ in own if name in written))
-    return found
 
 
 def _cell(column: str, value: object) -> str:
@@ -578,12 +542,15 @@ def write(out: Path) -> None:
     with files.locked(out):
         found = filter(None, map(_run, out.glob("*/run.json")))
         runs = sorted(found, key=lambda run: run["finished"], reverse=True)
-        page = whole("index.html.j2", groups=_by_paper(runs), count=len(runs), version=files.versions()["radarsim"])
+        heading = next((run["entry"].heading for run in runs if run["entry"]), "")
+        groups = _by_group(runs)
+        version = files.versions()["radarsim"]
+        page = whole("index.html.j2", groups=groups, heading=heading, count=len(runs), version=version)
         files.replace_all(out, {NAME: page.encode()})
 
 
 def _run(path: Path) -> dict | None:
-    """A row of the index, from a run.json and the claims.csv beside it."""
+    """A row of the index, from a run.json and what extensions say of its folder."""
     try:
         record = json.loads(files.read(path))
         answer = [str(line) for line in record["answer"]]
@@ -597,16 +564,18 @@ def _run(path: Path) -> dict | None:
         }
     except (OSError, ArithmeticError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
-    return made | _claims_of(path.parent / "claims.csv")
+    entries = (extension.index_entry(path.parent) for extension in extensions())
+    return made | {"entry": next((entry for entry in entries if entry is not None), None)}
 
 
-def _by_paper(runs: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:
-    """The runs by the paper whose claims they judge; one that judges none with others of its study, or under that."""
-    papers = {run["study"]: run["paper"] for run in reversed(runs) if run["paper"]}
-    found: dict[str, list[Mapping[str, Any]]] = {}
+def _by_group(runs: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:
+    """The runs by the group that an extension puts them in; those in none with others of their study, or under that."""
+    groups = {run["study"]: run["entry"].group for run in reversed(runs) if run["entry"] and run["entry"].group}
+    by_group: dict[str, list[Mapping[str, Any]]] = {}
     for run in runs:
-        found.setdefault(run["paper"] or papers.get(run["study"], run["study"]), []).append(run)
-    return dict(sorted(found.items()))
+        group = run["entry"].group if run["entry"] else ""
+        by_group.setdefault(group or groups.get(run["study"], run["study"]), []).append(run)
+    return dict(sorted(by_group.items()))
 
 
 def _finished(record: Mapping, path: Path) -> str:
@@ -614,15 +583,3 @@ def _finished(record: Mapping, path: Path) -> str:
     finished = record.get("finished")
     when = datetime.fromisoformat(finished) if finished else datetime.fromtimestamp(path.stat().st_mtime, UTC)
     return when.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
-
-
-def _claims_of(path: Path) -> dict[str, Any]:
-    """From a table of claims the paper of the first, how many are of which class in words, and as styled marks."""
-    try:
-        rows = list(csv.DictReader(io.StringIO(files.read(path).decode("utf-8"), newline="")))
-        looks = [_css(parts[0]["class"]) for parts in claims_page.grouped(rows)]
-        marks = {look: looks.count(look) for look in ("confirmed", "refuted", "unclear") if look in looks}
-        paper = rows[0]["paper"].partition(",")[0] if rows else ""
-        return {"paper": paper, "claims": claims_page.counted(rows), "marks": marks}
-    except (OSError, ValueError, LookupError, csv.Error):
-        return {"paper": "", "claims": "", "marks": {}}

@@ -20,10 +20,9 @@ A study that follows this declares an object and writes no class:
 | `shown`, `drawn_from` | `figures.COMPONENTS` and `figures.DRAWN_FROM`, where there are such |
 | `question`, `answer` | functions of `words` |
 | `warnings`, if offered | the function of `words` |
-| `claims`, if there is a paper | those of `claims.yaml`, or `claims.CLAIMS`, judged by `measures.Evidence` |
+| claims, if there is a paper | those of `claims.yaml`, measured by functions of `measures`; see `radarsim.papers` |
 | `seconds_per_update`, `seconds_at_most`, if offered | functions of `cost` |
 | `errors`, `shortened`, `exact_but_for`, `costly`, if offered | functions of `study` |
-| `interpretations`, if offered | an object of the class `interpretations.Interpretations` |
 | `recorded`, if offered | an object of the class `track.Recorded` |
 | `chart`, if offered | the function of `chart` |
 | `own_filters`, if offered | the function of `given` |
@@ -40,11 +39,10 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, get_args
 
 from radarsim.report.quantities import COMMON, Component, Quantity
-from radarsim.studies.interface import OptionalPart, Paper, Study, paper_in
+from radarsim.studies.interface import OptionalPart, Paper, Study
 
 if TYPE_CHECKING:
     from radarsim.config.fields import Study as Keys
-    from radarsim.report.claims import PaperClaims
 
 
 class _Part:
@@ -118,26 +116,13 @@ class StudyFolder(Study):
     figures, chart = part("figures"), part("chart")
     question, answer, warnings = part("words"), part("words"), part("words")
     own_filters, floor = part("given"), part("floor")
-    interpretations, recorded = part("interpretations", "Interpretations"), part("track", "Recorded")
+    recorded = part("track", "Recorded")
 
     def shown(self) -> Sequence[Component]:
         return getattr(self.file("figures"), "COMPONENTS", ())
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
         return getattr(self.file("figures"), "DRAWN_FROM", {})
-
-    def paper_key(self) -> str:
-        (folder,) = import_module(self.package).__path__
-        written = Path(folder) / "claims.yaml"
-        return paper_in(written.read_text(encoding="utf-8")) if written.is_file() else ""
-
-    def claims(self) -> "PaperClaims | None":
-        if self.paper is None:
-            return None
-        from radarsim.report.claims import PaperClaims
-        from radarsim.report.claims.over import claims_of
-
-        return PaperClaims(claims_of(self.file), self.file("measures").Evidence, *self.paper)
 
     def shipped(self) -> Path | None:
         (folder,) = import_module(self.package).__path__

@@ -9,7 +9,6 @@ realisations. Everything else derives from these sums.
 
 A study whose files have the usual names need not write the class: see `radarsim.studies.folder`."""
 
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -29,9 +28,6 @@ if TYPE_CHECKING:
     from radarsim.config.fields import Model
     from radarsim.config.fields import Study as Keys
     from radarsim.engine.results import Axes, CaseResult, Layout, Track
-    from radarsim.report.claims import PaperClaims
-    from radarsim.report.claims.declared import Shipped
-    from radarsim.report.claims.over import PaperInterpretations
     from radarsim.report.drawing import Chart, Figure
     from radarsim.report.quantities import Component, Quantity
     from radarsim.studies.floor import Floor
@@ -356,7 +352,8 @@ def _one_by_one(plots: RecordedPlots, case: "Case", first: int, count: int) -> D
 
 
 class Paper(NamedTuple):
-    """The paper whose claims a study judges; its fields are those of `radarsim.report.claims.PaperClaims`."""
+    """The paper whose claims a study judges: how tables cite it, its page in docs/, lists of a config to which members
+    may be added, keys that only shorten a run, and by the stem of a config claims of other configs that it holds."""
 
     paper: str
     page: str = ""
@@ -365,13 +362,7 @@ class Paper(NamedTuple):
     held_too: Mapping[str, tuple[str, ...]] = MappingProxyType({})
 
 
-def paper_in(claims: str) -> str:
-    """The key `paper` in the text of a claims.yaml, on a line of its own; else nothing."""
-    found = re.search(r"^paper: *([\w-]+) *$", claims, re.MULTILINE)
-    return found[1] if found else ""
-
-
-Beside = Literal["interpretations", "recorded", "shipped", "chart", "shortened", "own_filters", "floor"]
+Beside = Literal["recorded", "shipped", "chart", "shortened", "own_filters", "floor"]
 Costs = Literal["cost", "seconds_per_update", "seconds_at_most"]
 OptionalPart = Literal["curves", "gains", "inputs", Costs, "warnings", "errors", "exact_but_for", "costly", Beside]
 
@@ -533,23 +524,6 @@ class Study(ABC):
 
     def cost(self, made: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":
         """A table of the filters' cost, for the report; run is as in run.json. Default: none."""
-        return None
-
-    def claim_faults(self, shipped: "Shipped") -> Sequence[str]:
-        """Names in its claims and interpretations that no shipped config has, a line each. `shipped` as of
-        `claims.judged`."""
-        return ()
-
-    def paper_key(self) -> str:
-        """The prefix of its claims' names (P1), before they are read. Default: not known, so they are read."""
-        return ""
-
-    def claims(self) -> "PaperClaims | None":
-        """The paper's claims. Default: none."""
-        return None
-
-    def interpretations(self) -> "PaperInterpretations | None":
-        """The paper's open choices, and its claims under each interpretation. Default: nothing."""
         return None
 
     # ---- beside --------------------------------------------------------------------------------------------------

@@ -102,11 +102,11 @@ class LinearStudy(OneFile):
             return
         for name, keys in (("detection", (cls.detection,)), ("fitted", cls.fitted)):
             if isinstance(getattr(cls, "parts", None), Mapping):
-                yield from (f"{name}: there is no key {key}" for key in keys if key and not cls._has(str(key)))
-        if cls.detection and cls._has(str(cls.detection)) and not cls._of_a_part(str(cls.detection)):
+                yield from (f"{name}: there is no key {key}" for key in keys if key and not cls.has_key(str(key)))
+        if cls.detection and cls.has_key(str(cls.detection)) and not cls._of_a_part(str(cls.detection)):
             yield f"detection: {cls.detection} must be a key of a part, PART.KEY"
         for key in map(str, cls.fitted):
-            if not cls._has(key):
+            if not cls.has_key(key):
                 continue
             part, *own = key.split(".")
             found: Any = cls.parts.get(part)

@@ -26,8 +26,8 @@
 `filters`, `baseline` and `scans` are added to the keys, with their marks. Made are the tables curves, gains and `last`,
 the figures, the question and the answer, claims and interpretations, and what is done with recorded plots; `shipped/`
 beside the file holds configs. Claims find a case by its keys, `of: [{radar.scan_period_s: 2}]`, and are measured by
-functions of the file whose first argument is `seen`, or by those of `radarsim.studies.judged`. The alternatives of a
-choice set keys, `sets: {radar.scan_period_s: 2}`.
+functions of the file whose first argument is `seen`, or by those of `radarsim.papers.one_file_measures`. The
+alternatives of a choice set keys, `sets: {radar.scan_period_s: 2}`.
 
 A base for a kind of model derives from `OneFile` and gives `prepare`, with `axes` and `sums` from here, `simulate`, and
 if it can `limits`, `drawing`, `tracker` and `likelihood`. `radarsim.studies.linear` is one.
@@ -39,7 +39,6 @@ import math
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property
 from itertools import chain, combinations
 from operator import attrgetter
 from pathlib import Path
@@ -51,7 +50,7 @@ from radarsim.errors import ConfigError
 from radarsim.failures import call
 from radarsim.language import Term, few, listed, term, tr
 from radarsim.report.quantities import COMMON, Component, Quantity
-from radarsim.studies.interface import Draw, Likelihood, Paper, RecordedPlots, Study, Tracker, paper_in
+from radarsim.studies.interface import Draw, Likelihood, Paper, RecordedPlots, Study, Tracker
 
 if TYPE_CHECKING:
     import numpy as np
@@ -59,9 +58,6 @@ if TYPE_CHECKING:
 
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import Axes, CaseResult, Layout
-    from radarsim.report.claims import PaperClaims
-    from radarsim.report.claims.declared import Claim, Shipped
-    from radarsim.report.claims.over import Choice, PaperInterpretations
     from radarsim.report.drawing import Figure
 
 
@@ -125,8 +121,6 @@ class OneFile(Study):
     def keys(self) -> "type[Keys]":
         if faults := [f"{self.place}: {fault}" for fault in self.missing()]:
             raise ConfigError(*faults)
-        if self.claims_yaml:
-            _ = self._written  # unknown names in a claim are reported before anything runs
         return self.key_class
 
     @property
@@ -178,8 +172,8 @@ class OneFile(Study):
         yield from ("measured: t_s is the time of a plot" for one in cls.measured if one.column == "t_s")
         keys = {"scan_period": (cls.scan_period,)} | {one.column: one.sigma_keys for one in cls.measured}
         for name, every in keys.items():
-            yield from (f"{name}: there is no key {key}" for key in every if key and not cls._has(key))
-        if cls._has(cls.scan_period) and not cls._of_a_part(cls.scan_period):
+            yield from (f"{name}: there is no key {key}" for key in every if key and not cls.has_key(key))
+        if cls.has_key(cls.scan_period) and not cls._of_a_part(cls.scan_period):
             yield f"scan_period: {cls.scan_period} must be a key of a part, PART.KEY"
 
     @classmethod
@@ -189,7 +183,7 @@ class OneFile(Study):
         return bool(own) and part in cls.parts
 
     @classmethod
-    def _has(cls, key: str) -> bool:
+    def has_key(cls, key: str) -> bool:
         """Whether a dotted name is a key, or a property, of the parts; a bare one is of the filters."""
         part, _, own = key.partition(".")
         if part in ("filters", "scans", "baseline"):
@@ -316,51 +310,6 @@ class OneFile(Study):
             base = result.axes.filters[result.axes.baseline]
             words = tr("Gain against {base} there: {filters}.", base=base, filters=listed(each))
             yield panels.at_its_place(result, words)
-
-    # ---- the paper -----------------------------------------------------------------------------------------------
-    @cached_property
-    def _written(self) -> "tuple[tuple[Claim, ...], tuple[Choice, ...]]":
-        """The content of `claims_yaml`."""
-        from radarsim.report.claims.over import written_in
-        from radarsim.studies import judged
-
-        own = sys.modules[type(self).__module__]
-        source = Path(own.__file__ or "").read_text(encoding="utf-8")
-        above = source[: max(source.find(self.claims_yaml), 0)].count("\n")
-        claims, choices = written_in("\n" * above + self.claims_yaml, str(own.__file__), judged, own)
-        keys = [key for choice in choices for one in choice.alternatives for key in one.sets if not self._has(key)]
-        if keys:
-            raise ConfigError(*(f"{self.place}: claims_yaml: choices: sets: there is no key {key}" for key in keys))
-        return claims, choices
-
-    def paper_key(self) -> str:
-        return paper_in(self.claims_yaml)
-
-    def claims(self) -> "PaperClaims | None":
-        if self.paper is None or not self.claims_yaml:
-            return None
-        from radarsim.report.claims import PaperClaims
-        from radarsim.studies import judged
-
-        evidence = getattr(sys.modules[type(self).__module__], "Evidence", judged.Evidence)
-        return PaperClaims(self._written[0], evidence, *self.paper)
-
-    def claim_faults(self, shipped: "Shipped") -> Sequence[str]:
-        if self.paper is None or not self.claims_yaml:
-            return ()
-        from radarsim.studies import judged
-
-        folder = self.shipped()
-        configs = sorted(file.stem for file in folder.glob("configs/*.yaml")) if folder else []
-        components = [one.name for one in self.components]
-        return tuple(judged.faults(*self._written, components, shipped, configs))
-
-    def interpretations(self) -> "PaperInterpretations | None":
-        if self.paper is None or not self.claims_yaml or not self._written[1]:
-            return None
-        from radarsim.studies.judged import Interpretations
-
-        return Interpretations(self._written[0][0].paper, self._written[1])
 
     # ---- beside --------------------------------------------------------------------------------------------------
     def columns(self, spec: Any, one: Any) -> tuple[str, ...]:

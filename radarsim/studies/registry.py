@@ -7,7 +7,7 @@ study is requested: lists of all studies leave it out, and `unusable` gives the 
 A package adds a filter to a study that allows this by an entry point of the group `radarsim.filters`: its name is the
 value of `kind:` of a filter in YAML, its target a class of keys, derived from that of `Study.own_filters`."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -23,6 +23,7 @@ from radarsim.config.fields import Study as Keys
 from radarsim.config.fields import kinds_of, widened
 from radarsim.config.schema import COMMON_KEYS
 from radarsim.errors import OF_AUTHORS, ConfigError, RadarsimError, StudyError
+from radarsim.extensions import extensions
 from radarsim.report.quantities import Quantity
 from radarsim.studies.interface import Study
 
@@ -123,15 +124,6 @@ def parts(take: Callable[[Study], Part]) -> dict[str, Part]:
     return found
 
 
-def papers(take: Callable[[Study], Part], keys: Collection[str] = ()) -> dict[str, Part | None]:
-    """The same for studies whose paper has one of these keys (P1), or a key unknown until its claims are read."""
-
-    def may_be(one: Study) -> bool:
-        return not keys or one.paper_key() in ("", *keys)
-
-    return parts(lambda one: take(one) if may_be(one) else None)
-
-
 def unusable() -> dict[str, str]:
     """The unusable studies of installed packages, by name, with the reason."""
     found = {
@@ -173,11 +165,19 @@ def keys(name: str) -> type[Keys]:
 
 def own_keys(name: str) -> type[Keys]:
     """The schema of a study's own YAML keys. Raises as `study`."""
-    found = part(name, lambda one: one.keys())
+    found = part(name, _checked_keys)
     if not (isinstance(found, type) and issubclass(found, Keys)):
         raise _fault(name, "must give keys that are a subclass of radarsim.config.fields.Study")
     if taken := [key for key in found.model_fields if key in COMMON_KEYS]:
         raise _fault(name, f"has keys that every config has already: {', '.join(taken)}")
+    return found
+
+
+def _checked_keys(study: Study) -> type[Keys]:
+    """The keys of a study. Raises ConfigError for faults in what a package's study declares for extensions."""
+    found = study.keys()
+    for extension in extensions() if study.name not in SHIPPED else ():
+        extension.check_study(study)
     return found
 
 

@@ -23,7 +23,7 @@ from radarsim.studies.user_code_sources import imports_in
 
 RADARSIM = __package__.partition(".")[0]
 ENGINE = "radarsim.app.case_work", "radarsim.engine.run"  # what takes a case through the engine
-SHOW_RESULTS = "radarsim.report", "radarsim.language"
+SHOW_RESULTS = "radarsim.report", "radarsim.language", "radarsim.papers", "radarsim.extensions"
 
 _COMMENT = re.compile(r"#.*")
 _TYPE_CHECKING = re.compile(r"^if TYPE_CHECKING:\n(?:[ \t]+.*\n|\n)+", re.MULTILINE)

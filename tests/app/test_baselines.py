@@ -15,8 +15,8 @@ from radarsim.app.recorded_cases import recorded_case
 from radarsim.app.result import gains_of
 from radarsim.app.run import RunOptions, case_result, check_precision, simulate
 from radarsim.errors import ConfigError
+from radarsim.papers.evidence import Evidence
 from radarsim.report import tables
-from radarsim.report.claims.declared import Evidence
 from radarsim.report.precision import worst
 from radarsim.report.quantities import GAIN
 from radarsim.studies.identity import identity

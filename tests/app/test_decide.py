@@ -5,9 +5,9 @@ import math
 import pytest
 
 import radarsim
-from radarsim.app import interpretations
-from radarsim.report import claims
-from radarsim.report.claims.rule import CONFIRMED, UNDECIDED
+from radarsim.papers import claims_table
+from radarsim.papers.decide import _undecided_rows as undecided_rows
+from radarsim.papers.verdict_rule import CONFIRMED, UNDECIDED
 from tests.program import command
 
 
@@ -25,11 +25,11 @@ def test_what_is_known_exactly_is_decided_at_the_first_look(tmp_path):
 
 def test_what_is_left_says_what_it_would_take():
     row = {"paper": "p", "claim": "P9.1", "as_shipped": UNDECIDED, "extension": False, "n": 4000, "needed": 12345.0}
-    assert interpretations.undecided([row]) == ["P9.1 not yet decided at 4,000 realisations; about 13,000 would"]
-    assert "more realisations would not decide" in interpretations.undecided([row | {"needed": math.nan}])[0]
-    assert interpretations.undecided([row | {"as_shipped": CONFIRMED}]) == []
-    assert interpretations.undecided([row | {"extension": True}]) == []
-    assert interpretations.undecided([row | {"class": CONFIRMED}])  # over all interpretations, by other runs than this
+    assert undecided_rows([row]) == ["P9.1 not yet decided at 4,000 realisations; about 13,000 would"]
+    assert "more realisations would not decide" in undecided_rows([row | {"needed": math.nan}])[0]
+    assert undecided_rows([row | {"as_shipped": CONFIRMED}]) == []
+    assert undecided_rows([row | {"extension": True}]) == []
+    assert undecided_rows([row | {"class": CONFIRMED}])  # over all interpretations, by other runs than this
 
 
 def test_a_time_limit_before_all_cases_names_the_claims_that_wait(tmp_path):
@@ -53,7 +53,7 @@ def test_undecided_at_the_most_is_exit_code_3(tmp_path):
 
 
 def test_an_exact_value_that_simulation_denies_is_exit_code_4_with_all_written(tmp_path, monkeypatch):
-    monkeypatch.setattr(claims, "errors", lambda table: ["P1.1: exact 1, simulated 2"])
+    monkeypatch.setattr(claims_table, "disagreements", lambda table: ["P1.1: exact 1, simulated 2"])
     done = command("run", "rls1", "rls2", "-n", "500", "--out", tmp_path, "--no-figures", "-q", code=4)
     assert done.stderr == "".join(f"{stem}: P1.1: exact 1, simulated 2\n" for stem in ("rls1", "rls2"))
     for stem in ("rls1", "rls2"):

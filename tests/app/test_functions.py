@@ -8,9 +8,9 @@ import pytest
 from click.testing import CliRunner
 
 import radarsim
-from radarsim.app import interpretations as interpretation
 from radarsim.app import shown as documents
 from radarsim.cli import main
+from radarsim.papers.interpretation_files import json_documents
 from radarsim.report import tables
 from tests.cli.test_every_study import CONFIGS, SOLVED
 
@@ -147,9 +147,7 @@ def test_claims(tmp_path):
 
 def test_interpretations(tmp_path):
     found = radarsim.interpretations("P1.4")
-    assert document(interpretation.documents(found)) == printed(
-        "interpretations", "P1.4", "--out", tmp_path, "--no-figures"
-    )
+    assert document(json_documents(found)) == printed("interpretations", "P1.4", "--out", tmp_path, "--no-figures")
     assert found.files == ()
     assert found.figures == ("P1.4",)
     assert repr(found).startswith("P1.4 ")

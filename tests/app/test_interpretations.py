@@ -12,13 +12,15 @@ from functools import partial
 import pytest
 
 import radarsim
-from radarsim.app import interpretations as app
-from radarsim.app.interpretations import Plan
 from radarsim.app.run import RunOptions
-from radarsim.app.stored import shipped_classes, stored_classes, stored_interpretations
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
-from radarsim.report.claims import rule
-from radarsim.report.claims.over import Alternative, Choice, PaperInterpretations, Unreadable
+from radarsim.papers.interpretation_runs import InterpretationRuns
+from radarsim.papers.interpretations import Alternative, Choice, ImpossibleInterpretation, PaperInterpretations
+from radarsim.papers.judge_interpretations import judge_requests
+from radarsim.papers.open_papers import JudgingRequest, OpenPaper, judging_requests, open_papers
+from radarsim.papers.stored_verdicts import shipped_classes, stored_classes, stored_interpretations
+from radarsim.papers.study_claims import claims_of
+from radarsim.papers.verdict_rule import CONFIRMED, REFUTED, UNDECIDED, UNSTATED
 from radarsim.studies import registry
 from tests.program import command
 
@@ -34,7 +36,7 @@ def table(out):
 def first(tmp_path_factory):
     """The first paper under all its interpretations."""
     out = tmp_path_factory.mktemp("results")
-    return out, app.judged(app.asked(["P1"]), out=out, figures=False)
+    return out, judge_requests(judging_requests(["P1"]), out=out, figures=False)
 
 
 def test_the_table_has_a_column_a_choice_and_a_row_a_part(first):
@@ -43,11 +45,11 @@ def test_the_table_has_a_column_a_choice_and_a_row_a_part(first):
     header = text.split("\n", 1)[0]
     assert header.startswith("claim,part,interpretation,kind,")
     assert COLUMNS in header
-    assert set(dict.fromkeys(c.key for p in app.papers().values() for c in p.interpretations.choices)) < set(
+    assert set(dict.fromkeys(c.key for p in open_papers().values() for c in p.interpretations.choices)) < set(
         header.split(",")
     )
     rows = table(out)
-    paper = app.papers()["P1"]
+    paper = open_papers()["P1"]
     open_claims = [one for one in paper.claims.claims if any(c.bears_on(one.id) for c in paper.interpretations.choices)]
     assert {row["claim"] for row in rows} == {one.id for one in open_claims}
     for claim in open_claims:
@@ -68,7 +70,7 @@ def test_a_verdict_is_that_of_the_rule_on_the_table(first):
         by_interpretation = {row["interpretation"]: row["outcome"] for row in own}
         found = over.outcome
         assert found.interpretations == len(by_interpretation)
-        assert found.holds_in == sum(one == rule.CONFIRMED for one in by_interpretation.values())
+        assert found.holds_in == sum(one == CONFIRMED for one in by_interpretation.values())
         assert over.sentence().startswith(f"holds in {found.holds_in} of {found.interpretations} interpretations")
         if found.depends_on:
             assert f"depends on {over.of.asked(found.depends_on)}" in over.sentence()
@@ -89,12 +91,12 @@ def test_what_is_known_of_the_first_paper(first):
     said = {over.claim.id: over.outcome for over in done.read[0].over}
     assert said["P1.5"].words == "depends on end_of, falls_to"
     assert (said["P1.5"].holds_in, said["P1.5"].interpretations) == (6, 18)
-    assert said["P1.17"].kind == rule.REFUTED  # in every interpretation: robust
+    assert said["P1.17"].kind == REFUTED  # in every interpretation: robust
     assert said["P1.17"].holds_in == 0
-    assert said["P1.9"].kind == said["P1.25"].kind == rule.CONFIRMED
+    assert said["P1.9"].kind == said["P1.25"].kind == CONFIRMED
     assert said["P1.6"].depends_on == ("falls_to",)
     assert said["P1.7"].depends_on == ("start",)
-    assert said["P1.20"].kind == rule.CONFIRMED  # a level is no matter of where a curve is cut
+    assert said["P1.20"].kind == CONFIRMED  # a level is no matter of where a curve is cut
 
 
 def test_figure_1a_is_of_several_variances(first):
@@ -165,29 +167,29 @@ def test_the_interpretations_agree_with_the_stored_run_of_the_shipped_config(fir
 def test_other_claims_keep_their_rows(first):
     out, _ = first
     before = table(out)
-    app.judged(app.asked(["P1.4"]), out=out, figures=False)
+    judge_requests(judging_requests(["P1.4"]), out=out, figures=False)
     assert table(out) == before
 
 
 def test_unknown_names_say_what_is_allowed():
     with pytest.raises(ConfigError) as caught:
-        app.asked(["P9", "P1.99"])
+        judging_requests(["P9", "P1.99"])
     assert caught.value.lines[0].startswith("interpretations: no paper or claim 'P9'; papers: P1, ")
     assert "its claims: P1.1, P1.2" in caught.value.lines[1]
     with pytest.raises(ConfigError, match=r"P1\.E1 is an extension of ours"):
-        app.asked(["P1.E1"])
+        judging_requests(["P1.E1"])
 
 
 def test_no_realisations_are_refused(tmp_path):
     with pytest.raises(ConfigError, match=r"^realisations: must be >= 1, got 0"):
-        app.judged(app.asked(["P3.8"]), out=tmp_path, realisations=0, figures=False)
+        judge_requests(judging_requests(["P3.8"]), out=tmp_path, realisations=0, figures=False)
 
 
 def test_a_damaged_table_is_reported(tmp_path):
     (tmp_path / "interpretations").mkdir()
     (tmp_path / "interpretations/interpretations.csv").write_text("a,b\n1,2\n")
     with pytest.raises(StoreError, match="is no table of interpretations"):
-        app.judged(app.asked(["P1.4"]), out=tmp_path, figures=False)
+        judge_requests(judging_requests(["P1.4"]), out=tmp_path, figures=False)
 
 
 @pytest.mark.slow
@@ -220,9 +222,9 @@ class Velocities(PaperInterpretations):
             "nothing",
             "nothing",
             (
-                Alternative("shipped", rule.UNSTATED, "as in the table"),
-                Alternative("useless", rule.UNSTATED, "a hundred times worse"),
-                Alternative("none", rule.UNSTATED, "no such radar"),
+                Alternative("shipped", UNSTATED, "as in the table"),
+                Alternative("useless", UNSTATED, "a hundred times worse"),
+                Alternative("none", UNSTATED, "no such radar"),
             ),
         ),
     )
@@ -230,7 +232,7 @@ class Velocities(PaperInterpretations):
     def changed(self, claim, case, interpretation):
         factor = {"shipped": 1.0, "useless": 1e2}.get(interpretation["sigma_velocity"])
         if factor is None:
-            raise Unreadable("there is no such radar")
+            raise ImpossibleInterpretation("there is no such radar")
         radar = case.spec.radar.model_copy(update={"sigma_velocity_mps": factor * case.spec.radar.sigma_velocity_mps})
         return dataclasses.replace(case, spec=case.spec.model_copy(update={"radar": radar}))
 
@@ -238,19 +240,19 @@ class Velocities(PaperInterpretations):
 @pytest.fixture
 def ran():
     """That paper, wanted for the claim on gains over 50 % (P1.8)."""
-    claims = registry.study("range_doppler").claims()
+    claims = claims_of(registry.study("range_doppler"))
     claim = next(one for one in claims.claims if one.id == "P1.8")
-    return app.Asked(app.Paper(Velocities(), claims, "range_doppler"), [claim])
+    return JudgingRequest(OpenPaper(Velocities(), claims, "range_doppler"), [claim])
 
 
 @pytest.mark.slow
 def test_interpretations_that_are_run(ran, tmp_path, monkeypatch):
     seen = []
-    done = app.judged([ran], out=tmp_path, figures=False, progress=lambda *of: seen.append(of))
+    done = judge_requests([ran], out=tmp_path, figures=False, progress=lambda *of: seen.append(of))
     (over,) = done.read[0].over
     by_name = {one.interpretation["sigma_velocity"]: one for one in over.under}
-    assert by_name["shipped"].outcome.kind == rule.CONFIRMED
-    assert by_name["useless"].outcome.kind == rule.REFUTED
+    assert by_name["shipped"].outcome.kind == CONFIRMED
+    assert by_name["useless"].outcome.kind == REFUTED
     assert by_name["none"].outcome is None
     assert by_name["none"].why == "there is no such radar"
     assert over.outcome.words == "depends on sigma_velocity"
@@ -260,16 +262,16 @@ def test_interpretations_that_are_run(ran, tmp_path, monkeypatch):
     assert judged.lo < judged.measured < judged.hi
     assert [done for done, _total, _held in seen] == sorted(done for done, _total, _held in seen)
     assert seen[-1][0] > 0.99 * seen[-1][1]  # all that was predicted is done
-    computed, run = [], Plan._run
+    computed, run = [], InterpretationRuns._run
 
     def counted(self, *of):
         found = run(self, *of)
         computed.extend(collected.computed for _, _, collected in found.cases)
         return found
 
-    monkeypatch.setattr(Plan, "_run", counted)
+    monkeypatch.setattr(InterpretationRuns, "_run", counted)
     again = []
-    app.judged([ran], out=tmp_path, progress=lambda *of: again.append(of))
+    judge_requests([ran], out=tmp_path, progress=lambda *of: again.append(of))
     assert set(computed) == {0}  # all of it from the store
     assert again[-1][0] > 0.99 * again[-1][1]
 
@@ -278,7 +280,7 @@ def test_interpretations_that_are_run(ran, tmp_path, monkeypatch):
 def test_a_run_is_judged_and_let_go(ran, tmp_path, monkeypatch):
     """Sums and tables of one run at a time are held, however many interpretations there are."""
     seen, alive = [], []
-    run = Plan._run
+    run = InterpretationRuns._run
 
     def counted(self, *of):
         alive.append(sum(one() is not None for one in seen))
@@ -286,9 +288,9 @@ def test_a_run_is_judged_and_let_go(ran, tmp_path, monkeypatch):
         seen.append(weakref.ref(found))
         return found
 
-    monkeypatch.setattr(Plan, "_run", counted)
+    monkeypatch.setattr(InterpretationRuns, "_run", counted)
     wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, interpretations=Margins()))
-    app.judged([wanted], out=tmp_path, realisations=4000, decide=True, figures=False)
+    judge_requests([wanted], out=tmp_path, realisations=4000, decide=True, figures=False)
     assert len(alive) > 2
     assert max(alive) == 0
     assert all(one() is None for one in seen)
@@ -300,7 +302,7 @@ def test_a_interpretation_as_shipped_measures_what_a_run_of_the_config_does(ran,
 
     result = radarsim.run("range_doppler", realisations=2000, out=tmp_path, figures=False)
     stored = result.tables["claims"].set_index(["claim", "what", "case"])[["measured", "exact"]]
-    done = app.judged([ran], out=tmp_path, figures=False)
+    done = judge_requests([ran], out=tmp_path, figures=False)
     for part, judged in done.read[0].over[0].under[0].parts:
         assert (judged.measured, judged.exact) == tuple(stored.loc["P1.8", part.what, f"rls{part.cases[0]}"])
 
@@ -309,9 +311,9 @@ def test_exact_values_decide_under_a_interpretation_as_in_a_run(ran, tmp_path):
     """Of 60 realisations: what a run knows exactly is undecided neither in the shipped interpretation nor in a changed
     one."""
     wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, interpretations=Near()))
-    (over,) = app.judged([wanted], out=tmp_path, realisations=60, figures=False).read[0].over
+    (over,) = judge_requests([wanted], out=tmp_path, realisations=60, figures=False).read[0].over
     assert all(judged.known and judged.n == 60 for one in over.under for _, judged in one.parts)
-    assert over.outcome.kind != rule.UNDECIDED
+    assert over.outcome.kind != UNDECIDED
     measured = {judged.exact for one in over.under for _, judged in one.parts}
     assert len(measured) == sum(len(one.parts) for one in over.under)  # each case has its own
 
@@ -323,7 +325,7 @@ class Near(Velocities):
     choices = (
         Choice(
             *("sigma_velocity", "How accurate the velocity is", "nothing", "nothing"),
-            (Alternative("shipped", rule.UNSTATED, "as in the table"), Alternative("worse", rule.UNSTATED, "by 1.1")),
+            (Alternative("shipped", UNSTATED, "as in the table"), Alternative("worse", UNSTATED, "by 1.1")),
         ),
     )
 
@@ -347,17 +349,17 @@ class Margins(Near):
 @pytest.mark.slow
 def test_what_is_undecided_runs_on_until_it_is_decided(ran, tmp_path):
     wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, interpretations=Margins()))
-    few = app.judged([wanted], out=tmp_path, figures=False)
+    few = judge_requests([wanted], out=tmp_path, figures=False)
     before = few.read[0].over[0]
-    assert before.outcome.kind == rule.UNDECIDED
+    assert before.outcome.kind == UNDECIDED
     assert before.undecided
     assert not few.left
-    little = app.judged([wanted], out=tmp_path, realisations=60, decide=True, figures=False)
+    little = judge_requests([wanted], out=tmp_path, realisations=60, decide=True, figures=False)
     assert little.read[0].over[0].outcome == before.outcome  # the most is what it began with
     assert f"P1.8 not yet decided under {len(before.undecided)} interpretations at 60 realisations; " in little.left[0]
-    decided = app.judged([wanted], out=tmp_path, realisations=64_000, decide=True, figures=False)
+    decided = judge_requests([wanted], out=tmp_path, realisations=64_000, decide=True, figures=False)
     (over,) = decided.read[0].over
-    assert over.outcome.kind != rule.UNDECIDED
+    assert over.outcome.kind != UNDECIDED
     assert not decided.left
     counts = {judged.n for one in over.under for _, judged in one.parts}
     assert counts - {60} <= {2000 * 2**m for m in range(6)}
@@ -378,7 +380,7 @@ def test_what_is_left_undecided_is_exit_code_3(tmp_path):
 
 def test_a_time_limit_stops_cleanly(ran, tmp_path):
     with pytest.raises(TargetUnmet, match="the same command continues"):
-        app.judged([ran], out=tmp_path, options=RunOptions(stop=lambda: "time limit reached"), figures=False)
+        judge_requests([ran], out=tmp_path, options=RunOptions(stop=lambda: "time limit reached"), figures=False)
 
 
 def test_names_of_earlier_versions_still_work(tmp_path):

@@ -9,8 +9,8 @@ import pytest
 
 from radarsim.cli import console, outcomes
 from radarsim.config import document
+from radarsim.papers.claims_table import CLASS_COLUMNS
 from radarsim.report import notes
-from radarsim.report.claims.judge import SAID
 from radarsim.report.wording import significant_digits
 from radarsim.threads import limited
 from tests.program import Terminal, command
@@ -50,7 +50,7 @@ def test_claims_without_results_say_where_to_find_them(tmp_path):
 
 def parts(*extensions):
     """Parts of a refuted claim, of which these are not counted."""
-    common = {"claim": "P9.1", "paper": "P", "place": "there"} | dict.fromkeys(SAID, "confirmed")
+    common = {"claim": "P9.1", "paper": "P", "place": "there"} | dict.fromkeys(CLASS_COLUMNS, "confirmed")
     common |= {"statement": "It is so", "original": "", "config": "c", "what": "size", "case": "", "unit": "m"}
     common |= {"measured": 9.0, "lo": 9.0, "hi": 9.0, "exact": 9.0, "expected": "≤ 5", "miss": 8.0, "depends_on": ""}
     common |= dict.fromkeys(("needed", "of", "holds", "worst_miss"), math.nan)

@@ -7,12 +7,14 @@ import re
 import pytest
 from making import claims, interpretations
 
-from radarsim.app.run import papers
-from radarsim.app.stored import shipped_classes
-from radarsim.report.claims import NOT_RUN, page
+from radarsim.papers.claim_rows import count_classes
+from radarsim.papers.claims_table import NOT_RUN
+from radarsim.papers.forest_plot import forest_plot
+from radarsim.papers.stored_verdicts import shipped_classes
+from radarsim.papers.study_claims import paper_claims
 
 LINE = re.compile(r"^\| (P\d\.\w+) \| <details><summary>(.*?)</summary>(.*?)</details> \| (.*) \| `(\w+)` \|$", re.M)
-DECLARED = {claim.id: claim for of in papers() for claim in of.claims}
+DECLARED = {claim.id: claim for of in paper_claims() for claim in of.claims}
 
 
 @pytest.fixture(scope="module")
@@ -55,15 +57,15 @@ def test_what_is_kept_is_a_part_of_its_claim():
 
 def test_a_full_reproduction_is_shown_with_every_part(tmp_path, text, monkeypatch):
     rows = claims.kept()
-    found = claims.run.Claims([*rows, rows[0] | {"what": "another part"}])
-    monkeypatch.setattr(claims.run, "claims", lambda out: found)
+    found = claims.list_claims.Claims([*rows, rows[0] | {"what": "another part"}])
+    monkeypatch.setattr(claims.list_claims, "claims", lambda out: found)
     full = claims.markdown(tmp_path)
     assert "| P1.1 | another part |" in full
     assert "another part" not in text
 
 
 def test_readme_and_landing_page_count_the_claims():
-    count = sum(page.counts(claims.kept())[0].values())
+    count = sum(count_classes(claims.kept())[0].values())
     for name in ("README.md", "docs/README.md"):
         assert f"{count} claims" in (claims.FILE.parents[2] / name).read_text(encoding="utf-8")
 
@@ -75,7 +77,7 @@ def test_results_that_cannot_be_read_are_no_full_reproduction(tmp_path, text):
 
 
 def test_the_figure_is_drawn_beside_the_page():
-    assert {getattr(mark, "label", "") for panel in page.figure(claims.kept()).panels for mark in panel.marks} >= {
+    assert {getattr(mark, "label", "") for panel in forest_plot(claims.kept()).panels for mark in panel.marks} >= {
         "confirmed",
         "refuted",
     }
@@ -87,7 +89,7 @@ def test_the_page_of_interpretations_has_every_class_and_choice(paper, tmp_path)
     for one in shipped_classes():
         if one.claim.startswith(f"{paper}."):
             assert re.search(rf"^\| {re.escape(one.claim)} \| .* \| {one.holds} of {one.of} \|$", made, re.M), one.claim
-    choices = interpretations.interpretations.papers()[paper].interpretations.choices
+    choices = interpretations.open_papers()[paper].interpretations.choices
     assert [f"### `{choice.key}`: {choice.asks}" for choice in choices] == re.findall("^### .*$", made, re.M)
     whole = tmp_path / "interpretations" / f"{paper}.md"
     whole.parent.mkdir()

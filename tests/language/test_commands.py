@@ -7,15 +7,19 @@ import re
 import pytest
 from making import messages
 
-from radarsim.app import configs, interpretations, solve
+from radarsim.app import configs, solve
 from radarsim.app.compare import chart, described
 from radarsim.app.configs import load
 from radarsim.app.quantities import Asked
 from radarsim.language import speaking, tr
-from radarsim.report.claims import page as curve
-from radarsim.report.claims import rule
-from radarsim.report.claims.declared import differences
-from radarsim.report.claims.over import alternative
+from radarsim.papers.claim_rows import decisive_value_words, expected_words, unit_after
+from radarsim.papers.interpretation_files import markdown_pages
+from radarsim.papers.interpretations import alternative_words
+from radarsim.papers.judge_interpretations import judge_requests
+from radarsim.papers.open_papers import judging_requests, open_papers
+from radarsim.papers.paper_cases import key_differences
+from radarsim.papers.reasons import translate_reason
+from radarsim.papers.specification_curve import specification_curve
 from radarsim.report.quantities import SIGMA
 from radarsim.studies.range_doppler.chart import SAID
 from radarsim.studies.range_doppler.study import exact_but_for
@@ -82,10 +86,10 @@ def test_the_list_says_what_things_are_and_leaves_their_names():
 @pytest.mark.parametrize("claim", ["P1.4", "P1.5"])
 def test_interpretations_of_a_claim_and_their_curve(claim, tmp_path):
     with speaking("ru"):
-        done = interpretations.judged(interpretations.asked([claim]), out=tmp_path, figures=False)
-        page = interpretations.pages(done)
+        done = judge_requests(judging_requests([claim]), out=tmp_path, figures=False)
+        page = markdown_pages(done)
         over = done.read[0].over[0]
-        texts = shown(curve.specification(over))
+        texts = shown(specification_curve(over))
     every = [one.name for choice in over.of.choices for one in choice.alternatives]  # the page has them as keys
     typed = {part for name in every for part in re.findall("[A-Za-z]+", name)} | {"same", "time"}
     names = NAMES | typed | {"interpretations", "markdown", "results", "verdicts"}
@@ -93,13 +97,13 @@ def test_interpretations_of_a_claim_and_their_curve(claim, tmp_path):
 
 
 def test_what_papers_leave_open_is_said_in_the_language():
-    choices = [choice for paper in interpretations.papers().values() for choice in paper.interpretations.choices]
+    choices = [choice for paper in open_papers().values() for choice in paper.interpretations.choices]
     names = {one.name for choice in choices for one in choice.alternatives}
     with speaking("ru"):
-        said = {name: alternative(name) for name in names}
+        said = {name: alternative_words(name) for name in names}
     assert {name: words for name, words in said.items() if untranslated(words, set())} == {}
     assert said["0.003"] == "0,003"
-    assert (alternative("half σ_a"), alternative("process_noise")) == ("half σ_a", "process noise")
+    assert (alternative_words("half σ_a"), alternative_words("process_noise")) == ("half σ_a", "process noise")
 
 
 REASONS = (
@@ -116,9 +120,9 @@ REASONS = (
 
 @pytest.mark.parametrize("why", REASONS)
 def test_reasons_of_claims_that_are_not_judged(why):
-    assert rule.said(why) == why
+    assert translate_reason(why) == why
     with speaking("ru"):
-        said = rule.said(why)
+        said = translate_reason(why)
     assert untranslated(said, {"rls", "seed", "filters", "target", "radar"}) == []
     assert re.findall(r"\d+", said.replace(",", ".")) == re.findall(r"\d+", why)
 
@@ -135,20 +139,20 @@ def test_every_reason_that_the_sources_give_is_known():
             )
     assert len(raised) > 4
     assert raised <= found
-    assert differences  # its texts are the patterns of `reasons`
+    assert key_differences  # its texts are the patterns of `reasons`
 
 
 def test_units_that_count_have_the_form_of_their_number():
     found = {"measured": 1.0, "exact": 1.0, "judged_lo": "", "judged_hi": "", "lo": 0.0, "hi": 3.0, "unit": "scans"}
-    assert [curve.unit_after(n, "scans") for n in (1, 2, 0.5)] == ["scan", "scans", "scans"]
-    assert curve.shown(found) == "1 scan exactly"
+    assert [unit_after(n, "scans") for n in (1, 2, 0.5)] == ["scan", "scans", "scans"]
+    assert decisive_value_words(found) == "1 scan exactly"
     with speaking("ru"):
-        said = [curve.unit_after(n, "scans") for n in (1, -2, 5, 1.5, 21, float("inf"))]
+        said = [unit_after(n, "scans") for n in (1, -2, 5, 1.5, 21, float("inf"))]
         assert said == ["обзор", "обзора", "обзоров", "обзора", "обзор", "обзора"]
-        assert curve.shown(found) == "1 обзор точно"
-        assert curve.expected("about 2 to 5", "plots").endswith(" 5 отметок")
-        assert curve.expected("0.5", "%") == "0,5 %"
-        assert curve.expected("few") == tr("few")
+        assert decisive_value_words(found) == "1 обзор точно"
+        assert expected_words("about 2 to 5", "plots").endswith(" 5 отметок")
+        assert expected_words("0.5", "%") == "0,5 %"
+        assert expected_words("few") == tr("few")
 
 
 def test_what_solve_announces():

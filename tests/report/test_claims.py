@@ -7,10 +7,14 @@ import pytest
 
 import radarsim
 from radarsim.app import configs
-from radarsim.app.run import papers
-from radarsim.report import claims, tables
-from radarsim.report.claims import CONFIRMED, REFUTED, UNCLEAR, Series
-from radarsim.report.claims.rule import UNDECIDED
+from radarsim.papers import expected_ranges
+from radarsim.papers.claims_table import NOT_JUDGED, UNCLEAR, claim_rows, claims_table, disagreements, old_verdict
+from radarsim.papers.evidence import Curve, MissingEvidence, common_times, ratio, subtract
+from radarsim.papers.expected_ranges import about, at_most, below, between, greater, printed, same, within
+from radarsim.papers.result_claims import claims_by_class, unjudged_claims
+from radarsim.papers.study_claims import claims_of, paper_claims
+from radarsim.papers.verdict_rule import CONFIRMED, REFUTED, UNDECIDED
+from radarsim.report import tables
 from radarsim.report.statistics import Estimate
 from radarsim.studies import registry
 from radarsim.studies.range_doppler import tables as range_doppler
@@ -20,7 +24,7 @@ from tests.tolerances import assert_rounded, recursion_rounding
 
 def judged(results, shipped=configs.shipped):
     made = {"curves": tables.curves(results), "gains": tables.gains(results), **range_doppler.tables(results)}
-    return claims.judged(registry.study("range_doppler").claims(), results, made, shipped)
+    return claims_table(claims_of(registry.study("range_doppler")), results, made, shipped)
 
 
 @pytest.fixture(scope="module")
@@ -32,33 +36,33 @@ def table(paper, swept_all):
 
 def test_ranges_from_words():
     """Values, margin, and the range of the old rule."""
-    assert claims.printed("18")[:2] == (18, 18)
-    assert claims.printed("18").margin == 0.5
-    assert claims.printed("25", step=5).margin == 2.5
-    assert_rounded(claims.printed("0.33").strict, (0.325, 0.335), operations=2)
-    assert claims.between("7", "15")[:2] == (7, 15)
-    assert claims.between("7", "15").strict == (6.5, 15.5)
-    assert_rounded(claims.about("10").margin, 1)
-    assert claims.about("10", margin=5).margin == 5
-    assert_rounded(claims.about("20", "30").strict, (18, 33), operations=2)
-    assert claims.above(50).lo > 50
-    assert claims.above(50).margin == 0.5
-    assert_rounded(claims.above(0.99).margin, 0.005, operations=2)
-    assert claims.below(10).hi < 10
-    assert claims.within(3, 4)[:2] == (3, 4)
+    assert printed("18")[:2] == (18, 18)
+    assert printed("18").margin == 0.5
+    assert printed("25", step=5).margin == 2.5
+    assert_rounded(printed("0.33").strict, (0.325, 0.335), operations=2)
+    assert between("7", "15")[:2] == (7, 15)
+    assert between("7", "15").strict == (6.5, 15.5)
+    assert_rounded(about("10").margin, 1)
+    assert about("10", margin=5).margin == 5
+    assert_rounded(about("20", "30").strict, (18, 33), operations=2)
+    assert expected_ranges.above(50).lo > 50
+    assert expected_ranges.above(50).margin == 0.5
+    assert_rounded(expected_ranges.above(0.99).margin, 0.005, operations=2)
+    assert below(10).hi < 10
+    assert within(3, 4)[:2] == (3, 4)
 
 
 def test_kinds_of_margins():
-    assert claims.above(0).kind == claims.greater().kind == "material"
-    assert claims.above(50).kind == claims.at_most(10).kind == "limit"
-    assert (claims.printed("18").kind, claims.about("10").kind, claims.same().kind) == ("print", "about", "same")
+    assert expected_ranges.above(0).kind == greater().kind == "material"
+    assert expected_ranges.above(50).kind == at_most(10).kind == "limit"
+    assert (printed("18").kind, about("10").kind, same().kind) == ("print", "about", "same")
 
 
 def test_words_give_the_margin():
-    assert claims.between("10", "50").words == "10 to 50 ± 0.5"
-    assert claims.printed("25", step=5).words == "25 ± 2.5"
-    assert claims.about("10").words == "about 10 ± 1"
-    assert claims.about("20", "30", margin=10).words == "about 20 to 30 ± 10"
+    assert between("10", "50").words == "10 to 50 ± 0.5"
+    assert printed("25", step=5).words == "25 ± 2.5"
+    assert about("10").words == "about 10 ± 1"
+    assert about("20", "30", margin=10).words == "about 20 to 30 ± 10"
 
 
 @pytest.mark.parametrize(
@@ -76,37 +80,37 @@ def test_words_give_the_margin():
     ],
 )
 def test_verdict_is_of_the_interval(lo, hi, said):
-    assert claims.verdict(Estimate((lo + hi) / 2, lo, hi), (1.0, 2.0)) == said
+    assert old_verdict(Estimate((lo + hi) / 2, lo, hi), (1.0, 2.0)) == said
 
 
 def test_series():
     k = np.arange(1, 5)
     value = np.array([1.0, 3.0, 2.9, 0.5])
-    series = Series(k, 10.0 * k, value, value - 0.2, value + 0.2)
+    series = Curve(k, 10.0 * k, value, value - 0.2, value + 0.2)
     assert series.largest() == (3.0, 2.8, 3.2)
     assert series.least().value == 0.5
     assert series.when_largest() == (20.0, 20.0, 30.0)
     assert series.when_largest("k") == (2, 2, 3)
     assert series.since(3).first().value == 2.9
     assert series.at(4) == series.last()
-    with pytest.raises(claims.Missing):
+    with pytest.raises(MissingEvidence):
         series.at(9)
-    half = Series(k[:2], 20.0 * k[:2], value[:2], value[:2], value[:2])
-    a, b = claims.common_times(series, half)
+    half = Curve(k[:2], 20.0 * k[:2], value[:2], value[:2], value[:2])
+    a, b = common_times(series, half)
     np.testing.assert_array_equal(a.t, [20, 40])
-    np.testing.assert_array_equal(claims.minus(a, b).value, [2.0, -2.5])
-    assert_rounded(claims.minus(a, b).lo, [1.8, -2.7], size=3, operations=2)
+    np.testing.assert_array_equal(subtract(a, b).value, [2.0, -2.5])
+    assert_rounded(subtract(a, b).lo, [1.8, -2.7], size=3, operations=2)
 
 
 def test_ratio_of_estimates():
-    of = claims.ratio(Estimate(3.0, 2.7, 3.3), Estimate(2.0, 2.0, 2.0), scale=100)
+    of = ratio(Estimate(3.0, 2.7, 3.3), Estimate(2.0, 2.0, 2.0), scale=100)
     assert_rounded(of, (150, 135, 165), operations=2)
 
 
 def test_a_ratio_to_what_is_exactly_known_has_no_ends():
     none, some = Estimate(0.0, 0.0, 0.0), Estimate(1.0, 0.9, 1.1)
     for a, b in ((none, some), (some, none)):
-        assert np.isnan([claims.ratio(a, b).lo, claims.ratio(a, b).hi]).all()  # and no warning, which is an error here
+        assert np.isnan([ratio(a, b).lo, ratio(a, b).hi]).all()  # and no warning, which is an error here
 
 
 def test_all_claims_judged(table):
@@ -231,14 +235,14 @@ def test_exact_values_decide(paper):
 
 def test_simulation_checks_a_parts_own_exact_value(paper):
     """Another formula than that of the exact curves is held against the simulation; too few say nothing."""
-    paper_of = registry.study("range_doppler").claims()
+    paper_of = claims_of(registry.study("range_doppler"))
     first = next(claim for claim in paper_of.claims if claim.id == "P1.1")
 
     def errors(results, exact):
         parts = tuple(replace(part, exact=exact) for part in first.parts)
         of = replace(paper_of, claims=(replace(first, parts=parts),))
         made = {"curves": tables.curves(results), "gains": tables.gains(results), **range_doppler.tables(results)}
-        return claims.errors(claims.judged(of, results, made, configs.shipped))
+        return disagreements(claims_table(of, results, made, configs.shipped))
 
     assert errors(paper, None) == []
     assert all("5.85" in line and line.startswith("P1.1: ") for line in errors(paper, lambda seen: 90.0))
@@ -265,21 +269,21 @@ def test_what_does_not_hang_on_the_end_is_judged_of_a_shorter_run():
         assert classes[still] in (CONFIRMED, REFUTED), still
     assert classes["P1.14"] == CONFIRMED  # of RLS 2; the settling of the others is shown, and decides nothing
     for lost in ("P1.4", "P1.8", "P1.11", "P1.12", "P1.19"):
-        own = table[(table["claim"] == lost) & (table["verdict"] == claims.NOT_JUDGED)]
+        own = table[(table["claim"] == lost) & (table["verdict"] == NOT_JUDGED)]
         assert len(own), lost
         assert own["why"].str.contains("ends at 70 s, the paper's run at 140 s").all()
-    assert set(result.unjudged()) >= {"rls3 ends at 70 s, the paper's run at 140 s"}
-    assert {"P1.4", "P1.8"} <= set(result.verdicts()[claims.NOT_JUDGED])  # no class that is shipped stands for a run
+    assert set(unjudged_claims(result)) >= {"rls3 ends at 70 s, the paper's run at 140 s"}
+    assert {"P1.4", "P1.8"} <= set(claims_by_class(result)[NOT_JUDGED])  # no class that is shipped stands for a run
 
 
 def test_all_claims_are_listed_run_or_not(table):
-    ids = [claim.id for of in papers() for claim in of.claims]
+    ids = [claim.id for of in paper_claims() for claim in of.claims]
     assert len(ids) == len(set(ids))
-    rows = claims.listed(papers(), {})
+    rows = claim_rows(paper_claims(), {})
     assert [row["claim"] for row in rows] == ids
     assert {row["verdict"] for row in rows} == {"not run"}
     assert {row["config"] for row in rows if row["paper"] == "Gorshkov & Zavizhenets 2017"} == {"range_doppler"}
-    rows = claims.listed(papers(), {"range_doppler": table.to_dict("records")})
+    rows = claim_rows(paper_claims(), {"range_doppler": table.to_dict("records")})
     assert sum(row["paper"] == "Gorshkov & Zavizhenets 2017" for row in rows) == len(table)
     assert all(row["config"] for row in rows)
 
@@ -288,4 +292,4 @@ def test_a_manoeuvre_that_begins_after_the_last_scan_is_no_claim():
     overrides = ["scans=12", "uses.at_s=[35]", "sweep.target.acceleration_mps2=[0.2138, 0.4]"]
     result = radarsim.run("sonar_manoeuvre", overrides=overrides, realisations=50)
     papers = result.cases  # as if the paper's experiment were so short
-    assert claims.judged(registry.study("sonar").claims(), result.cases, result.tables, lambda config: papers).empty
+    assert claims_table(claims_of(registry.study("sonar")), result.cases, result.tables, lambda config: papers).empty

@@ -6,14 +6,14 @@ import re
 import pytest
 
 from radarsim.app import configs
-from radarsim.app.run import papers
-from radarsim.report.claims import rule
+from radarsim.papers.study_claims import paper_claims
+from radarsim.papers.verdict_rule import ABOUT, GRID, LIMIT, MATERIAL, PRINT, SAME
 
-PAPERS = papers()
+PAPERS = paper_claims()
 CLAIMS = [claim for of in PAPERS for claim in of.claims]
 ORIGINAL = re.compile("[А-Яа-я]{3}")  # the papers are in Russian
-SENTENCE = {rule.PRINT, rule.ABOUT, rule.GRID, rule.SAME}  # a range, or a value, of the words
-ONE_SIDED = {rule.LIMIT, rule.MATERIAL}
+SENTENCE = {PRINT, ABOUT, GRID, SAME}  # a range, or a value, of the words
+ONE_SIDED = {LIMIT, MATERIAL}
 
 
 @pytest.mark.slow
@@ -39,7 +39,7 @@ def test_no_expected_value_is_without_a_rule():
         assert bounded or math.isfinite(of.lo) or math.isfinite(of.hi), where
         if of.kind in ONE_SIDED:
             assert not bounded, where
-        elif of.kind != rule.SAME:  # "no loss" is the same or better
+        elif of.kind != SAME:  # "no loss" is the same or better
             assert bounded, where
 
 

@@ -1,9 +1,11 @@
 """The page's headline, its lines, and the forest plot, by hand."""
 
+from radarsim.papers.claim_rows import classes_in_words, count_classes, measured_words, verdict_sentence, worst_part
+from radarsim.papers.claims_page import _class_lines, claims_page
+from radarsim.papers.claims_table import NOT_RUN
+from radarsim.papers.forest_plot import BEYOND, MAX_DRAWN_MARGINS, _drawn_distance, forest_plot
+from radarsim.papers.verdict_rule import CONFIRMED, DEPENDS, REFUTED, UNDECIDED
 from radarsim.report import chart
-from radarsim.report.claims import page
-from radarsim.report.claims.judge import NOT_RUN
-from radarsim.report.claims.rule import CONFIRMED, DEPENDS, REFUTED, UNDECIDED
 from radarsim.report.drawing import Line, Note
 
 
@@ -37,10 +39,10 @@ def row(claim="P9.1", kind=REFUTED, **more):
 def test_headline_counts_classes_and_leaves_extensions_out():
     rows = [row(), *(row(f"P9.{n}", CONFIRMED) for n in (2, 3, 4)), row("P9.5", CONFIRMED, extension="true")]
     rows += [row("P9.6", DEPENDS), row("P9.8", DEPENDS)]
-    assert page.counts(rows) == ({CONFIRMED: 3, REFUTED: 1, DEPENDS: 2}, 1)
+    assert count_classes(rows) == ({CONFIRMED: 3, REFUTED: 1, DEPENDS: 2}, 1)
     said = "3 confirmed, 1 refuted, 2 depend on what the paper leaves open; 1 extension not counted"
-    assert page.counted(rows) == said
-    lines = page.headline(rows)
+    assert classes_in_words(rows) == said
+    lines = _class_lines(rows)
     assert lines[0].startswith("In all 6 claims, and 1 extensions")
     assert lines[2:] == [
         "* **3 confirmed**, true as stated: P9.2–P9.4",
@@ -51,22 +53,22 @@ def test_headline_counts_classes_and_leaves_extensions_out():
 
 def test_a_claim_says_how_far_it_stands():
     flips = {"overall": "", "holds": 1, "of": 2, "depends_on": "flight, start", "as_shipped": REFUTED}
-    said = page.verdict_of([row(kind=DEPENDS, **flips)])
+    said = verdict_sentence([row(kind=DEPENDS, **flips)])
     assert said == "refuted as shipped; depends on flight, start (true under 1 of 2 interpretations)"
-    assert page.verdict_of([row(kind=DEPENDS, **flips | {"as_shipped": DEPENDS})]).startswith("depends on flight")
+    assert verdict_sentence([row(kind=DEPENDS, **flips | {"as_shipped": DEPENDS})]).startswith("depends on flight")
     few = row(kind=CONFIRMED, overall="", holds=3, of=3, as_shipped=UNDECIDED, needed=8123)
     words = "not yet decided as shipped; confirmed over all interpretations"
-    assert page.verdict_of([few]) == f"{words} (8,200 realisations would decide; true under all 3 interpretations)"
-    assert page.verdict_of([row()]) == "**refuted**"  # by how much stands with its parts
+    assert verdict_sentence([few]) == f"{words} (8,200 realisations would decide; true under all 3 interpretations)"
+    assert verdict_sentence([row()]) == "**refuted**"  # by how much stands with its parts
 
 
 def test_forest_stands_in_margins():
-    assert page.depth_in_forest(3.0, row()) == 2.0
-    assert page.depth_in_forest(6.5, row()) == -1.5
-    assert page.depth_in_forest(-100.0, row()) == page.FURTHEST_IN_FOREST
+    assert _drawn_distance(3.0, row()) == 2.0
+    assert _drawn_distance(6.5, row()) == -1.5
+    assert _drawn_distance(-100.0, row()) == MAX_DRAWN_MARGINS
     between = row(expected_hi=7.0)
-    assert page.depth_in_forest(6.5, between) == -0.5
-    (panel,) = page.figure([row(), row("P9.2", CONFIRMED, measured=6.0, lo=5.5, hi=6.5, exact=6.25)]).panels
+    assert _drawn_distance(6.5, between) == -0.5
+    (panel,) = forest_plot([row(), row("P9.2", CONFIRMED, measured=6.0, lo=5.5, hi=6.5, exact=6.25)]).panels
     lines = [mark for mark in panel.marks if isinstance(mark, Line)]
     confirmed, other_interval, exact, refuted, its_interval = lines
     assert [(one.label, one.x.tolist(), one.y.tolist()) for one in (refuted, confirmed)] == [
@@ -77,33 +79,33 @@ def test_forest_stands_in_margins():
     assert (exact.x.tolist(), exact.exact.tolist()) == ([-1.25], [1.0])
     assert [words for _, words in panel.y.ticks] == ["s  1", "s  2"]
     assert [mark.text for mark in panel.marks if isinstance(mark, Note)] == ["3 [2, 4] m", "6.25 m exactly"]
-    assert page.figure([row(kind=NOT_RUN)]) is None
-    (few,) = page.figure([row(judged_lo="", judged_hi="")]).panels  # few realisations have no interval
+    assert forest_plot([row(kind=NOT_RUN)]) is None
+    (few,) = forest_plot([row(judged_lo="", judged_hi="")]).panels  # few realisations have no interval
     assert few.marks[1].x[:2].tolist() == [2.0, 2.0]
-    assert page.measured(row(judged_lo="", judged_hi="")) == "3 m"
+    assert measured_words(row(judged_lo="", judged_hi="")) == "3 m"
 
 
 def test_what_lies_beyond_the_rim_has_an_arrow():
     rows = [row(), row("P9.2", measured=-50.0), row("P9.3", CONFIRMED, measured=90.0)]
-    (panel,) = page.figure(rows).panels
+    (panel,) = forest_plot(rows).panels
     arrows = {
         mark.style.marker: (mark.x.tolist(), mark.y.tolist())
         for mark in panel.marks
-        if isinstance(mark, Line) and mark.x.size and abs(mark.x[0]) == page.BEYOND
+        if isinstance(mark, Line) and mark.x.size and abs(mark.x[0]) == BEYOND
     }
     left, right = chart.MARKERS.index("m-3.1 0l5.4-3v6z"), chart.MARKERS.index("m3.1 0l-5.4-3v6z")
-    assert arrows == {right: ([page.BEYOND], [1.0]), left: ([-page.BEYOND], [2.0])}
+    assert arrows == {right: ([BEYOND], [1.0]), left: ([-BEYOND], [2.0])}
 
 
 def test_words_that_markdown_would_read_are_escaped():
     of = row(statement="a | b < c", expected="< 0", config="rls2", original="а")
     words = "<summary>a \\| b &lt; c</summary>«а» (p)<br>Result: x: 3 [2, 4] m; expected &lt; 0 m.</details>"
-    text = page.page([of], {"Someone": "range_doppler"})
+    text = claims_page([of], {"Someone": "range_doppler"})
     assert f"| P9.1 | <details>{words} | **refuted** | `rls2` |" in text
 
 
 def test_of_variants_of_a_number_the_nearest_is_drawn():
     far = row(number="T", measured=-50.0, lo=-51.0, hi=-49.0)
     near = row(number="T", measured=4.9, lo=4.8, hi=5.0)
-    assert page.worst([far, near]) is near
-    assert page.worst([row(extension=True), near]) is near
+    assert worst_part([far, near]) is near
+    assert worst_part([row(extension=True), near]) is near

@@ -7,21 +7,23 @@ from types import ModuleType
 
 import pytest
 
-from radarsim.app.run import papers
 from radarsim.errors import ConfigError
 from radarsim.language import speaking, tr
-from radarsim.report.claims import above, declared, printed
-from radarsim.report.claims.over import choices_in, claims_in, of_other_cases, with_arguments
+from radarsim.papers import evidence
+from radarsim.papers.claim_files import load_choices, load_claims, with_arguments, with_cases
+from radarsim.papers.evidence import ExactNumber
+from radarsim.papers.expected_ranges import above, printed
+from radarsim.papers.sonar.measures import FOUND
+from radarsim.papers.study_claims import claims_of, interpretations_of, paper_claims
 from radarsim.report.statistics import Estimate
 from radarsim.studies import registry
-from radarsim.studies.sonar.measures import FOUND
 
 HEAD = "paper: P9\nconfig: walk\nnames: {PAIRS: [[2, 3], [4, 5]], R: [range]}\nclaims:\n"
 CLAIM = "- id: 1\n  place: section 1\n  statement: It gains\n  parts:\n"
 PART = "  - {of: [1], what: gain, measure: {gain: {pick: first}}, expected: {above: 0}}\n"
 
 
-class Evidence(declared.Evidence):
+class Evidence(evidence.Evidence):
     """One that knows a number of a case."""
 
     def known(self, key: int, times: float = 1.0) -> float:
@@ -51,8 +53,8 @@ def claims(tmp_path):
     def read(text):
         file = tmp_path / "claims.yaml"
         file.write_text(text, encoding="utf-8")
-        claims_in.cache_clear()
-        return claims_in(file, module)
+        load_claims.cache_clear()
+        return load_claims(file, module)
 
     return read
 
@@ -65,7 +67,7 @@ def test_a_claim_is_what_is_written(claims):
     seen = Evidence((), {}, {})
     assert part.measure(seen) == Estimate(1, 1, 5)
     assert part.exact(seen) == 10
-    assert of_other_cases(part, 4).measure(seen) == Estimate(4, 1, 5)
+    assert with_cases(part, 4).measure(seen) == Estimate(4, 1, 5)
     assert with_arguments(part, scan=3).measure(seen) == Estimate(1, 3, 5)
 
 
@@ -78,7 +80,7 @@ def test_each_makes_a_part_of_every_combination_in_order(claims):
     assert claim.parts[1].expected == printed("2.50")
     seen = Evidence((), {}, {})
     assert [one.measure(seen).value for one in claim.parts] == [21, 28, 42, 56]
-    assert isinstance(claim.parts[0].measure(seen), declared.Certain)
+    assert isinstance(claim.parts[0].measure(seen), ExactNumber)
 
 
 def test_a_method_is_that_of_the_evidence_at_hand(claims):
@@ -149,7 +151,12 @@ def test_parts_of_a_claim_that_is_not_there(claims):
 
 def test_every_case_that_p3_names_is_one_that_is_looked_for():
     keys = {
-        key for of in papers() for claim in of.claims if claim.paper == "P3" for p in claim.parts for key in p.cases
+        key
+        for of in paper_claims()
+        for claim in of.claims
+        if claim.paper == "P3"
+        for p in claim.parts
+        for key in p.cases
     }
     assert {key if isinstance(key, str) else key[0] for key in keys} == set(FOUND)
 
@@ -159,7 +166,7 @@ def test_a_list_reads_no_claims():
         "import sys\n"
         "from radarsim.cli import entry\n"
         "try: entry()\n"
-        "finally: assert 'radarsim.report.claims.over' not in sys.modules"
+        "finally: assert 'radarsim.papers.claim_files' not in sys.modules"
     )
     for argument in ("list", "--help"):
         subprocess.run([sys.executable, "-c", program, argument], check=True, capture_output=True)
@@ -171,19 +178,19 @@ def test_what_a_paper_leaves_open_is_what_is_written(tmp_path):
         "paper: P9\nnames: {FAST: [1, 3]}\nchoices:\n- key: start\n  asks: how it starts\n  original: nothing\n"
         "  claims: [$FAST, 5t]\n  alternatives:\n  - {name: slow, kind: U, reason: none, sets: {rate: 2}}\n"
     )
-    (choice,) = choices_in(file)
+    (choice,) = load_choices(file)
     assert (choice.key, choice.original, choice.english) == ("start", "nothing", "nothing")
     assert choice.claims == ("P9.1", "P9.3", "P9.5t")
     assert (choice.default, choice["slow"].sets, choice.contradicts) == ("slow", {"rate": 2}, False)
     file.write_text(file.read_text().replace("kind: U", "kind: X").replace("$FAST", "$SLOW"))
     with pytest.raises(ConfigError, match=r"interpretations.yaml:9:24: .*kind: must be one of E, U, N, got 'X'"):
-        choices_in(file)
+        load_choices(file)
 
 
 def test_a_choice_bears_on_claims_that_there_are():
     for name in registry.SHIPPED:
-        interpretations = registry.study(name).interpretations()
-        known = {claim.id for claim in registry.study(name).claims().claims} if interpretations else set()
+        interpretations = interpretations_of(registry.study(name))
+        known = {claim.id for claim in claims_of(registry.study(name)).claims} if interpretations else set()
         assert interpretations is None or {one for choice in interpretations.choices for one in choice.claims} <= known
 
 
@@ -194,7 +201,7 @@ def test_a_choice_is_named_by_few_words_within_a_sentence(language):
         said = [
             tr(one.asks)
             for name in registry.SHIPPED
-            if (of := registry.study(name).interpretations())
+            if (of := interpretations_of(registry.study(name)))
             for one in of.choices
         ]
     assert [words for words in said if len(words) > 36 or ", " in words or re.match("[A-ZА-Я][a-zа-я ]", words)] == []
@@ -202,9 +209,9 @@ def test_a_choice_is_named_by_few_words_within_a_sentence(language):
 
 def test_how_long_fast_radars_are_watched_bears_on_all_claims_that_look_at_one():
     study = registry.study("range_doppler")
-    points = next(one for one in study.interpretations().choices if one.key == "points")
+    points = next(one for one in interpretations_of(study).choices if one.key == "points")
     looked = {}
-    for claim in study.claims().claims:
+    for claim in claims_of(study).claims:
         cases = [case for part in claim.parts if part.asserted for case in part.cases]
         looked[claim.id] = {case[0] if isinstance(case, tuple) else case for case in cases}
     algebra, level = {"P1.16", "P1.31", "P1.34", "P1.36"}, {"P1.20"}  # what a curve converges to

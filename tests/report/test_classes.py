@@ -10,50 +10,59 @@ from html import unescape
 import pytest
 
 import radarsim
-from radarsim.app import interpretations, reproduce, run
-from radarsim.app import stored as stored_interpretations
-from radarsim.app.stored import CLASSES, classes_of, shipped_classes, stored_classes
+from radarsim.app import reproduce
 from radarsim.config import document as lookup
 from radarsim.errors import StoreError
+from radarsim.papers import list_claims, stored_verdicts, verdict_rule
+from radarsim.papers.claim_rows import classes_in_words, count_classes, group_by_claim, is_extension
+from radarsim.papers.claims_page import _class_lines
+from radarsim.papers.claims_table import CLASS_COLUMNS, COLUMNS, NOT_JUDGED, empty_row
+from radarsim.papers.forest_plot import forest_plot
+from radarsim.papers.judge_interpretations import judge_requests
+from radarsim.papers.open_papers import judging_requests, open_papers
+from radarsim.papers.result_claims import claims_by_class
+from radarsim.papers.stored_verdicts import CLASSES, known_classes, shipped_classes, stored_classes
+from radarsim.papers.study_claims import paper_claims
+from radarsim.papers.verdict_classes import add_classes, class_words, rows_in_words, verdict_words
+from radarsim.papers.verdict_rule import CONFIRMED, CONTRADICTORY, DEPENDS, IMMATERIAL, REFUTED, UNDECIDED
 from radarsim.report import html
-from radarsim.report.claims import CLAIMED, NOT_JUDGED, judge, page, rule
 from tests.program import printed
 
-PAPERS = {claim.id: (of, claim) for of in run.papers() for claim in of.claims}
-OPEN = [(paper.interpretations, paper.claims) for paper in interpretations.papers().values()]
+PAPERS = {claim.id: (of, claim) for of in paper_claims() for claim in of.claims}
+OPEN = [(paper.interpretations, paper.claims) for paper in open_papers().values()]
 
 
 def as_runs_would_store(out, own):
     """All claims of all papers, were all of them to come out so as shipped."""
     stored = {}
     for of, claim in PAPERS.values():
-        row = judge.blank(claim, of.paper) | dict.fromkeys(judge.SAID, own)
+        row = empty_row(claim, of.paper) | dict.fromkeys(CLASS_COLUMNS, own)
         row |= {"measured": 3.0, "lo": 2.0, "hi": 4.0, "expected_lo": 5.0, "margin": 1.0, "miss": 2.0, "what": "x"}
         row |= {"judged_lo": 2.0, "judged_hi": 4.0}
         stored.setdefault(claim.config, []).append(row)
-    known = classes_of(OPEN, None)
+    known = known_classes(OPEN, None)
     for config, rows in stored.items():
         (out / config).mkdir()
         with (out / config / "claims.csv").open("w", encoding="utf-8", newline="") as file:
-            table = csv.DictWriter(file, CLAIMED, extrasaction="ignore")
+            table = csv.DictWriter(file, COLUMNS, extrasaction="ignore")
             table.writeheader()
-            for row in page.with_classes(rows, known):
+            for row in add_classes(rows, known):
                 table.writerow({key: "" if value != value else value for key, value in row.items()})
 
 
 def told(row):
     """What every rendering has to say of a claim: its class, and the phrase that tells how far it stands."""
-    return row["class"], page.words(row["class"], row["as_shipped"], row["depends_on"])
+    return row["class"], class_words(row["class"], row["as_shipped"], row["depends_on"])
 
 
 def agree(out):
     """Hold every rendering of the stored claims under `out` against the class in claims.csv; gives the classes."""
     every = json.loads(printed("claims", "--json", "--out", out))
-    worded = {row["claim"]: row for row in page.in_words(every, [interpretations for interpretations, _ in OPEN])}
-    rows = {parts[0]["claim"]: parts[0] for parts in page.grouped(every)}
+    worded = {row["claim"]: row for row in rows_in_words(every, [interpretations for interpretations, _ in OPEN])}
+    rows = {parts[0]["claim"]: parts[0] for parts in group_by_claim(every)}
     lines = {line.split()[0]: line for line in printed("claims", "--out", out).splitlines() if line[:1] == "P"}
     made = printed("claims", "--markdown", "--out", out)
-    marks = drawn(run.claims(out=out).rows)
+    marks = drawn(list_claims.claims(out=out).rows)
     stands = dict(re.findall(r"^\| (P\d\.\w+) \| .* \| ([^|]*) \| `\w+` \|$", made, re.MULTILINE))
     assert rows.keys() == lines.keys() == stands.keys() == PAPERS.keys()
     for claim, row in rows.items():
@@ -68,13 +77,13 @@ def agree(out):
         if (config / "report.html").is_file():
             assert reported(config)[claim].startswith(phrase), claim
     kinds = {claim: row["class"] for claim, row in rows.items()}
-    counted, count = page.counted(every), sum(page.counts(every)[0].values())
+    counted, count = classes_in_words(every), sum(count_classes(every)[0].values())
     assert f"claims   {count}: {counted}" in reproduce.summary([reproduce.Done("rls2", 1.0, "")], str(out), 1.0)
     assert printed("claims", "--out", out).splitlines()[-2].removesuffix(" (in brackets)") == counted
-    for line in page.headline(every)[2:]:
+    for line in _class_lines(every)[2:]:
         said, _, names = line.rpartition(": ")
         kind = kinds[re.match(r"P\d\.\w+", names)[0]]
-        own = [parts for parts in page.grouped(every) if parts[0]["class"] == kind and not page.extension(parts)]
+        own = [parts for parts in group_by_claim(every) if parts[0]["class"] == kind and not is_extension(parts)]
         assert int(re.search(r"\d+", said)[0]) == len(own)
     return kinds
 
@@ -83,9 +92,9 @@ def drawn(rows):
     """The class that the figure's mark of each claim stands for."""
     return {
         f"{panel.title.split()[0]}.{dict(panel.y.ticks)[y].split()[-1]}": mark.label
-        for panel in page.figure(rows).panels
+        for panel in forest_plot(rows).panels
         for mark in panel.marks
-        if getattr(mark, "label", "") in rule.CLASSES
+        if getattr(mark, "label", "") in verdict_rule.CLASSES
         for y in mark.y
     }
 
@@ -101,14 +110,14 @@ def reported(config):
     }
 
 
-@pytest.mark.parametrize("own", [rule.CONFIRMED, rule.REFUTED, rule.UNDECIDED])
+@pytest.mark.parametrize("own", [CONFIRMED, REFUTED, UNDECIDED])
 def test_every_claim_has_one_class_wherever_it_is_said(tmp_path, own):
     as_runs_would_store(tmp_path, own)
     kinds = agree(tmp_path)
     shipped = {one.claim: one.kind for one in shipped_classes()}
     assert kinds == {claim: shipped.get(claim, own) for claim in PAPERS}
     assert len(shipped) > 50
-    assert len(drawn(run.claims(out=tmp_path).rows)) == len(PAPERS)
+    assert len(drawn(list_claims.claims(out=tmp_path).rows)) == len(PAPERS)
 
 
 def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
@@ -126,20 +135,20 @@ def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
     assert f"P1.18  {phrase}: RLS 2" in printed("claims", "rls2", "--parts", "--out", tmp_path)
     html.write(tmp_path)
     assert "1 confirmed, 2 depend on what the paper leaves open" in (tmp_path / "index.html").read_text()
-    rows = run.claims("rls2", out=tmp_path).rows
-    assert drawn(rows)["P1.18"] == rule.DEPENDS
-    assert "1 confirmed, 2 depend on what the paper leaves open" in page.figure(rows).caption
+    rows = list_claims.claims("rls2", out=tmp_path).rows
+    assert drawn(rows)["P1.18"] == DEPENDS
+    assert "1 confirmed, 2 depend on what the paper leaves open" in forest_plot(rows).caption
 
 
 def test_a_result_that_is_not_written_has_the_class_and_a_radar_of_ones_own_none():
-    assert radarsim.run("rls2", realisations=60).verdicts()[rule.DEPENDS] == ["P1.18", "P1.28"]
+    assert claims_by_class(radarsim.run("rls2", realisations=60))[DEPENDS] == ["P1.18", "P1.28"]
     result = radarsim.run("rls2", overrides=["radar.sigma_range_m=100"], realisations=60)
     assert set(result.tables["claims"]["class"]) <= {NOT_JUDGED}
 
 
 def test_claims_as_they_are_declared_have_a_shipped_class():
     """Where one has none `make interpretations-pages` was not called since its parts or choices were changed."""
-    assert [claim for claim, found in classes_of(OPEN, None).items() if found is None] == []
+    assert [claim for claim, found in known_classes(OPEN, None).items() if found is None] == []
 
 
 def test_what_was_judged_of_other_words_is_no_class():
@@ -148,19 +157,19 @@ def test_what_was_judged_of_other_words_is_no_class():
     part = claim.parts[0]
     wider = dataclasses.replace(part, expected=part.expected._replace(margin=2 * part.expected.margin))
     changed = dataclasses.replace(claim, parts=(wider, *claim.parts[1:]))
-    assert classes_of([(of, dataclasses.replace(claims, claims=[claim]))], None)[claim.id].kind == rule.DEPENDS
-    known = classes_of([(of, dataclasses.replace(claims, claims=[changed]))], None)
+    assert known_classes([(of, dataclasses.replace(claims, claims=[claim]))], None)[claim.id].kind == DEPENDS
+    known = known_classes([(of, dataclasses.replace(claims, claims=[changed]))], None)
     assert known == {claim.id: None}
-    row = {"claim": claim.id, "class": rule.REFUTED, "as_shipped": rule.REFUTED, "depends_on": ""}
-    (alone,) = page.with_classes([row], known)
-    assert (alone["class"], alone["overall"]) == (rule.REFUTED, "refuted as shipped; other interpretations not judged")
-    assert page.verdict_words(alone) == alone["overall"]
-    (torn,) = page.with_classes([row | {"as_shipped": rule.CONTRADICTORY}], known)  # no interpretation mends it
-    assert torn["overall"] == rule.CONTRADICTORY
+    row = {"claim": claim.id, "class": REFUTED, "as_shipped": REFUTED, "depends_on": ""}
+    (alone,) = add_classes([row], known)
+    assert (alone["class"], alone["overall"]) == (REFUTED, "refuted as shipped; other interpretations not judged")
+    assert verdict_words(alone) == alone["overall"]
+    (torn,) = add_classes([row | {"as_shipped": CONTRADICTORY}], known)  # no interpretation mends it
+    assert torn["overall"] == CONTRADICTORY
 
 
 def test_a_run_without_any_class_says_that_it_is_judged_as_shipped_alone(monkeypatch, tmp_path):
-    monkeypatch.setattr(stored_interpretations, "shipped_classes", lambda: ())
+    monkeypatch.setattr(stored_verdicts, "shipped_classes", lambda: ())
     text = printed("run", "rls2", "-n", 60, "--no-figures", "--out", tmp_path)
     assert "only as shipped: P1.18, P1.23, P1.28; `radarsim interpretations P1` judges" in text
     assert "P1.18  refuted as shipped    RLS" in printed("claims", "rls2", "--out", tmp_path)
@@ -174,14 +183,14 @@ def test_classes_that_were_worked_out_beside_the_run_count(tmp_path):
     assert "note" not in printed("interpretations", "P1.23", "--no-figures", "--out", tmp_path)
     (own,) = stored_classes(tmp_path)
     path = tmp_path / CLASSES
-    path.write_text(path.read_text().replace(f",{rule.CONFIRMED},", f",{rule.IMMATERIAL},"))
-    assert own.kind == rule.CONFIRMED
-    assert f"P1.23  confirmed as shipped; {rule.IMMATERIAL} over all" in printed(
+    path.write_text(path.read_text().replace(f",{CONFIRMED},", f",{IMMATERIAL},"))
+    assert own.kind == CONFIRMED
+    assert f"P1.23  confirmed as shipped; {IMMATERIAL} over all" in printed(
         "claims", "rls2", "--parts", "--out", tmp_path
     )
     printed("report", "rls2", "-n", 300, "--no-figures", "--out", tmp_path)
     rows = csv.DictReader((tmp_path / "rls2/claims.csv").read_text(encoding="utf-8").splitlines())
-    assert {row["class"] for row in rows if row["claim"] == "P1.23"} == {rule.IMMATERIAL}
+    assert {row["class"] for row in rows if row["claim"] == "P1.23"} == {IMMATERIAL}
     path.write_text("claim,class\nP1.23,certain\n")
     with pytest.raises(StoreError, match="is no table of interpretations"):
         stored_classes(tmp_path)
@@ -192,7 +201,7 @@ def test_interpretations_tell_of_runs_that_were_written_with_other_classes(tmp_p
     asked = ("interpretations", "P1.9", "P1.8", "--no-figures", "--out", tmp_path)
     assert "radarsim report" not in printed(*asked)
     classes = tmp_path / CLASSES
-    classes.write_text(classes.read_text().replace(f",{rule.CONFIRMED},", f",{rule.REFUTED},"))
+    classes.write_text(classes.read_text().replace(f",{CONFIRMED},", f",{REFUTED},"))
     printed("run", "range_doppler", "-n", 300, "--no-figures", "--out", tmp_path)
     assert f"`radarsim report range_doppler --out {tmp_path}`" in printed(*asked)
     printed("run", "range_doppler", "-n", 300, "--no-figures", "--out", tmp_path)
@@ -202,7 +211,7 @@ def test_interpretations_tell_of_runs_that_were_written_with_other_classes(tmp_p
 @pytest.mark.slow
 def test_shipped_classes_are_what_interpretations_give(tmp_path):
     """All of P1, P3 and P4, and what of P2 takes under a minute; what few realisations leave open may be decided."""
-    done = interpretations.judged(interpretations.asked(["P1", "P3", "P4", "P2.4"]), out=tmp_path, figures=False)
+    done = judge_requests(judging_requests(["P1", "P3", "P4", "P2.4"]), out=tmp_path, figures=False)
     shipped, own = ({one.claim: one for one in every} for every in (shipped_classes(), stored_classes(tmp_path)))
     for over in (over for read in done.read for over in read.over):
         claim = over.claim.id

@@ -2,12 +2,22 @@
 
 import dataclasses
 
-from radarsim.report.claims import Claim, Part, certain, printed, rule
-from radarsim.report.claims import over as data
-from radarsim.report.claims.declared import Missing
-from radarsim.report.claims.interpretations_page import page
-from radarsim.report.claims.over import Alternative, Choice, Over, PaperInterpretations, columns, depth, rows, under
-from radarsim.report.claims.rule import AGAINST, CONFIRMED, DEPENDS, EQUIVALENT, REFUTED, UNDECIDED, UNSTATED
+from radarsim.papers import verdicts_by_interpretation
+from radarsim.papers.claim import Claim, Part
+from radarsim.papers.claim_outcome import round_up
+from radarsim.papers.evidence import MissingEvidence, exact_number
+from radarsim.papers.expected_ranges import printed
+from radarsim.papers.interpretation_outcome import outcome_over_interpretations
+from radarsim.papers.interpretations import DEFAULT, Alternative, Choice, PaperInterpretations
+from radarsim.papers.interpretations_page import interpretations_page
+from radarsim.papers.verdict_rule import AGAINST, CONFIRMED, DEPENDS, EQUIVALENT, REFUTED, UNDECIDED, UNSTATED
+from radarsim.papers.verdicts_by_interpretation import (
+    ClaimVerdicts,
+    judge_under,
+    verdict_columns,
+    verdict_rows,
+    worst_distance,
+)
 from radarsim.report.statistics import Estimate
 from tests.tolerances import assert_rounded
 
@@ -37,7 +47,7 @@ class Small(PaperInterpretations):
 
     def evidence(self, claim, interpretation, seen, of):
         if interpretation["form"] == "square" and interpretation["scale"] == "two":
-            raise Missing("no square is so large")
+            raise MissingEvidence("no square is so large")
         return {"one": 1.0, "two": 2.0, "ten": 10.0}[interpretation["scale"]]
 
 
@@ -52,11 +62,11 @@ class Ends(Estimate):
     """Evidence of one number, which is not known exactly."""
 
     def exactly(self):
-        raise Missing("not known exactly")
+        raise MissingEvidence("not known exactly")
 
 
 def claim(number, *values):
-    parts = tuple(Part((), f"number {text}", "m", lambda seen: certain(seen), printed(text)) for text in values)
+    parts = tuple(Part((), f"number {text}", "m", lambda seen: exact_number(seen), printed(text)) for text in values)
     return Claim(f"P9.{number}", "somewhere", f"It is {' and '.join(values)}", parts)
 
 
@@ -64,11 +74,11 @@ def over(of, one):
     every = []
     for interpretation in of.of_claim(one.id):
         try:
-            every.append(under(of, one, interpretation, of.evidence(one, interpretation, None, None)))
-        except Missing as missing:
-            every.append(under(of, dataclasses.replace(one, parts=()), interpretation, None))
+            every.append(judge_under(of, one, interpretation, of.evidence(one, interpretation, None, None)))
+        except MissingEvidence as missing:
+            every.append(judge_under(of, dataclasses.replace(one, parts=()), interpretation, None))
             every[-1] = dataclasses.replace(every[-1], claim=one, outcome=None, why=missing.args[0])
-    return Over(of, one, tuple(every))
+    return ClaimVerdicts(of, one, tuple(every))
 
 
 def test_interpretations_of_a_claim_leave_out_what_does_not_bear_on_it():
@@ -81,7 +91,7 @@ def test_interpretations_of_a_claim_leave_out_what_does_not_bear_on_it():
 
 def test_names_and_kinds():
     of = Small()
-    assert of.name(of.interpretation()) == data.DEFAULT
+    assert of.name(of.interpretation()) == DEFAULT
     assert of.name(of.interpretation(scale="two", form="square")) == "scale: two; form: square"
     assert [
         of.kind(of.interpretation(**taken)) for taken in ({}, {"form": "square"}, {"scale": "two"}, {"scale": "ten"})
@@ -105,13 +115,13 @@ def test_the_rule_looks_at_all_interpretations_once(monkeypatch):
     """A row each asks for the class: of 768 interpretations, each looking at all the others, that took ten minutes."""
     asked = []
     monkeypatch.setattr(
-        rule,
-        "over_interpretations",
-        lambda own, every, true=rule.over_interpretations: asked.append(1) or true(own, every),
+        verdicts_by_interpretation,
+        "outcome_over_interpretations",
+        lambda own, every, true=outcome_over_interpretations: asked.append(1) or true(own, every),
     )
     one = over(Small(), claim(1, "1"))
-    names = columns([Small()])
-    assert {row["over"] for each in one.under for row in rows(each, names, one.outcome)} == {one.outcome.kind}
+    names = verdict_columns([Small()])
+    assert {row["over"] for each in one.under for row in verdict_rows(each, names, one.outcome)} == {one.outcome.kind}
     assert one.sentence()
     assert len(asked) == 1
 
@@ -122,16 +132,16 @@ def test_a_interpretation_that_cannot_be_done_is_listed():
     assert impossible.why == "no square is so large"
     assert "1 not possible" in one.sentence()
     assert one.outcome.interpretations == 3  # of four that the paper allows
-    names = columns([Small()])
-    (row,) = rows(impossible, names)
+    names = verdict_columns([Small()])
+    (row,) = verdict_rows(impossible, names)
     assert (row["verdict"], row["reason"], row["scale"]) == ("not possible", "no square is so large", "two")
 
 
 def test_depth_is_in_margins_with_its_sign():
     of = Small()
     one = over(of, claim(2, "1", "1.6"))
-    assert_rounded(depth(one.under[0])[0], (1.6 - 1.0) / 0.05, operations=3)  # of the worst part
-    assert depth(over(of, claim(2, "1")).under[0])[0] == 0
+    assert_rounded(worst_distance(one.under[0])[0], (1.6 - 1.0) / 0.05, operations=3)  # of the worst part
+    assert worst_distance(over(of, claim(2, "1")).under[0])[0] == 0
 
 
 def test_what_is_open_says_what_would_decide_it():
@@ -141,23 +151,25 @@ def test_what_is_open_says_what_would_decide_it():
     part = Part((), "number", "m", lambda seen: Estimate(*seen), printed("1.0"))
     ends = {"one": (1.0, 0.99, 1.01), "two": (1.04, 1.0, 1.08), "ten": (1.0, 0.0, 2.0)}
     every = [
-        under(of, dataclasses.replace(one, parts=(part,)), interpretation, Ends(*ends[interpretation["scale"]]), 1000)
+        judge_under(
+            of, dataclasses.replace(one, parts=(part,)), interpretation, Ends(*ends[interpretation["scale"]]), 1000
+        )
         for interpretation in of.of_claim(one.id)
     ]
-    found = Over(of, one, tuple(every))
+    found = ClaimVerdicts(of, one, tuple(every))
     assert [each.outcome.kind for each in every] == [CONFIRMED, UNDECIDED, UNDECIDED]
     needed = every[1].outcome.needed
     assert 1000 < needed < every[2].outcome.needed
     assert (found.outcome.kind, found.outcome.needed, found.looked) == (UNDECIDED, needed, 1000)
-    assert f"1 open at 1,000 realisations, about {rule.roughly(needed):,} would decide" in found.sentence()
-    assert {row["needed"] for each in every[1:2] for row in rows(each, columns([of]))} == {needed}
-    assert found.still_open() in page(of, "Nobody 1900", [found])
+    assert f"1 open at 1,000 realisations, about {round_up(needed):,} would decide" in found.sentence()
+    assert {row["needed"] for each in every[1:2] for row in verdict_rows(each, verdict_columns([of]))} == {needed}
+    assert found.still_open() in interpretations_page(of, "Nobody 1900", [found])
     assert over(Small(), claim(2, "1")).still_open() == ""
 
 
 def test_page_lists_claims_impossible_interpretations_and_open_choices():
     of = Small()
-    text = page(of, "Nobody 1900", [over(of, claim(1, "1")), over(of, claim(2, "10"))])
+    text = interpretations_page(of, "Nobody 1900", [over(of, claim(1, "1")), over(of, claim(2, "10"))])
     assert "| P9.1 |" in text
     assert "no square is so large" in text
     assert "> nichts" in text

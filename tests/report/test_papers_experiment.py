@@ -7,14 +7,15 @@ import pytest
 import radarsim
 from radarsim.app import configs
 from radarsim.app import result as output
-from radarsim.app.run import papers
 from radarsim.config.check import models_in
 from radarsim.config.fields import Display, Model
-from radarsim.report import claims
-from radarsim.report.claims.declared import described, own_members
+from radarsim.papers.claims_table import NOT_JUDGED
+from radarsim.papers.paper_cases import case_keys, paper_members
+from radarsim.papers.result_claims import unjudged_claims
+from radarsim.papers.study_claims import claims_of, paper_claims
 from radarsim.studies import registry
 
-CONFIGS = sorted({claim.config for of in papers() for claim in of.claims})
+CONFIGS = sorted({claim.config for of in paper_claims() for claim in of.claims})
 MAY_GROW = {
     "range_doppler": (),
     "multimodel": ("filters",),
@@ -67,14 +68,14 @@ def swept(spec):
 @pytest.mark.parametrize("config", CONFIGS)
 def test_every_key_but_the_declared_ones_makes_another_experiment(config):
     study, cases = configs.load(config).study, configs.shipped(config)
-    may_grow = registry.study(study).claims().may_grow
-    may_shorten = registry.study(study).claims().may_shorten
+    may_grow = claims_of(registry.study(study)).may_grow
+    may_shorten = claims_of(registry.study(study)).may_shorten
     assert may_grow == MAY_GROW[study]
     for case in cases[:6]:
-        spec, papers = case.spec, [described(case, may_grow, may_shorten)]
+        spec, papers = case.spec, [case_keys(case, may_grow, may_shorten)]
         changes = {path: replace(case, spec=changed) for path, changed in swept(spec)}
-        mine = {path: described(changed, may_grow, may_shorten) for path, changed in changes.items()}
-        still = {path for path, own in mine.items() if own_members(own, papers, may_grow) is not None}
+        mine = {path: case_keys(changed, may_grow, may_shorten) for path, changed in changes.items()}
+        still = {path for path, own in mine.items() if paper_members(own, papers, may_grow) is not None}
         assert still == {path for path, _ in swept(spec)} & MAY_DIFFER[study]
 
 
@@ -105,7 +106,7 @@ def test_only_the_declared_keys_are_for_display(study):
 def test_a_changed_experiment_judges_nothing(config, override):
     table = radarsim.run(config, overrides=[override], realisations=50).tables["claims"]
     assert len(table)
-    assert table["class"].eq(claims.NOT_JUDGED).all()
+    assert table["class"].eq(NOT_JUDGED).all()
     assert table["why"].str.contains("not the paper's experiment: ").all()
     assert table[["measured", "miss", "old_verdict"]].replace("", float("nan")).isna().all(axis=None)
 
@@ -133,14 +134,14 @@ def test_a_file_of_the_users_is_no_measure_of_the_paper(tmp_path, monkeypatch):
     configs.shipped.cache_clear()
     assert radarsim.run("rls1.yaml", realisations=50).tables["claims"].empty
     found = radarsim.claims("rls1.yaml").table
-    assert found["class"].eq(claims.NOT_JUDGED).all()
+    assert found["class"].eq(NOT_JUDGED).all()
     why = "not the paper's experiment: rls1: radar.sigma_range_m is 30, the paper's 25"
     assert found["why"].str.startswith(why).all()
     unchanged = radarsim.run(configs.document.SHIPPED / "configs" / "rls1.yaml", realisations=50).cases
     assert not output.case_tables(unchanged)["claims"].empty
 
 
-HELD_TOO = {stem: ids for of in papers() for stem, ids in of.held_too.items()}
+HELD_TOO = {stem: ids for of in paper_claims() for stem, ids in of.held_too.items()}
 QUICK = ("rls1", "rls2", "rls3", "manoeuvre_variance", "discriminator_as_printed", "sonar_fluctuating")
 
 
@@ -154,10 +155,10 @@ QUICK = ("rls1", "rls2", "rls3", "manoeuvre_variance", "discriminator_as_printed
 )
 def test_a_config_holds_the_claims_that_it_is_said_to_hold(config):
     """Unchanged it judges its own and those of `held_too`, and no other; that these are lost can then be said."""
-    own = {claim.id for of in papers() for claim in of.claims if claim.config == config}
+    own = {claim.id for of in paper_claims() for claim in of.claims if claim.config == config}
     table = radarsim.run(config, realisations=20).tables["claims"]
     assert set(table["claim"]) == own | set(HELD_TOO.get(config, ()))
-    assert not table["class"].eq(claims.NOT_JUDGED).any()
+    assert not table["class"].eq(NOT_JUDGED).any()
 
 
 @pytest.mark.parametrize(
@@ -168,7 +169,7 @@ def test_claims_of_another_config_are_not_lost_in_silence(config, override):
     found = radarsim.run(config, overrides=[override], realisations=50)
     table = found.tables["claims"]
     assert set(table["claim"]) == set(HELD_TOO[config])
-    lost = table["verdict"].eq(claims.NOT_JUDGED)
+    lost = table["verdict"].eq(NOT_JUDGED)
     assert lost.any()
     assert table.loc[lost, "why"].ne("").all()
-    assert {claim for names in found.unjudged().values() for claim in names} == set(table.loc[lost, "claim"])
+    assert {claim for names in unjudged_claims(found).values() for claim in names} == set(table.loc[lost, "claim"])

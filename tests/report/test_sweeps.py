@@ -9,8 +9,8 @@ import pytest
 from radarsim.app import result as output
 from radarsim.app import run
 from radarsim.language import speaking
+from radarsim.papers.claim_rows import measured_words
 from radarsim.report import chart, figures, panels, sweeps, tables
-from radarsim.report.claims import page
 from radarsim.report.drawing import Line
 
 
@@ -99,7 +99,7 @@ def test_no_sweep_no_figure(expected_radar):
 
 def test_measured_values_are_written_to_two_figures_of_their_half_width():
     def said(value, lo, hi, unit="%"):
-        return page.measured({"measured": value, "judged_lo": lo, "judged_hi": hi, "unit": unit, "exact": ""})
+        return measured_words({"measured": value, "judged_lo": lo, "judged_hi": hi, "unit": unit, "exact": ""})
 
     assert said(82.7032, 82.33, 83.07) == "82.70 [82.33, 83.07] %"
     assert said(-6.5e-5, -1.3e-4, 4e-7) == "−0.000065 [−0.000130, 0.000000] %"

@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from radarsim.config.fields import Study as Keys
-from radarsim.report.claims import Evidence, PaperClaims
+from radarsim.papers.claim import PaperClaims
+from radarsim.papers.evidence import Evidence
+from radarsim.papers.study_claims import claims_of
 from radarsim.studies import registry
 from radarsim.studies.folder import StudyFolder
 from radarsim.studies.interface import RecordedPlots, Study
@@ -49,7 +51,7 @@ def test_every_part_is_there_and_takes_what_the_interface_gives(study, monkeypat
             assert list(inspect.signature(getattr(study.file(file), part)).parameters) == given, part
     assert issubclass(study.keys(), Keys)
     if study.paper is not None:
-        claims = study.claims()
+        claims = claims_of(study)
         assert isinstance(claims, PaperClaims)
         assert claims.claims
         assert issubclass(claims.evidence, Evidence)
@@ -62,7 +64,7 @@ def test_every_part_is_there_and_takes_what_the_interface_gives(study, monkeypat
 
 def test_what_is_not_offered_is_as_the_interface_has_it():
     bare = StudyFolder(package="radarsim.studies.multimodel", name="bare", about="a study", filters={})
-    assert (bare.claims(), bare.recorded(), bare.shipped()) == (None, None, None)
+    assert (claims_of(bare), bare.recorded(), bare.shipped()) == (None, None, None)
     assert (bare.inputs([]), bare.cost({}, {}), bare.seconds_per_update(None)) == (None, None, {})
     assert bare.exact_errors
     assert not bare.draws_sweeps

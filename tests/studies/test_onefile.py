@@ -12,10 +12,12 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.config.fields import Member, Model, NonNegative, Positive, key
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
-from radarsim.report import claims, tables
-from radarsim.report.claims import over
-from radarsim.report.claims.declared import NoSuchName
-from radarsim.studies import judged
+from radarsim.papers import one_file_measures
+from radarsim.papers.claim_files import MeasureCall
+from radarsim.papers.claims_table import claims_table, failed_measures
+from radarsim.papers.evidence import MissingEvidence, UnknownName
+from radarsim.papers.study_claims import check_declarations, claim_faults, claims_of, interpretations_of
+from radarsim.report import tables
 from radarsim.studies.interface import Paper, true_column
 from radarsim.studies.noise import noise_key
 from radarsim.studies.onefile import Component, Measured, OneFile
@@ -177,7 +179,7 @@ def test_question_answer_and_figures(made):
 
 def test_claims_find_a_case_by_its_keys_and_interpretations_set_keys(made):
     study, results, every = made
-    papers = study.claims()
+    papers = claims_of(study)
     (claim,) = papers.claims
     places = {result.name: {"filters": {0, 1}} for result in results}
     seen = papers.evidence(results, every, places)
@@ -188,7 +190,7 @@ def test_claims_find_a_case_by_its_keys_and_interpretations_set_keys(made):
     assert seen.case({"scans": 40}) is results[0]
     with pytest.raises(ConfigError, match=r"target\.step: there is no such key"):
         seen.case({"target.step": 2})
-    interpretations = study.interpretations()
+    interpretations = interpretations_of(study)
     assert [interpretations.name(one) for one in interpretations.of_claim("walk.1")] == [
         "as shipped",
         "noise: a half of it",
@@ -200,12 +202,12 @@ def test_claims_find_a_case_by_its_keys_and_interpretations_set_keys(made):
 
 def test_a_ratio_is_paired_where_one_of_the_two_is_the_baseline(made):
     study, results, every = made
-    seen = study.claims().evidence(results, every, {result.name: {"filters": {0, 1}} for result in results})
+    seen = claims_of(study).evidence(results, every, {result.name: {"filters": {0, 1}} for result in results})
     at = {"target.sigma_step_m": 2}
-    one = judged.ratio(seen, at, "quick", "slow", "x")
-    other = judged.ratio(seen, at, "slow", "quick", "x")
+    one = one_file_measures.ratio(seen, at, "quick", "slow", "x")
+    other = one_file_measures.ratio(seen, at, "slow", "quick", "x")
     assert_rounded(one.value, 1 / other.value, operations=5)
-    quick, slow = (judged.sigma(seen, at, name, "x").value for name in ("quick", "slow"))
+    quick, slow = (one_file_measures.sigma(seen, at, name, "x").value for name in ("quick", "slow"))
     assert_rounded(quick / slow, one.value, operations=5)
     assert one.lo < one.value < one.hi
     assert other.lo < other.value < other.hi
@@ -230,12 +232,18 @@ WRONG = {
 }
 
 
+def check(study):
+    """What is checked of a study before its configs are read."""
+    study.keys()
+    check_declarations(study)
+
+
 @pytest.mark.parametrize("name", WRONG)
 def test_what_is_missing_is_one_line(name):
     value, said = WRONG[name]
     Wrong = type("Wrong", (Walk,), {name.strip(): value, "__module__": __name__})
     with pytest.raises(ConfigError, match=said) as caught:
-        Wrong().keys()
+        check(Wrong())
     assert len(caught.value.lines) == 1
 
 
@@ -249,7 +257,7 @@ def test_a_time_between_plots_is_a_time():
 def test_a_key_that_no_interpretation_can_set_is_one_line():
     text = Walk.claims_yaml.replace("sensor.sigma_x_m: 0.5", "sensor.sigma: 1")
     with pytest.raises(ConfigError, match=r"choices: sets: there is no key sensor\.sigma"):
-        type("Wrong", (Walk,), {"claims_yaml": text, "__module__": __name__})().keys()
+        check(type("Wrong", (Walk,), {"claims_yaml": text, "__module__": __name__})())
 
 
 UNKNOWN = {  # in the text: what stands there instead, and what is said of it
@@ -275,8 +283,8 @@ def test_what_a_claim_names_and_is_not_there_is_known_without_a_run(what):
     written = Walk.claims_yaml.replace(what, text)
     study = type("Wrong", (Walk,), {"claims_yaml": written, "__module__": __name__})()
     cases = {"walk": (case_of(Walk(), 0.1), case_of(Walk()))}
-    assert not Walk().claim_faults(cases.get)
-    (line,) = set(study.claim_faults(cases.get))
+    assert not claim_faults(Walk(), cases.get)
+    (line,) = set(claim_faults(study, cases.get))
     assert said in line
     number = int(re.match(r".*test_onefile\.py:(\d+):\d+: ", line)[1])
     lines = written.splitlines()  # a text that is not in the file: its own lines
@@ -291,7 +299,7 @@ def failing(what):
             raise what
         return what(seen) if callable(what) else what
 
-    return over.Call("own", measure, (), {}, "file.py:7:1")
+    return MeasureCall("own", measure, (), {}, "file.py:7:1")
 
 
 @pytest.mark.parametrize(
@@ -301,35 +309,35 @@ def failing(what):
         ("fast", "must give an Estimate or a number, got 'fast'"),
         (ValueError("boom"), "ValueError: boom \\("),
         (SystemExit(0), "SystemExit: 0 \\("),
-        (NoSuchName("no filter 'quikc'; there are slow"), "no filter 'quikc'; there are slow \\("),
+        (UnknownName("no filter 'quikc'; there are slow"), "no filter 'quikc'; there are slow \\("),
         (lambda seen: seen.curve({}, "quick", "x").at(41), "no such scans; there are 1 to 40 \\("),
         (lambda seen: seen.gain({}, "quick", "x").since(50), "no such scans; there are 1 to 40 \\("),
     ],
 )
 def test_a_measure_that_fails_is_one_line_and_the_other_claims_are_judged(made, what, said):
     study, results, every = made
-    papers = study.claims()
+    papers = claims_of(study)
     (claim,) = papers.claims
     part = replace(claim.parts[0], measure=failing(what), cases=())
     both = replace(papers, claims=(replace(claim, id="walk.0", parts=(part,)), claim))
     shipped = {"walk": results}
-    table = claims.judged(both, results, every, shipped.get, "walk")
+    table = claims_table(both, results, every, shipped.get, "walk")
     assert table["class"].tolist() == ["not judged here", "confirmed"]
-    (line,) = claims.failed(table)
+    (line,) = failed_measures(table)
     assert re.match(f"file\\.py:7:1: own: {said}", line)
 
 
 def test_a_name_that_a_measure_of_ones_own_looks_for_in_vain_is_the_reason(made):
     study, results, every = made
-    seen = study.claims().evidence(results, every, {result.name: {"filters": {0, 1}} for result in results})
-    with pytest.raises(claims.Missing, match="no filter 'quikc'; there are slow, quick"):
+    seen = claims_of(study).evidence(results, every, {result.name: {"filters": {0, 1}} for result in results})
+    with pytest.raises(MissingEvidence, match="no filter 'quikc'; there are slow, quick"):
         seen.curve({}, "quikc", "x")
-    with pytest.raises(claims.Missing, match="no component 'y'; there are x"):
+    with pytest.raises(MissingEvidence, match="no component 'y'; there are x"):
         seen.row("last", filter="quick", component="y")
-    with pytest.raises(claims.Missing, match="filter 'slow' is the baseline: it has no gain"):
+    with pytest.raises(MissingEvidence, match="filter 'slow' is the baseline: it has no gain"):
         seen.gain({}, "slow", "x")
     with pytest.raises(ConfigError, match="no table 'believed'; there are last, curves, gains"):
-        judged.over_believed(seen, {}, "quick", "x")
+        one_file_measures.over_believed(seen, {}, "quick", "x")
 
 
 WRONG_NAMES = {

@@ -13,9 +13,10 @@ from radarsim.config.fields import Member, Model, Positive, Probability, key
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.kernels.traced import elimination, sqrt, updated, where
+from radarsim.papers import one_file_measures
 from radarsim.recorded import page
 from radarsim.recorded.follow import BEFORE, Followed
-from radarsim.studies import judged, stepwise
+from radarsim.studies import stepwise
 from radarsim.studies.onefile import Component, Measured
 from radarsim.studies.stepwise import Steps, StepStudy
 from tests.tolerances import assert_rounded, column_sizes, mean_error, sigma_error
@@ -181,14 +182,14 @@ def test_what_the_study_knows_exactly_and_what_its_filters_believe_stands_in_tab
     made = study.tables([result])
     assert set(made["believed"]["filter"]) == set(made["consistency"]["filter"]) == {"kalman"}
     assert set(made["consistency"]["nees_verdict"]) == {"consistent"}
-    seen = judged.Evidence([result], made, {})
+    seen = one_file_measures.Evidence([result], made, {})
     for at, place in ((None, -1), (3, 2)):
-        found = judged.bias(seen, "walk", "halves", "x", at)
+        found = one_file_measures.bias(seen, "walk", "halves", "x", at)
         assert found.value == sums["error"][1, place, 0, 0] / n
         half = 1.96 * plan.axes.exact_sigma[1, place, 0] / np.sqrt(n)
         assert found.hi - found.value == pytest.approx(half, rel=sigma_error(n))
         ratio = np.sqrt(sums["error"][0, place, 0, 1] / sums["believed"][0, place, 0])
-        assert_rounded(judged.over_believed(seen, "walk", "kalman", "x", at).value, ratio, operations=5)
+        assert_rounded(one_file_measures.over_believed(seen, "walk", "kalman", "x", at).value, ratio, operations=5)
 
 
 @pytest.mark.parametrize("sensor", [{}, {"detection_probability": 0.6}], ids=["all plots", "missed plots"])

@@ -13,20 +13,35 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app import interpretations, run
+from radarsim.app import run
 from radarsim.app.configs import load
 from radarsim.app.run import RunOptions, SimulatedCases
 from radarsim.engine.results import Axes, Layout
 from radarsim.engine.run import Collected
+from radarsim.papers import decide
+from radarsim.papers.claim import Claim, PaperClaims, Part
+from radarsim.papers.claim_outcome import claim_outcome
+from radarsim.papers.decide import simulate_until_decided
+from radarsim.papers.evidence import Evidence, MissingEvidence
+from radarsim.papers.expected_ranges import ExpectedRange
+from radarsim.papers.verdict_rule import (
+    CONFIRMED,
+    LOOKS,
+    PRINT,
+    REFUTED,
+    UNDECIDED,
+    VOID,
+    Z95,
+    JudgedPart,
+    widen,
+    widening_factor,
+)
 from radarsim.report import statistics
-from radarsim.report.claims import rule
-from radarsim.report.claims.declared import Claim, Evidence, Missing, PaperClaims, Part
-from radarsim.report.claims.rule import Judged, Range
 from radarsim.report.precision import FIRST, FLOOR, FLOOR_OF_TAILS, MOST, looks
 from radarsim.report.quantities import LOST, SIGMA
 from radarsim.studies import registry
 
-Z = rule.level(1) * rule.Z95
+Z = widening_factor(1) * Z95
 EVERY = (1000, *looks(MOST))  # the looks that may be taken
 
 
@@ -49,7 +64,7 @@ def crossed(places, factor, points=401):
 
 @pytest.mark.parametrize(("count", "known"), [(1, 0.050), (2, 0.083), (3, 0.107), (5, 0.142), (10, 0.193)])
 def test_the_recursion_gives_what_is_known_of_equal_steps(count, known):
-    assert crossed(np.arange(1.0, count + 1), rule.Z95) == pytest.approx(known, abs=6e-4)
+    assert crossed(np.arange(1.0, count + 1), Z95) == pytest.approx(known, abs=6e-4)
 
 
 @pytest.mark.parametrize("most", [2000, 8000, 100_000, 128_000, 10**6, 10**8, MOST])
@@ -57,9 +72,9 @@ def test_however_often_one_looks_at_most_5_per_cent_of_true_claims_fall(most):
     """At 95 % a look it would be 5, 8, 20 … 65 %; the looks are those that `--decide` and `interpretations` take."""
     places = np.array([1000.0, *looks(most)])
     assert crossed(places, Z) <= 0.05
-    assert crossed(places, rule.Z95) > 0.07
+    assert crossed(places, Z95) > 0.07
     if most == MOST:
-        assert len(EVERY) == rule.LOOKS
+        assert len(EVERY) == LOOKS
         assert crossed(places, Z) > 0.038  # nor is it much wider than it has to be
 
 
@@ -72,12 +87,12 @@ def walk(rng, most, parts=1):
 
 def outcome(means, n, borders):
     """What the rule says of a claim whose parts are printed numbers, true at the last value that their words leave."""
-    half = rule.Z95 / math.sqrt(n)
+    half = Z95 / math.sqrt(n)
     judged = [
-        Judged(10 + x, 10 + x - half, 10 + x + half, 8.0, 9.5 + gap, 0.5, n=n)
+        JudgedPart(10 + x, 10 + x - half, 10 + x + half, 8.0, 9.5 + gap, 0.5, n=n)
         for x, gap in zip(means[n], borders, strict=True)
     ]
-    return rule.claim(judged)
+    return claim_outcome(judged)
 
 
 @pytest.mark.slow_cases("borders0")
@@ -101,12 +116,12 @@ def test_runs_that_decide_refute_few_claims_that_are_true_at_the_border(monkeypa
             {"paper": "p", "claim": "P9.1", "as_shipped": said.kind, "extension": False, "n": 1.0, "needed": needed}
         ]
 
-    monkeypatch.setattr(interpretations.run, "simulate", simulated)
-    monkeypatch.setattr(interpretations, "rows_of", rows_of)
+    monkeypatch.setattr(decide.run, "simulate", simulated)
+    monkeypatch.setattr(decide, "_claim_rows", rows_of)
     for _ in range(runs):
         means = walk(rng, most, len(borders))
-        ended = interpretations.simulated(experiment, RunOptions(out="nowhere"))
-        refuted += outcome(means, ended.done["rls2"], borders).kind == rule.REFUTED
+        ended = simulate_until_decided(experiment, RunOptions(out="nowhere"))
+        refuted += outcome(means, ended.done["rls2"], borders).kind == REFUTED
     assert refuted / runs < 0.025 + 3 * math.sqrt(0.025 * 0.975 / runs)
 
 
@@ -114,7 +129,7 @@ def test_claims_far_from_a_border_cost_no_more():
     """At twelve standard errors of the first look its interval decides, of however many looks it is one."""
     rng, n = np.random.default_rng(4), FIRST
     far = 12 / math.sqrt(n)
-    assert all(outcome(walk(rng, n), n, (far,)).kind == rule.CONFIRMED for _ in range(200))
+    assert all(outcome(walk(rng, n), n, (far,)).kind == CONFIRMED for _ in range(200))
 
 
 def test_a_rate_keeps_what_is_promised_too():
@@ -125,7 +140,7 @@ def test_a_rate_keeps_what_is_promised_too():
         for n in EVERY:
             count, before = count + rng.binomial(n - before, p, runs), n
             of = statistics.rate(count, np.full(runs, float(n)))
-            lo, hi = rule.widened(of.lo, of.value, of.hi, rule.level(1))
+            lo, hi = widen(of.lo, of.value, of.hi, widening_factor(1))
             left |= (hi < p) | (p < lo)
         assert left.mean() < 0.05 + 3 * math.sqrt(0.05 * 0.95 / runs)
 
@@ -137,13 +152,13 @@ def test_a_verdict_is_the_same_however_its_number_came_about(tmp_path):
     rows = decided.tables["claims"]
     again = radarsim.run("orders", realisations=decided.cases[0].count), radarsim.load("orders", out=tmp_path)
     assert all(one.tables["claims"].equals(rows) for one in again)
-    judged = rows[rows["exact"].isna() & (rows["lo"] < rows["hi"]) & (rows["verdict"] != rule.VOID)]
-    assert set(judged["verdict"]) >= {rule.CONFIRMED, rule.REFUTED, rule.UNDECIDED}
+    judged = rows[rows["exact"].isna() & (rows["lo"] < rows["hi"]) & (rows["verdict"] != VOID)]
+    assert set(judged["verdict"]) >= {CONFIRMED, REFUTED, UNDECIDED}
     for row in judged.to_dict("records"):
         low = -math.inf if math.isnan(row["expected_lo"]) else row["expected_lo"] - row["margin"]
         high = math.inf if math.isnan(row["expected_hi"]) else row["expected_hi"] + row["margin"]
         beyond = row["judged_hi"] < low or row["judged_lo"] > high
-        assert (row["verdict"] == rule.REFUTED) == beyond
+        assert (row["verdict"] == REFUTED) == beyond
         assert row["judged_lo"] <= row["lo"] <= row["hi"] <= row["judged_hi"]
 
 
@@ -161,10 +176,10 @@ def test_a_real_claim_at_the_border_is_refuted_in_few_runs_that_decide(monkeypat
         return statistics.Estimate(*(row(seen.tables)[name] for name in ("sigma", "sigma_lo", "sigma_hi")))
 
     def unknown(seen):
-        raise Missing("nobody knows")
+        raise MissingEvidence("nobody knows")
 
     truth = row(radarsim.run("rls2", realisations=2000).tables)["exact_sigma"]
-    expected = Range(0.9 * truth, 0.965 * truth, "said", 0.035 * truth, rule.PRINT, (0.0, truth))
+    expected = ExpectedRange(0.9 * truth, 0.965 * truth, "said", 0.035 * truth, PRINT, (0.0, truth))
     part = Part(("rls2",), "σ", "m", measure, expected, exact=unknown)
     evidence = type("Any", (Evidence,), {"case": lambda self, key: self.results[0]})
     own = PaperClaims([Claim("P9.1", "here", "said", (part,), config="rls2")], evidence, "nobody")
@@ -172,8 +187,8 @@ def test_a_real_claim_at_the_border_is_refuted_in_few_runs_that_decide(monkeypat
     ended = [radarsim.run("rls2", realisations=64_000, seed=1 + seed, decide=True) for seed in range(runs)]
     verdicts = [one.tables["claims"]["class"].iloc[0] for one in ended]
     assert np.median([one.cases[0].count for one in ended]) == 64_000
-    assert verdicts.count(rule.REFUTED) / runs < 0.025 + 3 * math.sqrt(0.025 * 0.975 / runs)
-    assert verdicts.count(rule.UNDECIDED) / runs > 0.9
+    assert verdicts.count(REFUTED) / runs < 0.025 + 3 * math.sqrt(0.025 * 0.975 / runs)
+    assert verdicts.count(UNDECIDED) / runs > 0.9
 
 
 # ---- precision ------------------------------------------------------------------------------------------------------

@@ -3,7 +3,6 @@
 from radarsim.language import term
 from radarsim.report.quantities import FLOORS, RIGHT, WRONG, Quantity
 from radarsim.studies.folder import StudyFolder
-from radarsim.studies.interface import Paper
 
 COLUMN = "above_oracle_percent|above_oracle"  # against the filter that is given the true folds
 ABOVE_ORACLE = Quantity(
@@ -24,7 +23,6 @@ STUDY = StudyFolder(
         "doppler: folded": "the same, unfolded by up to `hypotheses` sequences of folds; 1: the nearest fold",
         "merge: each_scan": "the same, hypotheses merged into one each scan (GPB1): no memory",
     },
-    paper=Paper("Gorshkov & Zavizhenets 2017, conclusion", page="ambiguous_doppler"),
     offers=("inputs", "recorded", "warnings", "floor", "errors"),
     own_quantities=(ABOVE_ORACLE, RIGHT, WRONG, *FLOORS),
 )

@@ -3,7 +3,6 @@
 from radarsim.language import term
 from radarsim.report.quantities import Quantity
 from radarsim.studies.folder import StudyFolder
-from radarsim.studies.interface import Paper
 
 STUDY = StudyFolder(
     package=__name__,
@@ -15,13 +14,7 @@ STUDY = StudyFolder(
         "output": "rule that forms the estimate: moment, best",
         "covariance_at": "the plot's covariance at the plot or at its prediction",
     },
-    paper=Paper(
-        "Sychev & Osipov 2023",
-        page="multimodel",
-        may_grow=("filters",),
-        held_too={"multimodel_families": ("P2.8", "P2.9")},
-    ),
-    offers=("cost", "interpretations", "seconds_per_update", "recorded", "errors"),
+    offers=("cost", "seconds_per_update", "recorded", "errors"),
     own_quantities=(
         Quantity("probability", term("probability"), "probabilities", "probability", per=term("model"), kind="share"),
     ),

@@ -2,7 +2,6 @@
 
 from radarsim.report.quantities import FLOORS, LOCK, LOST, RIGHT, WRONG
 from radarsim.studies.folder import StudyFolder
-from radarsim.studies.interface import Paper
 
 STUDY = StudyFolder(
     package=__name__,
@@ -15,7 +14,6 @@ STUDY = StudyFolder(
         "estimator: spectrum": "the same by the classical method: the peak of the spectrum, then scoring",
         "estimator: fisher_bound": "the idealisation: Gaussian errors of the Fisher bound, which always lock",
     },
-    paper=Paper("Uss, Baryshev & Djavad 2010, into Gorshkov & Zavizhenets 2017", page="pulses_to_tracks"),
     offers=("inputs", "warnings", "floor"),
     own_quantities=(LOCK, LOST, RIGHT, WRONG, *FLOORS),
 )

@@ -2,7 +2,6 @@
 
 from radarsim.report.quantities import FLOORS
 from radarsim.studies.folder import StudyFolder
-from radarsim.studies.interface import Paper
 
 STUDY = StudyFolder(
     package=__name__,
@@ -13,20 +12,9 @@ STUDY = StudyFolder(
         "observes: [range, velocity]": "the same on range and radial velocity, started on two scans",
         "kind: NAME": "a filter of an installed package (entry points radarsim.filters), by its gains at every scan",
     },
-    paper=Paper(
-        "Gorshkov & Zavizhenets 2017",
-        page="range_doppler",
-        may_shorten=("scans",),
-        held_too={
-            "rls1": ("P1.1", "P1.2", "P1.3", "P1.17", "P1.29"),
-            **dict.fromkeys(("rls2", "rls2_manoeuvre_variance", "rls2_manoeuvres"), ("P1.18", "P1.23", "P1.28")),
-            "manoeuvre_variance": tuple(f"P1.{number}" for number in range(1, 37)),
-        },
-    ),
     offers=(
         "gains",
         "inputs",
-        "interpretations",
         "recorded",
         "chart",
         "shortened",

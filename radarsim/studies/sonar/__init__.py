@@ -5,7 +5,6 @@ parts have; the folders `manoeuvre` and `clutter` have files of the same names a
 `radarsim.studies.folder`, for cases that ask their questions. A table may have no rows, a figure be None."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
 
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import CaseResult
-    from radarsim.report.claims import PaperClaims
-    from radarsim.report.claims.over import PaperInterpretations
     from radarsim.report.drawing import Figure
     from radarsim.studies.floor import Floor
     from radarsim.studies.sonar.config import Keys
@@ -114,25 +111,6 @@ class Sonar(Study):
     def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> list[str]:
         answers = (file_of(part, "words").answer(chosen, made) for part, chosen in reversed(by_part(results)))
         return [sentence for answer in answers for sentence in answer]
-
-    def paper_key(self) -> str:
-        return "P3"
-
-    def claims(self) -> "PaperClaims":
-        from radarsim.report.claims import PaperClaims
-        from radarsim.report.claims.over import claims_of
-        from radarsim.studies.sonar.measures import Evidence
-
-        claims = [claim for part in (BASE, "manoeuvre") for claim in claims_of(partial(file_of, part))]
-        claims.sort(key=lambda claim: int(claim.id.partition(".")[2]))
-        of_smoothing = tuple(claim.id for claim in claims if claim.config == "sonar_smoothing")
-        held_too = {"sonar_fluctuating": of_smoothing}  # which includes its cases
-        return PaperClaims(claims, Evidence, "Butyrskiy", page="sonar", may_grow=("filters",), held_too=held_too)
-
-    def interpretations(self) -> "PaperInterpretations":
-        from radarsim.studies.sonar.manoeuvre.interpretations import Interpretations
-
-        return Interpretations()
 
     def recorded(self) -> RecordedPlots:
         from radarsim.studies.sonar.track import Recorded

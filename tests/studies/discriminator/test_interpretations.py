@@ -9,15 +9,17 @@ import pytest
 from radarsim.app.configs import load
 from radarsim.bursts import burst as model
 from radarsim.engine.results import CaseResult
-from radarsim.report.claims import rule
-from radarsim.report.claims.over import Unreadable, under
+from radarsim.papers.discriminator.interpretations import PRINTED_PRIOR, ExactEvidence, Interpretations, windows
+from radarsim.papers.interpretations import ImpossibleInterpretation
+from radarsim.papers.study_claims import claims_of
+from radarsim.papers.verdict_rule import CONFIRMED, REFUTED
+from radarsim.papers.verdicts_by_interpretation import judge_under
 from radarsim.studies import registry
 from radarsim.studies.discriminator import study
-from radarsim.studies.discriminator.interpretations import PRINTED_PRIOR, ExactEvidence, Interpretations, windows
 from tests.tolerances import rounding, scaled_condition
 
 OF = Interpretations()
-CLAIMS = {one.id: one for one in registry.study("discriminator").claims().claims}
+CLAIMS = {one.id: one for one in claims_of(registry.study("discriminator")).claims}
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +78,7 @@ def test_other_windows_go_into_the_config(cases):
 
 
 def test_a_window_that_does_not_exist_says_why():
-    with pytest.raises(Unreadable, match="no root"):
+    with pytest.raises(ImpossibleInterpretation, match="no root"):
         ExactEvidence(OF.interpretation(first_phase="kept")).windows("computed")
 
 
@@ -102,7 +104,7 @@ def classes(claim):
     found = {}
     varied = [choice for choice in OF.choices if choice.key in ("noise_variance", "threshold", "lobe", "forecast")]
     for interpretation in OF.combined(varied):
-        seen = under(OF, CLAIMS[claim], interpretation, ExactEvidence(interpretation))
+        seen = judge_under(OF, CLAIMS[claim], interpretation, ExactEvidence(interpretation))
         found.setdefault((interpretation["threshold"], interpretation["lobe"]), set()).add(seen.outcome.kind)
     return found
 
@@ -110,10 +112,10 @@ def classes(claim):
 def test_a_design_by_11_for_the_lobe_of_10_keeps_its_promise():
     """Two numbers are printed for c: the design may take one and the lobe the other, and only 0.5 for 1 holds."""
     assert classes("P4.12") == {
-        ("0.5", "one c"): {rule.REFUTED},
-        ("1", "one c"): {rule.REFUTED},
-        ("0.5", "two"): {rule.CONFIRMED},
-        ("1", "two"): {rule.REFUTED},
+        ("0.5", "one c"): {REFUTED},
+        ("1", "one c"): {REFUTED},
+        ("0.5", "two"): {CONFIRMED},
+        ("1", "two"): {REFUTED},
     }
     worst = {name: ExactEvidence(OF.interpretation(lobe=name)).worst_handover("any").value for name in ("one c", "two")}
     # By another program, with 400 000 draws of the form.
@@ -123,7 +125,7 @@ def test_a_design_by_11_for_the_lobe_of_10_keeps_its_promise():
 
 def test_the_phase_is_searched_for_once():
     """The forecast's phase is anywhere; at the hand-overs it is as near as the form's rank-one error leaves it."""
-    assert set(chain(*classes("P4.20").values())) == {rule.CONFIRMED}
+    assert set(chain(*classes("P4.20").values())) == {CONFIRMED}
     for noise, c in (("9", "0.5"), ("2.25", "1")):
         offsets = ExactEvidence(OF.interpretation(noise_variance=noise, threshold=c)).phase_offsets("any")
         assert offsets[0] > np.pi / 2
@@ -132,7 +134,7 @@ def test_the_phase_is_searched_for_once():
 
 def test_offsets_of_the_phase_are_those_of_the_prepared_case(cases):
     """Of many versions at once, in scaled units, and by the designer of a run."""
-    evidence = registry.study("discriminator").claims().evidence
+    evidence = claims_of(registry.study("discriminator")).evidence
     for noise, taken in ((9.0, {}), (2.25, {"noise_variance": "2.25", "threshold": "1", "forecast": "multiples"})):
         result = registry.study("discriminator").prepare(cases[noise])
         case, own = cases[noise], {"estimators": set(range(len(result.axes.filters)))}

@@ -7,8 +7,9 @@ import pytest
 
 from radarsim.app import run
 from radarsim.bursts.burst import phase_turns, sample_times, signal
+from radarsim.papers.discriminator import measures
 from radarsim.report.drawing import Line
-from radarsim.studies.discriminator import measures, study, words
+from radarsim.studies.discriminator import study, words
 from radarsim.studies.discriminator import tables as report
 from radarsim.studies.discriminator.figures import one_burst
 from radarsim.studies.discriminator.kernels import bin_edges

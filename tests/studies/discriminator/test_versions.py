@@ -7,9 +7,9 @@ import pytest
 
 from radarsim.bursts import burst as model
 from radarsim.bursts.burst import Condition, Designer
-from radarsim.studies.discriminator import burst_versions
-from radarsim.studies.discriminator.burst_versions import Version
-from radarsim.studies.discriminator.interpretations import BURST, PRINTED_PRIOR
+from radarsim.papers.discriminator import burst_versions
+from radarsim.papers.discriminator.burst_versions import Version
+from radarsim.papers.discriminator.interpretations import BURST, PRINTED_PRIOR
 from tests.tolerances import rounding, scaled_condition
 
 POWERS = 2.1e5  # κ of five powers of time, each in its own unit

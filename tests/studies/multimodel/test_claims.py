@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.report.claims import CONFIRMED, REFUTED, page
+from radarsim.papers.claim_rows import count_classes, is_extension
+from radarsim.papers.multimodel import measures
+from radarsim.papers.multimodel.interpretations import Interpretations
+from radarsim.papers.study_claims import claims_of
+from radarsim.papers.verdict_rule import CONFIRMED, REFUTED
 from radarsim.studies import registry
-from radarsim.studies.multimodel import cost, measures
-from radarsim.studies.multimodel.interpretations import Interpretations
+from radarsim.studies.multimodel import cost
 from tests.tolerances import mean_error
 
-CLAIMS = {one.id: one for one in registry.study("multimodel").claims().claims}
+CLAIMS = {one.id: one for one in claims_of(registry.study("multimodel")).claims}
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +63,6 @@ def test_what_the_paper_reports_of_others_is_judged_and_not_counted(transition):
     parts = transition.tables["claims"].to_dict("records")
     own = [row for row in parts if row["claim"] == "P2.12"]
     assert {row["class"] for row in own} == {REFUTED}
-    assert page.extension(own)
+    assert is_extension(own)
     assert "P2.12" in [claim for claim in CLAIMS if Interpretations().of_claim(claim)]
-    assert page.counts(own) == ({}, 1)
+    assert count_classes(own) == ({}, 1)

@@ -4,8 +4,8 @@ them."""
 import numpy as np
 import pytest
 
+from radarsim.papers.multimodel.interpretations import Interpretations
 from radarsim.studies.multimodel import world
-from radarsim.studies.multimodel.interpretations import Interpretations
 from radarsim.studies.multimodel.world import FLIGHTS
 
 T = np.arange(0, 186.2, 0.5)

@@ -5,13 +5,14 @@ from pathlib import Path
 import pytest
 
 from radarsim.app.configs import load
+from radarsim.papers.multimodel.interpretations import Interpretations
+from radarsim.papers.study_claims import claims_of
 from radarsim.studies import registry
-from radarsim.studies.multimodel.interpretations import Interpretations
 from radarsim.studies.multimodel.world import FLIGHTS
 from tests.tolerances import rounding
 
 OF = Interpretations()
-CLAIMS = {one.id: one for one in registry.study("multimodel").claims().claims}
+CLAIMS = {one.id: one for one in claims_of(registry.study("multimodel")).claims}
 
 
 @pytest.fixture(scope="module")
@@ -87,11 +88,12 @@ def test_the_output_start_and_bank(case):
 
 @pytest.mark.slow
 def test_a_flown_interpretation_is_measured_over_its_own_stages(tmp_path):
-    from radarsim.app import interpretations
+    from radarsim.papers.judge_interpretations import judge_requests
+    from radarsim.papers.open_papers import JudgingRequest, judging_requests
 
-    of = next(one for one in interpretations.asked(["P2.3"]))
-    wanted = interpretations.Asked(of.paper, of.claims, whole=False)
-    done = interpretations.judged([wanted], out=tmp_path, realisations=16, figures=False)
+    of = next(one for one in judging_requests(["P2.3"]))
+    wanted = JudgingRequest(of.paper, of.claims, whole=False)
+    done = judge_requests([wanted], out=tmp_path, realisations=16, figures=False)
     flown = [one for one in done.read[0].over[0].under if one.interpretation["flight"] == "pull-up 250"]
     assert flown
     assert all(one.outcome is not None for one in flown)

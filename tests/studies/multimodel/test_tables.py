@@ -11,13 +11,16 @@ import pytest
 import radarsim
 from radarsim.app import result as output
 from radarsim.language import speaking
-from radarsim.report import claims, figures, html
+from radarsim.papers.claims_table import NOT_JUDGED
+from radarsim.papers.multimodel.measures import Evidence
+from radarsim.papers.study_claims import claims_of
+from radarsim.papers.verdict_rule import CONFIRMED
+from radarsim.report import figures, html
 from radarsim.report.drawing import Note
 from radarsim.studies.multimodel import STUDY, words
-from radarsim.studies.multimodel.measures import Evidence
 from tests.tolerances import assert_rounded, rounding
 
-CLAIMS = STUDY.claims().claims
+CLAIMS = claims_of(STUDY).claims
 
 
 @pytest.fixture(scope="module")
@@ -75,14 +78,14 @@ def test_gains_between_any_two_filters_are_paired(result):
 def test_claims_of_this_config_are_judged_and_no_others(result):
     rows = result.tables["claims"]
     assert set(rows["claim"]) == {c.id for c in CLAIMS if c.config == "multimodel"}
-    assert (rows.loc[rows["claim"] == "P2.11", "verdict"] == claims.CONFIRMED).all()
+    assert (rows.loc[rows["claim"] == "P2.11", "verdict"] == CONFIRMED).all()
 
 
 @pytest.mark.slow
 def test_another_flight_is_not_the_papers(result):
     changed = radarsim.run("multimodel", realisations=8, overrides=["target.lag_s=2"])
     table = changed.tables["claims"]
-    assert table["class"].eq(claims.NOT_JUDGED).all()
+    assert table["class"].eq(NOT_JUDGED).all()
     assert table["why"].str.contains("target.lag_s is 2, the paper's 1").all()
 
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from radarsim.studies.range_doppler import filter_versions, filters
-from radarsim.studies.range_doppler.measures import RADARS
+from radarsim.papers.range_doppler import filter_versions
+from radarsim.papers.range_doppler.measures import RADARS
+from radarsim.studies.range_doppler import filters
 from tests.tolerances import assert_rounded, rounding, scaled_condition
 
 VERSION = [("random_jerk", 1e-3, "weighted")]

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from radarsim.papers.range_doppler.measures import RADARS
 from radarsim.physics import manoeuvre_covariance, transition
 from radarsim.studies.range_doppler import filters, search
 from radarsim.studies.range_doppler.filters import Plots, design
-from radarsim.studies.range_doppler.measures import RADARS
 from tests.studies.range_doppler import naive
 from tests.tolerances import absolute_product, assert_rounded, rounding, scaled_condition
 

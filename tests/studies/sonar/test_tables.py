@@ -6,7 +6,9 @@ import pytest
 
 import radarsim
 from radarsim.app import result as output
-from radarsim.report import claims, figures, statistics
+from radarsim.papers.study_claims import claims_of
+from radarsim.papers.verdict_rule import CONFIRMED, REFUTED
+from radarsim.report import figures, statistics
 from radarsim.studies.sonar import STUDY, exact, world
 from radarsim.studies.sonar.figures import conversion_figure, plots_figure
 from tests.studies.sonar import counted
@@ -127,8 +129,8 @@ def test_claims_are_judged_where_their_cases_are(results):
     assert found["sonar_correlated"] == {"P3.6", "P3.12", "P3.17"}
     assert found["sonar_missed"] == {"P3.5"}
     rows = results["sonar_missed"].tables["claims"]
-    assert set(rows["verdict"]) == {claims.CONFIRMED}
-    assert [claim.id for claim in STUDY.claims().claims] == [f"P3.{n}" for n in range(1, 20)]
+    assert set(rows["verdict"]) == {CONFIRMED}
+    assert [claim.id for claim in claims_of(STUDY).claims] == [f"P3.{n}" for n in range(1, 20)]
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +147,7 @@ def test_the_filter_as_printed_is_growing_memory(walking):
     same = walking.loc["P3.14"].iloc[-1]
     assert_rounded(same["exact"], 1.0, condition=LINE, operations=60 * TERMS)
     assert (same["verdict"], same["extension"]) == ("no material difference", True)
-    assert set(walking.loc["P3.14", "class"]) == {claims.CONFIRMED}
+    assert set(walking.loc["P3.14", "class"]) == {CONFIRMED}
 
 
 def test_a_subscript_of_a_scan_contradicts_no_print(walking):
@@ -156,9 +158,9 @@ def test_a_subscript_of_a_scan_contradicts_no_print(walking):
 def test_coordinates_apart_are_those_at_once_on_a_linear_trajectory_alone(walking):
     """Of independent errors and constant rates nothing is lost; of a straight course 4 % in two minutes."""
     own = walking.loc["P3.19"]
-    assert set(own["class"]) == {claims.CONFIRMED}
+    assert set(own["class"]) == {CONFIRMED}
     assert own["exact"].tolist() == pytest.approx([1, 1, 1.0422, 1.0137], abs=5e-5)
-    assert own["verdict"].tolist() == [claims.CONFIRMED] * 2 + [claims.REFUTED] * 2
+    assert own["verdict"].tolist() == [CONFIRMED] * 2 + [REFUTED] * 2
     assert own["extension"].tolist() == [False, False, True, True]
 
 

@@ -3,18 +3,19 @@
 import pytest
 
 from radarsim.app.configs import load
+from radarsim.papers.sonar.manoeuvre.interpretations import Interpretations
+from radarsim.papers.study_claims import claims_of
 from radarsim.studies import registry
-from radarsim.studies.sonar.manoeuvre.interpretations import Interpretations
 
 OF = Interpretations()
 STUDY = registry.study("sonar")
-CLAIMS = {one.id: one for one in STUDY.claims().claims}
+CLAIMS = {one.id: one for one in claims_of(STUDY).claims}
 
 
 def values(claim, **taken):
     interpretation = OF.interpretation(**taken)
     assert OF.exact(CLAIMS[claim], interpretation)
-    seen = OF.evidence(CLAIMS[claim], interpretation, None, STUDY.claims())
+    seen = OF.evidence(CLAIMS[claim], interpretation, None, claims_of(STUDY))
     return [part.measure(seen).value for part in OF.parts(CLAIMS[claim], interpretation)]
 
 
@@ -78,11 +79,12 @@ def test_a_part_on_delays_asks_for_the_interpretations_rate():
 @pytest.mark.slow
 def test_more_plots_can_be_worth_while_under_a_interpretation(tmp_path, monkeypatch):
     """At 0.01 false alarms eight plots see the weakest manoeuvre sooner than four or five; in %, as the words want."""
-    from radarsim.app import interpretations
+    from radarsim.papers.judge_interpretations import judge_requests
+    from radarsim.papers.open_papers import judging_requests
 
     taken = OF.interpretation(false_alarms="0.01", manoeuvre="80 s", seen="beginning", tests="sliding")
     monkeypatch.setattr(type(OF), "of_claim", lambda self, claim: [self.interpretation(), taken])
-    done = interpretations.judged(interpretations.asked(["P3.8"]), out=tmp_path, realisations=200, figures=False)
+    done = judge_requests(judging_requests(["P3.8"]), out=tmp_path, realisations=200, figures=False)
     shipped, other = done.read[0].over[0].under
     weak = [one.parts[4][1] for one in (shipped, other)]
     assert all(one.parts[4][0].unit == "%" for one in (shipped, other))

@@ -6,12 +6,13 @@ import pytest
 import radarsim
 from radarsim.app import result as output
 from radarsim.app.configs import load
-from radarsim.report import claims, figures, notes, panels
+from radarsim.papers.sonar.manoeuvre import measures as measured
+from radarsim.papers.verdict_rule import REFUTED
+from radarsim.report import figures, notes, panels
 from radarsim.report.drawing import Reference
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.exact import sigma_acceleration
 from radarsim.studies.sonar.manoeuvre import exact
-from radarsim.studies.sonar.manoeuvre import measures as measured
 from tests.studies.sonar.precision import PARABOLA, TERMS
 from tests.tolerances import assert_rounded, sigma_error
 
@@ -164,7 +165,7 @@ def test_claims_are_judged(result, tables):
     assert set(rows["claim"]) == {"P3.8", "P3.9", "P3.10"}
     row = rows[rows["claim"] == "P3.9"].iloc[0]
     assert row["lo"] < 0.523 < row["hi"]
-    assert row["verdict"] == claims.REFUTED
+    assert row["verdict"] == REFUTED
     ratios = rows[rows["what"].str.startswith("acceleration at the threshold")]["measured"]
     assert ratios.to_numpy() == pytest.approx([0.5345, 0.2887], abs=5e-5)
     strong = result.cases[2]

@@ -66,7 +66,7 @@ class Walk(LinearStudy):
         return None if one.gain is None else np.full((spec.scans, 1, 1), one.gain)
 
     # Yours: the paper's claims, each with the range its wording allows, and the choices the paper leaves open.
-    # Measures are the functions of radarsim.studies.judged and those in this file whose first argument is `seen`.
+    # Measures are the functions of radarsim.papers.one_file and those in this file whose first argument is `seen`.
     claims_yaml = """
 paper: random_walk
 config: random_walk

@@ -1,18 +1,19 @@
 """The quantities measured for the claims. Yours: a function for each `measure` of claims.yaml."""
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import claims
+from radarsim.papers import evidence
+from radarsim.papers.evidence import MissingEvidence
 from radarsim.report.statistics import Estimate
 
 
-class Evidence(claims.Evidence):
+class Evidence(evidence.Evidence):
     """Results of the paper's experiment: only cases with the keys of the claims' config are visible here."""
 
     def case(self, key: object) -> CaseResult:
         """Yours: the case that a key under `of` means. Here the paper has only one."""
         for result in self.results:
             return result
-        raise claims.Missing(key)
+        raise MissingEvidence(key)
 
 
 def last_gain(seen: Evidence, case: str) -> Estimate:

@@ -1,0 +1,43 @@
+"""What is measured for the claims on folded velocity, from the tables."""
+
+from typing import TYPE_CHECKING, Literal
+
+from radarsim.papers import evidence
+from radarsim.papers.evidence import Curve, MissingEvidence, ratio
+from radarsim.report.statistics import Estimate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Evidence(evidence.Evidence):
+    """Finds the shipped experiments' cases by their names."""
+
+    def above_oracle(self, key: str, name: str) -> Curve:
+        """By how much σ of the velocity is above that of unfolded velocity, %, by scan."""
+        gains = self.tables["gains"]
+        columns = ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")
+        return self._of(gains[gains["component"] == "Vr"], key, name, columns)
+
+    def _of(self, table: "pd.DataFrame", key: str, name: str, columns: tuple[str, ...]) -> Curve:
+        rows = table[(table["case"] == self.case(key).name) & (table["filter"] == name)]
+        if not len(rows):
+            raise MissingEvidence(key)
+        k, t, value, lo, hi = (rows[column].to_numpy() for column in ("k", "t_s", *columns))
+        return Curve(k, t, value, lo, hi)
+
+
+def velocity_gain(seen: Evidence, key: str, name: str, scan: int | Literal["last"]) -> Estimate:
+    """Gain of a filter in σ of the velocity against range alone at a scan, %."""
+    found = seen.gain(key, name, "Vr")
+    return found.at(scan) if isinstance(scan, int) else found.last()
+
+
+def above_at_the_end(seen: Evidence, key: str, name: str) -> Estimate:
+    """σ of the velocity above that of unfolded velocity at the last scan, %."""
+    return seen.above_oracle(key, name).last()
+
+
+def worst_to_worst(seen: Evidence, key: str, name: str, single: str) -> Estimate:
+    """The largest σ of range over the scans, of a combination over that of a single order."""
+    return ratio(seen.curve(key, name, "r").largest(), seen.curve(key, single, "r").largest())

@@ -1,0 +1,117 @@
+"""DOC radarsim.papers.expected_ranges"""
+
+import math
+from typing import NamedTuple
+
+from radarsim.papers.verdict_rule import ABOUT, GRID, LIMIT, MATERIAL, PRINT, SAME
+
+
+class ExpectedRange(NamedTuple):
+    """The range of the words, ends included, the words, their margin, and the kind of rule that gives it.
+
+    strict is the range of the rule of version 0.1, for `old_verdict`."""
+
+    lo: float
+    hi: float
+    words: str
+    margin: float
+    kind: str
+    strict: tuple[float, float]
+
+
+def last_digit_unit(text: str) -> float:
+    """The unit of a printed number's last digit."""
+    return 10.0 ** -len(text.partition(".")[2])
+
+
+def printed(text: str, step: float | None = None) -> ExpectedRange:
+    """A printed number; step: its resolution where numbers are read off a graph. Default: its last digit."""
+    return _inclusive_range(text, text, text, step, PRINT)
+
+
+def between(low: str, high: str, step: float | None = None) -> ExpectedRange:
+    """A printed range, both its ends as `printed`."""
+    return _inclusive_range(low, high, f"{low} to {high}", step, PRINT)
+
+
+def _inclusive_range(low: str, high: str, words: str, step: float | None, kind: str) -> ExpectedRange:
+    half = max(last_digit_unit(low), last_digit_unit(high)) / 2
+    margin = half if step is None else step / 2
+    strict = (float(low) - last_digit_unit(low) / 2, float(high) + last_digit_unit(high) / 2)
+    return ExpectedRange(float(low), float(high), f"{words} ± {margin:g}", margin, kind, strict)
+
+
+def about(low: str, high: str | None = None, margin: float | None = None, kind: str = ABOUT) -> ExpectedRange:
+    """A positive number or range with "about"; margin where the paper or its grid is coarser than 10 %."""
+    high = high or low
+    words = f"about {low}" + (f" to {high}" if high != low else "")
+    wide = 0.1 * float(high) if margin is None else margin
+    strict = (0.9 * float(low), 1.1 * float(high))
+    return ExpectedRange(float(low), float(high), f"{words} ± {wide:g}", wide, kind, strict)
+
+
+def _half_last_digit(value: float) -> float:
+    return last_digit_unit(f"{value:.12f}".rstrip("0").rstrip(".")) / 2
+
+
+def above(value: float, margin: float | None = None) -> ExpectedRange:
+    """More than a value. Over zero: better, a difference of at least the margin, by default 1 %."""
+    kind, wide = _one_sided_margin(value, margin)
+    return ExpectedRange(math.nextafter(value, math.inf), math.inf, f"> {value:g}", wide, kind, (value, math.inf))
+
+
+def below(value: float, margin: float | None = None) -> ExpectedRange:
+    """Less than a value. Under zero: better, as in `above`."""
+    kind, wide = _one_sided_margin(value, margin)
+    return ExpectedRange(-math.inf, math.nextafter(value, -math.inf), f"< {value:g}", wide, kind, (-math.inf, value))
+
+
+def _one_sided_margin(value: float, margin: float | None) -> tuple[str, float]:
+    if value == 0:
+        return MATERIAL, 1.0 if margin is None else margin
+    return LIMIT, _half_last_digit(value) if margin is None else margin
+
+
+def at_most(value: float, margin: float | None = None) -> ExpectedRange:
+    """No more than a value."""
+    wide = _half_last_digit(value) if margin is None else margin
+    return ExpectedRange(-math.inf, value, f"≤ {value:g}", wide, LIMIT, (-math.inf, value))
+
+
+def at_least(value: float, margin: float | None = None) -> ExpectedRange:
+    """No less than a value."""
+    wide = _half_last_digit(value) if margin is None else margin
+    return ExpectedRange(value, math.inf, f"≥ {value:g}", wide, LIMIT, (value, math.inf))
+
+
+def greater(margin: float = 0.01) -> ExpectedRange:
+    """A ratio of two σ over one: the first is the worse."""
+    return above(1.0, margin)._replace(kind=MATERIAL)
+
+
+def less(margin: float = 0.01) -> ExpectedRange:
+    """A ratio of two σ under one: the first is the better."""
+    return below(1.0, margin)._replace(kind=MATERIAL)
+
+
+def within(low: float, high: float, margin: float = 0.5) -> ExpectedRange:
+    """From low to high as they stand: counts of scans (half a scan is their margin), shares."""
+    words = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+    return ExpectedRange(low, high, words, margin, PRINT, (low, high))
+
+
+def same(value: float = 0.0, margin: float = 1.0, strict: float | None = None) -> ExpectedRange:
+    """Coincidence: a value to within a margin, by default 1 % of σ."""
+    old = margin if strict is None else strict
+    return ExpectedRange(value, value, f"{value:g} ± {margin:g}", margin, SAME, (value - old, value + old))
+
+
+def kept(margin: float = 1.0, strict: float = 0.5) -> ExpectedRange:
+    """No loss, in % of σ: a gain, or a loss within the margin."""
+    return ExpectedRange(0.0, math.inf, f"≥ 0 ± {margin:g}", margin, SAME, (-strict, math.inf))
+
+
+def on_grid(low: float, high: float, step: float, strict: tuple[float, float]) -> ExpectedRange:
+    """A time, or a ratio of times, no finer than the grid on which it is read."""
+    words = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+    return ExpectedRange(low, high, f"{words} ± {step:g}", step, GRID, strict)

@@ -1,0 +1,113 @@
+"""DOC radarsim.papers.forest_plot"""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from textwrap import shorten
+
+import numpy as np
+
+from radarsim.language import plural, tr
+from radarsim.papers.claim_rows import (
+    CLASS_ORDER,
+    cell_number,
+    class_count,
+    decisive_value_words,
+    group_by_claim,
+    row_distance,
+    shown_interval,
+    worst_part,
+)
+from radarsim.papers.claims_table import NOT_JUDGED, NOT_RUN
+from radarsim.papers.specification_curve import AXIS_MM, ROW_MM
+from radarsim.papers.verdict_rule import CLASSES
+from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
+from radarsim.report.wording import formulas
+
+MAX_DRAWN_MARGINS = 4.0  # margins: larger distances are drawn there
+MAX_STATEMENT_CHARACTERS = 56  # letters of a claim beside its row
+BEYOND, RIM = 4.35, 4.6  # where an arrow says so, and where the panel ends
+CLASS_COLOURS = (5, 2, 4, GREY, 3, 1, 6)  # of the classes in their order: green, red, blue, grey, …
+CLASS_STYLES = {
+    kind: Style(colour=colour, dash=None, marker=i, size_pt=4.0)
+    for i, (kind, colour) in enumerate(zip(CLASSES, CLASS_COLOURS, strict=True))
+}
+
+
+def _drawn_distance(value: float, row: Mapping) -> float:
+    """Distance of a value from the words, in margins, cut at 4."""
+    return float(np.clip(row_distance(value, row), -MAX_DRAWN_MARGINS, MAX_DRAWN_MARGINS))
+
+
+def forest_plot(rows: Sequence[Mapping]) -> Figure | None:
+    """All judged claims of these rows, a panel of rows for each paper; None where there are none."""
+    judged = [own for own in group_by_claim(rows) if own[0]["class"] not in (NOT_RUN, NOT_JUDGED)]
+    found = [(own, row) for own in judged if (row := worst_part(own)) is not None]
+    papers = list(dict.fromkeys(own[0]["paper"] for own, _ in found))
+    panels = [_paper_panel(paper, [(own, row) for own, row in found if own[0]["paper"] == paper]) for paper in papers]
+    if not panels:
+        return None
+    classes = Counter(own[0]["class"] for own in judged)
+    counted = ", ".join(class_count(kind, classes[kind]) for kind in CLASS_ORDER if classes[kind])
+    return Figure(
+        name="claims",
+        title=tr("Claims, in margins of what their papers say"),
+        caption=plural("Of {count} claim: {counted}. ", "Of {count} claims: {counted}. ", len(judged), counted=counted)
+        + tr(
+            "For each claim, the part furthest from the paper's words: the measured value with the judged "
+            "interval, and the exact value, in margins of that part; beside it the value itself. What lies beyond "
+            "± {furthest:g} is drawn there, with an arrow. Below 0 it agrees with the words, up to 1 it is within "
+            "their margin. The marker shows the claim's class over all interpretations that its paper allows.",
+            furthest=MAX_DRAWN_MARGINS,
+        ),
+        panels=tuple(panels),
+        width_mm=PAGE_MM,
+    )
+
+
+def _paper_panel(paper: str, found: Sequence[tuple[Sequence[Mapping], Mapping]]) -> Panel:
+    """The claims of a paper: statement, distance, and at the right the value."""
+    key = found[0][0][0]["claim"].partition(".")[0]
+    ticks, marks, values = [], [], []
+    for y, (own, row) in enumerate(found):
+        statement = shorten(tr(own[0]["statement"]), MAX_STATEMENT_CHARACTERS, placeholder=" …", break_on_hyphens=False)
+        ticks.append((float(y), f"{formulas(statement)}  {own[0]['claim'].partition('.')[2]}"))
+        values.append(Note(RIM, float(y), decisive_value_words(row), "e"))
+    for kind, style in CLASS_STYLES.items():
+        of = [(y, row) for y, (own, row) in enumerate(found) if own[0]["class"] == kind]
+        marks += _forest_lines(kind, style, of) if of else []
+    return Panel(
+        Axis(
+            tr("distance from the words, margins (cut at ± {furthest:g})", furthest=MAX_DRAWN_MARGINS),
+            limits=(-RIM, RIM),
+        ),
+        Axis("", limits=(len(found) - 0.4, -0.6), ticks=tuple(ticks)),
+        (*marks, *values, Reference(0.0, "x"), Reference(1.0, "x")),
+        title=f"{key} {tr(paper)}",
+        direct=False,
+        height_mm=AXIS_MM + ROW_MM * len(found),
+    )
+
+
+def _forest_lines(kind: str, style: Style, of: Sequence[tuple[int, Mapping]]) -> list[Line]:
+    """The marks of one class: values, intervals, exact values, and arrows where a value lies beyond the rims."""
+    y, rows = np.array([float(y) for y, _ in of]), [row for _, row in of]
+    value = np.array([_drawn_distance(float(row["measured"]), row) for row in rows])
+    ends = np.array([sorted(_drawn_distance(end, row) for end in shown_interval(row)) for row in rows])
+    lo, hi = np.fmin(ends[:, 0], value), np.fmax(ends[:, 1], value)
+    known = [cell_number(row["exact"]) for row in rows]
+    exact = np.array(
+        [math.nan if one is None else _drawn_distance(one, row) for one, row in zip(known, rows, strict=True)]
+    )
+    gap = np.full(len(y), math.nan)
+    marks = [
+        Line(value, y, tr(kind), style),
+        Line(np.ravel([lo, hi, gap], "F"), np.ravel([y, y, gap], "F"), "", replace(style, dash=0, marker=None)),
+    ]
+    marks += [Line(exact, gap, style=replace(style, dash=None), exact=y)] if np.isfinite(exact).any() else []
+    for sign, arrow in ((-1, 8), (1, 10)):
+        beyond = sign * value >= MAX_DRAWN_MARGINS
+        look = replace(style, marker=arrow, size_pt=3.0)
+        marks += [Line(np.full(beyond.sum(), sign * BEYOND), y[beyond], "", look)] if beyond.any() else []
+    return marks

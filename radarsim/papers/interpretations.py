@@ -1,0 +1,218 @@
+"""DOC radarsim.papers.interpretations"""
+
+import itertools
+import re
+from abc import ABC
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from radarsim.engine.results import CaseResult
+from radarsim.language import listed, numeral, tr
+from radarsim.papers.claim import Claim, PaperClaims, Part
+from radarsim.papers.evidence import Evidence
+from radarsim.papers.verdict_rule import AGAINST, EQUIVALENT, UNSTATED
+
+if TYPE_CHECKING:
+    from radarsim.config.experiment import Case
+
+
+KINDS = (EQUIVALENT, UNSTATED, AGAINST)  # an interpretation is of the last kind among its alternatives
+DEFAULT = "as shipped"
+
+
+class ImpossibleInterpretation(Exception):
+    """An interpretation that is impossible to fly or design, and why."""
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """One way to take a choice: its name in tables, its kind (E, U or N), the reason for it, and the settings."""
+
+    name: str
+    kind: str
+    reason: str
+    sets: Mapping[str, Any] = field(default_factory=dict, compare=False)
+    source: str = field(default="", compare=False)  # where it is written, for messages
+
+
+@dataclass(frozen=True)
+class Choice:
+    """An open point of a paper: the column of the table, its name in a sentence, and the paper's sentence on it.
+
+    asks: what a verdict depends on, such as "how the filter starts", without a comma. original is the sentence in the
+    paper's language, english in English; both say "nothing" where it is silent. The first alternative is the default.
+    claims: the ids of the claims affected; empty: all of the paper. contradicts: the print has more than one of the
+    alternatives."""
+
+    key: str
+    asks: str
+    original: str
+    english: str
+    alternatives: tuple[Alternative, ...]
+    claims: tuple[str, ...] = ()
+    contradicts: bool = False
+
+    @property
+    def default(self) -> str:
+        """The name of the alternative in the shipped configs."""
+        return self.alternatives[0].name
+
+    def __getitem__(self, name: str) -> Alternative:
+        return next(one for one in self.alternatives if one.name == name)
+
+    def bears_on(self, claim: str) -> bool:
+        """Whether this choice may change the verdict on a claim."""
+        return not self.claims or claim in self.claims
+
+
+@dataclass(frozen=True)
+class Interpretation:
+    """One alternative of each choice of a paper, by the choice's key, in the order of the choices."""
+
+    taken: tuple[tuple[str, str], ...]
+
+    def __getitem__(self, key: str) -> str:
+        return dict(self.taken)[key]
+
+
+class PaperInterpretations(ABC):
+    """The interpretations of a paper, and how its claims are measured under one. A study with exact numbers gives
+    evidence without a run; any other changes the cases of a claim's config, which are then run, and reads their sums
+    like those of the paper's own."""
+
+    paper: str  # P1
+    choices: tuple[Choice, ...]
+    realisations: int = 1000  # of each run, by default
+    most: int = 16_000  # of a run that is to decide a claim, by default
+
+    def open(self, claim: Claim) -> bool:
+        """Whether the paper leaves anything open that affects a claim of its own."""
+        return not claim.extension and any(choice.bears_on(claim.id) for choice in self.choices)
+
+    # ---- the interpretations
+    # --------------------------------------------------------------------------------------------
+    def declared(self) -> Sequence[Interpretation]:
+        """The interpretations to judge, the default first: all combinations of E and U, and each N alone."""
+        return list(dict.fromkeys([*self.combined(self.choices), *self.against_print()]))
+
+    def combined(self, choices: Iterable[Choice]) -> Iterator[Interpretation]:
+        """All combinations of the E and U alternatives of these choices, all others at their default."""
+        varied = list(choices)
+        allowed = [[one.name for one in choice.alternatives if one.kind != AGAINST] for choice in varied]
+        for names in itertools.product(*allowed):
+            yield self.interpretation(**dict(zip((choice.key for choice in varied), names, strict=True)))
+
+    def against_print(self) -> Iterator[Interpretation]:
+        """Each alternative against the print, all else at its default."""
+        for choice in self.choices:
+            for one in choice.alternatives:
+                if one.kind == AGAINST:
+                    yield self.interpretation(**{choice.key: one.name})
+
+    def interpretation(self, **taken: str) -> Interpretation:
+        """The interpretation of these alternatives, the others at their default."""
+        return Interpretation(tuple((choice.key, taken.get(choice.key, choice.default)) for choice in self.choices))
+
+    def of_claim(self, claim: str) -> list[Interpretation]:
+        """The declared interpretations that differ for a claim: choices that do not affect it stay at their default."""
+        bears = [choice.bears_on(claim) for choice in self.choices]
+        firsts: dict[tuple[tuple[str, str], ...], Interpretation] = {}
+        for one in self._declared:
+            firsts.setdefault(tuple(itertools.compress(one.taken, bears)), one)
+        return [self.bearing(one, claim) for one in firsts.values()]
+
+    @cached_property
+    def _declared(self) -> Sequence[Interpretation]:
+        return self.declared()
+
+    def bearing(self, interpretation: Interpretation, claim: str) -> Interpretation:
+        """An interpretation with the choices that do not affect a claim at their default."""
+        pairs = zip(interpretation.taken, self.choices, strict=True)
+        return Interpretation(tuple((key, name if one.bears_on(claim) else one.default) for (key, name), one in pairs))
+
+    def kind(self, interpretation: Interpretation) -> str:
+        """E, U or N: the last of the kinds of its alternatives that are not the default; E for the default itself."""
+        kinds = [choice[interpretation[choice.key]].kind for choice in self._other(interpretation)]
+        return max(kinds, key=KINDS.index, default=EQUIVALENT)
+
+    def name(self, interpretation: Interpretation) -> str:
+        """How an interpretation differs from the shipped configs."""
+        words = [f"{choice.key}: {interpretation[choice.key]}" for choice in self._other(interpretation)]
+        return "; ".join(words) or DEFAULT
+
+    def said(self, interpretation: Interpretation) -> str:
+        """How an interpretation differs from the shipped configs, for people."""
+        return describe_choices(
+            {choice.key: interpretation[choice.key] for choice in self._other(interpretation)}, self.asks
+        )
+
+    @cached_property
+    def asks(self) -> Mapping[str, str]:
+        """The choices by key, in words."""
+        return {choice.key: choice.asks for choice in self.choices}
+
+    def asked(self, keys: Iterable[str]) -> str:
+        """Choices within a sentence."""
+        return listed([tr(self.asks[key]) for key in keys])
+
+    def sets(self, interpretation: Interpretation) -> dict[str, Any]:
+        """The settings of an interpretation's alternatives."""
+        return {key: value for one in self.choices for key, value in one[interpretation[one.key]].sets.items()}
+
+    def _other(self, interpretation: Interpretation) -> list[Choice]:
+        return [choice for choice in self.choices if interpretation[choice.key] != choice.default]
+
+    # ---- a claim under an interpretation
+    # -----------------------------------------------------------------------------------
+    def parts(self, claim: Claim, interpretation: Interpretation) -> Sequence[Part]:
+        """The parts of a claim to judge under an interpretation. Default: all."""
+        return claim.parts
+
+    def changed(self, claim: Claim, case: "Case", interpretation: Interpretation) -> "Case | None":
+        """A case of a claim's config changed for an interpretation; None where the claim does not need it. Raises
+        Unreadable where it is impossible to fly or design."""
+        return None
+
+    def evidence(
+        self, claim: Claim, interpretation: Interpretation, seen: "ChangedResults | None", of: PaperClaims
+    ) -> "Evidence":
+        """The evidence for a claim under an interpretation; seen: the results of its cases, None where all is exact.
+
+        of: the paper's claims. Default: their evidence, over `seen`."""
+        assert seen is not None  # a paper with exact values gives its own evidence
+        return of.evidence(seen.results, seen.tables, seen.places)
+
+    def exact(self, claim: Claim, interpretation: Interpretation) -> bool:
+        """Whether the evidence for a claim is exact under an interpretation, so that nothing is run. Default: no."""
+        return False
+
+
+def describe_choices(taken: Mapping[str, str], asks: Mapping[str, str]) -> str:
+    """What is taken of choices in place of the default, for people."""
+    words = [f"{tr(asks.get(key, key))}: {alternative_words(name)}" for key, name in taken.items()]
+    return "; ".join(words) or tr(DEFAULT)
+
+
+def alternative_words(name: str) -> str:
+    """The name of an alternative, for people."""
+    return tr(with_spaces(name)) if re.search("[a-zA-Z]", name) else numeral(name)
+
+
+def with_spaces(name: str) -> str:
+    """A name with its words apart; σ_a stays."""
+    return re.sub("(?<=[a-z])_(?=[a-z])", " ", name)
+
+
+@dataclass(frozen=True)
+class ChangedResults:
+    """Results of the changed cases of a config, under the names and keys of that config.
+
+    results (in the order of the config) have the sums and axes of the run and the keys of the paper's own case, by
+    which claims find it; ran has them with the keys of the run. tables and places are as in `claims.Evidence`."""
+
+    results: Sequence[CaseResult]
+    ran: Sequence[CaseResult]
+    tables: Mapping[str, Any]
+    places: Mapping[str, Mapping[str, set[int]]]

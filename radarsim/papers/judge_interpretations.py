@@ -1,0 +1,132 @@
+"""DOC radarsim.papers.judge_interpretations"""
+
+import os
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from radarsim.app import configs
+from radarsim.app.ahead import Ahead, Progress
+from radarsim.app.run import RunOptions
+from radarsim.engine.run import Either, Signals, Stop, TimeLimit
+from radarsim.errors import ConfigError, argument
+from radarsim.papers.claim_outcome import round_up
+from radarsim.papers.interpretation_files import outdated_configs, write_files
+from radarsim.papers.interpretation_runs import FIGURE_S, InterpretationRuns
+from radarsim.papers.interpretation_verdicts import InterpretationVerdicts, PaperVerdicts
+from radarsim.papers.interpretations import PaperInterpretations
+from radarsim.papers.open_papers import JudgingRequest, judging_requests
+from radarsim.papers.stored_verdicts import TABLE
+from radarsim.papers.verdict_rule import UNDECIDED
+from radarsim.papers.verdicts_by_interpretation import ClaimVerdicts
+from radarsim.threads import limited
+
+
+def judge_requests(
+    wanted: Sequence[JudgingRequest],
+    *,
+    out: str | Path,
+    realisations: int | None = None,
+    decide: bool = False,
+    options: RunOptions | None = None,
+    progress: Progress | None = None,
+    figures: bool = True,
+    stop: Signals | None = None,
+    write: bool = True,
+) -> InterpretationVerdicts:
+    """Judge claims under every interpretation and, unless disabled, write table and specification curves into
+    out/interpretations.
+
+    wanted: of `asked`. realisations of each run, where runs are needed; default: the number declared by the paper's
+    interpretations. decide: runs behind undecided claims are extended, up to 2000·2^m realisations, until each claim is
+    decided; `realisations` is then the limit. Runs go through the store of blocks under out, so that a second call
+    continues. Raises TargetUnmet where a time limit left something undone, Interrupted on a signal seen by `stop`."""
+    if realisations is not None and realisations < 1:
+        raise ConfigError(f"{argument('realisations')}: must be >= 1, got {realisations}")
+    options = replace(options or RunOptions(), out=out)
+    plans = [
+        InterpretationRuns(one, _first_realisations(one.paper.interpretations, realisations, decide)) for one in wanted
+    ]
+
+    def estimate() -> None:
+        for plan in plans:
+            plan.estimate(ahead, options.threads)
+
+    ahead = Ahead(progress, estimate)
+    for plan, one in zip(plans, wanted, strict=True):
+        plan.expect(ahead, realisations or one.paper.interpretations.most if decide else 0)
+    if write and figures:
+        several = [
+            claim for one in wanted for claim in one.claims if len(one.paper.interpretations.of_claim(claim.id)) > 1
+        ]
+        ahead.add("figure", FIGURE_S, len(several))
+    read, left = [], []
+    for plan, one in zip(plans, wanted, strict=True):
+        over = plan.judged(options, ahead, stop)
+        if decide:
+            over = plan.decided(over, realisations or one.paper.interpretations.most, options, ahead, stop)
+            left += [line for each in over if (line := _undecided_message(each))]
+        read.append(PaperVerdicts(one.paper, over))
+    made = InterpretationVerdicts(read, Path(out) / TABLE.parent, left=tuple(left))
+    if write:
+        made.files = write_files(made, figures, ahead)
+        made.outdated = outdated_configs(made)
+    return made
+
+
+def interpretations(
+    *names: str,
+    realisations: float | None = None,
+    decide: bool = False,
+    threads: int | None = None,
+    time_limit: float | Stop | None = None,
+    out: str | os.PathLike[str] | None = None,
+    figures: bool = True,
+    progress: Progress | None = None,
+    stop: Signals | None = None,
+) -> InterpretationVerdicts:
+    """Judge claims (P1.4) or whole papers (P1) under every interpretation that the papers allow; default: all.
+
+    Interpretations are judged exactly where possible, otherwise by runs of `realisations`, by default the number that
+    the paper's interpretations declare. decide: extend the runs, up to `realisations`, until each claim is decided.
+    time_limit is in seconds. out: directory for interpretations.csv, a figure for each claim, and the stored runs.
+
+    `table` is interpretations.csv: a row for each claim, interpretation and part. Raises ConfigError for unknown names,
+    TargetUnmet if the time did not suffice. progress is called with the milliseconds that have passed, those that all
+    is expected to take, and 0.
+
+    >>> interpretations("P1.4")
+    P1.4 depends on: holds in 4 of 6 interpretations; depends on how the filter starts
+    """
+    configs.check(threads=threads, time_limit=time_limit, out=out, figures=figures)
+    configs.texts(names)
+    wanted = judging_requests(names)
+    limit = time_limit if time_limit is None or callable(time_limit) else TimeLimit(time_limit)
+    options: dict[str, Any] = {"realisations": configs.whole(realisations), "decide": decide}
+    options |= {"progress": progress, "figures": figures, "stop": stop, "write": out is not None}
+    with tempfile.TemporaryDirectory(prefix="radarsim-") as folder, limited(threads):
+        means = RunOptions(None, threads, Either(stop, limit))
+        return judge_requests(wanted, out=Path(folder if out is None else out), options=means, **options)
+
+
+def _first_realisations(of: PaperInterpretations, realisations: int | None, decide: bool) -> int:
+    """Realisations of the first runs: those requested, or declared; with `decide`, at most those requested."""
+    if realisations is None:
+        return of.realisations
+    return min(of.realisations, realisations) if decide else realisations
+
+
+def _undecided_message(over: ClaimVerdicts) -> str:
+    """The line on an undecided claim: under how many interpretations, and what it would take."""
+    if over.outcome is None or over.outcome.kind != UNDECIDED:
+        return ""
+    needed = over.outcome.needed
+    would = (
+        "a value lies on a border: more realisations would not decide"
+        if needed is None
+        else f"about {round_up(needed):,} would"
+    )
+    open_, n = len(over.undecided), over.looked
+    return f"{over.claim.id} not yet decided under {open_} interpretations at {n:,} realisations; {would}"

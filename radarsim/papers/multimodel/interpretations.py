@@ -1,0 +1,83 @@
+"""What P2 leaves open, and its claims under each interpretation: small runs of the shipped configs with another flight,
+σ_A, output, start or bank."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from radarsim.config.experiment import Case
+from radarsim.papers.claim import Claim, PaperClaims
+from radarsim.papers.claim_files import load_choices
+from radarsim.papers.evidence import Evidence
+from radarsim.papers.interpretations import ChangedResults, Interpretation, PaperInterpretations
+from radarsim.papers.multimodel import measures
+from radarsim.studies.multimodel import tables
+from radarsim.studies.multimodel.world import FLIGHTS
+
+AERODYNAMIC = "P2.4"  # speaks of another target than the lost flight
+
+
+class Interpretations(PaperInterpretations):
+    """P2's interpretations."""
+
+    paper = "P2"
+    choices = load_choices(Path(__file__).with_name("interpretations.yaml"))
+
+    def changed(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
+        """The case with the flight, the banks, the output and the start of an interpretation."""
+        spec = case.spec
+        if claim.id == AERODYNAMIC and not measures.is_flight(spec.target, "airliner"):
+            return None
+        changes = self.sets(interpretation)
+        if claim.id != AERODYNAMIC:
+            changes["target"] = FLIGHTS.get(interpretation["flight"], spec.target)
+        period = spec.sensor.scan_period_s
+        interpretation = self.bearing(interpretation, claim.id)
+        changes["filters"] = tuple(_changed(one, interpretation, period) for one in spec.filters)
+        return replace(case, spec=spec.model_copy(update=changes))
+
+    def evidence(
+        self, claim: Claim, interpretation: Interpretation, seen: ChangedResults | None, of: PaperClaims
+    ) -> Evidence:
+        assert seen is not None  # nothing of P2 is exact
+        return Flown(seen)
+
+
+def _changed(one: Any, interpretation: Interpretation, period_s: float) -> Any:
+    """A filter as an interpretation has it."""
+    changes: dict[str, Any] = {}
+    if one.family != "kalman" and one.output == "best":
+        changes["output"] = interpretation["output"]
+    models = one.models
+    if (
+        interpretation["bank"] == "accelerated"
+        and len(models) == 2
+        and len({m.sigma_acceleration_mps2 for m in models}) == 1
+    ):
+        halved = models[1].model_copy(update={"sigma_acceleration_mps2": models[1].sigma_acceleration_mps2 / 2})
+        models = (halved, models[1])
+    per = interpretation["sigma_acceleration"]
+    if per != "per step":
+        models = tuple(
+            m.model_copy(update={"sigma_acceleration_mps2": m.sigma_acceleration_mps2 * period_s})
+            if m.motion == "accelerated" or per == "per second, both motions"
+            else m
+            for m in models
+        )
+    return one.model_copy(update={**changes, "models": models})
+
+
+class Flown(measures.Evidence):
+    """The flights under an interpretation, found by the settings of the shipped filters; stages are those of the
+    flights."""
+
+    def __init__(self, seen: ChangedResults):
+        super().__init__(seen.results, seen.tables, seen.places)
+        self._ran = {one.name: one for one in seen.ran}
+
+    def stage(self, key: Any, name: str) -> int:
+        """The number of a stage of a flight."""
+        return tables.stage_names(self._ran[self.case(key).name]).index(name)
+
+    def _bounds(self, of: Any, stage: str) -> tuple[float, float]:
+        return super()._bounds(self._ran[of.name], stage)

@@ -1,0 +1,114 @@
+"""Measures of claims of a study in one file, whose evidence finds a case by its keys.
+
+A claim says `of: [{radar.scan_period_s: 2}]`: the case with these keys, or properties, by their dotted names; `of:
+[{}]` is the first one. The functions here whose first argument is `seen` may be its `measure`; `at` is a scan, by
+default the last one."""
+
+import math
+from collections.abc import Mapping, Sequence
+from operator import attrgetter
+from typing import Any
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.errors import ConfigError
+from radarsim.papers import evidence
+from radarsim.papers.evidence import Curve, MissingEvidence
+from radarsim.report.statistics import Estimate, difference, mean
+from radarsim.report.tables import realisations
+
+NOWHERE = object()
+CLOSE = 1e-9  # relative difference of one number written in two ways
+
+
+class Evidence(evidence.Evidence):
+    """Results of the paper's experiment; a case is identified by a mapping of its keys, or by its name."""
+
+    def case(self, key: Any) -> CaseResult:
+        if not isinstance(key, Mapping):
+            return super().case(key)
+        if unknown := unknown_key(key, [result.spec for result in self.results]):
+            raise ConfigError(f"of: {unknown}: there is no such key")
+        for result in self.results:
+            if has_values(result.spec, key):
+                return result
+        raise MissingEvidence(key)
+
+
+def _value(spec: Any, path: str) -> Any:
+    """A key of a case, by its dotted name; NOWHERE where it has none of that name."""
+    try:
+        return attrgetter(path)(spec)
+    except AttributeError:
+        return NOWHERE
+
+
+def unknown_key(key: Mapping[str, Any], specs: Sequence[Any]) -> str:
+    """The first dotted name that no case has."""
+    return next((path for path in key if all(_value(spec, path) is NOWHERE for spec in specs)), "")
+
+
+def has_values(spec: Any, key: Mapping[str, Any]) -> bool:
+    """Whether it is the case with these keys."""
+    return all(_equal(_value(spec, path), value) for path, value in key.items())
+
+
+def _equal(one: Any, other: Any) -> bool:
+    if isinstance(one, float | int) and isinstance(other, float | int):
+        return math.isclose(one, other, rel_tol=CLOSE)
+    return bool(one == other)
+
+
+def sigma(seen: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
+    """σ of a filter."""
+    return _at(seen.curve(case, filter, component), at)
+
+
+def gain(seen: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
+    """The gain of a filter against the case's baseline, %."""
+    return _at(seen.gain(case, filter, component), at)
+
+
+def gain_change(
+    seen: Evidence, first: Any, second: Any, filter: str, component: str, at: int | None = None
+) -> Estimate:
+    """By how many points the gain in the second case exceeds that in the first."""
+    return difference(*(gain(seen, case, filter, component, at) for case in (second, first)))
+
+
+def ratio(seen: Evidence, case: Any, filter: str, over: str, component: str, at: int | None = None) -> Estimate:
+    """σ of a filter over that of another one: paired where one of the two is a baseline."""
+    return _at(seen.ratio(case, filter, over, component), at)
+
+
+def bias(seen: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
+    """The mean error of a filter about the truth."""
+    found = seen.case(case)
+    place = _place(found, filter, component, at)
+    total, square = np.asarray(found.sums["error"])[place][:2]
+    return mean(total, square, realisations(found)[place])
+
+
+def over_believed(seen: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
+    """σ of a filter over the σ that it predicts; where the study has the table `believed`."""
+    found = seen.case(case)
+    k = int(found.axes.k[_place(found, filter, component, at)[1]])
+    row = seen.row("believed", case=found.name, filter=filter, component=component, k=k)
+    return Estimate(row["ratio"], row["ratio_lo"], row["ratio_hi"])
+
+
+def _place(found: CaseResult, filter: str, component: str, at: int | None) -> tuple[int, int, int]:
+    """The index of an error in the sums."""
+    axes = found.axes
+    k = list(axes.k).index(at) if at is not None else -1
+    return axes.filters.index(filter), k, [name for name, _ in axes.components].index(component)
+
+
+def limit(seen: Evidence, case: Any, filter: str, component: str) -> float:
+    """The limit of a filter's σ, by the study's own limits."""
+    return float(seen.row("last", case=seen.case(case).name, filter=filter, component=component)["steady_sigma"])
+
+
+def _at(series: Curve, at: int | None) -> Estimate:
+    return series.last() if at is None else series.at(at)

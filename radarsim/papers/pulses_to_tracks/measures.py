@@ -1,0 +1,20 @@
+"""What is measured for the claims on the chain, from the tables."""
+
+from radarsim.papers import evidence
+from radarsim.papers.evidence import ratio
+from radarsim.report.statistics import Estimate
+
+
+class Evidence(evidence.Evidence):
+    """Finds the shipped experiments' cases by their names."""
+
+    def over_ideal(self, key: str, name: str, component: str) -> Estimate:
+        """σ of a filter at the last scan over the exact σ of its idealisation."""
+        result = self.case(key)
+        row = self.row("idealisations", case=result.name, filter=name, component=component, k=int(result.axes.k[-1]))
+        return Estimate(*(float(row[column]) for column in ("over_ideal", "over_ideal_lo", "over_ideal_hi")))
+
+
+def last_to_last(seen: Evidence, key: str, name: str, other: str, component: str) -> Estimate:
+    """σ at the last scan, of a filter over that of another."""
+    return ratio(seen.curve(key, name, component).last(), seen.curve(key, other, component).last())

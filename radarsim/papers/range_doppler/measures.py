@@ -1,0 +1,357 @@
+"""How P1's claims are measured: which case is which of the paper's radars, and the numbers taken from the tables.
+
+Radars are keyed by their number, and found by their accuracies and period, whatever their names."""
+
+import math
+from collections.abc import Collection
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.papers import evidence
+from radarsim.papers.evidence import Curve, MissingEvidence, common_times, exact_number, ratio, subtract
+from radarsim.physics import manoeuvre_covariance, transition
+from radarsim.report.statistics import Estimate, difference
+from radarsim.studies.range_doppler import filters, tables
+
+RADARS = {1: (25, 5, 10), 2: (250, 15, 10), 3: (250, 15, 5), 4: (50, 1, 10), 5: (50, 1, 5)}  # σ_r, σ_V, Δt
+VARIANCE = 1e-3  # the paper's D_M, (m/s³)²
+SPEED_MPS = 300.0  # the paper's example of an ambiguous Doppler frequency
+DURATION = 140.0  # s: fifteen points at Δt = 10 s
+R, RV = ("range",), ("range", "velocity")
+COMPONENTS = {"r": "range", "Vr": "velocity", "ar": "acceleration"}
+Key = int | tuple[int, float]  # a radar at D_M = 10⁻³, or a radar and its D_M
+
+
+class Evidence(evidence.Evidence):
+    """Finds the paper's radars, and its two filters, by their settings."""
+
+    extremum = 1.0  # point of gain: what differs by less is no material difference, of two times either
+
+    def case(self, key: Any) -> CaseResult:
+        """key: the number of a radar (at D_M = 10⁻³), or (number, D_M)."""
+        radar, variance = key if isinstance(key, tuple) else (key, VARIANCE)
+        for result in self.results:
+            if self._radar(result) == radar and math.isclose(variance, self._variance(result)):
+                return result
+        raise MissingEvidence(key)
+
+    @staticmethod
+    def _radar(result: CaseResult) -> int | None:
+        """The number of the paper's radar that a case is."""
+        radar = result.spec.radar
+        own = (radar.sigma_range_m, radar.sigma_velocity_mps, radar.scan_period_s)
+        return next((number for number, row in RADARS.items() if all(map(math.isclose, own, row))), None)
+
+    @staticmethod
+    def _variance(result: CaseResult) -> float:
+        """The manoeuvre variance of the paper's two filters."""
+        variance: float = result.spec.filters[0].manoeuvre_variance
+        return variance
+
+    def whole_sigma(self, key: Key, observes: tuple[str, ...], component: str) -> Curve:
+        """σ(k) of the filter that observes these, to the end of the run."""
+        return self.marked(self.curve(key, self.filter(key, observes), component), key)
+
+    def sigma(self, key: Key, observes: tuple[str, ...], component: str) -> Curve:
+        """σ(k) of the filter that observes these, over the paper's fifteen points."""
+        return _as_long_as_the_papers(self.whole_sigma(key, observes, component))
+
+    def filter(self, key: Key, observes: tuple[str, ...]) -> str:
+        """The name of the filter that observes these."""
+        return next(f.name for f in self.case(key).spec.filters if f.observes == observes)
+
+    def k_gain(self, radar: Key, component: str) -> Curve:
+        """The relative gain K (eq. 17), from the scan at which the filter with velocity has filtered, k ≥ 2. At k = 1
+        both filters give the same measured range, and no gain is spoken of."""
+        gain = self.marked(self.gain(radar, self.filter(radar, RV), component), radar)
+        return _as_long_as_the_papers(gain.since(2))
+
+    def settling(self, key: Key, observes: tuple[str, ...], component: str = "r") -> Estimate:
+        """Scan periods from the first plot to settling (5 % of the steady value, for good)."""
+        sigma = self.whole_sigma(key, observes, component)
+        sigma.last()  # missing where the run is too short to settle in
+        axes, c = self.case(key).axes, list(COMPONENTS).index(component)
+        f = axes.filters.index(self.filter(key, observes))
+        variance = float(axes.manoeuvre_variance[f])
+        _, steady = filters.steady_state(int(axes.observes[f]), variance, axes.sigma, axes.scan_period_s)
+        when = tables.settling(Estimate(sigma.value, sigma.lo, sigma.hi), sigma.t, float(np.sqrt(steady[c, c])))
+        return Estimate(*(part / axes.scan_period_s for part in when))
+
+    def marked(self, series: Curve, key: Key) -> Curve:
+        """A curve of a case, marked where its run ends before the paper's 140 s."""
+        result = self.case(key)
+        end = float(result.axes.t_s[-1])
+        short = f"{result.name} ends at {end:g} s, the paper's run at {DURATION:g} s" if end < DURATION - 1e-6 else ""
+        return replace(series, short=short)
+
+    def variances(self, radar: int) -> list[float]:
+        """The manoeuvre variances at hand for a radar; raises Missing where there are fewer than two."""
+        found = sorted({self._variance(result) for result in self.results if self._radar(result) == radar})
+        if len(found) < 2:
+            raise MissingEvidence(radar)
+        return found
+
+
+Pick = Literal["largest", "least", "first", "last", "when_largest", "scan_of_largest"] | int  # or the scan itself
+
+
+def _as_long_as_the_papers(series: Curve) -> Curve:
+    return series.where(series.t <= DURATION + 1e-6)
+
+
+def _picked(series: Curve, pick: Pick) -> Estimate:
+    if pick == "scan_of_largest":
+        return series.when_largest("k")
+    found: Estimate = series.at(pick) if isinstance(pick, int) else getattr(series, pick)()
+    return found
+
+
+# ---- gains --------------------------------------------------------------------------------------------------------
+def gain(seen: Evidence, radar: int, component: str, pick: Pick, since: int = 2, upto: int | None = None) -> Estimate:
+    """A point of a radar's gain over the scans from `since` to `upto`, %."""
+    found = seen.k_gain(radar, component).since(since)
+    return _picked(found if upto is None else found.upto(upto), pick)
+
+
+def extreme_gain(
+    seen: Evidence, *radars: int, which: Literal["least", "largest"], component: str, pick: Pick
+) -> Estimate:
+    """The least or the largest of these radars' gains, %."""
+    found = [gain(seen, radar, component, pick) for radar in radars]
+    return min(found) if which == "least" else max(found)
+
+
+def gain_above(
+    seen: Evidence, *radars: int, component: str, high: int, which: Literal["least", "largest"], pick: Pick
+) -> Estimate:
+    """Gain of the first `high` radars, the least or the largest of them, less the largest of the others, points."""
+    upper = extreme_gain(seen, *radars[:high], which=which, component=component, pick=pick)
+    return difference(upper, extreme_gain(seen, *radars[high:], which="largest", component=component, pick=pick))
+
+
+def above_all_others(seen: Evidence, radar: int, component: str, scans: Collection[int]) -> Estimate:
+    """The least gain of a radar at these scans less its largest at any other, points."""
+    found = seen.k_gain(radar, component)
+    own = np.isin(found.k, list(scans))
+    return difference(found.where(own).least(), found.where(~own).largest())
+
+
+def gain_raised(seen: Evidence, slow: int, fast: int) -> Estimate:
+    """The least difference of range gains, fast − slow, at common times."""
+    return subtract(*common_times(seen.k_gain(fast, "r"), seen.k_gain(slow, "r"))).least()
+
+
+def extrema_apart(seen: Evidence, slow: int, fast: int) -> Estimate:
+    """Time from one radar's largest range gain to the other's, s; each is all times within a point of the largest.
+
+    Or within as much as the evidence takes for one: 0 for the largest value alone."""
+    return apart_in_time(*(_extremum(seen.k_gain(radar, "r"), seen.extremum) for radar in (fast, slow)))
+
+
+def _extremum(gain: Curve, within: float) -> tuple[Estimate, Estimate]:
+    """First and last time at which a gain is so near its largest; with intervals, at which it may be."""
+    top = gain.largest()
+    sure = gain.t[gain.value >= top.value - within]
+    likely = gain.t[gain.hi >= top.lo - within]
+    return Estimate(sure[0], likely[0], sure[0]), Estimate(sure[-1], sure[-1], likely[-1])
+
+
+def apart_in_time(one: tuple[Estimate, Estimate], other: tuple[Estimate, Estimate]) -> Estimate:
+    """The gap between two spans of time, 0 where they meet; at least, that of the widest they may be."""
+    gap = max(one[0].value - other[1].value, other[0].value - one[1].value, 0.0)
+    least = max(one[0].lo - other[1].hi, other[0].lo - one[1].hi, 0.0)
+    return Estimate(float(gap), float(least), float(gap))
+
+
+def apart(seen: Evidence, slow: int, fast: int, component: str) -> Estimate:
+    """How far two radars' gains lie apart at most, in % of the larger curve's height, over common times."""
+    a, b = common_times(seen.k_gain(fast, component), seen.k_gain(slow, component))
+    gap = subtract(a, b)
+    sign = np.sign(gap.value)
+    ends = np.where(sign < 0, -gap.hi, gap.lo), np.where(sign < 0, -gap.lo, gap.hi)
+    size = Curve(gap.k, gap.t, abs(gap.value), *ends, short=gap.short)
+    height = max(a.largest().value, b.largest().value)
+    if height <= 0:
+        raise MissingEvidence("there is no gain")
+    return Estimate(*(100 * max(part, 0.0) / height for part in size.largest()))
+
+
+def likeness(seen: Evidence, radar: int, one: str, other: str) -> Estimate:
+    """Correlation over the scans of two components' gains of a radar; half-widths of all points add in squares."""
+    a, b = common_times(seen.k_gain(radar, one), seen.k_gain(radar, other))
+    a.last()
+    value = float(np.corrcoef(a.value, b.value)[0, 1])
+    steps = np.diag((a.hi - a.lo) / 2), np.diag((b.hi - b.lo) / 2)
+    with np.errstate(invalid="ignore"):  # of one realisation they are infinite
+        moved = [np.corrcoef(a.value + step, b.value)[0, 1] for step in steps[0]]
+        moved += [np.corrcoef(a.value, b.value + step)[0, 1] for step in steps[1]]
+    half = float(np.sqrt(np.sum((np.array(moved) - value) ** 2)))
+    return Estimate(value, value - half, value + half)
+
+
+def gain_by_variance(seen: Evidence, radar: int) -> Estimate:
+    """Final range gain at the greatest D_M at hand less that at the least, points; without its sign."""
+    keys = [(radar, seen.variances(radar)[end]) for end in (0, -1)]
+    gains = [seen.marked(seen.gain(key, seen.filter(key, RV), "r"), key) for key in keys]
+    of = difference(*(_as_long_as_the_papers(one).last() for one in gains))
+    return of if of.value >= 0 else Estimate(-of.value, -of.hi, -of.lo)
+
+
+def ineffective_from(seen: Evidence, radar: int, asked_s: float) -> Estimate:
+    """The first time at which the acceleration gain is gone (zero or a loss); missing where the run is over before
+    that time."""
+    found = seen.k_gain(radar, "ar")
+    found.last()
+    if found.t[-1] < asked_s and found.value.min() > 0:
+        raise MissingEvidence(f"the run of RLS {radar} ends at {found.t[-1]:g} s, before {asked_s:g} s")
+    gone = [found.t[part <= 0] for part in (found.value, found.lo, found.hi)]
+    return Estimate(*(float(times[0]) if times.size else np.inf for times in gone))
+
+
+def loss_scans(seen: Evidence, radar: int) -> Estimate:
+    """Scans at which a radar loses in acceleration; the interval counts the sure ones, and the possible ones."""
+    found = seen.k_gain(radar, "ar")
+    found.last()
+    return Estimate(*(float(np.sum(part < 0)) for part in (found.value, found.hi, found.lo)))
+
+
+def after_loss(seen: Evidence, radar: int) -> Estimate:
+    """The largest acceleration gain of a radar after its first scan with a loss."""
+    found = seen.k_gain(radar, "ar")
+    lost = np.flatnonzero(found.value < 0)
+    return found.where(slice(int(lost[0]) + 1 if lost.size else len(found.k) - 1, None)).largest()
+
+
+def after_peak(seen: Evidence, radar: int) -> Estimate:
+    """The largest range gain less the last one."""
+    return difference(gain(seen, radar, "r", "largest"), gain(seen, radar, "r", "last"))
+
+
+def rise(seen: Evidence, radar: int) -> Estimate:
+    """The largest rise of the velocity gain over an earlier scan's."""
+    found = seen.k_gain(radar, "Vr")
+    found.last()
+    return max(difference(found.point(j), found.where(slice(0, j)).least()) for j in range(1, len(found.k)))
+
+
+def fall(seen: Evidence, radar: int) -> Estimate:
+    """The velocity gain at the end less that at its first scan."""
+    return difference(gain(seen, radar, "Vr", "last"), gain(seen, radar, "Vr", "first"))
+
+
+# ---- σ ------------------------------------------------------------------------------------------------------------
+def sigma_of(
+    seen: Evidence, radar: int, *others: int, observes: tuple[str, ...], component: str, pick: Pick
+) -> Estimate:
+    """A point of σ(k) of the first of these radars."""
+    return _picked(seen.sigma(radar, observes, component), pick)
+
+
+def sigma_change(
+    seen: Evidence, slow: int, fast: int, observes: tuple[str, ...], component: str, pick: Pick
+) -> Estimate:
+    """σ fast − σ slow of two radars, first or last of each."""
+    return difference(*(_picked(seen.sigma(radar, observes, component), pick) for radar in (fast, slow)))
+
+
+def largest_rise(seen: Evidence, radar: int, observes: tuple[str, ...], component: str, since: int) -> Estimate:
+    """The largest rise of σ over an earlier scan's from scan `since` on, in % of that; 0 where it never rises."""
+    sigma = seen.sigma(radar, observes, component).since(since)
+    sigma.last()
+    worst = max(ratio(sigma.point(j), sigma.where(slice(0, j)).least(), 100) for j in range(1, len(sigma.k)))
+    return Estimate(*(max(part - 100, 0.0) for part in worst))
+
+
+def final_share(seen: Evidence, radar: int) -> Estimate:
+    """Δσ_r at the end in % of its largest value."""
+    apart = range_difference(seen, radar)
+    return ratio(apart.last(), apart.largest(), 100)
+
+
+def range_difference(seen: Evidence, radar: int) -> Curve:
+    """Δσ_r(k) = σ_r(r) − σ_r(r,V_r), from k = 2.
+
+    Taken as independent: the common noise makes the two errors alike, so the interval is too wide, never too narrow."""
+    return subtract(seen.sigma(radar, R, "r").since(2), seen.sigma(radar, RV, "r").since(2))
+
+
+def final_to_fourth(seen: Evidence, radar: int, observes: tuple[str, ...]) -> Estimate:
+    """σ of range at the end in % of that at the 4th scan."""
+    sigma = seen.sigma(radar, observes, "r")
+    return ratio(sigma.last(), sigma.at(4), scale=100)
+
+
+def by_variance(
+    seen: Evidence, radar: int, of: Literal["final_range", "settling"], observes: tuple[str, ...]
+) -> Estimate:
+    """Final σ of the range, or its settling in scan periods, at the least D_M at hand less that at the greatest."""
+    keys = [(radar, seen.variances(radar)[end]) for end in (0, -1)]
+    if of == "final_range":
+        return difference(*(seen.whole_sigma(key, observes, "r").last() for key in keys))
+    small, large = (seen.settling(key, observes) for key in keys)
+    if not np.isfinite(small.value):  # not settled within the run: later than its end
+        low = min(small.lo, float(seen.case(keys[0]).axes.k[-1] - 1))
+        return Estimate(np.inf, low - large.hi, np.inf)
+    return difference(small, large)
+
+
+# ---- algebra ------------------------------------------------------------------------------------------------------
+def earlier(seen: Evidence, radar: int, unit: Literal["scans", "s"]) -> Estimate:
+    """How much earlier the filter with velocity has a velocity: in scans, or in seconds."""
+    a, b = (seen.sigma(radar, observes, "Vr") for observes in (R, RV))
+    return exact_number(a.k[0] - b.k[0] if unit == "scans" else a.t[0] - b.t[0])
+
+
+def doppler(seen: Evidence, radar: int) -> Estimate:
+    """Doppler frequency of the paper's 300 m/s in repetition rates."""
+    axes = seen.case(radar).axes
+    return exact_number(2 * SPEED_MPS / axes.wavelength_m / axes.repetition_rate_hz)
+
+
+def c_theta(seen: Evidence, radar: int) -> Estimate:
+    """C_θ (11) of a radar: algebra."""
+    return exact_number(seen.case(radar).axes.C_theta)
+
+
+def closed_forms(seen: Evidence, radar: int) -> Estimate:
+    """The largest relative difference of (8) and (12), as printed, from the matrices of (5) and (9). Of covariances
+    R̄_k drawn at random; an element of (8) counts against the root of the two variances it is between."""
+    axes = seen.case(radar).axes
+    dt, theta = axes.scan_period_s, axes.C_theta
+    C_M = VARIANCE / RADARS[radar][0] ** 2
+    B, Q = transition(dt), manoeuvre_covariance(C_M, dt)
+    H, noise = np.eye(2, 3), np.diag([1.0, 1 / (dt**2 * theta)])
+    rng, faults = np.random.default_rng(1), []
+    for root in rng.normal(size=(50, 3, 3)) / np.array([1, dt, dt**2])[:, None]:
+        forecast = B @ (root @ root.T) @ B.T + Q
+        spreads = np.sqrt(np.diag(forecast))
+        faults.append(np.abs(_forecast(root @ root.T, dt, C_M) - forecast) / np.outer(spreads, spreads))
+        gains = forecast @ H.T @ np.linalg.inv(H @ forecast @ H.T + noise)
+        faults.append(np.abs(_gains(forecast, noise[1, 1]) / gains - 1))
+    return exact_number(max(float(fault.max()) for fault in faults))
+
+
+def _forecast(R: np.ndarray, dt: float, C_M: float) -> np.ndarray:
+    """R̄₀ (3, 3) by (8) from R̄ = [[b, c, e], [c, d, f], [e, f, g]]."""
+    (b, c, e), (_, d, f), (_, _, g) = R
+    b3 = b + 2 * dt * c + dt**2 * (e + d) + dt**3 * f + dt**4 * g / 4 + dt**6 * C_M / 36
+    c3 = c + dt * (e + d) + 1.5 * dt**2 * f + 0.5 * dt**3 * g + dt**5 * C_M / 12
+    e3 = e + dt * f + 0.5 * dt**2 * g + dt**4 * C_M / 6
+    d3 = d + 2 * dt * f + dt**2 * g + 0.25 * dt**4 * C_M
+    f3 = f + dt * g + 0.5 * dt**3 * C_M
+    return np.array([[b3, c3, e3], [c3, d3, f3], [e3, f3, g + dt**2 * C_M]])
+
+
+def _gains(R: np.ndarray, velocity_variance: float) -> np.ndarray:
+    """K (3, 2) by (12) from R̄₀ and D_fVr / D_fr."""
+    (b, c, e), (_, d, f), _ = R
+    b_sum, d_sum = b + 1, d + velocity_variance
+    rows = [
+        [b * d_sum - c**2, c * (b_sum - b)],
+        [c * (d_sum - d), d * b_sum - c**2],
+        [e * d_sum - f * c, f * b_sum - e * c],
+    ]
+    return np.array(rows) / (b_sum * d_sum - c**2)

@@ -1,0 +1,81 @@
+"""DOC radarsim.papers.reasons"""
+
+import re
+from collections.abc import Iterator
+
+from radarsim.language import numeral, term, tr
+
+NUMBER_PATTERN = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?")
+PLACEHOLDER_PATTERN = re.compile(r"\{(\w+)\}")
+REASONS = (  # `changed` is made of differences, case by case
+    term("not the paper's experiment: {changed}"),
+    term("{case} ends at {end} s, the paper's run at {duration} s"),
+    term("the run of RLS {number} ends at {end} s, before {asked} s"),
+    term(
+        "exact value and simulation differ by more than {errors} standard errors: exact {exact}, simulated {simulated} "
+        "[{lo}, {hi}]"
+    ),
+    term("its measure fails: {error}"),
+    term("no filter {name}; there are {names}"),
+    term("no component {name}; there are {names}"),
+    term("filter {name} is the baseline: it has no gain"),
+)
+DIFFERENCES = (
+    term("{missing} of the paper's {count} {key} changed or missing"),
+    term("{key} differs from the paper's"),
+    term("{key} is {own}, the paper's {printed}"),
+)
+AND_MORE = term("and {count} more")
+PLAIN_REASONS = (
+    *(term("no such experiment is shipped"), term("a required case is missing"), term("there is no gain")),
+    *(term("there is nothing to measure it with"), term("no such scans"), term("not known exactly")),
+    *(term("no Kalman filter with manoeuvre variance"), term("gains against growing memory")),
+    *(term("the run ends before the manoeuvre does"),),
+    term("(15) has no root: with the phase in it, its left side exceeds c at every length"),
+)
+
+
+def translate_reason(why: object) -> str:
+    """A reason in the current language; an unknown one unchanged."""
+    text = str(why)
+    for message in REASONS:
+        found = _message_pattern(message).fullmatch(text)
+        if found:
+            places = _placeholder_values(found)
+            return tr(message, **places | {"changed": "; ".join(_differences_by_case(places.get("changed", "")))})
+    return tr(text)
+
+
+def _differences_by_case(changed: str) -> Iterator[str]:
+    """Differences by case: `rls2: radar.sigma_range_m is 30, the paper's 25; and 2 more`."""
+    for part in changed.split("; "):
+        case, _, differences = part.rpartition(": ")
+        found = _message_pattern(AND_MORE).fullmatch(part)
+        if found:
+            yield tr(AND_MORE, **_placeholder_values(found))
+        else:
+            yield (f"{case}: " if case else "") + ", ".join(map(_translate_difference, _split_differences(differences)))
+
+
+def _split_differences(differences: str) -> list[str]:
+    """A list of differences split; the second half of one begins with a comma as well."""
+    return re.split(r", (?!the paper's )(?=\S+ is |\d+ of the paper's |\S+ differs from )", differences)
+
+
+def _translate_difference(text: str) -> str:
+    for message in DIFFERENCES:
+        found = _message_pattern(message).fullmatch(text.removesuffix(" …"))
+        if found:
+            return tr(message, **_placeholder_values(found)) + (" …" if text.endswith(" …") else "")
+    return tr(text)
+
+
+def _placeholder_values(found: re.Match[str]) -> dict[str, str]:
+    """The values in the placeholders, numbers as the language writes them."""
+    return {name: numeral(text) if NUMBER_PATTERN.fullmatch(text) else text for name, text in found.groupdict().items()}
+
+
+def _message_pattern(message: str) -> re.Pattern[str]:
+    """The pattern of a message with its placeholders filled."""
+    parts = PLACEHOLDER_PATTERN.split(message)
+    return re.compile("".join(f"(?P<{one}>.+?)" if i % 2 else re.escape(one) for i, one in enumerate(parts)))

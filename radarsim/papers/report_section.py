@@ -1,0 +1,130 @@
+"""The claims in a result's page, and in the index of results."""
+
+import csv
+import io
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from radarsim.extensions import IndexEntry, ReportSection
+from radarsim.language import term, tr
+from radarsim.papers.claim_rows import (
+    classes_in_words,
+    expected_words,
+    group_by_claim,
+    shown_interval,
+    verdict_sentence,
+)
+from radarsim.papers.claims_table import TABLES_READ
+from radarsim.papers.reasons import translate_reason
+from radarsim.papers.study_claims import interpretations_of
+from radarsim.papers.verdict_classes import rows_in_words
+from radarsim.report import files, html
+from radarsim.studies.registry import study
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from markupsafe import Markup
+
+    from radarsim.extensions import Tables
+
+MAX_LINKED_FIGURES = 3  # from one claim
+HEADING = term("claims")  # of the index's column
+MARKED_CLASSES = ("confirmed", "refuted")
+
+TablesRead = Sequence[tuple[str, str]]  # tables, with the component that was read or nothing
+
+
+def claims_section(
+    tables: "Tables",
+    titles: Mapping[str, str],
+    sources: Mapping[str, Sequence[str]],
+    written: Collection[str],
+    study_name: str,
+) -> ReportSection | None:
+    """The claims of a result with their parts, and links from its figures to them; see `Extension.report_section`."""
+    claims = _claims(tables["claims"], sources, written, study_name)
+    if not claims:
+        return None
+    rows: Any = tables["claims"].to_dict("records")
+    content = {"claims": claims, "verdicts": classes_in_words(rows), "titles": titles}
+    links = {
+        name: _fragment("links.html.j2", claims=[claim["id"] for claim in claims if name in claim["figures"]])
+        for name in sources
+    }
+    return ReportSection(_fragment("claims.html.j2", **content), _fragment("rule.html.j2"), links)
+
+
+def _fragment(template: str, **content: object) -> "Markup":
+    filters: dict[str, Callable[..., str]] = {
+        "expected": expected_words,
+        "reason": translate_reason,
+        "measured": _measured_value,
+        "bounds": _interval,
+        "css": _css_class,
+    }
+    return html.fragment("radarsim.papers", template, filters, **content)
+
+
+def _claims(
+    table: "pd.DataFrame", sources: Mapping[str, Sequence[str]], written: Collection[str], study_name: str
+) -> list[dict[str, Any]]:
+    """Claims with their parts, from claims.csv's rows, with the figures and tables behind each."""
+    tables_read = table.attrs.get(TABLES_READ, [()] * len(table))
+    records: Any = table.to_dict("records")
+    rows = [row | {TABLES_READ: own} for row, own in zip(records, tables_read, strict=True)]
+    claims = []
+    for parts in group_by_claim(rows_in_words(rows, [interpretations_of(study(study_name))])):
+        read = list(dict.fromkeys(table for part in parts for table in part[TABLES_READ]))
+        columns = ("statement", "paper", "place", "interpretation", "original", "overall", "class")
+        claims.append(
+            {
+                **{column: parts[0][column] for column in columns},
+                "id": parts[0]["claim"],
+                "verdict": verdict_sentence(parts).replace("*", ""),
+                "parts": parts,
+                "figures": linked_figures(read, sources),
+                "tables": list(dict.fromkeys(name for name, _ in read if name in written)),
+            }
+        )
+    return claims
+
+
+def linked_figures(tables_read: TablesRead, sources: Mapping[str, Sequence[str]]) -> list[str]:
+    """The figures that show the tables read by a claim, and of these its component's own if there is one."""
+    figures: list[str] = []
+    for table, component in tables_read:
+        showing = [name for name, tables in sources.items() if table in tables]
+        of_component = [name for name in showing if component and name.endswith(f"_{component}")]
+        figures += of_component or showing
+    return list(dict.fromkeys(figures))[:MAX_LINKED_FIGURES]
+
+
+def index_entry(path: Path) -> IndexEntry | None:
+    """From a table of claims: how many are of which class in words and as styled marks, and the paper of the first."""
+    try:
+        rows = list(csv.DictReader(io.StringIO(files.read(path).decode("utf-8"), newline="")))
+        looks = [_css_class(parts[0]["class"]) for parts in group_by_claim(rows)]
+        marks = {look: looks.count(look) for look in (*MARKED_CLASSES, "unclear") if look in looks}
+        paper = rows[0]["paper"].partition(",")[0] if rows else ""
+        return IndexEntry(tr(HEADING), classes_in_words(rows), marks, paper)
+    except (OSError, ValueError, LookupError, csv.Error):
+        return None
+
+
+def _measured_value(part: Mapping[str, Any]) -> str:
+    """The measured value of a part of a claim; an infinite settling time as text."""
+    if math.isinf(part["measured"]) and "settling" in part["what"]:
+        return tr(html.NOT_SETTLED)
+    return html.cell(part["measured"])
+
+
+def _interval(part: Mapping[str, Any]) -> str:
+    """The interval of a part of a claim; a dash without a sampling error."""
+    lo, hi = shown_interval(part)
+    return "–" if lo == hi else f"{html.cell(lo)} … {html.cell(hi)}"
+
+
+def _css_class(verdict: str) -> str:
+    return next((name for name in MARKED_CLASSES if verdict.startswith(name)), "unclear")

@@ -1,0 +1,71 @@
+"""The claims that a result judges: claims.csv with its classes, and the claims by class."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from radarsim.app import configs
+from radarsim.engine.results import CaseResult
+from radarsim.papers.claim_rows import CLASS_ORDER, group_by_claim, is_extension
+from radarsim.papers.claims_table import NOT_JUDGED, claims_table, first_rows
+from radarsim.papers.stored_verdicts import known_classes
+from radarsim.papers.study_claims import claims_of, interpretations_of
+from radarsim.papers.verdict_classes import CLASS_COLUMNS, add_classes, is_judged_only_as_shipped
+from radarsim.report import outside
+from radarsim.studies.registry import study
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from radarsim.app.result import Result
+    from radarsim.extensions import Tables
+
+
+def claims_of_results(
+    results: Sequence[CaseResult], measured: "Tables", user_filters: "Tables", stem: str
+) -> "pd.DataFrame":
+    """claims.csv of results, with the shipped classes; see `Extension.tables`."""
+    tables = outside.for_claims(measured, user_filters)
+    verdicts = claims_table(claims_of(study(results[0].study)), results, tables, configs.shipped, stem)
+    return with_stored_classes(verdicts, results[0].study)
+
+
+def with_stored_classes(claims: "pd.DataFrame", study_name: str, out: Path | None = None) -> "pd.DataFrame":
+    """claims.csv of a study with the classes over all interpretations: those stored under `out`, else the shipped."""
+    paper_claims, interpretations = claims_of(study(study_name)), interpretations_of(study(study_name))
+    if interpretations is None or paper_claims is None or not len(claims):
+        return claims
+    records: Any = claims.to_dict("records")
+    rows = add_classes(records, known_classes([(interpretations, paper_claims)], out))
+    return claims.assign(**{column: [row[column] for row in rows] for column in CLASS_COLUMNS})
+
+
+def claims_by_class(result: "Result", column: str = "class") -> dict[str, list[str]]:
+    """The claims of a result by their class over all interpretations, or `as_shipped`; extensions apart."""
+    by_class: dict[str, list[str]] = {}
+    rows = group_by_claim(_records(result))
+    for parts in sorted(rows, key=lambda parts: CLASS_ORDER.index(parts[0][column])):
+        kind = parts[0][column] + (", extension" if is_extension(parts) else "")
+        by_class.setdefault(kind, []).append(parts[0]["claim"])
+    return by_class
+
+
+def unjudged_claims(result: "Result") -> dict[str, list[str]]:
+    """The claims of a result's config that it does not judge, or not in every part, by reason."""
+    by_reason: dict[str, list[str]] = {}
+    for row in _records(result):
+        if row["verdict"] == NOT_JUDGED:
+            names = by_reason.setdefault(row["why"], [])
+            if row["claim"] not in names:
+                names.append(row["claim"])
+    return by_reason
+
+
+def claims_judged_only_as_shipped(result: "Result") -> list[str]:
+    """Claims judged under the shipped interpretation alone, although they depend on an open choice of their paper."""
+    return [row["claim"] for row in first_rows(_records(result)) if is_judged_only_as_shipped(row)]
+
+
+def _records(result: "Result") -> list[dict[str, Any]]:
+    records: Any = result.tables["claims"].to_dict("records")
+    return list(records)

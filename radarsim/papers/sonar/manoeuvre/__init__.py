@@ -1,0 +1,1 @@
+"""The claims of P3 on manoeuvres."""

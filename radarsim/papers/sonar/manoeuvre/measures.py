@@ -1,0 +1,186 @@
+"""How P3's claims on manoeuvres are measured: the cases they mean, and the numbers taken from tables."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.papers.evidence import Curve, MissingEvidence, ratio
+from radarsim.papers.sonar.measures import FOUND, Evidence, Key
+from radarsim.report.statistics import Z95, Estimate
+from radarsim.studies.sonar.config import Filter
+from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes
+
+USUAL = 0.01  # false alarms a test
+AT_ONE = 0.31731050786291415  # false alarms a test at k = 1: a Gaussian outside one σ
+
+
+# ---- the cases ----------------------------------------------------------------------------------------------------
+def _by_strength(results: Sequence[CaseResult]) -> list[CaseResult[ManoeuvreAxes]]:
+    """The cases of an accelerating target with detectors in the polar frame, from the weakest manoeuvre on."""
+    found = [
+        r for r in results if r.spec.frame == "polar" and r.spec.detectors and r.spec.target.kind == "accelerating"
+    ]
+    found = [r for r in found if r.axes.manoeuvre_s and (r.axes.phase == 1).any()]
+    return sorted(found, key=lambda r: abs(r.spec.target.acceleration_mps2))
+
+
+def _weakest(results: Sequence[CaseResult]) -> CaseResult[ManoeuvreAxes] | None:
+    found = _by_strength(results)
+    return found[0] if len(found) > 1 else None
+
+
+def _strongest(results: Sequence[CaseResult]) -> CaseResult[ManoeuvreAxes] | None:
+    found = _by_strength(results)
+    return found[-1] if len(found) > 1 else None
+
+
+def _of_one_sigma(results: Sequence[CaseResult]) -> CaseResult[ManoeuvreAxes] | None:
+    return next((r for r in _by_strength(results) if abs(_shift_of_five(r) - 1) < 0.01), None)
+
+
+WEAK, STRONG, EQUAL = "weakest manoeuvre", "strongest manoeuvre", "manoeuvre of one σ_a"
+FOUND.update({WEAK: _weakest, STRONG: _strongest, EQUAL: _of_one_sigma})
+
+
+# ---- the numbers --------------------------------------------------------------------------------------------------
+def _detector(result: CaseResult[ManoeuvreAxes], plots: int, what: str, value: float) -> tuple[int, int]:
+    """Number of the detector of so many plots that tests at every scan, and of its threshold; raises Missing."""
+    for d, one in enumerate(result.spec.detectors):
+        given = getattr(one, what) or ()
+        if one.plots == plots and one.test_every == 1 and value in given:
+            return d, given.index(value)
+    raise MissingEvidence((plots, value))
+
+
+def _shift_of_five(result: CaseResult[ManoeuvreAxes]) -> float:
+    """Mean acceleration of five plots in σ_a at the last scan of the manoeuvre, in the range; zero without them."""
+    try:
+        d, _ = _detector(result, 5, "threshold_k", 1.0)
+    except MissingEvidence:
+        return 0.0
+    return float(result.axes.shifts[d, 0, _last(result)])
+
+
+def _last(result: CaseResult[ManoeuvreAxes]) -> int:
+    """The last scan of the manoeuvre."""
+    return int(np.flatnonzero(result.axes.phase == 1)[-1])
+
+
+def thresholds_ratio(seen: Evidence, key: Key, more: int, few: int) -> float:
+    """Accelerations at the thresholds of two detectors of the same false alarms: algebra."""
+    result, found = seen.case(key), []
+    for plots in (more, few):
+        d, _ = _detector(result, plots, "false_alarm_probability", USUAL)
+        name = result.spec.detectors[d].name
+        rows = seen.tables["thresholds"]
+        rows = rows[(rows["case"] == result.name) & (rows["filter"] == name) & (rows["component"] == "r")]
+        near = (rows["false_alarm_probability"] - USUAL).abs().idxmin()
+        found.append(rows.loc[near, "threshold_acceleration"])
+    return float(found[0] / found[1])
+
+
+def mean_delay(result: CaseResult[ManoeuvreAxes], plots: int, rate: float = USUAL) -> Estimate:
+    """Mean time from the beginning to the first alarm in the range, s; where there is none, to the manoeuvre's end."""
+    return _mean_time(result, plots, rate, 1)
+
+
+def both_ends(result: CaseResult[ManoeuvreAxes], plots: int, rate: float = USUAL) -> Estimate:
+    """`mean_delay`, and from the end to the first test without an alarm: their sum, taken as independent."""
+    one, other = (_mean_time(result, plots, rate, phase) for phase in (1, 2))
+    half = float(np.hypot(one.hi - one.value, other.hi - other.value))
+    value = one.value + other.value
+    return Estimate(value, value - half, value + half)
+
+
+def _mean_time(result: CaseResult[ManoeuvreAxes], plots: int, rate: float, phase: int) -> Estimate:
+    """Mean time from the beginning of a phase (1, 2) to its first event; where there is none, to its last scan."""
+    d, t = _detector(result, plots, "false_alarm_probability", rate)
+    scans = np.flatnonzero(result.axes.phase == phase)
+    if not scans.size:
+        raise MissingEvidence("the run ends before the manoeuvre does")
+    share = np.asarray(result.sums["first"])[d, 0, t, scans] / result.count
+    share[-1] += 1 - share.sum()
+    since_s = (result.axes.manoeuvre_s or (np.nan, np.nan))[phase - 1]
+    delay = result.axes.t_s[scans] - since_s
+    mean = share @ delay
+    half = Z95 * np.sqrt(max(share @ delay**2 - mean**2, 0.0) / result.count)
+    return Estimate(float(mean), float(mean - half), float(mean + half))
+
+
+Until = Literal["beginning", "beginning and end"]
+DELAYS = {"beginning": mean_delay, "beginning and end": both_ends}
+
+
+def delays_ratio(seen: Evidence, key: Key, more: int, few: int, until: Until, rate: float) -> Estimate:
+    """Mean delays of two detectors, taken as independent."""
+    result, delay = seen.case(key), DELAYS[until]
+    return ratio(delay(result, more, rate), delay(result, few, rate))
+
+
+def further(seen: Evidence, key: Key, enough: Sequence[int], until: Until, rate: float) -> Estimate:
+    """Least mean delay of detectors of more plots than `enough`, over the least of these, less 1, in %; as independent.
+    Negative where more plots see it sooner."""
+    of = _delays(seen, key, until, rate)
+    more = [one for n, one in of.items() if n > max(enough)]
+    few = [one for n, one in of.items() if n in enough]
+    least = [min(ones, key=lambda one: one.value) for ones in (more, few)]
+    return Estimate(*(part - 100 for part in ratio(least[0], least[1], 100)))
+
+
+def fastest(seen: Evidence, key: Key, until: Until, rate: float) -> Estimate:
+    """Plots of the detector with the least mean delay; the interval spans all that cannot be distinguished from it."""
+    of = _delays(seen, key, until, rate)
+    best = min(of, key=lambda plots: of[plots].value)
+    near = [plots for plots in of if of[plots].lo <= of[best].hi]
+    return Estimate(float(best), float(min(near)), float(max(near)))
+
+
+def _delays(seen: Evidence, key: Key, until: Until, rate: float) -> dict[int, Estimate]:
+    """Mean delays by plots, of the detectors that test at every scan at a rate of false alarms."""
+    result = seen.case(key)
+    tested = (one for one in result.spec.detectors if one.test_every == 1)
+    every = [one.plots for one in tested if rate in (one.false_alarm_probability or ())]
+    return {plots: DELAYS[until](result, plots, rate) for plots in every}
+
+
+def exact_detected_at_one(seen: Evidence, key: Key) -> float:
+    """`detected_at_one` of the exact law."""
+    return float(_at_one(seen, key)["exact"])
+
+
+def detected_at_one(seen: Evidence, key: Key) -> Estimate:
+    """Share of alarms of five plots at k = 1 at the last scan of the manoeuvre of one σ_a."""
+    row = _at_one(seen, key)
+    return Estimate(*(float(row[part]) for part in ("probability", "lo", "hi")))
+
+
+def _at_one(seen: Evidence, key: Key) -> Mapping[str, Any]:
+    result = seen.case(key)
+    d, _ = _detector(result, 5, "threshold_k", 1.0)
+    name, k = result.spec.detectors[d].name, int(result.axes.k[_last(result)])
+    return seen.row("detections", case=result.name, filter=name, component="r", threshold_k=1.0, k=k)
+
+
+def degrees_ratio(seen: Evidence, key: Key, degree: int) -> Estimate:
+    """σ over the run of growing memory of a held degree, over that of the degree switched by five plots."""
+    filters = [f for _, f in seen.members(seen.case(key))]
+    held = next((f.name for f in filters if (f.kind, f.degree) == ("growing_memory", degree)), None)
+    switched = next((f.name for f in filters if _by_five(f)), None)
+    if held is None or switched is None:
+        raise MissingEvidence((key,))
+    over_run = [_over_run(seen.curve(key, name, "r").since(5)) for name in (held, switched)]
+    return ratio(over_run[0], over_run[1])
+
+
+def _by_five(one: Filter) -> bool:
+    own = one.detector
+    if own is None or one.response == "shorten_memory" or (one.end_after or 1) != 1:
+        return False
+    return own.plots == 5 and own.false_alarm_probability == USUAL and own.coordinates == "each"
+
+
+def _over_run(curve: Curve) -> Estimate:
+    """Root of the mean square of a curve; scans of one realisation go together, so ends are taken all at once."""
+    return Estimate(*(float(np.sqrt(np.mean(np.square(part)))) for part in (curve.value, curve.lo, curve.hi)))
