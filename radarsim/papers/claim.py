@@ -1,4 +1,6 @@
-"""DOC radarsim.papers.claim"""
+"""Claims as data: statement, place, and parts that say what is measured and which range the paper's words allow.
+
+The ranges come from the words alone and were written down before anything was measured."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,7 +20,7 @@ class Part:
 
     scale gives the quantity that the margin is relative to, such as σ; default: the margin is in the part's own unit.
     exact gives the exact value where `measure` of the exact curves does not; ceiling the score of a perfect estimator.
-    statement, number, variant, against_print and asserted are as in `rule.Judged`."""
+    statement, number, variant, against_print and asserted are as in `verdict_rule.JudgedPart`."""
 
     cases: tuple
     what: str
@@ -70,7 +72,7 @@ class Claim:
 
     @property
     def how(self) -> dict[str, bool]:
-        """Its judging options, as arguments of `rule.claim`."""
+        """Its judging options, as arguments of `claim_outcome`."""
         return {"unstated": bool(self.unstated), "joint": self.joint, "internal": self.internal}
 
 
@@ -81,7 +83,7 @@ class PaperClaims:
     paper: how tables cite it, authors and year. page: the stem of the study's page in docs/, if any. may_shorten: keys
     that only shorten or extend a run: quantities that do not depend on its end are still judged. may_grow: the study's
     lists to which members may be added while it stays the paper's experiment; every other key must be as in the claim's
-    config, see `radarsim.report.claims.declared`. held_too: by the stem of a shipped config, the claims of other
+    config, see `radarsim.papers.paper_cases`. held_too: by the stem of a shipped config, the claims of other
     configs all of whose parts it holds: if it is changed so that it no longer judges them, it says so."""
 
     claims: Sequence[Claim]

@@ -1,4 +1,17 @@
-"""DOC radarsim.papers.claim_files"""
+"""Claims and choices as they are written in YAML: statement, place, and what is measured by which function.
+
+    - id: 4
+      place: section 2
+      statement: The gain lies between 10 and 50 %
+      original: Der Gewinn liegt zwischen 10 und 50 %
+      parts:
+      - {of: [1], each: {pick: [least, largest]}, what: $pick gain, unit: "%",
+         measure: {gain: {component: r, pick: $pick}}, expected: {between: ["10", "50"]}}
+
+`measure` names a function of the study's measures, or a method of its evidence; it is called with the evidence, the
+cases under `of`, and the arguments that are given by name. `expected` names a function of `papers.expected_ranges`.
+`$name` is a value of `names:`, or of `each:`, which makes a part of every combination of its values; `"a, b":` takes
+several at once. An unknown argument is a fault with file and line, as in a config."""
 
 import inspect
 import itertools
@@ -33,7 +46,7 @@ TYPE_WORDS = {str: "text", float: "a number", int: "a whole number", bool: "true
 
 
 class PartKeys(Model):
-    """A part of a claim; see `declared.Part`."""
+    """A part of a claim; see `claim.Part`."""
 
     what: str
     of: Anything
@@ -51,7 +64,7 @@ class PartKeys(Model):
 
 
 class ClaimKeys(Model):
-    """A claim; see `declared.Claim`. parts_of: the claims whose parts it has too."""
+    """A claim; see `claim.Claim`. parts_of: the claims whose parts it has too."""
 
     id: Anything
     place: str

@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.claim_outcome"""
+"""The outcome of a claim from the verdicts on its parts; the rule is in docs/verdicts.md."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.claim_rows"""
+"""Rows of claims.csv for people: counts by class, verdicts in sentences, values with units and intervals."""
 
 import math
 import re

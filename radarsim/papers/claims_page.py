@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.claims_page"""
+"""The page of claims in Markdown: all of a paper in a table, with every part below, from stored results."""
 
 from collections.abc import Mapping, Sequence
 

@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.claims_table"""
+"""claims.csv: verdicts on the claims of an experiment, and the reasons where there is none."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.evidence"""
+"""Measured values for claims: tables of a result as curves, and points of them with their intervals."""
 
 import copy
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.expected_ranges"""
+"""Ranges and margins from a paper's words; these functions see the words alone, never a measurement."""
 
 import math
 from typing import NamedTuple

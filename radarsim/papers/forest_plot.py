@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.forest_plot"""
+"""The forest plot of claims: the worst part of each, its interval and exact value, in margins of the words."""
 
 import math
 from collections import Counter

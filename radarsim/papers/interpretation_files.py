@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.interpretation_files"""
+"""What `radarsim interpretations` writes: interpretations.csv, classes.csv, curves, pages and JSON documents."""
 
 import csv
 import io

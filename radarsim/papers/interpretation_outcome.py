@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.interpretation_outcome"""
+"""The outcome of a claim under all interpretations that its paper allows, and the choices on which it depends."""
 
 import math
 from collections import Counter

@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.interpretation_runs"""
+"""The runs that a paper's interpretations need, each once, judged as soon as it finishes."""
 
 from collections.abc import Collection, Iterable, Sequence
 from contextlib import nullcontext

@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.interpretation_verdicts"""
+"""The result of `radarsim interpretations`: verdicts by paper, their table and figures."""
 
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,4 +1,8 @@
-"""DOC radarsim.papers.interpretations"""
+"""What a paper leaves open, as data: choices with their alternatives, and interpretations, which take one of each.
+
+An alternative is equivalent to the print in every respect (E), one of what the paper does not say (U), or against its
+print (N). The first alternative of a choice is what the shipped configs take. A verdict is robust if it is the same in
+all E and U interpretations; N shows what would have to be changed."""
 
 import itertools
 import re
@@ -91,8 +95,6 @@ class PaperInterpretations(ABC):
         """Whether the paper leaves anything open that affects a claim of its own."""
         return not claim.extension and any(choice.bears_on(claim.id) for choice in self.choices)
 
-    # ---- the interpretations
-    # --------------------------------------------------------------------------------------------
     def declared(self) -> Sequence[Interpretation]:
         """The interpretations to judge, the default first: all combinations of E and U, and each N alone."""
         return list(dict.fromkeys([*self.combined(self.choices), *self.against_print()]))
@@ -164,8 +166,6 @@ class PaperInterpretations(ABC):
     def _other(self, interpretation: Interpretation) -> list[Choice]:
         return [choice for choice in self.choices if interpretation[choice.key] != choice.default]
 
-    # ---- a claim under an interpretation
-    # -----------------------------------------------------------------------------------
     def parts(self, claim: Claim, interpretation: Interpretation) -> Sequence[Part]:
         """The parts of a claim to judge under an interpretation. Default: all."""
         return claim.parts

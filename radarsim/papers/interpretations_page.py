@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.interpretations_page"""
+"""The page of a paper's interpretations in Markdown: open choices, and claims over all interpretations."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.judge_interpretations"""
+"""`radarsim interpretations`: verdicts under every interpretation, computed exactly or by small stored runs."""
 
 import os
 import tempfile
@@ -39,7 +39,7 @@ def judge_requests(
     """Judge claims under every interpretation and, unless disabled, write table and specification curves into
     out/interpretations.
 
-    wanted: of `asked`. realisations of each run, where runs are needed; default: the number declared by the paper's
+    wanted: of `judging_requests`. realisations of each run, where runs are needed; default: the number declared by the paper's
     interpretations. decide: runs behind undecided claims are extended, up to 2000·2^m realisations, until each claim is
     decided; `realisations` is then the limit. Runs go through the store of blocks under out, so that a second call
     continues. Raises TargetUnmet where a time limit left something undone, Interrupted on a signal seen by `stop`."""

@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.open_papers"""
+"""The papers that leave something open, and requests to judge their claims under every interpretation."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,9 @@
-"""DOC radarsim.papers.paper_cases"""
+"""Whether a case is the paper's own experiment; only such cases may judge its claims.
+
+A claim names the shipped config that holds its experiment. A case is the paper's when its checked keys equal those of a
+case of that config. These may differ: the number of realisations, the seed and the options of a run, which are not keys
+of a study; display names (`config.fields.Display`); and members added to a list that the study declares in
+`PaperClaims.may_grow`, or user filters (`python:`) beside the paper's own."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence

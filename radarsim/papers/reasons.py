@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.reasons"""
+"""Reasons why a claim is not judged, in the current language: claims.csv and interpretations.csv have them in English."""
 
 import re
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.specification_curve"""
+"""Specification curves: a claim under every interpretation, sorted by outcome, and the alternatives of each."""
 
 import numpy as np
 

@@ -1,4 +1,7 @@
-"""DOC radarsim.papers.verdict_classes"""
+"""The class of a claim over all interpretations that its paper allows, beside its class as shipped.
+
+It is computed in one place, `ClaimVerdicts.outcome`, when `radarsim interpretations` judges a claim under each of them,
+and kept as a row of classes.csv. Everything else that shows a class looks it up."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,4 +1,7 @@
-"""DOC radarsim.papers.verdict_rule"""
+"""The rule by which one part of a claim is judged: numbers in, a verdict out. Written before anything was measured.
+
+docs/verdicts.md gives it in words. A judged part holds the measured value, the exact value where known, the range that
+the paper's words allow, and the margin of these words."""
 
 import math
 from dataclasses import dataclass, replace

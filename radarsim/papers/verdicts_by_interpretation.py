@@ -1,4 +1,4 @@
-"""DOC radarsim.papers.verdicts_by_interpretation"""
+"""Verdicts on a claim under every interpretation of its paper: rows of interpretations.csv, and a summary."""
 
 import math
 from collections.abc import Iterable, Sequence

@@ -109,7 +109,6 @@ def _picked(series: Curve, pick: Pick) -> Estimate:
     return found
 
 
-# ---- gains --------------------------------------------------------------------------------------------------------
 def gain(seen: Evidence, radar: int, component: str, pick: Pick, since: int = 2, upto: int | None = None) -> Estimate:
     """A point of a radar's gain over the scans from `since` to `upto`, %."""
     found = seen.k_gain(radar, component).since(since)
@@ -242,7 +241,6 @@ def fall(seen: Evidence, radar: int) -> Estimate:
     return difference(gain(seen, radar, "Vr", "last"), gain(seen, radar, "Vr", "first"))
 
 
-# ---- σ ------------------------------------------------------------------------------------------------------------
 def sigma_of(
     seen: Evidence, radar: int, *others: int, observes: tuple[str, ...], component: str, pick: Pick
 ) -> Estimate:
@@ -298,7 +296,6 @@ def by_variance(
     return difference(small, large)
 
 
-# ---- algebra ------------------------------------------------------------------------------------------------------
 def earlier(seen: Evidence, radar: int, unit: Literal["scans", "s"]) -> Estimate:
     """How much earlier the filter with velocity has a velocity: in scans, or in seconds."""
     a, b = (seen.sigma(radar, observes, "Vr") for observes in (R, RV))

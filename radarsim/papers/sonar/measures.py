@@ -46,7 +46,6 @@ class Evidence(evidence.Evidence):
         return self.case(key).axes.filters.index(name)
 
 
-# ---- the cases ----------------------------------------------------------------------------------------------------
 def _kinds(result: CaseResult) -> set[tuple[str, int]]:
     return {(f.kind, f.degree) for f in result.spec.filters}
 
@@ -107,7 +106,6 @@ FOUND.update(
 )
 
 
-# ---- exact values: least squares on n plots of one scan apart and of one σ, in units of these ------------------------
 @cache
 def _covariance(n: int, size: int = 2) -> np.ndarray:
     """Covariance (size, size) of the state at the last of n plots, by a factorisation that knows no closed form."""
@@ -162,7 +160,6 @@ def exact_bounded(seen: Evidence, key: Key) -> float:
     return seen.exactly().gain(key, seen.filter(key, "window", 1, 10), "r").last().value
 
 
-# ---- the numbers --------------------------------------------------------------------------------------------------
 def _read(row: Mapping[str, Any], name: str, over: float = 1.0) -> Estimate:
     """A number of a table with its interval, over another."""
     return Estimate(*(row[key] / over for key in (name, f"{name}_lo", f"{name}_hi")))
