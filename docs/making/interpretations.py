@@ -32,7 +32,7 @@ def shipped(paper: str) -> str:
     for claim in of.claims.claims:
         if (found := known.get(claim.id)) is not None:
             said = class_words(
-                found.kind, found.kind, of.interpretations.asked(filter(None, found.depends_on.split(", ")))
+                found.kind, found.kind, of.interpretations.list_choices(filter(None, found.depends_on.split(", ")))
             )
             rows.append((claim.id, claim.statement, said, f"{found.holds} of {found.of}"))
     parts = [

@@ -135,20 +135,22 @@ class MeasureCall:
         """The measured value; a plain number is without noise. Raises MeasureError where the function fails."""
         try:
             if self.function is None:
-                found = getattr(seen, self.name)(*self.cases, **self.arguments)
+                value = getattr(seen, self.name)(*self.cases, **self.arguments)
             else:
-                found = self.function(seen, *self.cases, **self.arguments)
+                value = self.function(seen, *self.cases, **self.arguments)
         except OF_AUTHORS as error:
-            other = isinstance(error, RadarsimError) and not isinstance(error, ConfigError)
-            if other or (isinstance(error, MissingEvidence | ImpossibleInterpretation) and not self._misspelt(error)):
+            is_our_error = isinstance(error, RadarsimError) and not isinstance(error, ConfigError)
+            if is_our_error or (
+                isinstance(error, MissingEvidence | ImpossibleInterpretation) and not self._misspelt(error)
+            ):
                 raise
             raise MeasureError(f"{self.source}: {self.name}: {failures.summary(error)}") from error
-        if isinstance(found, Estimate):
-            return found
+        if isinstance(value, Estimate):
+            return value
         with suppress(TypeError, ValueError):
-            if not isinstance(found, str | bytes):
-                return exact_number(found)
-        raise MeasureError(f"{self.source}: {self.name}: must give an Estimate or a number, got {shown(found)}")
+            if not isinstance(value, str | bytes):
+                return exact_number(value)
+        raise MeasureError(f"{self.source}: {self.name}: must give an Estimate or a number, got {shown(value)}")
 
     def _misspelt(self, error: Exception) -> bool:
         """Whether a function of a package asks for a name that the paper's own case does not have."""
@@ -197,14 +199,14 @@ def _declarations(
     document: Document | None,
     faults: Faults,
     model: type[KeysModel],
-    make: "Callable[[KeysModel, _Reader], Iterator[Declaration]]",
+    convert: "Callable[[KeysModel, _Reader], Iterator[Declaration]]",
     measures: Sequence[ModuleType] = (),
 ) -> tuple[Declaration, ...]:
     """The objects made of a checked document."""
     keys = None if document is None else check(model, document, faults)
-    made = () if document is None or keys is None else tuple(make(keys, _Reader(document, faults, measures)))
+    declarations = () if document is None or keys is None else tuple(convert(keys, _Reader(document, faults, measures)))
     faults.raise_if_any()
-    return made
+    return declarations
 
 
 def with_cases(part: Part, *cases: Any) -> Part:
@@ -231,51 +233,66 @@ class _Reader:
         self.functions: dict[str, Callable[..., Any]] = {}
         methods: dict[str, Callable[..., Any]] = {}
         for module in measures:
-            own = {name: one for name, one in vars(module).items() if inspect.isfunction(one)}
-            self.functions |= {name: one for name, one in own.items() if next(iter(_parameters_of(one)), "") == "seen"}
-            of = inspect.getmembers(getattr(module, "Evidence", Evidence), inspect.isfunction)
-            methods |= {name: one for name, one in of if not hasattr(Evidence, name)}
-        known = methods | self.functions
-        self.measures = {name: one for name, one in known.items() if not name.startswith("_")}
+            functions = {name: function for name, function in vars(module).items() if inspect.isfunction(function)}
+            self.functions |= {
+                name: function
+                for name, function in functions.items()
+                if next(iter(_parameters_of(function)), "") == "seen"
+            }
+            members = inspect.getmembers(getattr(module, "Evidence", Evidence), inspect.isfunction)
+            methods |= {name: function for name, function in members if not hasattr(Evidence, name)}
+        named = methods | self.functions
+        self.measures = {name: function for name, function in named.items() if not name.startswith("_")}
         self.ranges: dict[str, Callable[..., Any]] = {name: getattr(expected_ranges, name) for name in RANGE_NAMES}
 
     def claims(self, keys: FileKeys) -> Iterator[Claim]:
         """The claims in their order."""
         names = self._named(keys.names)
         parts: dict[str, list[Part]] = {}
-        for i, one in enumerate(keys.claims):
-            if f"{keys.paper}.{one.id}" in parts:
-                self._add(("claims", i, "id"), "stands there already", one.id)
-            own = parts[f"{keys.paper}.{one.id}"] = [
-                part for name in one.parts_of for part in self._parts_of(name, parts, ("claims", i, "parts_of"))
+        for i, claim_keys in enumerate(keys.claims):
+            if f"{keys.paper}.{claim_keys.id}" in parts:
+                self._add(("claims", i, "id"), "stands there already", claim_keys.id)
+            claim_parts = parts[f"{keys.paper}.{claim_keys.id}"] = [
+                part_keys
+                for name in claim_keys.parts_of
+                for part_keys in self._parts_of(name, parts, ("claims", i, "parts_of"))
             ]
-            for j, part in enumerate(one.parts):
-                own += self._parts(part, names, ("claims", i, "parts", j))
-            given = one.model_dump(exclude={"id", "config", "parts", "parts_of", "reading"})
-            given["interpretation"] = one.interpretation or one.reading
-            given["source"] = self._source(("claims", i, "config") if one.config else ("config",))
-            yield Claim(f"{keys.paper}.{one.id}", parts=tuple(own), config=one.config or keys.config, **given)
+            for j, part_keys in enumerate(claim_keys.parts):
+                claim_parts += self._parts(part_keys, names, ("claims", i, "parts", j))
+            fields = claim_keys.model_dump(exclude={"id", "config", "parts", "parts_of", "reading"})
+            fields["interpretation"] = claim_keys.interpretation or claim_keys.reading
+            fields["source"] = self._source(("claims", i, "config") if claim_keys.config else ("config",))
+            yield Claim(
+                f"{keys.paper}.{claim_keys.id}",
+                parts=tuple(claim_parts),
+                config=claim_keys.config or keys.config,
+                **fields,
+            )
 
     def choices(self, keys: ChoicesKeys | FileKeys) -> Iterator[Choice]:
         """The choices in their order."""
         names = self._named(keys.names)
-        for i, one in enumerate(keys.choices):
-            claims = self._filled(one.claims, names, ("choices", i, "claims"))
-            every = [own for each in claims for own in (each if isinstance(each, tuple) else (each,))]
+        for i, choice_keys in enumerate(keys.choices):
+            claims = self._filled(choice_keys.claims, names, ("choices", i, "claims"))
+            claim_ids = [
+                claim_id
+                for alternative_keys in claims
+                for claim_id in (alternative_keys if isinstance(alternative_keys, tuple) else (alternative_keys,))
+            ]
             yield Choice(
-                *(one.key, one.asks, one.original, one.english or one.original),
+                *(choice_keys.key, choice_keys.asks, choice_keys.original, choice_keys.english or choice_keys.original),
                 tuple(
-                    Alternative(**each.model_dump(), source=self._source(("choices", i, "alternatives", j)))
-                    for j, each in enumerate(one.alternatives)
+                    Alternative(**alternative_keys.model_dump(), source=self._source(("choices", i, "alternatives", j)))
+                    for j, alternative_keys in enumerate(choice_keys.alternatives)
                 ),
-                tuple(f"{keys.paper}.{own}" for own in every),
-                one.contradicts,
+                tuple(f"{keys.paper}.{claim_id}" for claim_id in claim_ids),
+                choice_keys.contradicts,
             )
 
-    def _named(self, given: Mapping[str, Any]) -> dict[str, Any]:
+    def _named(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The values under `names`; each may use those before it."""
         names: dict[str, Any] = {}
-        for name, value in given.items():
+        for name, value in values.items():
             with suppress(_UnknownNameError):
                 names[name] = self._filled(value, names, ("names", name))
         return names
@@ -295,51 +312,57 @@ class _Reader:
 
     def _varied(self, each: Mapping[str, Any], names: Mapping[str, Any], path: KeyPath) -> Iterator[dict[str, Any]]:
         axes = []
-        for key, given in each.items():
-            of, rows = [name.strip() for name in key.split(",")], self._filled(given, names, (*path, key))
-            rows = rows if len(of) > 1 or not isinstance(rows, tuple) else tuple((row,) for row in rows)
-            if not isinstance(rows, tuple) or not all(isinstance(row, tuple) and len(row) == len(of) for row in rows):
-                self._add((*path, key), "must be a list" + (f" of lists of {len(of)}" if len(of) > 1 else ""), given)
+        for key, values in each.items():
+            variables, rows = [name.strip() for name in key.split(",")], self._filled(values, names, (*path, key))
+            rows = rows if len(variables) > 1 or not isinstance(rows, tuple) else tuple((row,) for row in rows)
+            if not isinstance(rows, tuple) or not all(
+                isinstance(row, tuple) and len(row) == len(variables) for row in rows
+            ):
+                self._add(
+                    (*path, key),
+                    "must be a list" + (f" of lists of {len(variables)}" if len(variables) > 1 else ""),
+                    values,
+                )
                 raise _UnknownNameError
-            axes.append([dict(zip(of, row, strict=True)) for row in rows])
+            axes.append([dict(zip(variables, row, strict=True)) for row in rows])
         for combination in itertools.product(*axes):
             yield {name: value for row in combination for name, value in row.items()}
 
     def _part(self, keys: PartKeys, names: Mapping[str, Any], path: KeyPath) -> Part:
-        given: dict[str, Any] = {
+        fields: dict[str, Any] = {
             key: self._filled(value, names, (*path, key)) for key, value in keys.model_dump(exclude={"each"}).items()
         }
-        cases = given.pop("of")
+        cases = fields.pop("of")
         if not isinstance(cases, tuple):
             self._add((*path, "of"), "must be a list of cases", keys.of)
             raise _UnknownNameError
-        measure = self._call(given.pop("measure"), self.measures, cases, (*path, "measure"))
-        expected = self._call(given.pop("expected"), self.ranges, (), (*path, "expected"))
+        measure = self._call(fields.pop("measure"), self.measures, cases, (*path, "measure"))
+        expected = self._call(fields.pop("expected"), self.ranges, (), (*path, "expected"))
         for key in ("scale", "ceiling"):
-            if given[key] is not None:
-                given[key] = self._call(given[key], self.measures, cases, (*path, key)).number
+            if fields[key] is not None:
+                fields[key] = self._call(fields[key], self.measures, cases, (*path, key)).number
         exactly = self.functions.get(f"exact_{measure.name}")
         exact = replace(measure, name=f"exact_{measure.name}", function=exactly).number if exactly else None
         assert expected.function
-        found = expected.function(**expected.arguments)
-        if not (found.lo <= found.hi and found.margin > 0):
-            self._add((*path, "expected"), "must be a range from low to high with a margin > 0", found.words)
+        expected_range = expected.function(**expected.arguments)
+        if not (expected_range.lo <= expected_range.hi and expected_range.margin > 0):
+            self._add((*path, "expected"), "must be a range from low to high with a margin > 0", expected_range.words)
             raise _UnknownNameError
-        return Part(cases, measure=measure, expected=found, exact=exact, **given)
+        return Part(cases, measure=measure, expected=expected_range, exact=exact, **fields)
 
     def _filled(self, value: Any, names: Mapping[str, Any], path: KeyPath) -> Any:
         """A value with `$name` replaced, and tuples in place of lists."""
         if isinstance(value, dict):
-            return {key: self._filled(one, names, (*path, key)) for key, one in value.items()}
+            return {key: self._filled(item, names, (*path, key)) for key, item in value.items()}
         if isinstance(value, list | tuple):
-            return tuple(self._filled(one, names, (*path, i)) for i, one in enumerate(value))
+            return tuple(self._filled(item, names, (*path, i)) for i, item in enumerate(value))
         if not isinstance(value, str) or "$" not in value:
             return value
         try:
             text = Template(value)
-            (name, *others) = text.get_identifiers()
-            whole = not others and value in (f"${name}", f"${{{name}}}")
-            return names[name] if whole else text.substitute(names)
+            (name, *other_names) = text.get_identifiers()
+            is_only_name = not other_names and value in (f"${name}", f"${{{name}}}")
+            return names[name] if is_only_name else text.substitute(names)
         except ValueError:
             self._add(path, "must name a value after each $", value)
         except KeyError as error:
@@ -348,34 +371,36 @@ class _Reader:
             )
         raise _UnknownNameError
 
-    def _call(self, value: Any, known: Mapping[str, Callable[..., Any]], cases: tuple, path: KeyPath) -> MeasureCall:
+    def _call(
+        self, value: Any, functions: Mapping[str, Callable[..., Any]], cases: tuple, path: KeyPath
+    ) -> MeasureCall:
         """The call of `name` or `{name: arguments}`: arguments by name, or, for a range, in their order."""
-        name, given = next(iter(value.items())) if isinstance(value, dict) and len(value) == 1 else (value, {})
-        if name not in known:
-            self._add(path, f"must be one of them{_allowed_names(str(name), known)}", value)
+        name, arguments = next(iter(value.items())) if isinstance(value, dict) and len(value) == 1 else (value, {})
+        if name not in functions:
+            self._add(path, f"must be one of them{_allowed_names(str(name), functions)}", value)
             raise _UnknownNameError
-        function, path = known[name], (*path, name) if value is not name else path
+        function, path = functions[name], (*path, name) if value is not name else path
         parameters = _parameters_of(function)
-        free = list(parameters)[0 if known is self.ranges else 1 :]
-        if not isinstance(given, dict):
-            if known is not self.ranges:
-                self._add(path, "must have its arguments by name", given)
+        names = list(parameters)[0 if functions is self.ranges else 1 :]
+        if not isinstance(arguments, dict):
+            if functions is not self.ranges:
+                self._add(path, "must have its arguments by name", arguments)
                 raise _UnknownNameError
-            given = dict(zip(free, given if isinstance(given, tuple) else (given,), strict=False))
+            arguments = dict(zip(names, arguments if isinstance(arguments, tuple) else (arguments,), strict=False))
         try:
-            leading = () if known is self.ranges else (None, *cases)
-            inspect.signature(function).bind(*leading, **given)
+            positional = () if functions is self.ranges else (None, *cases)
+            inspect.signature(function).bind(*positional, **arguments)
         except TypeError as error:
-            self._add(path, f"{name}({', '.join(free)}): {error}", value)
+            self._add(path, f"{name}({', '.join(names)}): {error}", value)
             raise _UnknownNameError from None
-        for key, one in given.items():
-            wanted = _wrong_type(parameters[key].annotation, one) if key in parameters else ""
-            if wanted:
-                words = "; its ends must rise" if known is self.ranges and _has_falling_ends(given) else ""
-                self._add((*path, key), f"must be {wanted}{words}", one)
+        for key, argument in arguments.items():
+            wrong_type = _wrong_type(parameters[key].annotation, argument) if key in parameters else ""
+            if wrong_type:
+                hint = "; its ends must rise" if functions is self.ranges and _has_falling_ends(arguments) else ""
+                self._add((*path, key), f"must be {wrong_type}{hint}", argument)
                 raise _UnknownNameError
-        used = self.functions.get(name) if known is self.measures else function
-        return MeasureCall(name, used, cases, given, self._source(path))
+        called = self.functions.get(name) if functions is self.measures else function
+        return MeasureCall(name, called, cases, arguments, self._source(path))
 
     def _source(self, path: KeyPath) -> str:
         return str(self.document.origin(path))
@@ -389,8 +414,8 @@ def _parameters_of(function: Callable[..., Any]) -> Mapping[str, inspect.Paramet
     return inspect.signature(function).parameters
 
 
-def _allowed_names(name: str, known: Mapping[str, Any]) -> str:
-    return f"{did_you_mean(name, list(known)) or ';'} allowed: {', '.join(known)}"
+def _allowed_names(name: str, names: Mapping[str, Any]) -> str:
+    return f"{did_you_mean(name, list(names)) or ';'} allowed: {', '.join(names)}"
 
 
 def _has_falling_ends(ends: Mapping[str, Any]) -> bool:
@@ -405,10 +430,10 @@ def _wrong_type(annotation: Any, value: Any) -> str:
         allowed = get_args(annotation)
         return "" if value in allowed else f"one of {', '.join(map(str, allowed))}"
     if isinstance(annotation, UnionType):
-        every = [_wrong_type(one, value) for one in get_args(annotation)]
-        return "" if not all(every) else " or ".join(every)
+        wrong_types = [_wrong_type(member, value) for member in get_args(annotation)]
+        return "" if not all(wrong_types) else " or ".join(wrong_types)
     if annotation not in TYPE_WORDS:
         return ""
-    of = (int, float) if annotation is float else annotation
-    fits = isinstance(value, of) and isinstance(value, bool) == (annotation is bool)
+    types = (int, float) if annotation is float else annotation
+    fits = isinstance(value, types) and isinstance(value, bool) == (annotation is bool)
     return "" if fits else TYPE_WORDS[annotation]

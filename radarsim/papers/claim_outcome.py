@@ -58,23 +58,27 @@ def claim_outcome(
     give every number; where each is reproduced in some variant and no variant gives all, the print contradicts itself.
     internal: both sides are printed; where they differ, the print contradicts itself."""
     asserted = [part for part in parts if part.asserted] or list(parts)
-    many = sum(part.sampled and not part.void for part in asserted)
+    sampled_parts = sum(part.sampled and not part.void for part in asserted)
     if joint:
-        return _joint_outcome(asserted, many)
+        return _joint_outcome(asserted, sampled_parts)
     numbers = _parts_by_number(asserted)
-    said = {name: _number_verdict(own, many) for name, own in numbers.items()}
-    kind = UNJUDGEABLE if unstated else _claim_class(numbers, said, many)
+    verdicts = {name: _number_verdict(variants, sampled_parts) for name, variants in numbers.items()}
+    kind = UNJUDGEABLE if unstated else _claim_class(numbers, verdicts, sampled_parts)
     if internal and kind == REFUTED:
         kind = CONTRADICTORY
-    misses = [min(miss_in_margins(part) for part in own) for name, own in numbers.items() if said[name] != VOID]
-    open_ = [part for name, own in numbers.items() if said[name] == UNDECIDED for part in own]
+    misses = [
+        min(miss_in_margins(part) for part in variants) for name, variants in numbers.items() if verdicts[name] != VOID
+    ]
+    undecided = [part for name, variants in numbers.items() if verdicts[name] == UNDECIDED for part in variants]
     return ClaimOutcome(
         kind,
-        held=sum(one in (CONFIRMED, IMMATERIAL) for one in said.values()),
-        failed=sum(one in (REFUTED, CONTRADICTORY) for one in said.values()),
-        of=sum(one != VOID for one in said.values()),
+        held=sum(verdict in (CONFIRMED, IMMATERIAL) for verdict in verdicts.values()),
+        failed=sum(verdict in (REFUTED, CONTRADICTORY) for verdict in verdicts.values()),
+        of=sum(verdict != VOID for verdict in verdicts.values()),
         miss=max(misses, default=math.nan),
-        needed=largest_needed(needed_realisations(part, many) for part in open_) if kind == UNDECIDED else None,
+        needed=largest_needed(needed_realisations(part, sampled_parts) for part in undecided)
+        if kind == UNDECIDED
+        else None,
     )
 
 
@@ -86,47 +90,50 @@ def _parts_by_number(parts: Sequence[JudgedPart]) -> dict[tuple[str, str], list[
     return numbers
 
 
-def _number_verdict(variants: Sequence[JudgedPart], many: int) -> str:
+def _number_verdict(variants: Sequence[JudgedPart], sampled_parts: int) -> str:
     """The verdict on a number from those on its variants."""
-    said = []
+    verdicts = []
     for part in variants:
-        one = part_verdict(part, many)
-        if part.against_print and one in (CONFIRMED, IMMATERIAL):
-            one = CONTRADICTORY
-        if one != VOID:
-            said.append(REFUTED if part.against_print and one == UNDECIDED else one)
-    return min(said, key=BEST_FIRST.index) if said else VOID
+        verdict = part_verdict(part, sampled_parts)
+        if part.against_print and verdict in (CONFIRMED, IMMATERIAL):
+            verdict = CONTRADICTORY
+        if verdict != VOID:
+            verdicts.append(REFUTED if part.against_print and verdict == UNDECIDED else verdict)
+    return min(verdicts, key=BEST_FIRST.index) if verdicts else VOID
 
 
 def _claim_class(
-    numbers: Mapping[tuple[str, str], Sequence[JudgedPart]], said: Mapping[tuple[str, str], str], many: int
+    numbers: Mapping[tuple[str, str], Sequence[JudgedPart]], verdicts: Mapping[tuple[str, str], str], sampled_parts: int
 ) -> str:
     sentences = []
     for sentence in dict.fromkeys(name for name, _ in numbers):
-        own = {key: said[key] for key in numbers if key[0] == sentence and said[key] != VOID}
-        safe = all(
-            is_within_margins(part, many) for key, one in own.items() if one == UNDECIDED for part in numbers[key]
+        number_verdicts = {key: verdicts[key] for key in numbers if key[0] == sentence and verdicts[key] != VOID}
+        harmless = all(
+            is_within_margins(part, sampled_parts)
+            for key, verdict in number_verdicts.items()
+            if verdict == UNDECIDED
+            for part in numbers[key]
         )
-        sentences.append(_sentence_verdict(list(own.values()), safe))
+        sentences.append(_sentence_verdict(list(number_verdicts.values()), harmless))
     return min(sentences, key=WORST_FIRST.index) if sentences else UNJUDGEABLE
 
 
-def _sentence_verdict(said: Sequence[str], safe: bool) -> str:
+def _sentence_verdict(verdicts: Sequence[str], harmless: bool) -> str:
     """The verdict on a sentence: one material miss refutes it, immaterial ones neither refute nor confirm."""
     for bad in (REFUTED, CONTRADICTORY):
-        if bad in said:
+        if bad in verdicts:
             return bad
-    if UNDECIDED in said and not (safe and CONFIRMED in said):
+    if UNDECIDED in verdicts and not (harmless and CONFIRMED in verdicts):
         return UNDECIDED
-    if CONFIRMED in said:
+    if CONFIRMED in verdicts:
         return CONFIRMED
-    return IMMATERIAL if said else UNJUDGEABLE
+    return IMMATERIAL if verdicts else UNJUDGEABLE
 
 
-def largest_needed(every: Iterable[int | None]) -> int | None:
+def largest_needed(realisations: Iterable[int | None]) -> int | None:
     """The largest number of realisations; None where there is none, or one is None."""
-    known = list(every)
-    return None if not known or None in known else max(one for one in known if one is not None)
+    numbers = list(realisations)
+    return None if not numbers or None in numbers else max(number for number in numbers if number is not None)
 
 
 def round_up(n: float) -> int:
@@ -135,20 +142,23 @@ def round_up(n: float) -> int:
     return math.ceil(n / step) * step
 
 
-def _joint_outcome(parts: Sequence[JudgedPart], many: int) -> ClaimOutcome:
+def _joint_outcome(parts: Sequence[JudgedPart], sampled_parts: int) -> ClaimOutcome:
     by_variant: dict[str, list[str]] = {}
     by_number: dict[str, list[str]] = {}
     for part in parts:
-        said = part_verdict(part, many)
-        by_variant.setdefault(part.variant, []).append(said)
-        by_number.setdefault(part.number, []).append(said)
-    held = {name: sum(one in (CONFIRMED, IMMATERIAL) for one in said) for name, said in by_variant.items()}
-    best = max(held, key=lambda name: held[name])
-    if held[best] == len(by_number):
+        verdict = part_verdict(part, sampled_parts)
+        by_variant.setdefault(part.variant, []).append(verdict)
+        by_number.setdefault(part.number, []).append(verdict)
+    reproduced = {
+        name: sum(number_verdict in (CONFIRMED, IMMATERIAL) for number_verdict in verdict)
+        for name, verdict in by_variant.items()
+    }
+    best = max(reproduced, key=lambda name: reproduced[name])
+    if reproduced[best] == len(by_number):
         kind = CONFIRMED
-    elif any(UNDECIDED in said and REFUTED not in said for said in by_variant.values()):
+    elif any(UNDECIDED in verdict and REFUTED not in verdict for verdict in by_variant.values()):
         kind = UNDECIDED
     else:
-        kind = CONTRADICTORY if all(CONFIRMED in said for said in by_number.values()) else REFUTED
+        kind = CONTRADICTORY if all(CONFIRMED in verdict for verdict in by_number.values()) else REFUTED
     worst = max(miss_in_margins(part) for part in parts if part.variant == best)
-    return ClaimOutcome(kind, held[best], len(by_number) - held[best], len(by_number), worst)
+    return ClaimOutcome(kind, reproduced[best], len(by_number) - reproduced[best], len(by_number), worst)

@@ -76,18 +76,18 @@ def _class_lines(rows: Sequence[Mapping]) -> list[str]:
 
 def _claim_line(parts: Sequence[Mapping]) -> str:
     """A claim: its words; folded, the original, its interpretation and the part furthest from it; its class."""
-    first, found = parts[0], worst_part(parts)
+    first, worst = parts[0], worst_part(parts)
     original = f"«{first['original']}»" if first["original"] else ""
-    inner = [" ".join(filter(None, (original, f"({first['place']})")))]
+    details = [" ".join(filter(None, (original, f"({first['place']})")))]
     if first["interpretation"]:
-        inner.append(f"Interpretation: {first['interpretation']}.")
-    if found is not None:
-        inner.append(
-            f"Result: {part_name(found, parts)}: {decisive_value_words(found)}; expected {_expected_cell(found)}."
+        details.append(f"Interpretation: {first['interpretation']}.")
+    if worst is not None:
+        details.append(
+            f"Result: {part_name(worst, parts)}: {decisive_value_words(worst)}; expected {_expected_cell(worst)}."
         )
-    folded = "<br>".join(map(_markdown_cell, inner))
-    said = f"<details><summary>{_markdown_cell(first['statement'])}</summary>{folded}</details>"
-    return f"| {first['claim']} | {said} | {_markdown_cell(verdict_sentence(parts))} | `{first['config']}` |"
+    folded = "<br>".join(map(_markdown_cell, details))
+    statement = f"<details><summary>{_markdown_cell(first['statement'])}</summary>{folded}</details>"
+    return f"| {first['claim']} | {statement} | {_markdown_cell(verdict_sentence(parts))} | `{first['config']}` |"
 
 
 def _expected_cell(row: Mapping) -> str:
@@ -105,7 +105,7 @@ def _part_lines(parts: Sequence[Mapping]) -> list[str]:
             verdict = f"{NOT_JUDGED}: {row['why']}"
         if str(row["extension"]).lower() == "true":
             verdict += " (extension)"
-        exact, missed = cell_number(row["exact"]), cell_number(row["miss"])
+        exact, miss = cell_number(row["exact"]), cell_number(row["miss"])
         cells = (
             *(
                 row["claim"],
@@ -113,7 +113,7 @@ def _part_lines(parts: Sequence[Mapping]) -> list[str]:
                 measured_words(row) if cell_number(row["measured"]) is not None else "",
             ),
             *("" if exact is None else four_digits(exact), _expected_cell(row)),
-            *("" if missed is None else f"{missed:.3g}", verdict, row["old_verdict"]),
+            *("" if miss is None else f"{miss:.3g}", verdict, row["old_verdict"]),
         )
         lines.append("| " + " | ".join(map(_markdown_cell, cells)) + " |")
     return lines

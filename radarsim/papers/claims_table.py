@@ -53,9 +53,9 @@ NUMBER_COLUMNS = (
 
 
 def claims_table(
-    of: PaperClaims | None,
+    paper_claims: PaperClaims | None,
     results: Sequence[CaseResult],
-    made: "Mapping[str, pd.DataFrame]",
+    tables_by_name: "Mapping[str, pd.DataFrame]",
     shipped: ShippedCases,
     stem: str = "",
 ) -> "pd.DataFrame":
@@ -65,10 +65,10 @@ def claims_table(
     `stem`, the one that was run, are all listed, with a reason where they cannot be judged; other claims if every part
     can be judged."""
     rows: list[dict[str, Any]] = []
-    if of is not None:
-        papers = _PaperEvidence(of, results, made, shipped)
-        for claim in of.claims:
-            rows += _claim_rows(claim, of.paper, papers, own=of.holds(claim, stem))
+    if paper_claims is not None:
+        papers = _PaperEvidence(paper_claims, results, tables_by_name, shipped)
+        for claim in paper_claims.claims:
+            rows += _claim_rows(claim, paper_claims.paper, papers, of_config=paper_claims.holds(claim, stem))
     table = tables.frame({name: [row[name] for row in rows] for name in COLUMNS})
     table.attrs[TABLES_READ] = TablesRead(row[TABLES_READ] for row in rows)
     return table
@@ -87,50 +87,61 @@ class TablesRead(list[Any]):
 class _PaperEvidence:
     """The paper's part of the results, by the config of a claim."""
 
-    def __init__(self, of: PaperClaims, results: Sequence[CaseResult], made: Mapping, shipped: ShippedCases):
-        self._of, self._results, self._made, self._shipped = of, results, made, shipped
+    def __init__(
+        self, paper_claims: PaperClaims, results: Sequence[CaseResult], tables_by_name: Mapping, shipped: ShippedCases
+    ):
+        self._of, self._results, self._made, self._shipped = paper_claims, results, tables_by_name, shipped
         self._seen: dict[str, tuple[Evidence | None, str]] = {}
 
     def evidence(self, config: str) -> tuple[Evidence | None, str]:
         """The evidence for claims of a config, None where no case is the paper's; differences of the other cases."""
         if config not in self._seen:
-            of = self._of
-            specs = _paper_cases(of, config, self._shipped)
-            self._seen[config] = self._evidence(specs), _differences_in_words(of, self._results, specs)
+            paper_claims = self._of
+            specs = _paper_cases(paper_claims, config, self._shipped)
+            self._seen[config] = self._evidence(specs), _differences_in_words(paper_claims, self._results, specs)
         return self._seen[config]
 
     def _evidence(self, shipped: Sequence[CaseKeys]) -> Evidence | None:
-        grow = self._of.may_grow
-        every = {result.name: paper_members(_case_keys(self._of, result), shipped, grow) for result in self._results}
-        places = {name: own for name, own in every.items() if own is not None}
-        if not places:
+        may_grow = self._of.may_grow
+        members = {
+            result.name: paper_members(_case_keys(self._of, result), shipped, may_grow) for result in self._results
+        }
+        paper_members_of = {name: indices for name, indices in members.items() if indices is not None}
+        if not paper_members_of:
             return None
-        made = self._made
-        if len(places) < len(every):
-            made = {name: _rows_of_cases(table, set(places)) for name, table in made.items()}
-        return self._of.evidence([result for result in self._results if result.name in places], made, places)
+        tables_by_name = self._made
+        if len(paper_members_of) < len(members):
+            tables_by_name = {
+                name: _rows_of_cases(table, set(paper_members_of)) for name, table in tables_by_name.items()
+            }
+        return self._of.evidence(
+            [result for result in self._results if result.name in paper_members_of], tables_by_name, paper_members_of
+        )
 
 
-def _paper_cases(of: PaperClaims, config: str, shipped: ShippedCases) -> list[CaseKeys]:
+def _paper_cases(paper_claims: PaperClaims, config: str, shipped: ShippedCases) -> list[CaseKeys]:
     """The paper's cases, by the shipped config that claims name."""
-    return [_case_keys(of, case) for case in shipped(config) or ()]
+    return [_case_keys(paper_claims, case) for case in shipped(config) or ()]
 
 
-def _case_keys(of: PaperClaims, one: "CaseResult | Case") -> CaseKeys:
-    return case_keys(one, of.may_grow, of.may_shorten)
+def _case_keys(paper_claims: PaperClaims, case: "CaseResult | Case") -> CaseKeys:
+    return case_keys(case, paper_claims.may_grow, paper_claims.may_shorten)
 
 
 def _differences_in_words(
-    of: PaperClaims, held: "Sequence[CaseResult | Case]", papers: Sequence[CaseKeys], most: int = MAX_REASON_ITEMS
+    paper_claims: PaperClaims,
+    cases: "Sequence[CaseResult | Case]",
+    papers: Sequence[CaseKeys],
+    max_keys: int = MAX_REASON_ITEMS,
 ) -> str:
     """The keys in which other cases differ from the nearest of the paper's: at most so many for each case."""
-    said = []
-    for one in held:
-        found = key_differences(_case_keys(of, one), papers, of.may_grow)
-        if found:
-            said.append(f"{one.name}: {', '.join(found[:most])}" + (" …" if len(found) > most else ""))
-    return "; ".join(said[:MAX_REASON_ITEMS]) + (
-        f"; and {len(said) - MAX_REASON_ITEMS} more" if len(said) > MAX_REASON_ITEMS else ""
+    lines = []
+    for case in cases:
+        keys = key_differences(_case_keys(paper_claims, case), papers, paper_claims.may_grow)
+        if keys:
+            lines.append(f"{case.name}: {', '.join(keys[:max_keys])}" + (" …" if len(keys) > max_keys else ""))
+    return "; ".join(lines[:MAX_REASON_ITEMS]) + (
+        f"; and {len(lines) - MAX_REASON_ITEMS} more" if len(lines) > MAX_REASON_ITEMS else ""
     )
 
 
@@ -148,50 +159,59 @@ class _MeasuredPart:
     judged: JudgedPart | None = None
     old: str = ""
     why: str = ""
-    looked: tuple[tuple[str, str], ...] = ()
+    tables_read: tuple[tuple[str, str], ...] = ()
 
 
-def _claim_rows(claim: Claim, paper: str, papers: _PaperEvidence, own: bool) -> list[dict[str, Any]]:
+def _claim_rows(claim: Claim, paper: str, papers: _PaperEvidence, of_config: bool) -> list[dict[str, Any]]:
     seen, changed = papers.evidence(claim.config)
-    if seen is None and not (own and changed):
+    if seen is None and not (of_config and changed):
         return []
-    tried = [_measure_part(part, seen, changed) for part in claim.parts]
-    if not own and any(one.judged is None for one in tried):
+    measured_parts = [_measure_part(part, seen, changed) for part in claim.parts]
+    if not of_config and any(measured_part.judged is None for measured_part in measured_parts):
         return []
-    here = [(one, one.judged) for one in tried if one.judged is not None]
-    outcome = claim_outcome([of for _, of in here], **claim.how) if here else None
-    many = sum(of.sampled and not of.void and of.asserted for _, of in here)
-    asked = [one for one in tried if one.part.asserted] or tried  # other parts decide nothing
-    whole = all(one.judged is not None for one in asked) or (outcome is not None and outcome.kind == REFUTED)
-    return [_part_row(claim, paper, one, outcome if whole else None, many) for one in tried]
+    judged_parts = [
+        (measured_part, measured_part.judged) for measured_part in measured_parts if measured_part.judged is not None
+    ]
+    outcome = claim_outcome([judged for _, judged in judged_parts], **claim.how) if judged_parts else None
+    sampled_parts = sum(judged.sampled and not judged.void and judged.asserted for _, judged in judged_parts)
+    asserted = [
+        measured_part for measured_part in measured_parts if measured_part.part.asserted
+    ] or measured_parts  # other parts decide nothing
+    is_complete = all(measured_part.judged is not None for measured_part in asserted) or (
+        outcome is not None and outcome.kind == REFUTED
+    )
+    return [
+        _part_row(claim, paper, measured_part, outcome if is_complete else None, sampled_parts)
+        for measured_part in measured_parts
+    ]
 
 
 def _measure_part(part: Part, seen: Evidence | None, changed: str) -> _MeasuredPart:
     """Measure a part, or give the reason why not."""
     if seen is None:
         return _MeasuredPart(part, why=ANOTHER_EXPERIMENT.format(changed=changed))
-    seen.looked.clear()
+    seen.tables_read.clear()
     try:
         measured = part.measure(seen)
         cases = [seen.case(key) for key in part.cases]
-        of = judged_part(part, seen, measured, min((case.count for case in cases), default=0))
+        judged = judged_part(part, seen, measured, min((case.count for case in cases), default=0))
     except MissingEvidence as missing:
-        other = ANOTHER_EXPERIMENT.format(changed=changed) if changed else "a required case is missing"
-        reason = missing.why or other
+        default_reason = ANOTHER_EXPERIMENT.format(changed=changed) if changed else "a required case is missing"
+        reason = missing.why or default_reason
         return _MeasuredPart(part, why=reason)
     except MeasureError as error:
         return _MeasuredPart(part, why=f"{MEASURE_FAILED}: {error.lines[0]}")
-    closer = {table for table, component in seen.looked if component}
-    looked = tuple(sorted(one for one in seen.looked if one[1] or one[0] not in closer))
-    of = replace(of, exact=exact_value(part, seen, measured))
+    tables_with_components = {table for table, component in seen.tables_read if component}
+    tables_read = tuple(sorted(read for read in seen.tables_read if read[1] or read[0] not in tables_with_components))
+    judged = replace(judged, exact=exact_value(part, seen, measured))
     names = ", ".join(dict.fromkeys(case.name for case in cases))
     old = old_verdict(measured, part.expected.strict)
-    return _MeasuredPart(part, names, of, old, disagreement_message(part, of), looked)
+    return _MeasuredPart(part, names, judged, old, disagreement_message(part, judged), tables_read)
 
 
 def judged_part(part: Part, seen: Evidence, measured: Estimate, n: int) -> JudgedPart:
     """A part with its numbers, before its exact value is known; n: realisations."""
-    value, lo, hi = (float(one) for one in measured)
+    value, lo, hi = (float(number) for number in measured)
     return JudgedPart(
         *(value, lo, hi, part.expected.lo, part.expected.hi),
         margin=part.expected.margin * (part.scale(seen) if part.scale else 1.0),
@@ -212,16 +232,18 @@ def exact_value(part: Part, seen: Evidence, measured: Estimate) -> float:
         return float(measured.value) if isinstance(measured, ExactNumber) else math.nan
 
 
-def disagreement_message(part: Part, of: JudgedPart) -> str:
+def disagreement_message(part: Part, judged: JudgedPart) -> str:
     """A message where a part has an exact value of its own, further off than chance explains; else nothing. All other
     values follow from tables, which `agreement` compares with their exact columns."""
-    if part.exact is None or not of.known or of.n < FEW:
+    if part.exact is None or not judged.known or judged.n < FEW:
         return ""
-    slack = max(1e-9 * abs(of.exact), ROUNDING * of.margin)
-    apart = standard_errors(Estimate(of.measured, of.lo, of.hi), of.exact)
-    if abs(of.exact - of.measured) <= slack or not apart > ERROR_OF_PROGRAM:
+    slack = max(1e-9 * abs(judged.exact), ROUNDING * judged.margin)
+    distance = standard_errors(Estimate(judged.measured, judged.lo, judged.hi), judged.exact)
+    if abs(judged.exact - judged.measured) <= slack or not distance > ERROR_OF_PROGRAM:
         return ""
-    return f"{DISAGREEMENT}: exact {of.exact:.6g}, simulated {of.measured:.6g} [{of.lo:.6g}, {of.hi:.6g}]"
+    return (
+        f"{DISAGREEMENT}: exact {judged.exact:.6g}, simulated {judged.measured:.6g} [{judged.lo:.6g}, {judged.hi:.6g}]"
+    )
 
 
 ROUNDING = 1e-3  # of a margin, for values without width: identities hold to the last bits
@@ -231,20 +253,22 @@ DISAGREEMENT = f"exact value and simulation differ by more than {ERROR_OF_PROGRA
 
 def disagreements(rows: "pd.DataFrame") -> list[str]:
     """A line for each part whose own exact value and simulation disagree: errors of the program."""
-    own = rows[rows["why"].astype(str).str.startswith(DISAGREEMENT)]
-    return [f"{row['claim']}: {row['what']} ({row['case']}): {row['why']}" for _, row in own.iterrows()]
+    disagreeing = rows[rows["why"].astype(str).str.startswith(DISAGREEMENT)]
+    return [f"{row['claim']}: {row['what']} ({row['case']}): {row['why']}" for _, row in disagreeing.iterrows()]
 
 
 def failed_measures(rows: "pd.DataFrame") -> list[str]:
     """A line for each measure that failed, with its place: errors of the claims' author."""
-    every = dict.fromkeys(rows["why"].astype(str))
-    return [why.removeprefix(f"{MEASURE_FAILED}: ") for why in every if why.startswith(MEASURE_FAILED)]
+    reasons = dict.fromkeys(rows["why"].astype(str))
+    return [why.removeprefix(f"{MEASURE_FAILED}: ") for why in reasons if why.startswith(MEASURE_FAILED)]
 
 
-def _part_row(claim: Claim, paper: str, one: _MeasuredPart, outcome: ClaimOutcome | None, many: int) -> dict[str, Any]:
-    part, of = one.part, one.judged
+def _part_row(
+    claim: Claim, paper: str, measured_part: _MeasuredPart, outcome: ClaimOutcome | None, sampled_parts: int
+) -> dict[str, Any]:
+    part, judged = measured_part.part, measured_part.judged
     row = empty_row(claim, paper) | {
-        "case": one.cases,
+        "case": measured_part.cases,
         **{"what": part.what, "unit": part.unit, "margin_kind": part.expected.kind, "expected": part.expected.words},
         **{"expected_lo": _table_number(part.expected.lo), "expected_hi": _table_number(part.expected.hi)},
         "number": f"{part.statement}{part.number}" if part.number else "",
@@ -254,16 +278,16 @@ def _part_row(claim: Claim, paper: str, one: _MeasuredPart, outcome: ClaimOutcom
         "worst_miss": _table_number(outcome.miss) if outcome else math.nan,
         "needed": outcome.needed if outcome and outcome.needed else math.nan,
         "verdict": NOT_JUDGED,
-        "why": one.why or claim.unstated,
-        TABLES_READ: one.looked,
+        "why": measured_part.why or claim.unstated,
+        TABLES_READ: measured_part.tables_read,
     }
-    if of is None:
+    if judged is None:
         return row
     return row | {
-        **{name: getattr(of, name) for name in ("measured", "lo", "hi", "exact", "ceiling", "n")},
-        **{"margin": _table_number(of.margin), "miss": _table_number(miss_in_margins(of))},
-        **{"verdict": part_verdict(of, many), "old_verdict": one.old},
-        **dict(zip(("judged_lo", "judged_hi"), judged_interval(of, many), strict=True)),
+        **{name: getattr(judged, name) for name in ("measured", "lo", "hi", "exact", "ceiling", "n")},
+        **{"margin": _table_number(judged.margin), "miss": _table_number(miss_in_margins(judged))},
+        **{"verdict": part_verdict(judged, sampled_parts), "old_verdict": measured_part.old},
+        **dict(zip(("judged_lo", "judged_hi"), judged_interval(judged, sampled_parts), strict=True)),
     }
 
 
@@ -287,31 +311,33 @@ def claim_rows(papers: Sequence[PaperClaims], stored: Mapping[str, Sequence[Mapp
 
     stored: config stem → the rows of its claims.csv."""
     rows: list[dict] = []
-    for paper, claim in ((of.paper, claim) for of in papers for claim in of.claims):
-        own = [dict(row) for row in stored.get(claim.config, ()) if row["claim"] == claim.id]
-        if not own:
-            own = [empty_row(claim, paper) | dict.fromkeys(CLASS_COLUMNS, NOT_RUN)]
-            own[0] |= dict.fromkeys(NUMBER_COLUMNS, "")
-        rows += [row | {"config": claim.config} for row in own]
+    for paper, claim in ((paper_claims.paper, claim) for paper_claims in papers for claim in paper_claims.claims):
+        claim_rows_of = [dict(row) for row in stored.get(claim.config, ()) if row["claim"] == claim.id]
+        if not claim_rows_of:
+            claim_rows_of = [empty_row(claim, paper) | dict.fromkeys(CLASS_COLUMNS, NOT_RUN)]
+            claim_rows_of[0] |= dict.fromkeys(NUMBER_COLUMNS, "")
+        rows += [row | {"config": claim.config} for row in claim_rows_of]
     return rows
 
 
-def rows_without_results(of: PaperClaims, cases: "Sequence[Case]", shipped: ShippedCases, stem: str) -> list[dict]:
+def rows_without_results(
+    paper_claims: PaperClaims, cases: "Sequence[Case]", shipped: ShippedCases, stem: str
+) -> list[dict]:
     """A row for each claim that an experiment without stored verdicts certainly judges, or certainly does not.
 
     With the columns of claims.csv. cases: all of the experiment's. Where none is the paper's, the claim is not judged,
     and the row gives the reason; where the shipped config `stem` holds it, it is not run. A claim that a run might
     judge has no row."""
     rows: list[dict] = []
-    for claim in of.claims:
-        papers, state, why = _paper_cases(of, claim.config, shipped), NOT_RUN, claim.unstated
-        if all(paper_members(_case_keys(of, case), papers, of.may_grow) is None for case in cases):
-            changed = _differences_in_words(of, cases[:1], papers, MAX_KEYS_OF_ONE_CASE)
+    for claim in paper_claims.claims:
+        papers, state, why = _paper_cases(paper_claims, claim.config, shipped), NOT_RUN, claim.unstated
+        if all(paper_members(_case_keys(paper_claims, case), papers, paper_claims.may_grow) is None for case in cases):
+            changed = _differences_in_words(paper_claims, cases[:1], papers, MAX_KEYS_OF_ONE_CASE)
             more = f"; and {len(cases) - 1} more" if len(cases) > 1 else ""
             state, why = NOT_JUDGED, ANOTHER_EXPERIMENT.format(changed=changed + more)
-        elif not of.holds(claim, stem):
+        elif not paper_claims.holds(claim, stem):
             continue
-        row = empty_row(claim, of.paper) | dict.fromkeys(NUMBER_COLUMNS, "") | {"why": why}
+        row = empty_row(claim, paper_claims.paper) | dict.fromkeys(NUMBER_COLUMNS, "") | {"why": why}
         rows.append(row | dict.fromkeys(CLASS_COLUMNS, state))
     return rows
 

@@ -115,5 +115,5 @@ def interpretations(
             click.echo(interpretation_files.markdown_pages(verdicts), nl=False)
         elif not quiet:
             print_claims.print_interpretations(verdicts, detailed=any("." in name for name in names))
-        if verdicts.left:
-            raise TargetUnmet(*verdicts.left)
+        if verdicts.undecided_messages:
+            raise TargetUnmet(*verdicts.undecided_messages)

@@ -25,9 +25,9 @@ from radarsim.studies import registry
 
 def check_config_has_claims(experiment: Experiment) -> None:
     """ConfigError for a config that no claim names."""
-    of = claims_of(registry.study(experiment.study))
-    if of is None or all(claim.config != experiment.stem for claim in of.claims):
-        configs = sorted({claim.config for claim in of.claims}) if of else []
+    paper_claims = claims_of(registry.study(experiment.study))
+    if paper_claims is None or all(claim.config != experiment.stem for claim in paper_claims.claims):
+        configs = sorted({claim.config for claim in paper_claims.claims}) if paper_claims else []
         hint = f"; claims of its study name {', '.join(configs)}" if configs else ""
         raise ConfigError(f"{experiment.path or experiment.stem}: decide: no claim names this config{hint}")
 
@@ -37,51 +37,50 @@ def simulate_until_decided(
 ) -> SimulatedCases:
     """The cases at the first look at which every claim is decided, or at the last permitted look; progress is towards
     that one."""
-    most = max(case.realisations for case in experiment.cases)
-    each = [realisations for _, realisations in dict(run.keyed(experiment))]
-    before = 0  # realisations of the looks before
+    max_realisations = max(case.realisations for case in experiment.cases)
+    case_realisations = [realisations for _, realisations in dict(run.keyed(experiment))]
+    done_before = 0  # realisations of the looks before
 
-    def towards(done: int, _: int, held: int) -> None:
+    def report(done: int, _: int, stored: int) -> None:
         if progress is not None:
-            progress(before + done - held, sum(each), before)
+            progress(done_before + done - stored, sum(case_realisations), done_before)
 
     with ExitStack() as stack:
         if options.out is None:
             options = replace(options, out=stack.enter_context(tempfile.TemporaryDirectory(prefix="radarsim-")))
-        best: SimulatedCases | None = None
-        for n in dict.fromkeys((*looks(most), most)):
+        latest: SimulatedCases | None = None
+        for n in dict.fromkeys((*looks(max_realisations), max_realisations)):
             cases = tuple(replace(case, realisations=min(n, case.realisations)) for case in experiment.cases)
-            if before:
-                towards(0, 0, 0)  # judging is not in the rate
-            found = run.simulate(replace(experiment, cases=cases), options, progress=progress and towards)
-            before = sum(min(n, one) for one in each)
-            if found.stopped and best is not None and len(found.cases) < len(best.cases):
-                return replace(best, stopped=found.stopped)
-            best = found
-            if found.stopped or not _undecided_rows(_claim_rows(experiment, found)):
+            if done_before:
+                report(0, 0, 0)  # judging is not in the rate
+            simulated = run.simulate(replace(experiment, cases=cases), options, progress=progress and report)
+            done_before = sum(min(n, realisations) for realisations in case_realisations)
+            if simulated.stopped and latest is not None and len(simulated.cases) < len(latest.cases):
+                return replace(latest, stopped=simulated.stopped)
+            latest = simulated
+            if simulated.stopped or not _undecided_rows(_claim_rows(experiment, simulated)):
                 break
-    assert best is not None  # there is a look at `most`
-    return best
+    assert latest is not None  # there is a look at `most`
+    return latest
 
 
-def _claim_rows(experiment: Experiment, found: SimulatedCases) -> list[dict[str, Any]]:
+def _claim_rows(experiment: Experiment, simulated: SimulatedCases) -> list[dict[str, Any]]:
     """The rows of claims.csv so far."""
-    results = run.finished(found)
+    results = run.finished(simulated)
     if len(results) < len(experiment.cases):
         return []
     table = result.case_tables(results, configs.shipped_stem(experiment))["claims"]
     return list(table.to_dict("records"))
 
 
-def undecided_messages(experiment: Experiment, found: SimulatedCases) -> list[str]:
+def undecided_messages(experiment: Experiment, simulated: SimulatedCases) -> list[str]:
     """Lines on claims that stayed undecided or, where the time was up before all cases, unjudged."""
-    if len(found.cases) == len(experiment.cases):
-        return _undecided_rows(_claim_rows(experiment, found))
-    of = claims_of(registry.study(experiment.study))
-    names = [claim.id for claim in of.claims if claim.config == experiment.stem] if of else []
-    return [
-        f"{len(found.cases)} of {len(experiment.cases)} cases were done by then, too few to decide {', '.join(names)}"
-    ]
+    if len(simulated.cases) == len(experiment.cases):
+        return _undecided_rows(_claim_rows(experiment, simulated))
+    paper_claims = claims_of(registry.study(experiment.study))
+    names = [claim.id for claim in paper_claims.claims if claim.config == experiment.stem] if paper_claims else []
+    done = f"{len(simulated.cases)} of {len(experiment.cases)} cases were done by then"
+    return [f"{done}, too few to decide {', '.join(names)}"]
 
 
 def _undecided_rows(rows: Sequence[dict[str, Any]]) -> list[str]:
@@ -91,11 +90,11 @@ def _undecided_rows(rows: Sequence[dict[str, Any]]) -> list[str]:
         if parts[0]["as_shipped"] != UNDECIDED or is_extension(parts):
             continue
         needed = cell_number(parts[0]["needed"])
-        would = (
+        remedy = (
             "its value lies on a border: more realisations would not decide"
             if needed is None
             else f"about {round_up(needed):,} would"
         )
-        most = max(cell_number(part["n"]) or 0.0 for part in parts)
-        lines.append(f"{parts[0]['claim']} not yet decided at {most:,.0f} realisations; {would}")
+        max_realisations = max(cell_number(part["n"]) or 0.0 for part in parts)
+        lines.append(f"{parts[0]['claim']} not yet decided at {max_realisations:,.0f} realisations; {remedy}")
     return lines

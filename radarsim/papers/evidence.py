@@ -127,8 +127,8 @@ def common_times(a: Curve, b: Curve) -> tuple[Curve, Curve]:
 
 def subtract(a: Curve, b: Curve) -> Curve:
     """a − b, point by point, of independent noise: half-widths add in squares."""
-    of = difference(Estimate(a.value, a.lo, a.hi), Estimate(b.value, b.lo, b.hi))
-    return Curve(a.k, a.t, *of, short=a.short or b.short)
+    difference_of = difference(Estimate(a.value, a.lo, a.hi), Estimate(b.value, b.lo, b.hi))
+    return Curve(a.k, a.t, *difference_of, short=a.short or b.short)
 
 
 def ratio(a: Estimate, b: Estimate, scale: float = 1.0) -> Estimate:
@@ -166,8 +166,10 @@ class Evidence:
     def __init__(self, results: Sequence[CaseResult], made: Mapping, places: Mapping[str, Mapping[str, set[int]]]):
         """places: by case name and list key, the indices of the paper's members."""
         self.results: list[CaseResult] = list(results)
-        self.looked: set[tuple[str, str]] = set()  # tables read, with or without a component, since it was last emptied
-        self.tables: Mapping = _WatchedTables(made, self.looked)
+        self.tables_read: set[tuple[str, str]] = (
+            set()
+        )  # tables read, with or without a component, since it was last emptied
+        self.tables: Mapping = _WatchedTables(made, self.tables_read)
         self._places = places
         self._exact = False
         self._groups: dict[str, Mapping] = {}
@@ -228,7 +230,7 @@ class Evidence:
     ) -> Curve:
         result = self.case(key)
         rows = self._grouped(table).get((result.name, filter_name, component, *base))
-        self.looked.add((table, component))
+        self.tables_read.add((table, component))
         if rows is None:
             raise self._lacking(result, filter_name, component, *base)
         value, lo, hi, exact = (rows[name].to_numpy(dtype=float) for name in names)
@@ -246,24 +248,29 @@ class Evidence:
         case = self.case(key)
         gains = self._grouped("gains")
         if (case.name, filter_name, component, over) in gains:
-            of = self._gain(key, filter_name, component, over)
-            value, lo, hi = (1 - part / 100 for part in (of.value, of.hi, of.lo))
-            return Curve(of.k, of.t, value, lo, hi)
+            gain = self._gain(key, filter_name, component, over)
+            value, lo, hi = (1 - part / 100 for part in (gain.value, gain.hi, gain.lo))
+            return Curve(gain.k, gain.t, value, lo, hi)
         if (case.name, over, component, filter_name) in gains:
-            of = self._gain(key, over, component, filter_name)
-            value, lo, hi = (1 / (1 - part / 100) for part in (of.value, of.lo, of.hi))
-            return Curve(of.k, of.t, value, lo, hi)
-        own, other = (self.curve(key, name, component) for name in (filter_name, over))
-        own, other = own.where(np.isin(own.k, other.k)), other.where(np.isin(other.k, own.k))
-        found = ratio(Estimate(own.value, own.lo, own.hi), Estimate(other.value, other.lo, other.hi))
-        return Curve(own.k, own.t, found.value, found.lo, found.hi)
+            gain = self._gain(key, over, component, filter_name)
+            value, lo, hi = (1 / (1 - part / 100) for part in (gain.value, gain.lo, gain.hi))
+            return Curve(gain.k, gain.t, value, lo, hi)
+        curve, other_curve = (self.curve(key, name, component) for name in (filter_name, over))
+        curve, other_curve = (
+            curve.where(np.isin(curve.k, other_curve.k)),
+            other_curve.where(np.isin(other_curve.k, curve.k)),
+        )
+        ratios = ratio(
+            Estimate(curve.value, curve.lo, curve.hi), Estimate(other_curve.value, other_curve.lo, other_curve.hi)
+        )
+        return Curve(curve.k, curve.t, ratios.value, ratios.lo, ratios.hi)
 
     def row(self, table: str, **equal: object) -> Mapping[str, Any]:
         """The one row of a table with these values; raises Missing, ConfigError where there is no such table."""
         if not isinstance(self.tables, HiddenTables) and table not in self.tables:
             raise ConfigError(f"this study has no table {table!r}; there are {', '.join(self.tables)}")
         rows = self.tables[table]
-        self.looked.add((table, str(equal.get("component", ""))))
+        self.tables_read.add((table, str(equal.get("component", ""))))
         for name, value in equal.items():
             if name in ("filter", "component") and not (rows[name] == value).any():
                 raise UnknownName(f"no {name} {value!r}; there are {', '.join(dict.fromkeys(rows[name].astype(str)))}")

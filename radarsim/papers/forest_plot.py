@@ -42,18 +42,23 @@ def _drawn_distance(value: float, row: Mapping) -> float:
 
 def forest_plot(rows: Sequence[Mapping]) -> Figure | None:
     """All judged claims of these rows, a panel of rows for each paper; None where there are none."""
-    judged = [own for own in group_by_claim(rows) if own[0]["class"] not in (NOT_RUN, NOT_JUDGED)]
-    found = [(own, row) for own in judged if (row := worst_part(own)) is not None]
-    papers = list(dict.fromkeys(own[0]["paper"] for own, _ in found))
-    panels = [_paper_panel(paper, [(own, row) for own, row in found if own[0]["paper"] == paper]) for paper in papers]
+    judged_claims = [parts for parts in group_by_claim(rows) if parts[0]["class"] not in (NOT_RUN, NOT_JUDGED)]
+    claims = [(parts, worst) for parts in judged_claims if (worst := worst_part(parts)) is not None]
+    papers = list(dict.fromkeys(parts[0]["paper"] for parts, _ in claims))
+    panels = [
+        _paper_panel(paper, [(parts, worst) for parts, worst in claims if parts[0]["paper"] == paper])
+        for paper in papers
+    ]
     if not panels:
         return None
-    classes = Counter(own[0]["class"] for own in judged)
+    classes = Counter(parts[0]["class"] for parts in judged_claims)
     counted = ", ".join(class_count(kind, classes[kind]) for kind in CLASS_ORDER if classes[kind])
     return Figure(
         name="claims",
         title=tr("Claims, in margins of what their papers say"),
-        caption=plural("Of {count} claim: {counted}. ", "Of {count} claims: {counted}. ", len(judged), counted=counted)
+        caption=plural(
+            "Of {count} claim: {counted}. ", "Of {count} claims: {counted}. ", len(judged_claims), counted=counted
+        )
         + tr(
             "For each claim, the part furthest from the paper's words: the measured value with the judged "
             "interval, and the exact value, in margins of that part; beside it the value itself. What lies beyond "
@@ -66,33 +71,35 @@ def forest_plot(rows: Sequence[Mapping]) -> Figure | None:
     )
 
 
-def _paper_panel(paper: str, found: Sequence[tuple[Sequence[Mapping], Mapping]]) -> Panel:
+def _paper_panel(paper: str, claims: Sequence[tuple[Sequence[Mapping], Mapping]]) -> Panel:
     """The claims of a paper: statement, distance, and at the right the value."""
-    key = found[0][0][0]["claim"].partition(".")[0]
+    key = claims[0][0][0]["claim"].partition(".")[0]
     ticks, marks, values = [], [], []
-    for y, (own, row) in enumerate(found):
-        statement = shorten(tr(own[0]["statement"]), MAX_STATEMENT_CHARACTERS, placeholder=" …", break_on_hyphens=False)
-        ticks.append((float(y), f"{formulas(statement)}  {own[0]['claim'].partition('.')[2]}"))
-        values.append(Note(RIM, float(y), decisive_value_words(row), "e"))
+    for y, (parts, worst) in enumerate(claims):
+        statement = shorten(
+            tr(parts[0]["statement"]), MAX_STATEMENT_CHARACTERS, placeholder=" …", break_on_hyphens=False
+        )
+        ticks.append((float(y), f"{formulas(statement)}  {parts[0]['claim'].partition('.')[2]}"))
+        values.append(Note(RIM, float(y), decisive_value_words(worst), "e"))
     for kind, style in CLASS_STYLES.items():
-        of = [(y, row) for y, (own, row) in enumerate(found) if own[0]["class"] == kind]
-        marks += _forest_lines(kind, style, of) if of else []
+        of_class = [(y, worst) for y, (parts, worst) in enumerate(claims) if parts[0]["class"] == kind]
+        marks += _forest_lines(kind, style, of_class) if of_class else []
     return Panel(
         Axis(
             tr("distance from the words, margins (cut at ± {furthest:g})", furthest=MAX_DRAWN_MARGINS),
             limits=(-RIM, RIM),
         ),
-        Axis("", limits=(len(found) - 0.4, -0.6), ticks=tuple(ticks)),
+        Axis("", limits=(len(claims) - 0.4, -0.6), ticks=tuple(ticks)),
         (*marks, *values, Reference(0.0, "x"), Reference(1.0, "x")),
         title=f"{key} {tr(paper)}",
         direct=False,
-        height_mm=AXIS_MM + ROW_MM * len(found),
+        height_mm=AXIS_MM + ROW_MM * len(claims),
     )
 
 
-def _forest_lines(kind: str, style: Style, of: Sequence[tuple[int, Mapping]]) -> list[Line]:
+def _forest_lines(kind: str, style: Style, claims: Sequence[tuple[int, Mapping]]) -> list[Line]:
     """The marks of one class: values, intervals, exact values, and arrows where a value lies beyond the rims."""
-    y, rows = np.array([float(y) for y, _ in of]), [row for _, row in of]
+    y, rows = np.array([float(y) for y, _ in claims]), [row for _, row in claims]
     value = np.array([_drawn_distance(float(row["measured"]), row) for row in rows])
     ends = np.array([sorted(_drawn_distance(end, row) for end in shown_interval(row)) for row in rows])
     lo, hi = np.fmin(ends[:, 0], value), np.fmax(ends[:, 1], value)

@@ -18,57 +18,67 @@ from radarsim.papers.verdicts_by_interpretation import InterpretationVerdict, ve
 from radarsim.report import files
 
 
-def write_files(done: InterpretationVerdicts, figures: bool, ahead: Ahead) -> tuple[str, ...]:
+def write_files(verdicts: InterpretationVerdicts, figures: bool, forecast: Ahead) -> tuple[str, ...]:
     """Write the table, with the stored rows of other claims, and a curve for each claim."""
-    contents = {TABLE.name: _interpretations_csv(done).encode(), CLASSES.name: _classes_csv(done).encode()}
-    described = done._described if figures else {}
-    for name, figure in described.items():
+    contents = {TABLE.name: _interpretations_csv(verdicts).encode(), CLASSES.name: _classes_csv(verdicts).encode()}
+    figures_by_name = verdicts._described if figures else {}
+    for name, figure in figures_by_name.items():
         from radarsim.report.figures import save  # Matplotlib
 
-        with ahead.doing("figure"):
+        with forecast.doing("figure"):
             contents[f"{name}.svg"] = save(figure, ("svg",))["svg"]
-    files.replace_all(done.folder, contents)
+    files.replace_all(verdicts.folder, contents)
     return tuple(sorted(contents))
 
 
-def _interpretations_csv(done: InterpretationVerdicts) -> str:
-    names = verdict_columns(paper.interpretations for paper in open_papers().values())
-    new = [row for over in done.over for one in over.under for row in verdict_rows(one, names, over.outcome)]
-    return _merged_csv(names, stored_interpretations(done.folder.parent), new, {over.claim.id for over in done.over})
+def _interpretations_csv(verdicts: InterpretationVerdicts) -> str:
+    columns = verdict_columns(paper.interpretations for paper in open_papers().values())
+    rows = [
+        row
+        for claim in verdicts.claims
+        for verdict in claim.verdicts
+        for row in verdict_rows(verdict, columns, claim.outcome)
+    ]
+    return _merged_csv(
+        columns, stored_interpretations(verdicts.folder.parent), rows, {claim.claim.id for claim in verdicts.claims}
+    )
 
 
-def _classes_csv(done: InterpretationVerdicts) -> str:
+def _classes_csv(verdicts: InterpretationVerdicts) -> str:
     """The class of each claim over its interpretations."""
-    new = [found.as_row() for over in done.over if (found := verdict_class(over)) is not None]
-    kept = [one.as_row() for one in stored_classes(done.folder.parent)]
-    return _merged_csv(CLASS_FILE_COLUMNS, kept, new, {over.claim.id for over in done.over})
+    rows = [verdict.as_row() for claim in verdicts.claims if (verdict := verdict_class(claim)) is not None]
+    stored_rows = [stored.as_row() for stored in stored_classes(verdicts.folder.parent)]
+    return _merged_csv(CLASS_FILE_COLUMNS, stored_rows, rows, {claim.claim.id for claim in verdicts.claims})
 
 
-def outdated_configs(done: InterpretationVerdicts) -> tuple[str, ...]:
+def outdated_configs(verdicts: InterpretationVerdicts) -> tuple[str, ...]:
     """Configs whose stored claims differ in class from their interpretations now. Except configs that have changed
     since their run: their stored results make no report."""
-    new = {over.claim.id: over for over in done.over if over.outcome}
-    found = []
-    for config in dict.fromkeys(over.claim.config for over in new.values()):
-        if not files.is_of(done.folder.parent / config, configs.load(config)):
+    judged = {claim.claim.id: claim for claim in verdicts.claims if claim.outcome}
+    stems = []
+    for config in dict.fromkeys(claim.claim.config for claim in judged.values()):
+        if not files.is_of(verdicts.folder.parent / config, configs.load(config)):
             continue
         with suppress(StoreError):  # `radarsim claims` reports a damaged one
-            for row in stored_claims(done.folder.parent / config / "claims.csv") or ():
-                outcome = new[row["claim"]].outcome if row["claim"] in new else None
+            for row in stored_claims(verdicts.folder.parent / config / "claims.csv") or ():
+                outcome = judged[row["claim"]].outcome if row["claim"] in judged else None
                 if outcome and row["class"] not in (NOT_JUDGED, outcome.kind):
-                    found.append(config)
-    return tuple(dict.fromkeys(found))
+                    stems.append(config)
+    return tuple(dict.fromkeys(stems))
 
 
-def _merged_csv(names: Sequence[str], stored: Sequence[Mapping], new: Sequence[Mapping], own: set[str]) -> str:
+def _merged_csv(
+    columns: Sequence[str], stored_rows: Sequence[Mapping], new_rows: Sequence[Mapping], claims: set[str]
+) -> str:
     """New rows and the stored rows of other claims."""
     text = io.StringIO(newline="")
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(names)
-    every = sorted(
-        [*(row for row in stored if row["claim"] not in own), *new], key=lambda row: _claim_order(row["claim"])
+    table.writerow(columns)
+    rows = sorted(
+        [*(row for row in stored_rows if row["claim"] not in claims), *new_rows],
+        key=lambda row: _claim_order(row["claim"]),
     )
-    table.writerows([row.get(name, "") for name in names] for row in every)
+    table.writerows([row.get(name, "") for name in columns] for row in rows)
     return text.getvalue()
 
 
@@ -79,39 +89,39 @@ def _claim_order(claim: str) -> tuple[str, float, str]:
     return paper, float(digits) if digits.isdigit() else 0.0, number
 
 
-def markdown_pages(done: InterpretationVerdicts) -> str:
+def markdown_pages(verdicts: InterpretationVerdicts) -> str:
     """The page of each paper, one after the other."""
     from radarsim.papers import interpretations_page
 
     return "\n".join(
-        interpretations_page.interpretations_page(read.paper.interpretations, read.paper.claims.paper, read.over)
-        for read in done.read
+        interpretations_page.interpretations_page(paper.paper.interpretations, paper.paper.claims.paper, paper.claims)
+        for paper in verdicts.papers
     )
 
 
-def json_documents(done: InterpretationVerdicts) -> list[dict[str, Any]]:
+def json_documents(verdicts: InterpretationVerdicts) -> list[dict[str, Any]]:
     """The documents of --json: one for each claim, with every interpretation."""
-    found = []
-    for over in done.over:
-        outcome = over.outcome
-        found.append(
+    documents = []
+    for claim in verdicts.claims:
+        outcome = claim.outcome
+        documents.append(
             {
-                "claim": over.claim.id,
+                "claim": claim.claim.id,
                 "verdict": outcome.words if outcome else "not judged",
                 **{"holds": outcome and outcome.holds_in, "of": outcome and outcome.interpretations},
                 "depends_on": list(outcome.depends_on) if outcome else [],
-                "interpretations": [_interpretation_document(one) for one in over.under],
+                "interpretations": [_interpretation_document(verdict) for verdict in claim.verdicts],
             }
         )
-    return found
+    return documents
 
 
-def _interpretation_document(one: InterpretationVerdict) -> dict[str, Any]:
+def _interpretation_document(verdict: InterpretationVerdict) -> dict[str, Any]:
     return {
-        "interpretation": one.name,
-        "kind": one.kind,
-        "choices": dict(one.interpretation.taken),
-        "verdict": one.outcome.kind if one.outcome else None,
-        "miss": one.outcome.miss if one.outcome else None,
-        "reason": one.why or None,
+        "interpretation": verdict.name,
+        "kind": verdict.kind,
+        "choices": dict(verdict.interpretation.taken),
+        "verdict": verdict.outcome.kind if verdict.outcome else None,
+        "miss": verdict.outcome.miss if verdict.outcome else None,
+        "reason": verdict.why or None,
     }

@@ -17,7 +17,7 @@ from radarsim.papers.claim import Claim
 from radarsim.papers.interpretations import ChangedResults, ImpossibleInterpretation, Interpretation
 from radarsim.papers.open_papers import JudgingRequest
 from radarsim.papers.verdict_rule import UNDECIDED
-from radarsim.papers.verdicts_by_interpretation import ClaimVerdicts, InterpretationVerdict, judge_under
+from radarsim.papers.verdicts_by_interpretation import ClaimVerdicts, InterpretationVerdict, judge_claim
 from radarsim.report.precision import looks
 
 # Expected seconds of judging a run, of an exact verdict and of a figure, until some are measured.
@@ -29,139 +29,156 @@ class InterpretationRuns:
     """The runs that a paper's interpretations need, each once, and the verdicts from them. A run is judged as soon as
     it is done and then dropped: memory is that of one run, however many interpretations there are."""
 
-    def __init__(self, wanted: JudgingRequest, realisations: int):
-        self._wanted, self._paper, self._n = wanted, wanted.paper, realisations
+    def __init__(self, request: JudgingRequest, realisations: int):
+        self._request, self._paper, self._realisations = request, request.paper, realisations
         self._experiments: dict[str, Experiment] = {}
-        self._jobs: dict[tuple[str, ...], list[tuple[Case, Case]]] = {}  # key: original and changed cases
-        self._key: dict[tuple[str, Interpretation], tuple[str, ...]] = {}
+        self._case_pairs: dict[tuple[str, ...], list[tuple[Case, Case]]] = {}  # key: original and changed cases
+        self._run_of: dict[tuple[str, Interpretation], tuple[str, ...]] = {}
         self._impossible: dict[tuple[str, Interpretation], str] = {}
-        self._judged: dict[tuple[str, Interpretation], InterpretationVerdict] = {}
-        self._claims = {claim.id: claim for claim in wanted.claims}
+        self._verdicts: dict[tuple[str, Interpretation], InterpretationVerdict] = {}
+        self._claims = {claim.id: claim for claim in request.claims}
         self._seconds: dict[tuple[str, str], float] = {}  # of a realisation, by config and case
-        self._open: dict[tuple[str, ...], None] = {}  # keys of the runs ahead
-        self._looks, self._look_s = 0, 0.0  # later looks ahead, and the expected seconds of each
-        for claim in wanted.claims:
-            for interpretation in self._paper.interpretations.of_claim(claim.id):
-                if not self._paper.interpretations.exact(claim, interpretation):
+        self._pending: dict[tuple[str, ...], None] = {}  # keys of the runs ahead
+        self._later_looks, self._look_seconds = 0, 0.0  # later looks ahead, and the expected seconds of each
+        for claim in request.claims:
+            for interpretation in self._paper.interpretations.for_claim(claim.id):
+                if not self._paper.interpretations.is_exact(claim, interpretation):
                     self._add(claim, interpretation)
 
     def _add(self, claim: Claim, interpretation: Interpretation) -> None:
         try:
             pairs = [
-                (case, replace(changed, realisations=self._n))
+                (case, replace(changed, realisations=self._realisations))
                 for case in self._experiment(claim.config).cases
-                if (changed := self._paper.interpretations.changed(claim, case, interpretation)) is not None
+                if (changed := self._paper.interpretations.changed_case(claim, case, interpretation)) is not None
             ]
             key = (claim.config, *(f"{case.name}: {changed.spec!r}" for case, changed in pairs))
         except ImpossibleInterpretation as error:
             self._impossible[claim.id, interpretation] = str(error)
             return
-        self._key[claim.id, interpretation] = key
-        self._jobs[key] = pairs
+        self._run_of[claim.id, interpretation] = key
+        self._case_pairs[key] = pairs
 
     def _experiment(self, config: str) -> Experiment:
         if config not in self._experiments:
             self._experiments[config] = configs.load(configs.shipped_file(config) or config)
         return self._experiments[config]
 
-    def expect(self, ahead: Ahead, most: int) -> None:
+    def forecast_runs(self, forecast: Ahead, max_realisations: int) -> None:
         """Add the runs, verdicts, and looks up to so many realisations that are ahead."""
-        self._looks = sum(n > self._n for n in looks(most))
-        self._expect_runs(ahead, self._jobs)
-        for claim in self._wanted.claims:
-            own = self._paper.interpretations.of_claim(claim.id)
-            ahead.add(f"verdict of {claim.id}", VERDICT_S, sum((claim.id, one) not in self._key for one in own))
+        self._later_looks = sum(n > self._realisations for n in looks(max_realisations))
+        self._expect_runs(forecast, self._case_pairs)
+        for claim in self._request.claims:
+            interpretations = self._paper.interpretations.for_claim(claim.id)
+            forecast.add(
+                f"verdict of {claim.id}",
+                VERDICT_S,
+                sum((claim.id, interpretation) not in self._run_of for interpretation in interpretations),
+            )
 
-    def _expect_runs(self, ahead: Ahead, keys: Iterable[tuple[str, ...]]) -> None:
-        self._open = dict.fromkeys(keys)
-        for key in self._open:
-            ahead.add(f"judging of {key[0]}", RUN_JUDGED_S)
-            ahead.add(self._kind(key), 1.0, self._expected(key))
+    def _expect_runs(self, forecast: Ahead, keys: Iterable[tuple[str, ...]]) -> None:
+        self._pending = dict.fromkeys(keys)
+        for key in self._pending:
+            forecast.add(f"judging of {key[0]}", RUN_JUDGED_S)
+            forecast.add(self._forecast_name(key), 1.0, self._expected_seconds(key))
 
-    def estimate(self, ahead: Ahead, threads: int | None) -> None:
+    def estimate(self, forecast: Ahead, threads: int | None) -> None:
         """Measure a few realisations of every case as shipped, and add the seconds of the runs ahead."""
-        cases = {(key[0], case.name): case for key in self._open for case, _ in self._jobs[key]}
-        each = self._n * (available_cores() if threads is None else max(threads, 1))
-        timed = estimated({of: (CaseWork(case), self._n) for of, case in cases.items()})
-        self._seconds = {of: seconds / each for of, seconds in timed.items()}
-        for key in self._open:
-            ahead.add(self._kind(key), 1.0, self._expected(key))
-        self._look_s = LATER_LOOK_SHARE * sum(map(self._expected, self._jobs))
-        self._expect_looks(ahead, self._looks)
+        cases = {(key[0], case.name): case for key in self._pending for case, _ in self._case_pairs[key]}
+        realisations = self._realisations * (available_cores() if threads is None else max(threads, 1))
+        seconds_of_case = estimated(
+            {case_key: (CaseWork(case), self._realisations) for case_key, case in cases.items()}
+        )
+        self._seconds = {case_key: seconds / realisations for case_key, seconds in seconds_of_case.items()}
+        for key in self._pending:
+            forecast.add(self._forecast_name(key), 1.0, self._expected_seconds(key))
+        self._look_seconds = LATER_LOOK_SHARE * sum(map(self._expected_seconds, self._case_pairs))
+        self._expect_looks(forecast, self._later_looks)
 
-    def _expect_looks(self, ahead: Ahead, count: int) -> None:
-        ahead.add("later looks", 1.0, self._look_s * count)
+    def _expect_looks(self, forecast: Ahead, count: int) -> None:
+        forecast.add("later looks", 1.0, self._look_seconds * count)
 
-    def _kind(self, key: tuple[str, ...]) -> str:
-        """What is foretold together: an interpretation may change what a case takes, but hardly that of other cases."""
-        return ", ".join(("run of", key[0], *(case.name for case, _ in self._jobs[key])))
+    def _forecast_name(self, key: tuple[str, ...]) -> str:
+        """A name for runs that take similar times: an interpretation may change what a case takes, but hardly that of
+        other cases."""
+        return ", ".join(("run of", key[0], *(case.name for case, _ in self._case_pairs[key])))
 
-    def _expected(self, key: tuple[str, ...]) -> float:
+    def _expected_seconds(self, key: tuple[str, ...]) -> float:
         """Expected seconds of a run; 0 before `estimate`."""
-        return sum(self._seconds.get((key[0], case.name), 0.0) for case, _ in self._jobs[key]) * self._n
+        return (
+            sum(self._seconds.get((key[0], case.name), 0.0) for case, _ in self._case_pairs[key]) * self._realisations
+        )
 
-    def judged(self, options: RunOptions, ahead: Ahead, stop: Signals | None) -> list[ClaimVerdicts]:
+    def judge(self, options: RunOptions, forecast: Ahead, stop: Signals | None) -> list[ClaimVerdicts]:
         """Every claim under every interpretation."""
-        for key, pairs in self._jobs.items():
+        for key, pairs in self._case_pairs.items():
             try:
-                self._see(key, pairs, options, ahead, stop)
+                self._run_and_judge(key, pairs, options, forecast, stop)
             except ConfigError as error:
-                self._fail(key, error.lines[0])
-                ahead.add(f"judging of {key[0]}", RUN_JUDGED_S, -1)
-        found = list[ClaimVerdicts]()
-        for claim in self._wanted.claims:
+                self._note_impossible(key, error.lines[0])
+                forecast.add(f"judging of {key[0]}", RUN_JUDGED_S, -1)
+        claims = list[ClaimVerdicts]()
+        for claim in self._request.claims:
             verdicts = []
-            for interpretation in self._paper.interpretations.of_claim(claim.id):
-                run_for = (claim.id, interpretation) in self._key
-                with nullcontext() if run_for else ahead.doing(f"verdict of {claim.id}"):
-                    verdicts.append(self._under(claim, interpretation))
-            found.append(ClaimVerdicts(self._paper.interpretations, claim, tuple(verdicts)))
-        return found
+            for interpretation in self._paper.interpretations.for_claim(claim.id):
+                has_run = (claim.id, interpretation) in self._run_of
+                with nullcontext() if has_run else forecast.doing(f"verdict of {claim.id}"):
+                    verdicts.append(self._verdict(claim, interpretation))
+            claims.append(ClaimVerdicts(self._paper.interpretations, claim, tuple(verdicts)))
+        return claims
 
-    def decided(
-        self, over: list[ClaimVerdicts], most: int, options: RunOptions, ahead: Ahead, stop: Signals | None
+    def decide(
+        self,
+        claims: list[ClaimVerdicts],
+        max_realisations: int,
+        options: RunOptions,
+        forecast: Ahead,
+        stop: Signals | None,
     ) -> list[ClaimVerdicts]:
         """The claims again, undecided ones after longer runs of the interpretations that leave them undecided. Looks
         are at declared numbers only, as in `run --decide`; each claim is judged at its own last look, so that other
         requests change nothing."""
-        for n in (n for n in looks(most) if n > self._n):
-            open_ = {
-                (one.claim.id, each.interpretation)
-                for one in over
-                if one.outcome is not None and one.outcome.kind == UNDECIDED
-                for each in one.undecided
+        for n in (n for n in looks(max_realisations) if n > self._realisations):
+            undecided = {
+                (claim.claim.id, verdict.interpretation)
+                for claim in claims
+                if claim.outcome is not None and claim.outcome.kind == UNDECIDED
+                for verdict in claim.undecided
             }
-            keys = dict.fromkeys(key for place, key in self._key.items() if place in open_)
+            keys = dict.fromkeys(key for subject, key in self._run_of.items() if subject in undecided)
             if not keys:
                 break
-            self._n = n
-            self._looks -= 1
-            self._expect_looks(ahead, -1)
-            self._expect_runs(ahead, keys)
+            self._realisations = n
+            self._later_looks -= 1
+            self._expect_looks(forecast, -1)
+            self._expect_runs(forecast, keys)
             for key in keys:
-                pairs = [(case, replace(changed, realisations=n)) for case, changed in self._jobs[key]]
-                self._see(key, pairs, options, ahead, stop, open_)
-            over = [
-                replace(one, under=tuple(self._under(one.claim, own.interpretation) for own in one.under))
-                for one in over
+                pairs = [(case, replace(changed, realisations=n)) for case, changed in self._case_pairs[key]]
+                self._run_and_judge(key, pairs, options, forecast, stop, undecided)
+            claims = [
+                replace(
+                    claim,
+                    verdicts=tuple(self._verdict(claim.claim, verdict.interpretation) for verdict in claim.verdicts),
+                )
+                for claim in claims
             ]
-        self._expect_looks(ahead, -self._looks)
-        self._looks = 0
-        return over
+        self._expect_looks(forecast, -self._later_looks)
+        self._later_looks = 0
+        return claims
 
-    def _see(
+    def _run_and_judge(
         self,
         key: tuple[str, ...],
         pairs: Sequence[tuple[Case, Case]],
         options: RunOptions,
-        ahead: Ahead,
+        forecast: Ahead,
         stop: Signals | None,
         only: Collection[tuple[str, Interpretation]] | None = None,
     ) -> None:
         """Run or continue the cases of a key, and judge what they show; `only`: for these places."""
-        progress = ahead.running(self._kind(key), partial(self._expected, key))
+        progress = forecast.running(self._forecast_name(key), partial(self._expected_seconds, key))
         try:
-            done = self._run(key, pairs, options, progress)
+            simulated = self._run(key, pairs, options, progress)
         except ConfigError:
             progress(1, 1, 1)  # nothing of it is ahead
             raise
@@ -170,54 +187,67 @@ class InterpretationRuns:
                 stop.raise_if_received()
             raise
         finally:
-            del self._open[key]
-        with ahead.doing(f"judging of {key[0]}"):
-            seen = self._seen(pairs, done)
-            for place in (place for place, own in self._key.items() if own == key and (only is None or place in only)):
-                self._judged[place] = self._judge(self._claims[place[0]], place[1], seen)
+            del self._pending[key]
+        with forecast.doing(f"judging of {key[0]}"):
+            results = self._changed_results(pairs, simulated)
+            for subject in (
+                subject
+                for subject, run_key in self._run_of.items()
+                if run_key == key and (only is None or subject in only)
+            ):
+                self._verdicts[subject] = self._judge(self._claims[subject[0]], subject[1], results)
 
     def _run(
         self, key: tuple[str, ...], pairs: Sequence[tuple[Case, Case]], options: RunOptions, progress: Progress
     ) -> SimulatedCases:
-        changed = tuple(other for _, other in pairs)
-        experiment = replace(self._experiment(key[0]), cases=changed, realisations=self._n)
+        changed_cases = tuple(changed_case for _, changed_case in pairs)
+        experiment = replace(self._experiment(key[0]), cases=changed_cases, realisations=self._realisations)
         simulated = run.simulate(experiment, options, progress=progress)
         if simulated.stopped:
             raise TargetUnmet(f"interpretations: {simulated.stopped}: the same command continues")
         return simulated
 
-    def _seen(self, pairs: Sequence[tuple[Case, Case]], simulated: SimulatedCases) -> ChangedResults:
+    def _changed_results(self, pairs: Sequence[tuple[Case, Case]], simulated: SimulatedCases) -> ChangedResults:
         results = run.finished(simulated)
         tables = result.measured(results)
-        originals = [replace(own, spec=case.spec) for own, (case, _) in zip(results, pairs, strict=True)]
+        originals = [replace(changed, spec=case.spec) for changed, (case, _) in zip(results, pairs, strict=True)]
         may_grow = self._paper.claims.may_grow
-        places = {own.name: {key: set(range(len(getattr(own.spec, key)))) for key in may_grow} for own in originals}
+        places = {
+            changed.name: {key: set(range(len(getattr(changed.spec, key)))) for key in may_grow}
+            for changed in originals
+        }
         return ChangedResults(originals, results, tables, places)
 
-    def _fail(self, key: tuple[str, ...], why: str) -> None:
+    def _note_impossible(self, key: tuple[str, ...], why: str) -> None:
         """A run that could not be prepared: a target that hits the ground, an impossible schedule."""
-        for place, own in list(self._key.items()):
-            if own == key:
-                self._impossible[place] = why
+        for subject, run_key in list(self._run_of.items()):
+            if run_key == key:
+                self._impossible[subject] = why
 
-    def _under(self, claim: Claim, interpretation: Interpretation) -> InterpretationVerdict:
+    def _verdict(self, claim: Claim, interpretation: Interpretation) -> InterpretationVerdict:
         """A claim under an interpretation: the verdict of its run, or the exact one, or why there is none."""
-        place = claim.id, interpretation
-        if place not in self._judged:
-            self._judged[place] = self._judge(claim, interpretation, None)
-        return self._judged[place]
+        subject = claim.id, interpretation
+        if subject not in self._verdicts:
+            self._verdicts[subject] = self._judge(claim, interpretation, None)
+        return self._verdicts[subject]
 
     def _judge(
-        self, claim: Claim, interpretation: Interpretation, seen: ChangedResults | None
+        self, claim: Claim, interpretation: Interpretation, results: ChangedResults | None
     ) -> InterpretationVerdict:
-        of = self._paper.interpretations
+        interpretations = self._paper.interpretations
         why = self._impossible.get((claim.id, interpretation))
         if why is None:
             try:
-                evidence = of.evidence(claim, interpretation, seen, self._paper.claims)
-                return judge_under(
-                    of, claim, interpretation, evidence, min(one.count for one in seen.ran) if seen else 0
+                evidence = interpretations.evidence(claim, interpretation, results, self._paper.claims)
+                return judge_claim(
+                    interpretations,
+                    claim,
+                    interpretation,
+                    evidence,
+                    min(result.count for result in results.run_results) if results else 0,
                 )
             except ImpossibleInterpretation as error:
                 why = str(error)
-        return InterpretationVerdict(claim, interpretation, of.name(interpretation), of.kind(interpretation), why=why)
+        return InterpretationVerdict(
+            claim, interpretation, interpretations.name(interpretation), interpretations.kind(interpretation), why=why
+        )

@@ -21,38 +21,45 @@ class PaperVerdicts:
     """Verdicts over the interpretations of a paper."""
 
     paper: OpenPaper
-    over: list[ClaimVerdicts]
+    claims: list[ClaimVerdicts]
 
 
 @dataclass(repr=False)
 class InterpretationVerdicts(Shown):
     """Result of `interpretations`: for each paper, and the files written, by their path under `folder`.
 
-    left: a line for each claim that stayed undecided although `decide` was set. outdated: configs whose stored claims
-    have another class."""
+    undecided_messages: a line for each claim that stayed undecided although `decide` was set. outdated: configs whose
+    stored claims have another class."""
 
-    read: list[PaperVerdicts]
+    papers: list[PaperVerdicts]
     folder: Path
     files: tuple[str, ...] = field(default=())
-    left: tuple[str, ...] = field(default=())
+    undecided_messages: tuple[str, ...] = field(default=())
     outdated: tuple[str, ...] = field(default=())
 
     @property
-    def over(self) -> list[ClaimVerdicts]:
+    def claims(self) -> list[ClaimVerdicts]:
         """The claims, each with its verdicts."""
-        return [over for read in self.read for over in read.over]
+        return [claim for paper in self.papers for claim in paper.claims]
 
     @property
     def table(self) -> "pd.DataFrame":
         """The rows of interpretations.csv for these claims: one for each claim, interpretation and part."""
-        names = verdict_columns(read.paper.interpretations for read in self.read)
-        made = [row for over in self.over for one in over.under for row in verdict_rows(one, names, over.outcome)]
-        return read_rows(made, names)
+        columns = verdict_columns(paper.paper.interpretations for paper in self.papers)
+        rows = [
+            row
+            for claim in self.claims
+            for verdict in claim.verdicts
+            for row in verdict_rows(verdict, columns, claim.outcome)
+        ]
+        return read_rows(rows, columns)
 
     @property
     def _described(self) -> dict[str, Figure]:
-        several = (over for over in self.over if len(over.under) > 1 and over.outcome is not None)
-        return {over.claim.id: specification_curve(over) for over in several}
+        claims = (claim for claim in self.claims if len(claim.verdicts) > 1 and claim.outcome is not None)
+        return {claim.claim.id: specification_curve(claim) for claim in claims}
 
     def _said(self) -> list[str]:
-        return [f"{over.claim.id} {tr(over.outcome.kind)}: {over.sentence()}" for over in self.over if over.outcome]
+        return [
+            f"{claim.claim.id} {tr(claim.outcome.kind)}: {claim.sentence()}" for claim in self.claims if claim.outcome
+        ]

@@ -89,9 +89,9 @@ class PaperInterpretations(ABC):
     paper: str  # P1
     choices: tuple[Choice, ...]
     realisations: int = 1000  # of each run, by default
-    most: int = 16_000  # of a run that is to decide a claim, by default
+    max_realisations: int = 16_000  # of a run that is to decide a claim, by default
 
-    def open(self, claim: Claim) -> bool:
+    def leaves_open(self, claim: Claim) -> bool:
         """Whether the paper leaves anything open that affects a claim of its own."""
         return not claim.extension and any(choice.bears_on(claim.id) for choice in self.choices)
 
@@ -117,19 +117,19 @@ class PaperInterpretations(ABC):
         """The interpretation of these alternatives, the others at their default."""
         return Interpretation(tuple((choice.key, taken.get(choice.key, choice.default)) for choice in self.choices))
 
-    def of_claim(self, claim: str) -> list[Interpretation]:
+    def for_claim(self, claim: str) -> list[Interpretation]:
         """The declared interpretations that differ for a claim: choices that do not affect it stay at their default."""
         bears = [choice.bears_on(claim) for choice in self.choices]
         firsts: dict[tuple[tuple[str, str], ...], Interpretation] = {}
         for one in self._declared:
             firsts.setdefault(tuple(itertools.compress(one.taken, bears)), one)
-        return [self.bearing(one, claim) for one in firsts.values()]
+        return [self.restricted_to(one, claim) for one in firsts.values()]
 
     @cached_property
     def _declared(self) -> Sequence[Interpretation]:
         return self.declared()
 
-    def bearing(self, interpretation: Interpretation, claim: str) -> Interpretation:
+    def restricted_to(self, interpretation: Interpretation, claim: str) -> Interpretation:
         """An interpretation with the choices that do not affect a claim at their default."""
         pairs = zip(interpretation.taken, self.choices, strict=True)
         return Interpretation(tuple((key, name if one.bears_on(claim) else one.default) for (key, name), one in pairs))
@@ -144,22 +144,22 @@ class PaperInterpretations(ABC):
         words = [f"{choice.key}: {interpretation[choice.key]}" for choice in self._other(interpretation)]
         return "; ".join(words) or DEFAULT
 
-    def said(self, interpretation: Interpretation) -> str:
+    def describe(self, interpretation: Interpretation) -> str:
         """How an interpretation differs from the shipped configs, for people."""
         return describe_choices(
-            {choice.key: interpretation[choice.key] for choice in self._other(interpretation)}, self.asks
+            {choice.key: interpretation[choice.key] for choice in self._other(interpretation)}, self.choice_words
         )
 
     @cached_property
-    def asks(self) -> Mapping[str, str]:
+    def choice_words(self) -> Mapping[str, str]:
         """The choices by key, in words."""
         return {choice.key: choice.asks for choice in self.choices}
 
-    def asked(self, keys: Iterable[str]) -> str:
+    def list_choices(self, keys: Iterable[str]) -> str:
         """Choices within a sentence."""
-        return listed([tr(self.asks[key]) for key in keys])
+        return listed([tr(self.choice_words[key]) for key in keys])
 
-    def sets(self, interpretation: Interpretation) -> dict[str, Any]:
+    def settings(self, interpretation: Interpretation) -> dict[str, Any]:
         """The settings of an interpretation's alternatives."""
         return {key: value for one in self.choices for key, value in one[interpretation[one.key]].sets.items()}
 
@@ -170,7 +170,7 @@ class PaperInterpretations(ABC):
         """The parts of a claim to judge under an interpretation. Default: all."""
         return claim.parts
 
-    def changed(self, claim: Claim, case: "Case", interpretation: Interpretation) -> "Case | None":
+    def changed_case(self, claim: Claim, case: "Case", interpretation: Interpretation) -> "Case | None":
         """A case of a claim's config changed for an interpretation; None where the claim does not need it. Raises
         Unreadable where it is impossible to fly or design."""
         return None
@@ -184,7 +184,7 @@ class PaperInterpretations(ABC):
         assert seen is not None  # a paper with exact values gives its own evidence
         return of.evidence(seen.results, seen.tables, seen.places)
 
-    def exact(self, claim: Claim, interpretation: Interpretation) -> bool:
+    def is_exact(self, claim: Claim, interpretation: Interpretation) -> bool:
         """Whether the evidence for a claim is exact under an interpretation, so that nothing is run. Default: no."""
         return False
 
@@ -210,9 +210,10 @@ class ChangedResults:
     """Results of the changed cases of a config, under the names and keys of that config.
 
     results (in the order of the config) have the sums and axes of the run and the keys of the paper's own case, by
-    which claims find it; ran has them with the keys of the run. tables and places are as in `claims.Evidence`."""
+    which claims find it; run_results has them with the keys of the run. tables and places are as in
+    `claims.Evidence`."""
 
     results: Sequence[CaseResult]
-    ran: Sequence[CaseResult]
+    run_results: Sequence[CaseResult]
     tables: Mapping[str, Any]
     places: Mapping[str, Mapping[str, set[int]]]

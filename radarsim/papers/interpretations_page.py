@@ -17,24 +17,27 @@ INTRODUCTION = term(
 )
 
 
-def interpretations_page(of: PaperInterpretations, cited: str, over: Sequence[ClaimVerdicts]) -> str:
+def interpretations_page(interpretations: PaperInterpretations, cited: str, claims: Sequence[ClaimVerdicts]) -> str:
     """The page as Markdown."""
-    parts = [tr("# {paper} by interpretation", paper=of.paper), f"{tr(cited)}. {tr(INTRODUCTION, paper=of.paper)}"]
-    parts += [tr("## Claims over all interpretations"), _claims_table(over)]
-    changed = _changed_verdicts(over)
+    parts = [
+        tr("# {paper} by interpretation", paper=interpretations.paper),
+        f"{tr(cited)}. {tr(INTRODUCTION, paper=interpretations.paper)}",
+    ]
+    parts += [tr("## Claims over all interpretations"), _claims_table(claims)]
+    changed = _changed_verdicts(claims)
     if changed:
         words = tr("What would have to change: interpretations against the print that give a claim another verdict.")
         parts += [words, changed]
-    impossible = _impossible_interpretations(over)
+    impossible = _impossible_interpretations(claims)
     if impossible:
         parts += [tr("Interpretations that cannot be flown, designed or measured:"), impossible]
-    parts += [*open_choices(of)]
+    parts += [*open_choices(interpretations)]
     return "\n\n".join(parts) + "\n"
 
 
-def open_choices(of: PaperInterpretations) -> list[str]:
+def open_choices(interpretations: PaperInterpretations) -> list[str]:
     """The open choices of the paper, each with its alternatives and their reasons: paragraphs of Markdown."""
-    return [tr("## What the paper leaves open"), tr(KINDS_EXPLAINED), *map(_choice_section, of.choices)]
+    return [tr("## What the paper leaves open"), tr(KINDS_EXPLAINED), *map(_choice_section, interpretations.choices)]
 
 
 def markdown_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -50,33 +53,37 @@ def _cell(text: str) -> str:
     return text.replace("|", "\\|").replace("\n", " ")
 
 
-def _claims_table(over: Sequence[ClaimVerdicts]) -> str:
+def _claims_table(claims: Sequence[ClaimVerdicts]) -> str:
     rows = []
-    for one in over:
-        found = one.outcome
-        holds = tr("{count} of {of}", count=found.holds_in or 0, of=found.interpretations or 0) if found else ""
-        said = class_words(found.kind, found.kind, one.of.asked(found.depends_on), tr) if found else tr("not judged")
-        verdict = "; ".join(filter(None, (said, one.still_open())))
-        rows.append((one.claim.id, tr(one.claim.statement), verdict, holds))
+    for claim in claims:
+        outcome = claim.outcome
+        holds = tr("{count} of {of}", count=outcome.holds_in or 0, of=outcome.interpretations or 0) if outcome else ""
+        class_text = (
+            class_words(outcome.kind, outcome.kind, claim.interpretations.list_choices(outcome.depends_on), tr)
+            if outcome
+            else tr("not judged")
+        )
+        verdict = "; ".join(filter(None, (class_text, claim.undecided_sentence())))
+        rows.append((claim.claim.id, tr(claim.claim.statement), verdict, holds))
     return markdown_table((term("claim"), term("statement"), term("verdict"), term("holds in")), rows)
 
 
-def _changed_verdicts(over: Sequence[ClaimVerdicts]) -> str:
+def _changed_verdicts(claims: Sequence[ClaimVerdicts]) -> str:
     rows = [
-        (one.claim.id, one.of.said(interpretation.interpretation), tr(interpretation.outcome.kind))
-        for one in over
-        for interpretation in one.against_print
-        if interpretation.outcome is not None
+        (claim.claim.id, claim.interpretations.describe(verdict.interpretation), tr(verdict.outcome.kind))
+        for claim in claims
+        for verdict in claim.against_print
+        if verdict.outcome is not None
     ]
     return markdown_table((term("claim"), term("interpretation"), term("matches")), rows) if rows else ""
 
 
-def _impossible_interpretations(over: Sequence[ClaimVerdicts]) -> str:
+def _impossible_interpretations(claims: Sequence[ClaimVerdicts]) -> str:
     reasons: dict[tuple[str, str], list[str]] = {}
-    for one in over:
-        for interpretation in one.impossible:
-            reasons.setdefault((one.claim.id, interpretation.why), []).append(
-                one.of.said(interpretation.interpretation)
+    for claim in claims:
+        for verdict in claim.impossible:
+            reasons.setdefault((claim.claim.id, verdict.why), []).append(
+                claim.interpretations.describe(verdict.interpretation)
             )
     rows = [(claim, str(len(names)), names[0], translate_reason(why)) for (claim, why), names in reasons.items()]
     return (
@@ -85,7 +92,7 @@ def _impossible_interpretations(over: Sequence[ClaimVerdicts]) -> str:
 
 
 def _choice_section(choice: Choice) -> str:
-    rows = [(one.name, one.kind, tr(one.reason)) for one in choice.alternatives]
+    rows = [(alternative.name, alternative.kind, tr(alternative.reason)) for alternative in choice.alternatives]
     quoted = (
         choice.original
         if current() == QUOTATION_LANGUAGE or choice.original == choice.english

@@ -25,7 +25,7 @@ from radarsim.threads import limited
 
 
 def judge_requests(
-    wanted: Sequence[JudgingRequest],
+    requests: Sequence[JudgingRequest],
     *,
     out: str | Path,
     realisations: int | None = None,
@@ -39,41 +39,48 @@ def judge_requests(
     """Judge claims under every interpretation and, unless disabled, write table and specification curves into
     out/interpretations.
 
-    wanted: of `judging_requests`. realisations of each run, where runs are needed; default: the number declared by the paper's
-    interpretations. decide: runs behind undecided claims are extended, up to 2000·2^m realisations, until each claim is
-    decided; `realisations` is then the limit. Runs go through the store of blocks under out, so that a second call
-    continues. Raises TargetUnmet where a time limit left something undone, Interrupted on a signal seen by `stop`."""
+    wanted: of `judging_requests`. realisations of each run, where runs are needed; default: the number declared by the
+    paper's interpretations. decide: runs behind undecided claims are extended, up to 2000·2^m realisations, until each
+    claim is decided; `realisations` is then the limit. Runs go through the store of blocks under out, so that a second
+    call continues. Raises TargetUnmet where a time limit left something undone, Interrupted on a signal seen by
+    `stop`."""
     if realisations is not None and realisations < 1:
         raise ConfigError(f"{argument('realisations')}: must be >= 1, got {realisations}")
     options = replace(options or RunOptions(), out=out)
-    plans = [
-        InterpretationRuns(one, _first_realisations(one.paper.interpretations, realisations, decide)) for one in wanted
+    all_runs = [
+        InterpretationRuns(request, _first_realisations(request.paper.interpretations, realisations, decide))
+        for request in requests
     ]
 
     def estimate() -> None:
-        for plan in plans:
-            plan.estimate(ahead, options.threads)
+        for runs in all_runs:
+            runs.estimate(forecast, options.threads)
 
-    ahead = Ahead(progress, estimate)
-    for plan, one in zip(plans, wanted, strict=True):
-        plan.expect(ahead, realisations or one.paper.interpretations.most if decide else 0)
+    forecast = Ahead(progress, estimate)
+    for runs, request in zip(all_runs, requests, strict=True):
+        runs.forecast_runs(forecast, realisations or request.paper.interpretations.max_realisations if decide else 0)
     if write and figures:
-        several = [
-            claim for one in wanted for claim in one.claims if len(one.paper.interpretations.of_claim(claim.id)) > 1
+        claims_with_curves = [
+            claim
+            for request in requests
+            for claim in request.claims
+            if len(request.paper.interpretations.for_claim(claim.id)) > 1
         ]
-        ahead.add("figure", FIGURE_S, len(several))
-    read, left = [], []
-    for plan, one in zip(plans, wanted, strict=True):
-        over = plan.judged(options, ahead, stop)
+        forecast.add("figure", FIGURE_S, len(claims_with_curves))
+    papers, undecided = [], []
+    for runs, request in zip(all_runs, requests, strict=True):
+        claims = runs.judge(options, forecast, stop)
         if decide:
-            over = plan.decided(over, realisations or one.paper.interpretations.most, options, ahead, stop)
-            left += [line for each in over if (line := _undecided_message(each))]
-        read.append(PaperVerdicts(one.paper, over))
-    made = InterpretationVerdicts(read, Path(out) / TABLE.parent, left=tuple(left))
+            claims = runs.decide(
+                claims, realisations or request.paper.interpretations.max_realisations, options, forecast, stop
+            )
+            undecided += [line for claim_verdicts in claims if (line := _undecided_message(claim_verdicts))]
+        papers.append(PaperVerdicts(request.paper, claims))
+    verdicts = InterpretationVerdicts(papers, Path(out) / TABLE.parent, undecided_messages=tuple(undecided))
     if write:
-        made.files = write_files(made, figures, ahead)
-        made.outdated = outdated_configs(made)
-    return made
+        verdicts.files = write_files(verdicts, figures, forecast)
+        verdicts.outdated = outdated_configs(verdicts)
+    return verdicts
 
 
 def interpretations(
@@ -102,31 +109,31 @@ def interpretations(
     """
     configs.check(threads=threads, time_limit=time_limit, out=out, figures=figures)
     configs.texts(names)
-    wanted = judging_requests(names)
+    requests = judging_requests(names)
     limit = time_limit if time_limit is None or callable(time_limit) else TimeLimit(time_limit)
     options: dict[str, Any] = {"realisations": configs.whole(realisations), "decide": decide}
     options |= {"progress": progress, "figures": figures, "stop": stop, "write": out is not None}
     with tempfile.TemporaryDirectory(prefix="radarsim-") as folder, limited(threads):
-        means = RunOptions(None, threads, Either(stop, limit))
-        return judge_requests(wanted, out=Path(folder if out is None else out), options=means, **options)
+        run_options = RunOptions(None, threads, Either(stop, limit))
+        return judge_requests(requests, out=Path(folder if out is None else out), options=run_options, **options)
 
 
-def _first_realisations(of: PaperInterpretations, realisations: int | None, decide: bool) -> int:
+def _first_realisations(interpretations: PaperInterpretations, realisations: int | None, decide: bool) -> int:
     """Realisations of the first runs: those requested, or declared; with `decide`, at most those requested."""
     if realisations is None:
-        return of.realisations
-    return min(of.realisations, realisations) if decide else realisations
+        return interpretations.realisations
+    return min(interpretations.realisations, realisations) if decide else realisations
 
 
-def _undecided_message(over: ClaimVerdicts) -> str:
+def _undecided_message(verdicts: ClaimVerdicts) -> str:
     """The line on an undecided claim: under how many interpretations, and what it would take."""
-    if over.outcome is None or over.outcome.kind != UNDECIDED:
+    if verdicts.outcome is None or verdicts.outcome.kind != UNDECIDED:
         return ""
-    needed = over.outcome.needed
+    needed = verdicts.outcome.needed
     would = (
         "a value lies on a border: more realisations would not decide"
         if needed is None
         else f"about {round_up(needed):,} would"
     )
-    open_, n = len(over.undecided), over.looked
-    return f"{over.claim.id} not yet decided under {open_} interpretations at {n:,} realisations; {would}"
+    undecided, n = len(verdicts.undecided), verdicts.fewest_realisations
+    return f"{verdicts.claim.id} not yet decided under {undecided} interpretations at {n:,} realisations; {would}"

@@ -70,8 +70,8 @@ class Interpretations(PaperInterpretations):
     def __init__(self, paper: str, choices: tuple[Choice, ...]):
         self.paper, self.choices = paper, choices
 
-    def changed(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
-        return replace(case, spec=_with_settings(case.spec, self.sets(interpretation)))
+    def changed_case(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
+        return replace(case, spec=_with_settings(case.spec, self.settings(interpretation)))
 
 
 def _faults_of_claims(

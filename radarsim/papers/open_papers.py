@@ -29,52 +29,57 @@ class JudgingRequest:
 
 def open_papers(keys: Collection[str] = ()) -> dict[str, OpenPaper]:
     """The papers with interpretations, by key (P1); `keys` adds or restricts papers."""
-    found = {}
-    for name, of in by_study(interpretations_of, keys).items():
-        claims = None if of is None else claims_of(registry.study(name))
-        if of is not None and claims is not None:
-            found[of.paper] = OpenPaper(of, claims, name)
-    return dict(sorted(found.items()))
+    papers = {}
+    for name, interpretations in by_study(interpretations_of, keys).items():
+        claims = None if interpretations is None else claims_of(registry.study(name))
+        if interpretations is not None and claims is not None:
+            papers[interpretations.paper] = OpenPaper(interpretations, claims, name)
+    return dict(sorted(papers.items()))
 
 
 def judging_requests(names: Sequence[str] = ()) -> list[JudgingRequest]:
     """Requests from names of papers (P1) and claims (P1.4); without names, all papers. Raises ConfigError for an
     unknown paper or claim, with the known ones."""
-    every = open_papers()
-    owner = {claim.id: key for key, paper in every.items() for claim in paper.claims.claims}
-    faults = [_unknown_name(name, every, owner) for name in names if name not in every and name not in owner]
-    faults += [fault for paper in every.values() for fault in _claims_without_choices(paper, names)]
+    papers = open_papers()
+    owner = {claim.id: key for key, paper in papers.items() for claim in paper.claims.claims}
+    faults = [_unknown_name(name, papers, owner) for name in names if name not in papers and name not in owner]
+    faults += [fault for paper in papers.values() for fault in _claims_without_choices(paper, names)]
     if faults:
         raise ConfigError(*faults)
-    found = []
-    for key, paper in every.items():
-        whole = not names or key in names
-        claims = [one for one in paper.claims.claims if (whole or one.id in names) and paper.interpretations.open(one)]
+    requests = []
+    for key, paper in papers.items():
+        is_whole = not names or key in names
+        claims = [
+            claim
+            for claim in paper.claims.claims
+            if (is_whole or claim.id in names) and paper.interpretations.leaves_open(claim)
+        ]
         if claims:
-            found.append(JudgingRequest(paper, claims))
-    return found
+            requests.append(JudgingRequest(paper, claims))
+    return requests
 
 
 def _claims_without_choices(paper: OpenPaper, names: Sequence[str]) -> list[str]:
     """Faults of requested claims that depend on nothing that the paper leaves open."""
-    kept = [one.id for one in paper.claims.claims if paper.interpretations.open(one)]
+    open_claims = [claim.id for claim in paper.claims.claims if paper.interpretations.leaves_open(claim)]
+    others = ", ".join(open_claims)
     return [
-        f"interpretations: {one.id} depends on nothing that its paper leaves open; claims that do: {', '.join(kept)}"
-        for one in paper.claims.claims
-        if one.id in names and one.id not in kept
+        f"interpretations: {claim.id} depends on nothing that its paper leaves open; claims that do: {others}"
+        for claim in paper.claims.claims
+        if claim.id in names and claim.id not in open_claims
     ]
 
 
-def _unknown_name(name: str, every: Mapping[str, OpenPaper], owner: Mapping[str, str]) -> str:
+def _unknown_name(name: str, papers: Mapping[str, OpenPaper], owner: Mapping[str, str]) -> str:
     paper = name.partition(".")[0]
-    judged = {claim.id for of in paper_claims([paper]) for claim in of.claims}
-    if paper not in every and any(claim.partition(".")[0] == paper for claim in judged):
+    claims = {claim.id for paper_claims_of in paper_claims([paper]) for claim in paper_claims_of.claims}
+    if paper not in papers and any(claim.partition(".")[0] == paper for claim in claims):
         return (
             f"interpretations: {name}: its study declares no choices that {paper} leaves open: "
             "there are no other interpretations"
         )
-    if name in judged:
+    if name in claims:
         return f"interpretations: {name} is an extension of ours: no paper leaves anything open in it"
     ids = [claim for claim, key in owner.items() if key == paper]
-    allowed = f"its claims: {', '.join(ids)}" if ids else f"papers: {', '.join(every)}; claims as P1.4"
+    allowed = f"its claims: {', '.join(ids)}" if ids else f"papers: {', '.join(papers)}; claims as P1.4"
     return f"interpretations: no paper or claim {name!r}; {allowed}"

@@ -31,83 +31,86 @@ class CaseKeys:
     outside: dict[str, str]
 
 
-def case_keys(one: CaseResult | Case, may_grow: Sequence[str], may_shorten: Sequence[str] = ()) -> CaseKeys:
+def case_keys(case: CaseResult | Case, may_grow: Sequence[str], may_shorten: Sequence[str] = ()) -> CaseKeys:
     """The keys of a case for comparison: all but may_shorten."""
-    spec = one.spec
-    plain = {key: value for key, value in canonical(spec).items() if key not in may_shorten}
-    members = {key: plain.pop(key) for key in may_grow}
+    spec = case.spec
+    keys = {key: value for key, value in canonical(spec).items() if key not in may_shorten}
+    members = {key: keys.pop(key) for key in may_grow}
     named = {}
     for name, info in type(spec).model_fields.items():
         for mark in info.metadata:
             if isinstance(mark, NameIn) and mark.field in members:
-                named[name] = members[mark.field][plain.pop(name)]
-    return CaseKeys(plain, members, named, _user_filters(one))
+                named[name] = members[mark.field][keys.pop(name)]
+    return CaseKeys(keys, members, named, _user_filters(case))
 
 
-def _user_filters(one: CaseResult | Case) -> dict[str, str]:
+def _user_filters(case: CaseResult | Case) -> dict[str, str]:
     """What filters from outside depend on, by their names."""
-    if isinstance(one, Case):
-        return {member.name: member.identity for member in one.outside}
-    axes: Any = one.outside and one.outside.axes
+    if isinstance(case, Case):
+        return {member.name: member.identity for member in case.outside}
+    axes: Any = case.outside and case.outside.axes
     return dict(zip(axes.filters, axes.identities, strict=True)) if axes else {}
 
 
-def paper_members(mine: CaseKeys, shipped: Iterable[CaseKeys], may_grow: Sequence[str]) -> dict[str, set[int]] | None:
+def paper_members(
+    case: CaseKeys, paper_cases: Iterable[CaseKeys], may_grow: Sequence[str]
+) -> dict[str, set[int]] | None:
     """For a paper's case, the indices of the paper's members of its lists; None for any other case.
 
     shipped: the cases of the claim's config."""
-    found: dict[str, set[int]] | None = None
-    for papers in shipped:
-        same = is_equal(mine.fixed, papers.fixed) and is_equal(mine.named, papers.named)
-        if not same or not papers.outside.items() <= mine.outside.items():
+    members: dict[str, set[int]] | None = None
+    for paper_case in paper_cases:
+        is_same = is_equal(case.fixed, paper_case.fixed) and is_equal(case.named, paper_case.named)
+        if not is_same or not paper_case.outside.items() <= case.outside.items():
             continue
-        places = {key: _member_indices(papers.members[key], mine.members[key]) for key in may_grow}
-        if all(len(places[key]) == len(papers.members[key]) for key in may_grow):
-            found = {key: places[key] | (found or {}).get(key, set()) for key in may_grow}
-    return found
+        indices = {key: _member_indices(paper_case.members[key], case.members[key]) for key in may_grow}
+        if all(len(indices[key]) == len(paper_case.members[key]) for key in may_grow):
+            members = {key: indices[key] | (members or {}).get(key, set()) for key in may_grow}
+    return members
 
 
-def key_differences(mine: CaseKeys, shipped: Iterable[CaseKeys], may_grow: Sequence[str]) -> list[str]:
+def key_differences(case: CaseKeys, paper_cases: Iterable[CaseKeys], may_grow: Sequence[str]) -> list[str]:
     """The keys in which a case differs from the nearest of these, "key is x, the paper's y"; empty if none."""
-    shipped = list(shipped)
-    if paper_members(mine, shipped, may_grow) is not None:
+    paper_cases = list(paper_cases)
+    if paper_members(case, paper_cases, may_grow) is not None:
         return []
-    every = [
-        _data_differences(mine.fixed, papers.fixed) + _member_differences(mine, papers, may_grow) for papers in shipped
+    differences = [
+        _data_differences(case.fixed, paper_case.fixed) + _member_differences(case, paper_case, may_grow)
+        for paper_case in paper_cases
     ]
-    return min(every, key=len, default=["no such experiment is shipped"])
+    return min(differences, key=len, default=["no such experiment is shipped"])
 
 
-def _member_differences(mine: CaseKeys, papers: CaseKeys, may_grow: Sequence[str]) -> list[str]:
-    said = []
+def _member_differences(case: CaseKeys, paper_case: CaseKeys, may_grow: Sequence[str]) -> list[str]:
+    lines = []
     for key in may_grow:
-        missing = len(papers.members[key]) - len(_member_indices(papers.members[key], mine.members[key]))
+        missing = len(paper_case.members[key]) - len(_member_indices(paper_case.members[key], case.members[key]))
         if missing:
-            said.append(f"{missing} of the paper's {len(papers.members[key])} {key} changed or missing")
-    if others := [name for name, one in papers.outside.items() if mine.outside.get(name) != one]:
-        said.append(f"filter {', '.join(others)} missing, or of other code")
-    if not is_equal(mine.named, papers.named):
-        said.append(f"{', '.join(papers.named)} differs from the paper's")
-    return said
+            lines.append(f"{missing} of the paper's {len(paper_case.members[key])} {key} changed or missing")
+    if changed_filters := [name for name, identity in paper_case.outside.items() if case.outside.get(name) != identity]:
+        lines.append(f"filter {', '.join(changed_filters)} missing, or of other code")
+    if not is_equal(case.named, paper_case.named):
+        lines.append(f"{', '.join(paper_case.named)} differs from the paper's")
+    return lines
 
 
-def _data_differences(mine: object, papers: object, path: str = "") -> list[str]:
+def _data_differences(value: object, paper_value: object, path: str = "") -> list[str]:
     """The keys of plain data in which two differ, by dotted path."""
-    if is_equal(mine, papers):
+    if is_equal(value, paper_value):
         return []
-    if isinstance(mine, dict) and isinstance(papers, dict):
-        if mine.get("kind") != papers.get("kind"):  # keys of one kind are meaningless for another
-            return _data_differences(mine.get("kind"), papers.get("kind"), f"{path}.kind".strip("."))
-        keys = dict.fromkeys((*mine, *papers))
+    if isinstance(value, dict) and isinstance(paper_value, dict):
+        if value.get("kind") != paper_value.get("kind"):  # keys of one kind are meaningless for another
+            return _data_differences(value.get("kind"), paper_value.get("kind"), f"{path}.kind".strip("."))
+        keys = dict.fromkeys((*value, *paper_value))
         return [
             line
             for key in keys
-            for line in _data_differences(mine.get(key), papers.get(key), f"{path}.{key}".strip("."))
+            for line in _data_differences(value.get(key), paper_value.get(key), f"{path}.{key}".strip("."))
         ]
-    if isinstance(mine, list) and isinstance(papers, list) and len(mine) == len(papers):
-        pairs = enumerate(zip(mine, papers, strict=True))
-        return [line for i, (own, other) in pairs for line in _data_differences(own, other, f"{path}.{i}")]
-    return [f"{path} is {_quoted(mine)}, the paper's {_quoted(papers)}"]
+    if isinstance(value, list) and isinstance(paper_value, list) and len(value) == len(paper_value):
+        pairs = enumerate(zip(value, paper_value, strict=True))
+        return [line for i, (item, paper_item) in pairs for line in _data_differences(item, paper_item, f"{path}.{i}")]
+    return [f"{path} is {_quoted(value)}, the paper's {_quoted(paper_value)}"]
 
 
 def _quoted(value: object) -> str:
@@ -120,24 +123,26 @@ def _quoted(value: object) -> str:
 MAX_QUOTED_CHARACTERS = 40  # characters of a value quoted in a reason
 
 
-def _member_indices(wanted: Sequence, given: Sequence) -> set[int]:
+def _member_indices(members: Sequence, available: Sequence) -> set[int]:
     """The indices of the wanted members among the given ones, all different."""
-    places: set[int] = set()
-    for one in wanted:
-        place = next((i for i, other in enumerate(given) if i not in places and is_equal(one, other)), None)
-        if place is not None:
-            places.add(place)
-    return places
+    indices: set[int] = set()
+    for member in members:
+        index = next(
+            (i for i, candidate in enumerate(available) if i not in indices and is_equal(member, candidate)), None
+        )
+        if index is not None:
+            indices.add(index)
+    return indices
 
 
-def is_equal(one: object, other: object) -> bool:
+def is_equal(first: object, second: object) -> bool:
     """Whether plain data are equal, numbers to a relative 10⁻¹²."""
-    if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(is_equal(value, other[key]) for key, value in one.items())
-    if isinstance(one, list) and isinstance(other, list):
-        return len(one) == len(other) and all(map(is_equal, one, other))
-    if isinstance(one, bool) or isinstance(other, bool):
-        return one is other
-    if isinstance(one, int | float) and isinstance(other, int | float):
-        return math.isclose(one, other, rel_tol=RELATIVE_TOLERANCE)
-    return one == other
+    if isinstance(first, dict) and isinstance(second, dict):
+        return first.keys() == second.keys() and all(is_equal(value, second[key]) for key, value in first.items())
+    if isinstance(first, list) and isinstance(second, list):
+        return len(first) == len(second) and all(map(is_equal, first, second))
+    if isinstance(first, bool) or isinstance(second, bool):
+        return first is second
+    if isinstance(first, int | float) and isinstance(second, int | float):
+        return math.isclose(first, second, rel_tol=RELATIVE_TOLERANCE)
+    return first == second

@@ -185,7 +185,7 @@ def _part_words(row: Row, parts: Sequence[Row]) -> list[str]:
 
 def print_interpretations(verdicts: "InterpretationVerdicts", detailed: bool) -> None:
     """Print a line for each claim, for single claims one for each interpretation too, and where the files are."""
-    for claim in verdicts.over:
+    for claim in verdicts.claims:
         if detailed:
             _print_each_interpretation(claim)
         kind = tr(claim.outcome.kind) if claim.outcome else tr("not judged")  # the sentence says on what it depends
@@ -206,8 +206,8 @@ def print_interpretations(verdicts: "InterpretationVerdicts", detailed: bool) ->
 
 
 def _print_each_interpretation(claim: "ClaimVerdicts") -> None:
-    kinds = [tr(verdict.outcome.kind) if verdict.outcome else tr("not possible") for verdict in claim.under]
+    kinds = [tr(verdict.outcome.kind) if verdict.outcome else tr("not possible") for verdict in claim.verdicts]
     width = max(map(len, kinds))
-    for verdict, kind in zip(claim.under, kinds, strict=True):
+    for verdict, kind in zip(claim.verdicts, kinds, strict=True):
         why = f" ({translate_reason(verdict.why)})" if verdict.why else ""
-        say(f"       {verdict.kind}  {kind:<{width}}  {claim.of.said(verdict.interpretation)}{why}")
+        say(f"       {verdict.kind}  {kind:<{width}}  {claim.interpretations.describe(verdict.interpretation)}{why}")

@@ -1,4 +1,5 @@
-"""Reasons why a claim is not judged, in the current language: claims.csv and interpretations.csv have them in English."""
+"""Reasons why a claim is not judged, in the current language: claims.csv and interpretations.csv have them in
+English."""
 
 import re
 from collections.abc import Iterator
@@ -39,10 +40,10 @@ def translate_reason(why: object) -> str:
     """A reason in the current language; an unknown one unchanged."""
     text = str(why)
     for message in REASONS:
-        found = _message_pattern(message).fullmatch(text)
-        if found:
-            places = _placeholder_values(found)
-            return tr(message, **places | {"changed": "; ".join(_differences_by_case(places.get("changed", "")))})
+        match = _message_pattern(message).fullmatch(text)
+        if match:
+            values = _placeholder_values(match)
+            return tr(message, **values | {"changed": "; ".join(_differences_by_case(values.get("changed", "")))})
     return tr(text)
 
 

@@ -21,52 +21,59 @@ KIND_STYLES = {
 }
 
 
-def specification_curve(over: ClaimVerdicts) -> Figure:
+def specification_curve(claim: ClaimVerdicts) -> Figure:
     """The curve of a claim: above its worst part's distance from the paper's words, below the alternatives taken."""
-    judged = [(one, worst_distance(one)) for one in over.under if one.outcome is not None]
-    judged.sort(key=lambda pair: pair[1][0])
-    every = [one for one, _ in judged]
-    where = np.arange(1, len(every) + 1)
-    ends = np.clip(np.array([found for _, found in judged]), -MAX_DRAWN_MARGINS, MAX_DRAWN_MARGINS)
-    varied = [choice for choice in over.of.choices if len({one.interpretation[choice.key] for one in every}) > 1]
+    distances = [(verdict, worst_distance(verdict)) for verdict in claim.verdicts if verdict.outcome is not None]
+    distances.sort(key=lambda pair: pair[1][0])
+    verdicts = [verdict for verdict, _ in distances]
+    places = np.arange(1, len(verdicts) + 1)
+    ends = np.clip(np.array([distance for _, distance in distances]), -MAX_DRAWN_MARGINS, MAX_DRAWN_MARGINS)
+    varied_choices = [
+        choice
+        for choice in claim.interpretations.choices
+        if len({verdict.interpretation[choice.key] for verdict in verdicts}) > 1
+    ]
     caption = tr(
         "{statement}. {outcome}. Above: distance of the claim's worst part from the paper's words, in "
         "margins of that part, cut at ± {furthest:g}; below 0 it holds, above 1 it fails beyond the "
         "margin. Below: the choices of each interpretation.",
-        statement=tr(over.claim.statement),
-        outcome=over.sentence().capitalize(),
+        statement=tr(claim.claim.statement),
+        outcome=claim.sentence().capitalize(),
         furthest=MAX_DRAWN_MARGINS,
     )
-    if gone := len(over.impossible):
-        left = plural(
+    if left_out := len(claim.impossible):
+        note = plural(
             "{count} interpretation that cannot be flown, designed or measured is left out.",
             "{count} interpretations that cannot be flown, designed or measured are left out.",
-            gone,
+            left_out,
         )
-        caption = f"{caption} {left}"
+        caption = f"{caption} {note}"
     return Figure(
-        name=over.claim.id,
-        title=tr("{claim} under every interpretation", claim=over.claim.id),
+        name=claim.claim.id,
+        title=tr("{claim} under every interpretation", claim=claim.claim.id),
         caption=caption,
-        headline=f"{over.claim.id}: {over.sentence()}",
-        panels=(_distance_panel(every, where, ends), *([_choices_panel(varied, every, where)] if varied else [])),
+        headline=f"{claim.claim.id}: {claim.sentence()}",
+        panels=(
+            _distance_panel(verdicts, places, ends),
+            *([_choices_panel(varied_choices, verdicts, places)] if varied_choices else []),
+        ),
         width_mm=PAGE_MM,
     )
 
 
-def _distance_panel(every: list[InterpretationVerdict], where: np.ndarray, ends: np.ndarray) -> Panel:
-    marks = []
+def _distance_panel(verdicts: list[InterpretationVerdict], places: np.ndarray, ends: np.ndarray) -> Panel:
+    lines = []
     for kind, (label, style) in KIND_STYLES.items():
-        of = np.array([one.kind == kind for one in every])
-        if of.any():
-            value, lo, hi = ends[of].T
-            marks.append(Line(where[of], value, tr(label), style, lo, hi))
+        of_kind = np.array([verdict.kind == kind for verdict in verdicts])
+        if of_kind.any():
+            value, lo, hi = ends[of_kind].T
+            lines.append(Line(places[of_kind], value, tr(label), style, lo, hi))
     return Panel(
-        Axis(tr("interpretation, sorted"), limits=(-LEFT_SPACE * len(every), len(every) + 1)),
+        Axis(tr("interpretation, sorted"), limits=(-LEFT_SPACE * len(verdicts), len(verdicts) + 1)),
         Axis(tr("distance of the worst part, margins (cut at ± {furthest:g})", furthest=MAX_DRAWN_MARGINS)),
         (
-            *marks,
-            *_shipped_lines(every, tr("as shipped")),
+            *lines,
+            *_shipped_lines(verdicts, tr("as shipped")),
             Reference(0.0, label=tr("as the paper says")),
             Reference(1.0, label=tr("beyond the margin")),
         ),
@@ -74,32 +81,32 @@ def _distance_panel(every: list[InterpretationVerdict], where: np.ndarray, ends:
     )
 
 
-def _shipped_lines(every: list[InterpretationVerdict], words: str) -> list[Reference]:
+def _shipped_lines(verdicts: list[InterpretationVerdict], words: str) -> list[Reference]:
     """A line at the interpretation of the shipped configs."""
-    return [Reference(float(n), "x", words) for n, one in enumerate(every, 1) if one.name == DEFAULT]
+    return [Reference(float(n), "x", words) for n, verdict in enumerate(verdicts, 1) if verdict.name == DEFAULT]
 
 
-def _choices_panel(varied: list[Choice], every: list[InterpretationVerdict], where: np.ndarray) -> Panel:
+def _choices_panel(choices: list[Choice], verdicts: list[InterpretationVerdict], places: np.ndarray) -> Panel:
     ticks, marks, height = [], [], HEADING_LINES - 1.0
-    for choice in varied:
+    for choice in choices:
         height -= HEADING_LINES
         ticks.append((float(height), formulas(_shortened(f"{tr(choice.asks)}:"))))
-        for one in choice.alternatives:
+        for alternative in choice.alternatives:
             height -= 1
-            ticks.append((float(height), _shortened(alternative_words(one.name))))
-            taken = np.array([interpretation.interpretation[choice.key] == one.name for interpretation in every])
+            ticks.append((float(height), _shortened(alternative_words(alternative.name))))
+            taken = np.array([verdict.interpretation[choice.key] == alternative.name for verdict in verdicts])
             if taken.any():
                 style = Style(
-                    colour=KIND_STYLES[one.kind][1].colour,
+                    colour=KIND_STYLES[alternative.kind][1].colour,
                     dash=None,
-                    marker=KIND_STYLES[one.kind][1].marker,
+                    marker=KIND_STYLES[alternative.kind][1].marker,
                     size_pt=2.6,
                 )
-                marks.append(Line(where[taken], np.full(taken.sum(), float(height)), "", style))
+                marks.append(Line(places[taken], np.full(taken.sum(), float(height)), "", style))
     return Panel(
-        Axis(tr("interpretation, sorted"), limits=(-LEFT_SPACE * len(every), len(every) + 1)),
+        Axis(tr("interpretation, sorted"), limits=(-LEFT_SPACE * len(verdicts), len(verdicts) + 1)),
         Axis("", limits=(height - 1.0, 0.0), ticks=tuple(reversed(ticks))),
-        (*marks, *_shipped_lines(every, "")),
+        (*marks, *_shipped_lines(verdicts, "")),
         legend="none",
         height_mm=AXIS_MM - ROW_MM * height,
     )

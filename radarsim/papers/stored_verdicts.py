@@ -89,7 +89,7 @@ def known_classes(papers: Iterable[tuple[PaperInterpretations, PaperClaims]], ou
         claim.id: classes.get((claim.id, declaration_digest(interpretations, claim)))
         for interpretations, paper in papers
         for claim in paper.claims
-        if interpretations.open(claim)
+        if interpretations.leaves_open(claim)
     }
 
 

@@ -58,9 +58,9 @@ class VerdictClass:
 KnownClasses = Mapping[str, VerdictClass | None]
 
 
-def declaration_digest(of: PaperInterpretations, claim: Claim) -> str:
+def declaration_digest(interpretations: PaperInterpretations, claim: Claim) -> str:
     """A mark of a claim's assertions and of the open choices that affect it: a changed mark means another claim."""
-    parts = [
+    part_declarations = [
         [
             *(part.what, part.unit, part.statement, part.number, part.variant, part.against_print, part.asserted),
             *(repr(end) for end in (part.expected.lo, part.expected.hi, part.expected.margin)),
@@ -68,28 +68,28 @@ def declaration_digest(of: PaperInterpretations, claim: Claim) -> str:
         ]
         for part in claim.parts
     ]
-    choices = [
-        [choice.key, choice.contradicts, *([one.name, one.kind] for one in choice.alternatives)]
-        for choice in of.choices
+    choice_declarations = [
+        [choice.key, choice.contradicts, *([alternative.name, alternative.kind] for alternative in choice.alternatives)]
+        for choice in interpretations.choices
         if choice.bears_on(claim.id)
     ]
-    return digest([parts, claim.how, choices])[:16]
+    return digest([part_declarations, claim.how, choice_declarations])[:16]
 
 
-def verdict_class(over: ClaimVerdicts) -> VerdictClass | None:
+def verdict_class(verdicts: ClaimVerdicts) -> VerdictClass | None:
     """The class of a claim over its interpretations; None where it could not be judged."""
-    found = over.outcome
-    if found is None or found.interpretations is None or found.holds_in is None:
+    outcome = verdicts.outcome
+    if outcome is None or outcome.interpretations is None or outcome.holds_in is None:
         return None
-    needed, on = float(found.needed or math.nan), ", ".join(found.depends_on)
+    needed, depends_on = float(outcome.needed or math.nan), ", ".join(outcome.depends_on)
     return VerdictClass(
-        over.claim.id,
-        found.kind,
-        found.holds_in,
-        found.interpretations,
-        on,
+        verdicts.claim.id,
+        outcome.kind,
+        outcome.holds_in,
+        outcome.interpretations,
+        depends_on,
         needed,
-        declaration_digest(over.of, over.claim),
+        declaration_digest(verdicts.interpretations, verdicts.claim),
     )
 
 
@@ -100,29 +100,34 @@ def add_classes(rows: Sequence[Mapping[str, Any]], known: KnownClasses) -> list[
 
 
 def _class_columns(row: Mapping[str, Any], known: KnownClasses) -> dict[str, Any]:
-    own = row["as_shipped"]
-    if own in (NOT_RUN, NOT_JUDGED):
+    as_shipped = row["as_shipped"]
+    if as_shipped in (NOT_RUN, NOT_JUDGED):
         return {}
-    found = known.get(str(row["claim"]))
-    if found is None:
-        nothing: dict[str, Any] = {"class": own, "holds": math.nan, "of": math.nan, "depends_on": ""}
-        lost = str(row["claim"]) in known and own not in FIXED_CLASSES
-        return nothing | {"overall": ONLY_SHIPPED.format(own=own) if lost else own}
-    needed = {} if own == UNDECIDED else {"needed": found.needed}
-    every = {"class": found.kind, "holds": found.holds, "of": found.of, "depends_on": found.depends_on}
-    return every | needed | {"overall": class_words(found.kind, own, found.depends_on)}
+    overall = known.get(str(row["claim"]))
+    if overall is None:
+        columns: dict[str, Any] = {"class": as_shipped, "holds": math.nan, "of": math.nan, "depends_on": ""}
+        is_unknown = str(row["claim"]) in known and as_shipped not in FIXED_CLASSES
+        return columns | {"overall": ONLY_SHIPPED.format(own=as_shipped) if is_unknown else as_shipped}
+    needed = {} if as_shipped == UNDECIDED else {"needed": overall.needed}
+    columns_of_class = {
+        "class": overall.kind,
+        "holds": overall.holds,
+        "of": overall.of,
+        "depends_on": overall.depends_on,
+    }
+    return columns_of_class | needed | {"overall": class_words(overall.kind, as_shipped, overall.depends_on)}
 
 
 def rows_in_words(
-    rows: Iterable[Mapping[str, Any]], every: Iterable[PaperInterpretations | None]
+    rows: Iterable[Mapping[str, Any]], papers: Iterable[PaperInterpretations | None]
 ) -> list[dict[str, Any]]:
     """Rows of claims.csv for people: what a claim depends on is in the words of its paper's interpretations."""
-    of = {one.paper: one for one in every if one is not None}
-    found = [dict(row) for row in rows]
-    for row in found:
+    by_paper = {paper.paper: paper for paper in papers if paper is not None}
+    records = [dict(row) for row in rows]
+    for row in records:
         if row["depends_on"]:
-            row["depends_on"] = of[row["claim"].partition(".")[0]].asked(row["depends_on"].split(", "))
-    return found
+            row["depends_on"] = by_paper[row["claim"].partition(".")[0]].list_choices(row["depends_on"].split(", "))
+    return records
 
 
 def is_judged_only_as_shipped(row: Mapping[str, Any]) -> bool:
@@ -137,13 +142,13 @@ def verdict_words(row: Mapping[str, Any]) -> str:
     return class_words(row["class"], row["as_shipped"], row["depends_on"], tr)
 
 
-def class_words(kind: str, own: str, depends_on: str = "", say: Callable[..., str] = str.format) -> str:
+def class_words(kind: str, as_shipped: str, depends_on: str = "", fill: Callable[..., str] = str.format) -> str:
     """The verdict on a claim as a phrase: its class, and the one as shipped if it differs.
 
     say: puts values into a message, as `language.tr` does; default: in English."""
-    over: str = say(DEPENDS_ON, choices=depends_on) if kind == DEPENDS and depends_on else say(kind)
-    if own == kind:
-        return over
+    overall: str = fill(DEPENDS_ON, choices=depends_on) if kind == DEPENDS and depends_on else fill(kind)
+    if as_shipped == kind:
+        return overall
     if kind not in (DEPENDS, CONTRADICTORY):
-        over = say(OVERALL, kind=over)
-    return say(SHIPPED_AND_OVERALL, own=term(own), over=over)
+        overall = fill(OVERALL, kind=overall)
+    return fill(SHIPPED_AND_OVERALL, own=term(as_shipped), over=overall)

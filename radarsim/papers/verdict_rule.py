@@ -154,20 +154,20 @@ def needed_realisations(part: JudgedPart, parts: int = 1) -> int | None:
     lo, hi = judged_interval(part, parts)
     if part.known or not part.n or not (math.isfinite(lo) and math.isfinite(hi) and lo < hi):
         return None
-    found = [
-        one
-        for one in (_realisations_clear_of(part, parts, border) for border in _verdict_borders(part))
-        if one is not None
+    numbers = [
+        number
+        for number in (_realisations_clear_of(part, parts, border) for border in _verdict_borders(part))
+        if number is not None
     ]
-    return min(found, default=None)
+    return min(numbers, default=None)
 
 
 def _verdict_borders(part: JudgedPart) -> list[float]:
     """The values at which verdicts change."""
-    ways = (-part.margin, part.margin) if part.kind == MATERIAL else (0.0,)
-    out = (part.expected_lo - part.margin, part.expected_hi + part.margin)
-    inner = [end + way for end in (part.expected_lo, part.expected_hi) for way in ways]
-    return sorted({one for one in (*out, *(() if part.kind in INCLUSIVE else inner)) if math.isfinite(one)})
+    offsets = (-part.margin, part.margin) if part.kind == MATERIAL else (0.0,)
+    outer = (part.expected_lo - part.margin, part.expected_hi + part.margin)
+    inner = [end + offset for end in (part.expected_lo, part.expected_hi) for offset in offsets]
+    return sorted({border for border in (*outer, *(() if part.kind in INCLUSIVE else inner)) if math.isfinite(border)})
 
 
 def _realisations_clear_of(part: JudgedPart, parts: int, border: float) -> int | None:

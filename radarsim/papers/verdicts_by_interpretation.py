@@ -56,20 +56,20 @@ class InterpretationVerdict:
         """Whether the paper allows the interpretation."""
         return self.kind != AGAINST and self.outcome is not None
 
-    def as_rule(self) -> InterpretationOutcome:
+    def as_outcome(self) -> InterpretationOutcome:
         """The input of the rule."""
         outcome = self.outcome.kind if self.outcome else ""
         return InterpretationOutcome(self.name, self.kind, dict(self.interpretation.taken), outcome)
 
 
-def judge_under(
+def judge_claim(
     of: PaperInterpretations, claim: Claim, interpretation: Interpretation, evidence: Evidence, n: int = 0
 ) -> InterpretationVerdict:
     """Judge a claim by the evidence of an interpretation with n realisations; 0 where nothing was run."""
     name, kind = of.name(interpretation), of.kind(interpretation)
     try:
         parts = tuple(
-            (part, _judge_part(part, evidence, of.exact(claim, interpretation), n, name == DEFAULT))
+            (part, _judge_part(part, evidence, of.is_exact(claim, interpretation), n, name == DEFAULT))
             for part in of.parts(claim, interpretation)
         )
     except MissingEvidence as missing:
@@ -97,149 +97,169 @@ def _judge_part(part: Part, seen: Evidence, exact: bool, n: int, shipped: bool) 
 class ClaimVerdicts:
     """A claim over all interpretations of its paper, the default one first."""
 
-    of: PaperInterpretations
+    interpretations: PaperInterpretations
     claim: Claim
-    under: tuple[InterpretationVerdict, ...]
+    verdicts: tuple[InterpretationVerdict, ...]
 
     @cached_property
     def outcome(self) -> ClaimOutcome | None:
         """The verdict of the rule; None where the default interpretation was not judged."""
-        own = self.under[0].outcome
-        if own is None:
+        default_outcome = self.verdicts[0].outcome
+        if default_outcome is None:
             return None
-        found = outcome_over_interpretations(own, [one.as_rule() for one in self.under])
+        outcome = outcome_over_interpretations(default_outcome, [verdict.as_outcome() for verdict in self.verdicts])
         printed_twice = any(part.against_print for part in self.claim.parts)
-        torn = printed_twice and any(one.contradicts and one.key in found.depends_on for one in self.of.choices)
-        torn = torn or (self.claim.joint and self._each_somewhere())
-        if torn:
-            return replace(found, kind=CONTRADICTORY)
-        return replace(found, needed=self._needed() if found.kind == UNDECIDED else None)
+        contradictory = printed_twice and any(
+            verdict.contradicts and verdict.key in outcome.depends_on for verdict in self.interpretations.choices
+        )
+        contradictory = contradictory or (self.claim.joint and self._each_somewhere())
+        if contradictory:
+            return replace(outcome, kind=CONTRADICTORY)
+        return replace(outcome, needed=self._needed() if outcome.kind == UNDECIDED else None)
 
     def _needed(self) -> int | None:
         """Realisations that would decide every undecided interpretation; None where a value lies on a border."""
-        return largest_needed(one.outcome.needed for one in self.undecided if one.outcome)
+        return largest_needed(verdict.outcome.needed for verdict in self.undecided if verdict.outcome)
 
     def _each_somewhere(self) -> bool:
         """Whether every number of a joint claim is reproduced under some interpretation, though no interpretation gives
         all."""
-        counted = [one for one in self.under if one.counted]
-        held = {part.number for one in counted for part, judged in one.parts if part_verdict(judged) == CONFIRMED}
-        every = {part.number for one in counted for part, _ in one.parts}
-        return held == every and not any(one.outcome.kind == CONFIRMED for one in counted if one.outcome)
+        verdicts = [verdict for verdict in self.verdicts if verdict.counted]
+        reproduced = {
+            part.number for verdict in verdicts for part, judged in verdict.parts if part_verdict(judged) == CONFIRMED
+        }
+        numbers = {part.number for verdict in verdicts for part, _ in verdict.parts}
+        return reproduced == numbers and not any(
+            verdict.outcome.kind == CONFIRMED for verdict in verdicts if verdict.outcome
+        )
 
     @property
     def against_print(self) -> list[InterpretationVerdict]:
         """The interpretations against the print with another verdict than the default one."""
-        own = self.under[0].outcome
-        judged = [one for one in self.under if one.kind == AGAINST and one.outcome]
-        return [one for one in judged if own and one.outcome and one.outcome.kind != own.kind]
+        default_outcome = self.verdicts[0].outcome
+        verdicts = [verdict for verdict in self.verdicts if verdict.kind == AGAINST and verdict.outcome]
+        return [
+            verdict
+            for verdict in verdicts
+            if default_outcome and verdict.outcome and verdict.outcome.kind != default_outcome.kind
+        ]
 
     @property
     def undecided(self) -> list[InterpretationVerdict]:
         """The interpretations that the paper allows and that are undecided."""
-        return [one for one in self.under if one.counted and one.outcome and one.outcome.kind == UNDECIDED]
+        return [
+            verdict
+            for verdict in self.verdicts
+            if verdict.counted and verdict.outcome and verdict.outcome.kind == UNDECIDED
+        ]
 
     @property
-    def looked(self) -> int:
+    def fewest_realisations(self) -> int:
         """The fewest realisations of an undecided interpretation; 0 where all are decided."""
-        return min((judged.n for one in self.undecided for _, judged in one.parts), default=0)
+        return min((judged.n for verdict in self.undecided for _, judged in verdict.parts), default=0)
 
     @property
     def impossible(self) -> list[InterpretationVerdict]:
         """The interpretations that were not judged, with their reasons."""
-        return [one for one in self.under if one.outcome is None]
+        return [verdict for verdict in self.verdicts if verdict.outcome is None]
 
     def sentence(self) -> str:
         """One line: in how many interpretations it holds, on what it depends, what would have to be changed."""
-        found = self.outcome
-        if found is None:
-            return tr("not judged: {why}", why=translate_reason(self.under[0].why))
-        words = [
-            tr("holds in {holds} of {of} interpretations", holds=found.holds_in or 0, of=found.interpretations or 0)
+        outcome = self.outcome
+        if outcome is None:
+            return tr("not judged: {why}", why=translate_reason(self.verdicts[0].why))
+        clauses = [
+            tr("holds in {holds} of {of} interpretations", holds=outcome.holds_in or 0, of=outcome.interpretations or 0)
         ]
-        if self.still_open():
-            words.append(self.still_open())
-        if found.depends_on:
-            words.append(tr(DEPENDS_ON, choices=self.of.asked(found.depends_on)))
-        held = [one for one in self.against_print if one.outcome and one.outcome.kind == CONFIRMED]
-        if held and found.holds_in == 0:
-            names = " | ".join(self.of.said(one.interpretation) for one in held)
-            words.append(tr("it holds, against the print, with {interpretations}", interpretations=names))
+        if self.undecided_sentence():
+            clauses.append(self.undecided_sentence())
+        if outcome.depends_on:
+            clauses.append(tr(DEPENDS_ON, choices=self.interpretations.list_choices(outcome.depends_on)))
+        confirmed = [verdict for verdict in self.against_print if verdict.outcome and verdict.outcome.kind == CONFIRMED]
+        if confirmed and outcome.holds_in == 0:
+            names = " | ".join(self.interpretations.describe(verdict.interpretation) for verdict in confirmed)
+            clauses.append(tr("it holds, against the print, with {interpretations}", interpretations=names))
         if self.impossible:
-            words.append(tr("{count} not possible", count=len(self.impossible)))
-        return "; ".join(words)
+            clauses.append(tr("{count} not possible", count=len(self.impossible)))
+        return "; ".join(clauses)
 
-    def still_open(self) -> str:
+    def undecided_sentence(self) -> str:
         """For an undecided claim, how many interpretations are undecided, and the realisations they need; else
         nothing."""
         if self.outcome is None or self.outcome.kind != UNDECIDED:
             return ""
-        told, needed = {"count": len(self.undecided), "n": f"{self.looked:,}"}, self.outcome.needed
+        values, needed = {"count": len(self.undecided), "n": f"{self.fewest_realisations:,}"}, self.outcome.needed
         if needed is None:
             return tr(
                 "{count} open at {n} realisations: a value lies on a border, and more realisations would not decide",
-                **told,
+                **values,
             )
         return tr(
-            "{count} open at {n} realisations, about {needed} would decide", **told, needed=f"{round_up(needed):,}"
+            "{count} open at {n} realisations, about {needed} would decide", **values, needed=f"{round_up(needed):,}"
         )
 
 
-def verdict_columns(every: Iterable[PaperInterpretations]) -> tuple[str, ...]:
+def verdict_columns(papers: Iterable[PaperInterpretations]) -> tuple[str, ...]:
     """The columns of interpretations.csv: one for each choice of these papers."""
-    choices = dict.fromkeys(choice.key for of in every for choice in of.choices)
+    choices = dict.fromkeys(choice.key for paper in papers for choice in paper.choices)
     return (*LEADING_COLUMNS, *choices, *TRAILING_COLUMNS)
 
 
 def verdict_rows(
-    one: InterpretationVerdict, names: Sequence[str], over: ClaimOutcome | None = None
+    verdict: InterpretationVerdict, columns: Sequence[str], overall_outcome: ClaimOutcome | None = None
 ) -> list[dict[str, Any]]:
     """Rows of interpretations.csv: one for each part; a single one with the reason where it was not judged.
 
-    over: the result over all interpretations, whose class is in each row."""
-    choices = dict(one.interpretation.taken)
-    blank: dict[str, Any] = dict.fromkeys(names, "") | {
-        "claim": one.claim.id,
-        "interpretation": one.name,
-        "kind": one.kind,
+    overall_outcome: that over all interpretations, whose class is in each row."""
+    choices = dict(verdict.interpretation.taken)
+    row: dict[str, Any] = dict.fromkeys(columns, "") | {
+        "claim": verdict.claim.id,
+        "interpretation": verdict.name,
+        "kind": verdict.kind,
     }
-    blank |= {key: value for key, value in choices.items() if key in names}
-    blank["over"] = over.kind if over else ""
-    if one.outcome is None:
-        return [blank | {"verdict": "not possible", "reason": one.why}]
-    many = sum(judged.sampled for _, judged in one.parts)
+    row |= {key: value for key, value in choices.items() if key in columns}
+    row["over"] = overall_outcome.kind if overall_outcome else ""
+    if verdict.outcome is None:
+        return [row | {"verdict": "not possible", "reason": verdict.why}]
+    sampled_parts = sum(judged.sampled for _, judged in verdict.parts)
     return [
-        blank
+        row
         | {
-            **{name: _table_value(getattr(judged, name), never=True) for name in ("measured", "lo", "hi", "exact")},
+            **{
+                name: _table_value(getattr(judged, name), allow_infinite=True)
+                for name in ("measured", "lo", "hi", "exact")
+            },
             **{name: _table_value(getattr(judged, name)) for name in ("expected_lo", "expected_hi", "margin")},
-            **{"part": number, "what": part.what, "unit": part.unit, "verdict": part_verdict(judged, many)},
-            **{"outcome": one.outcome.kind, "miss": _table_value(miss_in_margins(judged)), "n": judged.n or ""},
-            "needed": one.outcome.needed or "",
+            **{"part": number, "what": part.what, "unit": part.unit, "verdict": part_verdict(judged, sampled_parts)},
+            **{"outcome": verdict.outcome.kind, "miss": _table_value(miss_in_margins(judged)), "n": judged.n or ""},
+            "needed": verdict.outcome.needed or "",
         }
-        for number, (part, judged) in enumerate(one.parts, 1)
+        for number, (part, judged) in enumerate(verdict.parts, 1)
     ]
 
 
-def _table_value(value: float, never: bool = False) -> float | str:
-    """A number for the table: twelve digits, empty for NaN; never: `inf` for a settling time that is never reached."""
-    if never and math.isinf(value):
+def _table_value(value: float, allow_infinite: bool = False) -> float | str:
+    """A number for the table: twelve digits, empty for NaN; allow_infinite: `inf` for a settling time that is never
+    reached."""
+    if allow_infinite and math.isinf(value):
         return value
     return float(f"{value:.12g}") if math.isfinite(value) else ""
 
 
-def worst_distance(one: InterpretationVerdict) -> tuple[float, float, float]:
+def worst_distance(verdict: InterpretationVerdict) -> tuple[float, float, float]:
     """How far the worst part is from the words, in margins, with the ends of its interval.
 
     Negative inside: the distance to the nearest end."""
-    found = [_distance(judged) for _, judged in one.parts if judged.asserted and not judged.void]
-    return max(found, default=(math.nan,) * 3, key=lambda ends: ends[0])
+    distances = [_distance(judged) for _, judged in verdict.parts if judged.asserted and not judged.void]
+    return max(distances, default=(math.nan,) * 3, key=lambda ends: ends[0])
 
 
 def _distance(judged: JudgedPart) -> tuple[float, float, float]:
-    def of(value: float) -> float:
+    """The same of a part."""
+
+    def distance(value: float) -> float:
         return max(judged.expected_lo - value, value - judged.expected_hi) / judged.margin
 
     ends = judged_interval(judged)
-    every = [of(value) for value in (*ends, judged.value)]
-    return of(judged.value), min(every), max(every)
+    distances = [distance(value) for value in (*ends, judged.value)]
+    return distance(judged.value), min(distances), max(distances)

@@ -54,7 +54,7 @@ def test_the_table_has_a_column_a_choice_and_a_row_a_part(first):
     assert {row["claim"] for row in rows} == {one.id for one in open_claims}
     for claim in open_claims:
         own = [row for row in rows if row["claim"] == claim.id]
-        interpretations = paper.interpretations.of_claim(claim.id)
+        interpretations = paper.interpretations.for_claim(claim.id)
         assert {row["interpretation"] for row in own} == {paper.interpretations.name(one) for one in interpretations}
         shipped = [row for row in own if row["interpretation"] == "as shipped"]
         assert len(shipped) == len(claim.parts)
@@ -65,7 +65,7 @@ def test_a_verdict_is_that_of_the_rule_on_the_table(first):
     """What the last line of a claim says, counted in the table by hand."""
     out, done = first
     rows = table(out)
-    for over in done.read[0].over:
+    for over in done.papers[0].claims:
         own = [row for row in rows if row["claim"] == over.claim.id and row["kind"] in "EU" and row["outcome"]]
         by_interpretation = {row["interpretation"]: row["outcome"] for row in own}
         found = over.outcome
@@ -73,7 +73,7 @@ def test_a_verdict_is_that_of_the_rule_on_the_table(first):
         assert found.holds_in == sum(one == CONFIRMED for one in by_interpretation.values())
         assert over.sentence().startswith(f"holds in {found.holds_in} of {found.interpretations} interpretations")
         if found.depends_on:
-            assert f"depends on {over.of.asked(found.depends_on)}" in over.sentence()
+            assert f"depends on {over.of.list_choices(found.depends_on)}" in over.sentence()
 
 
 def test_the_classes_of_the_first_paper_are_those_that_are_shipped(first):
@@ -83,12 +83,12 @@ def test_the_classes_of_the_first_paper_are_those_that_are_shipped(first):
     own = stored_classes(out)
     assert {one.claim: str(one) for one in own} == {one.claim: str(shipped[one.claim]) for one in own}
     over = {row["claim"]: row["over"] for row in table(out)}
-    assert over == {one.claim: one.kind for one in own} == {o.claim.id: o.outcome.kind for o in done.read[0].over}
+    assert over == {one.claim: one.kind for one in own} == {o.claim.id: o.outcome.kind for o in done.papers[0].claims}
 
 
 def test_what_is_known_of_the_first_paper(first):
     _, done = first
-    said = {over.claim.id: over.outcome for over in done.read[0].over}
+    said = {over.claim.id: over.outcome for over in done.papers[0].claims}
     assert said["P1.5"].words == "depends on end_of, falls_to"
     assert (said["P1.5"].holds_in, said["P1.5"].interpretations) == (6, 18)
     assert said["P1.17"].kind == REFUTED  # in every interpretation: robust
@@ -102,7 +102,7 @@ def test_what_is_known_of_the_first_paper(first):
 def test_figure_1a_is_of_several_variances(first):
     """P1.18 fails in all but one of fifteen: unweighted start and a large D_M, where the difference does stabilise."""
     out, done = first
-    outcome = next(one.outcome for one in done.read[0].over if one.claim.id == "P1.18")
+    outcome = next(one.outcome for one in done.papers[0].claims if one.claim.id == "P1.18")
     assert (outcome.words, outcome.holds_in, outcome.interpretations) == ("depends on shown_variance, start", 1, 15)
     rows = {row["interpretation"]: row for row in table(out) if row["claim"] == "P1.18" and row["kind"] in "EU"}
     held = rows.pop("start: unweighted; shown_variance: 0.1")
@@ -124,7 +124,7 @@ def test_what_falls_may_rise_by_the_tolerance_of_the_interpretation(first):
     out, done = first
     rows = [row for row in table(out) if row["claim"] == "P1.27" and row["kind"] in "EU"]
     assert {(row["settled_within"], float(row["margin"])) for row in rows} == {("5 %", 5), ("2 %", 2), ("10 %", 10)}
-    assert "settled_within" in next(one for one in done.read[0].over if one.claim.id == "P1.27").outcome.depends_on
+    assert "settled_within" in next(one for one in done.papers[0].claims if one.claim.id == "P1.27").outcome.depends_on
 
 
 def test_one_printed_end_of_two_curves_is_that_of_each_or_of_the_lower(first):
@@ -139,7 +139,7 @@ def test_one_printed_end_of_two_curves_is_that_of_each_or_of_the_lower(first):
 def test_sentences_on_figures_2a_and_3a_speak_of_their_radar_or_of_each(first):
     """RLS 4 and 5 keep a third of their gain in acceleration; of RLS 2 alone errors fall to 5 %."""
     out, done = first
-    over = {one.claim.id: one for one in done.read[0].over}
+    over = {one.claim.id: one for one in done.papers[0].claims}
     steps = over["P1.28"].outcome
     assert (steps.depends_on, steps.holds_in, steps.interpretations) == (("first_steps_of",), 3, 6)
     each = [
@@ -229,7 +229,7 @@ class Velocities(PaperInterpretations):
         ),
     )
 
-    def changed(self, claim, case, interpretation):
+    def changed_case(self, claim, case, interpretation):
         factor = {"shipped": 1.0, "useless": 1e2}.get(interpretation["sigma_velocity"])
         if factor is None:
             raise ImpossibleInterpretation("there is no such radar")
@@ -249,8 +249,8 @@ def ran():
 def test_interpretations_that_are_run(ran, tmp_path, monkeypatch):
     seen = []
     done = judge_requests([ran], out=tmp_path, figures=False, progress=lambda *of: seen.append(of))
-    (over,) = done.read[0].over
-    by_name = {one.interpretation["sigma_velocity"]: one for one in over.under}
+    (over,) = done.papers[0].claims
+    by_name = {one.interpretation["sigma_velocity"]: one for one in over.verdicts}
     assert by_name["shipped"].outcome.kind == CONFIRMED
     assert by_name["useless"].outcome.kind == REFUTED
     assert by_name["none"].outcome is None
@@ -303,7 +303,7 @@ def test_a_interpretation_as_shipped_measures_what_a_run_of_the_config_does(ran,
     result = radarsim.run("range_doppler", realisations=2000, out=tmp_path, figures=False)
     stored = result.tables["claims"].set_index(["claim", "what", "case"])[["measured", "exact"]]
     done = judge_requests([ran], out=tmp_path, figures=False)
-    for part, judged in done.read[0].over[0].under[0].parts:
+    for part, judged in done.papers[0].claims[0].verdicts[0].parts:
         assert (judged.measured, judged.exact) == tuple(stored.loc["P1.8", part.what, f"rls{part.cases[0]}"])
 
 
@@ -311,11 +311,11 @@ def test_exact_values_decide_under_a_interpretation_as_in_a_run(ran, tmp_path):
     """Of 60 realisations: what a run knows exactly is undecided neither in the shipped interpretation nor in a changed
     one."""
     wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, interpretations=Near()))
-    (over,) = judge_requests([wanted], out=tmp_path, realisations=60, figures=False).read[0].over
-    assert all(judged.known and judged.n == 60 for one in over.under for _, judged in one.parts)
+    (over,) = judge_requests([wanted], out=tmp_path, realisations=60, figures=False).papers[0].claims
+    assert all(judged.known and judged.n == 60 for one in over.verdicts for _, judged in one.parts)
     assert over.outcome.kind != UNDECIDED
-    measured = {judged.exact for one in over.under for _, judged in one.parts}
-    assert len(measured) == sum(len(one.parts) for one in over.under)  # each case has its own
+    measured = {judged.exact for one in over.verdicts for _, judged in one.parts}
+    assert len(measured) == sum(len(one.parts) for one in over.verdicts)  # each case has its own
 
 
 class Near(Velocities):
@@ -329,7 +329,7 @@ class Near(Velocities):
         ),
     )
 
-    def changed(self, claim, case, interpretation):
+    def changed_case(self, claim, case, interpretation):
         factor = {"shipped": 1.0, "worse": 1.1}[interpretation["sigma_velocity"]]
         radar = case.spec.radar.model_copy(update={"sigma_velocity_mps": factor * case.spec.radar.sigma_velocity_mps})
         return dataclasses.replace(case, spec=case.spec.model_copy(update={"radar": radar}))
@@ -350,21 +350,21 @@ class Margins(Near):
 def test_what_is_undecided_runs_on_until_it_is_decided(ran, tmp_path):
     wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, interpretations=Margins()))
     few = judge_requests([wanted], out=tmp_path, figures=False)
-    before = few.read[0].over[0]
+    before = few.papers[0].claims[0]
     assert before.outcome.kind == UNDECIDED
     assert before.undecided
     assert not few.left
     little = judge_requests([wanted], out=tmp_path, realisations=60, decide=True, figures=False)
-    assert little.read[0].over[0].outcome == before.outcome  # the most is what it began with
+    assert little.papers[0].claims[0].outcome == before.outcome  # the most is what it began with
     assert f"P1.8 not yet decided under {len(before.undecided)} interpretations at 60 realisations; " in little.left[0]
     decided = judge_requests([wanted], out=tmp_path, realisations=64_000, decide=True, figures=False)
-    (over,) = decided.read[0].over
+    (over,) = decided.papers[0].claims
     assert over.outcome.kind != UNDECIDED
     assert not decided.left
-    counts = {judged.n for one in over.under for _, judged in one.parts}
+    counts = {judged.n for one in over.verdicts for _, judged in one.parts}
     assert counts - {60} <= {2000 * 2**m for m in range(6)}
     open_ = {one.interpretation for one in before.undecided}
-    for one in over.under:  # those that were decided are left as they were
+    for one in over.verdicts:  # those that were decided are left as they were
         assert ({judged.n for _, judged in one.parts} == {60}) == (one.interpretation not in open_)
     assert {int(row["n"]) for row in table(tmp_path)} == counts
     assert {row["over"] for row in table(tmp_path)} == {over.outcome.kind}

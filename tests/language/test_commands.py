@@ -88,7 +88,7 @@ def test_interpretations_of_a_claim_and_their_curve(claim, tmp_path):
     with speaking("ru"):
         done = judge_requests(judging_requests([claim]), out=tmp_path, figures=False)
         page = markdown_pages(done)
-        over = done.read[0].over[0]
+        over = done.papers[0].claims[0]
         texts = shown(specification_curve(over))
     every = [one.name for choice in over.of.choices for one in choice.alternatives]  # the page has them as keys
     typed = {part for name in every for part in re.findall("[A-Za-z]+", name)} | {"same", "time"}

@@ -213,7 +213,7 @@ def test_shipped_classes_are_what_interpretations_give(tmp_path):
     """All of P1, P3 and P4, and what of P2 takes under a minute; what few realisations leave open may be decided."""
     done = judge_requests(judging_requests(["P1", "P3", "P4", "P2.4"]), out=tmp_path, figures=False)
     shipped, own = ({one.claim: one for one in every} for every in (shipped_classes(), stored_classes(tmp_path)))
-    for over in (over for read in done.read for over in read.over):
+    for over in (over for read in done.papers for over in read.claims):
         claim = over.claim.id
         if over.undecided:
             assert shipped[claim].of == own[claim].of

@@ -13,7 +13,7 @@ from radarsim.papers.interpretations_page import interpretations_page
 from radarsim.papers.verdict_rule import AGAINST, CONFIRMED, DEPENDS, EQUIVALENT, REFUTED, UNDECIDED, UNSTATED
 from radarsim.papers.verdicts_by_interpretation import (
     ClaimVerdicts,
-    judge_under,
+    judge_claim,
     verdict_columns,
     verdict_rows,
     worst_distance,
@@ -42,7 +42,7 @@ class Small(PaperInterpretations):
         ),
     )
 
-    def exact(self, claim, interpretation):
+    def is_exact(self, claim, interpretation):
         return True
 
     def evidence(self, claim, interpretation, seen, of):
@@ -54,7 +54,7 @@ class Small(PaperInterpretations):
 class Sampled(Small):
     """The same, of numbers with an interval."""
 
-    def exact(self, claim, interpretation):
+    def is_exact(self, claim, interpretation):
         return False
 
 
@@ -72,11 +72,11 @@ def claim(number, *values):
 
 def over(of, one):
     every = []
-    for interpretation in of.of_claim(one.id):
+    for interpretation in of.for_claim(one.id):
         try:
-            every.append(judge_under(of, one, interpretation, of.evidence(one, interpretation, None, None)))
+            every.append(judge_claim(of, one, interpretation, of.evidence(one, interpretation, None, None)))
         except MissingEvidence as missing:
-            every.append(judge_under(of, dataclasses.replace(one, parts=()), interpretation, None))
+            every.append(judge_claim(of, dataclasses.replace(one, parts=()), interpretation, None))
             every[-1] = dataclasses.replace(every[-1], claim=one, outcome=None, why=missing.args[0])
     return ClaimVerdicts(of, one, tuple(every))
 
@@ -84,9 +84,9 @@ def over(of, one):
 def test_interpretations_of_a_claim_leave_out_what_does_not_bear_on_it():
     of = Small()
     assert len(of.declared()) == 5  # two by two of E and U, and one against the print
-    assert len(of.of_claim("P9.1")) == 5
-    assert len(of.of_claim("P9.2")) == 3
-    assert all(one["form"] == "round" for one in of.of_claim("P9.2"))
+    assert len(of.for_claim("P9.1")) == 5
+    assert len(of.for_claim("P9.2")) == 3
+    assert all(one["form"] == "round" for one in of.for_claim("P9.2"))
 
 
 def test_names_and_kinds():
@@ -102,7 +102,7 @@ def test_names_and_kinds():
 def test_a_claim_over_its_interpretations():
     of = Small()
     one = over(of, claim(2, "1"))
-    assert [each.outcome.kind for each in one.under] == [CONFIRMED, REFUTED, REFUTED]
+    assert [each.outcome.kind for each in one.verdicts] == [CONFIRMED, REFUTED, REFUTED]
     assert one.outcome.kind == DEPENDS
     assert (one.outcome.holds_in, one.outcome.interpretations, one.outcome.depends_on) == (1, 2, ("scale",))
     assert one.sentence() == "holds in 1 of 2 interpretations; depends on how large it is"
@@ -121,7 +121,9 @@ def test_the_rule_looks_at_all_interpretations_once(monkeypatch):
     )
     one = over(Small(), claim(1, "1"))
     names = verdict_columns([Small()])
-    assert {row["over"] for each in one.under for row in verdict_rows(each, names, one.outcome)} == {one.outcome.kind}
+    assert {row["over"] for each in one.verdicts for row in verdict_rows(each, names, one.outcome)} == {
+        one.outcome.kind
+    }
     assert one.sentence()
     assert len(asked) == 1
 
@@ -140,8 +142,8 @@ def test_a_interpretation_that_cannot_be_done_is_listed():
 def test_depth_is_in_margins_with_its_sign():
     of = Small()
     one = over(of, claim(2, "1", "1.6"))
-    assert_rounded(worst_distance(one.under[0])[0], (1.6 - 1.0) / 0.05, operations=3)  # of the worst part
-    assert worst_distance(over(of, claim(2, "1")).under[0])[0] == 0
+    assert_rounded(worst_distance(one.verdicts[0])[0], (1.6 - 1.0) / 0.05, operations=3)  # of the worst part
+    assert worst_distance(over(of, claim(2, "1")).verdicts[0])[0] == 0
 
 
 def test_what_is_open_says_what_would_decide_it():
@@ -151,20 +153,20 @@ def test_what_is_open_says_what_would_decide_it():
     part = Part((), "number", "m", lambda seen: Estimate(*seen), printed("1.0"))
     ends = {"one": (1.0, 0.99, 1.01), "two": (1.04, 1.0, 1.08), "ten": (1.0, 0.0, 2.0)}
     every = [
-        judge_under(
+        judge_claim(
             of, dataclasses.replace(one, parts=(part,)), interpretation, Ends(*ends[interpretation["scale"]]), 1000
         )
-        for interpretation in of.of_claim(one.id)
+        for interpretation in of.for_claim(one.id)
     ]
     found = ClaimVerdicts(of, one, tuple(every))
     assert [each.outcome.kind for each in every] == [CONFIRMED, UNDECIDED, UNDECIDED]
     needed = every[1].outcome.needed
     assert 1000 < needed < every[2].outcome.needed
-    assert (found.outcome.kind, found.outcome.needed, found.looked) == (UNDECIDED, needed, 1000)
+    assert (found.outcome.kind, found.outcome.needed, found.fewest_realisations) == (UNDECIDED, needed, 1000)
     assert f"1 open at 1,000 realisations, about {round_up(needed):,} would decide" in found.sentence()
     assert {row["needed"] for each in every[1:2] for row in verdict_rows(each, verdict_columns([of]))} == {needed}
-    assert found.still_open() in interpretations_page(of, "Nobody 1900", [found])
-    assert over(Small(), claim(2, "1")).still_open() == ""
+    assert found.undecided_sentence() in interpretations_page(of, "Nobody 1900", [found])
+    assert over(Small(), claim(2, "1")).undecided_sentence() == ""
 
 
 def test_page_lists_claims_impossible_interpretations_and_open_choices():

@@ -191,11 +191,13 @@ def test_claims_find_a_case_by_its_keys_and_interpretations_set_keys(made):
     with pytest.raises(ConfigError, match=r"target\.step: there is no such key"):
         seen.case({"target.step": 2})
     interpretations = interpretations_of(study)
-    assert [interpretations.name(one) for one in interpretations.of_claim("walk.1")] == [
+    assert [interpretations.name(one) for one in interpretations.for_claim("walk.1")] == [
         "as shipped",
         "noise: a half of it",
     ]
-    changed = interpretations.changed(claim, case_of(study), interpretations.interpretation(noise="a half of it")).spec
+    changed = interpretations.changed_case(
+        claim, case_of(study), interpretations.interpretation(noise="a half of it")
+    ).spec
     assert (changed.sensor.sigma_x_m, [one.gain for one in changed.filters]) == (0.5, [0.3, 0.3])
     assert changed.target == case_of(study).spec.target
 

@@ -43,12 +43,12 @@ class Interpretations(PaperInterpretations):
     paper = "P4"
     choices = load_choices(Path(__file__).with_name("interpretations.yaml"))
     realisations = 4000  # with 500 the interval of P4.6 reaches over its limit, though not over the margin
-    most = 1_024_000  # P4.4: σ of the locked bursts is up to 0.6 % off, of the 1 % that it may be
+    max_realisations = 1_024_000  # P4.4: σ of the locked bursts is up to 0.6 % off, of the 1 % that it may be
 
-    def exact(self, claim: Claim, interpretation: Interpretation) -> bool:
+    def is_exact(self, claim: Claim, interpretation: Interpretation) -> bool:
         return claim.id in EXACT
 
-    def of_claim(self, claim: str) -> list[Interpretation]:
+    def for_claim(self, claim: str) -> list[Interpretation]:
         """All combinations of E and U for exact claims; for claims that need runs, of the choices that bear on them."""
         own = [choice for choice in self.choices if choice.bears_on(claim)]
         singly = [
@@ -66,7 +66,7 @@ class Interpretations(PaperInterpretations):
         both = {COMPUTED, PRINTED} <= {part.cases[0] for part in asserted}
         return [_counted(part, interpretation) for part in asserted if not both or part.cases[0] != PRINTED]
 
-    def changed(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
+    def changed_case(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
         """The case with the noise and forecast of an interpretation, and its windows in place of those of its
         estimators. One of the two shipped interpretations takes the place of any; of the sweeps, those that a part asks
         for."""
@@ -142,7 +142,7 @@ SCALES = (10.0, 1.0, 0.1, 0.01, 0.001)  # of the forecast, in P4.8
 def _designed() -> Mapping[Version, tuple[np.ndarray, list[int] | None]]:
     """Spreads and windows of every version that a declared interpretation asks for, all at once."""
     of = Interpretations()
-    plain = {version(one) for claim in ("P4.1", *WINDOWS) for one in of.of_claim(claim)}
+    plain = {version(one) for claim in ("P4.1", *WINDOWS) for one in of.for_claim(claim)}
     found = burst_versions.designed(BURST, every := list(plain))
     return {one: (spreads, own) for one, spreads, own in zip(every, found.spreads, found.windows, strict=True)}
 
@@ -150,7 +150,7 @@ def _designed() -> Mapping[Version, tuple[np.ndarray, list[int] | None]]:
 @cache
 def _scaled() -> Mapping[tuple[Version, float], int | None]:
     """The first windows with the forecast's spreads times each of SCALES."""
-    plain = {version(one) for one in Interpretations().of_claim("P4.8")}
+    plain = {version(one) for one in Interpretations().for_claim("P4.8")}
     every = [(one, scale) for one in plain for scale in SCALES]
     asked = []
     for one, scale in every:

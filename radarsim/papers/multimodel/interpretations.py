@@ -23,16 +23,16 @@ class Interpretations(PaperInterpretations):
     paper = "P2"
     choices = load_choices(Path(__file__).with_name("interpretations.yaml"))
 
-    def changed(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
+    def changed_case(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
         """The case with the flight, the banks, the output and the start of an interpretation."""
         spec = case.spec
         if claim.id == AERODYNAMIC and not measures.is_flight(spec.target, "airliner"):
             return None
-        changes = self.sets(interpretation)
+        changes = self.settings(interpretation)
         if claim.id != AERODYNAMIC:
             changes["target"] = FLIGHTS.get(interpretation["flight"], spec.target)
         period = spec.sensor.scan_period_s
-        interpretation = self.bearing(interpretation, claim.id)
+        interpretation = self.restricted_to(interpretation, claim.id)
         changes["filters"] = tuple(_changed(one, interpretation, period) for one in spec.filters)
         return replace(case, spec=spec.model_copy(update=changes))
 
@@ -73,7 +73,7 @@ class Flown(measures.Evidence):
 
     def __init__(self, seen: ChangedResults):
         super().__init__(seen.results, seen.tables, seen.places)
-        self._ran = {one.name: one for one in seen.ran}
+        self._ran = {one.name: one for one in seen.run_results}
 
     def stage(self, key: Any, name: str) -> int:
         """The number of a stage of a flight."""

@@ -38,7 +38,7 @@ class Interpretations(PaperInterpretations):
     paper = "P1"
     choices = load_choices(Path(__file__).with_name("interpretations.yaml"))
 
-    def exact(self, claim: Claim, interpretation: Interpretation) -> bool:
+    def is_exact(self, claim: Claim, interpretation: Interpretation) -> bool:
         return True
 
     def parts(self, claim: Claim, interpretation: Interpretation) -> Sequence[Part]:
@@ -51,7 +51,7 @@ class Interpretations(PaperInterpretations):
             ]
         if claim.id not in FALLING:
             return claim.parts
-        wide = same(0, 100 * self.sets(interpretation)["within"])
+        wide = same(0, 100 * self.settings(interpretation)["within"])
         meant = [part for part in claim.parts if interpretation["curves_of"] == EACH or part.cases == (2,)]
         return [replace(part, expected=wide) for part in meant]
 
@@ -119,7 +119,7 @@ class ExactEvidence(measures.Evidence):
 
     def __init__(self, interpretation: Interpretation):
         super().__init__((), {}, {})
-        self._interpretation, self._sets = interpretation, Interpretations().sets(interpretation)
+        self._interpretation, self._sets = interpretation, Interpretations().settings(interpretation)
         self._limit_s: float = self._sets.get("limit_s", np.inf)
         self.extremum = self._sets["extremum"]
         shown = interpretation["shown_variance"]

@@ -13,7 +13,7 @@ from radarsim.papers.discriminator.interpretations import PRINTED_PRIOR, ExactEv
 from radarsim.papers.interpretations import ImpossibleInterpretation
 from radarsim.papers.study_claims import claims_of
 from radarsim.papers.verdict_rule import CONFIRMED, REFUTED
-from radarsim.papers.verdicts_by_interpretation import judge_under
+from radarsim.papers.verdicts_by_interpretation import judge_claim
 from radarsim.studies import registry
 from radarsim.studies.discriminator import study
 from tests.tolerances import rounding, scaled_condition
@@ -28,13 +28,13 @@ def cases():
 
 
 def test_the_default_interpretation_is_the_config_as_printed(cases):
-    changed = OF.changed(CLAIMS["P4.6"], cases[2.25], OF.interpretation())
+    changed = OF.changed_case(CLAIMS["P4.6"], cases[2.25], OF.interpretation())
     printed = cases[9.0].spec
     assert changed.spec.burst == printed.burst
     assert changed.spec.prior == printed.prior
     thresholds = [one.main_lobe_threshold for one in changed.spec.estimators if one.name in ("sequence", "wide")]
     assert thresholds == [0.5, 0.5]
-    assert OF.changed(CLAIMS["P4.6"], cases[9.0], OF.interpretation()) is None  # one case an interpretation
+    assert OF.changed_case(CLAIMS["P4.6"], cases[9.0], OF.interpretation()) is None  # one case an interpretation
 
 
 @pytest.mark.slow
@@ -69,7 +69,7 @@ def test_the_probability_of_a_miss_is_that_of_the_prepared_case(cases):
 
 def test_other_windows_go_into_the_config(cases):
     interpretation = OF.interpretation(curvature="as printed")
-    changed = OF.changed(CLAIMS["P4.4"], cases[2.25], interpretation)
+    changed = OF.changed_case(CLAIMS["P4.4"], cases[2.25], interpretation)
     wanted = np.array(windows(ExactEvidence(interpretation)._version)) * 1e-5
     of = {one.name: one for one in changed.spec.estimators}
     np.testing.assert_allclose(of["sequence"].schedule, wanted, rtol=rounding(operations=2))
@@ -84,7 +84,7 @@ def test_a_window_that_does_not_exist_says_why():
 
 def test_the_sweeps_follow_the_interpretations_noise():
     cases = load("discriminator_maps").cases
-    kept = [OF.changed(CLAIMS["P4.9"], case, OF.interpretation()) for case in cases]
+    kept = [OF.changed_case(CLAIMS["P4.9"], case, OF.interpretation()) for case in cases]
     noises = sorted(case.spec.burst.noise_variance for case in kept if case is not None)
     assert noises == [9.0, 288.0]  # 2.25 and 72, four times
     assert all(case.spec.prior.sigma == PRINTED_PRIOR for case in kept if case is not None)
@@ -104,7 +104,7 @@ def classes(claim):
     found = {}
     varied = [choice for choice in OF.choices if choice.key in ("noise_variance", "threshold", "lobe", "forecast")]
     for interpretation in OF.combined(varied):
-        seen = judge_under(OF, CLAIMS[claim], interpretation, ExactEvidence(interpretation))
+        seen = judge_claim(OF, CLAIMS[claim], interpretation, ExactEvidence(interpretation))
         found.setdefault((interpretation["threshold"], interpretation["lobe"]), set()).add(seen.outcome.kind)
     return found
 

@@ -64,5 +64,5 @@ def test_what_the_paper_reports_of_others_is_judged_and_not_counted(transition):
     own = [row for row in parts if row["claim"] == "P2.12"]
     assert {row["class"] for row in own} == {REFUTED}
     assert is_extension(own)
-    assert "P2.12" in [claim for claim in CLAIMS if Interpretations().of_claim(claim)]
+    assert "P2.12" in [claim for claim in CLAIMS if Interpretations().for_claim(claim)]
     assert count_classes(own) == ({}, 1)

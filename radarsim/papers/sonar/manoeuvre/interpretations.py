@@ -31,10 +31,10 @@ class Interpretations(PaperInterpretations):
     choices = load_choices(Path(__file__).with_name("interpretations.yaml"))
     realisations = 5000
 
-    def exact(self, claim: Claim, interpretation: Interpretation) -> bool:
-        return claim.id in (ENOUGH, SINGLE) or "plots" in self.sets(interpretation)
+    def is_exact(self, claim: Claim, interpretation: Interpretation) -> bool:
+        return claim.id in (ENOUGH, SINGLE) or "plots" in self.settings(interpretation)
 
-    def of_claim(self, claim: str) -> list[Interpretation]:
+    def for_claim(self, claim: str) -> list[Interpretation]:
         """All combinations of the choices that bear on a claim."""
         return list(self.combined([choice for choice in self.choices if choice.bears_on(claim)]))
 
@@ -43,7 +43,7 @@ class Interpretations(PaperInterpretations):
             plots, criterion = _enough(interpretation["high_accuracy"])
             return [replace(part, what=criterion, measure=lambda seen: exact_number(plots)) for part in claim.parts]
         if claim.id == SINGLE:
-            strength = self.sets(interpretation)["shift"]
+            strength = self.settings(interpretation)["shift"]
             probability = float(exact.detection(1.0, strength))
             what = f"alarms a test at k = 1, five plots, acceleration of {strength:g} σ_a"
             if strength == 1:
@@ -52,21 +52,21 @@ class Interpretations(PaperInterpretations):
                 replace(part, what=what, measure=lambda seen: exact_number(probability), exact=None)
                 for part in claim.parts
             ]
-        if claim.id == SWITCHES and "plots" in self.sets(interpretation):
-            return [_switched(part, interpretation["memory"], **self.sets(interpretation)) for part in claim.parts]
+        if claim.id == SWITCHES and "plots" in self.settings(interpretation):
+            return [_switched(part, interpretation["memory"], **self.settings(interpretation)) for part in claim.parts]
         asserted = [part for part in claim.parts if part.asserted]
         return (
-            [_delay(part, interpretation["seen"], self.sets(interpretation)["rate"]) for part in asserted]
+            [_delay(part, interpretation["seen"], self.settings(interpretation)["rate"]) for part in asserted]
             if claim.id == DETECTS
             else asserted
         )
 
-    def changed(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
+    def changed_case(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
         """The weakest and the strongest manoeuvre of the sweep, tested and followed as an interpretation says."""
         target = case.spec.target
         if abs(target.acceleration_mps2) not in STRENGTHS:
             return None
-        taken = self.sets(interpretation)
+        taken = self.settings(interpretation)
         changes: dict[str, Any] = {"target": target.model_copy(update={"end_s": target.start_s + taken["lasts_s"]})}
         if interpretation["tests"] == "batches":
             changes["detectors"] = tuple(

@@ -14,7 +14,7 @@ CLAIMS = {one.id: one for one in claims_of(STUDY).claims}
 
 def values(claim, **taken):
     interpretation = OF.interpretation(**taken)
-    assert OF.exact(CLAIMS[claim], interpretation)
+    assert OF.is_exact(CLAIMS[claim], interpretation)
     seen = OF.evidence(CLAIMS[claim], interpretation, None, claims_of(STUDY))
     return [part.measure(seen).value for part in OF.parts(CLAIMS[claim], interpretation)]
 
@@ -56,16 +56,16 @@ def test_switching_within_the_papers_own_six_plots():
 
 def test_cases_are_changed_as_a_interpretation_says():
     cases = load("sonar_manoeuvre").cases
-    assert not OF.exact(CLAIMS["P3.8"], OF.interpretation())
+    assert not OF.is_exact(CLAIMS["P3.8"], OF.interpretation())
     taken = OF.interpretation(tests="batches", manoeuvre="80 s")
-    changed = [one for one in (OF.changed(CLAIMS["P3.8"], case, taken) for case in cases) if one is not None]
+    changed = [one for one in (OF.changed_case(CLAIMS["P3.8"], case, taken) for case in cases) if one is not None]
     assert sorted(abs(one.spec.target.acceleration_mps2) for one in changed) == [0.1, 0.8]
     for one in changed:
         assert one.spec.target.end_s - one.spec.target.start_s == 80
         own = [d for d in one.spec.detectors if d.name == f"{d.plots} plots"]
         assert own
         assert all(d.test_every == d.plots for d in own)
-    faster = OF.changed(CLAIMS["P3.10"], cases[-1], OF.interpretation(switching_false_alarms="0.1"))
+    faster = OF.changed_case(CLAIMS["P3.10"], cases[-1], OF.interpretation(switching_false_alarms="0.1"))
     rates = {f.name: f.detector.false_alarm_probability for f in faster.spec.filters if f.detector}
     assert set(rates.values()) == {0.1}
 
@@ -85,7 +85,7 @@ def test_more_plots_can_be_worth_while_under_a_interpretation(tmp_path, monkeypa
     taken = OF.interpretation(false_alarms="0.01", manoeuvre="80 s", seen="beginning", tests="sliding")
     monkeypatch.setattr(type(OF), "of_claim", lambda self, claim: [self.interpretation(), taken])
     done = judge_requests(judging_requests(["P3.8"]), out=tmp_path, realisations=200, figures=False)
-    shipped, other = done.read[0].over[0].under
+    shipped, other = done.papers[0].claims[0].verdicts
     weak = [one.parts[4][1] for one in (shipped, other)]
     assert all(one.parts[4][0].unit == "%" for one in (shipped, other))
     assert -100 < weak[1].measured < -10 < weak[0].measured < 100
