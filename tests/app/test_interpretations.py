@@ -73,7 +73,7 @@ def test_a_verdict_is_that_of_the_rule_on_the_table(first):
         assert found.holds_in == sum(one == CONFIRMED for one in by_interpretation.values())
         assert over.sentence().startswith(f"holds in {found.holds_in} of {found.interpretations} interpretations")
         if found.depends_on:
-            assert f"depends on {over.of.list_choices(found.depends_on)}" in over.sentence()
+            assert f"depends on {over.interpretations.list_choices(found.depends_on)}" in over.sentence()
 
 
 def test_the_classes_of_the_first_paper_are_those_that_are_shipped(first):

@@ -211,12 +211,12 @@ def notes_beside_exact_values(right):
     return lambda table: right(table) & False
 
 
-@fault("report.claims.rule:level", "report/test_claims_rule.py::test_level_is_of_all_parts")
+@fault("papers.verdict_rule:widening_factor", "report/test_claims_rule.py::test_level_is_of_all_parts")
 def each_part_judged_as_if_alone(right):
     return lambda parts: right(1)
 
 
-@fault("report.claims.rule:ends", "report/test_claims_rule.py::test_exact_first")
+@fault("papers.verdict_rule:judged_interval", "report/test_claims_rule.py::test_exact_first")
 def exact_values_judged_by_their_sample(right):
     return lambda part, parts=1: right(dataclasses.replace(part, exact=float("nan")), parts)
 
