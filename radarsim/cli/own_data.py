@@ -44,14 +44,13 @@ def new(name: str, like: str) -> None:
 @main.command(name="new-study")
 @click.argument("name", metavar="NAME")
 @click.option("--step", is_flag=True, help="For nonlinear filters: you write the step of one realisation.")
-@click.option("--folder", is_flag=True, help="A study in several files, for what the base classes do not cover.")
-def new_study(name: str, step: bool, folder: bool) -> None:
+def new_study(name: str, step: bool) -> None:
     """Write a package with a small study, to make your own: ./NAME.
 
     It compares two filters on a random walk: one file with keys, matrices, claims and a reading, from which kernel,
     exact values, tables, figures and recorded plots follow; a config; a test. With --step the filters are functions of
-    one plot and may be nonlinear. With --folder each part is a separate file. Comments `Yours: …` mark the places to
-    edit. Once installed, the study works like the shipped ones. Nothing is ever overwritten.
+    one plot and may be nonlinear. Comments `Yours: …` mark the places to edit. Once installed, the study works like
+    the shipped ones, which are examples of studies in several files. Nothing is ever overwritten.
 
     \b
     Example
@@ -62,13 +61,12 @@ def new_study(name: str, step: bool, folder: bool) -> None:
     from radarsim.app.reproduce import new_study as write
     from radarsim.cli import console
 
-    if step and folder:
-        raise click.UsageError("--step and --folder do not go together: give one of them")
-    path = write(name, form="step" if step else "folder" if folder else "linear")
-    guide = path / "README.md" if folder else path / "src" / name / "__init__.py"
+    path = write(name, form="step" if step else "linear")
+    values = {"path": str(path), "name": name, "guide": str(path / "src" / name / "__init__.py")}
     console.field("package", str(path))
-    told = {"path": str(path), "name": name, "guide": str(guide)}
-    console.field("", tr("`pip install -e {path}`, then `radarsim run {name}`; {guide} explains what to edit", **told))
+    console.field(
+        "", tr("`pip install -e {path}`, then `radarsim run {name}`; {guide} explains what to edit", **values)
+    )
 
 
 @main.command()

@@ -3,7 +3,6 @@
 import inspect
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -29,20 +28,11 @@ FILES = {  # of the parts that are functions: the file
 }
 
 
-def template():
-    sys.path.insert(0, str(ROOT / "radarsim/app/template/src"))
-    try:
-        return import_module("random_walk").STUDY
-    finally:
-        del sys.path[0]
-
-
-FOLDERS = [study for study in map(registry.study, registry.SHIPPED) if isinstance(study, StudyFolder)] + [template()]
+FOLDERS = [study for study in map(registry.study, registry.SHIPPED) if isinstance(study, StudyFolder)]
 
 
 @pytest.mark.parametrize("study", FOLDERS, ids=lambda study: study.name)
-def test_every_part_is_there_and_takes_what_the_interface_gives(study, monkeypatch):
-    monkeypatch.syspath_prepend(ROOT / "radarsim/app/template/src")
+def test_every_part_is_there_and_takes_what_the_interface_gives(study):
     for part, file in FILES.items():
         if part in study.offers or part in Study.__abstractmethods__:
             given = list(inspect.signature(getattr(Study, part)).parameters)[1:]
