@@ -39,7 +39,6 @@ ROOMS = {
     "studies.radial": ("errors", "constants", "physics"),
     "studies.floor": (*DATA, "report", "studies.interface"),
     "studies.interface": ("errors", *CASE, *DATA, "report", "studies.floor"),
-    "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "report.quantities", "studies.interface"),
     "studies.onefile": (
         "errors",
         "failures",
@@ -115,14 +114,13 @@ ROLES = {
             *CASE,
             *DATA,
             "studies.interface",
-            "studies.folder",
             "studies.floor",
             "language",
             "report.claims",
             "report.drawing",
             "report.quantities",
         ),
-        (*READ, "track", "__init__"),
+        (*READ, "track", "chart", "floor", "__init__"),
     ),
 }
 

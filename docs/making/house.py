@@ -54,7 +54,7 @@ def room_of(module: str) -> str | None:
         return parts[1] if parts[1] in ABOUT else None
     if len(parts) > 2 and parts[2] in ABOUT:
         return parts[2]
-    return "interface" if parts[2:3] in (["noise"], ["folder"], ["radial"], ["floor"]) else "registry"
+    return "interface" if parts[2:3] in (["noise"], ["radial"], ["floor"]) else "registry"
 
 
 def modules() -> Iterator[tuple[str, ast.Module]]:

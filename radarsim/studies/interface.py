@@ -2,12 +2,10 @@
 
 A study is an object of a class derived from `Study`. Its abstract methods are required; the others are optional, with
 the defaults in their docstrings. Methods import what they need when they are called, so that `radarsim list` loads no
-kernels.
+kernels. The shipped studies are examples.
 
 The numbers come from two of them: `prepare` makes a plan of a case, once; `simulate` makes the sums of one block of
-realisations. Everything else derives from these sums.
-
-A study whose files have the usual names need not write the class: see `radarsim.studies.folder`."""
+realisations. Everything else derives from these sums."""
 
 import re
 from abc import ABC, abstractmethod
@@ -16,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from threading import RLock
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from radarsim.errors import ConfigError
 
@@ -60,8 +58,10 @@ class Tracker(Protocol):
     most_rows: how many rows it takes, all at once; None: any number, chunk by chunk in constant memory. several:
     whether rows may have the time of the row before, as plots of one scan do."""
 
-    most_rows: int | None
-    several: bool
+    @property
+    def most_rows(self) -> int | None: ...
+    @property
+    def several(self) -> bool: ...
 
     def feed(self, columns: Mapping[str, "np.ndarray"]) -> "Track":
         """The estimates over the next rows: columns (n,), NaN where a value is missing. Raises PlotFault for a row that
@@ -369,11 +369,6 @@ def paper_in(claims: str) -> str:
     """The key `paper` in the text of a claims.yaml, on a line of its own; else nothing."""
     found = re.search(r"^paper: *([\w-]+) *$", claims, re.MULTILINE)
     return found[1] if found else ""
-
-
-Beside = Literal["readings", "recorded", "shipped", "chart", "shortened", "own_filters", "floor"]
-Costs = Literal["cost", "seconds_per_update", "seconds_at_most"]
-OptionalPart = Literal["curves", "gains", "inputs", Costs, "warnings", "errors", "exact_but_for", "costly", Beside]
 
 
 class Study(ABC):

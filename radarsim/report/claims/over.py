@@ -523,16 +523,6 @@ class Call:
         return float(self(seen).value)
 
 
-def claims_of(file: Callable[[str], ModuleType]) -> Sequence[Claim]:
-    """The claims of a study: of claims.yaml beside its measures, or `CLAIMS` of its module claims; or of this file."""
-    measures = file("measures")
-    written = Path(str(measures.__file__)).with_name("claims.yaml")
-    if written.is_file():
-        return claims_in(written, measures)
-    claims: Sequence[Claim] = file("claims").CLAIMS
-    return claims
-
-
 @cache
 def claims_in(file: Path, *measures: ModuleType) -> tuple[Claim, ...]:
     """The claims of a file, measured by functions of these modules; raises ConfigError, one line for each fault."""
