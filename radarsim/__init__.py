@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from radarsim.app.compare import chart, compare
     from radarsim.app.judge import judge
     from radarsim.app.outlook import check
-    from radarsim.app.own_data import fit, plots, read_plots, register, simulate, track
     from radarsim.app.readings import readings
     from radarsim.app.result import Result
     from radarsim.app.run import claims, run
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from radarsim.app.solve import solve
     from radarsim.app.tune import tune
     from radarsim.errors import ConfigError, RadarsimError
+    from radarsim.recorded.python import fit, plots, read_plots, register, simulate, track
 
 __version__ = "0.3.0"
 __all__ = [
@@ -57,7 +57,7 @@ __all__ = [
 
 _HOMES = {
     **{"judge": "app.judge:judge", "tune": "app.tune:tune", "run": "app.run:run", "Result": "app.result:Result"},
-    **{name: f"app.own_data:{name}" for name in ("fit", "plots", "read_plots", "register", "simulate", "track")},
+    **{name: f"recorded.python:{name}" for name in ("fit", "plots", "read_plots", "register", "simulate", "track")},
     **{"chart": "app.compare:chart", "check": "app.outlook:check", "claims": "app.run:claims"},
     **{"compare": "app.compare:compare", "load": "app.run:stored_result", "readings": "app.readings:readings"},
     **{"sensitivity": "app.sensitivity:sensitivity", "solve": "app.solve:solve"},

@@ -71,16 +71,20 @@ ROOMS = {
     ),
     "studies.sources": ("config", "module_sources", "studies.registry", "studies.user_code_sources"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry", "studies.sources"),
-    "recorded": ("errors", "threads", "config", "language", "engine", "kernels", "physics", "report", "studies"),
     "app": (
         *("errors", "threads", "private_files", "config", "language", "engine", "kernels", "physics", "report"),
-        *("studies", "recorded"),
+        "studies",
     ),
+    "extensions": (),
     "cli": (
-        *("errors", "config", "language", "engine", "kernels", "physics", "report", "studies", "recorded", "app"),
-        *("__init__", "threads"),
+        *("errors", "config", "language", "engine", "kernels", "physics", "report", "studies", "app"),
+        *("__init__", "extensions", "threads"),
     ),
-    "__init__": ("errors", "app"),
+    "recorded": (
+        *("errors", "threads", "config", "language", "engine", "kernels", "physics", "report", "studies"),
+        *("app", "cli", "extensions"),
+    ),
+    "__init__": ("errors", "app", "recorded"),
     "__main__": ("cli",),
 }
 
@@ -129,14 +133,14 @@ LIBRARIES = {  # library: the files and rooms that may import it
     "matplotlib": {"report/figures.py"},
     "dask": {"engine/cluster.py"},
     "distributed": {"engine/cluster.py"},
-    "click": {"cli"},
+    "click": {"cli", "recorded/commands.py"},
     "rich": {"cli/console.py"},
     "jinja2": {"report/html.py"},
     "numba": {"kernels/compile.py", "kernels/lanes.py", "kernels/numba_internals.py", "kernels/numba_options.py"},
     "llvmlite": {"kernels/lanes.py", "kernels/numba_internals.py"},
     "pydantic": {"config", "studies/*/config.py"},
     "pydantic_core": {"config/check.py", "config/fields.py", "config/load.py"},
-    "pandas": {"report/tables.py", "report/precision.py", "app/own_data.py", "app/judge.py"},
+    "pandas": {"report/tables.py", "report/precision.py", "app/judge.py", "recorded/python.py"},
 }
 
 
@@ -274,7 +278,8 @@ PLANTED = [
     ("engine.results", "radarsim.report.tables"),
     ("kernels.linear", "radarsim.physics"),
     ("report.panels", "radarsim.studies.sonar.study"),
-    ("recorded.follow", "radarsim.cli.console"),
+    ("app.judge", "radarsim.recorded.follow"),
+    ("cli.design", "radarsim.recorded.fit"),
     ("studies.range_doppler.kernels.missed", "radarsim.studies.range_doppler.filters"),
     ("kernels.traced", "radarsim.failures"),
     ("studies.range_doppler.config", "radarsim.studies.range_doppler.filters"),

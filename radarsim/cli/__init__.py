@@ -2,16 +2,21 @@
 
 import gc
 import os
+from importlib import import_module
 
-from radarsim.cli import design, experiments, maintenance, own_data
+from radarsim.cli import create, design, experiments, maintenance
 from radarsim.cli.group import main
 from radarsim.cli.streams import tolerant_output
+from radarsim.extensions import extensions
 
 # Matrices here are of a few rows: where other processes run too, a second thread of OpenBLAS made a Riccati equation
 # cost 15 times its processor time. It reads this when NumPy loads it, which is not yet.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-__all__ = ["design", "entry", "experiments", "main", "maintenance", "own_data", "papers"]
+__all__ = ["create", "design", "entry", "experiments", "main", "maintenance", "papers"]
+
+for module in filter(None, (extension.command_module for extension in extensions())):
+    import_module(module)  # adds commands to `main`
 
 
 def entry() -> None:

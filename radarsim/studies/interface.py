@@ -547,7 +547,7 @@ class Study(ABC):
         return None
 
     # ---- beside --------------------------------------------------------------------------------------------------
-    def recorded(self) -> RecordedPlots | None:
+    def recording_interface(self) -> RecordedPlots | None:
         """Its part for recorded plots. Default: nothing; `track` and `simulate` refuse its configs."""
         return None
 

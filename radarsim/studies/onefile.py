@@ -373,7 +373,7 @@ class OneFile(Study):
         """As `RecordedPlots.likelihood`. Default: not known."""
         return None
 
-    def recorded(self) -> RecordedPlots | None:
+    def recording_interface(self) -> RecordedPlots | None:
         drawing, tracker = self.drawing, self.tracker
         return Recorded(self, drawing, tracker) if self.measured and drawing and tracker else None
 

@@ -358,7 +358,7 @@ def first_plots(study: "Study", case: Case, count: int) -> Plots:
 
 def drawing(study: "Study", case: Case) -> "Draw":
     """What draws the plots of a case; raises ConfigError for a study without any."""
-    recorded = study.recorded()
+    recorded = study.recording_interface()
     if recorded is None:
         raise ConfigError(f"{case.name}: study {study.name} draws no plots that a filter from outside could take")
     return recorded.drawing(case)
@@ -366,7 +366,7 @@ def drawing(study: "Study", case: Case) -> "Draw":
 
 def world_of(study: "Study", case: Case, drawn: "Drawn", components: tuple[tuple[str, str], ...]) -> World:
     """What a filter over these plots may know, of a state with these components."""
-    recorded = study.recorded()
+    recorded = study.recording_interface()
     keys = {} if recorded is None else recorded.sigmas(case.spec)
     stated = {one.rpartition("sigma_")[2]: one for of in keys.values() for one in of}
     sigma = {name: attrgetter(stated[name])(case.spec) for name in drawn.columns if name in stated}

@@ -20,7 +20,7 @@ class Frozen(RangeDoppler):
 
         return Keys
 
-    def recorded(self):
+    def recording_interface(self):
         from frozen.track import Recorded
 
         return Recorded()

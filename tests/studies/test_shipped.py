@@ -31,7 +31,7 @@ def test_keys_claims_and_recorded_plots_are_of_the_declared_types(study):
     assert isinstance(claims, PaperClaims)
     assert issubclass(claims.evidence, Evidence)
     assert {claim.id.partition(".")[0] for claim in claims.claims} == {study.paper_key()}
-    assert isinstance(study.recorded(), RecordedPlots | None)
+    assert isinstance(study.recording_interface(), RecordedPlots | None)
 
 
 def test_declared_studies_load_nothing_that_computes():

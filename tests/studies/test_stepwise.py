@@ -195,7 +195,7 @@ def test_what_the_study_knows_exactly_and_what_its_filters_believe_stands_in_tab
 def test_the_plots_of_a_realisation_followed_in_plain_python_are_what_the_run_made(sensor):
     study = Walk()
     case, i = case_of(study, **sensor), 1029
-    plots = study.recorded().simulated(case, i)
+    plots = study.recording_interface().simulated(case, i)
     assert list(plots) == ["t_s", "x_m", "drift_m", "true_x_m"]
     missed = np.isnan(plots["x_m"])
     assert not missed[0]
@@ -215,7 +215,7 @@ def test_a_filter_without_a_covariance_is_told_of_beside_recorded_plots():
     """Its errors, and that it is not tested."""
     study = Walk()
     case = case_of(study)
-    columns = dict(study.recorded().simulated(case, 1))
+    columns = dict(study.recording_interface().simulated(case, 1))
     track, found = study.tracker(case).feed(columns), Followed(case)
     truth = {name: columns.pop(name) for name in list(columns) if name.startswith("true_")}
     found.take(columns, track)
@@ -230,7 +230,7 @@ def test_a_filter_without_a_covariance_is_told_of_beside_recorded_plots():
 def test_missed_plots_are_missed_as_often_as_stated():
     study = Walk()
     case = case_of(study, detection_probability=0.6)
-    missed = [np.isnan(study.recorded().simulated(case, i)["x_m"][1:]).mean() for i in range(0, 400, 4)]
+    missed = [np.isnan(study.recording_interface().simulated(case, i)["x_m"][1:]).mean() for i in range(0, 400, 4)]
     assert abs(np.mean(missed) - 0.4) < 4.5 * np.sqrt(0.24 / (100 * (SCANS - 1)))
 
 

@@ -113,7 +113,7 @@ class AmbiguousDoppler(Study):
 
         return words.warnings(experiment)
 
-    def recorded(self) -> "Recorded":
+    def recording_interface(self) -> "Recorded":
         from radarsim.studies.ambiguous_doppler.track import Recorded
 
         return Recorded()

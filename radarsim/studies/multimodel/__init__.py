@@ -107,7 +107,7 @@ class MultiModel(Study):
 
         return words.answer(results, made)
 
-    def recorded(self) -> "Recorded":
+    def recording_interface(self) -> "Recorded":
         from radarsim.studies.multimodel.track import Recorded
 
         return Recorded()

@@ -134,7 +134,7 @@ class RangeDoppler(Study):
 
         return words.answer(results, made)
 
-    def recorded(self) -> "Recorded":
+    def recording_interface(self) -> "Recorded":
         from radarsim.studies.range_doppler.track import Recorded
 
         return Recorded()

@@ -304,7 +304,7 @@ class Sonar(Study):
         answers = (part.answer(members, made) for part, members in reversed(by_part(results)))
         return [sentence for answer in answers for sentence in answer]
 
-    def recorded(self) -> "RecordedPlots":
+    def recording_interface(self) -> "RecordedPlots":
         from radarsim.studies.sonar.track import Recorded
 
         return Recorded(last_part)
