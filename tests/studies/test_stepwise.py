@@ -150,7 +150,7 @@ def test_errors_are_the_exact_ones():
 def test_a_realisation_is_itself_in_any_block(monkeypatch):
     study = Walk()
     case = case_of(study, detection_probability=0.7)
-    monkeypatch.setattr(stepwise, "ROOM", 130)  # two eights at once
+    monkeypatch.setattr(stepwise, "MAX_ROWS", 130)  # two eights at once
     _, together = added(study, case, 40, step=40)
     _, apart = added(study, case, 40, step=3)
     for name, sums in together.items():
