@@ -114,7 +114,7 @@ def measure(pairs: int) -> None:
     """Time all and print."""
     for name, (overrides, count, chunk) in CASES.items():
         case = load(name.split(",")[0], overrides).cases[0]
-        plots = registry.study(case.study).recorded()
+        plots = registry.study(case.study).recording_interface()
 
         def ours(plots=plots, case=case, count=count, chunk=chunk) -> None:
             for first in range(0, count, chunk):

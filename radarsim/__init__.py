@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from radarsim.app.compare import chart, compare
     from radarsim.app.judge import judge
     from radarsim.app.outlook import check
-    from radarsim.app.own_data import fit, plots, read_plots, register, simulate, track
     from radarsim.app.result import Result
     from radarsim.app.run import run
     from radarsim.app.run import stored_result as load
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
     from radarsim.errors import ConfigError, RadarsimError
     from radarsim.papers.judge_interpretations import interpretations
     from radarsim.papers.list_claims import claims
+    from radarsim.recorded.python import fit, plots, read_plots, register, simulate, track
 
 __version__ = "0.3.0"
 __all__ = [
@@ -58,7 +58,7 @@ __all__ = [
 
 _HOMES = {
     **{"judge": "app.judge:judge", "tune": "app.tune:tune", "run": "app.run:run", "Result": "app.result:Result"},
-    **{name: f"app.own_data:{name}" for name in ("fit", "plots", "read_plots", "register", "simulate", "track")},
+    **{name: f"recorded.python:{name}" for name in ("fit", "plots", "read_plots", "register", "simulate", "track")},
     **{"chart": "app.compare:chart", "check": "app.outlook:check", "claims": "papers.list_claims:claims"},
     **{"compare": "app.compare:compare", "load": "app.run:stored_result"},
     **{"interpretations": "papers.judge_interpretations:interpretations"},

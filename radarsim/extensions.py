@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from radarsim.engine.results import CaseResult
     from radarsim.report.drawing import Figure
 
-MODULES = ("radarsim.papers.extension", "radarsim.recordings.extension")
+MODULES = ("radarsim.papers.extension", "radarsim.recorded.extension")
 
 Tables = Mapping[str, "pd.DataFrame"]
 

@@ -16,11 +16,9 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "radarsim"
-TEMPLATE = PACKAGE / "app/template/src"  # a study of a package of its own, to which the rules of studies apply
 
 STUDIES = sorted(path.name for path in (PACKAGE / "studies").iterdir() if (path / "__init__.py").is_file())
 ON_THE_OUTSIDE = "app/one_file", "app/one_step"  # studies in one file, which stand on what all packages may use
-TEMPLATES = sorted(path.name for path in TEMPLATE.iterdir())
 DATA = ("engine.results",)  # the engine's plain data, which studies fill
 CASE = ("config.experiment", "config.fields")
 ROOMS = {
@@ -65,7 +63,6 @@ ROOMS = {
     ),
     "studies.sources": ("config", "module_sources", "studies.registry", "studies.user_code_sources"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry", "studies.sources"),
-    "recorded": ("errors", "threads", "config", "language", "engine", "kernels", "physics", "report", "studies"),
     "app": (
         *("errors", "extensions", "threads", "private_files", "config", "language", "engine", "kernels", "physics"),
         *("report", "studies", "recorded"),
@@ -85,6 +82,7 @@ ROOMS = {
         ),
         *("report", "studies", "app", "cli"),
     ),
+    "extensions": (),
     "cli": (
         *(
             "errors",
@@ -129,17 +127,8 @@ ROLES = {
     "chart": ((*GROUND, *DATA, "report", "language"), READ),
     "track": ((*GROUND, *DATA, "studies.noise", "studies.interface"), (*SUMS, "track")),
     "__init__": (
-        (
-            *CASE,
-            *DATA,
-            "studies.interface",
-            "studies.folder",
-            "studies.floor",
-            "language",
-            "report.drawing",
-            "report.quantities",
-        ),
-        (*READ, "track", "__init__"),
+        (*CASE, *DATA, "studies.interface", "studies.floor", "language", "report.drawing", "report.quantities"),
+        (*READ, "track", "chart", "floor", "__init__"),
     ),
 }
 
@@ -155,7 +144,7 @@ LIBRARIES = {  # library: the files and rooms that may import it
     "llvmlite": {"kernels/lanes.py", "kernels/numba_internals.py"},
     "pydantic": {"config", "studies/*/config.py"},
     "pydantic_core": {"config/check.py", "config/fields.py", "config/load.py"},
-    "pandas": {"report/tables.py", "report/precision.py", "app/own_data.py", "app/judge.py"},
+    "pandas": {"report/tables.py", "report/precision.py", "app/judge.py", "recorded/python.py"},
 }
 
 
@@ -171,8 +160,6 @@ class Place(NamedTuple):
 def place(module: str) -> Place:
     """The place of a module by its name without `radarsim.`: `studies.sonar.clutter.kernels.tracker`."""
     parts = module.split(".")
-    if parts[0] == "template":
-        return Place("study", ".".join(parts[:2]), "", role(parts[2:]))
     if parts[0] != "studies" or len(parts) == 1:
         return Place(parts[0])
     if parts[1] not in STUDIES:
@@ -225,12 +212,10 @@ CHOOSE = {"studies.sonar"}  # where the variants of a study are chosen
 
 
 def modules() -> dict[str, Path]:
-    """Every module, by its name without `radarsim.`; those of the template by `template.`."""
+    """Every module, by its name without `radarsim.`."""
     found = {named(path.relative_to(PACKAGE)): path for path in sorted(PACKAGE.rglob("*.py"))}
-    apart = tuple(f"{PACKAGE / place}/" for place in ("app/template", *ON_THE_OUTSIDE))
-    found = {name: path for name, path in found.items() if not str(path).startswith(apart)}
-    template = {f"template.{named(path.relative_to(TEMPLATE))}": path for path in sorted(TEMPLATE.rglob("*.py"))}
-    return found | template
+    apart = tuple(f"{PACKAGE / place}/" for place in ON_THE_OUTSIDE)
+    return {name: path for name, path in found.items() if not str(path).startswith(apart)}
 
 
 def named(path: Path) -> str:
@@ -274,9 +259,7 @@ def imported(body: Iterable[ast.stmt]) -> frozenset[str]:
 def ours(module: str) -> str | None:
     """A module of ours by its name here; None for any other."""
     first, _, rest = module.partition(".")
-    if first == "radarsim":
-        return rest or "__init__"
-    return f"template.{module}" if first in TEMPLATES else None
+    return rest or "__init__" if first == "radarsim" else None
 
 
 def faults(module: str, text: str) -> list[str]:
@@ -294,7 +277,7 @@ def test_arrows_point_downwards():
 
 
 def test_every_module_is_looked_at():
-    here = {PACKAGE / "__init__.py", *PACKAGE.rglob("*.py")} - set((PACKAGE / "app/template/tests").rglob("*.py"))
+    here = {PACKAGE / "__init__.py", *PACKAGE.rglob("*.py")}
     here -= {file for place in ON_THE_OUTSIDE for file in (PACKAGE / place).rglob("*.py")}
     assert set(MODULES.values()) == here
     assert {place(module).room for module in MODULES} == {*ROOMS, "studies", "study"}
@@ -320,8 +303,6 @@ PLANTED = [
     ("studies.range_doppler.study", "radarsim.studies.range_doppler.tables"),
     ("studies.multimodel.tables", "radarsim.studies.sonar.tables"),
     ("studies.sonar.manoeuvre.study", "radarsim.studies.sonar.clutter.study"),
-    ("template.random_walk.study", "radarsim.app.run"),
-    ("template.random_walk.study", "random_walk.tables"),
 ]
 
 
@@ -339,9 +320,8 @@ def users() -> dict[str, set[str]]:
     """By library, the files that import it when they run, by their path in the package."""
     found: dict[str, set[str]] = defaultdict(set)
     for module, path in MODULES.items():
-        if not path.is_relative_to(TEMPLATE):
-            for name in imports(text_of(module)).running:
-                found[name.split(".")[0]].add(path.relative_to(PACKAGE).as_posix())
+        for name in imports(text_of(module)).running:
+            found[name.split(".")[0]].add(path.relative_to(PACKAGE).as_posix())
     return found
 
 

@@ -22,7 +22,7 @@ LIBRARIES = (  # most of what commands import
     *("pydantic", "yaml", "click"),
 )
 PARTS = ("app", "cli", "kernels", "report", "studies")  # of radarsim
-APART = ("__main__", "template", "one_file", "one_step", "reproduce")  # no command imports them
+APART = ("__main__", "one_file", "one_step", "reproduce")  # no command imports them
 LIMIT_S = 300
 
 

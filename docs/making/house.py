@@ -13,19 +13,20 @@ from pathlib import Path
 PACKAGE = Path(__file__).parents[2] / "radarsim"
 # Rooms from left to right, a row each. Every room may use `errors`, which is left out.
 ROWS = (
+    ("recorded",),
     ("cli",),
-    ("app", "recorded"),
+    ("app",),
     ("registry",),
     ("range_doppler", "multimodel", "sonar", "discriminator", "ambiguous_doppler", "pulses_to_tracks"),
     ("interface", "report"),
     ("config", "language", "engine", "bursts"),
     ("kernels", "physics"),
 )
-STUDIES = 3  # the row of the papers, which the registry knows by their names
+STUDIES = 4  # the row of the papers, which the registry knows by their names
 ABOUT = {
     "cli": "parse, call, print",
     "app": "run, result, claims …",
-    "recorded": "recorded plots",
+    "recorded": "recorded plots: an extension",
     "registry": "which there are; identity",
     "interface": "what a study is; noise",
     "report": "statistics, charts, page",
@@ -54,7 +55,7 @@ def room_of(module: str) -> str | None:
         return parts[1] if parts[1] in ABOUT else None
     if len(parts) > 2 and parts[2] in ABOUT:
         return parts[2]
-    return "interface" if parts[2:3] in (["noise"], ["folder"], ["radial"], ["floor"]) else "registry"
+    return "interface" if parts[2:3] in (["noise"], ["radial"], ["floor"]) else "registry"
 
 
 def modules() -> Iterator[tuple[str, ast.Module]]:

@@ -29,7 +29,7 @@ PACKAGE = ROOT / "radarsim"
 CATALOGUES = PACKAGE / "language"
 CALLS = {"tr": 1, "term": 1, "plural": 2}  # functions that say messages, and how many texts they take
 SAYING = ("exact_but_for",)  # functions of studies that return a message
-APART = ("app/template", "app/one_file", "app/one_step")  # of other packages
+APART = ("app/one_file", "app/one_step")  # of other packages
 IN_TEMPLATE = re.compile(r'\b(tr|plural)\(((?:"(?:[^"\\]|\\.)*"(?:,\s*)?)+)')
 QUOTED = re.compile(r'"((?:[^"\\]|\\.)*)"')
 

@@ -15,13 +15,13 @@ import numpy as np
 from radarsim.app import configs, run
 from radarsim.app.case_work import CaseWork
 from radarsim.app.configs import Config, Overrides
+from radarsim.config.case_choice import case_choice
 from radarsim.config.check import check
 from radarsim.config.document import Document, Faults, Origin
 from radarsim.config.experiment import Case, Experiment
 from radarsim.config.schema import OwnCode
 from radarsim.errors import ConfigError, DisagreementError, MeasureError, argument
 from radarsim.language import tr
-from radarsim.recorded import follow
 from radarsim.report import statistics
 from radarsim.studies import outside, registry
 from radarsim.studies.interface import TRUE, true_column
@@ -161,7 +161,7 @@ def source(given: Any, name: str, components: tuple[str, ...], one_by_one: bool,
         of = given if hasattr(given, "__qualname__") else type(given)
         return Called(name, given, f"{of.__module__}.{of.__qualname__}", components, one_by_one)
     if len(cases := experiment.cases) > 1:
-        which = follow.choice(experiment, "radarsim judge {} ESTIMATES")
+        which = case_choice(experiment, "radarsim judge {} ESTIMATES")
         raise ConfigError(f"{name}: estimates belong to one case, and there are {len(cases)}: {which}")
     if isinstance(given, Iterator):
         return Chunks(name, given, "iterator", components)

@@ -4,9 +4,9 @@ Two processes share the configs, so that one computes while the other draws: dra
 about as long as computing; the store is safe with both. Configs are taken from both ends of the list: those with
 similar names are mostly of one study, and both processes would compile its kernels at the same time.
 
-`radarsim new-study`: a package with a small complete study. It is a copy of radarsim/app/one_file, with the files of
-radarsim/app/one_step in place of its own, or of radarsim/app/template, under another name; these packages work as they
-stand, and are linted and tested. Nothing is overwritten."""
+`radarsim new-study`: a package with a small complete study. It is a copy of radarsim/app/one_file under another name,
+with --step with the files of radarsim/app/one_step in place of its own; these packages work as they stand, and are
+linted and tested. Nothing is overwritten."""
 
 import os
 import re
@@ -167,8 +167,8 @@ def _stages(done: Sequence[Done]) -> list[str]:
 
 
 # ---- new study -------------------------------------------------------------------------------------------------------
-ONE_FILE, ONE_STEP, TEMPLATE = (Path(__file__).parent / name for name in ("one_file", "one_step", "template"))
-FORMS = {"linear": (ONE_FILE,), "step": (ONE_FILE, ONE_STEP), "folder": (TEMPLATE,)}  # files of a later folder win
+ONE_FILE, ONE_STEP = (Path(__file__).parent / name for name in ("one_file", "one_step"))
+FORMS = {"linear": (ONE_FILE,), "step": (ONE_FILE, ONE_STEP)}  # files of a later folder win
 MODULE = "random_walk"  # the name that the templates have
 SUFFIXES = (".md", ".py", ".toml", ".yaml")
 PLAIN = re.compile(r"[a-z][a-z0-9_]{0,39}")

@@ -4,7 +4,7 @@ import gc
 import os
 from importlib import import_module
 
-from radarsim.cli import design, experiments, maintenance, own_data
+from radarsim.cli import create, design, experiments, maintenance
 from radarsim.cli.group import main
 from radarsim.cli.streams import tolerant_output
 from radarsim.extensions import extensions
@@ -13,11 +13,10 @@ from radarsim.extensions import extensions
 # cost 15 times its processor time. It reads this when NumPy loads it, which is not yet.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-__all__ = ["design", "entry", "experiments", "main", "maintenance", "own_data"]
+__all__ = ["create", "design", "entry", "experiments", "main", "maintenance"]
 
-for extension in extensions():
-    if extension.command_module:
-        import_module(extension.command_module)
+for module in filter(None, (extension.command_module for extension in extensions())):
+    import_module(module)  # adds commands to `main`
 
 
 def entry() -> None:

@@ -22,18 +22,26 @@ from radarsim.threads import limited
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-SECTIONS = {
+SECTIONS = {  # of commands in `radarsim --help`; extensions add theirs
     "A question": ("list", "check", "run", "report", "compare"),
     "Your own radar": ("new", "solve", "tune", "sensitivity", "chart", "new-study"),
-    "Your own data": ("import", "register", "simulate", "track", "fit", "judge"),
-    **{title: names for extension in extensions() for title, names in extension.command_sections.items()},
+    "Your own data": ("judge",),
     "Upkeep": ("schema", "compile", "doctor", "clean"),
 }
 OLD_NAMES = {"readings": "interpretations"}  # names of commands in earlier versions, which still work
-ORDER = tuple(name for names in SECTIONS.values() for name in names)
 NO_THREAD = "can't start new thread"  # in Python's words
 PATIENCE_S = 1.0  # from a signal to the end of whatever a command is doing
 SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
+
+
+@functools.cache
+def command_sections() -> dict[str, tuple[str, ...]]:
+    """Titles of the sections of `radarsim --help`, with their commands: those of extensions come first."""
+    sections = dict(SECTIONS)
+    for extension in extensions():
+        for title, names in extension.command_sections.items():
+            sections[title] = (*names, *sections.get(title, ()))
+    return sections
 
 
 class Commands(click.Group):
@@ -50,11 +58,11 @@ class Commands(click.Group):
         return super().get_command(ctx, cmd_name)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return sorted(self.commands, key=ORDER.index)
+        return [name for names in command_sections().values() for name in names]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        width = max(map(len, ORDER))
-        for title, names in SECTIONS.items():
+        width = max(map(len, self.commands))
+        for title, names in command_sections().items():
             rows = [(name.ljust(width), self.commands[name].get_short_help_str(100)) for name in names]
             with formatter.section(title):
                 formatter.write_dl(rows)

@@ -2,15 +2,14 @@
 
 import math
 import os
-import sys
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
-from radarsim.cli.console import broken, command, counted_cases, field, print_warnings, say, show
+from radarsim.cli.console import command, counted_cases, field, print_warnings, say, show
 from radarsim.extensions import extensions
 from radarsim.language import few, listed, numeral, plural, term, tr
-from radarsim.report.wording import interval, known, labelled, printable, shown, significant_digits, with_unit
+from radarsim.report.wording import known, shown, significant_digits, with_unit
 from radarsim.report.wording import unit as unit_of
 
 if TYPE_CHECKING:
@@ -27,10 +26,6 @@ if TYPE_CHECKING:
     from radarsim.app.solve import Answer
     from radarsim.app.tune import Tuned
     from radarsim.config.experiment import Experiment
-    from radarsim.recorded.fit import Advice, Fit, Fitted
-    from radarsim.recorded.follow import Followed
-    from radarsim.recorded.page import Judged
-    from radarsim.recorded.register import Registration
     from radarsim.report.quantities import Quantity
 
 
@@ -393,107 +388,3 @@ def _change(row: "dict[Hashable, Any] | None", of: "Quantity") -> str:
     value, lo, hi = (row[name] for name in of.changes)
     text = f"{shown(value, '+.3g')}{' %' * (of.changed_unit == '%')}"
     return text if row["exact"] else f"{text} [{shown(lo, '+.2g')}, {shown(hi, '+.2g')}]"
-
-
-# ---- recorded plots --------------------------------------------------------------------------------------------------
-def echo(rows: Iterable[Sequence[str]]) -> None:
-    """Rows of CSV to the terminal; names with a comma or a quote are quoted as in a file."""
-    import csv
-
-    csv.writer(sys.stdout, lineterminator="\n").writerows(rows)
-
-
-def report(followed: "Followed", judged: "Sequence[Judged]", advised: "Advice | None", stderr: bool = False) -> None:
-    """Print the results; to stderr where the track itself goes to stdout. advised: where a likelihood is known."""
-    from radarsim.recorded import page
-
-    stream = sys.stderr if stderr else sys.stdout
-    for line in page.rows(followed):
-        write(stream, line)
-    for title, rows in ((page.ERRORS, page.errors(followed)), (page.TESTS, page.tests(judged))):
-        if rows:
-            forms = [page.NUMBERS.get(name) for name in rows[0]]
-            texts = [
-                [known(cell, form) if form else cell for cell, form in zip(row.values(), forms, strict=True)]
-                for row in rows
-            ]
-            show(tr(title), list(rows[0]), texts, list(page.NUMBERS), stream=stream)
-    for line in (*page.findings(judged), *page.verdict(followed, judged, advised)):
-        write(stream, line)
-
-
-def write(stream: TextIO, line: str) -> None:
-    """A line, to a terminal broken between words."""
-    for part in broken(printable(line), stream):
-        stream.write(part + "\n")
-
-
-def report_fit(found: "Fit") -> None:
-    """Print a fit, and the options that put it into the config."""
-    from radarsim.recorded import fit, page
-
-    tracks = plural("{count} track", "{count} tracks", found.tracks)
-    told = tr("{rows} of {tracks}; filter {filter}", rows=page.counted(found.rows), tracks=tracks, filter=found.filter)
-    lines = [labelled("plots", told)]
-    if found.doubles:
-        words = plural("{count} plot", "{count} plots", found.doubles)
-        words = tr("{plots} left out: the same scan has one nearer to the track", plots=words)
-        lines.append(labelled("doubles", words))
-    plain = {} if found.plain is None else {one.key: one for one in found.plain.keys}
-    for one in found.keys:
-        line = f"{one.key}: {_known(one)}"
-        if one.key != fit.CORRELATION_TIME:
-            line += tr(", stated {stated}", stated=significant_digits(one.stated))
-        if one.key in plain:
-            line += tr(", plain {value}", value=_known(plain[one.key]))
-        if not one.identifiable:
-            line += (
-                tr("; the plots cannot distinguish it from zero")
-                if one.lo == 0
-                else tr("; the plots cannot distinguish it from larger values")
-            )
-        lines.append(line)
-    if found.outliers is not None:
-        lines.append(tr("outliers: {share} % of the plots", share=significant_digits(100 * found.outliers, "#.2g")))
-    settings = " ".join(f"--set {key}={value:g}" for key, value in fit.settings(found).items())
-    if found.beside is not None:
-        lines.append(labelled("", tr("the intervals are not valid: {what}", what=page.what(*found.beside[:2]))))
-    if found.plain is not None:
-        words = tr("plain: of errors that are normal and independent")
-        if found.plain.beside is not None:
-            words = tr("{words}; the plots contradict that, so those intervals are too narrow", words=words)
-        lines.append(labelled("", words))
-    so = page.times(found.gain)
-    words = tr("with these values the plots are {times} times as likely as with the stated ones", times=so)
-    lines.append(labelled("", words))
-    if settings:
-        lines.append(labelled("", tr("to use the fitted values: {settings}", settings=settings)))
-    for line in lines:
-        write(sys.stdout, line)
-
-
-def _known(one: "Fitted") -> str:
-    """A value with its interval."""
-    hi = tr("no upper bound") if one.hi == float("inf") else significant_digits(one.hi)
-    return f"{significant_digits(one.value)} {interval(significant_digits(one.lo), hi)}"
-
-
-def report_registration(found: "Registration", other: str) -> None:
-    """Print a registration, and the options that correct the radar's plots."""
-    from radarsim.recorded import identity, register
-
-    plots = plural("{count} plot", "{count} plots", found.plots)
-    by = ", ".join(f"{kind} {count}" for kind, count in found.by.items())
-    told = {"plots": plots, "matched": found.matched, "file": other, "by": by}
-    lines = [
-        labelled("plots", tr("{matched} of {plots} have a position of their aircraft in {file} (by {by})", **told))
-    ]
-    apart = tr("{distance} from it (median)", distance=identity.distance(*found.apart))
-    aircraft = tr("{count} aircraft", count=len(found.aircraft))
-    bent = tr("positions in between err by less than {most:.2g} m (95 %)", most=found.bent_m)
-    lines += [labelled("", f"{aircraft}; {apart}; {bent}")]
-    lines += [labelled("", tr("left out: {what}", what=one)) for one in found.left]
-    lines.append(tr("Biases of the plots with 95 % intervals, {file} taken as right", file=other))
-    lines += register.lines(found)
-    for line in lines:
-        write(sys.stdout, line)

@@ -9,7 +9,6 @@ any difference by itself.
 The plots of many realisations in a file: arrays of NumPy (.npz), or one row a plot as Parquet or CSV. Memory does not
 grow with their number."""
 
-import json
 import os
 import shlex
 import zipfile
@@ -22,8 +21,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from radarsim.config import document
-from radarsim.config.experiment import Case, Experiment, in_name
+from radarsim.config.case_choice import case_choice
+from radarsim.config.experiment import Case, Experiment
 from radarsim.config.fields import unknown_to
 from radarsim.config.schema import LARGEST_REALISATIONS
 from radarsim.engine.results import Track
@@ -117,7 +116,6 @@ def unlike(track: Track, other: Track) -> np.ndarray:
 
 # ---- follow ----------------------------------------------------------------------------------------------------------
 GAP = 3.0  # in median intervals
-MOST_NAMED = 12  # configs or values listed where one must be chosen
 BEFORE = 10  # first estimates of a filter, which are not compared with the truth
 SAMPLE, BLOCK = 5000, 100  # rows of a track kept for the advice, in blocks that follow each other
 BY_ROW = ("estimate", "sigma", "probability", "residual", "nis", "score", "residual_sigma")  # arrays (F, n, …)
@@ -125,7 +123,7 @@ BY_ROW = ("estimate", "sigma", "probability", "residual", "nis", "score", "resid
 
 def recorded_of(case: Case) -> RecordedPlots:
     """The recorded-plots interface of a case's study, which `one_case` has checked for."""
-    found = study(case.study).recorded()
+    found = study(case.study).recording_interface()
     assert found is not None
     return found
 
@@ -162,46 +160,13 @@ def one_case(experiment: Experiment, what: str, command: str) -> Case:
     place = experiment.path or experiment.stem
     if len(experiment.cases) > 1:
         count = len(experiment.cases)
-        raise ConfigError(f"{place}: must be one case to {what}, got {count}; {choice(experiment, command)}")
+        raise ConfigError(f"{place}: must be one case to {what}, got {count}; {case_choice(experiment, command)}")
     (case,) = experiment.cases
-    if study(case.study).recorded() is None:
+    if study(case.study).recording_interface() is None:
         if what == "simulate":
             raise ConfigError(f"{place}: study: {case.study} draws no plots: its filters take bursts of pulses")
         raise ConfigError(f"{place}: study: {case.study} has no filters for recorded plots")
     return case
-
-
-def choice(experiment: Experiment, command: str) -> str:
-    """The cases to choose from, and the command for the first: configs put together, or swept values."""
-    stems = list(dict.fromkeys(case.stem for case in experiment.cases))
-    if len(stems) > 1 and experiment.changes_included:
-        return f"choose one of {listed(stems)}: {_call(command, experiment.path or '', f'include=[{stems[0]}]')}"
-    if len(stems) > 1:
-        path = str(Path(experiment.path or "").parent / f"{stems[0]}.yaml")
-        return f"choose one of {listed(stems)}: {_call(command, path)}"
-    values: dict[str, list] = {}
-    for case in experiment.cases:
-        for key, value in case.swept:
-            values.setdefault(key, []).append(value)
-    each = {key: list({in_name(value): value for value in found}.values()) for key, found in values.items()}
-    there = "; ".join(f"{key} = {listed([in_name(value) for value in found])}" for key, found in each.items())
-    first = [f"sweep.{key}={json.dumps(found[:1], ensure_ascii=False)}" for key, found in each.items()]
-    return f"choose of {there}: {_call(command, experiment.path or experiment.stem, *first)}"
-
-
-def _call(command: str, path: str, *settings: str) -> str:
-    """A command on a config with settings, or the Python arguments; the config by its stem where that finds it."""
-    file = Path(path)
-    found = document.config_file(file.stem)
-    name = path if file.is_file() and not (found and found.samefile(file)) else file.stem
-    options = "".join(f" --set {shlex.quote(one)}" for one in settings)
-    overrides = f", overrides={list(settings)}" if settings else ""
-    return argument(f"{name!r}{overrides}", f"{command.format(shlex.quote(name))}{options}")
-
-
-def listed(names: list[str]) -> str:
-    """A list of names; if it is very long, its beginning."""
-    return ", ".join([*names[:MOST_NAMED], *(["…"] if len(names) > MOST_NAMED else [])])
 
 
 def simulated(experiment: Experiment, realisation: int = 0) -> dict[str, np.ndarray]:

@@ -2,12 +2,10 @@
 
 A study is an object of a class derived from `Study`. Its abstract methods are required; the others are optional, with
 the defaults in their docstrings. Methods import what they need when they are called, so that `radarsim list` loads no
-kernels.
+kernels. The shipped studies are examples.
 
 The numbers come from two of them: `prepare` makes a plan of a case, once; `simulate` makes the sums of one block of
-realisations. Everything else derives from these sums.
-
-A study whose files have the usual names need not write the class: see `radarsim.studies.folder`."""
+realisations. Everything else derives from these sums."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from threading import RLock
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from radarsim.errors import ConfigError
 
@@ -54,24 +52,26 @@ class Tracker(Protocol):
     """The filters of a case over recorded plots, chunk by chunk.
 
     most_rows: how many rows it takes, all at once; None: any number, chunk by chunk in constant memory. several:
-    whether rows may have the time of the row before, as plots of one scan do."""
+    whether a row may have the same time as the previous one, as plots of one scan do."""
 
-    most_rows: int | None
-    several: bool
+    @property
+    def most_rows(self) -> int | None: ...
+    @property
+    def several(self) -> bool: ...
 
     def feed(self, columns: Mapping[str, "np.ndarray"]) -> "Track":
         """The estimates over the next rows: columns (n,), NaN where a value is missing. Raises PlotFault for a row that
         a filter cannot take."""
 
 
-TRUE = "true_"  # what the names of columns that hold the truth begin with
-IN_NAMES = {"m/s": "mps", "m/s2": "mps2", "rad/s": "radps", "rad/s2": "radps2"}  # units; others stand as they are
+TRUE = "true_"  # prefix of the names of columns that hold the truth
+UNITS_IN_NAMES = {"m/s": "mps", "m/s2": "mps2", "rad/s": "radps", "rad/s2": "radps2"}  # other units stand as they are
 
 
 def true_column(component: str, unit: str) -> str:
     """The column with the true values of a component of the state: `true_Vr_mps`."""
     plain = unit.translate(str.maketrans("²³⁴⁵", "2345"))
-    return f"{TRUE}{component}_{IN_NAMES.get(plain, plain.replace('/', 'p'))}"
+    return f"{TRUE}{component}_{UNITS_IN_NAMES.get(plain, plain.replace('/', 'p'))}"
 
 
 @dataclass(frozen=True)
@@ -100,14 +100,14 @@ def column(columns: "Mapping[str, np.ndarray]", name: str) -> "np.ndarray":
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Drawn:
-    """The plots of n realisations from number `first` on, as a run draws them, and the truth at the times t_s (K,), s.
+    """The plots of n realisations from number `first` on, exactly those of a run, and the truth at times t_s (K,), s.
 
     columns (n, K)  what is measured, by name and unit, not-a-number where missing; (n, K, M) where a scan may have
                     several plots: these come first, the rest is not-a-number, and M is as large as needed
     truth (n, K, C) the true state, its components by name and unit; beside: further columns, true_…, of either shape
 
-    seed: of the noise; world: what a filter may know beforehand, a `World`. So a function that `radarsim.judge` takes
-    can be called with these: it reads `plots["range_m"]`, t_s, world. Arrays may be views that cannot be written."""
+    seed: of the noise; world: what a filter may know beforehand, a `World`. A function for `radarsim.judge` can be
+    called with these plots: it reads `plots["range_m"]`, t_s, world. Arrays may be views that cannot be written."""
 
     t_s: "np.ndarray"
     columns: "Mapping[str, np.ndarray]"
@@ -143,42 +143,42 @@ class Drawn:
         return f"<plots of realisations {numbers}: {', '.join(self.columns)}; truth {names}>"
 
     def truth_of(self, components: Sequence[tuple[str, str]]) -> "np.ndarray":
-        """The truth (n, K, C) of these components, as those of axes, which may be fewer or in another order."""
-        names = [true_column(*one) for one in self.components]
-        chosen = [names.index(true_column(*one)) for one in components]
+        """The truth (n, K, C) of these components, which may be fewer than all or in another order."""
+        names = [true_column(*component) for component in self.components]
+        chosen = [names.index(true_column(*component)) for component in components]
         return self.truth if chosen == list(range(len(names))) else self.truth[..., chosen]
 
     def arrays(self) -> "dict[str, np.ndarray]":
         """All arrays (n, K) or (n, K, M): what is measured, then the truth in columns true_…."""
-        names = (true_column(*one) for one in self.components)
+        names = (true_column(*component) for component in self.components)
         state = {name: self.truth[..., c] for c, name in enumerate(names)}
         return {**self.columns, **self.beside, **state}
 
     def table(self) -> "dict[str, np.ndarray]":
         """All realisations one after the other as columns (rows,): `realisation`, `t_s`, what is measured, the truth.
-        One row per scan; where a scan may have several plots, one per plot, without values where it has none, and of
-        the truth with the columns of `beside` alone."""
+
+        There is one row per scan. Where a scan may have several plots, there is one row per plot, or one without values
+        where a scan has none; the truth is then that in `beside`."""
         import numpy as np
 
         n, K = self.truth.shape[:2]
-        made = {"realisation": np.arange(self.first, self.first + n)[:, None], "t_s": self.t_s[None]}
+        columns = {"realisation": np.arange(self.first, self.first + n)[:, None], "t_s": self.t_s[None]}
         if not self.several:
-            return {name: np.broadcast_to(v, (n, K)).flatten() for name, v in (made | self.arrays()).items()}
-        made |= {**self.columns, **self.beside}
-        there = np.any([np.isfinite(column) for column in self.columns.values()], axis=0)
-        there[..., 0] = True
-        wide = ((name, values if values.ndim == 3 else values[..., None]) for name, values in made.items())
-        return {name: np.broadcast_to(values, there.shape)[there] for name, values in wide}
+            return {name: np.broadcast_to(v, (n, K)).flatten() for name, v in (columns | self.arrays()).items()}
+        columns |= {**self.columns, **self.beside}
+        has_row = np.any([np.isfinite(column) for column in self.columns.values()], axis=0)
+        has_row[..., 0] = True
+        wide = ((name, values if values.ndim == 3 else values[..., None]) for name, values in columns.items())
+        return {name: np.broadcast_to(values, has_row.shape)[has_row] for name, values in wide}
 
     def rows(self, i: int) -> "dict[str, np.ndarray]":
-        """One of the realisations, counted from 0, as in `table`, without its number."""
-        parts = ({name: v[i : i + 1] for name, v in values.items()} for values in (self.columns, self.beside))
-        made = Drawn(self.t_s, next(parts), self.components, self.truth[i : i + 1], next(parts)).table()
-        return {name: column for name, column in made.items() if name != "realisation"}
+        """One of the realisations, counted from 0, with the columns of `table` except its number."""
+        selected = ({name: v[i : i + 1] for name, v in values.items()} for values in (self.columns, self.beside))
+        realisation = Drawn(self.t_s, next(selected), self.components, self.truth[i : i + 1], next(selected)).table()
+        return {name: column for name, column in realisation.items() if name != "realisation"}
 
     def to_xarray(self) -> "xarray.Dataset":
-        """All arrays as a dataset of the package xarray, which must be there: with realisation, t_s and plot as
-        dimensions."""
+        """All arrays as a dataset of xarray, which must be installed; its dimensions are realisation, t_s and plot."""
         import numpy as np
 
         try:
@@ -192,7 +192,7 @@ class Drawn:
 
 
 Draw = Callable[[int, int], Drawn]
-KEPT = 4  # cases whose plots were drawn last, which are prepared once
+MAX_PREPARED = 4  # cases that stay prepared: those whose plots were drawn last
 
 OUTLIERS, BIAS, CORRELATION = EXPLANATIONS = ("outliers", "bias", "correlation")
 
@@ -229,8 +229,8 @@ def usual_interval_s(tracks: "Sequence[Mapping[str, np.ndarray]]") -> float:
     """The usual interval between plots of tracks, columns (n,) each: the median of their medians; 1 without any."""
     import numpy as np
 
-    usual = [float(np.median(np.diff(one["t_s"]))) for one in tracks if len(one["t_s"]) > 1]
-    return float(np.median(usual)) if usual else 1.0
+    medians = [float(np.median(np.diff(track["t_s"]))) for track in tracks if len(track["t_s"]) > 1]
+    return float(np.median(medians)) if medians else 1.0
 
 
 class Turning(NamedTuple):
@@ -244,11 +244,11 @@ class Turning(NamedTuple):
 
 
 class RecordedPlots(ABC):
-    """A study's part for recorded plots: `radarsim track` and `radarsim simulate`.
+    """How a study simulates plots and takes recorded ones: `radarsim simulate`, `track` and `fit`.
 
-    A study has `drawing`, or the slower `simulated`, of which the other follows.
+    A study has `drawing`, or the slower `simulated`; the other one follows.
 
-    rows_asked: number of rows for the likelihood behind the advice of `radarsim track`, so that it takes some seconds.
+    rows_asked: number of rows that the advice of `radarsim track` uses for its likelihood, so that it takes seconds.
     from_any_origin: whether ranges count from any point, so that they may be negative. of_any_keys: whether it uses
     only methods of the study, so that it cannot ignore keys."""
 
@@ -260,8 +260,8 @@ class RecordedPlots(ABC):
     def columns(self, spec: Any) -> Sequence[Sequence[str]]:
         """The columns to read, `t_s` first; the first of these choices that a file has is taken."""
 
-    def columns_of(self, spec: Any, one: Any) -> Sequence[str]:
-        """The columns without which a filter takes no plot. Default: none, each takes what is read."""
+    def columns_of(self, spec: Any, filter_keys: Any) -> Sequence[str]:
+        """The columns that a filter needs to take a plot. Default: none, it takes what is read."""
         return ()
 
     @abstractmethod
@@ -274,14 +274,16 @@ class RecordedPlots(ABC):
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        for own, other in (("simulated", "drawing"), ("drawing", "simulated")):
-            if own in vars(cls) and other not in vars(cls):  # what a base class has of the other one is of its plots
-                setattr(cls, other, vars(RecordedPlots)[other])
+        for name, counterpart in (("simulated", "drawing"), ("drawing", "simulated")):
+            if name in vars(cls) and counterpart not in vars(
+                cls
+            ):  # what a base class has of the other one is of its plots
+                setattr(cls, counterpart, vars(RecordedPlots)[counterpart])
         if cls.drawing is RecordedPlots.drawing and cls.simulated is RecordedPlots.simulated:
             raise TypeError(f"{cls.__name__} must have `drawing` or `simulated`")
 
     def drawing(self, case: "Case") -> Draw:
-        """The case prepared once: plots of realisations first … first + count - 1, by these two numbers.
+        """Prepare a case; the result draws the plots of realisations first … first + count - 1.
 
         Default: one after the other by `simulated`."""
         return lambda first, count: _one_by_one(self, case, first, count)
@@ -293,37 +295,38 @@ class RecordedPlots(ABC):
         return self.drawn(case, realisation, 1).rows(0)
 
     def drawn(self, case: "Case", first: int, count: int) -> Drawn:
-        """The plots of realisations first … first + count - 1 of a case that is prepared once."""
+        """The plots of realisations first … first + count - 1; the case is prepared only once."""
         with _LOCK:
-            draw = next((draw for kind, one, draw in _LAST if one is case and kind is type(self)), None)
+            draw = next(
+                (draw for plots_type, last_case, draw in _LAST if last_case is case and plots_type is type(self)), None
+            )
             if draw is None:
                 draw = self.drawing(case)
-                _LAST[:] = [*_LAST[1 - KEPT :], (type(self), case, draw)]
+                _LAST[:] = [*_LAST[1 - MAX_PREPARED :], (type(self), case, draw)]
         return draw(first, count)
 
     @abstractmethod
     def tracker(self, case: "Case") -> Tracker:
-        """The filters of a case, before their first plot."""
+        """The filters of a case before their first plot."""
 
     def likelihood(
         self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"
     ) -> "Likelihood | None":
-        """The likelihood of tracks, columns (n,) each, under a filter; where None, the one that takes most columns of a
-        plot.
+        """The likelihood of tracks, columns (n,) each, under a filter, by default that which uses most of a plot.
 
         Default: not known; `radarsim fit` refuses its configs."""
         return None
 
     def span_mps(self, spec: Any) -> float | None:
-        """The span by which velocities of a config's radar are ambiguous, m/s; None, the default, if not stated."""
+        """The span of unambiguous velocities of a config's radar, m/s; None, the default, if it is not stated."""
         return None
 
     def unfolding(self, spec: Any, span_mps: float) -> Sequence[str]:
-        """The settings `KEY=VALUE` with which a config takes velocities folded by this span; none by default."""
+        """The settings `KEY=VALUE` by which a config allows for velocities folded by this span; none by default."""
         return ()
 
-    def unfolds(self, one: Any = None) -> bool:
-        """Whether a filter, by default any of the study, unfolds velocities by itself; by default not."""
+    def unfolds(self, filter_keys: Any = None) -> bool:
+        """Whether a filter, by default any filter of the study, unfolds velocities. Default: no."""
         return False
 
     def in_a_turn(self, case: "Case", filter_name: str, values: Mapping[str, float]) -> "Turning | None":
@@ -335,20 +338,20 @@ _LOCK, _LAST = RLock(), list[tuple[type[RecordedPlots], "Case", Draw]]()
 
 
 def _one_by_one(plots: RecordedPlots, case: "Case", first: int, count: int) -> Drawn:
-    """Of a study that has `simulated` alone."""
+    """The plots of a study that has only `simulated`."""
     import numpy as np
 
-    every = [plots.simulated(case, i) for i in range(first, first + count)]
-    t_s = every[0]["t_s"]
-    if not all(np.array_equal(one["t_s"], t_s) for one in every) or not (np.diff(t_s) > 0).all():
+    simulated = [plots.simulated(case, i) for i in range(first, first + count)]
+    t_s = simulated[0]["t_s"]
+    if not all(np.array_equal(arrays["t_s"], t_s) for arrays in simulated) or not (np.diff(t_s) > 0).all():
         raise ConfigError(f"study {case.study}: has plots of several realisations only if its `drawing` gives them")
-    columns = {name: np.stack([one[name] for one in every]) for name in every[0] if name != "t_s"}
-    true = {name: column for name, column in columns.items() if name.startswith(TRUE)}
-    units = {short: unit for unit, short in IN_NAMES.items()}
-    named = [name.removeprefix(TRUE).rpartition("_") for name in true]
-    components = tuple((name, units.get(unit, unit)) for name, _, unit in named)
-    measured = {name: column for name, column in columns.items() if name not in true}
-    return Drawn(t_s, measured, components, np.stack([*true.values()], axis=-1), first=first)
+    columns = {name: np.stack([arrays[name] for arrays in simulated]) for name in simulated[0] if name != "t_s"}
+    true_columns = {name: column for name, column in columns.items() if name.startswith(TRUE)}
+    units = {short: unit for unit, short in UNITS_IN_NAMES.items()}
+    name_parts = [name.removeprefix(TRUE).rpartition("_") for name in true_columns]
+    components = tuple((name, units.get(unit, unit)) for name, _, unit in name_parts)
+    measured = {name: column for name, column in columns.items() if name not in true_columns}
+    return Drawn(t_s, measured, components, np.stack([*true_columns.values()], axis=-1), first=first)
 
 
 class Paper(NamedTuple):
@@ -362,20 +365,15 @@ class Paper(NamedTuple):
     held_too: Mapping[str, tuple[str, ...]] = MappingProxyType({})
 
 
-Beside = Literal["recorded", "shipped", "chart", "shortened", "own_filters", "floor"]
-Costs = Literal["cost", "seconds_per_update", "seconds_at_most"]
-OptionalPart = Literal["curves", "gains", "inputs", Costs, "warnings", "errors", "exact_but_for", "costly", Beside]
-
-
 class Study(ABC):
     """A study. `name` is the value of `study:` in YAML, `about` one line for `radarsim list`."""
 
     name: str
     about: str
-    filters: Mapping[str, str]  # what `radarsim list` says of its filters: keys, and what they make
-    model: int = 1  # raised by an edit that moves numbers, so that no block from before is used, however rare they are
-    exact_errors: bool = True  # False: exact_sigma is a bound, which a filter may reach or not
-    draws_sweeps: bool = False  # True: `figures` draws sweeps too, in place of the common figures
+    filters: Mapping[str, str]  # for `radarsim list`: keys of filters, and what they choose
+    model: int = 1  # raised by an edit that changes numbers, so that no earlier block is used
+    exact_errors: bool = True  # False: exact_sigma is a bound, which a filter need not reach
+    draws_sweeps: bool = False  # True: `figures` draws sweeps as well, in place of the common figures
 
     # ---- what is asked -------------------------------------------------------------------------------------------
     @abstractmethod
@@ -394,10 +392,10 @@ class Study(ABC):
         """The plan of a case: truth, matrices, gains, exact values. Raises ConfigError for an impossible case."""
 
     def computing_modules(self, spec: Any, plots: bool) -> Sequence[str]:
-        """The modules that prepare and simulate the cases with these keys, read the keys, and, if asked, draw plots.
+        """The modules that prepare and simulate the cases with these keys, read the keys, and, with plots, draw plots.
 
         Stored blocks belong to the sources of these modules and of all that they import, directly or not: see
-        `radarsim.studies.sources`. Default: the module of the class; what its methods import counts, too."""
+        `radarsim.studies.sources`. Default: the module of the class, with what its methods import."""
         return (type(self).__module__,)
 
     @abstractmethod
@@ -408,38 +406,38 @@ class Study(ABC):
         """
 
     def errors(self, plan: Any, first: int, count: int) -> "np.ndarray":
-        """The errors (F, count, K, C) of the same realisations' estimates, not-a-number where a filter has none. What
-        is not available by the axes may hold anything. Default: the sums of each realisation alone."""
+        """The errors (F, count, K, C) of the same realisations' estimates, not-a-number where a filter has none.
+
+        Elements that are not available by the axes may hold anything. Default: from the sums of each realisation."""
         import numpy as np
 
-        found = np.empty((count, *np.shape(plan.axes.available)))
+        errors = np.empty((count, *np.shape(plan.axes.available)))
         for i in range(count):
             sums = plan.layout.unpack(self.simulate(plan, first + i, 1))
-            found[i] = sums["error"][..., 0]
+            errors[i] = sums["error"][..., 0]
             if "estimates" in sums:
-                found[i][sums["estimates"] == 0] = np.nan
-        return np.moveaxis(found, 0, 1)
+                errors[i][sums["estimates"] == 0] = np.nan
+        return np.moveaxis(errors, 0, 1)
 
     def shortened(self, case: "Case", at_s: float | None, at_k: int | None) -> "Case":
-        """A case with the same exact errors at a time (s) or scan, cheaper to prepare. Default: the case itself. Raises
-        ConfigError where the whole case is impossible."""
+        """A case with the same exact errors at a time (s) or scan that is cheaper to prepare. Default: the case itself.
+        Raises ConfigError where the whole case is impossible."""
         return case
 
     def exact_but_for(self, case: "Case") -> str:
-        """A qualification of the exact values of a case, in words, where they are approximate to less than the digits
-        printed.
+        """A qualification of a case's exact values, as text, where they are approximate in the digits printed.
 
-        Default: nothing, they are exact."""
+        Default: an empty string, they are exact."""
         return ""
 
     def floor(self, spec: Any, axes: "Axes") -> "Floor | None":
-        """What no estimator of a case can do better than, with its keys and the axes of its plan; see `studies.floor`.
+        """The lower bound on σ of any estimator of a case, by its keys and the axes of its plan; see `studies.floor`.
 
         Default: none is known."""
         return None
 
     def costly(self, case: "Case") -> bool:
-        """Whether the exact errors of a case are slow to compute, and much faster with `Case.roughly`. Default: no."""
+        """Whether a case's exact errors are slow to compute, and much faster with `Case.roughly`. Default: no."""
         return False
 
     def quantities(self, spec: Any = None) -> "tuple[Quantity, ...]":
@@ -457,15 +455,15 @@ class Study(ABC):
         return {}
 
     def seconds_at_most(self, plan: Any) -> float | None:
-        """An upper bound on CPU seconds for one realisation on any processor, from operation counts: nothing is
-        simulated. `radarsim check` times a few realisations, unless this shows that all of them are short. Default: not
-        known."""
+        """An upper bound on CPU seconds for one realisation on any processor, from operation counts, not simulation.
+
+        `radarsim check` times a few realisations, unless this bound shows that all are short. Default: not known."""
         return None
 
     # ---- what is shown -------------------------------------------------------------------------------------------
     @abstractmethod
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
-        """The study's own tables by the stem of their file; `curves` or `gains` among them replace the common ones."""
+        """The study's own tables by the stem of their file; a table `curves` or `gains` replaces the common one."""
 
     def curves(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
         """The table `curves` alone. Default: the common one."""
@@ -486,24 +484,25 @@ class Study(ABC):
         return floor.floors(self, results)
 
     def table(self, name: str, results: "Sequence[CaseResult]", column: str = "") -> "pd.DataFrame | None":
-        """The table of a name, with this column; None if there is none. Common ones without other tables."""
-        common = {"curves": self.curves, "gains": self.gains, "floor": self.floors}.get(name)
-        made = None if common is None else common(results)
-        return self.tables(results).get(name) if made is None or (column and column not in made) else made
+        """The table of a name that has this column; None if there is none. A common one is made without the others."""
+        common_tables = {"curves": self.curves, "gains": self.gains, "floor": self.floors}.get(name)
+        table = None if common_tables is None else common_tables(results)
+        return self.tables(results).get(name) if table is None or (column and column not in table) else table
 
     @abstractmethod
     def figures(
-        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
-        """The figures, described, by the stem of their file, from results and all their tables."""
+        """Descriptions of the figures by the stem of their file, from results and all their tables."""
 
     def shown(self) -> "Sequence[Component]":
-        """The components in letters and words, for figures of filters from outside. Default: range and its rates."""
+        """The components with letters and words, for figures of user filters. Default: range and its rates."""
         return ()
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
-        """The tables behind figures, by the beginning of the figure's name. Default: none named. Not needed for a
-        figure with the name of its table, nor where the name begins with sigma, gain or sweep."""
+        """The tables behind figures, by the prefix of the figure's name. Default: none.
+
+        Not needed for a figure with the name of its table, nor for names that begin with sigma, gain or sweep."""
         return {}
 
     @abstractmethod
@@ -511,30 +510,30 @@ class Study(ABC):
         """The question of an experiment, in one sentence."""
 
     @abstractmethod
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
         """The answer: sentences with numbers and 95 % intervals."""
 
     def warnings(self, experiment: "Experiment") -> Sequence[str]:
-        """Settings that are allowed but hardly intended, a line each; the run goes on. Default: nothing."""
+        """Settings that are allowed but hardly intended, a line each; the run continues. Default: none."""
         return ()
 
     def inputs(self, results: "Sequence[CaseResult]") -> "pd.DataFrame | None":
         """A table of the inputs, for the report. Default: none."""
         return None
 
-    def cost(self, made: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":
+    def cost(self, tables: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":
         """A table of the filters' cost, for the report; run is as in run.json. Default: none."""
         return None
 
     # ---- beside --------------------------------------------------------------------------------------------------
-    def recorded(self) -> RecordedPlots | None:
-        """Its part for recorded plots. Default: nothing; `track` and `simulate` refuse its configs."""
+    def recording_interface(self) -> RecordedPlots | None:
+        """Its simulated and recorded plots. Default: none; `track` and `simulate` refuse its configs."""
         return None
 
     def chart(self, cases: "Sequence[Case]", references: "Sequence[Case]") -> "Chart | None":
-        """One chart for all radars, with these cases on it, and others to compare with. Default: none."""
+        """A chart for all radars, with these cases on it and others for comparison. Default: none."""
         return None
 
     def shipped(self) -> Path | None:
-        """The folder that holds `configs/` and `scenarios/` of its own. Default: none."""
+        """The folder with the study's own `configs/` and `scenarios/`. Default: none."""
         return None

@@ -23,16 +23,16 @@
 | `measured` | the numbers of a recorded plot, where there is such |
 | `paper`, `claims_yaml` | whose claims are judged: a text as claims.yaml, and under `choices` as interpretations.yaml |
 
-`filters`, `baseline` and `scans` are added to the keys, with their marks. Made are the tables curves, gains and `last`,
-the figures, the question and the answer, claims and interpretations, and what is done with recorded plots; `shipped/`
-beside the file holds configs. Claims find a case by its keys, `of: [{radar.scan_period_s: 2}]`, and are measured by
-functions of the file whose first argument is `seen`, or by those of `radarsim.papers.one_file_measures`. The
-alternatives of a choice set keys, `sets: {radar.scan_period_s: 2}`.
+`filters`, `baseline` and `scans` are added to the keys, with their marks. The tables curves, gains and `last`, figures,
+question and answer, claims and interpretations, and the use of recorded plots follow; `shipped/` beside the file holds
+configs. Claims find a case by its keys, `of: [{radar.scan_period_s: 2}]`, and are measured by functions
+of the file whose first argument is `seen`, or by those of `radarsim.papers.one_file_measures`. The alternatives of a choice set
+keys, `sets: {radar.scan_period_s: 2}`.
 
-A base for a kind of model derives from `OneFile` and gives `prepare`, with `axes` and `sums` from here, `simulate`, and
-if it can `limits`, `drawing`, `tracker` and `likelihood`. `radarsim.studies.linear` is one.
+A base for a kind of model derives from `OneFile` and gives `prepare`, with `axes` and `sums` from this module,
+`simulate`, and if it can `limits`, `drawing`, `tracker` and `likelihood`. `radarsim.studies.linear` is such a base.
 
-Whatever a class lacks, or has of the wrong kind, is one line of a ConfigError when its keys are first asked for."""
+Each attribute that a class lacks, or has of the wrong kind, is a line of a ConfigError when its keys are first read."""
 
 import inspect
 import math
@@ -70,7 +70,7 @@ class Measured(NamedTuple):
 
 
 RESERVED = "filters", "baseline", "scans"
-MOST_SETS = 6  # sets of columns of which a file may have any; if more, all or one
+MAX_COLUMN_SETS = 6  # sets of columns of which a file may have any; with more, all sets or one
 NEEDED: Mapping[str, tuple[type, str]] = {
     "name": (str, "the value of `study:` in YAML"),
     "about": (str, "one line for `radarsim list`"),
@@ -109,13 +109,15 @@ class OneFile(Study):
     key_class: "type[Keys]"
 
     def __init_subclass__(cls) -> None:
-        """Makes the class of the keys, if nothing is missing. Other processes find it by its name in the module."""
+        """Make the class of the keys, if nothing is missing. Other processes find it by its name in the module."""
         super().__init_subclass__()
         if not any(True for _ in cls.missing()):
             name = f"{cls.__name__}Keys"
             cls.key_class = keys_of(name, cls.__module__, cls.parts, cls.Filter, cls.most_scans)
-            shown = (f"{kind}_{one.name}" for one in cls.components for kind in ("sigma", "gain", "dynamic"))
-            cls.key_class.figure_names = (*shown, *cls.extra_figures)
+            names = (
+                f"{kind}_{component.name}" for component in cls.components for kind in ("sigma", "gain", "dynamic")
+            )
+            cls.key_class.figure_names = (*names, *cls.extra_figures)
             setattr(sys.modules[cls.__module__], name, cls.key_class)
 
     def keys(self) -> "type[Keys]":
@@ -133,32 +135,45 @@ class OneFile(Study):
 
     @classmethod
     def missing(cls) -> Iterator[str]:
-        """Attributes that the class lacks, or has of the wrong kind: a line each."""
-        given = {name: getattr(cls, name, None) for name in NEEDED}
-        if wrong := {name: one for name, one in given.items() if not isinstance(one, NEEDED[name][0]) or not one}:
-            for name, one in wrong.items():
-                got = "nothing" if one is None else repr(one)[:40]
-                yield f"{cls.__name__}.{name} must be given: {NEEDED[name][1]}; got {got}"
-            return
-        if bare := [one for one in (cls.components, cls.measured) if isinstance(one, Component | Measured)]:
-            yield from (f"{one!r} must stand in a tuple, ({type(one).__name__}(…),)" for one in bare)
-            return
-        for one in cls.components:
-            if not isinstance(one, Component) or not (one.name and one.unit):
-                yield f"components: {one!r} must be Component(name, unit, symbol, words), with a unit"
+        """Attributes that the class lacks, or has of the wrong kind: a line each. Each check relies on those before."""
+        for check in (cls._attribute_errors, cls._tuple_errors, cls._type_errors, cls._content_errors):
+            errors = list(check())
+            yield from errors
+            if errors:
+                return
+
+    @classmethod
+    def _attribute_errors(cls) -> Iterator[str]:
+        for name, (kind, description) in NEEDED.items():
+            value = getattr(cls, name, None)
+            if not isinstance(value, kind) or not value:
+                got = "nothing" if value is None else repr(value)[:40]
+                yield f"{cls.__name__}.{name} must be given: {description}; got {got}"
+
+    @classmethod
+    def _tuple_errors(cls) -> Iterator[str]:
+        for value in (cls.components, cls.measured):
+            if isinstance(value, Component | Measured):
+                yield f"{value!r} must stand in a tuple, ({type(value).__name__}(…),)"
+
+    @classmethod
+    def _type_errors(cls) -> Iterator[str]:
+        for component in cls.components:
+            if not isinstance(component, Component) or not (component.name and component.unit):
+                yield f"components: {component!r} must be Component(name, unit, symbol, words), with a unit"
         for name, part in (*cls.parts.items(), ("Filter", cls.Filter)):
             base = Member if name == "Filter" else Model
             if not (isinstance(part, type) and issubclass(part, base)):
                 yield f"{name} must be a subclass of radarsim.config.fields.{base.__name__}, got {part!r}"
-                return
-        others = [one for one in cls.measured if not isinstance(one, Measured)]
-        yield from (f"measured: {one!r} must be Measured(column, unit, keys of its σ)" for one in others)
-        texts = [one for one in cls.measured if isinstance(one, Measured) and isinstance(one.sigma_keys, str)]
-        for one in texts:
-            yield f"{one.column}: sigma_keys must be a tuple, ({one.sigma_keys!r},); got {one.sigma_keys!r}"
-        if others or texts:
-            return
-        names = [one.name for one in cls.components if isinstance(one, Component)]
+        for number in cls.measured:
+            if not isinstance(number, Measured):
+                yield f"measured: {number!r} must be Measured(column, unit, keys of its σ)"
+            elif isinstance(keys := number.sigma_keys, str):
+                yield f"{number.column}: sigma_keys must be a tuple, ({keys!r},); got {keys!r}"
+
+    @classmethod
+    def _content_errors(cls) -> Iterator[str]:
+        names = [component.name for component in cls.components]
         for name in dict.fromkeys(names):
             if not re.fullmatch(r"[A-Za-z0-9_]+", name):
                 yield f"components: {name!r} must be of letters, digits and _"
@@ -169,31 +184,32 @@ class OneFile(Study):
         elif cls.paper is not None and isinstance(cls.paper.may_grow, str):
             yield f"paper: may_grow: must be a tuple, ({cls.paper.may_grow!r},); got {cls.paper.may_grow!r}"
         yield from (f"parts: {name} is added to the keys of every study" for name in RESERVED if name in cls.parts)
-        yield from ("measured: t_s is the time of a plot" for one in cls.measured if one.column == "t_s")
-        keys = {"scan_period": (cls.scan_period,)} | {one.column: one.sigma_keys for one in cls.measured}
-        for name, every in keys.items():
-            yield from (f"{name}: there is no key {key}" for key in every if key and not cls.has_key(key))
+        yield from ("measured: t_s is the time of a plot" for number in cls.measured if number.column == "t_s")
+        keys_by_user: dict[str, tuple[str, ...]] = {"scan_period": (cls.scan_period,)}
+        keys_by_user |= {number.column: number.sigma_keys for number in cls.measured}
+        for user, keys in keys_by_user.items():
+            yield from (f"{user}: there is no key {key}" for key in keys if key and not cls.has_key(key))
         if cls.has_key(cls.scan_period) and not cls._of_a_part(cls.scan_period):
             yield f"scan_period: {cls.scan_period} must be a key of a part, PART.KEY"
 
     @classmethod
     def _of_a_part(cls, key: str) -> bool:
         """Whether a dotted name is of a part, so that a case has one value of it."""
-        part, _, own = key.partition(".")
-        return bool(own) and part in cls.parts
+        part, _, subkey = key.partition(".")
+        return bool(subkey) and part in cls.parts
 
     @classmethod
     def has_key(cls, key: str) -> bool:
         """Whether a dotted name is a key, or a property, of the parts; a bare one is of the filters."""
-        part, _, own = key.partition(".")
+        part, _, subkey = key.partition(".")
         if part in ("filters", "scans", "baseline"):
             return True
-        model, first = cls.parts.get(part, Model) if own else cls.Filter, (own or part).partition(".")[0]
+        model, first = cls.parts.get(part, Model) if subkey else cls.Filter, (subkey or part).partition(".")[0]
         return first in model.model_fields or isinstance(getattr(model, first, None), property)
 
     # ---- numbers -------------------------------------------------------------------------------------------------
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """The value of one of the study's functions; ConfigError with its place and the study's name if it fails."""
+        """The value of a function of the study; ConfigError with its place and the study's name if it fails."""
         return call(function, *arguments, of=f"study {self.name}: ")
 
     def scan_period_s(self, spec: Any) -> float:
@@ -209,11 +225,11 @@ class OneFile(Study):
 
         from radarsim.engine.results import Axes
 
-        names, k = tuple(one.name for one in spec.filters), np.arange(spec.scans)
+        names, k = tuple(filter_keys.name for filter_keys in spec.filters), np.arange(spec.scans)
         shape = len(names), k.size, len(self.components)
         return Axes(
             filters=names,
-            components=tuple((one.name, one.unit) for one in self.components),
+            components=tuple((component.name, component.unit) for component in self.components),
             k=k + 1,
             t_s=k * self.scan_period_s(spec),
             available=np.ones(shape, dtype=bool),
@@ -260,59 +276,66 @@ class OneFile(Study):
         } | ({} if limits is None else {"steady_sigma": limits[f, c]})
 
     def figures(
-        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
         from radarsim.report import panels
 
-        return panels.per_component(results, made, self.shown(), experiment)
+        return panels.per_component(results, tables, self.shown(), experiment)
 
     def shown(self) -> "list[Component]":
         from radarsim.report import panels
 
         return [
-            one._replace(symbol=one.symbol or panels.letter(one.name), words=self._term(one.words or one.name))
-            for one in self.components
+            component._replace(
+                symbol=component.symbol or panels.letter(component.name),
+                words=self._term(component.words or component.name),
+            )
+            for component in self.components
         ]
 
     def question(self, experiment: "Experiment") -> str:
-        names = dict.fromkeys(one.name for case in experiment.cases for one in case.spec.filters)
+        names = dict.fromkeys(filter_keys.name for case in experiment.cases for filter_keys in case.spec.filters)
         return f"{tr(self._term(self.asks))} {tr('Filters: {names}.', names=few(list(names)))}"
 
     def _term(self, words: str) -> Term:
-        """A text of the study, translated by the catalogue of its package."""
+        """A text of the study, which the catalogue of its package translates."""
         return term(words, type(self).__module__.partition(".")[0])
 
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
         from radarsim.report import panels
 
-        shown, others = panels.reported(results)
-        several = len(panels.families(results)) > 1  # configs of an `include`
-        each = ((f"{panels.stem(one)}: " if several else "", one) for one in shown)
-        return [*(f"{name}{sentence}" for name, one in each for sentence in self._sentences(one, made)), *others]
+        quoted_results, further_sentences = panels.reported(results)
+        has_families = len(panels.families(results)) > 1  # configs of an `include`
+        sentences = [
+            f"{panels.stem(result)}: {sentence}" if has_families else sentence
+            for result in quoted_results
+            for sentence in self._sentences(result, tables)
+        ]
+        return [*sentences, *further_sentences]
 
-    def _sentences(self, result: "CaseResult", made: "Mapping[str, pd.DataFrame]") -> Iterator[str]:
+    def _sentences(self, result: "CaseResult", tables_of_run: "Mapping[str, pd.DataFrame]") -> Iterator[str]:
         """σ of the leading component at the last scan, and the gain of each filter."""
         from radarsim.report import panels, tables, wording
 
         leading = self.components[0]
-        last = tables.where(made["last"], case=result.name, component=leading.name).to_dict("records")
+        last = tables.where(tables_of_run["last"], case=result.name, component=leading.name).to_dict("records")
         keys: tuple[str, ...] = ("last_sigma", "last_lo", "last_hi")
-        each = [f"{row['filter']} {wording.estimate((row[key] for key in keys), tr(row['unit']))}" for row in last]
+        estimates = [f"{row['filter']} {wording.estimate((row[key] for key in keys), tr(row['unit']))}" for row in last]
         fields = {"quantity": self._term(leading.words or leading.name), "t": float(result.axes.t_s[-1])}
-        words = tr("σ of the {quantity} after {t:g} s: {filters}.", **fields, filters=listed(each))
-        yield panels.at_its_place(result, words)
-        gains = tables.where(made["gains"], case=result.name, component=leading.name)
+        sentence = tr("σ of the {quantity} after {t:g} s: {filters}.", **fields, filters=listed(estimates))
+        yield panels.at_its_place(result, sentence)
+        gains = tables.where(tables_of_run["gains"], case=result.name, component=leading.name)
         gains = gains[gains["k"] == gains["k"].max()]
         if len(gains):
             keys = ("gain_percent", "gain_lo", "gain_hi")
-            each = [f"{row['filter']} {wording.estimate((row[key] for key in keys), '%', '.3g')}"
-                    for row in gains.to_dict("records")]  # fmt: skip
-            base = result.axes.filters[result.axes.baseline]
-            words = tr("Gain against {base} there: {filters}.", base=base, filters=listed(each))
-            yield panels.at_its_place(result, words)
+            rows = gains.to_dict("records")
+            estimates = [f"{row['filter']} {wording.estimate((row[key] for key in keys), '%', '.3g')}" for row in rows]
+            baseline = result.axes.filters[result.axes.baseline]
+            sentence = tr("Gain against {base} there: {filters}.", base=baseline, filters=listed(estimates))
+            yield panels.at_its_place(result, sentence)
 
     # ---- beside --------------------------------------------------------------------------------------------------
-    def columns(self, spec: Any, one: Any) -> tuple[str, ...]:
+    def columns(self, spec: Any, filter_keys: Any) -> tuple[str, ...]:
         """The columns of recorded plots that a filter takes, in the order of `measured`. Default: theirs."""
         return tuple(number.column for number in self.measured)
 
@@ -322,17 +345,17 @@ class OneFile(Study):
         """As `RecordedPlots.likelihood`. Default: not known."""
         return None
 
-    def recorded(self) -> RecordedPlots | None:
+    def recording_interface(self) -> RecordedPlots | None:
         drawing, tracker = self.drawing, self.tracker
-        return Recorded(self, drawing, tracker) if self.measured and drawing and tracker else None
+        return OneFileRecordings(self, drawing, tracker) if self.measured and drawing and tracker else None
 
     def shipped(self) -> Path | None:
         folder = Path(str(sys.modules[type(self).__module__].__file__)).parent / "shipped"
         return folder if folder.is_dir() else None
 
 
-class Recorded(RecordedPlots):
-    """The part of a study of one file for recorded plots: a file may have all columns, or those of some filters."""
+class OneFileRecordings(RecordedPlots):
+    """Recorded plots of a study in one file: a recording may have all columns, or those of some filters."""
 
     from_any_origin = True
     of_any_keys = True
@@ -341,17 +364,22 @@ class Recorded(RecordedPlots):
         self.study, self._drawing, self._tracker = study, drawing, tracker
 
     def columns(self, spec: Any) -> Sequence[Sequence[str]]:
-        each = list(dict.fromkeys(self.study.columns(spec, one) for one in spec.filters))
-        counts = range(len(each), 0, -1) if len(each) <= MOST_SETS else (len(each), 1)
-        some = [tuple(dict.fromkeys(chain(*part))) for n in counts for part in combinations(each, n)]
-        return [("t_s", *names) for names in dict.fromkeys(some)]
+        filter_columns = list(dict.fromkeys(self.study.columns(spec, filter_keys) for filter_keys in spec.filters))
+        counts = (
+            range(len(filter_columns), 0, -1) if len(filter_columns) <= MAX_COLUMN_SETS else (len(filter_columns), 1)
+        )
+        choices = [tuple(dict.fromkeys(chain(*chosen))) for n in counts for chosen in combinations(filter_columns, n)]
+        return [("t_s", *names) for names in dict.fromkeys(choices)]
 
-    def columns_of(self, spec: Any, one: Any) -> Sequence[str]:
-        return self.study.columns(spec, one)
+    def columns_of(self, spec: Any, filter_keys: Any) -> Sequence[str]:
+        return self.study.columns(spec, filter_keys)
 
     def sigmas(self, spec: Any) -> Mapping[str, Sequence[str]]:
-        pairs = [zip(self.study.columns(spec, one), self.study.measured, strict=False) for one in spec.filters]
-        return {column: number.sigma_keys for each in pairs for column, number in each}
+        pairs = [
+            zip(self.study.columns(spec, filter_keys), self.study.measured, strict=False)
+            for filter_keys in spec.filters
+        ]
+        return {column: number.sigma_keys for columns in pairs for column, number in columns}
 
     def scan_period_s(self, spec: Any) -> float:
         return self.study.scan_period_s(spec)

@@ -43,10 +43,10 @@ SHIPPED = {  # in the order of the papers, then extensions
 @cache
 def entries(group: str = GROUP) -> Mapping[str, Mapping[str, EntryPoint]]:
     """Entry points of installed packages in a group: by the entry's name, then by the package's."""
-    found: dict[str, dict[str, EntryPoint]] = {}
+    by_name: dict[str, dict[str, EntryPoint]] = {}
     for entry in sorted(entry_points(group=group)):
-        found.setdefault(entry.name, {}).setdefault(entry.dist.name if entry.dist else entry.value, entry)
-    return found
+        by_name.setdefault(entry.name, {}).setdefault(entry.dist.name if entry.dist else entry.value, entry)
+    return by_name
 
 
 def offered() -> tuple[str, ...]:
@@ -60,21 +60,21 @@ def names() -> tuple[str, ...]:
 
 
 def has(name: str) -> bool:
-    """Whether a study of that name exists; looks at installed packages only where it is not shipped here."""
+    """Whether a study of that name exists; installed packages are searched only for names that are not shipped here."""
     return name in SHIPPED or name in offered()
 
 
 def study(name: str) -> Study:
     """The study of a name. Raises KeyError where there is none, ConfigError where a package's cannot be loaded."""
-    found = _loaded(name)
-    if isinstance(found, ConfigError):
-        raise found
-    return found
+    loaded = _loaded(name)
+    if isinstance(loaded, ConfigError):
+        raise loaded
+    return loaded
 
 
 @cache
 def _loaded(name: str) -> Study | ConfigError:
-    """The study, or why it cannot be loaded: a package that fails is imported once."""
+    """The study, or the error for which it cannot be loaded, so that a package that fails is imported only once."""
     if name in SHIPPED:
         return import_module(SHIPPED[name]).STUDY
     packages = entries()[name]
@@ -84,14 +84,14 @@ def _loaded(name: str) -> Study | ConfigError:
         )
     (entry,) = packages.values()
     try:
-        found = entry.load()
+        loaded = entry.load()
     except OF_AUTHORS as error:
         return _fault(name, f"cannot be loaded: {failures.summary(error)}")
-    if not isinstance(found, Study):
-        return _fault(name, f"must offer a radarsim.studies.interface.Study, got {type(found).__name__}")
-    if found.name != name:
-        return _fault(name, f"offers it under this name, but it is called {found.name}")
-    return found
+    if not isinstance(loaded, Study):
+        return _fault(name, f"must offer a radarsim.studies.interface.Study, got {type(loaded).__name__}")
+    if loaded.name != name:
+        return _fault(name, f"offers it under this name, but it is called {loaded.name}")
+    return loaded
 
 
 def module(name: str) -> str:
@@ -102,11 +102,11 @@ def module(name: str) -> str:
 def part(name: str, take: Callable[[Study], Part]) -> Part:
     """The result of `take` for the study of a name. Raises ConfigError with the package's name where the study of a
     package fails."""
-    one = study(name)
+    loaded = study(name)
     if name in SHIPPED:
-        return take(one)
+        return take(loaded)
     try:
-        return take(one)
+        return take(loaded)
     except RadarsimError:
         raise
     except OF_AUTHORS as error:
@@ -114,19 +114,19 @@ def part(name: str, take: Callable[[Study], Part]) -> Part:
 
 
 def parts(take: Callable[[Study], Part]) -> dict[str, Part]:
-    """The result of `take` for every study that gives one, by the study's name."""
-    found = {}
+    """The results of `take` by the name of the study, without studies for which it fails."""
+    results = {}
     for name in names():
         try:
-            found[name] = part(name, take)
+            results[name] = part(name, take)
         except ConfigError:
             continue  # reported by `unusable`, and where this study is requested
-    return found
+    return results
 
 
 def unusable() -> dict[str, str]:
     """The unusable studies of installed packages, by name, with the reason."""
-    found = {
+    reasons = {
         name: f"study {name}: shipped with radarsim; that of the package {' and '.join(sorted(packages))} is not used"
         for name, packages in entries().items()
         if name in SHIPPED
@@ -135,17 +135,17 @@ def unusable() -> dict[str, str]:
         try:
             keys(name)
         except ConfigError as error:
-            found[name] = error.lines[0]
-    return found
+            reasons[name] = error.lines[0]
+    return reasons
 
 
 def lacking(stem: str) -> tuple[str, ...]:
-    """Why no config of a stem was found: faults of the studies of this name, or whose packages ship such a config."""
+    """Why no config of a stem was found: errors of studies with this name, or whose packages ship such a config."""
     return tuple(fault for name, fault in unusable().items() if stem == name or _ships(name, stem))
 
 
 def _ships(name: str, stem: str) -> bool:
-    """Whether a package that may fail to import has a config of this stem in a folder `configs` within it."""
+    """Whether a package, which may fail to import, has a config of this stem in one of its folders `configs`."""
     for entry in entries()[name].values():
         try:
             spec = find_spec(entry.module.partition(".")[0])  # of the outermost module, which this does not import
@@ -158,68 +158,72 @@ def _ships(name: str, stem: str) -> bool:
 
 
 def keys(name: str) -> type[Keys]:
-    """The schema of a study's YAML keys, with those of filters of packages. Raises as `study`."""
-    takes = name in SHIPPED and entries(FILTERS) and study(name).own_filters()
-    return _with_filters(name) if takes else own_keys(name)
+    """The schema of a study's YAML keys, with filters that packages add. Raises as `study`."""
+    takes_filters = name in SHIPPED and entries(FILTERS) and study(name).own_filters()
+    return _with_filters(name) if takes_filters else own_keys(name)
 
 
 def own_keys(name: str) -> type[Keys]:
     """The schema of a study's own YAML keys. Raises as `study`."""
-    found = part(name, _checked_keys)
-    if not (isinstance(found, type) and issubclass(found, Keys)):
+    key_class = part(name, _checked_keys)
+    if not (isinstance(key_class, type) and issubclass(key_class, Keys)):
         raise _fault(name, "must give keys that are a subclass of radarsim.config.fields.Study")
-    if taken := [key for key in found.model_fields if key in COMMON_KEYS]:
-        raise _fault(name, f"has keys that every config has already: {', '.join(taken)}")
-    return found
+    if taken_keys := [key for key in key_class.model_fields if key in COMMON_KEYS]:
+        raise _fault(name, f"has keys that every config has already: {', '.join(taken_keys)}")
+    return key_class
 
 
 def _checked_keys(study: Study) -> type[Keys]:
     """The keys of a study. Raises ConfigError for faults in what a package's study declares for extensions."""
-    found = study.keys()
+    key_class = study.keys()
     for extension in extensions() if study.name not in SHIPPED else ():
         extension.check_study(study)
-    return found
+    return key_class
 
 
 def usable() -> tuple[str, ...]:
     """The names of the studies whose keys can be read."""
-    return tuple(parts(lambda one: keys(one.name)))
+    return tuple(parts(lambda loaded: keys(loaded.name)))
 
 
 def quantity(name: str, case: Case) -> Quantity:
-    """The quantity of a name that a case measures, also in the spelling of its option (`above-oracle`). Raises
-    ConfigError for an unknown one."""
-    measured = {one.name: one for one in quantities(case.study, case.spec)}
+    """The quantity of this name in a case, also in the spelling of its option (`above-oracle`). Raises ConfigError for
+    an unknown name."""
+    measured = {candidate.name: candidate for candidate in quantities(case.study, case.spec)}
     spelt = name if name in measured else name.removeprefix("--").replace("-", "_")
     if spelt not in measured:
-        near = did_you_mean(spelt, measured)
-        raise ConfigError(f"{case.name}: study {case.study} measures no {name!r}, but {', '.join(measured)}{near}")
+        suggestion = did_you_mean(spelt, measured)
+        raise ConfigError(
+            f"{case.name}: study {case.study} measures no {name!r}, but {', '.join(measured)}{suggestion}"
+        )
     return measured[spelt]
 
 
 def quantities(name: str, spec: Keys | None) -> tuple[Quantity, ...]:
-    """The quantities that the study of a name measures in a case with these keys; None: in any. Raises as `part`."""
-    return part(name, lambda one: declared(one, spec))
+    """The quantities of a study in a case with these keys; None: in any case. Raises as `part`."""
+    return part(name, lambda loaded: declared(loaded, spec))
 
 
 def declared(study: Study, spec: Keys | None) -> tuple[Quantity, ...]:
-    """The same of a study. ConfigError for anything but a Quantity."""
-    given: Any = study.quantities(spec)
-    if not isinstance(given, tuple | list) or not all(isinstance(one, Quantity) for one in given):
-        raise _fault(study.name, f"quantities: must give a tuple of Quantity, got {given!r}"[:200])
-    return tuple(given)
+    """The quantities of a study object. Raises ConfigError for anything but a tuple of Quantity."""
+    quantities: Any = study.quantities(spec)
+    if not isinstance(quantities, tuple | list) or not all(isinstance(quantity, Quantity) for quantity in quantities):
+        raise _fault(study.name, f"quantities: must give a tuple of Quantity, got {quantities!r}"[:200])
+    return tuple(quantities)
 
 
 def folders() -> tuple[Path, ...]:
-    """Folders with `configs/` and `scenarios/` of packages, whose configs are found by stem."""
-    found = parts(lambda one: one.shipped()) if offered() else {}
-    return tuple(Path(folder) for folder in found.values() if folder is not None)
+    """Folders of packages with `configs/` and `scenarios/`, whose configs are found by stem."""
+    shipped_folders = parts(lambda loaded: loaded.shipped()) if offered() else {}
+    return tuple(Path(folder) for folder in shipped_folders.values() if folder is not None)
 
 
 def packages() -> tuple[str, ...]:
     """The top-level modules of the packages that offer studies or filters, without importing them."""
-    added = (entry.module for of in entries(FILTERS).values() for entry in of.values())
-    return tuple(dict.fromkeys(one.partition(".")[0] for one in (*map(module, offered()), *added)))
+    filter_modules = (entry.module for by_package in entries(FILTERS).values() for entry in by_package.values())
+    return tuple(
+        dict.fromkeys(module_name.partition(".")[0] for module_name in (*map(module, offered()), *filter_modules))
+    )
 
 
 def package(name: str) -> str | None:
@@ -230,7 +234,7 @@ def package(name: str) -> str | None:
 
 
 def homes() -> Iterator[Path]:
-    """The folder of each of these packages, or its one file."""
+    """The folder of each of these packages, or its single file."""
     for name in packages():
         try:
             spec = find_spec(name)
@@ -238,7 +242,7 @@ def homes() -> Iterator[Path]:
             continue
         if spec is not None:
             folders = spec.submodule_search_locations or [spec.origin or ""]
-            yield from (Path(one).resolve() for one in folders)
+            yield from (Path(folder).resolve() for folder in folders)
 
 
 failures.homes = homes
@@ -249,7 +253,7 @@ def _package(entry: EntryPoint) -> str:
 
 
 def fault_of(error: BaseException) -> StudyError | None:
-    """The message of an uncaught error if the code of an installed package raised it; else None."""
+    """An error for the user where the code of an installed package raised an uncaught one; else None."""
     if failures.place(error, installed=True) is None:
         return None
     return StudyError(f"the code of an installed package fails: {failures.summary(error)}")
@@ -260,14 +264,14 @@ def _fault(name: str, words: str) -> ConfigError:
 
 
 def coded(keys: Any, place: str, baseline: bool, folder: Path) -> Any:
-    """A filter of the user's own code that a config in a folder names at a place. Raises ConfigError."""
+    """The user filter in Python that a config in a folder names at a place. Raises ConfigError."""
     from radarsim.studies import code
 
     return code.coded(keys, place, baseline, folder, first_plots)
 
 
 def first_plots(case: Case, count: int) -> Any:
-    """What a filter of the user's sees of the first realisations of a case, as in a run."""
+    """The plots of a case's first realisations as a user filter sees them in a run."""
     from radarsim.studies import outside
 
     return outside.first_plots(study(case.study), case, count)
@@ -275,7 +279,7 @@ def first_plots(case: Case, count: int) -> Any:
 
 # ---- filters of packages ---------------------------------------------------------------------------------------------
 class Filters(NamedTuple):
-    """Filters of installed packages: the keys of each by study and kind, and by kind why others are unusable."""
+    """Filters of installed packages: the keys of each by study and kind, and by kind why others cannot be used."""
 
     usable: Mapping[str, Mapping[str, Any]]
     unusable: Mapping[str, str]
@@ -287,43 +291,45 @@ def filters() -> Filters:
     usable: dict[str, dict[str, Any]] = {}
     unusable: dict[str, str] = {}
     for kind, packages in entries(FILTERS).items():
-        of: dict[str, dict[str, Any]] = {}
+        by_study: dict[str, dict[str, Any]] = {}
         faults = []
         for package, entry in packages.items():
-            found, fault = _filter(kind, entry)
+            key_class, fault = _filter(kind, entry)
             if fault:
                 faults.append(f"the package {_package(entry)} offers the filter {kind}, {fault}")
             else:
-                of.setdefault(found.study, {})[package] = found
-        for name, several in of.items():
-            if len(several) > 1:
-                every = " and ".join(sorted(several))
-                faults.append(f"filter {kind} of {name}: offered by the packages {every}: uninstall all but one")
+                by_study.setdefault(key_class.study, {})[package] = key_class
+        for name, by_package in by_study.items():
+            if len(by_package) > 1:
+                package_names = " and ".join(sorted(by_package))
+                faults.append(
+                    f"filter {kind} of {name}: offered by the packages {package_names}: uninstall all but one"
+                )
             else:
-                usable.setdefault(name, {})[kind] = next(iter(several.values()))
+                usable.setdefault(name, {})[kind] = next(iter(by_package.values()))
         if faults:
             unusable[kind] = "; ".join(faults)
     return Filters(usable, unusable)
 
 
 def _filter(kind: str, entry: EntryPoint) -> tuple[Any, str]:
-    """The keys of a filter that a package offers, and its fault; empty if it is usable."""
+    """The keys of a filter that a package offers, and why it cannot be used; empty where it can."""
     try:
-        found = entry.load()
+        key_class = entry.load()
     except OF_AUTHORS as error:
         return None, f"which cannot be loaded: {failures.summary(error)}"
-    name = str(getattr(found, "study", None))
+    name = str(getattr(key_class, "study", None))
     base = study(name).own_filters() if name in SHIPPED else None
     if base is None:
-        takes = " and ".join(one for one in SHIPPED if study(one).own_filters())
+        takes = " and ".join(study_name for study_name in SHIPPED if study(study_name).own_filters())
         return None, f"for the study {name}, which takes no filters of packages: {takes} does"
-    if not (isinstance(found, type) and issubclass(found, base)) or isabstract(found):
+    if not (isinstance(key_class, type) and issubclass(key_class, base)) or isabstract(key_class):
         return None, f"which must be a class derived from {base.__module__}.{base.__name__}, with all that it asks for"
     if kind in kinds_of(own_keys(name)):
         return None, f"which {name} has itself: that of the package is not used"
-    if kinds_of(found) != (kind,):
+    if kinds_of(key_class) != (kind,):
         return None, f"whose key kind must be Literal[{kind!r}]"
-    return found, ""
+    return key_class, ""
 
 
 @cache

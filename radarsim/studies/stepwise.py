@@ -1,6 +1,6 @@
 """A study in one file whose filters are not linear: the step of one realisation, from which eight are computed at once.
 
-    class Turning(StepStudy):                       # beside what `radarsim.studies.onefile` asks
+    class Turning(StepStudy):                       # besides what `radarsim.studies.onefile` needs
         known_columns = ("own_x_m", "own_y_m")      # what is known at each scan, as columns of recorded plots
         kinds = {"ekf": Ekf, "pseudo_linear": Pseudo}  # the filters' steps, by their key `kind`
         normals = 4, 0, 1                           # unit normals: of the first state, of a move, of a plot
@@ -13,16 +13,16 @@
         def truth(self, x, u, c): …                 # the components of the state; where not given, the state itself
 
     class Ekf(Steps):
-        def design(spec, one): …                    # the numbers of a filter by its keys, a record
+        def design(spec, filter_keys): …            # the numbers of a filter by its keys, a record
         def start(z, u, c): …                       # its state after the first plot
         def predict(s, dt, u, c): …                 # its state before a plot, or in place of one that is missed
         def update(s, z, u, c): …                   # its state after a plot
-        def estimate(s, u, c): …                    # the components that it believes
+        def estimate(s, u, c): …                    # its estimates of the components
         def covariance(s, u, c): …                  # their packed covariance, or None
 
-These are plain functions of numbers, tuples and named records; numbers of a realisation are calculated with by what is
-in `radarsim.kernels.traced` (`sqrt`, `atan2`, `where`, …). A state, a plot, a record is any tuple of numbers or of
-such; its shape stays the same. The same text runs on eight realisations at a time, compiled, and on floats over
+These are plain functions of numbers, tuples and named records; what calculates with numbers of a realisation is in
+`radarsim.kernels.traced` (`sqrt`, `atan2`, `where`, …). A state, a plot, a record is any tuple of numbers or of such
+tuples; its shape stays the same. The same text runs on eight realisations at a time, compiled, and on floats over
 recorded plots. Branches by keys are Python's: text, truth values and whole numbers of a record are no numbers of a
 realisation, and a kernel of its own is made for each.
 
@@ -53,11 +53,11 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case, Experiment
     from radarsim.report.drawing import Figure
 
-ANOTHER = "gives another formula each time"
-ROUNDED = 1e-9  # of the largest truth: permitted difference between plain Python and the kernel
+DIFFERENT_FORMULA = "gives another formula each time"
+MAX_DIFFERENCE = 1e-9  # of the largest truth: permitted difference between plain Python and the kernel
 NO_COVARIANCE = -1e100  # stands for the variances and the NEES of a matrix that is not positive
 BLOCK = 512  # realisations in a block
-ROOM = 20_000  # rows of plots and errors at once, 1.3 MB: fits a processor's cache
+MAX_ROWS = 20_000  # rows of plots and errors at once, 1.3 MB: fits a processor's cache
 
 
 class Steps:
@@ -72,8 +72,8 @@ class Steps:
 
 
 @dataclass(frozen=True)
-class Followed:
-    """A filter of a case: its kernel, numbers (n,), rows of its state, whether it has a covariance."""
+class CompiledFilter:
+    """A filter of a case: its kernel, its numbers (n,), the rows of its state, and whether it has a covariance."""
 
     kernel: Callable[..., None]
     numbers: np.ndarray
@@ -94,7 +94,7 @@ class Plan:
     draw: Callable[..., None]
     numbers: np.ndarray
     shape: tuple[int, int, int]  # rows of the state and of a plot, pairs of normals of a scan
-    filters: tuple[Followed, ...]
+    filters: tuple[CompiledFilter, ...]
     case: "Case"
     checked: dict[str, np.ndarray] = field(default_factory=dict)
     block: int = BLOCK
@@ -137,8 +137,8 @@ class StepStudy(OneFile):
             if not hasattr(cls, needed):
                 yield f"{cls.__name__}.{needed} must be given; see radarsim.studies.stepwise"
         for name in ("world", "begin", "move", "plot", "known", "truth", "detection", "exact_sigma"):
-            if not callable(given := getattr(cls, name, len)):
-                yield f"{cls.__name__}.{name} must be a function, got {given!r}"[:200]
+            if not callable(attribute := getattr(cls, name, len)):
+                yield f"{cls.__name__}.{name} must be a function, got {attribute!r}"[:200]
         normals = getattr(cls, "normals", (0, 0, 0))
         if not isinstance(normals, tuple) or len(normals) != 3 or not all(type(n) is int and n >= 0 for n in normals):
             yield f"normals: must be three whole numbers, of the first state, of a move, of a plot; got {normals!r}"
@@ -155,12 +155,12 @@ class StepStudy(OneFile):
             for needed in ("design", "start", "predict", "update", "estimate"):
                 if not callable(getattr(steps, needed, None)):
                     yield f"{cls.__name__}.kinds: {kind}: {needed} must be given; see radarsim.studies.stepwise"
-        asked = kinds_of(cls.Filter) if isinstance(getattr(cls, "Filter", None), type) else ()
-        if kinds and not asked:
+        allowed_kinds = kinds_of(cls.Filter) if isinstance(getattr(cls, "Filter", None), type) else ()
+        if kinds and not allowed_kinds:
             yield f"Filter: must have a key kind: Literal[{', '.join(map(repr, kinds))}]"
-        elif lacking := [kind for kind in asked if kind not in kinds]:
-            there = ", ".join(kinds)
-            yield f"kinds: no {' and no '.join(lacking)}, which the key kind of Filter allows; there are {there}"
+        elif missing_kinds := [kind for kind in allowed_kinds if kind not in kinds]:
+            names = ", ".join(kinds)
+            yield f"kinds: no {' and no '.join(missing_kinds)}, which the key kind of Filter allows; there are {names}"
 
     # ---- numbers -------------------------------------------------------------------------------------------------
     def prepare(self, case: "Case") -> Plan:
@@ -175,47 +175,56 @@ class StepStudy(OneFile):
         known = self._known(spec, axes.t_s)
         world, detection = record(self.world, spec), self._probability(spec)
         scene = self._scene(world)
-        filters = tuple(self._followed(spec, one, scene, detection < 1) for one in spec.filters)
-        if any(one.tested for one in filters):
+        filters = tuple(self._compiled(spec, keys, scene, detection < 1) for keys in spec.filters)
+        if any(member.tested for member in filters):
             f, k, c = sums.shapes["paired"]
             sums = Layout(**sums.shapes, believed=(f, k, c), nees=(f, k, 2))
         keys = np.stack([noise_key(case, "plots"), noise_key(case, "detections")])
-        draw = kernel(stepped.world, scene.first, scene.following, scene.shape[2], scene.shape[1])
-        given = known.ravel(), known.shape[1], draw, plain(world)
-        return Plan(sums, axes, keys, detection, *given, scene.shape, filters, case)
+        draw = cached_kernel(stepped.world, scene.first, scene.following, scene.shape[2], scene.shape[1])
+        kernel_arguments = known.ravel(), known.shape[1], draw, to_numbers(world)
+        return Plan(sums, axes, keys, detection, *kernel_arguments, scene.shape, filters, case)
 
     def _probability(self, spec: Any) -> float:
         """The probability of a plot."""
-        given = self.call(self.detection, spec)
-        if not isinstance(given, int | float) or not 0 <= given <= 1:
-            raise fault(self.detection, f"must give a probability, from 0 to 1, got {given!r}"[:200])
-        return float(given)
+        probability = self.call(self.detection, spec)
+        if not isinstance(probability, int | float) or not 0 <= probability <= 1:
+            raise fault(self.detection, f"must give a probability, from 0 to 1, got {probability!r}"[:200])
+        return float(probability)
 
     def _exact(self, spec: Any) -> np.ndarray | None:
         """The value of `exact_sigma`, checked."""
-        if (given := self.call(self.exact_sigma, spec)) is None:
+        if (values := self.call(self.exact_sigma, spec)) is None:
             return None
         shape = len(spec.filters), spec.scans, len(self.components)
-        found = array_of(self.exact_sigma, given, "filters × scans × components")
-        if found.shape != shape or (found < 0).any():
-            raise fault(self.exact_sigma, f"must give σ {shape}, none negative, got {found.shape}")
-        return found
+        sigma = to_array(self.exact_sigma, values, "filters × scans × components")
+        if sigma.shape != shape or (sigma < 0).any():
+            raise fault(self.exact_sigma, f"must give σ {shape}, none negative, got {sigma.shape}")
+        return sigma
 
     def _known(self, spec: Any, t_s: np.ndarray) -> np.ndarray:
         """The time since the scan before, and the known quantities at each, (K, whole eights)."""
-        what = f"must give {len(self.known_columns)} columns of {t_s.size} finite numbers, as known_columns says; "
-        one, other = (self.call(self.known, spec, t_s) for _ in range(2))
-        if not isinstance(one, Sequence | np.ndarray) or isinstance(one, str) or len(one) != len(self.known_columns):
-            raise fault(self.known, f"{what}got {f'{len(one)}' if isinstance(one, tuple | list) else repr(one)}"[:200])
-        given, again = (array_of(self.known, columns, f"{t_s.size} in each column") for columns in (one, other))
-        if given.shape[1:] != (t_s.size,) * bool(len(one)) or not np.isfinite(given).all():
-            raise fault(self.known, f"{what}got {given.shape}, {np.sum(~np.isfinite(given))} of them not finite")
-        if not np.array_equal(given, again):
-            raise fault(self.known, f"{ANOTHER}: draw in begin, move and plot, by normals")
-        columns = [np.diff(t_s, prepend=t_s[0]), *given]
-        known = np.zeros((t_s.size, -(-len(columns) // 8) * 8))
-        known[:, : len(columns)] = np.transpose(columns)
-        return known
+        required = (
+            f"must give {len(self.known_columns)} columns of {t_s.size} finite numbers, as known_columns says; got "
+        )
+        known_quantities, repeated = (self.call(self.known, spec, t_s) for _ in range(2))
+        if (
+            not isinstance(known_quantities, Sequence | np.ndarray)
+            or isinstance(known_quantities, str)
+            or len(known_quantities) != len(self.known_columns)
+        ):
+            size = f"{len(known_quantities)}" if isinstance(known_quantities, tuple | list) else repr(known_quantities)
+            raise fault(self.known, f"{required}{size}"[:200])
+        values, repeated_values = (
+            to_array(self.known, columns, f"{t_s.size} in each column") for columns in (known_quantities, repeated)
+        )
+        if values.shape[1:] != (t_s.size,) * bool(len(known_quantities)) or not np.isfinite(values).all():
+            raise fault(self.known, f"{required}{values.shape}, {np.sum(~np.isfinite(values))} of them not finite")
+        if not np.array_equal(values, repeated_values):
+            raise fault(self.known, f"{DIFFERENT_FORMULA}: draw in begin, move and plot, by normals")
+        columns = [np.diff(t_s, prepend=t_s[0]), *values]
+        padded = np.zeros((t_s.size, -(-len(columns) // 8) * 8))
+        padded[:, : len(columns)] = np.transpose(columns)
+        return padded
 
     def _scene(self, world: Any) -> "Scene":
         """The programs of truth and plots."""
@@ -227,17 +236,17 @@ class StepStudy(OneFile):
         for count in (first, move):
             trace = traced.Trace()
             c, dt, u = trace.plain(stepped.NUMBERS, world, stated=True), *self._at_a_scan(trace)
-            w = [noise(trace, n) for n in range(count + plot)]
-            own, error = tuple(w[:count]), tuple(w[count:])
+            w = [unit_normal(trace, n) for n in range(count + plot)]
+            state_normals, plot_normals = tuple(w[:count]), tuple(w[count:])
             if state is None:
-                x = recorded(self.begin, c, own)
+                x = traced_step(self.begin, c, state_normals)
             else:
-                x = recorded(self.move, trace.rows(stepped.STATE, state), dt, c, own)
-                same_shape(self.move, x, state)
+                x = traced_step(self.move, trace.rows(stepped.STATE, state), dt, c, state_normals)
+                check_same_shape(self.move, x, state)
             state = x
-            z, true = recorded(self.plot, x, u, c, error), recorded(self.truth, x, u, c)
-            of_length(self.plot, z, len(self.measured), "measured")
-            of_length(self.truth, true, len(self.components), "components")
+            z, true = traced_step(self.plot, x, u, c, plot_normals), traced_step(self.truth, x, u, c)
+            check_length(self.plot, z, len(self.measured), "measured")
+            check_length(self.truth, true, len(self.components), "components")
             trace.write(stepped.STATE, x)
             trace.write(stepped.PLOT, (z, true), 1)
             programs.append(trace.program())
@@ -252,99 +261,112 @@ class StepStudy(OneFile):
         dt, *u = trace.plain(stepped.KNOWN, (0.0,) * (1 + len(self.known_columns)))
         return dt, tuple(u)
 
-    def _followed(self, spec: Any, one: Any, scene: "Scene", missed: bool) -> Followed:
+    def _compiled(self, spec: Any, filter_keys: Any, scene: "Scene", missed: bool) -> CompiledFilter:
         """A filter's kernel and numbers."""
         from radarsim.kernels import stepped
 
-        steps = self.kinds[one.kind]
-        numbers = record(steps.design, spec, one)
+        steps = self.kinds[filter_keys.kind]
+        numbers = record(steps.design, spec, filter_keys)
         first, following, rows = self._filter_programs(steps, numbers, scene, missed)
         tested, rows_of_plot = steps.covariance is not None, scene.shape[1]
-        made = kernel(stepped.follower, first, following, rows_of_plot, len(self.components), tested)
-        return Followed(made, plain(numbers), rows, tested)
+        compiled = cached_kernel(stepped.follower, first, following, rows_of_plot, len(self.components), tested)
+        return CompiledFilter(compiled, to_numbers(numbers), rows, tested)
 
     def _filter_programs(self, steps: type[Steps], numbers: Any, scene: "Scene", missed: bool) -> tuple[Any, Any, int]:
         """The programs of a filter's first scan and of later ones, and the rows of its state."""
         from radarsim.kernels import stepped
 
-        made, state = [], None
+        programs, state = [], None
         for begins in (True, False):
             trace = traced.Trace()
             c, dt, u = trace.plain(stepped.NUMBERS, numbers, stated=True), *self._at_a_scan(trace)
             z = trace.rows(stepped.PLOT, (0.0,) * len(self.measured), 1)
             if begins:
-                s = recorded(steps.start, z, u, c)
+                s = traced_step(steps.start, z, u, c)
             else:
-                before = recorded(steps.predict, trace.rows(stepped.STATE, state), dt, u, c)
-                same_shape(steps.predict, before, state)
-                s = recorded(steps.update, before, z, u, c)
-                same_shape(steps.update, s, state)
+                predicted = traced_step(steps.predict, trace.rows(stepped.STATE, state), dt, u, c)
+                check_same_shape(steps.predict, predicted, state)
+                s = traced_step(steps.update, predicted, z, u, c)
+                check_same_shape(steps.update, s, state)
                 if missed:
-                    s = traced.where(trace.rows(stepped.PLOT, 0.0) > 0.5, s, before)
+                    s = traced.where(trace.rows(stepped.PLOT, 0.0) > 0.5, s, predicted)
             state = s
             trace.write(stepped.STATE, s)
             components = (0.0,) * len(self.components)
             true = trace.rows(stepped.PLOT, components, 1 + len(self.measured))
-            estimate = recorded(steps.estimate, s, u, c)
-            of_length(steps.estimate, estimate, len(components), "components")
+            estimate = traced_step(steps.estimate, s, u, c)
+            check_length(steps.estimate, estimate, len(components), "components")
             e = tuple(a - b for a, b in zip(estimate, true, strict=True))
             counts = trace.rows(stepped.COUNTED, 0.0) > 0.5
             trace.write(stepped.ERRORS, traced.where(counts, e, (0.0,) * len(e)))
             if steps.covariance is not None:
-                P = recorded(steps.covariance, s, u, c)
+                P = traced_step(steps.covariance, s, u, c)
                 n = len(components)
-                of_length(steps.covariance, P, n * (n + 1) // 2, "elements of a packed covariance")
+                check_length(steps.covariance, P, n * (n + 1) // 2, "elements of a packed covariance")
                 nees, pivot = traced.elimination(P, e)
-                found = traced.where(pivot > 0.0, (*variances(P, n), nees), (NO_COVARIANCE,) * (n + 1))
-                trace.write(stepped.TESTED, traced.where(counts, found, (0.0,) * (n + 1)))
-            made.append(trace.program())
-        return made[0], made[1], traced.count(state)
+                tests = traced.where(pivot > 0.0, (*variances(P, n), nees), (NO_COVARIANCE,) * (n + 1))
+                trace.write(stepped.TESTED, traced.where(counts, tests, (0.0,) * (n + 1)))
+            programs.append(trace.program())
+        return programs[0], programs[1], traced.count(state)
 
     def simulate(self, plan: Plan, first: int, count: int) -> np.ndarray:
         values = np.zeros(plan.layout.size)
         sums = plan.layout.unpack(values)
         for _ in self._followers(plan, first, count, sums):
             pass
-        if (never := sums["error"][..., 1] == 0).any():
-            sums["error"][never & ~self._free_of_error(plan)] = np.nan
-        if "believed" in sums and (lost := (sums["believed"] < 0).any(axis=2)).any():
-            sums["believed"][lost] = sums["nees"][lost] = np.nan
+        if (is_zero := sums["error"][..., 1] == 0).any():
+            sums["error"][is_zero & ~self._free_of_error(plan)] = np.nan
+        if "believed" in sums and (has_no_covariance := (sums["believed"] < 0).any(axis=2)).any():
+            sums["believed"][has_no_covariance] = sums["nees"][has_no_covariance] = np.nan
         return values
 
     def errors(self, plan: Plan, first: int, count: int) -> np.ndarray:
-        found = np.empty((count, *plan.axes.available.shape))
+        errors = np.empty((count, *plan.axes.available.shape))
         sums = plan.layout.unpack(np.zeros(plan.layout.size))
-        for f, start, many, errors in self._followers(plan, first, count, sums):
-            found[start : start + many, f] = errors[:many]
-        if (never := found == 0).any():
-            found[never & ~self._free_of_error(plan)] = np.nan
-        return np.moveaxis(found, 0, 1)
+        for f, start, used, block_errors in self._followers(plan, first, count, sums):
+            errors[start : start + used, f] = block_errors[:used]
+        if (is_zero := errors == 0).any():
+            errors[is_zero & ~self._free_of_error(plan)] = np.nan
+        return np.moveaxis(errors, 0, 1)
 
     def _followers(
         self, plan: Plan, first: int, count: int, sums: Mapping[str, np.ndarray]
     ) -> Iterator[tuple[int, int, int, np.ndarray]]:
-        """Runs the filters over a block and adds up: each filter, the first of some realisations and how many they are,
-        and their errors (≥ many, K, C), valid till the next."""
+        """Run the filters over a block and add up their sums.
+
+        Gives each filter, the number of the first of some realisations and how many they are, and their errors
+        (≥ used, K, C), which are valid till the next ones."""
         from radarsim.kernels.compile import aligned_zeros
         from radarsim.kernels.lanes import WIDTH
 
         nothing = np.zeros((1, 2))
         scans, components = plan.axes.k.size, len(plan.axes.components)
-        most = max(1, ROOM // (scans * (plan.shape[1] + 2 * components)))
-        work = aligned_zeros(max(one.rows for one in plan.filters) * WIDTH)
-        base, own = (aligned_zeros(most * scans * components * WIDTH) for _ in range(2))
+        max_groups = max(1, MAX_ROWS // (scans * (plan.shape[1] + 2 * components)))
+        work = aligned_zeros(max(member.rows for member in plan.filters) * WIDTH)
+        baseline_errors, own_errors = (aligned_zeros(max_groups * scans * components * WIDTH) for _ in range(2))
         order = sorted(range(len(plan.filters)), key=lambda f: f != plan.axes.baseline)
-        for start in range(0, count, most * WIDTH):
-            many = min(most * WIDTH, count - start)
-            groups = -(-many // WIDTH)
-            plots = drawn(plan, first + start, groups)
+        for start in range(0, count, max_groups * WIDTH):
+            used = min(max_groups * WIDTH, count - start)
+            groups = -(-used // WIDTH)
+            plots = draw_plots(plan, first + start, groups)
             for f in order:
-                one, errors = plan.filters[f], base if f == plan.axes.baseline else own
-                tested = [sums[name][f] if one.tested else nothing for name in ("believed", "nees")]
-                of = sums["error"][f], sums["paired"][f], *tested
-                one.kernel(groups, many, plan.known, plan.width, one.numbers, plots, work, errors, base, *of)
-                each = errors.reshape(most, scans, components, WIDTH)[:groups]
-                yield f, start, many, each.transpose(0, 3, 1, 2).reshape(-1, scans, components)
+                member, errors = plan.filters[f], baseline_errors if f == plan.axes.baseline else own_errors
+                tested = [sums[name][f] if member.tested else nothing for name in ("believed", "nees")]
+                filter_sums = sums["error"][f], sums["paired"][f], *tested
+                member.kernel(
+                    groups,
+                    used,
+                    plan.known,
+                    plan.width,
+                    member.numbers,
+                    plots,
+                    work,
+                    errors,
+                    baseline_errors,
+                    *filter_sums,
+                )
+                values = errors.reshape(max_groups, scans, components, WIDTH)[:groups]
+                yield f, start, used, values.transpose(0, 3, 1, 2).reshape(-1, scans, components)
 
     def _free_of_error(self, plan: Plan) -> np.ndarray:
         """Where (F, K, C) estimates equal the truth in plain Python too, in realisation 0.
@@ -355,29 +377,29 @@ class StepStudy(OneFile):
             columns, truth = {name: column[0] for name, column in plots.columns.items()}, plots.truth[0]
             try:
                 with np.errstate(all="ignore"):
-                    found = self.tracker(plan.case).feed({"t_s": plan.axes.t_s, **columns}).estimate
+                    estimate = self.tracker(plan.case).feed({"t_s": plan.axes.t_s, **columns}).estimate
             except ConfigError:  # a division by zero
-                found = np.full_like(plan.axes.exact_sigma, np.nan)
-            plan.checked["free"] = np.abs(found - truth) <= ROUNDED * np.abs(truth).max(axis=0)
+                estimate = np.full_like(plan.axes.exact_sigma, np.nan)
+            plan.checked["free"] = np.abs(estimate - truth) <= MAX_DIFFERENCE * np.abs(truth).max(axis=0)
         return plan.checked["free"]
 
     # ---- what is shown -------------------------------------------------------------------------------------------
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
         from radarsim.report import tables
 
-        made = super().tables(results)
+        tables_of_study = super().tables(results)
         if any("nees" in result.sums for result in results):
             tested = [result for result in results if "nees" in result.sums]
-            made["believed"] = tables.joined(map(self._believed, tested))
-            made["consistency"] = tables.joined(map(self._consistency, tested))
-        return made
+            tables_of_study["believed"] = tables.joined(map(self._believed, tested))
+            tables_of_study["consistency"] = tables.joined(map(self._consistency, tested))
+        return tables_of_study
 
     def _believed(self, result: CaseResult) -> Mapping[str, Any]:
         """The σ that filters with a covariance predict, the root of its mean variance, beside the true one."""
         from radarsim.report import notes
 
         sigma = np.sqrt(np.asarray(result.sums["believed"]) / result.count)
-        tested = np.array([self.kinds[one.kind].covariance is not None for one in result.spec.filters])
+        tested = np.array([self.kinds[filter_keys.kind].covariance is not None for filter_keys in result.spec.filters])
         axes = replace(result.axes, available=result.axes.available & tested[:, None, None])
         return notes.believed(replace(result, axes=axes), sigma)
 
@@ -385,7 +407,11 @@ class StepStudy(OneFile):
         """Mean NEES of all components by scan, per degree of freedom, with bounds and verdict."""
         from radarsim.report import notes, statistics, tables
 
-        tested = [f for f, one in enumerate(result.spec.filters) if self.kinds[one.kind].covariance is not None]
+        tested = [
+            f
+            for f, filter_keys in enumerate(result.spec.filters)
+            if self.kinds[filter_keys.kind].covariance is not None
+        ]
         scans, freedom, n = result.axes.k.size, len(self.components), result.count
         sums = np.asarray(result.sums["nees"])[tested].reshape(-1, 2) / [freedom, freedom**2]
         bounds = notes.bounds_from_spread(sums[:, 0], sums[:, 1], n, len(sums))
@@ -397,16 +423,20 @@ class StepStudy(OneFile):
         }
 
     def figures(
-        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
         from radarsim.report import panels
 
-        drawn = super().figures(results, made, experiment)
-        return drawn | panels.consistency(results, made["consistency"], experiment) if "consistency" in made else drawn
+        figures = super().figures(results, tables, experiment)
+        return (
+            figures | panels.consistency(results, tables["consistency"], experiment)
+            if "consistency" in tables
+            else figures
+        )
 
     # ---- recorded plots ------------------------------------------------------------------------------------------
-    def columns(self, spec: Any, one: Any) -> tuple[str, ...]:
-        return (*super().columns(spec, one), *self.known_columns)
+    def columns(self, spec: Any, filter_keys: Any) -> tuple[str, ...]:
+        return (*super().columns(spec, filter_keys), *self.known_columns)
 
     def drawing(self, case: "Case") -> Draw:
         return self._drawing(self.prepare(case))
@@ -416,22 +446,22 @@ class StepStudy(OneFile):
 
         scans, rows, numbers = plan.axes.k.size, plan.shape[1], len(self.measured)
         known = plan.known.reshape(scans, -1)[:, 1 : 1 + len(self.known_columns)].T
-        size = max(1, ROOM // (scans * rows))
+        size = max(1, MAX_ROWS // (scans * rows))
 
         def draw(first: int, count: int) -> Drawn:
             groups = -(-count // WIDTH)
             plots = np.empty((rows, scans, groups, WIDTH))
-            for done in range(0, groups, size):
-                some = min(size, groups - done)
-                made = drawn(plan, first + done * WIDTH, some).reshape(some, scans, rows, WIDTH)
-                plots[:, :, done : done + some] = made.transpose(2, 1, 0, 3)
+            for start in range(0, groups, size):
+                group_count = min(size, groups - start)
+                block = draw_plots(plan, first + start * WIDTH, group_count).reshape(group_count, scans, rows, WIDTH)
+                plots[:, :, start : start + group_count] = block.transpose(2, 1, 0, 3)
             plots[1 : 1 + numbers, plots[0] < 0.5] = np.nan
-            each = plots.reshape(rows, scans, -1)[..., :count].swapaxes(1, 2)
-            columns = dict(zip((one.column for one in self.measured), each[1:], strict=False))
+            values = plots.reshape(rows, scans, -1)[..., :count].swapaxes(1, 2)
+            columns = dict(zip((number.column for number in self.measured), values[1:], strict=False))
             columns |= {
-                n: np.broadcast_to(one, each[0].shape) for n, one in zip(self.known_columns, known, strict=True)
+                name: np.broadcast_to(row, values[0].shape) for name, row in zip(self.known_columns, known, strict=True)
             }
-            truth = each[1 + numbers :].transpose(1, 2, 0)
+            truth = values[1 + numbers :].transpose(1, 2, 0)
             return Drawn(plan.axes.t_s, columns, plan.axes.components, truth, first=first)
 
         return draw
@@ -451,12 +481,12 @@ class Scene:
 
 
 @cache
-def kernel(make: Callable[..., Any], *of: Any) -> Callable[..., None]:
+def cached_kernel(make: Callable[..., Any], *programs: Any) -> Callable[..., None]:
     """The kernel that a function of `radarsim.kernels.stepped` makes of programs, cached."""
-    return make(*of)
+    return make(*programs)
 
 
-def drawn(plan: Plan, first: int, groups: int) -> np.ndarray:
+def draw_plots(plan: Plan, first: int, groups: int) -> np.ndarray:
     """Truth and plots (groups × K × rows × 8, flat) of realisations from `first` on, see `radarsim.kernels.stepped`."""
     from radarsim.kernels.compile import aligned_zeros
     from radarsim.kernels.lanes import WIDTH
@@ -469,7 +499,7 @@ def drawn(plan: Plan, first: int, groups: int) -> np.ndarray:
     return plots
 
 
-def noise(trace: traced.Trace, n: int) -> traced.Lane:
+def unit_normal(trace: traced.Trace, n: int) -> traced.Lane:
     """The unit normal n of a scan."""
     from radarsim.kernels import stepped
 
@@ -478,60 +508,62 @@ def noise(trace: traced.Trace, n: int) -> traced.Lane:
     return lane
 
 
-def plain(numbers: Any) -> np.ndarray:
+def to_numbers(numbers: Any) -> np.ndarray:
     """The numbers (n,) of a record and a zero, so that there is at least one."""
     return np.array([*traced.leaves(numbers), 0.0], dtype=float)
 
 
 # ---- faults of an author's formulas ----------------------------------------------------------------------------------
-def numbers_of(function: Callable[..., Any], *arguments: Any) -> Any:
+def step_numbers(function: Callable[..., Any], *arguments: Any) -> Any:
     """The result of a step, with whole numbers as numbers of a realisation."""
     return traced.numbered(call(function, *arguments))
 
 
-def recorded(function: Callable[..., Any], *arguments: Any) -> Any:
+def traced_step(function: Callable[..., Any], *arguments: Any) -> Any:
     """The result of a step on numbers of a realisation, checked to be the same on each call."""
-    made, again = (numbers_of(function, *arguments) for _ in range(2))
-    if made is None or isinstance(made, list):
-        raise fault(function, f"must give a tuple of numbers, got {'nothing' if made is None else 'a list'}")
-    if any(isinstance(one, traced.Mask) for one in traced.leaves(made)):
+    result, repeated = (step_numbers(function, *arguments) for _ in range(2))
+    if result is None or isinstance(result, list):
+        raise fault(function, f"must give a tuple of numbers, got {'nothing' if result is None else 'a list'}")
+    if any(isinstance(number, traced.Mask) for number in traced.leaves(result)):
         raise fault(function, "gives a comparison in place of a number: where(condition, 1.0, 0.0) makes one of it")
-    for numbers in (made, again):
+    for numbers in (result, repeated):
         if wrong := [
-            one for one in traced.leaves(numbers) if not isinstance(one, traced.Lane) and not math.isfinite(one)
+            number
+            for number in traced.leaves(numbers)
+            if not isinstance(number, traced.Lane) and not math.isfinite(number)
         ]:
             raise fault(function, f"gives {wrong[0]:g}, which is no number to calculate with")
-    formulas = ([getattr(one, "at", one) for one in traced.leaves(numbers)] for numbers in (made, again))
+    formulas = ([getattr(number, "at", number) for number in traced.leaves(numbers)] for numbers in (result, repeated))
     if next(formulas) != next(formulas):
-        raise fault(function, f"{ANOTHER}: draw by normals")
-    return made
+        raise fault(function, f"{DIFFERENT_FORMULA}: draw by normals")
+    return result
 
 
 def record(function: Callable[..., Any], *arguments: Any) -> Any:
     """The numbers that an author's function makes of keys; ConfigError where it gives no tuple or named record."""
-    given, again = call(function, *arguments), call(function, *arguments)
-    if not isinstance(given, tuple):
-        raise fault(function, f"must give a tuple or a named record, got {type(given).__name__}")
-    numbers = [float(one) for one in traced.leaves(given)]
+    result, repeated = call(function, *arguments), call(function, *arguments)
+    if not isinstance(result, tuple):
+        raise fault(function, f"must give a tuple or a named record, got {type(result).__name__}")
+    numbers = [float(number) for number in traced.leaves(result)]
     if not np.isfinite(numbers).all():
-        raise fault(function, f"must give finite numbers, got {given!r}"[:200])
-    if numbers != [float(one) for one in traced.leaves(again)]:
-        raise fault(function, f"{ANOTHER}: draw in begin, move and plot, by normals")
-    return given
+        raise fault(function, f"must give finite numbers, got {result!r}"[:200])
+    if numbers != [float(number) for number in traced.leaves(repeated)]:
+        raise fault(function, f"{DIFFERENT_FORMULA}: draw in begin, move and plot, by normals")
+    return result
 
 
-def array_of(function: Callable[..., Any], given: Any, what: str) -> np.ndarray:
+def to_array(function: Callable[..., Any], values: Any, description: str) -> np.ndarray:
     """An array (…,) of the numbers that an author's function gives; ConfigError where they are no such numbers."""
     try:
-        return np.asarray(given, dtype=float)
+        return np.asarray(values, dtype=float)
     except (TypeError, ValueError):
-        raise fault(function, f"must give numbers, {what}, got {given!r}"[:200]) from None
+        raise fault(function, f"must give numbers, {description}, got {values!r}"[:200]) from None
 
 
-def of_length(function: Callable[..., Any], given: Any, wanted: int, what: str) -> None:
-    """Raises ConfigError where a function gives other than so many numbers."""
-    if not isinstance(given, tuple) or traced.count(given) != wanted or len(given) != wanted:
-        raise fault(function, f"must give a tuple of {wanted} numbers ({what}), got {shape(given)}")
+def check_length(function: Callable[..., Any], values: Any, count: int, description: str) -> None:
+    """Raise ConfigError where a function does not give this many numbers."""
+    if not isinstance(values, tuple) or traced.count(values) != count or len(values) != count:
+        raise fault(function, f"must give a tuple of {count} numbers ({description}), got {shape(values)}")
 
 
 def variances(P: Sequence[Any], n: int) -> tuple[Any, ...]:
@@ -539,10 +571,10 @@ def variances(P: Sequence[Any], n: int) -> tuple[Any, ...]:
     return tuple(traced.row_of(P, n, i)[i] for i in range(n))
 
 
-def same_shape(function: Callable[..., Any], given: Any, wanted: Any) -> None:
-    """Raises ConfigError where a state's shape differs from the one before."""
-    if shape(given) != shape(wanted):
-        raise fault(function, f"gives a state of the shape {shape(given)}, the one before has {shape(wanted)}")
+def check_same_shape(function: Callable[..., Any], state: Any, previous: Any) -> None:
+    """Raise ConfigError where a state's shape differs from that of the previous one."""
+    if shape(state) != shape(previous):
+        raise fault(function, f"gives a state of the shape {shape(state)}, the one before has {shape(previous)}")
 
 
 def shape(value: Any) -> str:
@@ -560,67 +592,68 @@ class Tracker:
     several = False
 
     def __init__(self, study: StepStudy, spec: Any):
-        self.study, self.names = study, tuple(one.name for one in spec.filters)
-        every = [study.kinds[one.kind] for one in spec.filters]
+        self.study, self.names = study, tuple(filter_keys.name for filter_keys in spec.filters)
+        filter_steps = [study.kinds[filter_keys.kind] for filter_keys in spec.filters]
         self.filters = [
-            (steps, record(steps.design, spec, one)) for steps, one in zip(every, spec.filters, strict=True)
+            (steps, record(steps.design, spec, filter_keys))
+            for steps, filter_keys in zip(filter_steps, spec.filters, strict=True)
         ]
         self.states: list[Any] = [None] * len(self.filters)
         self.last = math.nan
 
     def feed(self, columns: "Mapping[str, np.ndarray]") -> Track:
         with of_study(self.study.name):
-            return self._followed(columns)
+            return self._follow(columns)
 
-    def _followed(self, columns: "Mapping[str, np.ndarray]") -> Track:
+    def _follow(self, columns: "Mapping[str, np.ndarray]") -> Track:
         study, t = self.study, columns["t_s"]
-        plots = np.transpose([columns[one.column] for one in study.measured])
+        plots = np.transpose([columns[number.column] for number in study.measured])
         known = np.reshape([columns[name] for name in study.known_columns], (-1, t.size)).T
-        found = np.full((len(self.filters), t.size, 2, len(study.components)), np.nan)
+        values = np.full((len(self.filters), t.size, 2, len(study.components)), np.nan)
         for n in range(t.size):
             z, u = tuple(map(float, plots[n])), tuple(map(float, known[n]))
             for f, (steps, c) in enumerate(self.filters):
-                s = before = self.states[f]
+                s = previous = self.states[f]
                 if s is not None:
-                    s = self._next(n, steps.predict, before, s, float(t[n] - self.last), u, c)
+                    s = self._next(n, steps.predict, previous, s, float(t[n] - self.last), u, c)
                 if not any(map(math.isnan, z)):
-                    step, given = (steps.start, (z, u, c)) if s is None else (steps.update, (s, z, u, c))
-                    s = self._next(n, step, before, *given)
+                    step, step_arguments = (steps.start, (z, u, c)) if s is None else (steps.update, (s, z, u, c))
+                    s = self._next(n, step, previous, *step_arguments)
                 self.states[f] = s
                 if s is not None:
                     m = len(study.components)
-                    found[f, n, 0] = self._numbers(n, steps.estimate, m, "components", s, u, c)
+                    values[f, n, 0] = self._numbers(n, steps.estimate, m, "components", s, u, c)
                     if steps.covariance is not None:
-                        what = "elements of a packed covariance"
-                        P = self._numbers(n, steps.covariance, m * (m + 1) // 2, what, s, u, c)
+                        description = "elements of a packed covariance"
+                        P = self._numbers(n, steps.covariance, m * (m + 1) // 2, description, s, u, c)
                         if min(variance := variances(P, m)) < 0:
                             raise refusal(n, steps.covariance, f"gives a variance of {min(variance):g}")
-                        found[f, n, 1] = np.sqrt(variance)
+                        values[f, n, 1] = np.sqrt(variance)
             self.last = float(t[n])
-        components = tuple((one.name, one.unit) for one in study.components)
-        return Track(self.names, components, t, found[:, :, 0], found[:, :, 1])
+        components = tuple((component.name, component.unit) for component in study.components)
+        return Track(self.names, components, t, values[:, :, 0], values[:, :, 1])
 
-    def _next(self, row: int, step: Callable[..., Any], before: Any, *given: Any) -> Any:
+    def _next(self, row: int, step: Callable[..., Any], previous: Any, *step_arguments: Any) -> Any:
         """The state after a step at a row, of the shape of the one before, if any."""
         with np.errstate(all="ignore"):
-            state = numbers_of(step, *given)
-        if before is not None:
-            same_shape(step, state, before)
-        return finite(row, step, state)
+            state = step_numbers(step, *step_arguments)
+        if previous is not None:
+            check_same_shape(step, state, previous)
+        return check_finite(row, step, state)
 
-    def _numbers(self, row: int, step: Callable[..., Any], count: int, what: str, *given: Any) -> Any:
+    def _numbers(self, row: int, step: Callable[..., Any], count: int, description: str, *step_arguments: Any) -> Any:
         """A given number of numbers from a step at a row."""
         with np.errstate(all="ignore"):
-            found = numbers_of(step, *given)
-        of_length(step, found, count, what)
-        return finite(row, step, found)
+            numbers = step_numbers(step, *step_arguments)
+        check_length(step, numbers, count, description)
+        return check_finite(row, step, numbers)
 
 
-def finite(row: int, step: Callable[..., Any], found: Any) -> Any:
+def check_finite(row: int, step: Callable[..., Any], result: Any) -> Any:
     """The result of a step; raises PlotFault with the row where a number of it is not finite."""
-    if wrong := [one for one in traced.leaves(found) if not math.isfinite(one)]:
+    if wrong := [number for number in traced.leaves(result) if not math.isfinite(number)]:
         raise refusal(row, step, f"gives {wrong[0]:g}")
-    return found
+    return result
 
 
 def refusal(row: int, step: Callable[..., Any], words: str) -> PlotFault:

@@ -10,7 +10,7 @@ from radarsim.errors import ConfigError, StoreError
 from tests.program import command
 
 
-@pytest.mark.parametrize(("form", "options"), [("linear", ()), ("step", ("--step",)), ("folder", ("--folder",))])
+@pytest.mark.parametrize(("form", "options"), [("linear", ()), ("step", ("--step",))])
 def test_the_command_writes_a_package_under_its_name(tmp_path, monkeypatch, form, options):
     monkeypatch.chdir(tmp_path)
     assert "pip install -e my_paper" in command("new-study", "my_paper", *options).output
@@ -23,15 +23,7 @@ def test_the_command_writes_a_package_under_its_name(tmp_path, monkeypatch, form
     assert '"my_paper"' in text
 
 
-def test_a_study_has_one_form(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for options in (("--step", "--folder"), ("--folder", "--step")):
-        refused = command("new-study", "my_paper", *options, code=2)
-        assert "--step and --folder do not go together" in refused.output
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("form", ["linear", "step"])
+@pytest.mark.parametrize("form", reproduce.FORMS)
 def test_a_study_in_one_file_is_one_file_with_a_config_and_a_test(form):
     files = list(reproduce.files(form).values())
     assert [file.suffix for file in files] == [".toml", ".py", ".yaml", ".py"]
@@ -40,9 +32,8 @@ def test_a_study_in_one_file_is_one_file_with_a_config_and_a_test(form):
 
 @pytest.mark.parametrize("form", reproduce.FORMS)
 def test_every_file_says_what_goes_there(form):
-    every = reproduce.files(form).values()
-    silent = [file.name for file in every if "Yours:" not in file.read_text(encoding="utf-8")]
-    assert silent == ["random_walk_step.yaml"] * (form == "folder")
+    files = reproduce.files(form).values()
+    assert [file.name for file in files if "Yours:" not in file.read_text(encoding="utf-8")] == []
 
 
 @pytest.mark.parametrize(

@@ -387,11 +387,11 @@ def test_new_comments_every_key_and_never_overwrites(tmp_path, monkeypatch):
 
 def test_help_is_grouped_with_one_whole_line_for_each_command():
     text = command("--help").stdout
-    order = [text.index(f"\n{title}:\n") for title in group.SECTIONS]
+    order = [text.index(f"\n{title}:\n") for title in group.command_sections()]
     assert order == sorted(order)
-    assert set(main.commands) == {name for names in group.SECTIONS.values() for name in names}
+    assert set(main.commands) == {name for names in group.command_sections().values() for name in names}
     lines = text[order[0] :].strip().split("\n")
-    assert len([line for line in lines if line]) == len(group.SECTIONS) + len(main.commands)
+    assert len([line for line in lines if line]) == len(group.command_sections()) + len(main.commands)
     assert not any("..." in line or len(line) > 80 for line in lines)
 
 

@@ -9,9 +9,27 @@ from tests.studies import outside
 
 FILES = {
     "__init__.py": """
-from radarsim.studies.folder import StudyFolder
+from radarsim.studies.range_doppler import RangeDoppler
 
-STUDY = StudyFolder(package=__name__, name="frozen", about="Frozen gains.", filters={}, offers=("recorded",))
+
+class Frozen(RangeDoppler):
+    name, about, filters = "frozen", "Frozen gains.", {}
+
+    def keys(self):
+        from frozen.config import Keys
+
+        return Keys
+
+    def recording_interface(self):
+        from frozen.track import Recorded
+
+        return Recorded()
+
+    def claims(self):
+        return None
+
+
+STUDY = Frozen()
 """,
     "config.py": """
 from radarsim.studies.range_doppler import config

@@ -186,7 +186,7 @@ def histories(scans: int, chance: float, needed: int, rows, sigma, maps, alone) 
 
 @pytest.mark.parametrize(("f", "start"), [(0, 3), (1, 2), (1, 5)])
 def test_missed_plots_are_averaged_over_detection_histories(f, start, monkeypatch):
-    monkeypatch.setattr(floors, "RAREST", 0.0)
+    monkeypatch.setattr(floors, "IGNORED_SHARE", 0.0)
     scans, chance = 7, 0.7
     axes, floor = of_case(
         "rls2", f"radar.detection_probability={chance}", f"scans={scans}", f"filters.{f}.initial_scans={start}"
@@ -207,7 +207,7 @@ def test_missed_plots_are_averaged_over_detection_histories(f, start, monkeypatc
 def test_fewer_patterns_and_less_information_are_lower_bounds(monkeypatch, most):
     config = "rls2", "radar.detection_probability=0.8", "scans=11"
     whole = of_case(*config)[1]
-    monkeypatch.setattr(floors, "MOST_PATTERNS", most)
+    monkeypatch.setattr(floors, "MAX_PATTERNS", most)
     less = of_case(*config)[1]
     for f in range(2):
         few, all_of = known(less, f), known(whole, f)
@@ -222,7 +222,7 @@ def test_fewer_patterns_and_less_information_are_lower_bounds(monkeypatch, most)
 
 def test_patterns_that_do_not_determine_a_component_count_as_nothing(monkeypatch):
     """A sonar has a range from the first plot on, and extrapolates it; what its rate is, no plot has told yet."""
-    monkeypatch.setattr(floors, "RAREST", 0.0)
+    monkeypatch.setattr(floors, "IGNORED_SHARE", 0.0)
     chance = 0.7
     missing = "sensor.missed_scans=[]", f"sweep.sensor.detection_probability=[{chance}]", "scans=8"
     axes, floor = of_case("sonar_missed", *missing)
@@ -241,8 +241,10 @@ def test_the_worst_patterns_are_left_out_where_they_are_rare(monkeypatch):
     """One plot alone in six scans, of a target of unknown velocity: once in 10⁵, and three quarters of the mean."""
     given = "ambiguous_rls4", "radar.detection_probability=0.9", "scans=6"
     bound = known(of_case(*given)[1], 1)
-    kept = 1 - floors.RAREST / (0.1 * 0.9 / 0.99) - EXACT  # at the second scan the worst are those of one plot: a tenth
-    monkeypatch.setattr(floors, "RAREST", 0.0)
+    kept = (
+        1 - floors.IGNORED_SHARE / (0.1 * 0.9 / 0.99) - EXACT
+    )  # at the second scan the worst are those of one plot: a tenth
+    monkeypatch.setattr(floors, "IGNORED_SHARE", 0.0)
     whole = known(of_case(*given)[1], 1)
     assert (bound.sigma <= whole.sigma).all()
     assert (bound.sigma[:2] ** 2 >= kept * whole.sigma[:2] ** 2).all()
@@ -255,7 +257,7 @@ def test_the_worst_patterns_are_left_out_where_they_are_rare(monkeypatch):
 
 
 def test_missed_plots_of_moving_states_are_averaged_too(monkeypatch):
-    monkeypatch.setattr(floors, "RAREST", 0.0)
+    monkeypatch.setattr(floors, "IGNORED_SHARE", 0.0)
     F, Q = transition(2.0, 2), np.diag([0.1, 0.02])
     H, R, P = np.tile(np.eye(1, 2), (6, 1, 1)), np.full((6, 1), 3.0), np.diag([4.0, 1.0])
     moves = np.broadcast_to(F, (6, 2, 2)), np.broadcast_to(Q, (6, 2, 2))
@@ -267,7 +269,7 @@ def test_missed_plots_of_moving_states_are_averaged_too(monkeypatch):
             S = S - np.outer(S[:, 0], S[0]) / (S[0, 0] + 3.0) if plot else S
         total += 0.6 ** sum(came) * 0.4 ** (6 - sum(came)) * np.diag(S)
     assert_rounded(bound.sigma[-1], np.sqrt(total), condition=scaled_condition(S), operations=60)  # ten a scan
-    monkeypatch.setattr(floors, "MOST_PATTERNS", 1)
+    monkeypatch.setattr(floors, "MAX_PATTERNS", 1)
     less = floors.driven(P, *moves, H, R, 0.6, 2)
     assert (less.sigma[-1] < bound.sigma[-1]).all()
     assert less.patterns[-1] == REDUCTION

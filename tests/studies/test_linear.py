@@ -273,7 +273,7 @@ def test_recorded_plots_are_followed_as_a_run_follows_them_and_between_irregular
     study = study_of(n, 2 if n == 4 else 1)
     D = len(study.measured)
     case = case_of(study, FILTERS, probability=0.8)
-    columns = study.recorded().simulated(case, 3)
+    columns = study.recording_interface().simulated(case, 3)
     t = columns["t_s"] + np.random.default_rng(1).uniform(-0.1, 0.1, SCANS)
     for times in (columns["t_s"], t):
         plots = {**columns, "t_s": times}
@@ -294,7 +294,7 @@ def test_recorded_plots_are_followed_as_a_run_follows_them_and_between_irregular
 def test_after_the_configs_scans_the_last_period_of_own_gains_goes_on():
     study = study_of(2, 1)
     short, whole = (case_of(study, [{"gain": "steady"}], scans=scans) for scans in (8, 41))
-    columns = study.recorded().simulated(whole, 0)
+    columns = study.recording_interface().simulated(whole, 0)
     one, other = (study.tracker(case).feed(columns).estimate for case in (short, whole))
     assert_rounded(one, other, size=np.abs(other).max(), operations=10 * 41)
 
@@ -303,7 +303,7 @@ def test_the_likelihood_is_that_of_all_plots_together():
     """By the covariance of all numbers of a track, made of the matrices at once."""
     study = study_of(2, 1)
     case = case_of(study, [{}], scans=6)
-    columns = study.recorded().simulated(case, 0)
+    columns = study.recording_interface().simulated(case, 0)
     found = study.likelihood(case, None, [columns, columns])
     assert (found.keys, found.rows, found.tracks) == (study.fitted, 12, 2)
     for sigma, noise in ((2.0, 1.0), (3.0, 0.2)):
@@ -328,7 +328,7 @@ def test_what_is_fitted_is_the_likeliest_of_the_filters_that_say_how_likely_plot
     """One with gains of its own does not; where all have such, by the model that they share with a Kalman filter."""
     study = study_of(2, 1)
     case = case_of(study, [{"gain": "half"}, {"wrong": "R"}, {}, {"wrong": "F"}])
-    columns = study.recorded().simulated(case, 0)
+    columns = study.recording_interface().simulated(case, 0)
     each = {one.name: study.likelihood(case, one.name, [columns]) for one in case.spec.filters}
     half, *others = each.values()
     assert half is None
@@ -352,7 +352,7 @@ def test_at_the_first_plot_and_over_no_time_the_state_stays_whatever_the_motion_
     F, Q = np.array([[0.9, 0.1], [0.0, 0.8]]), np.diag([0.5, 2.0])
     study.motion = lambda spec: Motion(lambda t: F * (t / t), lambda t: Q, [1, 2], np.eye(2))
     case = case_of(study, [{}])
-    columns = study.recorded().simulated(case, 0)
+    columns = study.recording_interface().simulated(case, 0)
     one = {name: value[:1] for name, value in columns.items()}
     S = rows(2, 1, 0)[0] @ rows(2, 1, 0)[0] + 4
     wanted = multivariate_normal(rows(2, 1, 0)[0] @ [1, 2], S).logpdf(one["z0_m"][0])
@@ -481,4 +481,4 @@ def test_what_is_fitted_is_a_real_number_and_what_is_detected_is_of_a_part():
     study = type("Right", (Wrong,), {"fitted": ("sensor.drift_m",), "detection": "", "__module__": __name__})()
     case = case_of(study, [{}])
     with pytest.raises(ConfigError, match=r"fitted: sensor\.drift_m is not given"):
-        study.likelihood(case, None, [study.recorded().simulated(case, 0)])
+        study.likelihood(case, None, [study.recording_interface().simulated(case, 0)])

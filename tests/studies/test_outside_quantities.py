@@ -20,7 +20,8 @@ from tests.tolerances import assert_rounded, rounding
 PRECISION = 10 * NEAR_ENOUGH  # of a root, where the quantity changes by a tenth of what the key does
 STUDY = '''
 from radarsim.report.quantities import Quantity
-from radarsim.studies.folder import StudyFolder
+from radarsim.report.quantities import COMMON
+from radarsim.studies.range_doppler import RangeDoppler
 
 QUANTITIES = (
     Quantity("area", "mean square error", "areas", "area", per="component", unit="m2"),
@@ -30,8 +31,26 @@ QUANTITIES = (
 )
 
 
-class Areas(StudyFolder):
+class Areas(RangeDoppler):
     """Range and Doppler again, with tables of its own: squares of sigma, and its largest one without scans."""
+
+    name, about = "areas", "Range and Doppler, by areas."
+    filters = {"observes: [range]": "Kalman filter on range"}
+
+    def quantities(self, spec=None):
+        return (*COMMON, *QUANTITIES)
+
+    def paper_key(self):
+        return ""
+
+    def claims(self):
+        return None
+
+    def readings(self):
+        return None
+
+    def floor(self, spec, axes):
+        return None
 
     def tables(self, results):
         curves = self.curves(results)
@@ -52,13 +71,7 @@ class Areas(StudyFolder):
         return ["Areas."]
 
 
-STUDY = Areas(
-    package="radarsim.studies.range_doppler",
-    name="areas",
-    about="Range and Doppler, by areas.",
-    filters={"observes: [range]": "Kalman filter on range"},
-    own_quantities=QUANTITIES,
-)
+STUDY = Areas()
 '''
 CONFIG = """
 study: areas

@@ -151,7 +151,7 @@ def test_errors_are_the_exact_ones():
 def test_a_realisation_is_itself_in_any_block(monkeypatch):
     study = Walk()
     case = case_of(study, detection_probability=0.7)
-    monkeypatch.setattr(stepwise, "ROOM", 130)  # two eights at once
+    monkeypatch.setattr(stepwise, "MAX_ROWS", 130)  # two eights at once
     _, together = added(study, case, 40, step=40)
     _, apart = added(study, case, 40, step=3)
     for name, sums in together.items():
@@ -196,7 +196,7 @@ def test_what_the_study_knows_exactly_and_what_its_filters_believe_stands_in_tab
 def test_the_plots_of_a_realisation_followed_in_plain_python_are_what_the_run_made(sensor):
     study = Walk()
     case, i = case_of(study, **sensor), 1029
-    plots = study.recorded().simulated(case, i)
+    plots = study.recording_interface().simulated(case, i)
     assert list(plots) == ["t_s", "x_m", "drift_m", "true_x_m"]
     missed = np.isnan(plots["x_m"])
     assert not missed[0]
@@ -216,7 +216,7 @@ def test_a_filter_without_a_covariance_is_told_of_beside_recorded_plots():
     """Its errors, and that it is not tested."""
     study = Walk()
     case = case_of(study)
-    columns = dict(study.recorded().simulated(case, 1))
+    columns = dict(study.recording_interface().simulated(case, 1))
     track, found = study.tracker(case).feed(columns), Followed(case)
     truth = {name: columns.pop(name) for name in list(columns) if name.startswith("true_")}
     found.take(columns, track)
@@ -231,7 +231,7 @@ def test_a_filter_without_a_covariance_is_told_of_beside_recorded_plots():
 def test_missed_plots_are_missed_as_often_as_stated():
     study = Walk()
     case = case_of(study, detection_probability=0.6)
-    missed = [np.isnan(study.recorded().simulated(case, i)["x_m"][1:]).mean() for i in range(0, 400, 4)]
+    missed = [np.isnan(study.recording_interface().simulated(case, i)["x_m"][1:]).mean() for i in range(0, 400, 4)]
     assert abs(np.mean(missed) - 0.4) < 4.5 * np.sqrt(0.24 / (100 * (SCANS - 1)))
 
 

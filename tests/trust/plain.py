@@ -430,7 +430,7 @@ def matrices():
         case = case_of(study, filters, 5, probability=probability)
         plan = study.prepare(case)
         sums = plan.layout.unpack(study.simulate(plan, 8, 9))
-        recorded = study.recorded().simulated(case, 3)
+        recorded = study.recording_interface().simulated(case, 3)
         sums["plots"] = np.nan_to_num(np.stack(list(recorded.values())))
         sums["track"] = study.tracker(case).feed(recorded).estimate
         made |= {f"{n} states, {D} numbers, {probability}/{name}": array for name, array in sums.items()}

@@ -183,7 +183,7 @@ UNDER = "import os, sys; os.umask(int(os.environ['UMASK'], 8)); from radarsim.cl
 WRITTEN = (
     ("run", "rls2", "-n", "2000", "--out", "results", "--set", "figures=[gain_r]"),
     ("new", "mine", "--like", "rls2"),
-    ("new-study", "walk", "--folder"),
+    ("new-study", "walk"),
     ("simulate", "rls2", "-o", "plots.csv"),
 )
 

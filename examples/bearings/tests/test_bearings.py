@@ -103,9 +103,9 @@ def test_filters_are_those_of_the_textbook_over_their_own_plots(changes):
     case = case_of(*changes)
     plan = STUDY.prepare(case)
     for i in (3, 700):
-        plots = STUDY.recorded().simulated(case, i)
+        plots = STUDY.recording_interface().simulated(case, i)
         own = np.transpose([plots[name] for name in OWN])
-        track = STUDY.recorded().tracker(case).feed(plots)
+        track = STUDY.recording_interface().tracker(case).feed(plots)
         error = plan.layout.unpack(STUDY.simulate(plan, i, 1))["error"][..., 0]
         true = np.transpose([plots[f"true_{name}"] for name in ("r_m", "vx_mps", "vy_mps")])
         for f, one in enumerate(case.spec.filters):

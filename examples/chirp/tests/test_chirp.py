@@ -23,7 +23,7 @@ def test_steady_errors_are_those_of_riccatis_equation():
 
 
 def test_a_filter_of_a_few_lines_makes_the_same_errors_of_the_same_plots():
-    columns = STUDY.recorded().simulated(CASE, 7)
+    columns = STUDY.recording_interface().simulated(CASE, 7)
     plan = STUDY.prepare(CASE)
     error = plan.layout.unpack(STUDY.simulate(plan, 7, 1))["error"][..., 0]
     for f, name in enumerate(("down", "up")):

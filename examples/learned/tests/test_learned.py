@@ -82,8 +82,8 @@ def mixed(weights, states):
 def test_filters_are_those_of_the_textbook_over_their_own_plots():
     plan = STUDY.prepare(CASE)
     for i in (3, 700):
-        plots = STUDY.recorded().simulated(CASE, i)
-        track = STUDY.recorded().tracker(CASE).feed(plots)
+        plots = STUDY.recording_interface().simulated(CASE, i)
+        track = STUDY.recording_interface().tracker(CASE).feed(plots)
         error = plan.layout.unpack(STUDY.simulate(plan, i, 1))["error"][..., 0]
         true = np.transpose([plots[f"true_{name}"] for name in ("x_m", "y_m", "vx_mps", "vy_mps")])
         for f, one in enumerate(SPEC.filters):
@@ -125,8 +125,8 @@ def test_targets_do_what_the_keys_say():
 
 def test_the_filter_within_the_network_is_that_of_the_config():
     case = load("learned", ["filters.2.sigma_acceleration_mps2=16"]).cases[0]
-    plots = STUDY.recorded().simulated(case, 5)
-    track = STUDY.recorded().tracker(case).feed(plots)
+    plots = STUDY.recording_interface().simulated(case, 5)
+    track = STUDY.recording_interface().tracker(case).feed(plots)
     inner = Inner((10, np.pi / 180, 5), 70, 1)
     for k in range(30):
         inner.features(*(plots[name][k : k + 1] for name in COLUMNS))

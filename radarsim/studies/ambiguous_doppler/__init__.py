@@ -1,8 +1,23 @@
-"""Folded Doppler velocity: filters that unfold it by hypotheses, with memory and without (the wish that ends P1)."""
+"""Folded Doppler velocity: filters that unfold it by hypotheses, with memory and without (P1's suggested extension)."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from radarsim.language import term
-from radarsim.report.quantities import FLOORS, RIGHT, WRONG, Quantity
-from radarsim.studies.folder import StudyFolder
+from radarsim.report.quantities import COMMON, FLOORS, RIGHT, WRONG, Quantity
+from radarsim.studies.interface import Study
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+
+    from radarsim.config.experiment import Case, Experiment
+    from radarsim.engine.results import Axes, CaseResult
+    from radarsim.report.drawing import Figure
+    from radarsim.studies.ambiguous_doppler.config import Keys
+    from radarsim.studies.ambiguous_doppler.study import Plan
+    from radarsim.studies.ambiguous_doppler.track import Recorded
+    from radarsim.studies.floor import Floor
 
 COLUMN = "above_oracle_percent|above_oracle"  # against the filter that is given the true folds
 ABOVE_ORACLE = Quantity(
@@ -13,16 +28,93 @@ ABOVE_ORACLE = Quantity(
     squares=True,
     paired=True,
 )
-STUDY = StudyFolder(
-    package=__name__,
-    name="ambiguous_doppler",
-    about="Beyond P1: folded Doppler, unfolded by hypotheses kept from scan to scan.",
-    filters={
+
+
+class AmbiguousDoppler(Study):
+    """Extension of P1, as `study: ambiguous_doppler`."""
+
+    name = "ambiguous_doppler"
+    about = "Beyond P1: folded Doppler, unfolded by hypotheses kept from scan to scan."
+    filters = {
         "doppler: none": "Kalman filter on range alone, order 0, 1 or 2: the upper reference",
         "doppler: unfolded": "the same with the velocity unfolded by the truth: the lower reference",
         "doppler: folded": "the same, unfolded by up to `hypotheses` sequences of folds; 1: the nearest fold",
         "merge: each_scan": "the same, hypotheses merged into one each scan (GPB1): no memory",
-    },
-    offers=("inputs", "recorded", "warnings", "floor", "errors"),
-    own_quantities=(ABOVE_ORACLE, RIGHT, WRONG, *FLOORS),
-)
+    }
+
+    def keys(self) -> "type[Keys]":
+        from radarsim.studies.ambiguous_doppler.config import Keys
+
+        return Keys
+
+    def quantities(self, spec: "Keys | None" = None) -> tuple[Quantity, ...]:
+        return (*COMMON, ABOVE_ORACLE, RIGHT, WRONG, *FLOORS)
+
+    def prepare(self, case: "Case") -> "Plan":
+        from radarsim.studies.ambiguous_doppler import study
+
+        return study.prepare(case)
+
+    def computing_modules(self, spec: "Keys", plots: bool) -> Sequence[str]:
+        modules = f"{__name__}.config", f"{__name__}.study"
+        return (*modules, f"{__name__}.track") if plots else modules
+
+    def simulate(self, plan: "Plan", first: int, count: int) -> "np.ndarray":
+        from radarsim.studies.ambiguous_doppler import study
+
+        return study.simulate(plan, first, count)
+
+    def errors(self, plan: "Plan", first: int, count: int) -> "np.ndarray":
+        from radarsim.studies.ambiguous_doppler import study
+
+        return study.errors(plan, first, count)
+
+    def floor(self, spec: "Keys", axes: "Axes") -> "Floor | None":
+        from radarsim.studies.ambiguous_doppler import floor
+
+        return floor.floor(spec, axes)
+
+    def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
+        from radarsim.studies.ambiguous_doppler import tables
+
+        return tables.tables(results)
+
+    def inputs(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
+        from radarsim.studies.ambiguous_doppler import tables
+
+        return tables.inputs(results)
+
+    def figures(
+        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+    ) -> "dict[str, Figure]":
+        from radarsim.studies.ambiguous_doppler import figures
+
+        return figures.figures(results, made, experiment)
+
+    def drawn_from(self) -> Mapping[str, Sequence[str]]:
+        from radarsim.studies.ambiguous_doppler import figures
+
+        return figures.DRAWN_FROM
+
+    def question(self, experiment: "Experiment") -> str:
+        from radarsim.studies.ambiguous_doppler import words
+
+        return words.question(experiment)
+
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
+        from radarsim.studies.ambiguous_doppler import words
+
+        return words.answer(results, made)
+
+    def warnings(self, experiment: "Experiment") -> Sequence[str]:
+        from radarsim.studies.ambiguous_doppler import words
+
+        return words.warnings(experiment)
+
+    def recording_interface(self) -> "Recorded":
+        from radarsim.studies.ambiguous_doppler.track import Recorded
+
+        return Recorded()
+
+
+STUDY = AmbiguousDoppler()

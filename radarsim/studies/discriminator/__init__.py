@@ -1,18 +1,92 @@
 """P4 (Uss, Baryshev & Djavad 2010): Doppler frequency and its derivatives from one burst, and how often they lock."""
 
-from radarsim.report.quantities import FLOOR, LOCK, LOST
-from radarsim.studies.folder import StudyFolder
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-STUDY = StudyFolder(
-    package=__name__,
-    name="discriminator",
-    about="P4 (Uss, Baryshev & Djavad 2010): Doppler frequency and derivatives from one burst, how often they lock.",
-    filters={
+from radarsim.report.quantities import COMMON, FLOOR, LOCK, LOST, Quantity
+from radarsim.studies.interface import Study
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+
+    from radarsim.config.experiment import Case, Experiment
+    from radarsim.engine.results import CaseResult
+    from radarsim.report.drawing import Figure
+    from radarsim.studies.discriminator.config import Keys
+    from radarsim.studies.discriminator.study import Plan
+    from radarsim.studies.floor import Floor
+
+
+class Discriminator(Study):
+    """P4, as `study: discriminator`."""
+
+    name = "discriminator"
+    about = "P4 (Uss, Baryshev & Djavad 2010): Doppler frequency and derivatives from one burst, how often they lock."
+    filters = {
         "method: sequence": "discriminators over windows that grow to the whole burst, Fisher scoring in each",
         "method: ridge": "the classical rival: short-time spectrum, robust fit, unwrapping, then scoring; no prior",
-    },
-    offers=("curves", "floor"),
-    exact_errors=False,  # exact_sigma is the bound, which an estimator reaches or does not
-    draws_sweeps=True,  # lock is what is swept for, and has figures of its own
-    own_quantities=(LOCK, LOST, FLOOR),
-)
+    }
+    exact_errors = False  # exact_sigma is the bound, which an estimator reaches or does not
+    draws_sweeps = True  # lock is what is swept for, and has figures of its own
+
+    def keys(self) -> "type[Keys]":
+        from radarsim.studies.discriminator.config import Keys
+
+        return Keys
+
+    def quantities(self, spec: "Keys | None" = None) -> tuple[Quantity, ...]:
+        return (*COMMON, LOCK, LOST, FLOOR)
+
+    def prepare(self, case: "Case") -> "Plan":
+        from radarsim.studies.discriminator import study
+
+        return study.prepare(case)
+
+    def computing_modules(self, spec: "Keys", plots: bool) -> Sequence[str]:
+        return f"{__name__}.config", f"{__name__}.study"
+
+    def simulate(self, plan: "Plan", first: int, count: int) -> "np.ndarray":
+        from radarsim.studies.discriminator import study
+
+        return study.simulate(plan, first, count)
+
+    def floor(self, spec: "Keys", axes: Any) -> "Floor | None":
+        from radarsim.studies.discriminator import floor
+
+        return floor.floor(spec, axes)
+
+    def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
+        from radarsim.studies.discriminator import tables
+
+        return tables.tables(results)
+
+    def curves(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
+        from radarsim.studies.discriminator import tables
+
+        return tables.curves(results)
+
+    def figures(
+        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+    ) -> "dict[str, Figure]":
+        from radarsim.studies.discriminator import figures
+
+        return figures.figures(results, made, experiment)
+
+    def drawn_from(self) -> Mapping[str, Sequence[str]]:
+        from radarsim.studies.discriminator import figures
+
+        return figures.DRAWN_FROM
+
+    def question(self, experiment: "Experiment") -> str:
+        from radarsim.studies.discriminator import words
+
+        return words.question(experiment)
+
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
+        from radarsim.studies.discriminator import words
+
+        return words.answer(results, made)
+
+
+STUDY = Discriminator()

@@ -1,21 +1,113 @@
 """P2 (Sychev & Osipov 2023): multiple-model filters on an aeroballistic target, families × merging rules."""
 
-from radarsim.language import term
-from radarsim.report.quantities import Quantity
-from radarsim.studies.folder import StudyFolder
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-STUDY = StudyFolder(
-    package=__name__,
-    name="multimodel",
-    about="P2 (Sychev & Osipov 2023): multiple-model filters on an aeroballistic target, families × merging rules.",
-    filters={
+from radarsim.language import term
+from radarsim.report.quantities import COMMON, Component, Quantity
+from radarsim.studies.interface import Study
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+
+    from radarsim.config.experiment import Case, Experiment
+    from radarsim.engine.results import CaseResult
+    from radarsim.report.drawing import Figure
+    from radarsim.studies.multimodel.config import Keys
+    from radarsim.studies.multimodel.study import Plan
+    from radarsim.studies.multimodel.track import Recorded
+
+PROBABILITY = Quantity(
+    *("probability", term("probability"), "probabilities", "probability"), per=term("model"), kind="share"
+)
+
+
+class MultiModel(Study):
+    """P2, as `study: multimodel`."""
+
+    name = "multimodel"
+    about = "P2 (Sychev & Osipov 2023): multiple-model filters on an aeroballistic target, families × merging rules."
+    filters = {
         "family": "kalman, gpb1 (MMA1), imm (MMA2), gpb2 (MMA3) with a bank of one to five motion models",
         "merge": "rule of the partial merges: moment, best, combined, modified_combined",
         "output": "rule that forms the estimate: moment, best",
         "covariance_at": "the plot's covariance at the plot or at its prediction",
-    },
-    offers=("cost", "seconds_per_update", "recorded", "errors"),
-    own_quantities=(
-        Quantity("probability", term("probability"), "probabilities", "probability", per=term("model"), kind="share"),
-    ),
-)
+    }
+
+    def keys(self) -> "type[Keys]":
+        from radarsim.studies.multimodel.config import Keys
+
+        return Keys
+
+    def quantities(self, spec: "Keys | None" = None) -> tuple[Quantity, ...]:
+        return (*COMMON, PROBABILITY)
+
+    def prepare(self, case: "Case") -> "Plan":
+        from radarsim.studies.multimodel import study
+
+        return study.prepare(case)
+
+    def computing_modules(self, spec: "Keys", plots: bool) -> Sequence[str]:
+        modules = f"{__name__}.config", f"{__name__}.study"
+        return (*modules, f"{__name__}.track") if plots else modules
+
+    def simulate(self, plan: "Plan", first: int, count: int) -> "np.ndarray":
+        from radarsim.studies.multimodel import study
+
+        return study.simulate(plan, first, count)
+
+    def errors(self, plan: "Plan", first: int, count: int) -> "np.ndarray":
+        from radarsim.studies.multimodel import study
+
+        return study.errors(plan, first, count)
+
+    def seconds_per_update(self, plan: "Plan") -> Mapping[str, float]:
+        from radarsim.studies.multimodel import cost
+
+        return cost.seconds_per_update(plan)
+
+    def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
+        from radarsim.studies.multimodel import tables
+
+        return tables.tables(results)
+
+    def cost(self, made: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":
+        from radarsim.studies.multimodel import tables
+
+        return tables.cost(made, run)
+
+    def figures(
+        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+    ) -> "dict[str, Figure]":
+        from radarsim.studies.multimodel import figures
+
+        return figures.figures(results, made, experiment)
+
+    def shown(self) -> Sequence[Component]:
+        from radarsim.studies.multimodel import figures
+
+        return figures.COMPONENTS
+
+    def drawn_from(self) -> Mapping[str, Sequence[str]]:
+        from radarsim.studies.multimodel import figures
+
+        return figures.DRAWN_FROM
+
+    def question(self, experiment: "Experiment") -> str:
+        from radarsim.studies.multimodel import words
+
+        return words.question(experiment)
+
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
+        from radarsim.studies.multimodel import words
+
+        return words.answer(results, made)
+
+    def recording_interface(self) -> "Recorded":
+        from radarsim.studies.multimodel.track import Recorded
+
+        return Recorded()
+
+
+STUDY = MultiModel()

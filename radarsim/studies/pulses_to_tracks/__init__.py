@@ -1,19 +1,98 @@
 """From pulses to tracks: what a burst's estimate of velocity and acceleration is worth to the track (P4 into P1)."""
 
-from radarsim.report.quantities import FLOORS, LOCK, LOST, RIGHT, WRONG
-from radarsim.studies.folder import StudyFolder
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-STUDY = StudyFolder(
-    package=__name__,
-    name="pulses_to_tracks",
-    about="Beyond P1 and P4: Doppler estimated from bursts, which may fail to lock, and the resulting tracks.",
-    filters={
+from radarsim.report.quantities import COMMON, FLOORS, LOCK, LOST, RIGHT, WRONG, Quantity
+from radarsim.studies.interface import Study
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+
+    from radarsim.config.experiment import Case, Experiment
+    from radarsim.engine.results import CaseResult
+    from radarsim.report.drawing import Figure
+    from radarsim.studies.floor import Floor
+    from radarsim.studies.pulses_to_tracks.config import Keys
+    from radarsim.studies.pulses_to_tracks.study import Plan
+
+
+class PulsesToTracks(Study):
+    """P4's estimates in P1's tracks, as `study: pulses_to_tracks`."""
+
+    name = "pulses_to_tracks"
+    about = "Beyond P1 and P4: Doppler estimated from bursts, which may fail to lock, and the resulting tracks."
+    filters = {
         "observes: [range]": "Kalman filter on range alone, which needs no burst",
         "estimator: sequence": "with the velocity, or velocity and acceleration, that P4's sequence estimates",
         "estimator: dense": "the same with twice as many windows; cured: with a search where coherence is short",
         "estimator: spectrum": "the same by the classical method: the peak of the spectrum, then scoring",
         "estimator: fisher_bound": "the idealisation: Gaussian errors of the Fisher bound, which always lock",
-    },
-    offers=("inputs", "warnings", "floor"),
-    own_quantities=(LOCK, LOST, RIGHT, WRONG, *FLOORS),
-)
+    }
+
+    def keys(self) -> "type[Keys]":
+        from radarsim.studies.pulses_to_tracks.config import Keys
+
+        return Keys
+
+    def quantities(self, spec: "Keys | None" = None) -> tuple[Quantity, ...]:
+        return (*COMMON, LOCK, LOST, RIGHT, WRONG, *FLOORS)
+
+    def prepare(self, case: "Case") -> "Plan":
+        from radarsim.studies.pulses_to_tracks import study
+
+        return study.prepare(case)
+
+    def computing_modules(self, spec: "Keys", plots: bool) -> Sequence[str]:
+        return f"{__name__}.config", f"{__name__}.study"
+
+    def simulate(self, plan: "Plan", first: int, count: int) -> "np.ndarray":
+        from radarsim.studies.pulses_to_tracks import study
+
+        return study.simulate(plan, first, count)
+
+    def floor(self, spec: "Keys", axes: Any) -> "Floor | None":
+        from radarsim.studies.pulses_to_tracks import floor
+
+        return floor.floor(spec, axes)
+
+    def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
+        from radarsim.studies.pulses_to_tracks import tables
+
+        return tables.tables(results)
+
+    def inputs(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
+        from radarsim.studies.pulses_to_tracks import tables
+
+        return tables.inputs(results)
+
+    def figures(
+        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+    ) -> "dict[str, Figure]":
+        from radarsim.studies.pulses_to_tracks import figures
+
+        return figures.figures(results, made, experiment)
+
+    def drawn_from(self) -> Mapping[str, Sequence[str]]:
+        from radarsim.studies.pulses_to_tracks import figures
+
+        return figures.DRAWN_FROM
+
+    def question(self, experiment: "Experiment") -> str:
+        from radarsim.studies.pulses_to_tracks import words
+
+        return words.question(experiment)
+
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
+        from radarsim.studies.pulses_to_tracks import words
+
+        return words.answer(results, made)
+
+    def warnings(self, experiment: "Experiment") -> Sequence[str]:
+        from radarsim.studies.pulses_to_tracks import words
+
+        return words.warnings(experiment)
+
+
+STUDY = PulsesToTracks()

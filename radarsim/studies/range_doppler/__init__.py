@@ -1,29 +1,139 @@
 """P1 (Gorshkov & Zavizhenets 2017): range-only against range + Doppler Kalman filters of the second order."""
 
-from radarsim.report.quantities import FLOORS
-from radarsim.studies.folder import StudyFolder
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
-STUDY = StudyFolder(
-    package=__name__,
-    name="range_doppler",
-    about="P1 (Gorshkov & Zavizhenets 2017): range-only against range + Doppler Kalman filters of the second order.",
-    filters={
+from radarsim.report.quantities import COMMON, FLOORS, Quantity
+from radarsim.studies.interface import Study
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+
+    from radarsim.config.experiment import Case, Experiment
+    from radarsim.engine.results import Axes, CaseResult
+    from radarsim.report.drawing import Chart, Figure
+    from radarsim.studies.floor import Floor
+    from radarsim.studies.range_doppler.config import Keys
+    from radarsim.studies.range_doppler.given import GivenGains
+    from radarsim.studies.range_doppler.study import Plan
+    from radarsim.studies.range_doppler.track import Recorded
+
+
+class RangeDoppler(Study):
+    """P1, as `study: range_doppler`."""
+
+    name = "range_doppler"
+    about = "P1 (Gorshkov & Zavizhenets 2017): range-only against range + Doppler Kalman filters of the second order."
+    filters = {
         "observes: [range]": "Kalman filter of the second order on range, started by least squares on three scans",
         "observes: [range, velocity]": "the same on range and radial velocity, started on two scans",
         "kind: NAME": "a filter of an installed package (entry points radarsim.filters), by its gains at every scan",
-    },
-    offers=(
-        "gains",
-        "inputs",
-        "recorded",
-        "chart",
-        "shortened",
-        "exact_but_for",
-        "costly",
-        "errors",
-        "seconds_at_most",
-        "own_filters",
-        "floor",
-    ),
-    own_quantities=FLOORS,
-)
+    }
+
+    def keys(self) -> "type[Keys]":
+        from radarsim.studies.range_doppler.config import Keys
+
+        return Keys
+
+    def own_filters(self) -> "type[GivenGains]":
+        from radarsim.studies.range_doppler.given import own_filters
+
+        return own_filters()
+
+    def quantities(self, spec: "Keys | None" = None) -> tuple[Quantity, ...]:
+        return (*COMMON, *FLOORS)
+
+    def prepare(self, case: "Case") -> "Plan":
+        from radarsim.studies.range_doppler import study
+
+        return study.prepare(case)
+
+    def computing_modules(self, spec: "Keys", plots: bool) -> Sequence[str]:
+        modules = f"{__name__}.config", f"{__name__}.study", f"{__name__}.given"
+        return (*modules, f"{__name__}.track") if plots else modules
+
+    def simulate(self, plan: "Plan", first: int, count: int) -> "np.ndarray":
+        from radarsim.studies.range_doppler import study
+
+        return study.simulate(plan, first, count)
+
+    def errors(self, plan: "Plan", first: int, count: int) -> "np.ndarray":
+        from radarsim.studies.range_doppler import study
+
+        return study.errors(plan, first, count)
+
+    def shortened(self, case: "Case", at_s: float | None, at_k: int | None) -> "Case":
+        from radarsim.studies.range_doppler import study
+
+        return study.shortened(case, at_s, at_k)
+
+    def exact_but_for(self, case: "Case") -> str:
+        from radarsim.studies.range_doppler import study
+
+        return study.exact_but_for(case)
+
+    def costly(self, case: "Case") -> bool:
+        from radarsim.studies.range_doppler import study
+
+        return study.costly(case)
+
+    def floor(self, spec: "Keys", axes: "Axes") -> "Floor | None":
+        from radarsim.studies.range_doppler import floor
+
+        return floor.floor(spec, axes)
+
+    def seconds_at_most(self, plan: "Plan") -> float:
+        from radarsim.studies.range_doppler import cost
+
+        return cost.seconds_at_most(plan)
+
+    def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
+        from radarsim.studies.range_doppler import tables
+
+        return tables.tables(results)
+
+    def gains(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
+        from radarsim.studies.range_doppler import tables
+
+        return tables.gains(results)
+
+    def inputs(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
+        from radarsim.studies.range_doppler import tables
+
+        return tables.inputs(results)
+
+    def figures(
+        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+    ) -> "dict[str, Figure]":
+        from radarsim.studies.range_doppler import figures
+
+        return figures.figures(results, made, experiment)
+
+    def drawn_from(self) -> Mapping[str, Sequence[str]]:
+        from radarsim.studies.range_doppler import figures
+
+        return figures.DRAWN_FROM
+
+    def question(self, experiment: "Experiment") -> str:
+        from radarsim.studies.range_doppler import words
+
+        return words.question(experiment)
+
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
+        from radarsim.studies.range_doppler import words
+
+        return words.answer(results, made)
+
+    def recording_interface(self) -> "Recorded":
+        from radarsim.studies.range_doppler.track import Recorded
+
+        return Recorded()
+
+    def chart(self, cases: "Sequence[Case]", references: "Sequence[Case]") -> "Chart":
+        from radarsim.studies.range_doppler import chart
+
+        return chart.chart(cases, references)
+
+
+STUDY = RangeDoppler()

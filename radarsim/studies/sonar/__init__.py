@@ -1,16 +1,16 @@
 """P3 (Butyrskiy): smoothing and extrapolation of sonar plots, missed plots, correlated errors.
 
-Its three parts are the paper's three questions. The files of this folder answer the first, smoothing, and hold what all
-parts have; the folders `manoeuvre` and `clutter` have files of the same names as those of
-`radarsim.studies.folder`, for cases that ask their questions. A table may have no rows, a figure be None."""
+The paper asks three questions, each with a part here. The files of this folder answer the first, smoothing, and hold
+what all parts have; the folders `manoeuvre` and `clutter` have files of the same names for cases that ask the others.
+A table may have no rows, a figure be None."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from radarsim.language import term
 from radarsim.report.quantities import COMMON, FLOORS, Component, Quantity
-from radarsim.studies.interface import Plan, RecordedPlots, Study
+from radarsim.studies.interface import Study
 
 if TYPE_CHECKING:
     import numpy as np
@@ -20,16 +20,204 @@ if TYPE_CHECKING:
     from radarsim.engine.results import CaseResult
     from radarsim.report.drawing import Figure
     from radarsim.studies.floor import Floor
+    from radarsim.studies.interface import Draw, Plan, RecordedPlots, Tracker
     from radarsim.studies.sonar.config import Keys
 
-BASE = "smoothing"
-# A part comes after those whose questions are asked of its cases too.
-PARTS = {BASE: __name__, "manoeuvre": f"{__name__}.manoeuvre", "clutter": f"{__name__}.clutter"}
-TRACKING = (  # of a tracker among false plots
+TRACKING = (  # quantities of a tracker among false plots
     Quantity("loss", term("ends of a track an hour"), "tracking", "ends_per_hour|ends", unit=term("/h")),
     Quantity("false_tracks", term("false tracks an hour"), "tracking", "false_tracks_per_hour|false", unit=term("/h")),
 )
 CaseOrResult = TypeVar("CaseOrResult", "Case", "CaseResult")
+
+
+class Part(ABC):
+    """One of the paper's three questions, and how cases that ask it are computed and shown."""
+
+    name: str
+    package: str
+
+    @abstractmethod
+    def prepare(self, case: "Case") -> "Plan":
+        """The plan of a case, which simulates."""
+
+    @abstractmethod
+    def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
+        """The part's own tables."""
+
+    @abstractmethod
+    def figures(
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+    ) -> "Mapping[str, Figure | None]":
+        """The part's own figures."""
+
+    @abstractmethod
+    def drawn_from(self) -> Mapping[str, Sequence[str]]:
+        """As `Study.drawn_from`."""
+
+    @abstractmethod
+    def question(self, specs: "Sequence[Keys]") -> str:
+        """The question of cases with these keys."""
+
+    @abstractmethod
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> list[str]:
+        """The answer to it."""
+
+    @abstractmethod
+    def drawing(self, case: "Case") -> "Draw":
+        """As `RecordedPlots.drawing`."""
+
+    @abstractmethod
+    def tracker(self, case: "Case") -> "Tracker":
+        """As `RecordedPlots.tracker`."""
+
+
+class Smoothing(Part):
+    """How well a track is smoothed and extrapolated."""
+
+    name, package = "smoothing", __name__
+
+    def prepare(self, case: "Case") -> "Plan":
+        from radarsim.studies.sonar import study
+
+        return study.prepare(case)
+
+    def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
+        from radarsim.studies.sonar import tables
+
+        return tables.tables(results)
+
+    def figures(
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+    ) -> "Mapping[str, Figure | None]":
+        from radarsim.studies.sonar import figures
+
+        return figures.figures(results, tables, experiment)
+
+    def drawn_from(self) -> Mapping[str, Sequence[str]]:
+        from radarsim.studies.sonar import figures
+
+        return figures.DRAWN_FROM
+
+    def question(self, specs: "Sequence[Keys]") -> str:
+        from radarsim.studies.sonar import words
+
+        return words.question(specs)
+
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> list[str]:
+        from radarsim.studies.sonar import words
+
+        return words.answer(results, tables)
+
+    def drawing(self, case: "Case") -> "Draw":
+        from radarsim.studies.sonar import track
+
+        return track.drawing(case)
+
+    def tracker(self, case: "Case") -> "Tracker":
+        from radarsim.studies.sonar import track
+
+        return track.Tracker(case)
+
+
+class Manoeuvre(Part):
+    """How soon a manoeuvre is detected, how filters respond to it, and what a track is used for."""
+
+    name, package = "manoeuvre", f"{__name__}.manoeuvre"
+
+    def prepare(self, case: "Case") -> "Plan":
+        from radarsim.studies.sonar.manoeuvre import study
+
+        return study.prepare(case)
+
+    def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
+        from radarsim.studies.sonar.manoeuvre import tables
+
+        return tables.tables(results)
+
+    def figures(
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+    ) -> "Mapping[str, Figure | None]":
+        from radarsim.studies.sonar.manoeuvre import figures
+
+        return figures.figures(results, tables)
+
+    def drawn_from(self) -> Mapping[str, Sequence[str]]:
+        from radarsim.studies.sonar.manoeuvre import figures
+
+        return figures.DRAWN_FROM
+
+    def question(self, specs: "Sequence[Keys]") -> str:
+        from radarsim.studies.sonar.manoeuvre import words
+
+        return words.question(specs)
+
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> list[str]:
+        from radarsim.studies.sonar.manoeuvre import words
+
+        return words.answer(results, tables)
+
+    def drawing(self, case: "Case") -> "Draw":
+        from radarsim.studies.sonar.manoeuvre import track
+
+        return track.drawing(case)
+
+    def tracker(self, case: "Case") -> "Tracker":
+        from radarsim.studies.sonar.manoeuvre import track
+
+        return track.Tracker(case)
+
+
+class Clutter(Part):
+    """How a target is tracked among false plots."""
+
+    name, package = "clutter", f"{__name__}.clutter"
+
+    def prepare(self, case: "Case") -> "Plan":
+        from radarsim.studies.sonar.clutter import study
+
+        return study.prepare(case)
+
+    def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
+        from radarsim.studies.sonar.clutter import tables
+
+        return tables.tables(results)
+
+    def figures(
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+    ) -> "Mapping[str, Figure | None]":
+        from radarsim.studies.sonar.clutter import figures
+
+        return figures.figures(results, tables)
+
+    def drawn_from(self) -> Mapping[str, Sequence[str]]:
+        from radarsim.studies.sonar.clutter import figures
+
+        return figures.DRAWN_FROM
+
+    def question(self, specs: "Sequence[Keys]") -> str:
+        from radarsim.studies.sonar.clutter import words
+
+        return words.question(specs)
+
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> list[str]:
+        from radarsim.studies.sonar.clutter import words
+
+        return words.answer(results, tables)
+
+    def drawing(self, case: "Case") -> "Draw":
+        from radarsim.studies.sonar.clutter import track
+
+        return track.drawing(case)
+
+    def tracker(self, case: "Case") -> "Tracker":
+        from radarsim.studies.sonar.clutter import track
+
+        return track.Tracker(case)
+
+
+SMOOTHING = Smoothing()
+# A part comes after those whose questions are asked of its cases too.
+PARTS: Mapping[str, Part] = {part.name: part for part in (SMOOTHING, Manoeuvre(), Clutter())}
 
 
 class Sonar(Study):
@@ -37,7 +225,7 @@ class Sonar(Study):
 
     name = "sonar"
     about = "P3 (Butyrskiy): smoothing and extrapolation of sonar plots, missed plots, correlated errors."
-    filters = {  # noqa: RUF012
+    filters = {
         "kind: growing_memory": "least squares on all plots so far, the recursion (12)-(14)",
         "kind: window": "least squares on the last `plots` plots",
         "kind: kalman": "Kalman-Bucy (11), with manoeuvre_variance or without",
@@ -61,73 +249,73 @@ class Sonar(Study):
             return COMMON + TRACKING + FLOORS
         return COMMON + (TRACKING if "clutter" in spec.parts else FLOORS)
 
-    def prepare(self, case: "Case") -> Plan:
-        plan: Plan = file_of(case.spec.parts[-1], "study").prepare(case)
-        return plan
+    def prepare(self, case: "Case") -> "Plan":
+        return last_part(case.spec).prepare(case)
 
     def computing_modules(self, spec: "Keys", plots: bool) -> Sequence[str]:
-        part = PARTS[spec.parts[-1]]
-        drawing = (f"{__name__}.track", f"{part}.track") if plots else ()
-        return f"{__name__}.config", f"{part}.study", *drawing
+        package = last_part(spec).package
+        track = (f"{__name__}.track", f"{package}.track") if plots else ()
+        return f"{__name__}.config", f"{package}.study", *track
 
     def simulate(self, plan: Any, first: int, count: int) -> "np.ndarray":
         sums: np.ndarray = plan.simulate(first, count)
         return sums
 
     def errors(self, plan: Any, first: int, count: int) -> "np.ndarray":
-        found: np.ndarray = plan.errors(first, count)
-        return found
+        errors: np.ndarray = plan.errors(first, count)
+        return errors
 
     def floor(self, spec: "Keys", axes: Any) -> "Floor | None":
-        return None if "clutter" in spec.parts else file_of(BASE, "floor").floor(spec, axes)
+        from radarsim.studies.sonar import floor
+
+        return None if "clutter" in spec.parts else floor.floor(spec, axes)
 
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
-        made: dict[str, pd.DataFrame] = file_of(BASE, "tables").tables(results)
-        for part, chosen in by_part(results):
-            made |= file_of(part, "tables").tables(chosen) if part != BASE else {}
-        return {name: table for name, table in made.items() if len(table)}
+        tables = SMOOTHING.tables(results)
+        for part, members in by_part(results):
+            tables |= {} if part is SMOOTHING else part.tables(members)
+        return {name: table for name, table in tables.items() if len(table)}
 
     def figures(
         self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
-        drawn: dict[str, Figure | None] = {}
-        for part, chosen in reversed(by_part(results)):  # first what answers the question, which is the last part's
-            drawn |= file_of(part, "figures").figures(chosen, made) if part != BASE else {}
-        drawn |= file_of(BASE, "figures").figures(results, made, experiment)
-        return {name: figure for name, figure in drawn.items() if figure}
+        figures: dict[str, Figure | None] = {}
+        for part, members in reversed(by_part(results)):  # first what answers the question, which is the last part's
+            figures |= {} if part is SMOOTHING else part.figures(members, made, experiment)
+        figures |= SMOOTHING.figures(results, made, experiment)
+        return {name: figure for name, figure in figures.items() if figure}
 
     def shown(self) -> "Sequence[Component]":
-        shown: Sequence[Component] = file_of(BASE, "figures").COMPONENTS
-        return shown
+        from radarsim.studies.sonar import figures
+
+        return figures.COMPONENTS
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
-        return {name: tables for part in PARTS for name, tables in file_of(part, "figures").DRAWN_FROM.items()}
+        return {name: tables for part in PARTS.values() for name, tables in part.drawn_from().items()}
 
     def question(self, experiment: "Experiment") -> str:
         part, cases = by_part(experiment.cases)[-1]
-        question: str = file_of(part, "words").question([case.spec for case in cases])
-        return question
+        return part.question([case.spec for case in cases])
 
     def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> list[str]:
-        answers = (file_of(part, "words").answer(chosen, made) for part, chosen in reversed(by_part(results)))
+        answers = (part.answer(members, made) for part, members in reversed(by_part(results)))
         return [sentence for answer in answers for sentence in answer]
 
-    def recorded(self) -> RecordedPlots:
+    def recording_interface(self) -> "RecordedPlots":
         from radarsim.studies.sonar.track import Recorded
 
-        return Recorded(lambda spec: file_of(spec.parts[-1], "track"))
+        return Recorded(last_part)
 
 
-# ---- which part -----------------------------------------------------------------------------------------------------
-def file_of(part: str, name: str) -> Any:
-    """A module of a part, by the name of its file."""
-    return import_module(f"{PARTS[part]}.{name}")
+def last_part(spec: "Keys") -> Part:
+    """The part whose plan, filters and plots a case with these keys has."""
+    return PARTS[spec.parts[-1]]
 
 
-def by_part(cases: Sequence[CaseOrResult]) -> list[tuple[str, list[CaseOrResult]]]:
+def by_part(cases: Sequence[CaseOrResult]) -> list[tuple[Part, list[CaseOrResult]]]:
     """The cases, or results, of each part whose questions some of them ask."""
-    chosen = [(part, [case for case in cases if part in case.spec.parts]) for part in PARTS]
-    return [(part, members) for part, members in chosen if members]
+    members = [(part, [case for case in cases if name in case.spec.parts]) for name, part in PARTS.items()]
+    return [(part, chosen) for part, chosen in members if chosen]
 
 
 STUDY = Sonar()

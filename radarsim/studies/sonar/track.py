@@ -376,21 +376,21 @@ def likelihood(
 class Recorded(RecordedPlots):
     """Recorded plots of all parts, for `radarsim track` and `radarsim simulate`.
 
-    file: of keys, the `track` of their part."""
+    part_of: the part of a case with these keys."""
 
     rows_asked = 3000
     columns, sigmas, likelihood = staticmethod(columns), staticmethod(sigmas), staticmethod(likelihood)
 
-    def __init__(self, file: Callable[[Any], Any]):
-        self.file = file
+    def __init__(self, part_of: Callable[[Any], Any]):
+        self.part_of = part_of
 
     def scan_period_s(self, spec: Keys) -> float:
         return spec.sensor.scan_period_s
 
     def drawing(self, case: Case) -> Draw:
-        draw: Draw = self.file(case.spec).drawing(case)
+        draw: Draw = self.part_of(case.spec).drawing(case)
         return draw
 
     def tracker(self, case: Case) -> interface.Tracker:
-        tracker: interface.Tracker = self.file(case.spec).Tracker(case)
+        tracker: interface.Tracker = self.part_of(case.spec).tracker(case)
         return tracker

@@ -154,7 +154,7 @@ def track_columns(n=6):
 def test_track_over_recorded_plots_is_least_squares():
     case = load(config(filters=FILTERS[:1] + FILTERS[8:9])).cases[0]
     columns = track_columns()
-    track = STUDY.recorded().tracker(case).feed(columns)
+    track = STUDY.recording_interface().tracker(case).feed(columns)
     for f, c, sigma, key in ((0, 0, 30.0, "range_m"), (0, 1, np.radians(1), "bearing_rad"), (1, 0, 30.0, "range_m")):
         z, since = columns[key], columns["t_s"] - columns["t_s"][-1]
         chosen = np.flatnonzero(np.isfinite(z))[-3 * f :]  # all, or the last three
@@ -172,7 +172,7 @@ def test_track_over_recorded_plots_is_least_squares():
 @pytest.mark.parametrize("frame", ["cartesian", "cartesian_unbiased"])
 def test_track_in_the_cartesian_frame(frame):
     case = load(config(filters=FILTERS[:1], frame=frame)).cases[0]
-    track = STUDY.recorded().tracker(case).feed(track_columns())
+    track = STUDY.recording_interface().tracker(case).feed(track_columns())
     assert [name for name, _ in track.components] == ["x", "vx", "y", "vy"]
     assert track.estimate[0, -1, 0] == pytest.approx(-8890, abs=30)  # σ of the plot
     assert np.isfinite(track.estimate[0, -1]).all()

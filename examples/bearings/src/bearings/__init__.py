@@ -47,7 +47,7 @@ class Filter(Member):
 Numbers = namedtuple("Numbers", "sigma bearing range sigma_range sigma_velocity")  # what truth and filters need
 
 
-def numbers(spec, one=None):
+def numbers(spec, filter_keys=None):
     t = spec.target
     return Numbers(spec.observer.sigma_bearing_rad, t.bearing_rad, t.range_m, t.sigma_range_m, t.sigma_velocity_mps)
 

@@ -75,18 +75,18 @@ class Chirp(LinearStudy):
             covariance=np.diag([target.sigma_range_m**2, target.sigma_velocity_mps**2]),
         )  # fmt: skip
 
-    def plot(self, spec, one, k):
-        return [1, SIGN[one.chirp][k % 2] * spec.radar.coupling_s], spec.radar.sigma_range_m
+    def plot(self, spec, filter_keys, k):
+        return [1, SIGN[filter_keys.chirp][k % 2] * spec.radar.coupling_s], spec.radar.sigma_range_m
 
-    def assumed_plot(self, spec, one, k):
-        seen, sigma = self.plot(spec, one, k)
-        return (seen if one.coupling == "known" else [1, 0]), sigma
+    def assumed_plot(self, spec, filter_keys, k):
+        seen, sigma = self.plot(spec, filter_keys, k)
+        return (seen if filter_keys.coupling == "known" else [1, 0]), sigma
 
-    def own_gains(self, spec, one):
-        return self.steady_gains(spec, one) if one.gain == "steady" else None
+    def own_gains(self, spec, filter_keys):
+        return self.steady_gains(spec, filter_keys) if filter_keys.gain == "steady" else None
 
-    def columns(self, spec, one):
-        return (f"z_{one.chirp}_m",)
+    def columns(self, spec, filter_keys):
+        return (f"z_{filter_keys.chirp}_m",)
 
     claims_yaml = """
 paper: chirp

@@ -78,10 +78,10 @@ def rows(z, c):
 class Linear(Steps):
     """The Kalman filter of a straight course, with the radar's own σ of each plot."""
 
-    def design(spec, one):
+    def design(spec, filter_keys):
         r, T = spec.radar, spec.radar.scan_period_s
         speed = spec.target.speed_mps
-        q = one.sigma_acceleration_mps2**2
+        q = filter_keys.sigma_acceleration_mps2**2
         return Kalman(r.sigma_range_m**2, 0.0, r.sigma_azimuth_rad, r.sigma_velocity_mps**2, speed, T, q)
 
     def start(z, u, c):
@@ -111,9 +111,9 @@ class Linear(Steps):
 class Constant(Linear):
     """The same with constant σ of x, y and radial velocity, as one that is fitted to data has them."""
 
-    def design(spec, one):
-        R, D = one.sigma_position_m**2, one.sigma_velocity_mps**2
-        speed, T, q = spec.target.speed_mps, spec.radar.scan_period_s, one.sigma_acceleration_mps2**2
+    def design(spec, filter_keys):
+        R, D = filter_keys.sigma_position_m**2, filter_keys.sigma_velocity_mps**2
+        speed, T, q = spec.target.speed_mps, spec.radar.scan_period_s, filter_keys.sigma_acceleration_mps2**2
         return Kalman(R, R, 0.0, D, speed, T, q)
 
 
@@ -122,13 +122,13 @@ class Models(Steps):
 
     Numbers = namedtuple("Numbers", "plot F q P T")
 
-    def design(spec, one):
+    def design(spec, filter_keys):
         t, T = spec.target, spec.radar.scan_period_s
         a, b = T / t.straight_s, T / t.turn_s
-        F = tuple(turned(rate, T) for rate in (0, one.turn_rate_radps, -one.turn_rate_radps))
-        q = one.sigma_acceleration_mps2**2, one.sigma_turning_mps2**2, one.sigma_turning_mps2**2
+        F = tuple(turned(rate, T) for rate in (0, filter_keys.turn_rate_radps, -filter_keys.turn_rate_radps))
+        q = filter_keys.sigma_acceleration_mps2**2, filter_keys.sigma_turning_mps2**2, filter_keys.sigma_turning_mps2**2
         changes = (1 - a, a / 2, a / 2), (b, 1 - b, 0.0), (b, 0.0, 1 - b)
-        return Models.Numbers(Linear.design(spec, one), F, q, changes, T)
+        return Models.Numbers(Linear.design(spec, filter_keys), F, q, changes, T)
 
     def mixed(weights, states):
         """Mean and covariance of a mixture."""

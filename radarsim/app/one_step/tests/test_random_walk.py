@@ -13,7 +13,7 @@ CASE = load("random_walk").cases[0]
 
 def test_the_kernel_agrees_with_the_textbook():
     """A few lines independent of the kernel, over the kernel's own plots."""
-    columns = STUDY.recorded().simulated(CASE, 7)
+    columns = STUDY.recording_interface().simulated(CASE, 7)
     plan = STUDY.prepare(CASE)
     error = plan.layout.unpack(STUDY.simulate(plan, 7, 1))["error"]
     x, P, h, q, R = 100.0, 25.0, 100.0, 0.25, 0.49

@@ -181,7 +181,7 @@ def test_recorded_plots_are_followed_as_the_twins_do():
     truth = STUDY.prepare(case).world.truth
     z = truth[:, :2, 0] + SIGMA * rng.standard_normal((SCANS, 2))
     z[[6, 17]] = np.nan
-    track = STUDY.recorded().tracker(case).feed({"t_s": t + 100, "range_m": z[:, 0], "bearing_rad": z[:, 1]})
+    track = STUDY.recording_interface().tracker(case).feed({"t_s": t + 100, "range_m": z[:, 0], "bearing_rad": z[:, 1]})
     names = [name for name, _ in track.components]
     assert names == ["r", "vr", "ar", "b", "vb", "ab", "course", "speed", "x_ahead", "y_ahead", "cpa", "t_cpa"]
     for f, spec in enumerate(FILTERS):

@@ -56,14 +56,14 @@ class Walk(LinearStudy):
         q = spec.target.sigma_step_m**2 / spec.sensor.scan_period_s
         return Motion(lambda t: [[1]], lambda t: [[q * t]], mean=[0], covariance=[[spec.target.sigma_start_m**2]])
 
-    def plot(self, spec, one, k):
+    def plot(self, spec, filter_keys, k):
         """z = x + v."""
         return [1], spec.sensor.sigma_x_m
 
     # Yours, where filters differ: other gains here; a mismatched model by assumed_motion and assumed_plot.
-    def own_gains(self, spec, one):
+    def own_gains(self, spec, filter_keys):
         """The fixed gain; None makes a Kalman filter."""
-        return None if one.gain is None else np.full((spec.scans, 1, 1), one.gain)
+        return None if filter_keys.gain is None else np.full((spec.scans, 1, 1), filter_keys.gain)
 
     # Yours: the paper's claims, each with the range its wording allows, and the choices the paper leaves open.
     # Measures are the functions of radarsim.papers.one_file and those in this file whose first argument is `seen`.
@@ -98,7 +98,9 @@ choices:
 def settled(seen, case, filter):
     """σ at the last scan over its limit."""
     last = seen.curve(case, filter, "x").last()
-    limit = STUDY.limits(seen.case(case).spec)[[one.name for one in seen.case(case).spec.filters].index(filter), 0]
+    limit = STUDY.limits(seen.case(case).spec)[
+        [filter_keys.name for filter_keys in seen.case(case).spec.filters].index(filter), 0
+    ]
     return type(last)(*(value / limit for value in last))
 
 

@@ -41,9 +41,9 @@ class Filter(Member):
 Numbers = namedtuple("Numbers", "h r2 x0 p2 q2 gain")  # height and first distance, m; variances, m²
 
 
-def numbers(spec, one=None):
+def numbers(spec, filter_keys=None):
     """The numbers of a config that truth and filters use."""
-    s, t, gain = spec.sensor, spec.target, getattr(one, "gain", None) or 0.0
+    s, t, gain = spec.sensor, spec.target, getattr(filter_keys, "gain", None) or 0.0
     return Numbers(s.height_m, s.sigma_range_m**2, t.distance_m, t.sigma_start_m**2, t.sigma_step_m**2, gain)
 
 

@@ -1,4 +1,4 @@
-"""Commands for users' own data and radars. Heavy imports are inside the commands."""
+"""`radarsim simulate`, `import`, `track`, `fit` and `register`. Heavy imports are inside the commands."""
 
 import sys
 from pathlib import Path
@@ -7,68 +7,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from radarsim.cli import group
-from radarsim.cli.group import Count, completed, config_argument, main, set_option
+from radarsim.cli.group import Count, config_argument, main, set_option
 from radarsim.language import plural, tr
 
 if TYPE_CHECKING:
     from radarsim.engine.results import Track
-
-
-@main.command()
-@click.argument("name", metavar="NAME")
-@click.option(
-    "--like",
-    required=True,
-    metavar="CONFIG",
-    shell_complete=completed,
-    help="The config to start from; `radarsim list` lists them.",
-)
-def new(name: str, like: str) -> None:
-    """Write a commented config of your own: ./NAME.yaml.
-
-    The file repeats CONFIG, with the unit and meaning of every key, and lists the optional keys as comments. An
-    existing file is never overwritten.
-
-    \b
-    Example
-      radarsim new mine --like rls2
-    """
-    from radarsim.app import configs
-    from radarsim.cli import console
-
-    path = configs.new(name, like)
-    console.field("config", str(path))
-    console.field("", tr("edit its values, then `radarsim check {path}` and `radarsim run {path}`", path=str(path)))
-
-
-@main.command(name="new-study")
-@click.argument("name", metavar="NAME")
-@click.option("--step", is_flag=True, help="For nonlinear filters: you write the step of one realisation.")
-@click.option("--folder", is_flag=True, help="A study in several files, for what the base classes do not cover.")
-def new_study(name: str, step: bool, folder: bool) -> None:
-    """Write a package with a small study, to make your own: ./NAME.
-
-    It compares two filters on a random walk: one file with keys, matrices, claims and an interpretation, from which
-    kernel, exact values, tables, figures and recorded plots follow; a config; a test. With --step the filters are
-    functions of one plot and may be nonlinear. With --folder each part is a separate file. Comments `Yours: …` mark the
-    places to edit. Once installed, the study works like the shipped ones. Nothing is ever overwritten.
-
-    \b
-    Example
-      radarsim new-study my_paper
-      pip install -e my_paper
-      radarsim run my_paper
-    """
-    from radarsim.app.reproduce import new_study as write
-    from radarsim.cli import console
-
-    if step and folder:
-        raise click.UsageError("--step and --folder do not go together: give one of them")
-    path = write(name, form="step" if step else "folder" if folder else "linear")
-    guide = path / "README.md" if folder else path / "src" / name / "__init__.py"
-    console.field("package", str(path))
-    told = {"path": str(path), "name": name, "guide": str(guide)}
-    console.field("", tr("`pip install -e {path}`, then `radarsim run {name}`; {guide} explains what to edit", **told))
 
 
 @main.command()
@@ -196,7 +139,8 @@ def import_(recording: str, output: str, **asked: Any) -> None:
       radarsim import radar.ast --at 52.30,4.76,12 -o plots.csv
       radarsim track range_doppler_own plots.csv -o track.csv
     """
-    from radarsim.cli import console, outcomes
+    from radarsim.cli import console
+    from radarsim.recorded import print_results
     from radarsim.recorded.formats import importing, sites
     from radarsim.report import wording
 
@@ -215,7 +159,7 @@ def import_(recording: str, output: str, **asked: Any) -> None:
     read = plural("{format}, {count} record read", "{format}, {count} records read", done.records, format=done.format)
     console.field("", read)
     for line in (*(tr("left out: {what}", what=what) for what in done.skipped), *done.notes):
-        outcomes.write(sys.stderr, wording.labelled("", line))
+        print_results.print_line(sys.stderr, wording.labelled("", line))
 
 
 @main.command()
@@ -252,8 +196,8 @@ def track(config: str, plots: str, output: str | None, quiet: bool, overrides: t
     import contextlib
 
     from radarsim.app import run
-    from radarsim.cli import console, outcomes
-    from radarsim.recorded import fit, follow, page
+    from radarsim.cli import console
+    from radarsim.recorded import fit, follow, page, print_results
     from radarsim.recorded import plots as files
     from radarsim.report import wording
     from radarsim.report.files import Writer
@@ -270,7 +214,7 @@ def track(config: str, plots: str, output: str | None, quiet: bool, overrides: t
         write(files.rows_of(piece, name))
 
     with contextlib.ExitStack() as stack:
-        write = stack.enter_context(Writer(output, read)).write if output else outcomes.echo
+        write = stack.enter_context(Writer(output, read)).write if output else print_results.print_rows
         counter = stack.enter_context(console.Counter("tracking", "rows"))
         followed = follow.follow(loaded, plots, sink, further["threads"], counter.update)
     folder = further["report"]
@@ -279,7 +223,7 @@ def track(config: str, plots: str, output: str | None, quiet: bool, overrides: t
             judged = page.judged(followed)
             advised = fit.advised(followed, counter.update)
     if not quiet:
-        outcomes.report(followed, judged, advised, stderr=output is None)
+        print_results.print_track(followed, judged, advised, stderr=output is None)
     if output:
         console.field("track", output)
     if folder:
@@ -324,8 +268,9 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: Any) -> 
       radarsim fit rls2 plots.csv --write mine.yaml
     """
     from radarsim.app import configs, run, shown
-    from radarsim.cli import console, outcomes
+    from radarsim.cli import console
     from radarsim.recorded import fit as fitting
+    from radarsim.recorded import print_results
     from radarsim.report import wording
     from radarsim.studies.interface import CORRELATION, OUTLIERS
 
@@ -341,7 +286,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: Any) -> 
     if options["as_json"]:
         click.echo(shown.text(fitting.as_rows(found)))
     else:
-        outcomes.report_fit(found)
+        print_results.print_fit(found)
     if options["write"]:
         path = Path(options["write"])
         made = configs.new(path.name, loaded.path or config, path.parent, fitting.settings(found), overrides)
@@ -369,11 +314,11 @@ def register(radar: str, other: str, as_json: bool) -> None:
       radarsim register radar.csv positions.csv
     """
     from radarsim.app import shown
-    from radarsim.cli import outcomes
+    from radarsim.recorded import print_results
     from radarsim.recorded import register as registering
 
     found = registering.register(radar, other)
     if as_json:
         click.echo(shown.text(registering.as_json(found)))
     else:
-        outcomes.report_registration(found, other)
+        print_results.print_registration(found, other)

@@ -1,0 +1,61 @@
+"""`radarsim new` and `new-study`: a config and a study of the user's own. Heavy imports are inside the commands."""
+
+import click
+
+from radarsim.cli.group import completed, main
+from radarsim.language import tr
+
+
+@main.command()
+@click.argument("name", metavar="NAME")
+@click.option(
+    "--like",
+    required=True,
+    metavar="CONFIG",
+    shell_complete=completed,
+    help="The config to start from; `radarsim list` lists them.",
+)
+def new(name: str, like: str) -> None:
+    """Write a commented config of your own: ./NAME.yaml.
+
+    The file repeats CONFIG, with the unit and meaning of every key, and lists the optional keys as comments. An
+    existing file is never overwritten.
+
+    \b
+    Example
+      radarsim new mine --like rls2
+    """
+    from radarsim.app import configs
+    from radarsim.cli import console
+
+    path = configs.new(name, like)
+    console.field("config", str(path))
+    console.field("", tr("edit its values, then `radarsim check {path}` and `radarsim run {path}`", path=str(path)))
+
+
+@main.command(name="new-study")
+@click.argument("name", metavar="NAME")
+@click.option("--step", is_flag=True, help="For nonlinear filters: you write the step of one realisation.")
+def new_study(name: str, step: bool) -> None:
+    """Write a package with a small study, to make your own: ./NAME.
+
+    It compares two filters on a random walk: one file with keys, matrices, claims and a reading, from which kernel,
+    exact values, tables, figures and recorded plots follow; a config; a test. With --step the filters are functions of
+    one plot and may be nonlinear. Comments `Yours: …` mark the places to edit. Once installed, the study works like
+    the shipped ones, which are examples of studies in several files. Nothing is ever overwritten.
+
+    \b
+    Example
+      radarsim new-study my_paper
+      pip install -e my_paper
+      radarsim run my_paper
+    """
+    from radarsim.app.reproduce import new_study as write
+    from radarsim.cli import console
+
+    path = write(name, form="step" if step else "linear")
+    values = {"path": str(path), "name": name, "guide": str(path / "src" / name / "__init__.py")}
+    console.field("package", str(path))
+    console.field(
+        "", tr("`pip install -e {path}`, then `radarsim run {name}`; {guide} explains what to edit", **values)
+    )

@@ -1,0 +1,45 @@
+"""The classes of the shipped studies: each method takes what the interface gives, and loads its modules when called."""
+
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from radarsim.report.claims import Evidence, PaperClaims
+
+from radarsim.config.fields import Study as Keys
+from radarsim.studies import registry
+from radarsim.studies.interface import RecordedPlots, Study
+
+ROOT = Path(__file__).parents[2]
+STUDIES = [registry.study(name) for name in registry.SHIPPED]
+
+
+@pytest.mark.parametrize("study", STUDIES, ids=lambda study: study.name)
+def test_methods_take_the_parameters_of_the_interface(study):
+    for name, method in vars(Study).items():
+        if callable(method) and not name.startswith("_"):
+            parameters = list(inspect.signature(method).parameters)
+            assert list(inspect.signature(getattr(type(study), name)).parameters) == parameters, name
+
+
+@pytest.mark.parametrize("study", STUDIES, ids=lambda study: study.name)
+def test_keys_claims_and_recorded_plots_are_of_the_declared_types(study):
+    assert issubclass(study.keys(), Keys)
+    claims = study.claims()
+    assert isinstance(claims, PaperClaims)
+    assert issubclass(claims.evidence, Evidence)
+    assert {claim.id.partition(".")[0] for claim in claims.claims} == {study.paper_key()}
+    assert isinstance(study.recording_interface(), RecordedPlots | None)
+
+
+def test_declared_studies_load_nothing_that_computes():
+    program = (
+        "import sys\n"
+        "from radarsim.studies import registry\n"
+        "for name in registry.SHIPPED: print(registry.study(name).about)\n"
+        "print({'numpy', 'numba', 'pandas', 'matplotlib'} & set(sys.modules))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "set()"
