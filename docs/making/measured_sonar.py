@@ -83,7 +83,7 @@ def correlated(results: Results) -> list[tuple]:
         case = {"case": f"correlation={rho:g}"}
         knows, ignores = (last(results, "sonar_correlated", filter=name, **case) for name in ("augmented", "naive"))
         naive = {"filter": "naive", "component": "r", **case}
-        believed = rows(results, "sonar_correlated", "believed", **naive).iloc[-1]
+        believed = rows(results, "sonar_correlated", "curves", **naive).iloc[-1]
         error = rows(results, "sonar_correlated", "consistency", **naive).iloc[-1]
         normalised = (with_bounds(error["nees"], error["nees_lo"], error["nees_hi"]), f"{error['exact_nees']:.2f}")
         made.append(

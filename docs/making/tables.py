@@ -14,14 +14,12 @@ from radarsim.studies import floor, registry
 
 SHARED = (common.leading, common.components, common.realisations, common.interval_columns, notes.beside, notes.noted)
 SEVERAL = {  # tables that studies have in common
-    "curves": (common.curves,),
+    "curves": (common.curves, floor.with_floors),
     "gains": (common.gains,),
-    "believed": (notes.believed, notes.ratio_columns),
     "consistency": (notes.normalised,),
     "rare": (rare.rows,),
     "failures": (outside.failures,),
     "nees": (outside.consistency, notes.normalised),
-    "floor": (floor.floors,),
 }
 UNITS = {  # by how a name ends
     **{"_s": "s", "_m": "m", "_mps": "m/s", "_mps2": "m/s²", "_rad": "rad", "_hz": "Hz", "_db": "dB"},

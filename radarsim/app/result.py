@@ -24,6 +24,7 @@ from radarsim.report.claims import page
 from radarsim.report.claims.page import OVER, with_classes
 from radarsim.report.drawing import Figure, reworded
 from radarsim.report.wording import estimate, spoken
+from radarsim.studies import floor
 from radarsim.studies.interface import Study
 from radarsim.studies.registry import quantities, study
 
@@ -91,7 +92,7 @@ class Result(Shown):
 
         >>> import radarsim
         >>> sorted(radarsim.run("rls2", realisations=2000).tables)
-        ['believed', 'claims', 'consistency', 'curves', 'floor', 'gains', 'radar', 'steady']
+        ['claims', 'consistency', 'curves', 'gains', 'radar', 'steady']
         """
         return {name: table.copy() for name, table in self._tables.items()}
 
@@ -229,9 +230,10 @@ def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
     made, from_outside = measured(results), outside.measured(results)
     verdicts = claims.judged(of.claims(), results, outside.for_claims(made, from_outside), configs.shipped, stem)
     made["claims"] = over_readings(verdicts, results[0].study)
-    made["floor"] = of.floors(results)
     made = notes.noted(made, results, of.exact_errors, quantities(results[0].study, results[0].spec))
-    return outside.added(made, results, from_outside)
+    made = outside.added(made, results, from_outside)
+    made["curves"] = floor.with_floors(made["curves"], of.floors(results))
+    return made
 
 
 def over_readings(verdicts: "pd.DataFrame", name: str, out: Path | None = None) -> "pd.DataFrame":
