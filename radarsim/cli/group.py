@@ -26,9 +26,10 @@ SECTIONS = {
     "Your own radar": ("new", "solve", "tune", "sensitivity", "chart", "new-study"),
     "Your own data": ("import", "register", "simulate", "track", "fit", "judge"),
     "The papers": ("claims", "readings"),
-    "Upkeep": ("schema", "compile", "doctor", "clean"),
+    "Upkeep": ("doctor",),
 }
-ORDER = tuple(name for names in SECTIONS.values() for name in names)
+UNLISTED = ("compile", "schema", "clean")  # named in one line below the sections
+ORDER = (*(name for names in SECTIONS.values() for name in names), *UNLISTED)
 NO_THREAD = "can't start new thread"  # in Python's words
 PATIENCE_S = 1.0  # from a signal to the end of whatever a command is doing
 SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
@@ -50,6 +51,8 @@ class Commands(click.Group):
             rows = [(name.ljust(width), self.commands[name].get_short_help_str(100)) for name in names]
             with formatter.section(title):
                 formatter.write_dl(rows)
+        formatter.write_paragraph()
+        formatter.write_text(f"Also: {', '.join(UNLISTED)}; `radarsim COMMAND --help` describes each.")
 
     def invoke(self, ctx: click.Context) -> Any:
         before = ON_COMMAND_LINE.set(True)
