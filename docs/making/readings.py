@@ -20,23 +20,27 @@ HERE = (
 
 def markdown(paper: str, results: Path = RESULTS) -> str:
     """The page of a paper without its title: as results hold it, else what is known without any."""
-    made = results / "readings" / f"{paper}.md"
-    return made.read_text(encoding="utf-8").partition("\n")[2].strip() if made.is_file() else shipped(paper)
+    file = results / "readings" / f"{paper}.md"
+    return file.read_text(encoding="utf-8").partition("\n")[2].strip() if file.is_file() else shipped(paper)
 
 
 def shipped(paper: str) -> str:
     """The claims of a paper with their classes over all readings, and what the paper leaves open."""
-    of = readings.papers()[paper]
-    known = stored.classes_of([(of.readings, of.claims)], None)
+    paper_readings = readings.papers()[paper]
+    classes = stored.classes_of([(paper_readings.readings, paper_readings.claims)], None)
     rows = []
-    for claim in of.claims.claims:
-        if (found := known.get(claim.id)) is not None:
-            said = page.words(found.kind, found.kind, of.readings.asked(filter(None, found.depends_on.split(", "))))
-            rows.append((claim.id, claim.statement, said, f"{found.holds} of {found.of}"))
+    for claim in paper_readings.claims.claims:
+        if (claim_class := classes.get(claim.id)) is not None:
+            verdict = page.words(
+                claim_class.kind,
+                claim_class.kind,
+                paper_readings.readings.asked(filter(None, claim_class.depends_on.split(", "))),
+            )
+            rows.append((claim.id, claim.statement, verdict, f"{claim_class.holds} of {claim_class.of}"))
     parts = [
-        f"{of.claims.paper}. {HERE.format(paper=paper)}",
+        f"{paper_readings.claims.paper}. {HERE.format(paper=paper)}",
         "## Claims over all readings",
         readings_page.table(("claim", "statement", "verdict", "holds in"), rows),
-        *readings_page.left_open(of.readings),
+        *readings_page.left_open(paper_readings.readings),
     ]
     return "\n\n".join(parts)
