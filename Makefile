@@ -9,7 +9,7 @@ SMOKE := $(VENV)/smoke
 # Drawing takes twice as long as all the rest: `make smoke SMOKE_FLAGS=` draws too.
 SMOKE_FLAGS ?= --no-figures
 
-.PHONY: run environment test slow machines processors mutants version-environments versions lowest lint smoke reproduce-figures claims-page interpretations-pages bench schema known docs docs-numbers docs-pictures docs-examples docs-house messages clean
+.PHONY: run environment test slow machines processors mutants version-environments versions lowest lint smoke reproduce-figures claims-page interpretations-pages bench schema known docs docs-numbers docs-pictures docs-examples messages clean
 
 # Containers often forbid Python to keep what it compiles: every process of the tests would compile the package anew.
 unexport PYTHONDONTWRITEBYTECODE
@@ -121,10 +121,6 @@ docs-examples: $(VENV)/installed
 # The catalogues of other languages, with the messages of today; what is new in them waits for its translation.
 messages: $(VENV)/installed
 	PYTHONPATH=docs $(BIN)/python -m making.messages
-
-# The picture of the rooms, from the package's own imports.
-docs-house: $(VENV)/installed
-	PYTHONPATH=docs $(BIN)/python -m making.house docs/house.svg
 
 # All that the other targets install, in one step: the search for versions takes as long as each of theirs.
 environment:

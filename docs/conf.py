@@ -80,6 +80,6 @@ def setup(app):
     app.connect("env-get-outdated", generated.outdated)
     app.connect("autodoc-process-docstring", modules.plain)
     app.connect("build-finished", contents.front_page)
-    app.connect("build-finished", chart.drawn)
-    app.connect("build-finished", claims.drawn)
+    app.connect("build-finished", chart.draw_chart)
+    app.connect("build-finished", claims.draw_figure)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

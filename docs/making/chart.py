@@ -5,7 +5,7 @@ from pathlib import Path
 from radarsim.app.compare import chart
 
 
-def drawn(app, exception) -> None:
+def draw_chart(app, exception) -> None:
     """docs/chart/ beside the page, when it is built as HTML."""
     if exception is None and app.builder.format == "html":
         chart(out=Path(app.outdir, "docs"), figures=False)

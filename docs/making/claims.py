@@ -32,40 +32,41 @@ PICTURE = f"""<details>
 </details>"""
 
 
-def kept() -> list[dict]:
+def stored_rows() -> list[dict]:
     """Rows of all claims with the columns of claims.csv of a run, from claims.csv beside this module."""
     with FILE.open(encoding="utf-8", newline="") as file:
-        read = {row["claim"]: row for row in csv.DictReader(file)}
-    found: dict[str, list[dict]] = {}
-    for of in paper_claims():
-        for claim in of.claims:
-            if row := read.get(claim.id):
+        rows_of_file = {row["claim"]: row for row in csv.DictReader(file)}
+    rows_by_config: dict[str, list[dict]] = {}
+    for claims_of_paper in paper_claims():
+        for claim in claims_of_paper.claims:
+            if row := rows_of_file.get(claim.id):
                 numbers = {name: float(row[name]) if row.get(name) else "" for name in NUMBER_COLUMNS}
-                one = empty_row(claim, of.paper) | row | numbers
-                one |= {"class": row["as_shipped"], "overall": row["as_shipped"]}
-                found.setdefault(claim.config, []).append(one)
+                claim_row = empty_row(claim, claims_of_paper.paper) | row | numbers
+                claim_row |= {"class": row["as_shipped"], "overall": row["as_shipped"]}
+                rows_by_config.setdefault(claim.config, []).append(claim_row)
     classes = known_classes([(paper.interpretations, paper.claims) for paper in open_papers().values()], None)
-    return add_classes(claim_rows(paper_claims(), found), classes)
+    return add_classes(claim_rows(paper_claims(), rows_by_config), classes)
 
 
 def rows(results: Path = RESULTS) -> tuple[list[dict], bool]:
     """Rows of all claims, and whether they are those of a full reproduction, with every part of each."""
     with suppress(StoreError):  # of another version, or damaged: no full reproduction
-        full = list_claims.claims(out=results).rows
-        if all(row["class"] != NOT_RUN for row in full):
-            return full, True
-    return kept(), False
+        rows_of_run = list_claims.claims(out=results).rows
+        if all(row["class"] != NOT_RUN for row in rows_of_run):
+            return rows_of_run, True
+    return stored_rows(), False
 
 
 def markdown(results: Path = RESULTS) -> str:
     """The page without its title."""
-    found, whole = rows(results)
-    found = rows_in_words(found, (of.interpretations for of in open_papers().values()))
-    text = claims_page(found, {of.paper: of.page for of in paper_claims()}, whole).removeprefix(TITLE).strip()
+    rows_of_claims, is_whole = rows(results)
+    rows_of_claims = rows_in_words(rows_of_claims, (paper.interpretations for paper in open_papers().values()))
+    pages = {claims_of_paper.paper: claims_of_paper.page for claims_of_paper in paper_claims()}
+    text = claims_page(rows_of_claims, pages, is_whole).removeprefix(TITLE).strip()
     return text.replace("\n\n## ", f"\n\n{PICTURE}\n\n## ", 1)
 
 
-def drawn(app, exception) -> None:
+def draw_figure(app, exception) -> None:
     """The figure of claims beside the page, when it is built as HTML."""
     if exception is None and app.builder.format == "html":
         run.Claims(rows()[0]).draw(Path(app.outdir, "docs", FIGURE))
@@ -73,20 +74,20 @@ def drawn(app, exception) -> None:
 
 def main(results: str) -> None:
     """Write claims.csv from a full reproduction; ends with 1 where a claim was not run."""
-    found, whole = rows(Path(results))
-    if not whole:
+    rows_of_claims, is_whole = rows(Path(results))
+    if not is_whole:
         sys.exit(f"{results}: holds no full reproduction of this version; `make reproduce-figures` makes it")
-    lines = []
-    for parts in group_by_claim(found):
+    table_rows = []
+    for parts in group_by_claim(rows_of_claims):
         row = dict(worst_part(parts) or parts[0])
         row |= {name: parts[0][name] for name in ("needed", "as_shipped", "why")} | {"what": part_name(row, parts)}
         numbers = {name: cell_number(row[name]) for name in MEASURED}
         row |= {name: "" if value is None else f"{value:.9g}" for name, value in numbers.items()}
-        lines.append({name: row[name] for name in COLUMNS})
+        table_rows.append({name: row[name] for name in COLUMNS})
     text = io.StringIO(newline="")
     table = csv.DictWriter(text, COLUMNS, lineterminator="\n")
     table.writeheader()
-    table.writerows(lines)
+    table.writerows(table_rows)
     FILE.write_text(text.getvalue(), encoding="utf-8")
 
 

@@ -36,14 +36,14 @@ class Block:
     slow: bool
 
 
-class Failed(Exception):
+class ExampleError(Exception):
     """An example that does not do what the page says."""
 
 
 def blocks(page: str) -> list[Block]:
     """The examples of a page, in order."""
-    found = BLOCK.finditer(page)
-    return [Block(one[2], one[3], page[: one.start(3)].count("\n") + 1, bool(one[1])) for one in found]
+    matches = BLOCK.finditer(page)
+    return [Block(match[2], match[3], page[: match.start(3)].count("\n") + 1, bool(match[1])) for match in matches]
 
 
 def run(page: str, folder: Path, slow: bool) -> Iterator[tuple[Block, str]]:
@@ -54,21 +54,21 @@ def run(page: str, folder: Path, slow: bool) -> Iterator[tuple[Block, str]]:
             if slow or not block.slow:
                 try:
                     yield block, RUN[block.language](block.text, names)
-                except Failed as failure:
-                    raise Failed(f"line {block.line}: {failure}") from None
+                except ExampleError as failure:
+                    raise ExampleError(f"line {block.line}: {failure}") from None
 
 
 def yaml(text: str, names: dict) -> str:
     """Write the file that the first line names, or change the same keys in it."""
-    first, _, rest = text.partition("\n")
-    match re.fullmatch(r"# (in )?(\S+\.yaml)", first):
+    first_line, _, other_lines = text.partition("\n")
+    match re.fullmatch(r"# (in )?(\S+\.yaml)", first_line):
         case None:
-            raise Failed(f"a yaml example begins `# NAME.yaml` or `# in NAME.yaml`, got {first!r}")
-        case found if found[1]:
-            file = Path(found[2])
-            file.write_text(changed(file.read_text(encoding="utf-8"), rest), encoding="utf-8")
-        case found:
-            Path(found[2]).write_text(text, encoding="utf-8")
+            raise ExampleError(f"a yaml example begins `# NAME.yaml` or `# in NAME.yaml`, got {first_line!r}")
+        case match if match[1]:
+            file = Path(match[2])
+            file.write_text(changed(file.read_text(encoding="utf-8"), other_lines), encoding="utf-8")
+        case match:
+            Path(match[2]).write_text(text, encoding="utf-8")
     return text
 
 
@@ -77,18 +77,20 @@ def changed(config: str, lines: str) -> str:
     for key, value in re.findall(r"^ *(\w+): *([^\s#].*?)(?: +#.*)?$", lines, re.MULTILINE):
         config, count = re.subn(rf"(?m)^( *{key}: *)([^\s#]\S*)", lambda old, new=value: old[1] + new, config)
         if count != 1:
-            raise Failed(f"{key} stands {count} times in the file")
+            raise ExampleError(f"{key} stands {count} times in the file")
     return config
 
 
 def console(text: str, names: dict) -> str:
     """Run the commands; the block with their present output. Failed where that is not what stands there."""
-    made = []
+    outputs = []
     for entry in re.split(r"^(?=\$ )", text, flags=re.MULTILINE)[1:]:
-        command, said = re.fullmatch(r"\$ ((?:[^\n]*\\\n)*[^\n]*)\n?(.*)", entry, re.DOTALL).groups()
+        command, expected = re.fullmatch(r"\$ ((?:[^\n]*\\\n)*[^\n]*)\n?(.*)", entry, re.DOTALL).groups()
         printed = output(command.replace("\\\n", ""))
-        made.append(entry if not said or agrees(said, printed) else f"$ {command}\n{shortened(printed, said)}")
-    return "".join(made)
+        outputs.append(
+            entry if not expected or agrees(expected, printed) else f"$ {command}\n{shortened(printed, expected)}"
+        )
+    return "".join(outputs)
 
 
 def output(command: str) -> str:
@@ -106,36 +108,40 @@ def output(command: str) -> str:
         done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
         code, out, err = done.returncode, done.stdout, done.stderr
     if code:
-        raise Failed(f"`{command}` ends with {code}: {err}")
+        raise ExampleError(f"`{command}` ends with {code}: {err}")
     return "\n".join(line.rstrip() for line in out.rstrip("\n").split("\n")) + "\n"
 
 
-def agrees(said: str, printed: str) -> bool:
+def agrees(expected: str, printed: str) -> bool:
     """Whether what was printed is what the page says, a line `…` standing for any lines."""
-    parts = [re.escape(part) for part in re.split(rf"^{ANYTHING}\n", said, flags=re.MULTILINE)]
+    parts = [re.escape(part) for part in re.split(rf"^{ANYTHING}\n", expected, flags=re.MULTILINE)]
     return re.fullmatch(r"(?:.*\n)*?".join(parts), printed) is not None
 
 
-def shortened(printed: str, said: str) -> str:
+def shortened(printed: str, expected: str) -> str:
     """What was printed, cut where the page cuts it.
 
     A line `…` stands for all up to the line that has most of its first words in common with the page's next one.
     """
-    lines, kept, cut = printed.splitlines(), [], False
-    for line in said.splitlines():
+    lines, shown_lines, after_gap = printed.splitlines(), [], False
+    for line in expected.splitlines():
         if line == ANYTHING:
-            kept.append(ANYTHING)
+            shown_lines.append(ANYTHING)
         elif lines:
-            at = max(range(len(lines)), key=[in_common(line, other) for other in lines].__getitem__) if cut else 0
-            kept.append(lines[at])
-            del lines[: at + 1]
-        cut = line == ANYTHING
-    return "\n".join(kept if cut else kept + lines) + "\n"
+            index = (
+                max(range(len(lines)), key=[in_common(line, candidate) for candidate in lines].__getitem__)
+                if after_gap
+                else 0
+            )
+            shown_lines.append(lines[index])
+            del lines[: index + 1]
+        after_gap = line == ANYTHING
+    return "\n".join(shown_lines if after_gap else shown_lines + lines) + "\n"
 
 
-def in_common(one: str, other: str) -> int:
+def in_common(line: str, other_line: str) -> int:
     """How many words two lines begin alike with."""
-    return sum(takewhile(bool, (a == b for a, b in zip(one.split(), other.split(), strict=False))))
+    return sum(takewhile(bool, (a == b for a, b in zip(line.split(), other_line.split(), strict=False))))
 
 
 def python(text: str, names: dict) -> str:
@@ -147,13 +153,13 @@ def python(text: str, names: dict) -> str:
 def pycon(text: str, names: dict) -> str:
     """Run a session; Failed where something else comes out."""
     test = doctest.DocTestParser().get_doctest(text, names, "example", None, 0)
-    said: list[str] = []
+    messages: list[str] = []
     if (
         doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
-        .run(test, out=said.append, clear_globs=False)
+        .run(test, out=messages.append, clear_globs=False)
         .failed
     ):
-        raise Failed("".join(said))
+        raise ExampleError("".join(messages))
     names.update(test.globs)
     return text
 

@@ -18,20 +18,20 @@ def prose(page: str) -> str:
 
 def anchors(page: str) -> set[str]:
     """What `#…` may name in a page, made of its headings as GitHub does."""
-    seen: Counter = Counter()
-    found = set()
+    counts: Counter = Counter()
+    slugs = set()
     for heading in re.findall(r"^#{1,6} +(.+?) *$", re.sub(r"^```.*?^```$", "", page, flags=re.M | re.S), re.MULTILINE):
         words = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower()
         slug = re.sub(r"[^\w\- ]", "", words).replace(" ", "-")
-        found.add(f"{slug}-{seen[slug]}" if seen[slug] else slug)
-        seen[slug] += 1
-    return found
+        slugs.add(f"{slug}-{counts[slug]}" if counts[slug] else slug)
+        counts[slug] += 1
+    return slugs
 
 
 def broken(path: Path) -> Iterator[str]:
     """Links of a page that lead nowhere, each with the reason."""
-    for found in LINK.finditer(prose(path.read_text(encoding="utf-8"))):
-        link = found[1] or found[2]
+    for match in LINK.finditer(prose(path.read_text(encoding="utf-8"))):
+        link = match[1] or match[2]
         if OUTSIDE.match(link):
             continue
         file, _, anchor = link.partition("#")

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from making.numbers import Results
-from making.pick import bounded, part, rows
+from making.result_rows import bounded, claim_value, select_rows
 
 PAPER, MAPS, RIVAL = "discriminator_paper", "discriminator_maps", "discriminator_rival"
 COMPUTED, PRINTED = "discriminator", "discriminator_as_printed"
@@ -14,18 +14,18 @@ REGION = ((0.5625, 1.125, 2.25, 4.5, 9, 18), (0.03, 0.1, 0.3, 1, 3, 10))
 
 def last(results: Results, stem: str, case: str, name: str, table: str = "locks"):
     """The last window of a method."""
-    found = rows(results, stem, table, filter=name)
-    return found[found["case"] == case].iloc[-1]
+    matching = select_rows(results, stem, table, filter=name)
+    return matching[matching["case"] == case].iloc[-1]
 
 
 def lock(stem: str, case: str, name: str) -> Callable[[Results], str]:
     """The share of bursts locked at the last window, %."""
 
-    def made(results: Results) -> str:
+    def text(results: Results) -> str:
         row = last(results, stem, case, name)
         return f"{percent(row)} %"
 
-    return made
+    return text
 
 
 def percent(row) -> str:
@@ -40,128 +40,130 @@ def percent(row) -> str:
 def lost(stem: str, case: str, name: str) -> Callable[[Results], str]:
     """How many bursts are lost, of how many."""
 
-    def made(results: Results) -> str:
+    def text(results: Results) -> str:
         row = last(results, stem, case, name)
         return f"{row['n'] - round(row['lock_rate'] * row['n'])} of {row['n']}"
 
-    return made
+    return text
 
 
 def always(case: str, name: str) -> Callable[[Results], str]:
     """The share of bursts with all errors within three spreads, prior included, at all windows, %."""
 
-    def made(results: Results) -> str:
+    def text(results: Results) -> str:
         return f"{bounded(last(results, PAPER, case, name), 'always_posterior_rate_3sigma', 'always_posterior', 100)} %"
 
-    return made
+    return text
 
 
 def passes(case: str, name: str) -> Callable[[Results], str]:
     """Passes over a window's data."""
 
-    def made(results: Results) -> str:
+    def text(results: Results) -> str:
         return f"{last(results, PAPER, case, name, 'passes')['passes']:.0f}"
 
-    return made
+    return text
 
 
 def efficiency(stem: str, case: str, column: str, figures: int, *names: str) -> Callable[[Results], str]:
     """From the least to the largest ratio of σ to the potential one among the components, last window."""
 
-    def made(results: Results) -> str:
-        found = []
+    def text(results: Results) -> str:
+        ratios = []
         for name in names:
-            table = rows(results, stem, "curves", filter=name)
-            own = table[table["case"] == case].groupby("component").tail(1)
-            found += list(own[column] / own["exact_sigma"])
-        return " … ".join(f"{float(f'{bound:.{figures}g}'):g}" for bound in (min(found), max(found)))
+            table = select_rows(results, stem, "curves", filter=name)
+            last_window = table[table["case"] == case].groupby("component").tail(1)
+            ratios += list(last_window[column] / last_window["exact_sigma"])
+        return " … ".join(f"{float(f'{ratio:.{figures}g}'):g}" for ratio in (min(ratios), max(ratios)))
 
-    return made
+    return text
 
 
 def noise(results: Results) -> list[tuple]:
     """Lock of the three sequences by noise, with the energy ratio of their first window."""
     names = ("sequence", "dense", "cured")
-    made: list[tuple] = [("σ²", "μ(T₀)", *(f"{name}, %" for name in names))]
+    table_rows: list[tuple] = [("σ²", "μ(T₀)", *(f"{name}, %" for name in names))]
     for variance in (0.5625, 1.125, 2.25, 4.5, 9, 18, 36, 72):
         case = f"discriminator_pair burst.noise_variance={variance:g}"
-        first = rows(results, MAPS, "locks", filter="cured")
+        first = select_rows(results, MAPS, "locks", filter="cured")
         energy = first[first["case"] == case].iloc[0]["energy_ratio"]
         locks = (percent(last(results, MAPS, case, name)) for name in names)
-        made.append((f"{variance:g}", f"{energy:.3g}", *locks))
-    return made
+        table_rows.append((f"{variance:g}", f"{energy:.3g}", *locks))
+    return table_rows
 
 
 def forecast(results: Results) -> list[tuple]:
     """Lock by how much worse the forecast is than believed."""
     names = ("sequence", "dense", "cured")
-    made: list[tuple] = [("errors over those believed", *(f"{name}, %" for name in names))]
+    table_rows: list[tuple] = [("errors over those believed", *(f"{name}, %" for name in names))]
     for scale in (0.25, 0.5, 1, 1.5, 2, 3, 4):
         case = f"discriminator_pair prior.error_scale={scale:g}"
-        made.append((f"{scale:g}", *(percent(last(results, MAPS, case, name)) for name in names)))
-    return made
+        table_rows.append((f"{scale:g}", *(percent(last(results, MAPS, case, name)) for name in names)))
+    return table_rows
 
 
 def region(results: Results) -> list[tuple]:
     """Lock of the cured sequence over noise and width of the forecast."""
     variances, scales = REGION
-    made: list[tuple] = [("forecast's spread ×", *(f"σ² = {variance:g}" for variance in variances))]
+    table_rows: list[tuple] = [("forecast's spread ×", *(f"σ² = {variance:g}" for variance in variances))]
     for scale in scales:
         cases = (
             f"discriminator_pair burst.noise_variance={variance:g} prior.scale={scale:g}" for variance in variances
         )
         shares = (last(results, "discriminator_region", case, "cured")["lock_rate"] for case in cases)
-        made.append((f"{scale:g}", *(f"{100 * share:.1f}" for share in shares)))
-    return made
+        table_rows.append((f"{scale:g}", *(f"{100 * share:.1f}" for share in shares)))
+    return table_rows
 
 
 def rival(results: Results) -> list[tuple]:
     """Lock of the classical way and of the sequences on the same samples."""
     names = ("ridge", "sequence", "cured")
-    made: list[tuple] = [("σ²", "ridge, locked %", "paper's sequence", "cured sequence")]
+    table_rows: list[tuple] = [("σ²", "ridge, locked %", "paper's sequence", "cured sequence")]
     for variance in NOISES:
         case = f"{RIVAL} burst.noise_variance={variance:g}"
-        made.append((f"{variance:g}", *(percent(last(results, RIVAL, case, name)) for name in names)))
-    return made
+        table_rows.append((f"{variance:g}", *(percent(last(results, RIVAL, case, name)) for name in names)))
+    return table_rows
 
 
 def motion(results: Results) -> list[tuple]:
     """What the potential spreads mean in velocity and acceleration, by band."""
     heads = ("velocity at the start, m/s", "at the middle", "acceleration at the start, m/s²", "at the middle")
-    made: list[tuple] = [("band", "λ, m", *heads)]
-    table = rows(results, PAPER, "motion")
+    table_rows: list[tuple] = [("band", "λ, m", *heads)]
+    table = select_rows(results, PAPER, "motion")
     table = table[table["case"] == COMPUTED]
-    for wavelength, own in table.groupby("wavelength_m"):
-        spots = [own[own["at"] == at].iloc[0] for at in ("beginning", "middle")]
-        cells = (f"{spot[f'sigma_{what}']:.2g}" for what in ("velocity_mps", "acceleration_mps2") for spot in spots)
-        made.append((own["band"].iloc[0], f"{wavelength:g}", *cells))
-    return made
+    for wavelength, rows_of_band in table.groupby("wavelength_m"):
+        spots = [rows_of_band[rows_of_band["at"] == moment].iloc[0] for moment in ("beginning", "middle")]
+        cells = (
+            f"{spot[f'sigma_{quantity}']:.2g}" for quantity in ("velocity_mps", "acceleration_mps2") for spot in spots
+        )
+        table_rows.append((rows_of_band["band"].iloc[0], f"{wavelength:g}", *cells))
+    return table_rows
 
 
 def model_error(column: str) -> Callable[[Results], str]:
     """What a cubic frequency leaves of the text's velocities."""
 
-    def made(results: Results) -> str:
-        return f"{rows(results, 'discriminator_profile', 'bounds').iloc[0][column]:.3g}"
+    def text(results: Results) -> str:
+        return f"{select_rows(results, 'discriminator_profile', 'bounds').iloc[0][column]:.3g}"
 
-    return made
+    return text
 
 
 def wide(results: Results) -> str:
     """σ of f₀ of the first window alone over the potential one of the burst (P4.7)."""
-    what = "σ of f0 of the first window over the potential one of the burst (σ² = 2.25, c = 1)"
-    return part(PAPER, "P4.7", what, "")(results)
+    part_name = "σ of f0 of the first window over the potential one of the burst (σ² = 2.25, c = 1)"
+    return claim_value(PAPER, "P4.7", part_name, "")(results)
 
 
 def costs(name: str, scale: float) -> Callable[[Results], str]:
     """Points of lock that a worse forecast costs (P4.10)."""
 
-    def made(results: Results) -> str:
+    def text(results: Results) -> str:
         case = "discriminator_pair prior.error_scale"
-        worse, right = (last(results, MAPS, f"{case}={one:g}", name)["lock_rate"] for one in (scale, 1))
+        worse, right = (last(results, MAPS, f"{case}={error_scale:g}", name)["lock_rate"] for error_scale in (scale, 1))
         return f"{100 * (right - worse):.0f}"
 
-    return made
+    return text
 
 
 TAILS = "discriminator_tails lock_probability"

@@ -18,15 +18,15 @@ def gains(results: Results) -> list[tuple]:
     table = results.table("range_doppler", "gains")
     ratio = results.table("range_doppler", "radar").set_index("case")["C_theta"]
     heads = [head for name in COMPONENTS.values() for head in (f"{name}: best, %", "at 140 s, %")]
-    rows: list[tuple] = [("radar", "C_θ", *heads)]
+    table_rows: list[tuple] = [("radar", "C_θ", *heads)]
     for radar in RADARS:
         cells = [title(radar), f"{ratio[radar]:.3g}"]
         for component in COMPONENTS:
-            own = table[(table["case"] == radar) & (table["component"] == component)]
-            highest = own.loc[own["gain_percent"].idxmax()]
-            cells += [f"{bounded(highest)}, at {highest['t_s']:g}\N{NO-BREAK SPACE}s", bounded(own.iloc[-1])]
-        rows.append(tuple(cells))
-    return rows
+            curve = table[(table["case"] == radar) & (table["component"] == component)]
+            highest = curve.loc[curve["gain_percent"].idxmax()]
+            cells += [f"{bounded(highest)}, at {highest['t_s']:g}\N{NO-BREAK SPACE}s", bounded(curve.iloc[-1])]
+        table_rows.append(tuple(cells))
+    return table_rows
 
 
 def bounded(row) -> str:
@@ -38,16 +38,18 @@ def best(results: Results) -> list[tuple]:
     """The best manoeuvre variance of each radar and filter by the paper's rule, with steady σ and settling time."""
     steady = results.table("manoeuvre_variance", "steady")
     ranges = steady[steady["component"] == "r"]
-    rows = [("radar", "filter", "best D_M, (m/s³)²", "steady σ_r, m", "settled after, s")]
+    table_rows = [("radar", "filter", "best D_M, (m/s³)²", "steady σ_r, m", "settled after, s")]
     for radar in RADARS:
-        own = ranges[ranges["case"].str.startswith(f"{radar} ")]
-        for name in dict.fromkeys(own["filter"]):
-            for one in own[(own["filter"] == name) & own["best"]].itertuples():
-                settled = f"{one.settling_s:g}"
-                rows.append((title(radar), name, power(one.manoeuvre_variance), f"{one.steady_sigma:.1f}", settled))
-            if not own.loc[own["filter"] == name, "best"].any():
-                rows.append((title(radar), name, "none of those tried", "–", "–"))
-    return rows
+        results_of_radar = ranges[ranges["case"].str.startswith(f"{radar} ")]
+        for name in dict.fromkeys(results_of_radar["filter"]):
+            for row in results_of_radar[(results_of_radar["filter"] == name) & results_of_radar["best"]].itertuples():
+                settled = f"{row.settling_s:g}"
+                table_rows.append(
+                    (title(radar), name, power(row.manoeuvre_variance), f"{row.steady_sigma:.1f}", settled)
+                )
+            if not results_of_radar.loc[results_of_radar["filter"] == name, "best"].any():
+                table_rows.append((title(radar), name, "none of those tried", "–", "–"))
+    return table_rows
 
 
 def power(value: float) -> str:
@@ -59,38 +61,38 @@ def power(value: float) -> str:
 def exact_gain(radar: str, component: str, k: int):
     """The exact gain of a radar at scan k, %."""
 
-    def made(results: Results) -> str:
+    def text(results: Results) -> str:
         table = results.table("range_doppler", "gains")
         (row,) = table[(table["case"] == radar) & (table["component"] == component) & (table["k"] == k)].itertuples()
         return f"{row.exact_percent:.1f} %"
 
-    return made
+    return text
 
 
-def difference(which: str):
+def difference(at: str):
     """The exact difference of σ_r between the filters of RLS 2: its `peak` with the time, or its `last` value."""
 
-    def made(results: Results) -> str:
+    def text(results: Results) -> str:
         table = results.table("range_doppler", "curves")
-        own = table[(table["case"] == "rls2") & (table["component"] == "r")]
-        sigma = own.pivot(index="t_s", columns="filter", values="exact_sigma")
-        apart = sigma["r"] - sigma["r+Vr"]
-        return f"{apart.max():.0f} m at {apart.idxmax():g} s" if which == "peak" else f"{apart.iloc[-1]:.0f} m"
+        curves = table[(table["case"] == "rls2") & (table["component"] == "r")]
+        sigma = curves.pivot(index="t_s", columns="filter", values="exact_sigma")
+        gap = sigma["r"] - sigma["r+Vr"]
+        return f"{gap.max():.0f} m at {gap.idxmax():g} s" if at == "peak" else f"{gap.iloc[-1]:.0f} m"
 
-    return made
+    return text
 
 
 def settling(radar: str):
     """Scan periods in which the range of a radar settles with range alone at D_M = 10⁻³."""
 
-    def made(results: Results) -> str:
+    def text(results: Results) -> str:
         steady = results.table("range_doppler", "steady")
         (row,) = steady[
             (steady["case"] == radar) & (steady["filter"] == "r") & (steady["component"] == "r")
         ].itertuples()
         return f"{row.settling_periods:g}"
 
-    return made
+    return text
 
 
 MEASURED = {

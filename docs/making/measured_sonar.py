@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from making.numbers import Results, signed, with_bounds
-from making.pick import rows
+from making.result_rows import select_rows
 
 COURSES = {"straight": "steady", "fluctuating": "fluctuating, 0.05 m/s²", "turning": "75 s into a turn of 1°/s"}
 DETECTION = (1, 0.9, 0.7, 0.5)
@@ -11,9 +11,9 @@ CORRELATIONS = (-0.5, 0, 0.3, 0.6, 0.9, 0.99)
 BEARINGS_DEG = (0.5, 1, 2, 4, 8)
 
 
-def last(results: Results, stem: str, **wanted):
+def last(results: Results, stem: str, **values):
     """The last scan of one filter's σ of the range."""
-    return rows(results, stem, "curves", component="r", **wanted).iloc[-1]
+    return select_rows(results, stem, "curves", component="r", **values).iloc[-1]
 
 
 def sigma(row) -> str:
@@ -24,48 +24,52 @@ def sigma(row) -> str:
 def plots(results: Results) -> list[tuple]:
     """What each further plot of a straight course buys, smoothed and a scan ahead, σ of a plot being 1."""
     heads = ("plots", "smoothed", "formula", "bought, %", "one scan ahead", "formula", "bought, %")
-    made: list[tuple] = [heads]
+    table_rows: list[tuple] = [heads]
     for count in range(2, 9):
         cells: list[str] = [str(count)]
-        for what in ("smoothed", "extrapolated"):
-            wanted = {"filter": "growing", "component": "r", "what": what, "plots": count}
-            row = rows(results, "sonar_smoothing", "plots", **wanted).iloc[0]
+        for estimate in ("smoothed", "extrapolated"):
+            columns = {"filter": "growing", "component": "r", "what": estimate, "plots": count}
+            row = select_rows(results, "sonar_smoothing", "plots", **columns).iloc[0]
             value = with_bounds(row["ratio"], row["ratio_lo"], row["ratio_hi"])
             cells += [value, f"{row['formula']:.4f}", f"{row['bought_percent']:.1f}" if count > 2 else ""]
-        made.append(tuple(cells))
-    return made
+        table_rows.append(tuple(cells))
+    return table_rows
 
 
 def courses(results: Results) -> list[tuple]:
     """σ_r at the last of 40 scans of each filter on each course."""
-    shown = ("growing", "kalman q", "alpha-beta", "window 10", "window 5")
-    made: list[tuple] = [("course", *shown)]
+    filter_names = ("growing", "kalman q", "alpha-beta", "window 10", "window 5")
+    table_rows: list[tuple] = [("course", *filter_names)]
     for target, words in COURSES.items():
         case = {"case": f"target=sonar_{target}"}
-        made.append((words, *(sigma(last(results, "sonar_fluctuating", filter=name, **case)) for name in shown)))
-    return made
+        table_rows.append(
+            (words, *(sigma(last(results, "sonar_fluctuating", filter=name, **case)) for name in filter_names))
+        )
+    return table_rows
 
 
 def missed(results: Results) -> list[tuple]:
     """σ_r after 20 scans of which three gave no plot, by the probability that each of the others did."""
-    shown = ("growing", "kalman", "window 5", "growing 2")
-    made: list[tuple] = [("P_D", *shown)]
+    filter_names = ("growing", "kalman", "window 5", "growing 2")
+    table_rows: list[tuple] = [("P_D", *filter_names)]
     for probability in DETECTION:
         case = {"case": f"probability={probability:g}"}
-        made.append(
-            (f"{probability:g}", *(sigma(last(results, "sonar_missed", filter=name, **case)) for name in shown))
+        table_rows.append(
+            (f"{probability:g}", *(sigma(last(results, "sonar_missed", filter=name, **case)) for name in filter_names))
         )
-    return made
+    return table_rows
 
 
 def gap(name: str) -> Callable[[Results], str]:
     """σ_r of a filter before and at the end of three scans missed in a row."""
 
-    def made(results: Results) -> str:
-        own = rows(results, "sonar_missed", "curves", case="probability=1", filter=name, component="r").set_index("k")
-        return f"{own.loc[7, 'sigma']:.1f} → {own.loc[10, 'sigma']:.1f} m"
+    def text(results: Results) -> str:
+        curve = select_rows(
+            results, "sonar_missed", "curves", case="probability=1", filter=name, component="r"
+        ).set_index("k")
+        return f"{curve.loc[7, 'sigma']:.1f} → {curve.loc[10, 'sigma']:.1f} m"
 
-    return made
+    return text
 
 
 def correlated(results: Results) -> list[tuple]:
@@ -78,31 +82,31 @@ def correlated(results: Results) -> list[tuple]:
         "normalised error",
         "calculated",
     )
-    made: list[tuple] = [heads]
+    table_rows: list[tuple] = [heads]
     for rho in CORRELATIONS:
         case = {"case": f"correlation={rho:g}"}
         knows, ignores = (last(results, "sonar_correlated", filter=name, **case) for name in ("augmented", "naive"))
         naive = {"filter": "naive", "component": "r", **case}
-        believed = rows(results, "sonar_correlated", "believed", **naive).iloc[-1]
-        error = rows(results, "sonar_correlated", "consistency", **naive).iloc[-1]
+        believed = select_rows(results, "sonar_correlated", "curves", **naive).iloc[-1]
+        error = select_rows(results, "sonar_correlated", "consistency", **naive).iloc[-1]
         normalised = (with_bounds(error["nees"], error["nees_lo"], error["nees_hi"]), f"{error['exact_nees']:.2f}")
-        made.append(
+        table_rows.append(
             (signed(f"{rho:g}"), sigma(knows), sigma(ignores), f"{believed['believed_sigma']:.2f}", *normalised)
         )
-    return made
+    return table_rows
 
 
 def conversion(results: Results) -> list[tuple]:
     """The bias of converted plots at 15 km, plain and unbiased."""
-    made: list[tuple] = [("σ_β", "plain, m", "by the formula, m", "unbiased, m")]
+    table_rows: list[tuple] = [("σ_β", "plain, m", "by the formula, m", "unbiased, m")]
     for degrees in BEARINGS_DEG:
         plain, unbiased = (
-            rows(results, "sonar_conversion", "conversion", case=f"deg={degrees:g} frame={frame}").iloc[0]
+            select_rows(results, "sonar_conversion", "conversion", case=f"deg={degrees:g} frame={frame}").iloc[0]
             for frame in ("cartesian", "cartesian_unbiased")
         )
         first, second = (with_bounds(row["bias_m"], row["bias_lo"], row["bias_hi"]) for row in (plain, unbiased))
-        made.append((f"{degrees:g}°", first, signed(f"{plain['formula_m']:.1f}"), second))
-    return made
+        table_rows.append((f"{degrees:g}°", first, signed(f"{plain['formula_m']:.1f}"), second))
+    return table_rows
 
 
 MEASURED = {

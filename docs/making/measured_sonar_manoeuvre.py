@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import binom
 
 from making.numbers import Results, with_bounds
-from making.pick import part, rows, value
+from making.result_rows import claim_value, column_value, select_rows
 
 STEM = "sonar_manoeuvre"
 ACCELERATIONS = (0, 0.1, 0.2138, 0.4, 0.8)
@@ -27,78 +27,95 @@ FILTERS = {
 HEADS = ("acceleration, m/s²", *(f"{acceleration:g}" for acceleration in ACCELERATIONS))
 
 
-def own(results: Results, name: str, acceleration: float, plots: int, **wanted):
+def rows_at_one_percent(results: Results, name: str, acceleration: float, plots: int, **values):
     """Rows of the range at 0.01 false alarms a test."""
     case = f"acceleration_mps2={acceleration:g}"
-    table = rows(results, STEM, name, case=case, filter=f"{plots} plots", component="r", **wanted)
+    table = select_rows(results, STEM, name, case=case, filter=f"{plots} plots", component="r", **values)
     return table[(table["false_alarm_probability"] - 0.01).abs() < 1e-6]
 
 
 def alarms(results: Results) -> list[tuple]:
     """Alarms a test at the end of the manoeuvre, with the exact probability below."""
-    made: list[tuple] = [HEADS]
+    table_rows: list[tuple] = [HEADS]
     for plots in PLOTS:
-        found = [own(results, "detections", one, plots, t_s=END_S).iloc[0] for one in ACCELERATIONS]
-        made.append((f"{plots} plots", *(f"{row['probability']:.3f}" for row in found)))
-        made.append(("exact", *(f"{row['exact']:.3f}" for row in found)))
-    return made
+        detections = [
+            rows_at_one_percent(results, "detections", acceleration, plots, t_s=END_S).iloc[0]
+            for acceleration in ACCELERATIONS
+        ]
+        table_rows.append((f"{plots} plots", *(f"{row['probability']:.3f}" for row in detections)))
+        table_rows.append(("exact", *(f"{row['exact']:.3f}" for row in detections)))
+    return table_rows
 
 
 def widest(results: Results) -> str:
     """The largest half-width of an interval in that table."""
-    found = [own(results, "detections", one, plots, t_s=END_S).iloc[0] for plots in PLOTS for one in ACCELERATIONS]
-    return f"{max((row['hi'] - row['lo']) / 2 for row in found):.4f}"
+    detections = [
+        rows_at_one_percent(results, "detections", acceleration, plots, t_s=END_S).iloc[0]
+        for plots in PLOTS
+        for acceleration in ACCELERATIONS
+    ]
+    return f"{max((row['hi'] - row['lo']) / 2 for row in detections):.4f}"
 
 
 def times(event: str) -> Callable[[Results], list[tuple]]:
     """Mean time to an event, s; the end of the last scan looked at is counted where it does not come."""
 
-    def made(results: Results) -> list[tuple]:
-        filled: list[tuple] = [("acceleration, m/s²", *HEADS[2:])]
+    def table(results: Results) -> list[tuple]:
+        table_rows: list[tuple] = [("acceleration, m/s²", *HEADS[2:])]
         for plots in PLOTS:
-            found = (own(results, "delays", one, plots, event=event) for one in ACCELERATIONS[1:])
-            filled.append((f"{plots} plots", *map(mean_time, found)))
-        return filled
+            delays = (
+                rows_at_one_percent(results, "delays", acceleration, plots, event=event)
+                for acceleration in ACCELERATIONS[1:]
+            )
+            table_rows.append((f"{plots} plots", *map(mean_time, delays)))
+        return table_rows
 
-    return made
+    return table
 
 
 def mean_time(delays) -> str:
     """Mean of the time to an event with its interval, from the probability that it has come by each scan."""
-    at = delays["delay_s"].to_numpy()
+    delay_s = delays["delay_s"].to_numpy()
     shares = np.diff(delays["probability"].to_numpy(), prepend=0.0)
     shares[-1] += 1 - shares.sum()
-    mean = shares @ at
-    half = 1.96 * math.sqrt(shares @ (at - mean) ** 2 / delays["n"].iloc[0])
+    mean = shares @ delay_s
+    half = 1.96 * math.sqrt(shares @ (delay_s - mean) ** 2 / delays["n"].iloc[0])
     return with_bounds(mean, mean - half, mean + half)
 
 
 def classes(results: Results) -> list[tuple]:
     """How often a leg is called what it is not."""
-    made: list[tuple] = [("wrongly called", *HEADS[1:])]
+    table_rows: list[tuple] = [("wrongly called", *HEADS[1:])]
     for plots in (5, 8, 10):
-        steady = own(results, "classes", 0, plots, truth="steady").iloc[-1]
-        made.append((f"manoeuvring over 220 steady s, {plots} plots", f"{steady['error_probability']:.3f}", *[""] * 4))
+        steady = rows_at_one_percent(results, "classes", 0, plots, truth="steady").iloc[-1]
+        table_rows.append(
+            (f"manoeuvring over 220 steady s, {plots} plots", f"{steady['error_probability']:.3f}", *[""] * 4)
+        )
     for plots in (5, 8, 10):
-        found = (own(results, "classes", one, plots, truth="manoeuvre").iloc[0] for one in ACCELERATIONS[1:])
-        cells = (f"{row['error_probability']:.3f}" for row in found)
-        made.append((f"steady over the manoeuvre, {plots} plots", "", *cells))
-    return made
+        manoeuvres = (
+            rows_at_one_percent(results, "classes", acceleration, plots, truth="manoeuvre").iloc[0]
+            for acceleration in ACCELERATIONS[1:]
+        )
+        cells = (f"{row['error_probability']:.3f}" for row in manoeuvres)
+        table_rows.append((f"steady over the manoeuvre, {plots} plots", "", *cells))
+    return table_rows
 
 
 def over_the_run(results: Results, name: str, acceleration: float) -> float:
     """σ of the range of a filter, the root of its mean square from the 5th scan on, m."""
-    wanted = {"case": f"acceleration_mps2={acceleration:g}", "filter": name, "component": "r"}
-    curve = rows(results, STEM, "curves", **wanted)
+    columns = {"case": f"acceleration_mps2={acceleration:g}", "filter": name, "component": "r"}
+    curve = select_rows(results, STEM, "curves", **columns)
     return math.sqrt((curve[curve["k"] >= 5]["sigma"] ** 2).mean())
 
 
 def courses(results: Results) -> list[tuple]:
     """σ of the range over the run, each filter in each manoeuvre."""
-    made: list[tuple] = [HEADS]
+    table_rows: list[tuple] = [HEADS]
     for name, words in FILTERS.items():
-        made.append((words, *(figures(over_the_run(results, name, one)) for one in ACCELERATIONS)))
-    return made
+        table_rows.append(
+            (words, *(figures(over_the_run(results, name, acceleration)) for acceleration in ACCELERATIONS))
+        )
+    return table_rows
 
 
 def figures(number: float) -> str:
@@ -106,19 +123,19 @@ def figures(number: float) -> str:
     return f"{number:#.3g}".rstrip(".")
 
 
-def premium(over: str) -> Callable[[Results], str]:
+def premium(filter_name: str) -> Callable[[Results], str]:
     """By how much σ of a filter on the steady leg lies over that of the degree switched by eight plots."""
 
-    def made(results: Results) -> str:
-        return f"{100 * (over_the_run(results, over, 0) / over_the_run(results, 'degree by 8', 0) - 1):.0f} %"
+    def text(results: Results) -> str:
+        return f"{100 * (over_the_run(results, filter_name, 0) / over_the_run(results, 'degree by 8', 0) - 1):.0f} %"
 
-    return made
+    return text
 
 
 def use(name: str, component: str) -> Callable[[Results], str]:
     """Measured over believed σ of a use of the track after 220 steady seconds."""
-    wanted = {"case": "acceleration_mps2=0", "filter": name, "component": component, "t_s": 220}
-    return value(STEM, "uses", "ratio", **wanted)
+    columns = {"case": "acceleration_mps2=0", "filter": name, "component": component, "t_s": 220}
+    return column_value(STEM, "uses", "ratio", **columns)
 
 
 def beyond(results: Results) -> str:
@@ -133,34 +150,34 @@ def beyond(results: Results) -> str:
 def turn(plots: int) -> Callable[[Results], str]:
     """Alarms a test in range at the end of a turn of 2°/s."""
 
-    def made(results: Results) -> str:
+    def text(results: Results) -> str:
         case = "rate_radps=0.03491 frame=polar"
-        wanted = {"case": case, "filter": f"{plots} plots", "component": "r", "t_s": END_S}
-        table = rows(results, "sonar_manoeuvre_turning", "detections", **wanted)
+        columns = {"case": case, "filter": f"{plots} plots", "component": "r", "t_s": END_S}
+        table = select_rows(results, "sonar_manoeuvre_turning", "detections", **columns)
         row = table[(table["false_alarm_probability"] - 0.01).abs() < 1e-6].iloc[0]
         return with_bounds(row["probability"], row["lo"], row["hi"])
 
-    return made
+    return text
 
 
 def threshold(more: int, few: int) -> Callable[[Results], str]:
     """The threshold's fall from few plots to more (P3.8)."""
-    what = f"acceleration at the threshold, {more} plots over {few}, at 0.01 false alarms a test"
-    return part(STEM, "P3.8", what, "")
+    part_name = f"acceleration at the threshold, {more} plots over {few}, at 0.01 false alarms a test"
+    return claim_value(STEM, "P3.8", part_name, "")
 
 
 def switched(case: str, degree: int) -> Callable[[Results], str]:
     """σ of a held degree over that of the degree switched by five plots (P3.10)."""
-    what = (
+    part_name = (
         f"σ of the range over the run in the {case} manoeuvre, degree {degree} fixed over degree switched by five plots"
     )
-    return part(STEM, "P3.10", what, "")
+    return claim_value(STEM, "P3.10", part_name, "")
 
 
 def delay_ratio(case: str) -> Callable[[Results], str]:
     """Mean time to see beginning and end of a manoeuvre, eight plots over five (P3.8)."""
-    what = f"mean time to detect beginning and end of the {case} manoeuvre at k = 1, 8 plots over 5"
-    return part(STEM, "P3.8", what, "")
+    part_name = f"mean time to detect beginning and end of the {case} manoeuvre at k = 1, 8 plots over 5"
+    return claim_value(STEM, "P3.8", part_name, "")
 
 
 USES = {
@@ -193,7 +210,7 @@ MEASURED = {
     "manoeuvre_threshold_8_5": threshold(8, 5),
     "manoeuvre_delay_weakest": delay_ratio("weakest"),
     "manoeuvre_delay_strongest": delay_ratio("strongest"),
-    "manoeuvre_at_one": part(STEM, "P3.9", "alarms a test at k = 1, five plots, acceleration of one σ_a", ""),
+    "manoeuvre_at_one": claim_value(STEM, "P3.9", "alarms a test at k = 1, five plots, acceleration of one σ_a", ""),
     **{
         f"manoeuvre_held_{degree}_{case}": switched(case, degree)
         for degree in (1, 2)

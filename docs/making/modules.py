@@ -39,7 +39,7 @@ def keys_in(module: ModuleType) -> list[str]:
     return [name for name, value in public(module) if inspect.isclass(value) and issubclass(value, BaseModel)]
 
 
-def plain(app, what: str, name: str, thing: object, options: dict, lines: list[str]) -> None:
+def plain(app, kind: str, name: str, thing: object, options: dict, lines: list[str]) -> None:
     """Docstrings are prose: columns stay columns, bars and stars are magnitudes and products, no markup."""
     paragraphs = "\n".join(lines).strip("\n").split("\n\n")
     lines[:] = [*"\n\n".join(map(paragraph, paragraphs)).split("\n"), ""]
@@ -62,13 +62,13 @@ def described(module: ModuleType) -> str:
 
 def public(module: ModuleType) -> list[tuple[str, object]]:
     """Functions, kernels and classes that a module defines, without those that begin with an underscore."""
-    found = []
+    members = []
     for name, value in vars(module).items():
         inner = getattr(value, "py_func", value)
         is_ours = (getattr(inner, "__module__", None), getattr(inner, "__name__", None)) == (module.__name__, name)
         if not name.startswith("_") and is_ours and (inspect.isfunction(inner) or inspect.isclass(inner)):
-            found.append((name, inner))
-    return found
+            members.append((name, inner))
+    return members
 
 
 def every_module() -> list[ModuleType]:

@@ -45,7 +45,7 @@ class Results:
 def measured() -> dict[str, Callable[[Results], object]]:
     """All tables and values that there are, by name."""
     modules = [import_module(f"making.{path.stem}") for path in sorted(HERE.glob("measured_*.py"))]
-    return {name: made for module in modules for name, made in module.MEASURED.items()}
+    return {name: make for module in modules for name, make in module.MEASURED.items()}
 
 
 def marks(page: str) -> list[tuple[str, str, str]]:
@@ -55,15 +55,15 @@ def marks(page: str) -> list[tuple[str, str, str]]:
 
 def filled(page: str, results: Results) -> str:
     """A page with its numbers as the results have them; KeyError for a mark that nothing makes."""
-    known = measured()
+    makers = measured()
 
-    def text(found: re.Match) -> str:
-        kind, name = found[1], found[2]
-        made = known[name](results)
-        inner = f"\n{table(made)}\n" if kind == "table" else made
+    def filled_mark(mark: re.Match) -> str:
+        kind, name = mark[1], mark[2]
+        value = makers[name](results)
+        inner = f"\n{table(value)}\n" if kind == "table" else value
         return f"<!-- {kind}: {name} -->{inner}<!-- end -->"
 
-    return MARK.sub(text, page)
+    return MARK.sub(filled_mark, page)
 
 
 def table(rows: list[tuple]) -> str:
@@ -95,8 +95,8 @@ def signed(text: str) -> str:
 
 def pages() -> list[Path]:
     """The pages that hold numbers."""
-    found = [page for page in sorted((ROOT / "docs").rglob("*.md")) if "_build" not in page.parts]
-    return [page for page in found if MARK.search(page.read_text(encoding="utf-8"))]
+    all_pages = [page for page in sorted((ROOT / "docs").rglob("*.md")) if "_build" not in page.parts]
+    return [page for page in all_pages if MARK.search(page.read_text(encoding="utf-8"))]
 
 
 def main(folder: str) -> None:

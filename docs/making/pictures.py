@@ -27,15 +27,18 @@ from radarsim.report.drawing import Figure
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "pictures"
 MARK = re.compile(r"(?<=^<!-- picture: )(.+?)( -->\n)(.*?)(?=^<!-- drawn -->$)", re.MULTILINE | re.DOTALL)
-MOST_BYTES = 60_000
+MAX_BYTES = 60_000
 CHART = "chart"  # in the place of a config: the figures of `radarsim chart`
-SIZES, COLOURS = (1.0, 0.8, 0.6), (64, 32, 16)  # of a PNG: shares of 200 dpi, and how many; the first that are small
+PNG_SIZES, PNG_COLOURS = (
+    (1.0, 0.8, 0.6),
+    (64, 32, 16),
+)  # of a PNG: shares of 200 dpi, and how many; the first that are small
 
 
-def asked(mark: str) -> list[tuple[str, str, float | None]]:
+def pictures_of_mark(mark: str) -> list[tuple[str, str, float | None]]:
     """Config, figure and width of each picture of a mark."""
-    parts = [one.split() for one in mark.split("|")]
-    return [(config, name, float(width[0]) if width else None) for config, name, *width in parts]
+    pictures = [picture.split() for picture in mark.split("|")]
+    return [(config, name, float(width[0]) if width else None) for config, name, *width in pictures]
 
 
 def pages() -> Iterator[tuple[Path, str]]:
@@ -45,14 +48,14 @@ def pages() -> Iterator[tuple[Path, str]]:
             yield path, text
 
 
-def every() -> dict[str, set[tuple[str, float | None]]]:
+def figures_by_config() -> dict[str, set[tuple[str, float | None]]]:
     """The figures that the pages show, by config."""
-    found: dict[str, set[tuple[str, float | None]]] = {}
+    figures: dict[str, set[tuple[str, float | None]]] = {}
     for _, text in pages():
         for mark in MARK.finditer(text):
-            for config, name, width in asked(mark[1]):
-                found.setdefault(config, set()).add((name, width))
-    return found
+            for config, name, width in pictures_of_mark(mark[1]):
+                figures.setdefault(config, set()).add((name, width))
+    return figures
 
 
 def figures_of(config: str, results: Path) -> dict[str, Figure]:
@@ -63,37 +66,39 @@ def figures_of(config: str, results: Path) -> dict[str, Figure]:
     return output.case_figures(result.cases, result.tables, result.experiment)
 
 
-def stem(config: str, name: str, width: float | None) -> str:
+def file_stem(config: str, name: str, width: float | None) -> str:
     """What a picture's file is called, without its ending."""
     return "_".join([config, name, *([f"{width:g}"] if width else [])])
 
 
-def drawn(figure: Figure, width: float | None) -> tuple[str, bytes]:
+def picture_file(figure: Figure, width: float | None) -> tuple[str, bytes]:
     """The ending and the bytes of a picture: SVG, or PNG in as many colours as keep it under MOST_BYTES."""
-    made = figures.save(figure, ("svg", "png"), width)
-    return ("svg", made["svg"]) if len(made["svg"]) < MOST_BYTES else ("png", smaller(made["png"]))
+    files = figures.save(figure, ("svg", "png"), width)
+    return ("svg", files["svg"]) if len(files["svg"]) < MAX_BYTES else ("png", compressed_png(files["png"]))
 
 
-def smaller(png: bytes) -> bytes:
+def compressed_png(png: bytes) -> bytes:
     """A PNG of a palette under MOST_BYTES, of fewer colours and then of fewer points where it has to be."""
     from PIL import Image  # Matplotlib brings it
 
-    whole = Image.open(io.BytesIO(png)).convert("RGB")
-    for size, colours in product(SIZES, COLOURS):
-        picture = whole.resize((round(size * whole.width), round(size * whole.height)), Image.Resampling.LANCZOS)
+    original = Image.open(io.BytesIO(png)).convert("RGB")
+    for size, colours in product(PNG_SIZES, PNG_COLOURS):
+        picture = original.resize(
+            (round(size * original.width), round(size * original.height)), Image.Resampling.LANCZOS
+        )
         out = io.BytesIO()
         picture.quantize(colours, dither=Image.Dither.NONE).save(out, "png", optimize=True)
-        if out.tell() < MOST_BYTES:
+        if out.tell() < MAX_BYTES:
             return out.getvalue()
-    raise ValueError(f"{len(png)} bytes of PNG cannot be made {MOST_BYTES}")
+    raise ValueError(f"{len(png)} bytes of PNG cannot be made {MAX_BYTES}")
 
 
-def shown(page: Path, parts: list[tuple[str, Figure, Path]]) -> str:
+def picture_text(page: Path, parts: list[tuple[str, Figure, Path]]) -> str:
     """What stands in a page between the marks: the pictures, and below them their captions."""
     images = [
-        f"![{spoken(one.title)}]({Path(os.path.relpath(file, page.parent)).as_posix()})" for _, one, file in parts
+        f"![{spoken(figure.title)}]({Path(os.path.relpath(file, page.parent)).as_posix()})" for _, figure, file in parts
     ]
-    captions = [f"*{spoken(one.title)}.* {spoken(one.caption)}" for _, one, _ in parts]
+    captions = [f"*{spoken(figure.title)}.* {spoken(figure.caption)}" for _, figure, _ in parts]
     if len(parts) > 1:
         captions = [f"* {caption}" for caption in captions]
         return "\n".join(images) + "\n\n" + "\n".join(captions) + "\n"
@@ -103,22 +108,22 @@ def shown(page: Path, parts: list[tuple[str, Figure, Path]]) -> str:
 def main(results: str) -> None:
     """Draw every picture that the pages show, write the marks again, remove pictures that no page shows."""
     FOLDER.mkdir(exist_ok=True)
-    made: dict[tuple[str, str, float | None], tuple[Figure, Path]] = {}
-    for config, wanted in every().items():
-        found = figures_of(config, Path(results))
-        for name, width in sorted(wanted, key=str):
-            ending, data = drawn(found[name], width)
-            path = FOLDER / f"{stem(config, name, width)}.{ending}"
+    drawn_figures: dict[tuple[str, str, float | None], tuple[Figure, Path]] = {}
+    for config, wanted_figures in figures_by_config().items():
+        figures = figures_of(config, Path(results))
+        for name, width in sorted(wanted_figures, key=str):
+            ending, data = picture_file(figures[name], width)
+            path = FOLDER / f"{file_stem(config, name, width)}.{ending}"
             path.write_bytes(data)
-            made[config, name, width] = found[name], path
+            drawn_figures[config, name, width] = figures[name], path
             sys.stdout.write(f"{path.relative_to(ROOT)}: {len(data)} bytes\n")
-    for path in set(FOLDER.iterdir()) - {file for _, file in made.values()}:
+    for path in set(FOLDER.iterdir()) - {file for _, file in drawn_figures.values()}:
         path.unlink()
     for page, text in list(pages()):
 
         def filled(mark: re.Match, page: Path = page) -> str:
-            parts = [(one[0], *made[one]) for one in asked(mark[1])]
-            return f"{mark[1]}{mark[2]}{shown(page, parts)}"
+            pictures = [(key[0], *drawn_figures[key]) for key in pictures_of_mark(mark[1])]
+            return f"{mark[1]}{mark[2]}{picture_text(page, pictures)}"
 
         page.write_text(MARK.sub(filled, text), encoding="utf-8")
 

@@ -14,14 +14,12 @@ from radarsim.studies import floor, registry
 
 SHARED = (common.leading, common.components, common.realisations, common.interval_columns, notes.beside, notes.noted)
 SEVERAL = {  # tables that studies have in common
-    "curves": (common.curves,),
+    "curves": (common.curves, floor.with_floors),
     "gains": (common.gains,),
-    "believed": (notes.believed, notes.ratio_columns),
     "consistency": (notes.normalised,),
     "rare": (rare.rows,),
     "failures": (outside.failures,),
     "nees": (outside.consistency, notes.normalised),
-    "floor": (floor.floors,),
 }
 UNITS = {  # by how a name ends
     **{"_s": "s", "_m": "m", "_mps": "m/s", "_mps2": "m/s²", "_rad": "rad", "_hz": "Hz", "_db": "dB"},
@@ -39,19 +37,19 @@ class Column(NamedTuple):
     meaning: str
 
 
-def read(of: Callable | ModuleType) -> tuple[str, list[Column]]:
+def read(thing: Callable | ModuleType) -> tuple[str, list[Column]]:
     """What a docstring says of a table, and the columns that it declares."""
     prose, columns = [], []
-    for paragraph in (inspect.getdoc(of) or "").split("\n\n"):
+    for paragraph in (inspect.getdoc(thing) or "").split("\n\n"):
         if not LINE.match(paragraph):
             prose.append(paragraph)
             continue
         for line in re.sub(r"\n +", " ", paragraph).splitlines():
-            found = LINE.fullmatch(line)
-            if found is None:
-                raise ValueError(f"{of.__name__}: a line of columns must be `name: meaning`, is {line!r}")
-            names = tuple(name for one in found["names"].split(", ") for name in with_ends(one))
-            columns.append(Column(names, found["unit"] or units(names), found["meaning"]))
+            match = LINE.fullmatch(line)
+            if match is None:
+                raise ValueError(f"{thing.__name__}: a line of columns must be `name: meaning`, is {line!r}")
+            names = tuple(name for name in match["names"].split(", ") for name in with_ends(name))
+            columns.append(Column(names, match["unit"] or units(names), match["meaning"]))
     return "\n\n".join(prose), columns
 
 
@@ -63,16 +61,16 @@ def with_ends(name: str) -> tuple[str, ...]:
 
 def units(names: tuple[str, ...]) -> str:
     """The units that names end in; nothing where they end in none."""
-    return ", ".join(dict.fromkeys(of for name in names for ending, of in UNITS.items() if name.endswith(ending)))
+    return ", ".join(dict.fromkeys(unit for name in names for ending, unit in UNITS.items() if name.endswith(ending)))
 
 
 def modules(study: str) -> Iterator[ModuleType]:
     """The modules of a study that declare tables, that of the whole study first."""
     package = import_module(registry.SHIPPED[study])
-    names = [one.name for one in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")]
-    for name in sorted(names, key=lambda name: name.count(".")):
-        if name.endswith(".tables"):
-            yield import_module(name)
+    names = [module.name for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")]
+    for module_name in sorted(names, key=lambda module_name: module_name.count(".")):
+        if module_name.endswith(".tables"):
+            yield import_module(module_name)
 
 
 def markdown() -> str:
@@ -101,8 +99,8 @@ def own_tables(study: str) -> str:
 
 def described(*things: Callable | ModuleType) -> list[str]:
     """What the first says, of a table or of all of a module, and the columns that all of them declare."""
-    found = [read(thing) for thing in things]
-    return [linked(found[0][0]), listed([column for _, own in found for column in own])]
+    docstrings = [read(thing) for thing in things]
+    return [linked(docstrings[0][0]), listed([column for _, columns in docstrings for column in columns])]
 
 
 def linked(prose: str) -> str:
@@ -112,8 +110,11 @@ def linked(prose: str) -> str:
 
 def listed(columns: list[Column]) -> str:
     """Columns as a table; nothing of none."""
-    of = {"unit": "that of `unit`"}
-    rows = [(", ".join(f"`{name}`" for name in one.names), of.get(one.unit, one.unit), one.meaning) for one in columns]
+    unit_words = {"unit": "that of `unit`"}
+    rows = [
+        (", ".join(f"`{name}`" for name in column.names), unit_words.get(column.unit, column.unit), column.meaning)
+        for column in columns
+    ]
     lines = [" | ".join(cell.replace("|", "\\|") for cell in row) for row in rows]
     head = ["| column | unit | meaning |", "|---|---|---|"]
     return "\n".join([*head, *(f"| {line} |" for line in lines)]) if lines else ""

@@ -22,10 +22,10 @@ def by_page() -> dict[str, int]:
         page for room in ("docs", "benchmarks") for page in (ROOT / room).rglob("*.md") if "_build" not in page.parts
     ]
     counts = {str(page.relative_to(ROOT)): count(page.read_text(encoding="utf-8")) for page in pages}
-    return dict(sorted(counts.items(), key=lambda one: -one[1]))
+    return dict(sorted(counts.items(), key=lambda item: -item[1]))
 
 
 if __name__ == "__main__":
-    found = by_page()
-    lines = [f"{words:6,} {page}" for page, words in found.items()]
-    sys.stdout.write("\n".join([*lines, f"{sum(found.values()):6,} in all"]) + "\n")
+    counts = by_page()
+    lines = [f"{words:6,} {page}" for page, words in counts.items()]
+    sys.stdout.write("\n".join([*lines, f"{sum(counts.values()):6,} in all"]) + "\n")

@@ -326,7 +326,7 @@ def tolerance(study: str) -> Tolerance:
     return TOLERANCES.get(study, UNKNOWN)
 
 
-EXACT = ("exact_sigma", "exact_bias", "exact_percent", "posterior_sigma")
+EXACT = ("exact_sigma", "exact_bias", "exact_percent", "posterior_sigma", "floor")
 LABELS_DIFFER = (float("inf"), float("inf"))
 FIRST_NUMBER = {"curves": "sigma", "gains": "gain_percent"}  # columns before it are labels and counts
 
@@ -383,7 +383,7 @@ def distances(table: str, one: bytes, other: bytes) -> tuple[float, float]:
     farthest = {False: 0.0, True: 0.0}
     for a, b in zip(first, second, strict=True):
         columns = list(b)
-        numbers = [name for name in columns[columns.index(FIRST_NUMBER[table]) :] if name != "note"]
+        numbers = [name for name in columns[columns.index(FIRST_NUMBER[table]) :] if name not in ("floor_kind", "note")]
         if any(a.get(name) != b[name] for name in columns if name not in (*numbers, "note")):
             return LABELS_DIFFER
         centre = FIRST_NUMBER[table]

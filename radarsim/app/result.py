@@ -22,6 +22,7 @@ from radarsim.report import files, notes, outside, panels, seen
 from radarsim.report import tables as common
 from radarsim.report.drawing import Figure, reworded
 from radarsim.report.wording import estimate, spoken
+from radarsim.studies import floor
 from radarsim.studies.interface import Study
 from radarsim.studies.registry import quantities, study
 
@@ -89,7 +90,7 @@ class Result(Shown):
 
         >>> import radarsim
         >>> sorted(radarsim.run("rls2", realisations=2000).tables)
-        ['believed', 'claims', 'consistency', 'curves', 'floor', 'gains', 'radar', 'steady']
+        ['claims', 'consistency', 'curves', 'gains', 'radar', 'steady']
         """
         return {name: table.copy() for name, table in self._tables.items()}
 
@@ -203,9 +204,10 @@ def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
     made, from_outside = measured(results), outside.measured(results)
     for extension in extensions():
         made |= extension.tables(results, made, from_outside, stem)
-    made["floor"] = of.floors(results)
     made = notes.noted(made, results, of.exact_errors, quantities(results[0].study, results[0].spec))
-    return outside.added(made, results, from_outside)
+    made = outside.added(made, results, from_outside)
+    made["curves"] = floor.with_floors(made["curves"], of.floors(results))
+    return made
 
 
 def measured(results: Sequence[CaseResult]) -> dict:

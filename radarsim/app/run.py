@@ -240,7 +240,7 @@ def _collected(
 
 def unknown(case: Case, of: Quantity) -> str:
     """The line for a case that has no row of a quantity."""
-    return f"{case.name}: of: must be what the case has, got {of.name}: no {of.words} in {of.table}.csv"
+    return f"{case.name}: of: must be what the case has, got {of.name}: no {of.words}"
 
 
 def check_precision(experiments: Sequence[Experiment], percent: float, of: str = "sigma") -> None:

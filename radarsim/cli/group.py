@@ -26,8 +26,9 @@ SECTIONS = {  # of commands in `radarsim --help`; extensions add theirs
     "A question": ("list", "check", "run", "report", "compare"),
     "Your own radar": ("new", "solve", "tune", "sensitivity", "chart", "new-study"),
     "Your own data": ("judge",),
-    "Upkeep": ("schema", "compile", "doctor", "clean"),
+    "Upkeep": ("doctor",),
 }
+UNLISTED = ("compile", "schema", "clean")  # named in one line below the sections
 OLD_NAMES = {"readings": "interpretations"}  # names of commands in earlier versions, which still work
 NO_THREAD = "can't start new thread"  # in Python's words
 PATIENCE_S = 1.0  # from a signal to the end of whatever a command is doing
@@ -58,7 +59,7 @@ class Commands(click.Group):
         return super().get_command(ctx, cmd_name)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return [name for names in command_sections().values() for name in names]
+        return [*(name for names in command_sections().values() for name in names), *UNLISTED]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         width = max(map(len, self.commands))
@@ -66,6 +67,8 @@ class Commands(click.Group):
             rows = [(name.ljust(width), self.commands[name].get_short_help_str(100)) for name in names]
             with formatter.section(title):
                 formatter.write_dl(rows)
+        formatter.write_paragraph()
+        formatter.write_text(f"Also: {', '.join(UNLISTED)}; `radarsim COMMAND --help` describes each.")
 
     def invoke(self, ctx: click.Context) -> Any:
         before = ON_COMMAND_LINE.set(True)

@@ -44,33 +44,34 @@ MESSAGES = {
     "less_than": "must be < {lt}",
     "less_than_equal": "must be <= {le}",
 }
-MAPPING = {"model_type", "model_attributes_type", "dict_type"}
-LIST = {"tuple_type", "list_type"}
-SCALAR = {"float_type", "int_type", "bool_type", "string_type", "literal_error"}
-BOUNDS = ("gt", "ge", "lt", "le")
-WITHOUT_VALUE = ("missing", "extra_forbidden", "unique", "union_tag_not_found")
+MAPPING_ERRORS = {"model_type", "model_attributes_type", "dict_type"}
+LIST_ERRORS = {"tuple_type", "list_type"}
+SCALAR_ERRORS = {"float_type", "int_type", "bool_type", "string_type", "literal_error"}
+FORM_ERRORS = MAPPING_ERRORS | LIST_ERRORS | SCALAR_ERRORS
+BOUND_NAMES = ("gt", "ge", "lt", "le")
+ERRORS_WITHOUT_VALUE = ("missing", "extra_forbidden", "unique", "union_tag_not_found")
 
 
 def check(model: type[M], document: Document, faults: Faults, also: Iterable[str] = ()) -> M | None:
-    """The document as a checked object; None, with faults noted, if it is invalid. `also` are top-level keys that are
-    checked elsewhere and are listed among the allowed ones."""
+    """The document as a checked object; None, with errors added, if it is invalid.
+
+    also: top-level keys that are checked elsewhere, and listed among the allowed ones."""
     refuse_both_units(document, faults)
     try:
         return model.model_validate(document.data)
     except ValidationError as error:
-        errors = error.errors(include_url=False, include_input=False)
-        found = [one for each in errors for one in _Found.of(each, document)]
-        for each in found:
-            if not _irrelevant(each, found, document):
-                _report(model, document, each, faults, also)
-        for each in _Partial(model, document, found, faults).misfits():
-            _report(model, document, each, faults, also)
+        pydantic_errors = error.errors(include_url=False, include_input=False)
+        input_errors = [item for raw in pydantic_errors for item in _InputError.from_pydantic(raw, document)]
+        relevant = [item for item in input_errors if not _is_of_other_member(item, input_errors, document)]
+        misfits = _PartialCheck(model, document, input_errors, faults).misfits()
+        for input_error in (*relevant, *misfits):
+            _add_fault(model, document, input_error, faults, also)
         return None
 
 
 @dataclass(frozen=True)
-class _Found:
-    """One of pydantic's errors: its kind, the path of the value as the user wrote it, and the data for its message."""
+class _InputError:
+    """An error that pydantic found: its kind, the path of the value as written, and the data for its message."""
 
     kind: str
     path: KeyPath
@@ -78,75 +79,75 @@ class _Found:
     text: str
 
     @classmethod
-    def of(cls, error: ErrorDetails, document: Document) -> "list[_Found]":
-        """One, or one for each fault of a mapping's cross-checks."""
+    def from_pydantic(cls, error: ErrorDetails, document: Document) -> "list[_InputError]":
+        """The errors that one of pydantic's stands for: several if it collects those of a mapping's cross-checks."""
         kind, context = error["type"], dict(error.get("ctx", {}))
         path = path_in(document.data, error["loc"], keep_last=kind in ("missing", "extra_forbidden"))
         if kind in ("union_tag_invalid", "union_tag_not_found", "no_such_kind"):
             path = (*path, context["discriminator"].strip("'"))
             kind = kind if document.get(path) is not ABSENT else "missing"
         if kind == "at":
-            return [cls.misfit(each, path, document) for each in context["faults"]]
+            return [cls.misfit(misfit, path, document) for misfit in context["faults"]]
         return [cls(kind, path, context, error["msg"])]
 
     @classmethod
-    def misfit(cls, fault: At, path: KeyPath, document: Document) -> "_Found":
-        """A fault from a cross-check of the mapping at a path."""
-        *above, key = fault.key.split(".")
-        outer = [int(step) if step.isdecimal() else step for step in above]
-        return cls("at", twin(document.data, (*path, *outer), key), {"message": fault.message}, fault.message)
+    def misfit(cls, fault: At, path: KeyPath, document: Document) -> "_InputError":
+        """The error that a cross-check of the mapping at a path reports."""
+        *outer_steps, key = fault.key.split(".")
+        outer_path = [int(step) if step.isdecimal() else step for step in outer_steps]
+        return cls("at", twin(document.data, (*path, *outer_path), key), {"message": fault.message}, fault.message)
 
 
-class _Partial:
-    """A document with faults: its valid part, for the cross-checks that need no more.
+class _PartialCheck:
+    """Runs the cross-checks of a document with errors on those of its fields that are valid.
 
-    Where a mapping has an unknown key, its optional keys that are not given count as unread: one may be misspelt."""
+    If a mapping has an unknown key, its missing optional keys count as unread, since one of them may be misspelt."""
 
-    def __init__(self, model: type[Model], document: Document, found: list[_Found], faults: Faults):
+    def __init__(self, model: type[Model], document: Document, input_errors: list[_InputError], faults: Faults):
         self.model, self.document, self.faults = model, document, faults
-        self.whole = {one.path for one in found if one.kind not in ("unique", "extra_forbidden")}
-        self.inside = {one.path[:n] for one in found for n in range(len(one.path) + 1)}
-        self.unknown = {one.path[:-1] for one in found if one.kind == "extra_forbidden"}
-        self.more: list[_Found] = []
+        self.unusable_paths = {error.path for error in input_errors if error.kind not in ("unique", "extra_forbidden")}
+        self.paths_with_errors = {error.path[:n] for error in input_errors for n in range(len(error.path) + 1)}
+        self.paths_with_unknown_keys = {error.path[:-1] for error in input_errors if error.kind == "extra_forbidden"}
+        self.further_errors: list[_InputError] = []
 
-    def misfits(self) -> list[_Found]:
-        """Further faults, from the cross-checks."""
+    def misfits(self) -> list[_InputError]:
+        """The errors that the cross-checks find."""
         with suppress(NotRead):
             self._read(())
-        return self.more
+        return self.further_errors
 
     def _read(self, path: KeyPath) -> Model:
-        """The mapping at a path, without the fields that have faults; raises NotRead if it is not a mapping."""
+        """The mapping at a path, without the fields that have errors; raises NotRead if it is not a mapping."""
         model, data = model_at(self.model, self.document.data, path), self.document.get(path)
-        if path in self.whole or model is None or not isinstance(data, dict):
+        if path in self.unusable_paths or model is None or not isinstance(data, dict):
             raise NotRead
-        if path not in self.inside:
+        if path not in self.paths_with_errors:
             return model.model_validate(data)
-        read, unread = {}, []
+        valid_values, unread_names = {}, []
         for name, info in model.model_fields.items():
             key = twin(data, (), name)[0]
             try:
                 if key in data:
-                    read[name] = self._field((*path, key), name, info, model)
-                elif info.is_required() or path in self.unknown or (*path, key) in self.whole:
-                    unread.append(name)
+                    valid_values[name] = self._field((*path, key), name, info, model)
+                elif info.is_required() or path in self.paths_with_unknown_keys or (*path, key) in self.unusable_paths:
+                    unread_names.append(name)
             except (NotRead, ValidationError):
-                unread.append(name)
-        part = model.model_construct(**read)
-        for name in unread:
-            part.__dict__.pop(name, None)
-        misfits = list(part.misfits())
-        self.more += [_Found.misfit(each, path, self.document) for each in misfits]
-        for each in misfits:
-            part.__dict__.pop(each.key, None)  # the mapping around it must not rely on it
-        return part
+                unread_names.append(name)
+        partial_model = model.model_construct(**valid_values)
+        for name in unread_names:
+            partial_model.__dict__.pop(name, None)
+        misfits = list(partial_model.misfits())
+        self.further_errors += [_InputError.misfit(misfit, path, self.document) for misfit in misfits]
+        for misfit in misfits:
+            partial_model.__dict__.pop(misfit.key, None)  # the mapping around it must not rely on it
+        return partial_model
 
     def _field(self, path: KeyPath, name: str, info: FieldInfo, model: type[Model]) -> Any:
         data = self.document.get(path)
-        if path in self.whole or self.faults.spoiled(self.document.origin(path), path):
+        if path in self.unusable_paths or self.faults.spoiled(self.document.origin(path), path):
             raise NotRead
-        if path not in self.inside:
-            return _reader(model, name).validate_python(radians(data) if path[-1] != name else data)
+        if path not in self.paths_with_errors:
+            return _field_adapter(model, name).validate_python(radians(data) if path[-1] != name else data)
         if not models_in(info.annotation) or not isinstance(data, list):
             return self._read(path)
         members = tuple([self._read((*path, i)) for i in range(len(data))])
@@ -155,69 +156,72 @@ class _Partial:
                 self._validate(mark.func, members, path)
         return members
 
-    def _validate(self, check: Callable[..., Any], members: tuple[Model, ...], path: KeyPath) -> None:
-        """Let a check of the whole list see the valid members."""
+    def _validate(self, validator: Callable[..., Any], members: tuple[Model, ...], path: KeyPath) -> None:
+        """Run the check of a list on its valid members."""
         try:
-            check(members)
+            validator(members)
         except NotRead:
             return
         except PydanticCustomError as error:
-            self.more.append(_Found(error.type, path, dict(error.context or {}), error.message()))
+            self.further_errors.append(_InputError(error.type, path, dict(error.context or {}), error.message()))
 
 
 @cache
-def _reader(model: type[Model], name: str) -> TypeAdapter[Any]:
-    """The check of one field by itself."""
+def _field_adapter(model: type[Model], name: str) -> TypeAdapter[Any]:
+    """The check of a single field."""
     info = model.model_fields[name]
     annotated: Any = Annotated[info.annotation, info]
     return TypeAdapter(annotated)
 
 
-def _irrelevant(one: _Found, found: list[_Found], document: Document) -> bool:
-    """Whether an error concerns a member of a choice that the value, by its form, was not meant to be."""
-    value = document.get(one.path)
-    form = MAPPING if isinstance(value, dict) else LIST if isinstance(value, list) else SCALAR
-    if one.kind not in (MAPPING | LIST | SCALAR) - form:
+def _is_of_other_member(error: _InputError, errors: list[_InputError], document: Document) -> bool:
+    """Whether an error is about a member of a choice whose form (mapping, list or scalar) the value does not have."""
+    value = document.get(error.path)
+    fitting = MAPPING_ERRORS if isinstance(value, dict) else LIST_ERRORS if isinstance(value, list) else SCALAR_ERRORS
+    wrong_form = FORM_ERRORS - fitting
+    if error.kind not in wrong_form:
         return False
-    depth = len(one.path)
-    others = [other for other in found if other.path[:depth] == one.path and other is not one]
-    forms = [other for other in found if other.path == one.path and other.kind in MAPPING | LIST | SCALAR]
-    if one is not forms[0] and all(other.kind in (MAPPING | LIST | SCALAR) - form for other in forms):
-        return True  # it has the form of no member: the first is named
-    return any(len(other.path) > depth or other.kind not in (MAPPING | LIST | SCALAR) - form for other in others)
+    depth = len(error.path)
+    other_errors = [item for item in errors if item.path[:depth] == error.path and item is not error]
+    errors_of_form = [item for item in errors if item.path == error.path and item.kind in FORM_ERRORS]
+    if error is not errors_of_form[0] and all(item.kind in wrong_form for item in errors_of_form):
+        return True  # the value has the form of no member: only the error of the first is reported
+    return any(len(item.path) > depth or item.kind not in wrong_form for item in other_errors)
 
 
-def _report(model: type[Model], document: Document, found: _Found, faults: Faults, also: Iterable[str]) -> None:
-    """Note one of pydantic's errors as a fault."""
-    kind, path, context = found.kind, found.path, found.context
+def _add_fault(
+    model: type[Model], document: Document, input_error: _InputError, faults: Faults, further_keys: Iterable[str]
+) -> None:
+    """Add an error in plain text at the place of its value."""
+    kind, path, context = input_error.kind, input_error.path, input_error.context
     if faults.spoiled(document.origin(path), path):
         return
     if kind == "extra_forbidden":
         holder = model_at(model, document.data, path[:-1])
-        known = allowed_keys(holder) if holder else ()
-        message = unknown_key(path[-1], [*known, *(also if len(path) == 1 else ())])
+        known_keys = allowed_keys(holder) if holder else ()
+        message = unknown_key(path[-1], [*known_keys, *(further_keys if len(path) == 1 else ())])
         faults.add(document.key_origin(path), path, message)
         return
-    message = _message(kind, context, found.text, str(path[-1]) if path else "")
+    message = _message(kind, context, input_error.text, str(path[-1]) if path else "")
     value = document.get(path)
     if kind == "too_short" and isinstance(value, list | dict) and len(value) >= context["min_length"]:
         return  # pydantic counts the good members alone; the bad ones are reported one by one
-    if kind in WITHOUT_VALUE or value is ABSENT:
+    if kind in ERRORS_WITHOUT_VALUE or value is ABSENT:
         faults.add(document.origin(path), path, message)
     else:
         faults.add(document.origin(path), path, message, value)
 
 
 def _message(kind: str, context: dict[str, Any], original: str, key: str) -> str:
-    """The requirement, as text; bounds of a `_deg` key in degrees."""
+    """What is required, as text; the bounds of a `_deg` key in degrees."""
     if kind == "at":
         return str(context["message"])
     if kind == "value_error":
         return str(context["error"])
-    for bound in BOUNDS:
-        if bound in context:
-            limit = math.degrees(context[bound]) if in_radians(key) else context[bound]
-            context[bound] = short(float(f"{limit:.12g}") if isinstance(limit, float) else limit)
+    for bound_name in BOUND_NAMES:
+        if bound_name in context:
+            limit = math.degrees(context[bound_name]) if in_radians(key) else context[bound_name]
+            context[bound_name] = short(float(f"{limit:.12g}") if isinstance(limit, float) else limit)
     if "expected" in context:
         context["expected"] = context["expected"].replace("'", "").replace(" or ", ", ")
     if "expected_tags" in context:
@@ -229,34 +233,34 @@ def _message(kind: str, context: dict[str, Any], original: str, key: str) -> str
     return original
 
 
-def unknown_key(key: object, known: Iterable[str]) -> str:
+def unknown_key(key: object, known_keys: Iterable[str]) -> str:
     """The message for an unknown key."""
-    known = list(known)
-    near = did_you_mean(str(key), known) or ";"
-    return f"unknown key{near} allowed: {', '.join(known)}"
+    known_keys = list(known_keys)
+    suggestion = did_you_mean(str(key), known_keys) or ";"
+    return f"unknown key{suggestion} allowed: {', '.join(known_keys)}"
 
 
 def path_in(data: object, location: tuple[int | str, ...], keep_last: bool) -> KeyPath:
-    """The keys of pydantic's location as in the data: without names of union members, `_deg` as written."""
+    """The path of a value from pydantic's location: without names of union members, `_deg` keys as written."""
     path: KeyPath = ()
     for i, step in enumerate(location):
-        written = step
+        key = step
         if child(data, step) is ABSENT and isinstance(data, dict) and isinstance(step, str):
-            written = twin(data, (), step)[0]
-        below = child(data, written)
-        if below is ABSENT and not (keep_last and i == len(location) - 1):
+            key = twin(data, (), step)[0]
+        value_below = child(data, key)
+        if value_below is ABSENT and not (keep_last and i == len(location) - 1):
             continue
-        path, data = (*path, written), below
+        path, data = (*path, key), value_below
     return path
 
 
 def twin(data: object, path: KeyPath, key: str) -> KeyPath:
-    """The path of a key below a path, under its `_deg` name where the user wrote that."""
+    """The path of a key below a path, with its `_deg` name if the user wrote that."""
     for step in path:
         data = child(data, step)
-    other = in_degrees(key)
-    if other and child(data, key) is ABSENT and child(data, other) is not ABSENT:
-        return (*path, other)
+    degrees_key = in_degrees(key)
+    if degrees_key and child(data, key) is ABSENT and child(data, degrees_key) is not ABSENT:
+        return (*path, degrees_key)
     return (*path, key)
 
 
@@ -275,7 +279,7 @@ def model_at(model: type[Model], data: object, path: KeyPath) -> type[Model] | N
             if current is None or step not in current.model_fields:
                 return None
             candidates = models_in(current.model_fields[step].annotation)
-        current = _chosen(candidates, data)
+        current = _matching_model(candidates, data)
     return current
 
 
@@ -286,20 +290,25 @@ def models_in(annotation: object) -> list[type[Model]]:
     return [model for argument in get_args(annotation) for model in models_in(argument)]
 
 
-def _chosen(candidates: list[type[Model]], data: object) -> type[Model] | None:
-    fitting = [model for model in candidates if _fits(model, data)] if len(candidates) > 1 else candidates
-    return fitting[0] if fitting else None
+def _matching_model(candidates: list[type[Model]], data: object) -> type[Model] | None:
+    """The schema among several whose tags the data has; None if there is none."""
+    matching = [model for model in candidates if _matches_tags(model, data)] if len(candidates) > 1 else candidates
+    return matching[0] if matching else None
 
 
-def _fits(model: type[Model], data: object) -> bool:
-    """Whether the fields with one allowed value, which distinguish a choice's members, have it in the data."""
+def _matches_tags(model: type[Model], data: object) -> bool:
+    """Whether the data has the tags of a schema: its fields with a single allowed value."""
     fields = [(name, info) for name, info in model.model_fields.items() if get_origin(info.annotation) is Literal]
-    tags = [(name, get_args(i.annotation)[0], i.default) for name, i in fields if len(get_args(i.annotation)) == 1]
+    tags = [
+        (name, get_args(info.annotation)[0], info.default)
+        for name, info in fields
+        if len(get_args(info.annotation)) == 1
+    ]
     return isinstance(data, dict) and all(data.get(name, default) == tag for name, tag, default in tags)
 
 
 def refuse_both_units(document: Document, faults: Faults, path: KeyPath = ()) -> None:
-    """Note every quantity that is given in radians and in degrees at once."""
+    """Add an error for each quantity that is given both in radians and in degrees."""
     data = document.get(path)
     if isinstance(data, list):
         data = dict(enumerate(data))
@@ -308,8 +317,8 @@ def refuse_both_units(document: Document, faults: Faults, path: KeyPath = ()) ->
     for key, value in data.items():
         if isinstance(value, dict | list):
             refuse_both_units(document, faults, (*path, key))
-        elif (other := in_radians(str(key))) in data and other:
-            faults.add(document.key_origin((*path, key)), (*path, key), f"given as {other} too")
+        elif (twin_key := in_radians(str(key))) in data and twin_key:
+            faults.add(document.key_origin((*path, key)), (*path, key), f"given as {twin_key} too")
 
 
 # ---- labels ----------------------------------------------------------------------------------------------------------
@@ -320,8 +329,8 @@ UNITS = {
 }
 
 
-class Words(str):
-    """The name of a key, and the top-level package of its schema, whose catalogues translate it."""
+class KeyTitle(str):
+    """The title of a key. package: the top-level package of its schema, whose catalogues translate the title."""
 
     package = ""
 
@@ -336,70 +345,79 @@ class Label(NamedTuple):
 
 
 def label(keys: Study | type[Study] | None, key: str) -> Label:
-    """The label of a key, dotted or bare, as `sweep` and `--set` name it; keys are a study's, checked or not.
+    """The label of a key, dotted or bare, as `sweep` and `--set` name it; keys: those of a study, or their schema.
 
     >>> from radarsim.studies import registry
     >>> label(registry.keys("range_doppler"), "radar.sigma_velocity_mps")
     Label(text='σ of the measured radial velocity', symbol='σ_V', unit='m/s')
 
-    A key without a schema is named by its own words:
+    A key without a schema is labelled by its name:
 
     >>> label(None, "echo.rise_time_s")
     Label(text='rise time', symbol='', unit='s')
     """
     steps = [step for step in key.split(".") if not step.isdecimal()]
-    stem, _, end = steps[-1].rpartition("_")
-    unit = UNITS.get(end, "") if stem and not stem.endswith("_per") else ""  # hertz per second are not seconds
-    at = _field(keys, steps) if keys is not None else None
-    if keys is not None and at is None and len(steps) > 2:
-        at = _field(keys, [steps[0], *steps[2:]])  # filters.NAME.KEY
-    holder, found = at or _field(Common, steps) or (None, None)
-    if found is None:
+    stem, _, unit_suffix = steps[-1].rpartition("_")
+    unit = UNITS.get(unit_suffix, "") if stem and not stem.endswith("_per") else ""  # hertz per second are not seconds
+    named_field = _find_field(keys, steps) if keys is not None else None
+    if keys is not None and named_field is None and len(steps) > 2:
+        named_field = _find_field(keys, [steps[0], *steps[2:]])  # filters.NAME.KEY
+    holder, field = named_field or _find_field(Common, steps) or (None, None)
+    if field is None:
         name = stem if unit else steps[-1]
         return Label(name.replace("_", " "), "", unit)
-    extra = found.json_schema_extra if isinstance(found.json_schema_extra, dict) else {}
-    text = Words(found.title or (stem if unit else steps[-1]).replace("_", " "))
+    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+    text = KeyTitle(field.title or (stem if unit else steps[-1]).replace("_", " "))
     text.package = holder.__module__.partition(".")[0] if holder else ""
-    own = unit if in_radians(steps[-1]) else str(extra.get("unit", unit))  # a twin in degrees has no field of its own
-    return Label(text, str(extra.get("symbol", "")), own)
+    # A key in degrees has no field: it takes the text of its twin in radians, but not the unit.
+    shown_unit = unit if in_radians(steps[-1]) else str(extra.get("unit", unit))
+    return Label(text, str(extra.get("symbol", "")), shown_unit)
 
 
-def _field(keys: Model | type[Model], steps: list[str]) -> tuple[type[Model], FieldInfo] | None:
-    """The field at dotted steps, from the top or, for a bare key, from the members of the study's list.
-
-    With it the schema that names it: a base class, where the field is inherited."""
+def _find_field(keys: Model | type[Model], steps: list[str]) -> tuple[type[Model], FieldInfo] | None:
+    """The field at dotted steps, counted from the top or, for a bare key, from the members of the study's list; and the
+    schema that defines it, a base class where the field is inherited."""
     model = keys if isinstance(keys, type) else type(keys)
-    if steps and _named(steps[0]).isdisjoint(model.model_fields) and issubclass(model, Study):
+    if steps and _key_and_twin(steps[0]).isdisjoint(model.model_fields) and issubclass(model, Study):
         steps = [model.bare_keys, *steps]
     holders: list[Any] = [keys]
-    found: tuple[type[Model], FieldInfo] | None = None
+    named_field: tuple[type[Model], FieldInfo] | None = None
     for step in steps:
-        at = next(((one, name) for one in holders for name in _named(step) if name in _fields(one)), None)
-        if at is None:
+        match = next(
+            ((owner, name) for owner in holders for name in _key_and_twin(step) if name in _fields_of(owner)), None
+        )
+        if match is None:
             return None
-        holder, name = at
-        info = _fields(holder)[name]
-        line = [one for one in (holder if isinstance(holder, type) else type(holder)).__mro__ if issubclass(one, Model)]
-        alike = [one for one in line if name in one.model_fields and one.model_fields[name].title == info.title]
-        found = alike[-1], info
-        given = [] if isinstance(holder, type) else list(_models(getattr(holder, name)))
-        holders = [*given, *models_in(info.annotation)]
-    return found
+        holder, name = match
+        info = _fields_of(holder)[name]
+        schemas = [
+            owner
+            for owner in (holder if isinstance(holder, type) else type(holder)).__mro__
+            if issubclass(owner, Model)
+        ]
+        same_key = [
+            owner for owner in schemas if name in owner.model_fields and owner.model_fields[name].title == info.title
+        ]
+        named_field = same_key[-1], info
+        given_models = [] if isinstance(holder, type) else list(_models_in_value(getattr(holder, name)))
+        holders = [*given_models, *models_in(info.annotation)]
+    return named_field
 
 
-def _named(step: str) -> set[str]:
-    """A key, and its twin in radians where it is one in degrees."""
+def _key_and_twin(step: str) -> set[str]:
+    """A key, and its twin in radians if it is in degrees."""
     return {step, in_radians(step) or step}
 
 
-def _fields(model: Model | type[Model]) -> dict[str, FieldInfo]:
+def _fields_of(model: Model | type[Model]) -> dict[str, FieldInfo]:
+    """The fields of a schema, or of the schema of an object."""
     return (model if isinstance(model, type) else type(model)).model_fields
 
 
-def _models(value: object) -> Iterator[Model]:
-    """The mappings that a value is or holds: of a choice, the given kind."""
+def _models_in_value(value: object) -> Iterator[Model]:
+    """The checked mappings that a value is or contains."""
     if isinstance(value, Model):
         yield value
     elif isinstance(value, tuple | list):
-        for one in value:
-            yield from _models(one)
+        for item in value:
+            yield from _models_in_value(item)

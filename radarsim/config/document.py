@@ -1,8 +1,8 @@
-"""A config as plain data in which every value keeps its place of origin.
+"""A config as plain data in which each value keeps its origin, the errors of a config, and the files of configs.
 
-Faults of a config: place, fault, allowed values; collected, so that the user sees all of them at once.
+Errors name place, mistake and allowed values. They are collected, so that the user sees all of them at once.
 
-Where configs and scenarios are found by their stem, and suggestions when they are not."""
+Configs and scenarios are found by their stems; for an unknown one the nearest name is suggested."""
 
 import difflib
 import re
@@ -17,16 +17,16 @@ from radarsim.errors import ConfigError
 # ---- faults ----------------------------------------------------------------------------------------------------------
 KeyPath = tuple[str | int, ...]
 ABSENT = object()
-LONGEST = 60  # characters of a value shown in a message
-ZEROS = 7  # at the end of a whole number, from which on they are counted
-LONGEST_SOURCE = 500  # characters of the place
+MAX_SHOWN_CHARACTERS = 60  # of a value in a message
+MIN_COUNTED_ZEROS = 7  # at the end of a whole number: from so many on it is written with an exponent
+MAX_SOURCE_CHARACTERS = 500  # of an origin in a message
 
 
 class Origin(NamedTuple):
-    """Where a value was written: a file with line and column from 1, an argument, or `config`: a dictionary.
+    """Where a value was written: in a file, with line and column from 1, in an argument, or in a dictionary (`config`).
 
-    prefix counts the leading keys of a path that are not in that file: a scenario's own keys begin below `target`. key:
-    the key that an argument such as `--set KEY` names itself, possibly a bare filter key."""
+    prefix: how many leading keys of a path are not in that file: the keys of a scenario begin below `target`. key: the
+    key that an argument such as `--set KEY` names itself, possibly a bare filter key."""
 
     source: str
     line: int = 0
@@ -39,32 +39,32 @@ class Origin(NamedTuple):
 
 
 class Faults:
-    """A growing list of faults; each is one line of the ConfigError."""
+    """The errors found so far in a config, each a line of the ConfigError to be raised."""
 
     def __init__(self) -> None:
         self._lines: dict[str, tuple[int, int, int, int]] = {}
         self._sources: list[str] = []
         self._spoiled: set[tuple[Origin, KeyPath]] = set()
-        self._of_arguments = False
+        self._has_argument = False
 
     def __len__(self) -> int:
         return len(self._lines)
 
     def add(self, origin: Origin, path: KeyPath, message: str, got: object = ABSENT) -> None:
-        """Note a fault at a key path; `got` is the value as the user wrote it."""
+        """Add an error at a key path; got: the value as the user wrote it."""
         key = dotted(path[origin.prefix :])
-        parts = [one_line(str(origin))[-LONGEST_SOURCE:]]
-        if key and not _names(origin, key):
+        parts = [one_line(str(origin))[-MAX_SOURCE_CHARACTERS:]]
+        if key and not _names_key(origin, key):
             parts.append(one_line(key))
         parts.append(message if got is ABSENT else f"{message}, got {shown(got)}")
-        self._of_arguments |= bool(origin.key)
+        self._has_argument |= bool(origin.key)
         if origin.source not in self._sources:
             self._sources.append(origin.source)
-        rank = self._sources.index(origin.source)
-        self._lines.setdefault(": ".join(parts), (rank, origin.line, origin.column, len(self._lines)))
+        source_index = self._sources.index(origin.source)
+        self._lines.setdefault(": ".join(parts), (source_index, origin.line, origin.column, len(self._lines)))
 
     def spoil(self, origin: Origin, path: KeyPath, message: str, got: object = ABSENT) -> None:
-        """Note a fault that makes the value at this place unusable: further faults of it are not reported."""
+        """Add an error that makes the value at this place unusable: its other errors are not reported."""
         self.add(origin, path, message, got)
         self._spoiled.add((origin._replace(prefix=0), path[origin.prefix :]))
 
@@ -72,19 +72,19 @@ class Faults:
         """Whether the value at this place is reported as unusable."""
         return (origin._replace(prefix=0), path[origin.prefix :]) in self._spoiled
 
-    def beside(self, source: str) -> None:
-        """Name the file whose keys are laid over others, where faults are attributed to the others alone."""
-        if source not in self._sources and not self._of_arguments:
+    def name_overlaying_file(self, source: str) -> None:
+        """Name the file whose keys are laid over others in each error, if all are attributed to the others."""
+        if source not in self._sources and not self._has_argument:
             self._lines = {f"{line} (with the keys of {source} over it)": rank for line, rank in self._lines.items()}
 
     def raise_if_any(self) -> None:
-        """Raise ConfigError with every fault, file by file, from the top of each downwards."""
+        """Raise ConfigError with all errors, file by file, each from top to bottom."""
         if self._lines:
             raise ConfigError(*sorted(self._lines, key=self._lines.__getitem__))
 
 
-def _names(origin: Origin, key: str) -> bool:
-    """Whether the origin, an argument, names the key already; a bare filter key is the end of the full."""
+def _names_key(origin: Origin, key: str) -> bool:
+    """Whether the origin is an argument that names the key, or the end of its path if it is a bare filter key."""
     return bool(origin.key) and (key == origin.key or key.endswith(f".{origin.key}"))
 
 
@@ -94,13 +94,13 @@ def dotted(path: KeyPath) -> str:
 
 
 def shown(value: object) -> str:
-    """A value quoted in a message: one line of at most 60 characters, control characters escaped."""
-    text = short(value) if isinstance(value, float | int) and not isinstance(value, bool) else _literal(value)
-    return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
+    """A value as quoted in a message: one line of at most 60 characters, with control characters escaped."""
+    text = short(value) if isinstance(value, float | int) and not isinstance(value, bool) else _text_of(value)
+    return text if len(text) <= MAX_SHOWN_CHARACTERS else text[: MAX_SHOWN_CHARACTERS - 1] + "…"
 
 
-def _literal(value: object, room: int = LONGEST) -> str:
-    """Like repr, with YAML's true and false, and without formatting more than shown."""
+def _text_of(value: object, max_characters: int = MAX_SHOWN_CHARACTERS) -> str:
+    """The text of a value as in YAML, formatted no further than it is shown."""
     match value:
         case None:
             return "nothing"
@@ -109,22 +109,24 @@ def _literal(value: object, room: int = LONGEST) -> str:
         case float() | int():
             return short(value)
         case str():
-            return ascii_controls(repr(value[: room + 1]))
+            return ascii_controls(repr(value[: max_characters + 1]))
         case dict():
-            inside = (f"{one_line(str(k)[:room])}: {_literal(v, room // 2)}" for k, v in list(value.items())[:room])
-            return "{" + ", ".join(_until(inside, room)) + "}"
+            pairs = list(value.items())[:max_characters]
+            items = (f"{one_line(str(k)[:max_characters])}: {_text_of(v, max_characters // 2)}" for k, v in pairs)
+            return "{" + ", ".join(_first_that_fit(items, max_characters)) + "}"
         case list() | tuple():
-            return "[" + ", ".join(_until((_literal(v, room // 2) for v in value[:room]), room)) + "]"
+            items = (_text_of(v, max_characters // 2) for v in value[:max_characters])
+            return "[" + ", ".join(_first_that_fit(items, max_characters)) + "]"
     return one_line(type(value).__name__)
 
 
-def _until(parts: Iterable[str], room: int) -> Iterator[str]:
-    """The first parts, up to a little more than fits."""
+def _first_that_fit(items: Iterable[str], max_characters: int) -> Iterator[str]:
+    """The first items, up to a little more than fits."""
     length = 0
-    for part in parts:
-        yield part
-        length += len(part) + 2
-        if length > room:
+    for item in items:
+        yield item
+        length += len(item) + 2
+        if length > max_characters:
             return
 
 
@@ -135,7 +137,7 @@ def short(number: float | int) -> str:
     text = repr(number).replace("e-0", "e-").replace("e+", "e").removesuffix(".0")
     digits = text.rstrip("0")
     zeros = len(text) - len(digits)
-    return f"{digits}e{zeros}" if zeros >= ZEROS and digits.lstrip("-").isdigit() else text
+    return f"{digits}e{zeros}" if zeros >= MIN_COUNTED_ZEROS and digits.lstrip("-").isdigit() else text
 
 
 def one_line(text: str) -> str:
@@ -153,51 +155,52 @@ SHIPPED = Path(__file__).parent.parent / "shipped"
 STEM = re.compile(r"\w[\w+=-]*(?:\.[\w+=-]+)*")
 
 
-FILES_OF_RESULTS = ("index.html", "readme.md")  # stand where the folder of a config's results would
+RESULT_FILES = ("index.html", "readme.md")  # stand beside the folders of results, which have the names of configs
 RESERVED = "a config must have another name: there is a file of that name among the results"
 
 
 def no_folders() -> tuple[Path, ...]:
-    """Folders with configs/ and scenarios/ besides the shipped one: none, but see radarsim.app.configs."""
+    """The further folders with configs/ and scenarios/: none, unless radarsim.app.configs sets `further_folders`."""
     return ()
 
 
 further_folders: Callable[[], tuple[Path, ...]] = no_folders
 
 
-def config_file(name: str, beside: Path | None = None) -> Path | None:
-    """The file of a config: beside the including one (or here), in ./configs, among the shipped; None if nowhere."""
-    folders = [Path(), Path("configs")] if beside is None else [beside.parent, Path("configs")]
-    return _first(name, [*folders, SHIPPED / "configs"]) or _first(name, _further("configs"))
+def config_file(name: str, including_file: Path | None = None) -> Path | None:
+    """The file of a config: beside the including one (or here), in ./configs, or shipped; None if there is none."""
+    folders = [Path(), Path("configs")] if including_file is None else [including_file.parent, Path("configs")]
+    return _first_file(name, [*folders, SHIPPED / "configs"]) or _first_file(name, _further_subfolders("configs"))
 
 
 def scenario_file(name: str, config: Path | None) -> Path | None:
-    """The file of a scenario: beside the config, in scenarios/ next to its folder or here, among the shipped. A config
-    of that name beside the config is not a scenario."""
+    """The file of a scenario: beside the config, in scenarios/ next to its folder or here, or shipped. A config of that
+    name beside the config is not a scenario."""
     folders = [] if config is None else [config.parent, next_to(config.parent) / "scenarios"]
-    found = _first(name, [*folders, Path("scenarios"), SHIPPED / "scenarios"], refused=_is_config)
-    return found or _first(name, _further("scenarios"), refused=_is_config)
+    file = _first_file(name, [*folders, Path("scenarios"), SHIPPED / "scenarios"], is_refused=_is_config)
+    return file or _first_file(name, _further_subfolders("scenarios"), is_refused=_is_config)
 
 
-def _further(kind: str) -> list[Path]:
+def _further_subfolders(kind: str) -> list[Path]:
+    """The folders configs/ or scenarios/ of user packages."""
     return [folder / kind for folder in further_folders()]
 
 
 def next_to(folder: Path) -> Path:
-    """The folder around a folder, in the user's own notation if it has one."""
+    """The folder around a folder, written as the user did if possible."""
     return folder.parent if folder.name not in ("", "..") else folder / ".."
 
 
-def _first(name: str, folders: list[Path], refused: Callable[[Path], bool] = lambda file: False) -> Path | None:
+def _first_file(name: str, folders: list[Path], is_refused: Callable[[Path], bool] = lambda file: False) -> Path | None:
     for folder in folders:
         file = folder / f"{name}.yaml"
-        if file.is_file() and not refused(file):
+        if file.is_file() and not is_refused(file):
             return file
     return None
 
 
 def _is_config(file: Path) -> bool:
-    """Whether a file has a key that only configs have; an unreadable file is left to its reader."""
+    """Whether a file has a key that only configs have. An unreadable file has none: whoever reads it reports it."""
     try:
         with file.open(encoding="utf-8", errors="replace") as text:
             return any(line.startswith(("study:", "include:")) for line in text)
@@ -206,41 +209,41 @@ def _is_config(file: Path) -> bool:
 
 
 def stems(kind: str) -> tuple[str, ...]:
-    """Stems of available configs or scenarios: those of the working directory and the shipped ones."""
-    folders = (Path(kind), SHIPPED / kind, *_further(kind))
+    """The stems of the available configs or scenarios: in the working directory, shipped, and in user packages."""
+    folders = (Path(kind), SHIPPED / kind, *_further_subfolders(kind))
     return tuple(sorted({file.stem for folder in folders for file in folder.glob("*.yaml")}))
 
 
 def is_stem(name: str) -> bool:
-    """Whether a name is a plain file stem: no separators, no drive, no `..`, no leading dot."""
+    """Whether a name is a plain file stem, without separators, drive, `..` or leading dot."""
     return len(name) <= 100 and STEM.fullmatch(composed(name)) is not None
 
 
 def composed(name: str) -> str:
-    """A name with its letters and accents composed: the same for every way of writing it (Unicode's NFC)."""
+    """A name with letters and accents composed (Unicode's NFC), so that equal looks are equal names."""
     return unicodedata.normalize("NFC", name)
 
 
 def is_reserved(stem: str) -> bool:
-    """Whether a config's results would have the name of a file written beside them, in letters of any case."""
-    return stem.casefold() in FILES_OF_RESULTS
+    """Whether the folder of a config's results would have the name of a file beside it, in any case of letters."""
+    return stem.casefold() in RESULT_FILES
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str:
+def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     """`; did you mean X?` for the nearest known name, or nothing."""
-    name, known = str(name)[:100], list(known)
-    begun = [full for full in known if len(name) > 2 and full.lower().startswith(name.lower())]
-    near = begun or difflib.get_close_matches(name, known, n=1, cutoff=0.6)
-    return f"; did you mean {near[0]}?" if near else ""
+    name, known_names = str(name)[:100], list(known_names)
+    beginnings = [full for full in known_names if len(name) > 2 and full.lower().startswith(name.lower())]
+    matches = beginnings or difflib.get_close_matches(name, known_names, n=1, cutoff=0.6)
+    return f"; did you mean {matches[0]}?" if matches else ""
 
 
 # ---- document --------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Document:
-    """Plain data, and the origins of values and keys by key path.
+    """Plain data, with the origins of its values and keys by key path.
 
-    data of a config or a scenario is a mapping, of an override any value. source is the file as the user named it; file
-    is where it lies (None for a dictionary)."""
+    data: a mapping for a config or a scenario, any value for an override. source: the file as the user named it; file:
+    its path (None for a dictionary)."""
 
     data: Any
     source: str
@@ -249,13 +252,13 @@ class Document:
     keys: Mapping[KeyPath, Origin] = field(default_factory=dict)
 
     def origin(self, path: KeyPath) -> Origin:
-        """Where the value at a path was written; if there is no value, the nearest one around it."""
+        """Where the value at a path was written; if there is none, that of the nearest value around it."""
         while path and path not in self.values:
             path = path[:-1]
         return self.values.get(path, Origin(self.source))
 
     def key_origin(self, path: KeyPath) -> Origin:
-        """Where the key of a path was written."""
+        """Where the last key of a path was written."""
         return self.keys.get(path) or self.origin(path)
 
     def get(self, path: KeyPath) -> object:
@@ -265,49 +268,54 @@ class Document:
             value = child(value, step)
         return value
 
-    def only(self, keys: Collection[str]) -> "Document":
-        """The document with some of its top-level keys."""
+    def with_keys(self, keys: Collection[str]) -> "Document":
+        """The document with only these top-level keys."""
         return self.with_data((), {key: value for key, value in self.data.items() if key in keys})
 
-    def without(self, keys: Collection[str]) -> "Document":
-        """The document without some of its top-level keys."""
+    def without_keys(self, keys: Collection[str]) -> "Document":
+        """The document without these top-level keys."""
         return self.with_data((), {key: value for key, value in self.data.items() if key not in keys})
 
     def with_data(self, path: KeyPath, value: object) -> "Document":
-        """The document with other data at a path, where every value keeps its origin."""
-        return replace(self, data=_with(self.data, path, value))
+        """The document with other data at a path; all values keep their origins."""
+        return replace(self, data=_with_value(self.data, path, value))
 
     def graft(self, path: KeyPath, value: object, origin: Origin) -> "Document":
-        """A document with another value at a path; containers on the way must exist, or become mappings."""
+        """The document with another value at a path; missing containers on the way become mappings."""
         return self._replaced(path, value, {path: origin}, {})
 
-    def graft_document(self, path: KeyPath, other: "Document") -> "Document":
-        """A document with another file's content at a path; faults below it are reported under that file's own keys."""
+    def graft_document(self, path: KeyPath, document: "Document") -> "Document":
+        """The document with another file's content at a path; errors below it are reported with that file's keys."""
 
-        def moved(origins: Mapping[KeyPath, Origin]) -> dict[KeyPath, Origin]:
-            return {(*path, *below): origin._replace(prefix=len(path)) for below, origin in origins.items()}
+        def placed_below(origins: Mapping[KeyPath, Origin]) -> dict[KeyPath, Origin]:
+            return {(*path, *inner_path): origin._replace(prefix=len(path)) for inner_path, origin in origins.items()}
 
-        whole = {path: Origin(other.source, prefix=len(path))}
-        return self._replaced(path, other.data, whole | moved(other.values), moved(other.keys))
+        root_origin = {path: Origin(document.source, prefix=len(path))}
+        return self._replaced(
+            path, document.data, root_origin | placed_below(document.values), placed_below(document.keys)
+        )
 
-    def laid(self, path: KeyPath, over: "Document") -> "Document":
-        """The document with another one's value and origins at a path, replacing its own."""
+    def with_value_of(self, path: KeyPath, overlay: "Document") -> "Document":
+        """The document with the value and the origins that another one has at a path."""
 
-        def of(origins: Mapping[KeyPath, Origin]) -> dict[KeyPath, Origin]:
-            return {below: origin for below, origin in origins.items() if below[: len(path)] == path}
+        def origins_below(origins: Mapping[KeyPath, Origin]) -> dict[KeyPath, Origin]:
+            return {inner_path: origin for inner_path, origin in origins.items() if inner_path[: len(path)] == path}
 
-        values, keys = {path: over.origin(path)} | of(over.values), {path: over.key_origin(path)} | of(over.keys)
-        return self._replaced(path, over.get(path), values, keys)
+        values = {path: overlay.origin(path)} | origins_below(overlay.values)
+        keys = {path: overlay.key_origin(path)} | origins_below(overlay.keys)
+        return self._replaced(path, overlay.get(path), values, keys)
 
     def _replaced(
         self, path: KeyPath, value: object, values: dict[KeyPath, Origin], keys: dict[KeyPath, Origin]
     ) -> "Document":
+        """The document with a value at a path, and the origins of the values and keys there."""
         depth = len(path)
-        made = {path[:n]: values[path] for n in range(1, depth) if not isinstance(self.get(path[:n]), dict | list)}
-        kept = {p: o for p, o in self.values.items() if p[:depth] != path}
-        kept_keys = {p: o for p, o in self.keys.items() if p[:depth] != path}
-        data = _with(self.data, path, value)
-        return replace(self, data=data, values=kept | made | values, keys=kept_keys | keys)
+        parents = (path[:n] for n in range(1, depth))
+        created = {parent: values[path] for parent in parents if not isinstance(self.get(parent), dict | list)}
+        remaining_values = {p: origin for p, origin in self.values.items() if p[:depth] != path}
+        remaining_keys = {p: origin for p, origin in self.keys.items() if p[:depth] != path}
+        data = _with_value(self.data, path, value)
+        return replace(self, data=data, values=remaining_values | created | values, keys=remaining_keys | keys)
 
 
 def child(value: object, step: str | int) -> object:
@@ -319,13 +327,13 @@ def child(value: object, step: str | int) -> object:
     return ABSENT
 
 
-def _with(container: object, path: KeyPath, value: object) -> object:
-    """A copy of a container with another value at a path; only the containers on the way are copied."""
+def _with_value(container: object, path: KeyPath, value: object) -> object:
+    """A copy of a container with another value at a path; only containers on the way are copied."""
     if not path:
         return value
-    first, *rest = path
-    below = child(container, first)
-    inner = _with({} if below is ABSENT else below, tuple(rest), value)
-    if isinstance(container, list) and isinstance(first, int):
-        return [*container[:first], inner, *container[first + 1 :]]
-    return {**(container if isinstance(container, dict) else {}), first: inner}
+    step, *inner_path = path
+    old_value = child(container, step)
+    new_value = _with_value({} if old_value is ABSENT else old_value, tuple(inner_path), value)
+    if isinstance(container, list) and isinstance(step, int):
+        return [*container[:step], new_value, *container[step + 1 :]]
+    return {**(container if isinstance(container, dict) else {}), step: new_value}

@@ -1,6 +1,4 @@
-"""A checked config: an experiment of cases.
-
-The part of a checked config that changes its numbers, as plain JSON-able data."""
+"""A checked config, an experiment of cases, and the parts of it that decide its numbers, as plain data."""
 
 import hashlib
 import json
@@ -20,49 +18,58 @@ from radarsim.config.fields import Added, DataFile, Design, Display, NameIn
 
 # ---- identity --------------------------------------------------------------------------------------------------------
 def digest(value: object) -> str:
-    """SHA-256 in hexadecimal of a JSON-able value; numbers by their shortest exact form, keys sorted."""
+    """The SHA-256, in hexadecimal, of plain data: numbers in their shortest exact form, keys sorted."""
     text = json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def canonical(spec: BaseModel) -> dict[str, Any]:
-    """All that changes a number, defaults filled in, in SI units; display names are left out."""
-    return _plain(spec, (Display,))
+    """All keys that change a number, with defaults, in SI units; without display names."""
+    return _plain_data(spec, (Display,))
 
 
 def world(spec: BaseModel) -> dict[str, Any]:
-    """The observed world, without the filters and the number of scans: cases of one world share their noise."""
-    return _plain(spec, (Display, Design))
+    """The keys of the observed world, without filters and number of scans: cases of one world share their noise."""
+    return _plain_data(spec, (Display, Design))
 
 
 def complete(spec: BaseModel) -> dict[str, Any]:
-    """Every key that has a value, including names: reads back as the same configuration."""
-    return _plain(spec, ())
+    """All keys with a value, including names: they can be read back as the same config."""
+    return _plain_data(spec, ())
 
 
-def _plain(value: object, leave_out: tuple[type, ...]) -> Any:
+def _plain_data(value: object, excluded_marks: tuple[type, ...]) -> Any:
+    """A value as plain data, without the fields that have one of these marks. Without marks, all keys with a value."""
     if isinstance(value, BaseModel):
-        return {
-            name: _plain(_without_names(value, name, info) if leave_out else getattr(value, name), leave_out)
-            for name, info in type(value).model_fields.items()
-            if not any(isinstance(mark, leave_out) for mark in info.metadata)
-            and not (_at_its_default(value, name, info) if leave_out else getattr(value, name) is None)
-        }
+        return _plain_mapping(value, excluded_marks)
     if isinstance(value, tuple | list):
-        return [_plain(item, leave_out) for item in value]
+        return [_plain_data(item, excluded_marks) for item in value]
     if isinstance(value, dict):
-        return {str(key): _plain(item, leave_out) for key, item in value.items()}
+        return {str(key): _plain_data(item, excluded_marks) for key, item in value.items()}
     return value
 
 
-def _at_its_default(model: BaseModel, name: str, info: FieldInfo) -> bool:
-    """Whether a field that earlier versions lacked has the value that keeps their behaviour."""
+def _plain_mapping(model: BaseModel, excluded_marks: tuple[type, ...]) -> dict[str, Any]:
+    """The fields of a model as plain data, see `_plain_data`."""
+    data = {}
+    for name, info in type(model).model_fields.items():
+        if any(isinstance(mark, excluded_marks) for mark in info.metadata):
+            continue
+        if excluded_marks and not _is_added_default(model, name, info):
+            data[name] = _plain_data(_value_without_names(model, name, info), excluded_marks)
+        elif not excluded_marks and getattr(model, name) is not None:
+            data[name] = _plain_data(getattr(model, name), excluded_marks)
+    return data
+
+
+def _is_added_default(model: BaseModel, name: str, info: FieldInfo) -> bool:
+    """Whether a field that earlier versions lacked has its default, which keeps their behaviour."""
     return any(isinstance(mark, Added) for mark in info.metadata) and getattr(model, name) == info.default
 
 
-def _without_names(model: BaseModel, name: str, info: FieldInfo) -> object:
-    """The value of a field, without the names in it. A name of a list's member is replaced by its place, 0 where none
-    is named; a file of data by its content's hash."""
+def _value_without_names(model: BaseModel, name: str, info: FieldInfo) -> object:
+    """The value of a field, with the name of a list's member replaced by its index (0 if none is named), and a data
+    file by the hash of its content."""
     value = getattr(model, name)
     for mark in info.metadata:
         if isinstance(mark, NameIn):
@@ -75,16 +82,16 @@ def _without_names(model: BaseModel, name: str, info: FieldInfo) -> object:
 # ---- experiment ------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Case:
-    """One configuration to run: a study's checked keys, the number of realisations, and the seed.
+    """One configuration to run: the checked keys of a study, the number of realisations, and the seed.
 
-    name is the stem of its config with ` key=value` for each swept key. spec holds the study's own keys, an object of
-    its subclass of `radarsim.config.fields.Study`. noise_of, where given, are the keys of another case, whose noise
-    this one shares although its world is another: common random numbers.
-    against: names of further filters that gains are against, beside the spec's `baseline`; of each there is a
-    companion, the same case but for that key, computed on the same noise.
-    asked_from_k: exact σ and gains are asked for from this scan on, counted from 1; 0: every exact value. roughly: what
-    is long to compute may be off by a thousandth, as where a search only looks about.
-    outside: filters of somebody else beside the study's own, see `radarsim.studies.outside`."""
+    name: the stem of its config, with ` key=value` for each swept key. spec: the keys of the study, an object of its
+    subclass of `radarsim.config.fields.Study`. noise_of: the keys of another case whose noise this one shares, although
+    its world differs (common random numbers); None for noise of its own.
+    against: further baselines, beside that of the spec. For each there is a companion: the same case with that
+    baseline, computed on the same noise.
+    asked_from_k: the scan, counted from 1, from which on exact σ and gains are needed; 0: all exact values. roughly:
+    what takes long to compute may be wrong by a thousandth, as for the first steps of a search.
+    outside: user filters beside those of the study, see `radarsim.studies.outside`."""
 
     name: str
     stem: str
@@ -110,20 +117,21 @@ class Case:
 
     @property
     def companions(self) -> "tuple[Case, ...]":
-        """The case with each further baseline in place of its own."""
+        """The case with each further baseline in place of that of the spec."""
         return tuple(
-            replace(self, spec=self.spec.model_copy(update={"baseline": name}), against=(), outside=())
-            for name in self.against
+            replace(self, spec=self.spec.model_copy(update={"baseline": baseline}), against=(), outside=())
+            for baseline in self.against
         )
 
     @property
     def keys(self) -> dict[str, Any]:
-        """Its keys as plain data, including names: all baselines where there are several."""
+        """The keys as plain data, including names, and all baselines if there are several."""
         keys, members = complete(self.spec), self.spec.bare_keys
-        if further := [*self.against, *(one.name for one in self.outside if one.baseline)]:
-            keys["baseline"] = [*filter(None, [keys.get("baseline")]), *further]
-        if codes := [one.written for one in self.outside if one.written]:
-            keys[members] = [*keys[members], *codes]
+        user_baselines = (user_filter.name for user_filter in self.outside if user_filter.baseline)
+        if further_baselines := [*self.against, *user_baselines]:
+            keys["baseline"] = [*filter(None, [keys.get("baseline")]), *further_baselines]
+        if code_filters := [user_filter.written for user_filter in self.outside if user_filter.written]:
+            keys[members] = [*keys[members], *code_filters]
         return keys
 
     def resolved(self) -> dict[str, Any]:
@@ -134,9 +142,10 @@ class Case:
 
 @dataclass(frozen=True)
 class Experiment:
-    """The experiment of a config; figures holds, for each figure to draw, names or patterns of its cases.
+    """The experiment of a config.
 
-    changes_included: keys of the study stand beside `include`, so that a case differs from the config of its stem."""
+    figures: for each figure to draw, the names or patterns of its cases. changes_included: whether keys of the study
+    stand beside `include`, so that a case differs from the config of its stem."""
 
     stem: str
     study: str
@@ -154,7 +163,7 @@ class Experiment:
 
     @cached_property
     def resolved(self) -> dict[str, Any]:
-        """The whole experiment as plain JSON-able data, defaults filled in and in SI units, for the record."""
+        """The whole experiment as plain data, with defaults, in SI units: what run.json records."""
         return {
             "config": self.stem,
             "study": self.study,
@@ -163,28 +172,28 @@ class Experiment:
         }
 
     def shown_in(self, figure: str) -> tuple[Case, ...]:
-        """The cases in a figure: all of them, unless the config selects some."""
+        """The cases in a figure: all, unless the config selects some."""
         if figure not in self.figures:
             return self.cases
         return tuple(case for case in self.cases if any(matches(case.name, p) for p in self.figures[figure]))
 
     def drawn(self, figures: Iterable[str]) -> list[str]:
-        """Those of the figures that the config selects, in its order; all of them, where it selects none."""
-        every = list(figures)
-        wanted = [name for pattern in self.figures for name in every if matches(name, pattern)]
-        return list(dict.fromkeys(wanted)) if self.figures else every
+        """The figures that the config selects, in its order; all if it selects none."""
+        figure_names = list(figures)
+        selected = [name for pattern in self.figures for name in figure_names if matches(name, pattern)]
+        return list(dict.fromkeys(selected)) if self.figures else figure_names
 
 
 DRAWN_FOR_ALL = ("sweep_*",)  # figures that no study names
 
 
 def matches(name: str, pattern: str) -> bool:
-    """Whether a pattern of `figures` matches a case: its exact name, or with * and ?."""
+    """Whether a pattern under `figures` matches a name: exactly, or with * and ?."""
     return name == pattern or fnmatchcase(name, pattern.replace("[", "[[]"))
 
 
 def in_name(value: object) -> str:
-    """A swept value in a case's name: numbers at their shortest, text plain, lists without blanks."""
+    """The text of a swept value in the name of a case: short numbers, plain text, lists without blanks."""
     match value:
         case bool():
             return str(value).lower()

@@ -1,6 +1,4 @@
-"""The YAML keys common to all configs, and the interface to the studies: their names and their keys.
-
-The schema of the YAML as JSON Schema, for editors and for `radarsim schema`."""
+"""The keys that all configs have, the interface to the studies, and the JSON Schema of configs for editors."""
 
 import json
 from pathlib import Path
@@ -37,7 +35,7 @@ class Common(Model):
     )
 
     def cases_of_figures(self) -> dict[str, tuple[str, ...]]:
-        """For each figure that is drawn, or pattern of such, the patterns of its cases."""
+        """For each figure to draw, or pattern of figures, the patterns of its cases."""
         return self.figures if isinstance(self.figures, dict) else dict.fromkeys(self.figures, ("*",))
 
 
@@ -61,25 +59,25 @@ COMMON_KEYS = tuple(Common.model_fields)
 
 
 class Studies(Protocol):
-    """The available studies; see radarsim.studies.registry, which config does not know."""
+    """The available studies: the interface of radarsim.studies.registry, which this package does not import."""
 
     def names(self) -> tuple[str, ...]:
-        """The permitted values of `study:`."""
+        """The allowed values of `study:`."""
 
     def usable(self) -> tuple[str, ...]:
-        """Those with readable keys; an outside package may be broken."""
+        """The studies whose keys can be read; a user package may be broken."""
 
     def has(self, name: str) -> bool:
         """Whether there is a study of that name."""
 
     def lacking(self, stem: str) -> tuple[str, ...]:
-        """Why there is no config of a stem: faults of packages that would have it."""
+        """Why there is no config with a stem: the errors of packages that would have it."""
 
     def keys(self, name: str) -> type[Study]:
         """The schema of a study's keys, imported on first use."""
 
     def coded(self, keys: "OwnCode", place: str, baseline: bool, folder: Path) -> Any:
-        """A filter of the user's own code that a config in a folder names at a place. Raises ConfigError."""
+        """The user filter that a config in a folder names at a place. Raises ConfigError."""
 
 
 # ---- json schema -----------------------------------------------------------------------------------------------------
@@ -87,7 +85,7 @@ TITLE = "radarsim experiment"
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-# Pydantic's own word for a bound, left where other checks precede it; its keyword, and which of two bounds counts.
+# Pydantic's words for bounds, which it leaves where other checks come first: their keywords, and which of two counts.
 BOUNDS = {
     "ge": ("minimum", max),
     "gt": ("exclusiveMinimum", max),
@@ -96,65 +94,81 @@ BOUNDS = {
 }
 
 
-class OwnTitles(GenerateJsonSchema):
-    """A key is called what its schema calls it: no title is made of its name."""
+class KeyTitles(GenerateJsonSchema):
+    """Takes the titles of keys from their schemas, and makes none from their names."""
 
     def field_title_should_be_set(self, schema: Any) -> bool:
         return False
 
 
 def schema(studies: Studies) -> dict[str, Any]:
-    """JSON Schema of a config, of one of the studies or an `include` of others, and of a scenario."""
+    """The JSON Schema of a config, of a study or with an `include`, and of a scenario."""
     models = {name: studies.keys(name) for name in studies.usable()}
-    described: tuple[type[BaseModel], ...] = (Common, OwnCode, *models.values())
-    wanted: list[tuple[type[BaseModel], Literal["validation"]]] = [(model, "validation") for model in described]
-    references, whole = models_json_schema(wanted, ref_template="#/$defs/{model}", schema_generator=OwnTitles)
-    definitions = tidy(whole["$defs"])
+    described_models: tuple[type[BaseModel], ...] = (Common, OwnCode, *models.values())
+    models_to_describe: list[tuple[type[BaseModel], Literal["validation"]]] = [
+        (model, "validation") for model in described_models
+    ]
+    references, all_schemas = models_json_schema(
+        models_to_describe, ref_template="#/$defs/{model}", schema_generator=KeyTitles
+    )
+    definitions = tidy(all_schemas["$defs"])
 
-    def popped(model: type[BaseModel]) -> Any:
+    def take_definition(model: type[BaseModel]) -> Any:
         return definitions.pop(references[(model, "validation")]["$ref"].removeprefix("#/$defs/"))
 
-    common = popped(Common)["properties"]
-    kinds = {name: _experiment(name, popped(model), common) for name, model in models.items()}
+    common = take_definition(Common)["properties"]
+    kinds = {name: _study_config_schema(name, take_definition(model), common) for name, model in models.items()}
     return {
         "$schema": DIALECT,
         "title": TITLE,
         "oneOf": [{"$ref": f"#/$defs/{name}"} for name in (*kinds, "include", "scenario")],
-        "$defs": {**kinds, "include": _comparison(common, kinds), "scenario": _scenario(models, kinds), **definitions},
+        "$defs": {
+            **kinds,
+            "include": _include_schema(common, kinds),
+            "scenario": _scenario_schema(models, kinds),
+            **definitions,
+        },
     }
 
 
-def _experiment(name: str, study: dict[str, Any], common: dict[str, Any]) -> dict[str, Any]:
-    """A config of one study: the common keys and its own."""
-    kept = {key: value for key, value in common.items() if key not in ("study", "include")}
+def _study_config_schema(name: str, study: dict[str, Any], common: dict[str, Any]) -> dict[str, Any]:
+    """The schema of a config of one study: the common keys and those of the study."""
+    common_keys = {key: value for key, value in common.items() if key not in ("study", "include")}
     properties = dict(study["properties"])
     if "baseline" in properties:
-        one = {key: value for key, value in properties["baseline"].items() if key not in ("title", "description")}
-        several = {"type": "array", "items": one, "minItems": 1, "uniqueItems": True}
-        said = {key: value for key, value in properties["baseline"].items() if key in ("title", "description")}
-        properties["baseline"] = {"anyOf": [one, several], **said}
+        single_baseline = {
+            key: value for key, value in properties["baseline"].items() if key not in ("title", "description")
+        }
+        baseline_list = {"type": "array", "items": single_baseline, "minItems": 1, "uniqueItems": True}
+        title_and_description = {
+            key: value for key, value in properties["baseline"].items() if key in ("title", "description")
+        }
+        properties["baseline"] = {"anyOf": [single_baseline, baseline_list], **title_and_description}
     if "filters" in properties:
         items = properties["filters"]["items"]
-        either = [*items.get("oneOf", [items]), {"$ref": f"#/$defs/{OwnCode.__name__}"}]
-        properties["filters"] = {**properties["filters"], "items": {"oneOf": either}}
-    about = {"const": name, "description": study.get("description", name)}  # of a docstring, which -OO leaves out
+        filter_schemas = [*items.get("oneOf", [items]), {"$ref": f"#/$defs/{OwnCode.__name__}"}]
+        properties["filters"] = {**properties["filters"], "items": {"oneOf": filter_schemas}}
+    study_schema = {
+        "const": name,
+        "description": study.get("description", name),
+    }  # of a docstring, which -OO leaves out
     return {
         **study,
         "title": name,
-        "properties": {"study": about, **properties, **kept},
+        "properties": {"study": study_schema, **properties, **common_keys},
         "required": ["study", *study.get("required", []), "realisations"],
     }
 
 
-def _comparison(common: dict[str, Any], kinds: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """A config that includes others; mappings laid over keys of their studies need not be complete."""
-    keys = {key: part for kind in reversed(kinds.values()) for key, part in kind["properties"].items()}
+def _include_schema(common: dict[str, Any], kinds: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """The schema of a config that includes others; mappings laid over theirs need not be complete."""
+    keys = {key: schema for kind in reversed(kinds.values()) for key, schema in kind["properties"].items()}
     return {
         "title": "include",
         "description": "Configs run together; keys of the study are laid over each: mappings key by key, lists whole.",
         "type": "object",
         "properties": {
-            **{key: {"description": part["description"]} for key, part in keys.items() if "description" in part},
+            **{key: {"description": schema["description"]} for key, schema in keys.items() if "description" in schema},
             **common,
             "study": {"enum": list(kinds), "description": common["study"]["description"]},
         },
@@ -163,42 +177,40 @@ def _comparison(common: dict[str, Any], kinds: dict[str, dict[str, Any]]) -> dic
     }
 
 
-def _scenario(models: dict[str, type[Study]], kinds: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """A file in scenarios/: the inline content that it replaces in a config."""
-    inline: list[dict[str, Any]] = []
+def _scenario_schema(models: dict[str, type[Study]], kinds: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """The schema of a file in scenarios/: what may stand in its place in a config."""
+    inline_schemas: list[dict[str, Any]] = []
     for name, model in models.items():
         for field, info in model.model_fields.items():
             if any(isinstance(mark, Scenario) for mark in info.metadata):
-                inline += kinds[name]["properties"][field]["anyOf"][1:]
-    return {"title": "scenario", "description": "What is observed.", "anyOf": inline}
+                inline_schemas += kinds[name]["properties"][field]["anyOf"][1:]
+    return {"title": "scenario", "description": "What is observed.", "anyOf": inline_schemas}
 
 
-def tidy(part: Any) -> Any:
-    """A schema in JSON Schema's keywords, without those that carry no information.
-
-    These are names of classes, and null, which means an absent key."""
-    if isinstance(part, list):
-        return [tidy(item) for item in part]
-    if not isinstance(part, dict):
-        return part
-    kept = {key: tidy(value) for key, value in part.items() if not _idle(key, value, part)}
-    for bound, (keyword, tighter) in BOUNDS.items():
-        if isinstance(kept.get(bound), int | float):
-            limit = kept.pop(bound)
-            kept[keyword] = tighter(limit, kept.get(keyword, limit))
-    choices = [choice for choice in kept.get("anyOf", ()) if choice != {"type": "null"}]
+def tidy(schema: Any) -> Any:
+    """A schema in the keywords of JSON Schema, without those that say nothing: names of classes, and null."""
+    if isinstance(schema, list):
+        return [tidy(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    keywords = {key: tidy(value) for key, value in schema.items() if not _carries_nothing(key, value, schema)}
+    for bound, (keyword, tighter_of) in BOUNDS.items():
+        if isinstance(keywords.get(bound), int | float):
+            limit = keywords.pop(bound)
+            keywords[keyword] = tighter_of(limit, keywords.get(keyword, limit))
+    choices = [choice for choice in keywords.get("anyOf", ()) if choice != {"type": "null"}]
     if len(choices) == 1:
-        del kept["anyOf"]
-        kept = choices[0] | kept
+        del keywords["anyOf"]
+        keywords = choices[0] | keywords
     elif choices:
-        kept["anyOf"] = choices
-    return kept
+        keywords["anyOf"] = choices
+    return keywords
 
 
-def _idle(key: str, value: object, part: dict[str, Any]) -> bool:
-    """Whether a keyword (and no property that happens to have its name) carries no information."""
+def _carries_nothing(key: str, value: object, schema: dict[str, Any]) -> bool:
+    """Whether a keyword, not a property with its name, says nothing."""
     if key == "title":
-        return isinstance(value, str) and "properties" in part
+        return isinstance(value, str) and "properties" in schema
     return key == "discriminator" or (key == "default" and value in (None, {}))
 
 

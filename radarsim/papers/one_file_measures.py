@@ -91,11 +91,13 @@ def bias(seen: Evidence, case: Any, filter: str, component: str, at: int | None 
 
 
 def over_believed(seen: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
-    """σ of a filter over the σ that it predicts; where the study has the table `believed`."""
+    """σ of a filter over the σ that it predicts; of a filter with a covariance."""
     found = seen.case(case)
     k = int(found.axes.k[_place(found, filter, component, at)[1]])
-    row = seen.row("believed", case=found.name, filter=filter, component=component, k=k)
-    return Estimate(row["ratio"], row["ratio_lo"], row["ratio_hi"])
+    row = seen.row("curves", case=found.name, filter=filter, component=component, k=k)
+    if np.isnan(row["believed_sigma"]):
+        raise ConfigError(f"filter {filter!r} predicts no σ: it gives no covariance")
+    return Estimate(*(row[end] / row["believed_sigma"] for end in ("sigma", "sigma_lo", "sigma_hi")))
 
 
 def _place(found: CaseResult, filter: str, component: str, at: int | None) -> tuple[int, int, int]:

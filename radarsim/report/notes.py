@@ -14,7 +14,7 @@ checked.
 
 A filter's predicted errors against its true ones, with the same columns and words in every study.
 
-`believed.csv` compares standard deviations, component by component: `ratio` is the true σ over the believed one.
+`believed_sigma` of `curves.csv` stands beside the true σ of each component.
 `consistency.csv` compares whole states and residuals by normalised squares, per degree of freedom: NEES eᵀP⁻¹e of the
 error e, NIS νᵀS⁻¹ν of the innovation ν, P and S the covariances that the filter predicts. Both are 1 for a consistent
 filter. Over 1 the filter is optimistic, its errors are larger than predicted; under 1 it is pessimistic. (Bar-Shalom,
@@ -211,20 +211,13 @@ def agreement(curves: "pd.DataFrame") -> "pd.DataFrame | None":
 OPTIMISTIC, CONSISTENT, PESSIMISTIC = "optimistic", "consistent", "pessimistic"
 
 
-def believed(result: CaseResult, sigma: np.ndarray) -> dict[str, np.ndarray]:
-    """The measured σ, by component and scan, beside the σ that the filters believe, sigma (F, K, C).
+def sigma_over_believed(curves: "pd.DataFrame") -> Estimate:
+    """True over believed σ (rows,) of rows of curves, with the interval of the true σ alone.
 
-    Over 1 a filter is *optimistic*, its errors are larger than it believes; under 1 it is *pessimistic*. The interval
-    is that of the measured σ alone. Where the believed one depends on which plots are missed, its mean has a small
-    sampling error of its own: rows of a radar that misses plots cover 94 … 95 %. Filters that adapt bring a `note`."""
-    at = f, k, c = tables.shown(result)
-    n = tables.realisations(result)[at]
-    true, claimed = statistics.errors(np.asarray(result.sums["error"])[at], n).sigma, sigma[at]
-    return {
-        **tables.leading(result, f, k, **tables.components(result, c)),
-        "n": n.astype(np.int64),
-        **ratio_columns(true, claimed),
-    }
+    Over 1 a filter is *optimistic*: its errors are larger than it believes. Under 1 it is *pessimistic*. The rows of a
+    radar that misses plots, whose believed σ is a sampled mean, cover 94 … 95 %."""
+    true = (curves[name].to_numpy(dtype=float) for name in ("sigma", "sigma_lo", "sigma_hi"))
+    return _over(Estimate(*true), curves["believed_sigma"].to_numpy(dtype=float))
 
 
 def ratio_columns(true: Estimate, claimed: np.ndarray) -> dict[str, np.ndarray]:
@@ -232,9 +225,13 @@ def ratio_columns(true: Estimate, claimed: np.ndarray) -> dict[str, np.ndarray]:
 
     believed_sigma [unit]: root of the mean variance that the filter believes
     ratio ±: true over believed"""
+    columns = tables.interval_columns("ratio", _over(true, claimed))
+    return {"sigma": true.value, "believed_sigma": claimed, **columns}
+
+
+def _over(true: Estimate, believed: np.ndarray) -> Estimate:
     with np.errstate(invalid="ignore", divide="ignore"):
-        ratio = Estimate(*(end / claimed for end in true))
-    return {"sigma": true.value, "believed_sigma": claimed, **tables.interval_columns("ratio", ratio)}
+        return Estimate(*(end / believed for end in true))
 
 
 def normalised(

@@ -262,8 +262,7 @@ def _said(result: CaseResult, name: str, case: str, made: Made) -> list[str]:
     mine = curves[curves["filter"] == name].iloc[0]
     sigmas = wording.estimate((mine[key] for key in SIGMA), panels.unit_of(unit))
     said = [start + first + "; " + tr("its σ is {sigma}, {floor}.", sigma=sigmas, floor=_floor(curves, best, unit))]
-    floor = common.where(made["floor"], case=result.name, component=component, k=last["k"].iloc[0])
-    said += _above_floor(floor, mine, {one: sigma[one] for one in rivals}, panels.unit_of(unit))
+    said += _above_floor(mine, {one: sigma[one] for one in rivals}, panels.unit_of(unit))
     against = [f"{one['baseline']} {_gain(one)}" for one in last.to_dict("records") if one["baseline"] != best]
     if against:
         said.append(tr("Further gains of {name} there: against {gains}.", name=name, gains=listed(against)))
@@ -295,17 +294,16 @@ def _floor(curves: "pd.DataFrame", best: str, unit: str) -> str:
               unit=panels.unit_of(unit))  # fmt: skip
 
 
-def _above_floor(floor: "pd.DataFrame", mine: Any, rivals: Mapping[str, float], unit: str) -> Iterator[str]:
+def _above_floor(mine: Any, rivals: Mapping[str, float], unit: str) -> Iterator[str]:
     """How far the filter from outside, a row of its curve, the config's best, and the best tuned one are from the
     floor."""
     name = mine["filter"]
-    rows = common.where(floor, filter=name)
-    if len(rows):
-        least = float(rows["floor"].iloc[0])
+    least = float(mine["floor"])
+    if not np.isnan(least):
         own = wording.estimate((100 * (mine[key] / least - 1) for key in SIGMA), "%", ".3g")
         others = [f"{one} {wording.number(round(100 * (of / least - 1), 2), 3)} %" for one, of in rivals.items()]
         told = {"name": name, "own": own, "floor": f"{wording.number(least)} {unit}".rstrip(), "others": listed(others)}
-        kind = tr(UNBIASED if rows["kind"].iloc[0].startswith("CRB") else ANY)
+        kind = tr(UNBIASED if mine["floor_kind"].startswith("CRB") else ANY)
         said = tr("The floor there, {kind}, is {floor}: {name} is {own} above it, {others}.", kind=kind, **told)
         if mine["sigma_hi"] < least:
             said += " " + tr("Below it is only what is biased, or knows more than these plots.")

@@ -567,17 +567,17 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: 
     return seen.begun(figure, seen.at_the_end(figure))
 
 
-def floored(figure: Figure, floor: "pd.DataFrame | None", component: str, factor: float = 1.0) -> Figure:
+def floored(figure: Figure, curves: "pd.DataFrame", component: str, factor: float = 1.0) -> Figure:
     """A figure of σ of one case, of few lines, with its floor. Of filters that have other plots it is that of those
     with the most."""
-    rows = None if floor is None or not len(floor) else floor[floor["component"] == component]
-    if rows is None or not len(rows) or len(figure.panels) != 1 or len(figure.panels[0].marks) > MOST_AT_ENDS:
+    rows = curves[curves["component"].eq(component) & curves["floor"].notna()] if "floor" in curves else curves[:0]
+    if not len(rows) or len(figure.panels) != 1 or len(figure.panels[0].marks) > MOST_AT_ENDS:
         return figure
     least = factor * rows.groupby("t_s", sort=True)["floor"].min()
     (panel,) = figure.panels
     line = Line(least.index.to_numpy(), least.to_numpy(), tr("floor"), GUIDE)
     panel = replace(panel, marks=(*panel.marks, line))
-    posterior = rows["kind"].str.startswith("posterior").all()
+    posterior = rows["floor_kind"].str.startswith("posterior").all()
     said = tr("Grey: the floor, a posterior Cramér-Rao bound.") if posterior else tr(UNDER_UNBIASED)
     return replace(figure, panels=(panel,), caption=f"{figure.caption} {said}")
 
@@ -792,7 +792,7 @@ def per_component(
             figure = draw(name, some, rows, of) if some else None
             if figure and any(isinstance(mark, Line) for panel in figure.panels for mark in panel.marks):
                 if kind == "sigma" and len(results) == 1:
-                    figure = floored(figure, tables.get("floor"), of.name)
+                    figure = floored(figure, tables["curves"], of.name)
                 made[name] = replace(figure, caption=figure.caption + left)
     return made
 

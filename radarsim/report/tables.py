@@ -27,6 +27,7 @@ LABEL_COLUMNS = (
     "unit",
     "baseline",
     "model",
+    "floor_kind",
     "note",
 )  # columns of text, whatever they hold
 
@@ -175,11 +176,15 @@ def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
     bias, bias_se [unit]: mean error, and its standard error
     spread [unit]: standard deviation of the errors
     n_eff: realisations that stand behind σ where a few large errors decide: n/(κ − 1), κ the fourth moment over the
-        squared second; half of n for Gaussian errors"""
-    return joined(map(_curves, results))
+        squared second; half of n for Gaussian errors
+    believed_sigma [unit]: root of the mean variance that the filter believes; with sigma above it a filter is
+        optimistic, with sigma below it pessimistic. A sampled mean where a filter adapts, or learns which plots are
+        missed"""
+    return joined(map(curve_columns, results))
 
 
-def _curves(result: CaseResult) -> Columns:
+def curve_columns(result: CaseResult, believed_sigma: np.ndarray | None = None) -> Columns:
+    """The columns of `curves` for one case. believed_sigma (F, K, C): what its filters believe, NaN where unknown."""
     axes, at = result.axes, shown(result)
     f, k, c = at
     n = realisations(result)[at]
@@ -195,6 +200,7 @@ def _curves(result: CaseResult) -> Columns:
         "exact_sigma": np.asarray(axes.exact_sigma, dtype=float)[at],
         "exact_bias": np.asarray(axes.exact_bias, dtype=float)[at],
         "n_eff": statistics.effective(moments[..., 1], moments[..., 3], n),
+        "believed_sigma": np.full(f.size, np.nan) if believed_sigma is None else believed_sigma[at],
     }
 
 

@@ -301,22 +301,35 @@ COLUMNS = ("case", "filter", "component", "unit", "k", "t_s", "floor", *LATER, "
 
 
 def floors(study: "Study", results: "Sequence[CaseResult]") -> "pd.DataFrame":
-    """What no estimator can do better than with the plots of a filter; only where a floor is known.
+    """What no estimator can do better than with the plots of a filter, where a floor is known: what quantities read.
 
-    The errors of a filter are beside it in curves.csv.
-
-    floor [unit]: the least σ with the plots up to the scan
-    lag_1, lag_2, lag_5, lag_10 [unit]: the least σ so many scans later, of fixed-lag smoothing
-    smoothed [unit]: the least σ after the last scan, of fixed-interval smoothing
-    reached: whether some estimator reaches it
-    kind: `CRB`, of a target that is the same in all realisations, under unbiased estimators; `posterior CRB`, of a
-        random one, under any; and how missed plots count, see `docs/methods.md`
-    """
+    `floor` is the least σ with the plots up to the scan; `lag_1` … `lag_10` that so many scans later, of fixed-lag
+    smoothing; `smoothed` that after the last scan, of fixed-interval smoothing. `reached` says whether some estimator
+    reaches it, `kind` which bound it is."""
     from radarsim.report import tables
 
     return tables.joined(
         (part for result in results for part in _parts(study.floor(result.spec, result.axes), result)), COLUMNS
     )
+
+
+def with_floors(curves: "pd.DataFrame", floors: "pd.DataFrame") -> "pd.DataFrame":
+    """Curves with the floor of each row; empty where none is known.
+
+    floor [unit]: what no estimator does better than with the plots that the filter is given up to the scan
+    floor_kind: `CRB`, of a target that is the same in all realisations, under unbiased estimators; `posterior CRB`, of
+        a random one, under any; and how missed plots count, see `docs/methods.md`
+    """
+    keys, note = ["case", "filter", "component", "k"], curves.columns.isin(["note"])
+    made = curves.loc[:, ~note]
+    if "believed_sigma" not in made:
+        made = made.assign(believed_sigma=np.nan)
+    if len(floors):
+        known = floors[[*keys, "floor", "kind"]].rename(columns={"kind": "floor_kind"})
+        made = made.merge(known, on=keys, how="left", validate="many_to_one").fillna({"floor_kind": ""})
+    else:
+        made = made.assign(floor=np.nan, floor_kind="")
+    return made.set_index(curves.index).join(curves.loc[:, note])
 
 
 def _parts(floor: Floor | None, result: "CaseResult") -> Iterator[dict[str, Any]]:

@@ -478,7 +478,7 @@ class Study(ABC):
         return tables.gains(results)
 
     def floors(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
-        """The table `floor`."""
+        """The floors of these results and the bounds of smoothing, row by row as in `curves`."""
         from radarsim.studies import floor
 
         return floor.floors(self, results)

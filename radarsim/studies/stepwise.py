@@ -26,13 +26,14 @@ tuples; its shape stays the same. The same text runs on eight realisations at a 
 recorded plots. Branches by keys are Python's: text, truth values and whole numbers of a record are no numbers of a
 realisation, and a kernel of its own is made for each.
 
-The first plot is always there; of later ones `detection` is the probability. Where a filter gives a covariance the
-tables `believed` and `consistency` say how it agrees with the errors. A study that knows σ exactly gives `exact_sigma`.
+The first plot is always there; of later ones `detection` is the probability. Where a filter gives a covariance,
+`believed_sigma` in `curves` and the table `consistency` say how it agrees with the errors. A study that knows σ exactly
+gives `exact_sigma`.
 """
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -390,18 +391,19 @@ class StepStudy(OneFile):
         tables_of_study = super().tables(results)
         if any("nees" in result.sums for result in results):
             tested = [result for result in results if "nees" in result.sums]
-            tables_of_study["believed"] = tables.joined(map(self._believed, tested))
+            tables_of_study["curves"] = tables.joined(map(self._curves, results))
             tables_of_study["consistency"] = tables.joined(map(self._consistency, tested))
         return tables_of_study
 
-    def _believed(self, result: CaseResult) -> Mapping[str, Any]:
-        """The σ that filters with a covariance predict, the root of its mean variance, beside the true one."""
-        from radarsim.report import notes
+    def _curves(self, result: CaseResult) -> Mapping[str, Any]:
+        """The curves, with the σ that filters with a covariance predict: the root of its mean variance."""
+        from radarsim.report import tables
 
+        if "believed" not in result.sums:
+            return tables.curve_columns(result)
         sigma = np.sqrt(np.asarray(result.sums["believed"]) / result.count)
-        tested = np.array([self.kinds[filter_keys.kind].covariance is not None for filter_keys in result.spec.filters])
-        axes = replace(result.axes, available=result.axes.available & tested[:, None, None])
-        return notes.believed(replace(result, axes=axes), sigma)
+        predicts = np.array([self.kinds[member.kind].covariance is not None for member in result.spec.filters])
+        return tables.curve_columns(result, np.where(predicts[:, None, None], sigma, np.nan))
 
     def _consistency(self, result: CaseResult) -> Mapping[str, Any]:
         """Mean NEES of all components by scan, per degree of freedom, with bounds and verdict."""

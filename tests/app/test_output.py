@@ -16,7 +16,7 @@ from radarsim.app.result import unnamed
 from radarsim.report import files, html
 from radarsim.studies.registry import study
 
-TABLES = {"curves.csv", "gains.csv", "floor.csv", "steady.csv", "believed.csv", "consistency.csv", "radar.csv"}
+TABLES = {"curves.csv", "gains.csv", "steady.csv", "consistency.csv", "radar.csv"}
 TABLES |= {"claims.csv"}
 FIGURES = {f"figures/{k}_{c}.{f}" for k in ("sigma", "gain") for c in ("r", "Vr", "ar") for f in ("svg", "png")}
 FIGURES |= {f"figures/{name}.{kind}" for name in ("consistency",) for kind in ("svg", "png")}

@@ -284,7 +284,7 @@ def test_both_rivals_stand_beside_the_floor():
                             realisations=100)  # fmt: skip
     (floor,) = [line for line in result.answer if line.startswith("The floor there")]
     sigma = result.curves.query("filter == 'raw' and component == 'r' and k == 15")[["sigma", "sigma_lo", "sigma_hi"]]
-    least = result.tables["floor"].query("filter == 'raw' and component == 'r' and k == 15")["floor"].item()
+    least = result.curves.query("filter == 'raw' and component == 'r' and k == 15")["floor"].item()
     value, lo, hi = (f"{100 * (one / least - 1):.3g}" for one in sigma.to_numpy()[0])
     assert f": raw is {value} % [{lo}, {hi}] above it, r+Vr " in floor
     assert ", tuned " in floor

@@ -389,9 +389,12 @@ def test_help_is_grouped_with_one_whole_line_for_each_command():
     text = command("--help").stdout
     order = [text.index(f"\n{title}:\n") for title in group.command_sections()]
     assert order == sorted(order)
-    assert set(main.commands) == {name for names in group.command_sections().values() for name in names}
-    lines = text[order[0] :].strip().split("\n")
-    assert len([line for line in lines if line]) == len(group.command_sections()) + len(main.commands)
+    listed = [name for names in group.command_sections().values() for name in names]
+    assert set(main.commands) == {*listed, *group.UNLISTED}
+    *lines, unlisted = [line for line in text[order[0] :].split("\n") if line]
+    assert len(lines) == len(group.command_sections()) + len(listed)
+    assert ", ".join(group.UNLISTED) in unlisted
+    assert all("Usage: " in command(name, "--help").stdout for name in group.UNLISTED)
     assert not any("..." in line or len(line) > 80 for line in lines)
 
 

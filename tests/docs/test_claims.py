@@ -56,7 +56,7 @@ def test_what_is_kept_is_a_part_of_its_claim():
 
 
 def test_a_full_reproduction_is_shown_with_every_part(tmp_path, text, monkeypatch):
-    rows = claims.kept()
+    rows = claims.stored_rows()
     found = claims.list_claims.Claims([*rows, rows[0] | {"what": "another part"}])
     monkeypatch.setattr(claims.list_claims, "claims", lambda out: found)
     full = claims.markdown(tmp_path)
@@ -65,7 +65,7 @@ def test_a_full_reproduction_is_shown_with_every_part(tmp_path, text, monkeypatc
 
 
 def test_readme_and_landing_page_count_the_claims():
-    count = sum(count_classes(claims.kept())[0].values())
+    count = sum(count_classes(claims.stored_rows())[0].values())
     for name in ("README.md", "docs/README.md"):
         assert f"{count} claims" in (claims.FILE.parents[2] / name).read_text(encoding="utf-8")
 
@@ -77,10 +77,9 @@ def test_results_that_cannot_be_read_are_no_full_reproduction(tmp_path, text):
 
 
 def test_the_figure_is_drawn_beside_the_page():
-    assert {getattr(mark, "label", "") for panel in forest_plot(claims.kept()).panels for mark in panel.marks} >= {
-        "confirmed",
-        "refuted",
-    }
+    assert {
+        getattr(mark, "label", "") for panel in forest_plot(claims.stored_rows()).panels for mark in panel.marks
+    } >= {"confirmed", "refuted"}
 
 
 @pytest.mark.parametrize("paper", interpretations.PAPERS)

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from making import contents, house, links, words
+from making import contents, links, words
 
 ROOT = Path(__file__).parents[2]
 PAGES = [
@@ -45,23 +45,6 @@ def test_pages_that_are_named_without_a_link_exist():
         if not (ROOT / name).exists() and not re.search("[A-Z]{4}", name) and name not in made
     }
     assert not missing
-
-
-@pytest.mark.slow
-def test_the_picture_of_the_house_has_every_room():
-    """Rooms that the picture lacks would be missing from its arrows, too."""
-    drawn = {room for row in house.ROWS for room in row}
-    assert drawn == set(house.ABOUT)
-    folders = {path.parent.name for path in house.PACKAGE.glob("*/__init__.py")} - {"studies"}
-    assert folders | {path.parent.name for path in house.PACKAGE.glob("studies/*/__init__.py")} <= drawn
-    assert 'class="name">cli<' in house.svg()
-
-
-def test_rooms_import_only_what_is_below_or_the_neighbour_that_is_drawn():
-    row = {room: i for i, rooms in enumerate(house.ROWS) for room in rooms}
-    assert not [(a, b) for a, b in house.arrows() if row[b] < row[a]]
-    for a, b in house.beside():
-        assert house.ROWS[row[a]].index(b) == house.ROWS[row[a]].index(a) + 1
 
 
 def test_what_is_written_by_hand_stays_readable():

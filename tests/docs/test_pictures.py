@@ -30,12 +30,14 @@ def test_every_picture_is_drawn_small_and_shown():
         for mark in pictures.MARK.finditer(text):
             found = IMAGE.findall(mark[3])
             files = [(page.parent / link).resolve() for _, link in found]
-            assert [file.stem for file in files] == [pictures.stem(*one) for one in pictures.asked(mark[1])]
+            assert [file.stem for file in files] == [
+                pictures.file_stem(*one) for one in pictures.pictures_of_mark(mark[1])
+            ]
             assert all(words.strip() for words, _ in found)
             assert mark[3].count("*") >= 2 * len(found)  # captions
             shown |= set(files)
     assert shown == set(pictures.FOLDER.iterdir())
-    assert all(file.stat().st_size < pictures.MOST_BYTES for file in shown)
+    assert all(file.stat().st_size < pictures.MAX_BYTES for file in shown)
 
 
 @pytest.mark.parametrize("study", STUDIES)
@@ -50,7 +52,8 @@ def test_a_studys_page_begins_with_its_question_its_answer_and_its_figure(study)
 def test_the_readme_and_the_first_papers_six_figures_are_shown():
     assert pictures.ROOT / "README.md" in PAGES
     gallery = [
-        pictures.asked(mark[1]) for mark in pictures.MARK.finditer(PAGES[pictures.ROOT / "docs/range_doppler.md"])
+        pictures.pictures_of_mark(mark[1])
+        for mark in pictures.MARK.finditer(PAGES[pictures.ROOT / "docs/range_doppler.md"])
     ]
     six = {"sigma_r", "gain_r", "sigma_Vr", "gain_Vr", "sigma_ar", "gain_ar"}
     assert six in [{name for config, name, _ in own if config == "range_doppler"} for own in gallery]
@@ -59,37 +62,41 @@ def test_the_readme_and_the_first_papers_six_figures_are_shown():
 def test_a_large_picture_becomes_a_small_png():
     rng = np.random.default_rng(1)
     lines = tuple(Line(np.arange(900.0), rng.normal(size=900), f"line {n}", Style(n)) for n in range(12))
-    ending, data = pictures.drawn(Figure("f", "F", "F.", (Panel(Axis("x"), Axis("y"), lines),), width_mm=175.0), None)
+    ending, data = pictures.picture_file(
+        Figure("f", "F", "F.", (Panel(Axis("x"), Axis("y"), lines),), width_mm=175.0), None
+    )
     assert ending == "png"
-    assert len(data) < pictures.MOST_BYTES
+    assert len(data) < pictures.MAX_BYTES
     assert Image.open(io.BytesIO(data)).width > 1000
     small = Figure("f", "F", "F.", (Panel(Axis("x"), Axis("y"), lines[:1]),))
-    assert pictures.drawn(small, 85.0)[0] == "svg"
+    assert pictures.picture_file(small, 85.0)[0] == "svg"
 
 
 def test_marks_are_filled_with_pictures_and_captions(tmp_path):
     figure = Figure("f", "$\\sigma$ of r", "What is seen. How it is drawn.", ())
     page, file = tmp_path / "docs" / "page.md", tmp_path / "docs" / "pictures" / "a_f.svg"
-    one = pictures.shown(page, [("f", figure, file)])
+    one = pictures.picture_text(page, [("f", figure, file)])
     assert one == "![σ of r](pictures/a_f.svg)\n\n*σ of r.* What is seen. How it is drawn.\n"
-    two = pictures.shown(tmp_path / "README.md", [("f", figure, file)] * 2)
+    two = pictures.picture_text(tmp_path / "README.md", [("f", figure, file)] * 2)
     assert two.count("![σ of r](docs/pictures/a_f.svg)") == 2
     assert two.count("* *σ of r.*") == 2
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("config", [config for config in pictures.every() if config != pictures.CHART])
+@pytest.mark.parametrize("config", [config for config in pictures.figures_by_config() if config != pictures.CHART])
 def test_every_figure_that_a_page_shows_is_one_of_its_config(config):
     from radarsim.app import result as output
     from radarsim.app.run import run
 
     result = run(config, realisations=64)
     drawn = output.case_figures(result.cases, result.tables, result.experiment)
-    assert {name for name, _ in pictures.every()[config]} <= set(drawn)
+    assert {name for name, _ in pictures.figures_by_config()[config]} <= set(drawn)
 
 
 def test_the_charts_pictures_are_its_figures():
-    assert {name for name, _ in pictures.every()[pictures.CHART]} == set(pictures.figures_of(pictures.CHART, None))
+    assert {name for name, _ in pictures.figures_by_config()[pictures.CHART]} == set(
+        pictures.figures_of(pictures.CHART, None)
+    )
 
 
 def formulas():

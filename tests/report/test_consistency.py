@@ -36,14 +36,14 @@ def test_bounds_from_the_spread_judge_as_the_interval_does(looks):
 
 @pytest.mark.slow_cases("multimodel-quantities2-False-False")
 @pytest.mark.parametrize(
-    ("config", "quantities", "exact", "sigma"),
+    ("config", "quantities", "exact", "believed"),
     [
         ("rls2", ("nees",), True, True),
         ("sonar_correlated", ("nees",), True, True),
         ("multimodel", ("nees", "nis"), False, False),
     ],
 )
-def test_every_study_has_the_same_columns(config, quantities, exact, sigma):
+def test_every_study_has_the_same_columns(config, quantities, exact, believed):
     made = radarsim.run(config, realisations=1000).tables
     columns = list(made["consistency"].columns)
     for quantity in quantities:
@@ -54,11 +54,14 @@ def test_every_study_has_the_same_columns(config, quantities, exact, sigma):
         assert columns[first : first + len(wanted)] == wanted
         known = {notes.OPTIMISTIC, notes.CONSISTENT, notes.PESSIMISTIC}
         assert set(made["consistency"][f"{quantity}_verdict"]) <= known
-    assert ("believed" in made) == sigma
-    if sigma:
-        rows = made["believed"]
-        assert list(rows.columns)[4:] == ["k", "t_s", "n", "sigma", "believed_sigma", "ratio", "ratio_lo", "ratio_hi"]
-        assert_rounded(rows["ratio"], rows["sigma"] / rows["believed_sigma"])
+    curves = made["curves"].drop(columns="note", errors="ignore")
+    assert list(curves.columns)[-4:] == ["n_eff", "believed_sigma", "floor", "floor_kind"]
+    assert curves["believed_sigma"].notna().all() == believed
+    assert curves["believed_sigma"].isna().all() != believed
+    if believed:
+        ratio = notes.sigma_over_believed(curves)
+        assert_rounded(ratio.value, curves["sigma"] / curves["believed_sigma"])
+        assert_rounded(ratio.hi, curves["sigma_hi"] / curves["believed_sigma"])
 
 
 def test_a_known_expectation_is_judged_in_place_of_the_mean():

@@ -115,10 +115,10 @@ def test_a_table_keeps_the_notes_that_it_brings():
         {"case": "a", "n": [5000, 500], "n_eff": 2500.0, "filter": "f", "component": "x", "k": [1, 99]}
     )
     table = table.assign(ratio=1.0, ratio_lo=0.9, ratio_hi=1.1)
-    made = {"curves": pd.DataFrame(), "believed": table.assign(note=["own", ""])}
-    assert list(notes.noted(made, [])["believed"]["note"]) == ["own", ""]
-    assert list(made["believed"]["note"]) == ["own", ""]
-    assert "note" not in notes.noted(made | {"believed": table.assign(note="")}, [])["believed"]
+    made = {"curves": pd.DataFrame(), "ratios": table.assign(note=["own", ""])}
+    assert list(notes.noted(made, [])["ratios"]["note"]) == ["own", ""]
+    assert list(made["ratios"]["note"]) == ["own", ""]
+    assert "note" not in notes.noted(made | {"ratios": table.assign(note="")}, [])["ratios"]
 
 
 @pytest.mark.parametrize("exact", [True, False])

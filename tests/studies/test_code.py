@@ -106,7 +106,7 @@ def test_it_stands_in_every_table_and_the_others_are_what_they_are_without_it(pl
     (place / "plain").mkdir()
     written("plain/mine")
     run("without", config="plain/mine.yaml")
-    for table in ("believed", "steady", "curves"):
+    for table in ("steady", "curves"):
         for name in ("r", "r+Vr"):
             assert rows("with", table, name) == rows("without", table, name) != []
     assert rows("with", "gains", "r+Vr") == rows("without", "gains", "r+Vr")

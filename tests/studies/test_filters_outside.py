@@ -126,7 +126,7 @@ def test_the_others_noise_and_errors_are_what_they_are_without_it(ran, radarsim,
     (tmp_path / "frozen.yaml").write_text("\n".join(line for line in own if "kind: frozen" not in line))
     radarsim("run", "frozen.yaml", "-n", N, "--no-figures", "--out", ".", cwd=tmp_path)
     for name in ("r", "r+Vr"):
-        for table in ("curves", "gains", "believed", "consistency", "steady"):
+        for table in ("curves", "gains", "consistency", "steady"):
             assert rows(ran, table, name) == rows(tmp_path / "frozen", table, name)
     assert rows(ran, "gains", "frozen")
     assert {line.split(",")[2] for line in rows(ran, "gains", "frozen")} == {"r"}  # paired, against the first

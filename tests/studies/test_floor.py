@@ -3,6 +3,7 @@
 import itertools
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import radarsim
@@ -366,8 +367,7 @@ def test_plain_conversion_lies_below_it():
     """Bearings that err by 8 degrees draw y = r sin e towards zero: E y² = (r² + σ²)(1 − exp(−2 σ_b²)) / 2."""
     given = "sweep.sensor.sigma_bearing_deg=[8]", "sweep.frame=[cartesian, cartesian_unbiased]", "scans=5"
     result = radarsim.run("sonar_conversion", realisations=40_000, overrides=given)
-    keys = ["case", "filter", "component", "k"]
-    both = result.tables["floor"].merge(result.curves, on=keys).query("filter == 'growing' and component == 'y'")
+    both = result.curves.query("filter == 'growing' and component == 'y'")
     plain, unbiased = (rows.iloc[0] for _, rows in both.groupby("case"))
     spread = np.deg2rad(8)
     assert_rounded(plain["floor"], 15e3 * spread, operations=10)
@@ -388,14 +388,28 @@ def test_where_no_floor_is_defined_there_is_none(config):
 
 
 # ---- table, solve ----------------------------------------------------------------------------------------------------
-def test_the_table_has_a_row_wherever_a_filter_has_an_estimate_and_a_floor_is_known():
+def test_curves_have_the_floor_of_each_row_where_it_is_known():
     result = radarsim.run("rls2", realisations=50)
-    rows, curves = result.tables["floor"], result.curves
-    keys = ["case", "filter", "component", "unit", "k", "t_s"]
-    assert rows[keys].equals(curves[keys])
-    assert (rows["floor"] <= curves["exact_sigma"] * (1 + EXACT)).all()
-    assert set(rows["kind"]) == {"CRB"}
-    assert rows["reached"].all()
+    curves, floors = result.curves, registry.study("range_doppler").floors(result.cases)
+    assert (curves["floor"] <= curves["exact_sigma"] * (1 + EXACT)).all()
+    assert set(curves["floor_kind"]) == {"CRB"}
+    keys = ["case", "filter", "component", "unit", "k", "t_s", "floor"]
+    assert floors[keys].equals(curves[keys])
+    assert floors["reached"].all()
+
+
+def test_rows_keep_their_order_and_notes_where_floors_are_joined():
+    keys = {"case": "a", "filter": ["f", "g", "f"], "component": "r", "k": [2, 1, 1]}
+    curves = pd.DataFrame({**keys, "sigma": [3.0, 2.0, 1.0], "note": ["", "few", ""]})
+    known = pd.DataFrame(
+        {"case": "a", "filter": "f", "component": "r", "k": [1, 2], "floor": [0.5, 0.25], "kind": "CRB"}
+    )
+    both = floors.with_floors(curves, known)
+    assert list(both["floor"].fillna(0)) == [0.25, 0, 0.5]
+    assert list(both["floor_kind"]) == ["CRB", "", "CRB"]
+    assert list(both.columns)[-4:] == ["believed_sigma", "floor", "floor_kind", "note"]
+    assert both[curves.columns].equals(curves)
+    assert floors.with_floors(curves, known[:0])["floor"].isna().all()
 
 
 def test_solve_answers_what_accuracy_a_floor_takes():
@@ -407,7 +421,7 @@ def test_solve_answers_what_accuracy_a_floor_takes():
 
 def test_a_filter_from_outside_has_the_floor_of_all_plots():
     result = radarsim.judge("rls2", lambda plots: plots["range_m"], name="raw", realisations=200)
-    rows = result.tables["floor"]
+    rows = result.curves
     own, best = (rows[rows["filter"].eq(name) & rows["component"].eq("r")] for name in ("raw", "r+Vr"))
     assert np.array_equal(own["floor"], best["floor"])
     assert any("The floor there" in line and "raw is" in line for line in result.answer)
@@ -427,13 +441,11 @@ def test_below_every_measured_sigma(stem):
     """But for chance: Z standard errors of σ, of the realisations that count."""
     experiment = configs.load(stem)
     result = radarsim.run(experiment, realisations=MISSED.get(stem) or FEW.get(experiment.study, 2000))
-    rows = result.tables["floor"]
-    keys = ["case", "filter", "component", "k"]
-    both = rows.merge(result.curves, on=keys, suffixes=("", "_of_curves"))
-    assert len(both) == len(rows)
+    both = result.curves.dropna(subset="floor")
+    assert len(both) == len(registry.study(experiment.study).floors(result.cases))
     exact = both["exact_sigma"].notna() & (experiment.study != "discriminator")
     assert (both["exact_sigma"][exact] >= both["floor"][exact] * (1 - MIXED)).all()
     counted = both[both["n_eff"].fillna(0) >= 50]
     ratio = counted["sigma"] / counted["floor"]
-    assert len(counted) > len(rows) / 2 or not len(rows)
+    assert len(counted) > len(both) / 2 or not len(both)
     assert (ratio > 1 - Z / np.sqrt(4 * counted["n_eff"])).all(), counted[ratio < 1]

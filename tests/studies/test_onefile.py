@@ -338,7 +338,7 @@ def test_a_name_that_a_measure_of_ones_own_looks_for_in_vain_is_the_reason(made)
         seen.row("last", filter="quick", component="y")
     with pytest.raises(MissingEvidence, match="filter 'slow' is the baseline: it has no gain"):
         seen.gain({}, "slow", "x")
-    with pytest.raises(ConfigError, match="no table 'believed'; there are last, curves, gains"):
+    with pytest.raises(ConfigError, match="filter 'quick' predicts no σ"):
         one_file_measures.over_believed(seen, {}, "quick", "x")
 
 

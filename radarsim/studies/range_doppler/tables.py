@@ -146,14 +146,14 @@ def _for_good(settled: np.ndarray, t: np.ndarray) -> float:
     return float(t[first]) if first < len(t) else np.inf
 
 
-@table("believed")
-def _believed(result: Result) -> common.Columns:
+@table("curves")
+def _curves(result: Result) -> common.Columns:
     """As everywhere."""
     variance = np.diagonal(result.axes.believed, axis1=2, axis2=3)
     if own_gains(result):
         with np.errstate(invalid="ignore"):
             variance = np.asarray(result.sums["believed"]) / np.asarray(result.sums["estimates"])
-    return notes.believed(result, np.sqrt(variance))
+    return common.curve_columns(result, np.sqrt(variance))
 
 
 @table("consistency")

@@ -46,7 +46,7 @@ WHAT = {  # of the position or motion, by its name in the table
     "extrapolated": term("extrapolated"),
     "acceleration": term("acceleration"),
 }
-DRAWN_FROM = {"missed": ("curves",), "believed": ("believed", "consistency")}
+DRAWN_FROM = {"missed": ("curves",), "believed": ("curves", "consistency")}
 
 
 SEEN = {
@@ -68,12 +68,12 @@ def figures(
         if chosen:
             figure = sigma_figure(name, chosen, curves, of, left_out)
             if figure and len(results) == 1:
-                figure = panels.floored(figure, made.get("floor"), of.name, panels.in_degrees(of.unit)[0])
+                figure = panels.floored(figure, made["curves"], of.name, panels.in_degrees(of.unit)[0])
             drawn[name] = figure
     known: Any = [result for result in results if isinstance(result.axes, GivenPlotsAxes)]
     of_tables = {"plots": plots_figure, "smoothing_gains": gains_figure, "conversion": conversion_figure}
     own = {name: draw(made[name]) for name, draw in of_tables.items() if name in made}
-    own["believed"] = believed_figure(known, made["believed"], made["consistency"])
+    own["believed"] = believed_figure(known, made["curves"], made["consistency"])
     own["missed"] = missed_figure(known, made["curves"])
     return drawn | seen.all_begun(own, SEEN)
 
@@ -182,7 +182,7 @@ def gains_figure(table: "pd.DataFrame") -> Figure:
 
 
 def believed_figure(
-    results: Sequence[CaseResult[GivenPlotsAxes]], believed: "pd.DataFrame", consistency: "pd.DataFrame"
+    results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.DataFrame", consistency: "pd.DataFrame"
 ) -> Figure | None:
     """True and believed σ, and the normalised error, against the correlation of the errors."""
     cases = [r for r in results if isinstance(r.spec.sensor.error_correlation, float) and r.spec.frame == "polar"]
@@ -194,7 +194,7 @@ def believed_figure(
     last, component = int(cases[0].axes.k[-1]), cases[0].axes.components[0][0]
     true_rows, consistency_rows = (
         tables.where(table, k=last, component=component).set_index(["case", "filter"])
-        for table in (believed, consistency)
+        for table in (curves, consistency)
     )
     left: list[Mark] = []
     right: list[Mark] = [Reference(1.0, label=tr("consistent"))]
@@ -202,7 +202,7 @@ def believed_figure(
         places = [(r.name, f) for r in cases]
         rows = true_rows.loc[places]
         true, claimed = rows["sigma"].to_numpy() / sigma, rows["believed_sigma"].to_numpy() / sigma
-        ends = ((rows[key] * rows["believed_sigma"]).to_numpy() / sigma for key in ("ratio_lo", "ratio_hi"))
+        ends = (rows[key].to_numpy() / sigma for key in ("sigma_lo", "sigma_hi"))
         left.append(Line(rho, true, f, Style(n, n, n), *ends))
         if np.max(np.abs(claimed / true - 1)) > 0.05:
             left.append(Line(rho, claimed, tr("{f}: own σ", f=f), Style(n, None, n)))

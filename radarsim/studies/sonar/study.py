@@ -155,7 +155,6 @@ def axes(
         sigma_of_plots=np.where(possible.T > 0, scene.sigma, np.inf),
         conversion_bias=float(conversion_bias(scene.polar[0, 0, 0], spec.sensor.sigma_bearing_rad)) if plain else 0.0,
         polar=scene.polar,
-        adapts=np.array([isinstance(one.response, filters.AdaptiveRule) for one in specs]),
     )
 
 

@@ -54,14 +54,12 @@ def _extrapolation(result: CaseResult[SonarAxes]) -> Columns:
     }
 
 
-@table("believed")
-def _believed(result: CaseResult[SonarAxes]) -> Columns:
-    """As everywhere."""
+@table("curves")
+def _curves(result: CaseResult[SonarAxes]) -> Columns:
+    """As everywhere. What filters with a test of manoeuvres believe varies much: alarms change their window."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        columns = notes.believed(result, np.sqrt(result.sums["believed"] / common.realisations(result)))
-    adapts = result.axes.adapts[common.shown(result)[0]] if isinstance(result.axes, GivenPlotsAxes) else False
-    # An alarm changes a window's length, and what is believed by a factor: its mean over realisations is itself a draw.
-    return {**columns, "note": np.where(adapts, notes.VARIES, "").astype(object)} if np.any(adapts) else columns
+        variance = result.sums["believed"] / common.realisations(result)
+    return common.curve_columns(result, np.sqrt(variance))
 
 
 @table("consistency")

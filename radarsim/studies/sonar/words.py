@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, tr
-from radarsim.report import panels, tables, wording
+from radarsim.report import notes, panels, tables, wording
 from radarsim.studies.sonar.config import Keys, correlation_of
 from radarsim.studies.sonar.figures import BY_NAME
 from radarsim.studies.sonar.world import SonarAxes
@@ -94,8 +94,10 @@ def _with(rows: "pd.DataFrame") -> str:
 def _most_optimistic(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
     """The filters, of complete state, that overestimate their accuracy the most; none if no filter does."""
     names = [result.name for result in results]
-    believed = made["believed"][made["believed"]["case"].isin(names)]
-    table = believed.merge(made["consistency"][["case", "filter", "k"]].drop_duplicates())
+    curves = made["curves"][made["curves"]["case"].isin(names)]
+    table = curves.merge(made["consistency"][["case", "filter", "k"]].drop_duplicates())
+    ratio = notes.sigma_over_believed(table)
+    table = table.assign(ratio=ratio.value, ratio_lo=ratio.lo, ratio_hi=ratio.hi)
     worst = table.iloc[int(table["ratio"].argmax())]
     if worst["ratio_lo"] <= 1.05:
         return []

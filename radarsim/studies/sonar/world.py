@@ -40,7 +40,6 @@ class GivenPlotsAxes(SonarAxes):
     #: converted without bias.
     conversion_bias: float
     polar: np.ndarray  #: (K, C, 3) the target's range, bearing (and depth or elevation) with first and second rates.
-    adapts: np.ndarray  #: (F,) whether what a filter believes hangs on a detector's alarms.
 
 
 # ---- world -----------------------------------------------------------------------------------------------------------

@@ -108,7 +108,9 @@ def test_radar_table(paper):
 
 def test_consistency_before_the_filter_adds_manoeuvre(paper):
     """At its least-squares start a filter is right about itself; later it allows for manoeuvres that are not there."""
-    table, sigma = range_doppler.tables(paper)["consistency"], range_doppler.tables(paper)["believed"]
+    tables = range_doppler.tables(paper)
+    table, curves = tables["consistency"], tables["curves"]
+    sigma = curves.assign(ratio=curves["sigma"] / curves["believed_sigma"])
     start = table[(table["filter"] == "r") & (table["k"] <= 3)]
     tolerance = rounding(138, 30)  # κ of a parabola through three ranges, in units of its errors
     np.testing.assert_allclose(start["nees"], 1, rtol=tolerance)

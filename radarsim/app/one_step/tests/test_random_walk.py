@@ -28,5 +28,5 @@ def test_the_kernel_agrees_with_the_textbook():
 def test_the_claim_is_confirmed_and_the_filter_believes_what_is_true():
     tables = radarsim.run("random_walk", realisations=20_000).tables
     assert list(tables["claims"]["as_shipped"]) == ["confirmed"]
-    believed = tables["believed"]
-    assert believed["ratio"].to_numpy() == pytest.approx(1, abs=0.05)
+    filtered = tables["curves"].dropna(subset="believed_sigma")
+    assert (filtered["sigma"] / filtered["believed_sigma"]).to_numpy() == pytest.approx(1, abs=0.05)

@@ -217,6 +217,7 @@ def _uses(result: CaseResult[ManoeuvreAxes]) -> Columns:
     """Course, speed, predicted position, closest approach: errors beside `believed_sigma` from the track's covariance.
 
     true_value [unit]: of the quantity that `component` names
+    ratio ±: true over believed σ
     distance_in_sigma: distance of speed or closest approach from zero, which they cannot pass, in believed σ
     first_order: whether it holds: within three σ it fails, and with it that of course and time of closest approach
     """

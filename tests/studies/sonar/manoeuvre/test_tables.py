@@ -8,7 +8,7 @@ from radarsim.app import result as output
 from radarsim.app.configs import load
 from radarsim.papers.sonar.manoeuvre import measures as measured
 from radarsim.papers.verdict_rule import REFUTED
-from radarsim.report import figures, notes, panels
+from radarsim.report import figures, panels
 from radarsim.report.drawing import Reference
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.exact import sigma_acceleration
@@ -49,15 +49,6 @@ def test_detections_lie_about_the_exact_law(tables):
     assert set(rows[rows["case"] == case(0.8)]["phase"]) == {"steady", "manoeuvre", "after"}
     whole = rows[(rows["case"] == case(0.2138)) & (rows["filter"] == "5 plots") & (rows["component"] == "r")]
     assert whole[whole["k"] == 27]["shift"].to_numpy() == pytest.approx(1.0, rel=5e-5 / 0.2138)  # its four digits
-
-
-def test_believed_errors_that_alarms_change_say_what_their_interval_is_of(tables):
-    """Two noises differ in such a ratio by up to 45 of its standard errors, in all other rows as they should."""
-    rows = tables["believed"]
-    varies = rows["filter"].str.startswith(("memory by", "degree by"))
-    assert (rows.loc[varies, "note"] != "").all()
-    assert notes.VARIES in set(rows.loc[varies, "note"])
-    assert notes.VARIES not in set(rows.loc[~varies, "note"])
 
 
 def test_delays_grow_to_the_class(tables):
