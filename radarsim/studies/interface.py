@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from radarsim.report.claims.over import PaperReadings
     from radarsim.report.drawing import Chart, Figure
     from radarsim.report.quantities import Component, Quantity
+    from radarsim.report.sentences import Sentence
     from radarsim.studies.floor import Floor
 
 
@@ -520,8 +521,9 @@ class Study(ABC):
         """The question of an experiment, in one sentence."""
 
     @abstractmethod
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
-        """The answer: sentences with numbers and 95 % intervals."""
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> "Sequence[str | Sentence]":
+        """The answer: sentences with numbers and 95 % intervals. A `Sentence` names the intervals that it rests on,
+        for warnings; a plain text is taken to rest on σ and gain of every filter at the last scan."""
 
     def warnings(self, experiment: "Experiment") -> Sequence[str]:
         """Settings that are allowed but hardly intended, a line each; the run goes on. Default: nothing."""

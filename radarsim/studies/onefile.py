@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from radarsim.report.claims.declared import Claim, Shipped
     from radarsim.report.claims.over import Choice, PaperReadings
     from radarsim.report.drawing import Figure
+    from radarsim.report.sentences import Sentence
 
 
 class Measured(NamedTuple):
@@ -288,34 +289,46 @@ class OneFile(Study):
         """A text of the study, translated by the catalogue of its package."""
         return term(words, type(self).__module__.partition(".")[0])
 
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
-        from radarsim.report import panels
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> "Sequence[str | Sentence]":
+        from radarsim.report import panels, sentences
 
-        shown, others = panels.reported(results)
-        several = len(panels.families(results)) > 1  # configs of an `include`
-        each = ((f"{panels.stem(one)}: " if several else "", one) for one in shown)
-        return [*(f"{name}{sentence}" for name, one in each for sentence in self._sentences(one, made)), *others]
+        reported, remark = panels.reported(results)
+        has_several_configs = len(panels.families(results)) > 1  # of an `include`
+        answer = []
+        for result in reported:
+            prefix = f"{panels.stem(result)}: " if has_several_configs else ""
+            answer += [sentence.with_text(prefix + sentence.text) for sentence in self._sentences(result, made)]
+        return [*answer, *map(sentences.Sentence, remark)]
 
-    def _sentences(self, result: "CaseResult", made: "Mapping[str, pd.DataFrame]") -> Iterator[str]:
+    def _sentences(self, result: "CaseResult", made: "Mapping[str, pd.DataFrame]") -> "Iterator[Sentence]":
         """σ of the leading component at the last scan, and the gain of each filter."""
-        from radarsim.report import panels, tables, wording
+        from radarsim.report import panels, sentences, tables, wording
 
         leading = self.components[0]
-        last = tables.where(made["last"], case=result.name, component=leading.name).to_dict("records")
+        last = tables.where(made["last"], case=result.name, component=leading.name)
         keys: tuple[str, ...] = ("last_sigma", "last_lo", "last_hi")
-        each = [f"{row['filter']} {wording.estimate((row[key] for key in keys), tr(row['unit']))}" for row in last]
-        fields = {"quantity": self._term(leading.words or leading.name), "t": float(result.axes.t_s[-1])}
-        words = tr("σ of the {quantity} after {t:g} s: {filters}.", **fields, filters=listed(each))
-        yield panels.at_its_place(result, words)
+        sigmas = [
+            f"{row['filter']} {wording.estimate((row[key] for key in keys), tr(row['unit']))}"
+            for row in last.to_dict("records")
+        ]
+        text = tr(
+            "σ of the {quantity} after {t:g} s: {filters}.",
+            quantity=self._term(leading.words or leading.name),
+            t=float(result.axes.t_s[-1]),
+            filters=listed(sigmas),
+        )
+        yield sentences.Sentence(panels.at_its_place(result, text), sentences.intervals("last", "last", last))
         gains = tables.where(made["gains"], case=result.name, component=leading.name)
         gains = gains[gains["k"] == gains["k"].max()]
         if len(gains):
             keys = ("gain_percent", "gain_lo", "gain_hi")
-            each = [f"{row['filter']} {wording.estimate((row[key] for key in keys), '%', '.3g')}"
-                    for row in gains.to_dict("records")]  # fmt: skip
+            texts = [
+                f"{row['filter']} {wording.estimate((row[key] for key in keys), '%', '.3g')}"
+                for row in gains.to_dict("records")
+            ]
             base = result.axes.filters[result.axes.baseline]
-            words = tr("Gain against {base} there: {filters}.", base=base, filters=listed(each))
-            yield panels.at_its_place(result, words)
+            text = tr("Gain against {base} there: {filters}.", base=base, filters=listed(texts))
+            yield sentences.Sentence(panels.at_its_place(result, text), sentences.intervals("gains", "gain", gains))
 
     # ---- the paper -----------------------------------------------------------------------------------------------
     @cached_property

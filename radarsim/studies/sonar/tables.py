@@ -8,6 +8,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import notes, statistics
 from radarsim.report import tables as common
+from radarsim.report.row_notes import notes_where
 from radarsim.report.tables import Columns, leading, stacked
 from radarsim.studies.sonar import exact
 from radarsim.studies.sonar.world import GivenPlotsAxes, SonarAxes
@@ -61,7 +62,7 @@ def _believed(result: CaseResult[SonarAxes]) -> Columns:
         columns = notes.believed(result, np.sqrt(result.sums["believed"] / common.realisations(result)))
     adapts = result.axes.adapts[common.shown(result)[0]] if isinstance(result.axes, GivenPlotsAxes) else False
     # An alarm changes a window's length, and what is believed by a factor: its mean over realisations is itself a draw.
-    return {**columns, "note": np.where(adapts, notes.VARIES, "").astype(object)} if np.any(adapts) else columns
+    return {**columns, "note": notes_where(np.asarray(adapts), notes.VARIES)} if np.any(adapts) else columns
 
 
 @table("consistency")
