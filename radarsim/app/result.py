@@ -378,8 +378,10 @@ def case_figures(
     if any(has_note(made[name]).any() for name in ("curves", "gains")):
         drawn = {name: panels.unbanded(figure) for name, figure in drawn.items()}
     names = names_in(results)
-    said = {name: reworded(seen.crossed(figure), partial(called, names=names)) for name, figure in drawn.items()}
-    return {name: panels.joined(figure) for name, figure in said.items()}
+    translate = partial(called, names=names)
+    return {
+        name: panels.joined(reworded(seen.with_meaning_of_crosses(figure), translate)) for name, figure in drawn.items()
+    }
 
 
 def _banded(made: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:

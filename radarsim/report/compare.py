@@ -10,7 +10,7 @@ worst case: the half-widths add. Sides of different noise are independent.
 The figures show each quantity of all sides on common axes, and the differences beside it."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -421,8 +421,7 @@ def _figure(name: str, of: Quantity, sides: Sequence[Side], rows: "pd.DataFrame"
         )
     ) + left_out([side.label for side in every], [side.label for side in some])
     figure = Figure(name, tr("{what} side by side", what=what), caption, panels, 2, PAGE_MM, HEIGHT_MM)
-    told = seen.at_the_end(replace(figure, panels=panels[1:]))
-    return seen.crossed(seen.begun(figure, tr("Right: {told}", told=told[0].lower() + told[1:]) if told else ""))
+    return seen.with_meaning_of_crosses(figure)
 
 
 def _values(of: Quantity, side: Side, n: int, filters: Sequence[str], component: str, model: str) -> list[Mark]:

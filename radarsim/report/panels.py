@@ -342,7 +342,7 @@ def left_out(every: Sequence[str], some: Sequence[str]) -> str:
     gone = [name for name in every if name not in some]
     if not gone:
         return ""
-    told = {"count": len(every) - len(gone), "all": len(every), "names": seen.named(map(plain, gone), MOST_GONE)}
+    told = {"count": len(every) - len(gone), "all": len(every), "names": seen.join_names(map(plain, gone), MOST_GONE)}
     return " " + tr("Shown: {count} of {all}; only in the tables: {names}.", **told)
 
 
@@ -507,7 +507,7 @@ def ever_lost(lines: Sequence[Line]) -> tuple[tuple[Line, ...], str]:
     losses = tuple(map(lost, lines))
     drawn = tuple(line for line in losses if (line.y > 0).any())
     names = [plain(line.name or line.label) for line in losses if not (line.y > 0).any()]
-    said = " " + tr("Zero throughout, so not drawn: {names}.", names=seen.named(names, MOST_GONE)) if names else ""
+    said = " " + tr("Zero throughout, so not drawn: {names}.", names=seen.join_names(names, MOST_GONE)) if names else ""
     if any((line.y == 0).any() for line in drawn):
         said += " " + tr("A zero has no point on this axis.")
     return drawn, said
@@ -564,7 +564,7 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: 
     )
     title = tr("σ of the {quantity}", quantity=of.words)
     figure = in_columns(Figure(name, title, caption, tuple(panels)))
-    return seen.begun(figure, seen.at_the_end(figure))
+    return figure
 
 
 def floored(figure: Figure, floor: "pd.DataFrame | None", component: str, factor: float = 1.0) -> Figure:
@@ -657,9 +657,7 @@ def consistency(results: Sequence[CaseResult], table: "pd.DataFrame", experiment
     """The figure `consistency` of a table with NEES by case, filter and time, a panel for each config."""
     rows = {(*key, "nees"): own for key, own in common.groups(table, "case", "filter").items()}
     some, left_out = shown_families(results, named(experiment, "consistency"))
-    figure = nees_figure(nees_panels(some, rows), left_out)
-    begun = seen.all_begun({"consistency": figure}, {"consistency": seen.extremes})
-    return {name: one for name, one in begun.items() if one}
+    return {"consistency": nees_figure(nees_panels(some, rows), left_out)}
 
 
 def nees_panels(results: Sequence[CaseResult], rows: Mapping) -> list[Panel]:
@@ -760,9 +758,10 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, of: Co
 def _gains_said(figure: Figure) -> Figure:
     """A figure of gains with its first sentence, and a note where losses are cut."""
     if any(panel.y.limits[0] == -LOSS for panel in figure.panels):
-        words = tr("Losses of over {loss:g} % lie below the axis: {names}.", loss=LOSS, names=seen.below(figure, -LOSS))
+        names = seen.lines_below(figure, -LOSS)
+        words = tr("Losses of over {loss:g} % lie below the axis: {names}.", loss=LOSS, names=names)
         figure = replace(figure, caption=f"{figure.caption} {words}")
-    return seen.begun(figure, seen.most(figure))
+    return figure
 
 
 def _cut(y: Axis, lines: Sequence[Mark]) -> tuple[Axis, tuple[Mark, ...]]:
@@ -821,7 +820,7 @@ def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of
     caption += left_out(titles, spread_out(titles, MOST_PANELS))
     title = tr("Dynamic and fluctuation error of the {quantity}", quantity=of.words)
     figure = in_columns(Figure(name, title, caption, tuple(spread_out(drawn, MOST_PANELS))))
-    return seen.begun(figure, seen.extremes(figure))
+    return figure
 
 
 def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Component) -> Panel:

@@ -8,7 +8,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import tr
-from radarsim.report import panels, seen
+from radarsim.report import panels
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Style
 
 WIDE = 20  # ratio of swept values from which the axis is logarithmic
@@ -101,7 +101,7 @@ def line_figure(name: str, key: str, groups: Sequence[Sequence[CaseResult]], cur
     figure = panels.in_columns(Figure(name, title, caption, tuple(made)))
     if len(made[0].x.ticks) > FEW_NAMES:
         figure = replace(figure, columns=min(2, len(made)))
-    return seen.begun(figure, seen.extremes(figure))
+    return figure
 
 
 FEW_NAMES = 3  # on the axis of a panel of three beside each other
@@ -168,7 +168,7 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
     columns = min(2, len(made))
     width = panels.WIDE_MM if columns == 1 else PAGE_MM
     figure = Figure(name, title, caption, tuple(made), columns, width, 62)
-    return seen.begun(figure, seen.extremes(figure))
+    return figure
 
 
 def _named(result: CaseResult, key: str, values: Sequence) -> Axis:
