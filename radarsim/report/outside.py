@@ -92,7 +92,7 @@ def _paired_gains(both: np.ndarray, baseline: str, case: CaseResult) -> common.C
 
 
 def failures(result: CaseResult) -> common.Columns:
-    """How often a filter from outside fails, by the reason; σ and gains count the others.
+    """How often a user filter fails, by the reason; σ and gains count the others.
 
     reason: `any`, or `not_a_number` after an estimate, `no_estimate` though a filter of the config has one, `diverged`
         with an error over a hundred times the largest of the config's filters in the realisation; no failure, but no
@@ -113,7 +113,7 @@ def failures(result: CaseResult) -> common.Columns:
 
 
 def consistency(result: CaseResult) -> common.Columns:
-    """NEES of the components that a filter from outside estimates, where it gives covariances."""
+    """NEES of the components that a user filter estimates, where it gives covariances."""
     parts: list[common.Columns] = []
     for case in others(result):
         sums = np.asarray(case.sums["nees"])
