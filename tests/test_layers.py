@@ -82,7 +82,6 @@ ROOMS = {
         ),
         *("report", "studies", "app", "cli"),
     ),
-    "extensions": (),
     "cli": (
         *(
             "errors",

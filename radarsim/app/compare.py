@@ -126,7 +126,7 @@ def compare(
     drawn = sides.figures([side for run in _labelled(every) for side in run], made)
     described = {name: reworded(figure, said) for name, figure in drawn.items()}
     rows, last = (tuple(table.to_dict("records")) for table in (made, sides.at_the_end(made)))
-    told = tuple((of.value, of.words) for of in sides.told(made, shared))
+    told = tuple((of.value, of.words) for of in sides.summary_quantities(made, shared))
     found = Comparison(None, (), tuple(sentences), tuple(notes), tuple(warnings), rows, last, told, described)
     if out is None:
         return found

@@ -211,7 +211,8 @@ def noted(quantity: Asked, result: CaseResult) -> str:
 
     study, name = registry.study(result.study), quantity.of.table
     tables = {"curves": study.curves([result]), name: table_of(quantity.of, result)}
-    table = notes.noted(tables, [result], exact=False, declared=registry.quantities(result.study, result.spec))[name]
+    declared = registry.quantities(result.study, result.spec)
+    table = notes.add_notes(tables, [result], exact=False, quantities=declared)[name]
     if "note" not in table:
         return ""
     rows = table[table["filter"] == quantity.filter]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from radarsim.app import configs
 from radarsim.app.shown import Several, Shown
@@ -18,9 +18,11 @@ from radarsim.engine.results import CaseResult
 from radarsim.errors import OF_AUTHORS, DisagreementError, MeasureError, RadarsimError
 from radarsim.extensions import extension_figures, extension_tables, extensions
 from radarsim.language import ENGLISH, called, current, plural, tr
-from radarsim.report import files, notes, outside, panels, seen
+from radarsim.report import files, notes, outside, panels, seen, sentences
 from radarsim.report import tables as common
 from radarsim.report.drawing import Figure, reworded
+from radarsim.report.row_notes import has_note, with_note_texts
+from radarsim.report.sentences import Sentence
 from radarsim.report.wording import estimate, spoken
 from radarsim.studies import floor
 from radarsim.studies.interface import Study
@@ -80,7 +82,11 @@ class Result(Shown):
         >>> radarsim.run("rls2", realisations=2000).answer[0].split(":")[0]
         'Range'
         """
-        return answered(self.cases, self._tables)
+        return self._answer.texts
+
+    @cached_property
+    def _answer(self) -> "Answer":
+        return make_answer(self.cases, self._tables)
 
     @property
     def tables(self) -> dict:
@@ -92,7 +98,7 @@ class Result(Shown):
         >>> sorted(radarsim.run("rls2", realisations=2000).tables)
         ['claims', 'consistency', 'curves', 'gains', 'radar', 'steady']
         """
-        return {name: table.copy() for name, table in self._tables.items()}
+        return {name: with_note_texts(table).copy() for name, table in self._tables.items()}
 
     @cached_property
     def _tables(self) -> dict:
@@ -109,12 +115,12 @@ class Result(Shown):
         >>> bool(first["sigma_lo"] < first["exact_sigma"] < first["sigma_hi"])
         True
         """
-        return self._tables["curves"].copy()
+        return with_note_texts(self._tables["curves"]).copy()
 
     @property
     def gains(self) -> "pd.DataFrame":
         """Gains against the baseline filter: a DataFrame with the columns of gains.csv."""
-        return self._tables["gains"].copy()
+        return with_note_texts(self._tables["gains"]).copy()
 
     @property
     def last_scan(self) -> "pd.DataFrame":
@@ -151,7 +157,7 @@ class Result(Shown):
         facts = self.facts | {"finished": datetime.now(UTC).isoformat("T", "seconds")}
         facts["warnings"] = [*self.faults, *facts["warnings"]]
         write = partial(write_files, draw=bool(formats), formats=formats, width_mm=width_mm)
-        self.written = write(self.experiment, self.cases, folder, facts, made=self.tables)
+        self.written = write(self.experiment, self.cases, folder, facts, made=self._tables)
         html.write(Path(out))
         self.check()
         return self.written
@@ -163,7 +169,7 @@ class Result(Shown):
         nearly = [case.name for case in self.experiment.cases if own.exact_but_for(case)]
         bounds = (*extension_tables(), *(() if own.exact_errors else ("curves", "gains")))
         return (
-            *notes.faults(made, nearly, bounds, quantities(own.name, self.cases[0].spec)),
+            *notes.disagreements(made, nearly, bounds, quantities(own.name, self.cases[0].spec)),
             *(line for extension in extensions() for line in extension.disagreements(made)),
         )
 
@@ -186,13 +192,11 @@ class Result(Shown):
     @property
     def warnings(self) -> list[str]:
         """Warnings on the numbers: faults, damaged or mixed blocks, too few realisations."""
-        return [*self.faults, *self.facts["warnings"], *self._of_intervals]
+        return [*self.faults, *self.facts["warnings"], *self._answer_warnings]
 
     @cached_property
-    def _of_intervals(self) -> Sequence[str]:
-        if self.written is not None:
-            return self.written.of_intervals
-        return of_intervals(self.cases, self._tables)
+    def _answer_warnings(self) -> Sequence[str]:
+        return self.written.answer_warnings if self.written is not None else self._answer.warnings
 
 
 # ---- output ----------------------------------------------------------------------------------------------------------
@@ -204,7 +208,7 @@ def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
     made, from_outside = measured(results), outside.measured(results)
     for extension in extensions():
         made |= extension.tables(results, made, from_outside, stem)
-    made = notes.noted(made, results, of.exact_errors, quantities(results[0].study, results[0].spec))
+    made = notes.add_notes(made, results, of.exact_errors, quantities(results[0].study, results[0].spec))
     made = outside.added(made, results, from_outside)
     made["curves"] = floor.with_floors(made["curves"], of.floors(results))
     return made
@@ -243,37 +247,40 @@ def against_first(made: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResu
     return {**made, "gains": common.against_own(made["gains"], results)}
 
 
-MOST_FURTHER = 6  # sentences on further baselines
+MAX_FURTHER = 6  # sentences on further baselines
 
 
-def answered(results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"]) -> tuple[str, ...]:
-    """The answer of an experiment: the study's, and the gains at the last scan against further baselines."""
-    more = [tr("Further gains are in gains.csv.")] if any(one.against for one in results) else []
+class Answer(NamedTuple):
+    """The answer of an experiment: its sentences, and warnings on the intervals that they rest on."""
+
+    texts: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def make_answer(results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"]) -> Answer:
+    """The answer of an experiment: on user filters, of its study, and gains against further baselines."""
+    study_tables = against_first(outside.without(made, results), results)
+    further = [gain for result in results for gain in result.against]
+    answer = [
+        *outside.answer(results, made),
+        *(
+            sentences.as_sentence(sentence, study_tables)
+            for sentence in study(results[0].study).answer(results, study_tables)
+        ),
+        *(sentence for baseline in further[:MAX_FURTHER] for sentence in _gains_against(baseline, made)),
+    ]
     names = names_in(results)
-    return (*(called(sentence, names) for part in answers(results) for sentence in part(made)), *more)
+    texts = [called(str(sentence), names) for sentence in answer]
+    if further:
+        texts.append(tr("Further gains are in gains.csv."))
+    warnings = [called(line, names) for line in notes.answer_warnings(results, made, answer)]
+    return Answer(tuple(texts), tuple(warnings))
 
 
 def asked(experiment: Experiment) -> str:
     """The question of an experiment, in one sentence."""
     question = outside.question(experiment) or study(experiment.study).question(experiment)
     return called(question, names_in(experiment.cases))
-
-
-def answers(results: Sequence[CaseResult]) -> "list[notes.Answer]":
-    """Functions that make the answer from the tables: the study's own, and for each further baseline."""
-    own = study(results[0].study)
-    further = [partial(_gained, one) for result in results for one in result.against]
-    return [
-        *outside.answers(results),
-        lambda made: own.answer(results, against_first(outside.without(made, results), results)),
-        *further[:MOST_FURTHER],
-    ]
-
-
-def of_intervals(results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"]) -> list[str]:
-    """Warnings on the intervals in the answer."""
-    names = names_in(results)
-    return [called(line, names) for line in notes.of_intervals(results, made, answers(results))]
 
 
 def names_in(cases: Iterable[Case | CaseResult]) -> frozenset[str]:
@@ -287,18 +294,24 @@ def names_in(cases: Iterable[Case | CaseResult]) -> frozenset[str]:
     return frozenset(name for one in found for name in (one, one.replace("_", " ")) if name)
 
 
-def _gained(result: CaseResult, made: Mapping[str, "pd.DataFrame"]) -> list[str]:
+def _gains_against(result: CaseResult, made: Mapping[str, "pd.DataFrame"]) -> list[Sentence]:
     """The gain of each filter in the first component against the baseline of a result, at the last scan of both."""
     gains = common.against_own(made["gains"], [result])
     last = gains[gains["component"].eq(gains["component"].iloc[0])] if len(gains) else gains
     last = last.groupby("filter", sort=False).tail(1)
-    keys = ("gain_percent", "gain_lo", "gain_hi")
-    each = [f"{row['filter']} {estimate((row[key] for key in keys), '%', '.3g')}" for row in last.to_dict("records")]
-    if not each:
+    if not len(last):
         return []
-    told = {"case": result.name, "base": result.baseline, "component": last["component"].iloc[0]}
-    told |= {"t": f"{last['t_s'].max():g}", "filters": "; ".join(each)}
-    return [tr("{case}, gain in {component} against {base} at {t} s: {filters}.", **told)]
+    keys = ("gain_percent", "gain_lo", "gain_hi")
+    texts = [f"{row['filter']} {estimate((row[key] for key in keys), '%', '.3g')}" for row in last.to_dict("records")]
+    text = tr(
+        "{case}, gain in {component} against {base} at {t} s: {filters}.",
+        case=result.name,
+        base=result.baseline,
+        component=last["component"].iloc[0],
+        t=f"{last['t_s'].max():g}",
+        filters="; ".join(texts),
+    )
+    return [Sentence(text, sentences.intervals("gains", "gain", last))]
 
 
 def case_figures(
@@ -324,11 +337,13 @@ def case_figures(
 
         curves = common.groups(banded["curves"], "case", "filter", "component")
         drawn |= sweeps.figures(outside.joined(results), curves)
-    if any(notes.heavy(made[name]).any() for name in ("curves", "gains")):
+    if any(has_note(made[name]).any() for name in ("curves", "gains")):
         drawn = {name: panels.unbanded(figure) for name, figure in drawn.items()}
     names = names_in(results)
-    said = {name: reworded(seen.crossed(figure), partial(called, names=names)) for name, figure in drawn.items()}
-    return {name: panels.joined(figure) for name, figure in said.items()}
+    translate = partial(called, names=names)
+    return {
+        name: panels.joined(reworded(seen.with_meaning_of_crosses(figure), translate)) for name, figure in drawn.items()
+    }
 
 
 def _banded(made: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:
@@ -336,7 +351,7 @@ def _banded(made: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:
     thinned = {}
     for name, ends in (("curves", ("sigma_lo", "sigma_hi")), ("gains", ("gain_lo", "gain_hi"))):
         table = made[name]
-        if (thin := notes.heavy(table)).any():
+        if (thin := has_note(table)).any():
             thinned[name] = table.assign(**{end: table[end].mask(thin) for end in ends})
     return {**made, **thinned}
 
@@ -346,7 +361,7 @@ class Written:
     """Output of `write_files`: the folder, its files by their path in it, the tables, and the sentences of the answer.
 
     removed: files of an earlier run that this one did not write. seconds: of drawing, and of writing with the report.
-    of_intervals: warnings on the intervals in the answer."""
+    answer_warnings: warnings on the intervals that the answer rests on."""
 
     folder: Path
     files: tuple[str, ...]
@@ -354,7 +369,7 @@ class Written:
     tables: Mapping[str, "pd.DataFrame"] = field(repr=False)
     answer: tuple[str, ...]
     seconds: Mapping[str, float]
-    of_intervals: tuple[str, ...]
+    answer_warnings: tuple[str, ...]
 
 
 ALWAYS = ("curves", "gains")  # tables written even without a row; others only if they have rows
@@ -386,9 +401,9 @@ def write_files(
         described = case_figures(results, made, experiment) if draw else {}
         foremost = [*described][:1] if any(result.outside for result in results) else []  # the answer is about it
         described = {name: described[name] for name in dict.fromkeys([*foremost, *experiment.drawn(described)])}
-        answer = answered(results, made)
+        answer = make_answer(results, made)
         for name in [*described][:1]:
-            described[name] = replace(described[name], headline=html.headline(answer))
+            described[name] = replace(described[name], headline=html.headline(answer.texts))
         question = asked(experiment)
     except RadarsimError:
         raise
@@ -404,15 +419,15 @@ def write_files(
             contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
         contents["figures/captions.md"] = captions(described).encode()
     drawn = time.perf_counter()
-    warned = of_intervals(results, made)
-    run = {**run, "warnings": [*run.get("warnings", ()), *warned, *unnamed(own, described)]}
-    record = files.record(experiment, results, run, contents, answer, machine_facts())
+    made = {name: with_note_texts(table) for name, table in made.items()}
+    run = {**run, "warnings": [*run.get("warnings", ()), *answer.warnings, *unnamed(own, described)]}
+    record = files.record(experiment, results, run, contents, answer.texts, machine_facts())
     report = html.report_page(
         experiment,
         made,
         list(described.values()),
         record,
-        answer,
+        answer.texts,
         question,
         inputs=own.inputs(results),
         cost=own.cost(outside.without(made, results), run),
@@ -424,7 +439,7 @@ def write_files(
     removed = sorted(set(files.outputs(folder)) - set(contents))
     files.replace_all(folder, contents, stale=files.outputs)
     seconds = {"drawing": drawn - began, "writing": time.perf_counter() - drawn}
-    return Written(folder, tuple(sorted(contents)), tuple(removed), made, answer, seconds, tuple(warned))
+    return Written(folder, tuple(sorted(contents)), tuple(removed), made, answer.texts, seconds, answer.warnings)
 
 
 def unnamed(own: Study, described: Iterable[str]) -> list[str]:

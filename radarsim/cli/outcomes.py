@@ -155,7 +155,7 @@ def too_narrow(row: Any, column: str) -> str:
     if not isinstance(note, str) or not note:  # not a text: of a gain that a row does not have
         return ""
     tails, other = MARKS
-    return tails if note == notes.HEAVY else other
+    return tails if note == str(notes.HEAVY) else other
 
 
 def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:

@@ -10,7 +10,7 @@ worst case: the half-widths add. Sides of different noise are independent.
 The figures show each quantity of all sides on common axes, and the differences beside it."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -47,7 +47,7 @@ class Side:
     tables: "Mapping[str, pd.DataFrame]" = field(repr=False)
     measured: tuple[Quantity, ...] = COMMON
 
-    def rest(self) -> str:
+    def swept_keys(self) -> str:
         """The name of the case without its config's: the swept keys."""
         return self.case.partition(" ")[2]
 
@@ -65,19 +65,20 @@ class Pair(NamedTuple):
 
 
 def pairs(runs: Sequence[Sequence[Side]]) -> tuple[list[Pair], list[str]]:
-    """Each further run's cases against those of the first, and a line for each case without a partner. A run of a
-    single case is compared with every case of the other; else cases with the same swept values, or the same name, are
-    partners."""
-    first, found, alone = runs[0], [], []
+    """Each further run's cases against those of the first, and a line for each case without a partner.
+
+    A run of a single case is compared with every case of the other; else cases with the same swept values, or the same
+    name, are partners."""
+    first, matched, unmatched = runs[0], list[Pair](), list[str]()
+    by_name = {side.case: side for side in first} | {side.swept_keys(): side for side in first if side.swept_keys()}
     for run in runs[1:]:
-        own = [Pair(side, other) for side in run for other in first if min(len(run), len(first)) == 1]
-        if not own:
-            named = {other.case: other for other in first} | {other.rest(): other for other in first if other.rest()}
-            answering = {side.label: named.get(side.rest() or side.case) for side in run}
-            own = [Pair(side, other) for side in run if (other := answering[side.label]) is not None]
-            alone += [f"{label}: no such case in {first[0].run}" for label, other in answering.items() if other is None]
-        found += own
-    return found, alone
+        if min(len(run), len(first)) == 1:
+            matched += [Pair(side, against) for side in run for against in first]
+            continue
+        partners = [(side, by_name.get(side.swept_keys() or side.case)) for side in run]
+        matched += [Pair(side, against) for side, against in partners if against is not None]
+        unmatched += [f"{side.label}: no such case in {first[0].run}" for side, against in partners if against is None]
+    return matched, unmatched
 
 
 # ---- table -----------------------------------------------------------------------------------------------------------
@@ -99,14 +100,14 @@ DIGITS = 9  # of a time, when rows are matched
 
 def compared(pairs: Sequence[Pair]) -> "pd.DataFrame":
     """A row for each value of a side that the other side has too."""
-    parts = [part for pair in pairs for of in shared(pair) if (part := _part(pair, of)) is not None]
+    parts = [part for pair in pairs for quantity in shared(pair) if (part := _part(pair, quantity)) is not None]
     return tables.joined(parts, COLUMNS)
 
 
 def shared(sides: Iterable[Side]) -> list[Quantity]:
     """The quantities measured by two sides or more; the complement of a share differs by the same amount."""
-    found = [one for side in sides for one in side.measured if not one.rest]
-    return [one for one in dict.fromkeys(found) if found.count(one) > 1]
+    measured = [quantity for side in sides for quantity in side.measured if not quantity.rest]
+    return [quantity for quantity in dict.fromkeys(measured) if measured.count(quantity) > 1]
 
 
 def filters_of(side: Side) -> list[str]:
@@ -114,30 +115,31 @@ def filters_of(side: Side) -> list[str]:
     return list(dict.fromkeys(side.tables["curves"]["filter"])) if "curves" in side.tables else []
 
 
-def _part(pair: Pair, of: Quantity) -> dict[str, Any] | None:
+def _part(pair: Pair, quantity: Quantity) -> dict[str, Any] | None:
     """The columns of one quantity of one pair; None where they share no row."""
-    found = [side.tables.get(of.table) for side in pair]
-    a, b = (None if table is None or not len(table) else _rows(table, of) for table in found)
+    stored = [side.tables.get(quantity.table) for side in pair]
+    a, b = (None if table is None or not len(table) else _rows(table, quantity) for table in stored)
     if a is None or b is None:
         return None
-    own, other = filters_of(pair.side), filters_of(pair.against)
-    alone = len(own) == len(other) == 1 and own != other  # two single filters are partners whatever their names
+    filters, other_filters = filters_of(pair.side), filters_of(pair.against)
+    # Two single filters are partners whatever their names.
+    are_single = len(filters) == len(other_filters) == 1 and filters != other_filters
     b = b.assign(against_filter=b["filter"])
-    if alone:
-        b = b.assign(filter=own[0])
+    if are_single:
+        b = b.assign(filter=filters[0])
     keys = [name for name in (*LABELS, "unit") if name in a and name in b]
     a, b = (rows.assign(at=rows["t_s"].round(DIGITS)) for rows in (a, b))
     if not set(a["at"]) & set(b["at"]):  # no common time: the ends of both
         a, b = (rows.groupby(keys, sort=False).tail(1).assign(at=np.nan) for rows in (a, b))
     rows = a.merge(b, on=[*keys, "at"], suffixes=("", "_b"))
-    return _columns(pair, of, rows) if len(rows) else None
+    return _columns(pair, quantity, rows) if len(rows) else None
 
 
-def _rows(table: "pd.DataFrame", of: Quantity) -> "pd.DataFrame":
+def _rows(table: "pd.DataFrame", quantity: Quantity) -> "pd.DataFrame":
     """Rows of a quantity's table with the columns of `LABELS`, `unit`, `t_s`, `value`, `lo`, `hi` and `exact`. The
     first ones as far as it has them; without times these are not-a-number."""
-    values, exact = of.read(table)
-    labels = {"filter": "filter", of.per if of.per in LABELS else "component": of.per, "unit": "unit"}
+    values, exact = quantity.read(table)
+    labels = {"filter": "filter", quantity.per if quantity.per in LABELS else "component": quantity.per, "unit": "unit"}
     return tables.frame(
         {
             **{name: table[column].to_numpy() for name, column in labels.items() if column in table},
@@ -148,29 +150,29 @@ def _rows(table: "pd.DataFrame", of: Quantity) -> "pd.DataFrame":
     )
 
 
-def _columns(pair: Pair, of: Quantity, rows: "pd.DataFrame") -> dict[str, Any]:
+def _columns(pair: Pair, quantity: Quantity, rows: "pd.DataFrame") -> dict[str, Any]:
     n = len(rows)
     empty, blank = np.full(n, np.nan), np.full(n, "", dtype=object)
-    unit = np.full(n, of.unit, dtype=object)
-    measured, other = (_estimate(rows, end) for end in ("", "_b"))
-    rho, pairing = correlation(pair, of, rows)
-    same = pairing == SAME
+    unit = np.full(n, quantity.unit, dtype=object)
+    measured, against = (_estimate(rows, end) for end in ("", "_b"))
+    rho, pairing = correlation(pair, quantity, rows)
+    is_same = pairing == SAME
 
-    def apart_of(one: Estimate, two: Estimate) -> Estimate:
-        apart = difference(one, two, rho)
-        return Estimate(apart.value, *(np.where(same, apart.value, end) for end in apart[1:]))
+    def difference_of(left: Estimate, right: Estimate) -> Estimate:
+        change = difference(left, right, rho)
+        return Estimate(change.value, *(np.where(is_same, change.value, end) for end in change[1:]))
 
-    apart = apart_of(measured, other)
+    change = difference_of(measured, against)
     exact, against_exact = (rows[f"exact{end}"].to_numpy() for end in ("", "_b"))
     percent, exact_percent = Estimate(empty, empty, empty), empty
-    if of.kind == "size":
+    if quantity.kind == "size":
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = apart_of(*(Estimate(*map(np.log, side)) for side in (measured, other)))
-            known = np.isfinite(ratio.value)  # not where either was never seen
-            percent = Estimate(*(np.where(known, 100 * np.expm1(end), np.nan) for end in ratio))
+            ratio = difference_of(*(Estimate(*map(np.log, side)) for side in (measured, against)))
+            is_finite = np.isfinite(ratio.value)  # not where either was never seen
+            percent = Estimate(*(np.where(is_finite, 100 * np.expm1(end), np.nan) for end in ratio))
             exact_percent = 100 * (exact / against_exact - 1)
     return {
-        "quantity": np.full(n, of.value, dtype=object),
+        "quantity": np.full(n, quantity.value, dtype=object),
         **{name: _column(rows, name, blank) for name in LABELS},
         "unit": _column(rows, "unit", unit),
         "t_s": rows["t_s"].to_numpy(dtype=float),
@@ -179,9 +181,9 @@ def _columns(pair: Pair, of: Quantity, rows: "pd.DataFrame") -> dict[str, Any]:
         "exact": exact,
         **{name: np.full(n, value, dtype=object) for name, value in _names(pair, "against_").items()},
         "against_filter": rows["against_filter"].to_numpy(),
-        **tables.interval_columns("against", other),
+        **tables.interval_columns("against", against),
         "against_exact": against_exact,
-        **tables.interval_columns("difference", apart),
+        **tables.interval_columns("difference", change),
         **tables.interval_columns("percent", percent),
         "exact_percent": exact_percent,
         "pairing": pairing,
@@ -201,38 +203,38 @@ def _estimate(rows: "pd.DataFrame", end: str) -> Estimate:
     return Estimate(*(rows[f"{name}{end}"].to_numpy(dtype=float) for name in ("value", "lo", "hi")))
 
 
-def correlation(pair: Pair, of: Quantity, rows: "pd.DataFrame") -> tuple[np.ndarray, np.ndarray]:
+def correlation(pair: Pair, quantity: Quantity, rows: "pd.DataFrame") -> tuple[np.ndarray, np.ndarray]:
     """For each row the correlation of both estimates, in the worst case, and how it is known."""
     n = len(rows)
     if not pair.common_noise:
         return np.zeros(n), np.full(n, INDEPENDENT, dtype=object)
     a, b = (_estimate(rows, end) for end in ("", "_b"))
-    same = np.all([x == y for x, y in zip(a, b, strict=True)], axis=0)
+    is_same = np.all([x == y for x, y in zip(a, b, strict=True)], axis=0)
     rho = np.full(n, -1.0)
-    if of == SIGMA and pair.side.count == pair.against.count:
-        one = _with_baseline(pair.side, rows, "filter")
-        two = _with_baseline(pair.against, rows, "against_filter")
+    if quantity == SIGMA and pair.side.count == pair.against.count:
+        rho_side = _with_baseline(pair.side, rows, "filter")
+        rho_against = _with_baseline(pair.against, rows, "against_filter")
         linked = _same_baseline(pair, rows)
         with np.errstate(invalid="ignore"):
-            worst = one * two - np.sqrt(np.maximum((1 - one**2) * (1 - two**2), 0))
+            worst = rho_side * rho_against - np.sqrt(np.maximum((1 - rho_side**2) * (1 - rho_against**2), 0))
         rho = np.where(linked & np.isfinite(worst), worst, rho)
-    words = np.where(rho > -1, LINKED, UNLINKED).astype(object)
-    return np.where(same, 1.0, rho), np.where(same, SAME, words)
+    pairing = np.where(rho > -1, LINKED, UNLINKED).astype(object)
+    return np.where(is_same, 1.0, rho), np.where(is_same, SAME, pairing)
 
 
 def _with_baseline(side: Side, rows: "pd.DataFrame", column: str) -> np.ndarray:
     """The correlation of each row's mean square with the baseline's: from the widths of both σ and of their gain."""
-    base, widths = baseline(side), _widths(side.tables["curves"], "sigma_lo", "sigma_hi")
+    baseline_name, widths = baseline(side), _widths(side.tables["curves"], "sigma_lo", "sigma_hi")
     gains = side.tables["gains"]
     ratios = _widths(gains.assign(hi=100 - gains["gain_lo"], lo=100 - gains["gain_hi"]), "lo", "hi")
-    found = np.full(len(rows), np.nan)
+    correlations = np.full(len(rows), np.nan)
     for i, (f, c, t) in enumerate(rows[[column, "component", "t_s"]].itertuples(index=False, name=None)):
-        own, other, joint = widths.get((f, c, t)), widths.get((base, c, t)), ratios.get((f, c, t))
-        if f == base:
-            found[i] = 1.0
-        elif own and other and joint is not None:
-            found[i] = np.clip((own**2 + other**2 - joint**2) / (2 * own * other), -1, 1)
-    return found
+        width, base_width, ratio_width = widths.get((f, c, t)), widths.get((baseline_name, c, t)), ratios.get((f, c, t))
+        if f == baseline_name:
+            correlations[i] = 1.0
+        elif width and base_width and ratio_width is not None:
+            correlations[i] = np.clip((width**2 + base_width**2 - ratio_width**2) / (2 * width * base_width), -1, 1)
+    return correlations
 
 
 def _widths(table: "pd.DataFrame", lo: str, hi: str) -> dict[tuple, float]:
@@ -251,73 +253,79 @@ def baseline(side: Side) -> str:
 
 def _same_baseline(pair: Pair, rows: "pd.DataFrame") -> np.ndarray:
     """Whether both sides' baselines have equal numbers at the row's component and time: the same filter."""
-    known = []
+    baseline_rows = []
     for side in pair:
         curves = side.tables["curves"]
-        own = curves[curves["filter"] == baseline(side)]
-        values = own[["component", "t_s", "sigma", "sigma_lo", "sigma_hi"]].itertuples(index=False, name=None)
-        known.append({(c, t): rest for c, t, *rest in values})
-    places = rows[["component", "t_s"]].itertuples(index=False, name=None)
-    return np.array([place in known[0] and known[0][place] == known[1].get(place) for place in places], dtype=bool)
-
-
-# ---- words -----------------------------------------------------------------------------------------------------------
-MOST_SENTENCES = 12  # sentences; the table has all
-
-
-def sentences(made: "pd.DataFrame", measured: Iterable[Quantity] = COMMON) -> list[str]:
-    """At the last common time, for the first component of each quantity in `told`: both values and their difference."""
-    last = at_the_end(made)
-    lines: list[str] = []
-    for of in told(made, measured):
-        rows = last[last["quantity"] == of.value]
-        if not len(rows):
-            continue
-        first = tables.where(rows, component=rows["component"].iloc[0], model=rows["model"].iloc[0])
-        lines += [_sentence(of.words, row) for row in first.to_dict("records")]
-    left = len(lines) - MOST_SENTENCES
-    return lines[:MOST_SENTENCES] + (
-        [
-            plural(
-                "{count} further comparison: in comparison.csv.",
-                "{count} further comparisons: in comparison.csv.",
-                left,
-            )
-        ]
-        if left > 0
-        else []
+        rows_of_baseline = curves[curves["filter"] == baseline(side)]
+        values = rows_of_baseline[["component", "t_s", "sigma", "sigma_lo", "sigma_hi"]].itertuples(
+            index=False, name=None
+        )
+        baseline_rows.append({(c, t): numbers for c, t, *numbers in values})
+    points = rows[["component", "t_s"]].itertuples(index=False, name=None)
+    return np.array(
+        [point in baseline_rows[0] and baseline_rows[0][point] == baseline_rows[1].get(point) for point in points],
+        dtype=bool,
     )
 
 
-def told(made: "pd.DataFrame", measured: Iterable[Quantity]) -> list[Quantity]:
+# ---- words -----------------------------------------------------------------------------------------------------------
+MAX_SENTENCES = 12  # the table has all
+
+
+def sentences(comparison: "pd.DataFrame", measured: Iterable[Quantity] = COMMON) -> list[str]:
+    """Both values and their difference at the last common time, for the first component of `summary_quantities`."""
+    last = at_the_end(comparison)
+    lines: list[str] = []
+    for quantity in summary_quantities(comparison, measured):
+        rows = last[last["quantity"] == quantity.value]
+        if not len(rows):
+            continue
+        first = tables.where(rows, component=rows["component"].iloc[0], model=rows["model"].iloc[0])
+        lines += [_sentence(quantity.words, row) for row in first.to_dict("records")]
+    further = len(lines) - MAX_SENTENCES
+    if further <= 0:
+        return lines
+    remark = plural(
+        "{count} further comparison: in comparison.csv.", "{count} further comparisons: in comparison.csv.", further
+    )
+    return [*lines[:MAX_SENTENCES], remark]
+
+
+def summary_quantities(comparison: "pd.DataFrame", measured: Iterable[Quantity]) -> list[Quantity]:
     """The quantities in sentences: the first, and those that neither follow from it (gains) nor list many shares."""
-    found = [of for of in measured if (made["quantity"] == of.value).any()]
-    return [of for n, of in enumerate(found) if not n or (not of.paired and of.per in ("", "component"))]
+    compared_quantities = [quantity for quantity in measured if (comparison["quantity"] == quantity.value).any()]
+    return [
+        quantity
+        for n, quantity in enumerate(compared_quantities)
+        if not n or (not quantity.paired and quantity.per in ("", "component"))
+    ]
 
 
-def at_the_end(made: "pd.DataFrame") -> "pd.DataFrame":
+def at_the_end(comparison: "pd.DataFrame") -> "pd.DataFrame":
     """The rows of the last common time of each line, of those with a value on both sides."""
     keys = ["quantity", "label", "against_label", "filter", "component", "model"]
-    last = made.groupby(keys, sort=False).tail(1)
+    last = comparison.groupby(keys, sort=False).tail(1)
     return last[last["value"].notna() & last["against"].notna()]
 
 
 def _sentence(words: str, row: dict[Any, Any]) -> str:
-    of = str(row["component"] or row["model"])
+    symbol = str(row["component"] or row["model"])
     unit = tr(unit_of(row["unit"]))
-    other = f"{row['against_label']}" + ("" if row["against_filter"] == row["filter"] else f", {row['against_filter']}")
-    what = tr("{quantity} of {symbol}", quantity=tr(words), symbol=of) if of else tr(words)
+    partner = f"{row['against_label']}" + (
+        "" if row["against_filter"] == row["filter"] else f", {row['against_filter']}"
+    )
+    subject = tr("{quantity} of {symbol}", quantity=tr(words), symbol=symbol) if symbol else tr(words)
     change, exact = changes(row)
     if row["t_s"] == row["t_s"]:
-        what = tr("{what} at {t_s:g} s", what=what, t_s=row["t_s"])
+        subject = tr("{what} at {t_s:g} s", what=subject, t_s=row["t_s"])
     return tr(
         "{label}, {filter}: {what} {value} against {against} of {other}: {change}.",
         label=row["label"],
         filter=row["filter"],
-        what=what,
+        what=subject,
         value=f"{value(row['value'])} {unit}".rstrip(),
         against=f"{value(row['against'])} {unit}".rstrip(),
-        other=other,
+        other=partner,
         change=change + (tr(", exactly {value}", value=exact) if exact else ""),
     )
 
@@ -330,9 +338,9 @@ def changes(row: dict[Any, Any]) -> tuple[str, str]:
     exact = row["exact_percent"]
     if row["lo"] == row["hi"] and row["against_lo"] == row["against_hi"] and exact == exact:
         return percent(exact), ""  # of a table of exact values: there is no interval
-    ends = row["percent_lo"], row["percent_hi"]
-    said = [signed(one, "#.3g") if max(ends) < MULTIPLE else percent(one) for one in ends]
-    return f"{percent(row['percent'])} {interval(*said)}", percent(exact) if exact == exact else ""
+    percents = row["percent_lo"], row["percent_hi"]
+    bounds = [signed(bound, "#.3g") if max(percents) < MULTIPLE else percent(bound) for bound in percents]
+    return f"{percent(row['percent'])} {interval(*bounds)}", percent(exact) if exact == exact else ""
 
 
 MULTIPLE = 300  # per cent, from which on a change is written as a multiple
@@ -356,13 +364,13 @@ def value(number: float) -> str:
     return significant_digits(number)
 
 
-def pairings(made: "pd.DataFrame") -> list[str]:
+def pairings(comparison: "pd.DataFrame") -> list[str]:
     """How the differences are paired, a line for each kind."""
-    kinds = made.loc[made["quantity"] == "sigma", "pairing"].tolist()
-    counts = {words: kinds.count(kind) for kind, words in MEANING.items()}
+    kinds = comparison.loc[comparison["quantity"] == "sigma", "pairing"].tolist()
+    counts = {meaning: kinds.count(kind) for kind, meaning in MEANING.items()}
     return [
-        tr("{count:,} of {total:,} differences of σ: {words}", count=count, total=len(kinds), words=tr(words))
-        for words, count in counts.items()
+        tr("{count:,} of {total:,} differences of σ: {words}", count=count, total=len(kinds), words=tr(meaning))
+        for meaning, count in counts.items()
         if count
     ]
 
@@ -371,89 +379,94 @@ def pairings(made: "pd.DataFrame") -> list[str]:
 HEIGHT_MM = 70.0
 
 
-def figures(sides: Sequence[Side], made: "pd.DataFrame") -> dict[str, Figure]:
+def figures(sides: Sequence[Side], comparison: "pd.DataFrame") -> dict[str, Figure]:
     """A figure for each quantity and component that two sides share: values on the left, differences on the right.
 
     made is from table.compared. Of more than eight sides the first eight are drawn, and the caption says so."""
-    drawn, measured = {}, {one.value: one for one in shared(sides)}
-    for (quantity, component, model), rows in made.groupby(["quantity", "component", "model"], sort=False):
-        of = measured[str(quantity)]
+    figures_by_name, quantities = {}, {quantity.value: quantity for quantity in shared(sides)}
+    for (value_column, component, model), rows in comparison.groupby(["quantity", "component", "model"], sort=False):
+        quantity = quantities[str(value_column)]
         component, model = str(component), str(model)
         if rows["t_s"].nunique() < 2:
             continue
-        parts = [of.value.removesuffix("_percent"), component, f"model{model}" if model else ""]
+        parts = [quantity.value.removesuffix("_percent"), component, f"model{model}" if model else ""]
         name = "_".join(filter(None, parts))
-        drawn[name] = _figure(name, of, sides, rows, component, model)
-    return drawn
+        figures_by_name[name] = _figure(name, quantity, sides, rows, component, model)
+    return figures_by_name
 
 
-def _figure(name: str, of: Quantity, sides: Sequence[Side], rows: "pd.DataFrame", component: str, model: str) -> Figure:
-    taking_part = {*rows["label"], *rows["against_label"]}
-    every = [side for side in sides if side.label in taking_part]
-    some = every[:MOST]
-    filters = list(dict.fromkeys(f for side in some for f in filters_of(side)))
+def _figure(
+    name: str, quantity: Quantity, sides: Sequence[Side], rows: "pd.DataFrame", component: str, model: str
+) -> Figure:
+    labels = {*rows["label"], *rows["against_label"]}
+    compared_sides = [side for side in sides if side.label in labels]
+    visible = compared_sides[:MOST]
+    filters = list(dict.fromkeys(f for side in visible for f in filters_of(side)))
     unit = rows["unit"].iloc[0]
     symbol = letter(component) if component else model
-    what = tr(of.axis, symbol=symbol) if of.axis else f"{tr(of.words)} {symbol}".strip()
-    values = [mark for n, side in enumerate(some) for mark in _values(of, side, n, filters, component, model)]
-    apart = _apart(of, some, rows, filters)
-    keys = [(literal(side.label), Style(n, 0)) for n, side in enumerate(some)]
+    axis_text = tr(quantity.axis, symbol=symbol) if quantity.axis else f"{tr(quantity.words)} {symbol}".strip()
+    values = [mark for n, side in enumerate(visible) for mark in _values(quantity, side, n, filters, component, model)]
+    changes = _change_lines(quantity, visible, rows, filters)
+    keys = [(literal(side.label), Style(n, 0)) for n, side in enumerate(visible)]
     keys += [(literal(f), Style(0, n, n)) for n, f in enumerate(filters)] if len(filters) > 1 else []
-    low = None if of.kind == "signed" else 0.0
-    y = Axis(with_unit(what, unit), limits=(low, None))
-    apart_by = term("change") if of.kind == "size" else term("difference")
+    low = None if quantity.kind == "signed" else 0.0
+    y = Axis(with_unit(axis_text, unit), limits=(low, None))
+    change_name = term("change") if quantity.kind == "size" else term("difference")
     against = rows["against_label"].iloc[0] if rows["against_label"].nunique() == 1 else tr("the first")
     difference = Axis(
-        with_unit(tr("{of} against {name}", of=apart_by, name=literal(against)), "%" if of.kind == "size" else unit)
+        with_unit(
+            tr("{of} against {name}", of=change_name, name=literal(against)), "%" if quantity.kind == "size" else unit
+        )
     )
     panels = (
         Panel(time_axis(), y, tuple(values), direct=False, legend="none"),
-        Panel(time_axis(), difference, (Reference(0), *apart), keys=tuple(keys), legend="right"),
+        Panel(time_axis(), difference, (Reference(0), *changes), keys=tuple(keys), legend="right"),
     )
     caption = (
         tr(
             "Left: {words} of {value} on common axes. Right: the {of} against {against} at common times. "
             "Bands: 95 % intervals.",
-            words=term(of.words),
-            value=", ".join(side.label for side in some),
-            of=apart_by,
+            words=term(quantity.words),
+            value=", ".join(side.label for side in visible),
+            of=change_name,
             against=against,
         )
-    ) + left_out([side.label for side in every], [side.label for side in some])
-    figure = Figure(name, tr("{what} side by side", what=what), caption, panels, 2, PAGE_MM, HEIGHT_MM)
-    told = seen.at_the_end(replace(figure, panels=panels[1:]))
-    return seen.crossed(seen.begun(figure, tr("Right: {told}", told=told[0].lower() + told[1:]) if told else ""))
+    ) + left_out([side.label for side in compared_sides], [side.label for side in visible])
+    figure = Figure(name, tr("{what} side by side", what=axis_text), caption, panels, 2, PAGE_MM, HEIGHT_MM)
+    return seen.with_meaning_of_crosses(figure)
 
 
-def _values(of: Quantity, side: Side, n: int, filters: Sequence[str], component: str, model: str) -> list[Mark]:
+def _values(quantity: Quantity, side: Side, n: int, filters: Sequence[str], component: str, model: str) -> list[Mark]:
     """A line for each filter of a side."""
-    table, marks = side.tables.get(of.table), list[Mark]()
+    table, marks = side.tables.get(quantity.table), list[Mark]()
     if table is None:
         return marks
-    rows = _rows(table, of)
+    rows = _rows(table, quantity)
     for i, f in enumerate(filters):
-        own = rows[rows["filter"] == f]
-        own = own[own["component"] == component] if component else own
-        own = own[own["model"] == model] if "model" in own and model else own
-        if len(own):
+        line_rows = rows[rows["filter"] == f]
+        line_rows = line_rows[line_rows["component"] == component] if component else line_rows
+        line_rows = line_rows[line_rows["model"] == model] if "model" in line_rows and model else line_rows
+        if len(line_rows):
             columns = ("t_s", "value", "lo", "hi", "exact")
-            marks.append(line(own, columns, "", Style(n, i, i), f"{literal(side.label)}, {literal(f)}"))
+            marks.append(line(line_rows, columns, "", Style(n, i, i), f"{literal(side.label)}, {literal(f)}"))
     return marks
 
 
-def _apart(of: Quantity, sides: Sequence[Side], rows: "pd.DataFrame", filters: Sequence[str]) -> list[Mark]:
+def _change_lines(
+    quantity: Quantity, sides: Sequence[Side], rows: "pd.DataFrame", filters: Sequence[str]
+) -> list[Mark]:
     """A line for each filter of each side that is compared with another."""
-    value, exact = ("percent", "exact_percent") if of.kind == "size" else ("difference", "")
+    value, exact = ("percent", "exact_percent") if quantity.kind == "size" else ("difference", "")
     numbers, marks = {side.label: n for n, side in enumerate(sides)}, list[Mark]()
-    several = rows["against_label"].nunique() > 1
-    for key, own in rows.groupby(["label", "against_label", "filter"], sort=False):
+    has_several_partners = rows["against_label"].nunique() > 1
+    for key, line_rows in rows.groupby(["label", "against_label", "filter"], sort=False):
         label, against, f = map(str, key)
         if label not in numbers or against not in numbers:
             continue
         name = f"{literal(label)}, {literal(f)}"
-        if several:
+        if has_several_partners:
             name = tr("{name} against {other}", name=name, other=literal(against))
         i = filters.index(f)
         columns = ["t_s", value, f"{value}_lo", f"{value}_hi", *([exact] if exact else [])]
-        marks.append(line(own, columns, "", Style(numbers[label], i, i), name))
+        marks.append(line(line_rows, columns, "", Style(numbers[label], i, i), name))
     return marks

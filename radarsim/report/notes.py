@@ -32,15 +32,17 @@ A row with an exact value has none: that value is the better one, whatever the i
 unmarked rows is in docs/trust.md."""
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language import plural, tr
-from radarsim.report import files, rare, seen, statistics, tables
+from radarsim.language import few, plural, tr
+from radarsim.report import files, rare, statistics, tables
 from radarsim.report.quantities import COMMON, Quantity
+from radarsim.report.row_notes import RowNote, concerns, note_kinds, notes_where
+from radarsim.report.sentences import Sentence
 from radarsim.report.statistics import ERROR_OF_PROGRAM, FEW, Z95, Estimate, Values, furthest, standard_errors
 
 if TYPE_CHECKING:
@@ -53,141 +55,156 @@ ALMOST = 2e-4  # of a value for which `Study.exact_but_for` gives a qualificatio
 ROUNDING = 1e-9  # of a value
 UNSEEN = 18.0  # realisations of n that are all missing in one sample of 6·10⁷
 STRAYS = 5.0  # standard errors by which κ of Gaussian errors may lie off theirs
-PLACE = ("case", "filter", "component")
+ROW_LABELS = ("case", "filter", "component")
 SQUARES = ("sigma", "nees", "nis")  # measured columns of means of squares, in any table
 
 
-class Beside(NamedTuple):
-    """A measured column, its ends, and its exact value; lo and hi are one column where it is the standard error."""
+class ExactColumn(NamedTuple):
+    """A measured column, its interval, and the column with its exact value.
+
+    low and high are one column where it is the standard error."""
 
     value: str
-    lo: str
-    hi: str
+    low: str
+    high: str
     exact: str
 
 
-def beside(table: "pd.DataFrame") -> Iterator[Beside]:
+def exact_columns(table: "pd.DataFrame") -> Iterator[ExactColumn]:
     """The measured columns of a table that have an exact one.
 
     exact: the measured value, known without sampling, empty where not; `exact_NAME` of the column NAME or gain_NAME"""
     columns = [str(name) for name in table.columns]
     for exact in (name for name in columns if name == "exact" or name.startswith("exact_")):
-        own = exact.removeprefix("exact").removeprefix("_")
-        for value, lo, hi in zip(columns, columns[1:], columns[2:], strict=False):
-            named = value in (own, f"gain_{own}") if own else (lo, hi) == ("lo", "hi")
-            if named and lo == f"{value}_se":
-                yield Beside(value, lo, lo, exact)
-            elif named and lo.endswith("lo") and hi.endswith("hi"):
-                yield Beside(value, lo, hi, exact)
+        stem = exact.removeprefix("exact").removeprefix("_")
+        for value, low, high in zip(columns, columns[1:], columns[2:], strict=False):
+            is_measured = value in (stem, f"gain_{stem}") if stem else (low, high) == ("lo", "hi")
+            if is_measured and low == f"{value}_se":
+                yield ExactColumn(value, low, low, exact)
+            elif is_measured and low.endswith("lo") and high.endswith("hi"):
+                yield ExactColumn(value, low, high, exact)
 
 
-def measured(table: "pd.DataFrame", of: Beside) -> Estimate:
+def measured_values(table: "pd.DataFrame", column: ExactColumn) -> Estimate:
     """The measured values (rows,) of a column with their 95 % intervals."""
-    value, lo, hi = (table[name].to_numpy(dtype=float) for name in of[:3])
-    return Estimate(value, value - Z95 * lo, value + Z95 * hi) if of.lo == of.hi else Estimate(value, lo, hi)
+    value, low, high = (table[name].to_numpy(dtype=float) for name in column[:3])
+    if column.low == column.high:
+        return Estimate(value, value - Z95 * low, value + Z95 * high)
+    return Estimate(value, low, high)
 
 
-def distances(
-    made: "Mapping[str, pd.DataFrame]",
+def standardised_errors(
+    tables_by_name: "Mapping[str, pd.DataFrame]",
     name: str,
-    of: Beside,
-    nearly: Collection[str] = (),
-    declared: Sequence[Quantity] = (),
+    column: ExactColumn,
+    approximate_cases: Collection[str] = (),
+    quantities: Sequence[Quantity] = (),
 ) -> np.ndarray:
-    """Standard errors (rows,) by which the measured values of a column lie off the exact ones.
+    """Standard errors (rows,) by which the measured values of a column differ from the exact ones.
 
-    made: all tables; nearly: the cases whose exact values are accurate to `ALMOST`. 0 where missing rare events may
-    explain the distance, see above. NaN where no exact value is known, or fewer than `FEW` realisations measured it."""
-    table = made[name]
-    (value, lo, hi), exact = measured(table, of), table[of.exact].to_numpy(dtype=float)
-    size, lacking, squares = (
-        np.abs(exact),
-        np.zeros(len(table)),
-        [(one.table, one.value) for one in declared if one.squares],
-    )
-    if of.value == "bias":
-        size = np.fmax(size, table["sigma"].to_numpy(dtype=float))
-        lacking = size * np.sqrt(UNSEEN / np.fmax(table["n"].to_numpy(dtype=float), 1.0))  # n = 0: no row is judged
-    elif of.value.endswith("_percent"):  # of a ratio of two σ
-        size = np.abs(100 - exact)
-        lacking[:] = np.inf
-    elif of.value in SQUARES or (name, of.value) in squares:
-        lacking[value < exact] = np.inf
-    room = size * np.where(table["case"].isin(list(nearly)), ALMOST, ROUNDING)
-    room = room + np.where(_gaussian(made, table), 0.0, lacking)
+    name: that of the column's table; approximate_cases: those whose exact values are accurate to `ALMOST` only. 0 where
+    missing rare events may explain the difference, see above. NaN where no exact value is known, or fewer than `FEW`
+    realisations measured it."""
+    table = tables_by_name[name]
+    (value, low, high), exact = measured_values(table, column), table[column.exact].to_numpy(dtype=float)
+    size, unseen = _size_and_unseen(table, name, column.value, value, exact, quantities)
+    tolerance = size * np.where(table["case"].isin(list(approximate_cases)), ALMOST, ROUNDING)
+    tolerance = tolerance + np.where(_gaussian(tables_by_name, table), 0.0, unseen)
     with np.errstate(invalid="ignore"):  # an infinite gain, against a σ of zero, has no distance from another
-        near = np.abs(exact - value) <= room
-        nearest = np.where(near, value, exact - np.sign(exact - value) * np.where(near, 0.0, room))
-    n = table["n"] if "n" in table else table["case"].map(made["curves"].groupby("case")["n"].min())
+        is_close = np.abs(exact - value) <= tolerance
+        nearest = np.where(is_close, value, exact - np.sign(exact - value) * np.where(is_close, 0.0, tolerance))
+    n = table["n"] if "n" in table else table["case"].map(tables_by_name["curves"].groupby("case")["n"].min())
     enough = (n.to_numpy(dtype=float) >= FEW) & ~np.isnan(exact)
-    return np.where(enough, standard_errors(Estimate(value, lo, hi), nearest), np.nan)
+    return np.where(enough, standard_errors(Estimate(value, low, high), nearest), np.nan)
 
 
-def _gaussian(made: "Mapping[str, pd.DataFrame]", table: "pd.DataFrame") -> np.ndarray:
+def _size_and_unseen(
+    table: "pd.DataFrame", name: str, column: str, value: np.ndarray, exact: np.ndarray, quantities: Sequence[Quantity]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The size (rows,) of which a tolerance is a fraction, and how much rare events that are missing may make."""
+    size, unseen = np.abs(exact), np.zeros(len(table))
+    of_squares = [(quantity.table, quantity.value) for quantity in quantities if quantity.squares]
+    if column == "bias":
+        size = np.fmax(size, table["sigma"].to_numpy(dtype=float))
+        unseen = size * np.sqrt(UNSEEN / np.fmax(table["n"].to_numpy(dtype=float), 1.0))  # n = 0: no row is judged
+    elif column.endswith("_percent"):  # of a ratio of two σ
+        size = np.abs(100 - exact)
+        unseen[:] = np.inf
+    elif column in SQUARES or (name, column) in of_squares:
+        unseen[value < exact] = np.inf
+    return size, unseen
+
+
+def _gaussian(tables_by_name: "Mapping[str, pd.DataFrame]", table: "pd.DataFrame") -> np.ndarray:
     """Whether errors are Gaussian, (rows,), of the filter of each row, and of the one it is compared with."""
-    curves = made.get("curves")
+    curves = tables_by_name.get("curves")
     if curves is None or not len(curves):
         return np.zeros(len(table), dtype=bool)
-    n, n_eff, square, bias, spread = (
+    n, n_eff, sigma, bias, spread = (
         curves[column].to_numpy(dtype=float) for column in ("n", "n_eff", "sigma", "bias", "spread")
     )
-    square, variance = square**2, spread**2
+    square, variance = sigma**2, spread**2
     with np.errstate(divide="ignore", invalid="ignore"):
         kurtosis = 1 + n / n_eff
-        theirs = (bias**4 + 6 * bias**2 * variance + 3 * variance**2) / square**2
+        gaussian_kurtosis = (bias**4 + 6 * bias**2 * variance + 3 * variance**2) / square**2
         error = np.sqrt((96 * bias**2 * variance**3 + 24 * variance**4) / n) / square**2
-        strays = np.abs(kurtosis - theirs) > STRAYS * error + ROUNDING
-    others = set(zip(curves["case"][strays], curves["filter"][strays], strict=True))
-    pairs = [zip(table["case"], table[who], strict=True) for who in {"filter", "baseline"} & set(table)]
-    return (
-        np.all([[pair not in others for pair in own] for own in pairs], axis=0) if pairs else np.ones(len(table), bool)
-    )
+        strays = np.abs(kurtosis - gaussian_kurtosis) > STRAYS * error + ROUNDING
+    not_gaussian = set(zip(curves["case"][strays], curves["filter"][strays], strict=True))
+    roles = [role for role in ("filter", "baseline") if role in table]
+    is_gaussian = np.ones(len(table), bool)
+    for role in roles:
+        is_gaussian &= [pair not in not_gaussian for pair in zip(table["case"], table[role], strict=True)]
+    return is_gaussian
 
 
-def faults(
-    made: "Mapping[str, pd.DataFrame]",
-    nearly: Collection[str] = (),
-    bounds: Collection[str] = ("claims",),
-    declared: Sequence[Quantity] = (),
+def disagreements(
+    tables_by_name: "Mapping[str, pd.DataFrame]",
+    approximate_cases: Collection[str] = (),
+    unchecked: Collection[str] = ("claims",),
+    quantities: Sequence[Quantity] = (),
 ) -> list[str]:
     """A line for each column that is further off its exact values than chance explains: its furthest row.
 
-    made, nearly: as for `distances`; bounds: tables without exact values of the measured quantities, whatever their
-    columns; declared: the quantities of the study."""
-    found = {
-        (name, of): distances(made, name, of, nearly, declared)
-        for name, table in made.items()
-        if name not in bounds and "case" in table and len(table)
-        for of in beside(table)
+    tables_by_name, approximate_cases, quantities: as for `standardised_errors`; unchecked: tables without exact values
+    of the measured quantities, whatever their columns."""
+    errors_by_column = {
+        (name, column): standardised_errors(tables_by_name, name, column, approximate_cases, quantities)
+        for name, table in tables_by_name.items()
+        if name not in unchecked and "case" in table and len(table)
+        for column in exact_columns(table)
     }
-    many = sum(int((~np.isnan(apart)).sum()) for apart in found.values())
-    bound = max(ERROR_OF_PROGRAM, furthest(many))
-    said = []
-    for (name, of), apart in found.items():
-        if (apart > bound).any():
-            at = int(np.nanargmax(apart))
-            row = made[name].iloc[at]
-            scan = f"k = {row['k']:g}" + (f" ({row['t_s']:g} s)" if "t_s" in row else "") if "k" in row else ""
-            place = ", ".join(filter(None, (*(str(row[key]) for key in PLACE if key in row), scan)))
-            said.append(
-                tr(
-                    "{table}.csv: {place}: {column} measured {measured:.6g}, exactly {exact:.6g}: "
-                    "{apart:.3g} standard errors apart; {count:,} of {rows:,} rows of this column exceed "
-                    "{bound:.3g}, the most that chance explains in {many:,}: the simulation or the exact value is "
-                    "wrong",
-                    table=name,
-                    place=place,
-                    column=of.value,
-                    measured=float(row[of.value]),
-                    exact=float(row[of.exact]),
-                    apart=float(apart[at]),
-                    bound=bound,
-                    many=many,
-                    count=int((apart > bound).sum()),
-                    rows=int((~np.isnan(apart)).sum()),
-                )
-            )
-    return said
+    count = sum(int((~np.isnan(errors)).sum()) for errors in errors_by_column.values())
+    limit = max(ERROR_OF_PROGRAM, furthest(count))
+    return [
+        _disagreement(tables_by_name[name], name, column, errors, limit, count)
+        for (name, column), errors in errors_by_column.items()
+        if (errors > limit).any()
+    ]
+
+
+def _disagreement(
+    table: "pd.DataFrame", name: str, column: ExactColumn, errors: np.ndarray, limit: float, count: int
+) -> str:
+    """The line on a column with errors (rows,) over the limit, the most that chance explains among `count`."""
+    index = int(np.nanargmax(errors))
+    row = table.iloc[index]
+    scan = f"k = {row['k']:g}" + (f" ({row['t_s']:g} s)" if "t_s" in row else "") if "k" in row else ""
+    return tr(
+        "{table}.csv: {place}: {column} measured {measured:.6g}, exactly {exact:.6g}: "
+        "{apart:.3g} standard errors apart; {count:,} of {rows:,} rows of this column exceed "
+        "{bound:.3g}, the most that chance explains in {many:,}: the simulation or the exact value is "
+        "wrong",
+        table=name,
+        place=", ".join(filter(None, (*(str(row[key]) for key in ROW_LABELS if key in row), scan))),
+        column=column.value,
+        measured=float(row[column.value]),
+        exact=float(row[column.exact]),
+        apart=float(errors[index]),
+        bound=limit,
+        many=count,
+        count=int((errors > limit).sum()),
+        rows=int((~np.isnan(errors)).sum()),
+    )
 
 
 def agreement(curves: "pd.DataFrame") -> "pd.DataFrame | None":
@@ -196,14 +213,14 @@ def agreement(curves: "pd.DataFrame") -> "pd.DataFrame | None":
     if not len(known):
         return None
     exact, sigma = known["exact_sigma"], known["sigma"]
-    marked = known.assign(
-        inside=(known["sigma_lo"] <= exact) & (exact <= known["sigma_hi"]), off=100 * (sigma / exact - 1)
+    known = known.assign(
+        inside=(known["sigma_lo"] <= exact) & (exact <= known["sigma_hi"]), difference=100 * (sigma / exact - 1)
     )
     rows = []
-    for keys, own in marked.groupby(["case", "filter", "component"], sort=False):
-        worst = own.loc[own["off"].abs().idxmax()]
-        share = 100 * float(own["inside"].mean())
-        rows.append((*keys, worst["unit"], len(own), round(share, 1), float(worst["off"]), int(worst["k"])))
+    for keys, scans in known.groupby(["case", "filter", "component"], sort=False):
+        worst = scans.loc[scans["difference"].abs().idxmax()]
+        share = 100 * float(scans["inside"].mean())
+        rows.append((*keys, worst["unit"], len(scans), round(share, 1), float(worst["difference"]), int(worst["k"])))
     return tables.frame({name: [row[i] for row in rows] for i, name in enumerate(COLUMNS)})
 
 
@@ -268,7 +285,7 @@ def bounds_from_spread(total: Values, square: Values, n: Values, looks: int) -> 
 # Of 14 configs, rows whose n/(κ − 1) over all samples together is 100 … 200 cover 93.6 % on the mean, over that 94.4 …
 # 95.2, 50 … 100 91, under 10 65 %.
 EFFECTIVE = 100
-HEAVY = f"under {EFFECTIVE} effective realisations, here or at a scan nearby: heavy tails"
+HEAVY = RowNote("heavy_tails", f"under {EFFECTIVE} effective realisations, here or at a scan nearby: heavy tails")
 # The few large errors that make a tail are in one sample and not in the next: where they are missing, so is the sign of
 # them. They last for some scans, and begin at any: a row is marked too where a scan is so near, in scans of the run.
 # Of `multimodel_1hz`, 200 × 1000 realisations, rows that their own scan alone marks cover 16 … 100 % where unmarked;
@@ -279,279 +296,247 @@ TAIL = 4
 # A paired gain of two filters that err nearly alike depends on the few realisations in which they do not, of which the
 # moments of either tell nothing. Of `multimodel_families_1hz`, 100 × 1000 realisations, unmarked intervals that are
 # under a tenth of what independent filters would have cover 81 %, all others 95 %.
-ALIKE = "filters nearly alike: rare differences decide"
+ALIKE = RowNote("alike", "filters nearly alike: rare differences decide")
 INDEPENDENT = 0.1
-# Filters from outside are paired one by one, so that the moments of the differences of squares are known. Those of a
-# filter that differs a little in every realisation are products of Gaussians: n/8 of them count.
+# User filters are paired one by one, so that the moments of the differences of squares are known. Those of a filter
+# that differs a little in every realisation are products of Gaussians: n/8 of them count.
 TAIL_OF_DIFFERENCES = 16
 # Of every row of a table: what its interval is of, not that it rests on too little. What is computed at an estimate has
 # a spread of its own: ratios of `sonar_manoeuvre` cover 93 %, one in twenty 31.
-VARIES = "interval of sigma alone: the believed one varies from one realisation to the next"
+VARIES = RowNote("varies", "interval of sigma alone: the believed one varies from one realisation to the next")
 # Tables that bring all their notes, and one whose mean squares are of several components and bounded: unmarked or
 # marked by these rules, rows of NEES and NIS cover 95 … 97 %.
-OWN = ("rare", "consistency")
-SAME = ["case", "filter", "component", "k"]
-OF_GAIN = "gain: "  # a note that begins with the name of an interval is of that one alone, here where a row has σ too
+WITHOUT_RULES = ("rare", "consistency")
+CURVE_KEY = ["case", "filter", "component", "k"]
 
 
-def noted(
-    made: Mapping[str, "pd.DataFrame"],
+def add_notes(
+    tables_by_name: Mapping[str, "pd.DataFrame"],
     results: Sequence[CaseResult],
     exact: bool = True,
-    declared: Sequence[Quantity] = COMMON,
+    quantities: Sequence[Quantity] = COMMON,
 ) -> "dict[str, pd.DataFrame]":
-    """The tables by name, those with intervals and with a row to be noted having the column.
+    """The tables by name; those with intervals and with a row that needs a note have the column.
 
     A table may bring notes of its own on rows that have no other. exact: whether the columns `exact_…` hold exact
-    values, in place of bounds that the measured ones reach or not (`Study.exact_errors`). declared: what the study
+    values, in place of bounds that the measured ones reach or not (`Study.exact_errors`). quantities: what the study
     measures.
 
     note: why a row rests on too few realisations or events for its interval; only in tables that have such a row"""
-    paired = {name: [one for one in declared if one.paired and one.table == name] for name in made}
-    return {name: _noted(name, table, made, results, exact, paired[name]) for name, table in made.items()}
+    return {
+        name: _with_notes(
+            name, table, tables_by_name, results, exact, [q for q in quantities if q.paired and q.table == name]
+        )
+        for name, table in tables_by_name.items()
+    }
 
 
-def _noted(
+def _with_notes(
     name: str,
     table: "pd.DataFrame",
-    made: Mapping[str, "pd.DataFrame"],
+    tables_by_name: Mapping[str, "pd.DataFrame"],
     results: Sequence[CaseResult],
     exact: bool,
     paired: Sequence[Quantity],
 ) -> "pd.DataFrame":
     if not len(table) or "case" not in table or not any(str(column).endswith("_lo") for column in table):
         return table
-    brought = table["note"].to_numpy(dtype=object) if "note" in table else np.full(len(table), "", dtype=object)
+    notes = table["note"].to_numpy(dtype=object) if "note" in table else np.full(len(table), "", dtype=object)
     table = table.drop(columns="note") if "note" in table else table
-    notes = brought
-    if name not in OWN:
-        notes = notes_on(*behind(table, made, results))
+    if name not in WITHOUT_RULES:
+        by_rules = heavy_tail_notes(*supporting_counts(table, tables_by_name, results))
         if paired:
-            notes = np.where((notes == "") & _alike(table, made["curves"], paired), ALIKE, notes)
-        notes = np.where(notes == "", brought, notes)
-        notes = np.where(known(table) & exact, "", notes)
+            by_rules = notes_where((by_rules == "") & _alike(table, tables_by_name["curves"], paired), ALIKE, by_rules)
+        notes = np.where(by_rules == "", notes, by_rules)
+        notes = np.where(is_exact(table) & exact, "", notes)
     return table.assign(note=notes) if any(notes) else table
 
 
-def known(table: "pd.DataFrame") -> np.ndarray:
+def is_exact(table: "pd.DataFrame") -> np.ndarray:
     """The rows (rows,) with exact values."""
     columns = [column for column in table if str(column).startswith("exact_") and column != "exact_bias"]
     return table[columns].notna().all(axis=1).to_numpy() & bool(columns)
 
 
-def heavy(table: "pd.DataFrame") -> np.ndarray:
-    """Which rows of a noted table of σ or gains (rows,) are marked."""
-    return table["note"].ne("").to_numpy() if "note" in table else np.full(len(table), False)
-
-
-Answer = Callable[[Mapping[str, "pd.DataFrame"]], Sequence[str]]  # sentences from the tables
-
-
-def concerned(made: Mapping[str, "pd.DataFrame"], answers: Sequence[Answer]) -> "dict[str, pd.DataFrame]":
-    """By table, the marked rows whose intervals the answer gives, or depends on: with wider ones it reads otherwise.
-
-    answers: the parts of the answer, each examined by itself, as most rows concern one of many."""
-    found: dict[str, set[int]] = {}
-    for answer in answers:
-        said = list(answer(made))
-        for name, table in made.items():
-
-            def matter(
-                at: np.ndarray,
-                name: str = name,
-                table: "pd.DataFrame" = table,
-                answer: Answer = answer,
-                said: list[str] = said,
-            ) -> bool:
-                return list(answer({**made, name: _wider(table, at)})) != said
-
-            marked = heavy(table) & (table["note"] != VARIES) if "note" in table else heavy(table)
-            found.setdefault(name, set()).update(_least(np.flatnonzero(marked), matter))
-    return {name: made[name].iloc[sorted(rows)] for name, rows in found.items() if rows}
-
-
-def _least(rows: np.ndarray, matter: Callable[[np.ndarray], bool]) -> list[int]:
-    """Of these rows those that matter, found by bisection; all of them where they matter only together."""
-    if not len(rows) or not matter(rows):
-        return []
-    half = len(rows) // 2
-    parts = [rows[:half], rows[half:]] if half else []
-    return [row for part in parts for row in _least(part, matter)] or rows.tolist()
-
-
-def _wider(table: "pd.DataFrame", rows: np.ndarray) -> "pd.DataFrame":
-    """The table with intervals twice as wide in these rows, in the columns that their notes concern."""
-    wider, said = table.copy(), table["note"].to_numpy(dtype=object)[rows]
-    lows = [str(column) for column in table if str(column).endswith(("_lo", "_lo_s"))]
-    for note in set(said):
-        at = table.index[rows[said == note]]
-        for low in (one for one in lows if is_of(note, one, lows)):
-            ends = [low, low.replace("_lo", "_hi")]
-            half = (table.loc[at, ends[1]] - table.loc[at, ends[0]]) / 2
-            wider.loc[at, ends] = np.stack([table.loc[at, ends[0]] - half, table.loc[at, ends[1]] + half], axis=1)
-    return wider
-
-
-def is_of(note: str, column: str, columns: Sequence[str]) -> bool:
-    """Whether a note concerns a column among those with intervals: those named at its beginning, else all.
-
-    >>> [is_of("gain: heavy tails", one, ["sigma", "gain_percent"]) for one in ("sigma", "gain_percent")]
-    [False, True]
-    """
-    name = note.partition(": ")[0]
-    return column.startswith(name) or not any(one.startswith(name) for one in columns)
-
-
-def needed(rows: "pd.DataFrame", made: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]) -> np.ndarray:
-    """How many realisations (rows,) marked intervals take, from the effective ones; NaN where unknown."""
-    n, fewest = behind(rows.drop(columns="n_eff", errors="ignore"), made, results)
-    with np.errstate(divide="ignore"):
-        return np.where(rows["note"].str.endswith(HEAVY) & (fewest < EFFECTIVE), n * EFFECTIVE / fewest, np.nan)
-
-
-def notes_on(n: np.ndarray, fewest: np.ndarray) -> np.ndarray:
+def heavy_tail_notes(n: np.ndarray, effective: np.ndarray) -> np.ndarray:
     """The notes (rows,) on intervals of n realisations (rows,).
 
-    fewest: how many of them count where a few large errors decide, at the scan where they are fewest; NaN where errors
-    have no tails, or nothing is known of them."""
-    return np.where(fewest < np.minimum(EFFECTIVE, n / TAIL), HEAVY, "").astype(object)
+    effective: how many of them count where a few large errors decide, at the scan where they are fewest; NaN where
+    errors have no tails, or nothing is known of them."""
+    return notes_where(effective < np.minimum(EFFECTIVE, n / TAIL), HEAVY)
 
 
 def nearby(curves: "pd.DataFrame") -> np.ndarray:
     """The fewest effective realisations (rows,) within NEARBY of the scans on either side, of a filter's component."""
-    own = curves["n_eff"].to_numpy(dtype=float)
-    fewest = own.copy()
-    for rows in curves.groupby(SAME[:3], sort=False).indices.values():
-        fewest[rows] = _fewest(own[rows])
+    effective = curves["n_eff"].to_numpy(dtype=float)
+    fewest = effective.copy()
+    for rows in curves.groupby(CURVE_KEY[:3], sort=False).indices.values():
+        fewest[rows] = _fewest_nearby(effective[rows])
     return fewest
 
 
-def _fewest(own: np.ndarray) -> np.ndarray:
+def _fewest_nearby(values: np.ndarray) -> np.ndarray:
     """The least values (K, …) within NEARBY of the scans (K, …) on either side."""
-    fewest = own.copy()
-    for by in range(1, min(max(1, round(NEARBY * len(own))) + 1, len(own))):
-        fewest[by:] = np.fmin(fewest[by:], own[:-by])
-        fewest[:-by] = np.fmin(fewest[:-by], own[by:])
+    fewest = values.copy()
+    for shift in range(1, min(max(1, round(NEARBY * len(values))) + 1, len(values))):
+        fewest[shift:] = np.fmin(fewest[shift:], values[:-shift])
+        fewest[:-shift] = np.fmin(fewest[:-shift], values[shift:])
     return fewest
 
 
 def few_differ(square: np.ndarray, fourth: np.ndarray, n: np.ndarray) -> np.ndarray:
-    """Whether few realisations decide the gain between two filters (F, K, C), here or at a scan nearby: Σd² and Σd⁴ of
-    the differences d of their squared errors, over n realisations."""
+    """Whether few realisations decide the gain between two filters (F, K, C), at a scan or at one nearby.
+
+    square, fourth: Σd² and Σd⁴ of the differences d of their squared errors, over n realisations."""
     with np.errstate(divide="ignore", invalid="ignore"):
         effective = square**2 / (fourth - square**2 / n)
-    fewest = np.moveaxis(_fewest(np.moveaxis(effective, 1, 0)), 0, 1)
+    fewest = np.moveaxis(_fewest_nearby(np.moveaxis(effective, 1, 0)), 0, 1)
     return ~(fewest >= np.minimum(EFFECTIVE, n / TAIL_OF_DIFFERENCES))
 
 
 def _alike(gains: "pd.DataFrame", curves: "pd.DataFrame", paired: Sequence[Quantity]) -> np.ndarray:
     """Which rows (rows,) compare filters that err nearly alike, by quantities in per cent of the baseline's σ."""
-    ends = ["sigma", "sigma_lo", "sigma_hi"]
-    own = gains[SAME].merge(curves[[*SAME, *ends]], on=SAME, how="left")
-    sigma, low, high = (own[end].to_numpy(dtype=float) for end in ends)
+    bounds = ["sigma", "sigma_lo", "sigma_hi"]
+    matching = gains[CURVE_KEY].merge(curves[[*CURVE_KEY, *bounds]], on=CURVE_KEY, how="left")
+    sigma, low, high = (matching[bound].to_numpy(dtype=float) for bound in bounds)
     with np.errstate(invalid="ignore", divide="ignore"):
         independent = np.sqrt(2) * (high - low) / sigma
-    found = np.full(len(gains), False)
-    for of in paired:
-        (value, low, high), _ = of.read(gains)
+    are_alike = np.full(len(gains), False)
+    for quantity in paired:
+        (value, low, high), _ = quantity.read(gains)
         with np.errstate(invalid="ignore", divide="ignore"):  # a gain of 100 % leaves nothing to be alike
-            width = (high - low) / (100 - value if of.more_is_better else 100 + value)
-        found |= (width < INDEPENDENT * independent) & (width > ROUNDING)
-    return found
+            width = (high - low) / (100 - value if quantity.more_is_better else 100 + value)
+        are_alike |= (width < INDEPENDENT * independent) & (width > ROUNDING)
+    return are_alike
 
 
-def behind(
-    table: "pd.DataFrame", made: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]
+def supporting_counts(
+    table: "pd.DataFrame", tables_by_name: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How many realisations are behind each row (rows,), and the fewest effective ones there and nearby. A row's own,
-    those of σ in the same row of curves, or the case's; NaN where effective ones are unknown. A gain rests on the fewer
-    of both filters."""
+    """For each row, the number of realisations that it is computed from, and the smallest effective number nearby.
+
+    Taken from the row itself, else from the matching row of `curves`, else from the case. NaN where the effective
+    number is unknown. For a gain, the smaller of the two filters' numbers counts."""
     if "n_eff" in table:
         return table["n"].to_numpy(dtype=float), nearby(table)
+
     if "n" in table:
-        whole = table["n"].to_numpy(dtype=float)
+        counts = table["n"].to_numpy(dtype=float)
     else:
-        whole = table["case"].map({result.name: float(result.count) for result in results}).to_numpy(dtype=float)
-    if not set(SAME) <= set(table) or not len(made["curves"]):
-        return whole, np.full(len(table), np.nan)
-    curves = made["curves"][[*SAME, "n"]].assign(fewest=nearby(made["curves"]))
-    n, fewest = _of_curves(table[SAME], curves)
+        case_counts = {result.name: float(result.count) for result in results}
+        counts = table["case"].map(case_counts).to_numpy(dtype=float)
+    curves = tables_by_name["curves"]
+    if not set(CURVE_KEY) <= set(table) or not len(curves):
+        return counts, np.full(len(table), np.nan)
+
+    curves = curves[[*CURVE_KEY, "n"]].assign(fewest=nearby(curves))
+    curve_counts, effective = _counts_of_curves(table[CURVE_KEY], curves)
     if "baseline" in table:
-        _, other = _of_curves(table[["case", "baseline", "component", "k"]].set_axis(SAME, axis=1), curves)
-        fewest = np.fmin(fewest, other)
-    return whole if "n" in table else np.where(np.isnan(n), whole, n), fewest
+        baseline_key = table[["case", "baseline", "component", "k"]].set_axis(CURVE_KEY, axis=1)
+        _, baseline_effective = _counts_of_curves(baseline_key, curves)
+        effective = np.fmin(effective, baseline_effective)
+    if "n" not in table:
+        counts = np.where(np.isnan(curve_counts), counts, curve_counts)
+    return counts, effective
 
 
-def _of_curves(rows: "pd.DataFrame", curves: "pd.DataFrame") -> tuple[np.ndarray, np.ndarray]:
+def _counts_of_curves(rows: "pd.DataFrame", curves: "pd.DataFrame") -> tuple[np.ndarray, np.ndarray]:
     """n and the fewest effective realisations of these rows in curves."""
-    own = rows.merge(curves, on=SAME, how="left")
-    return own["n"].to_numpy(dtype=float), own["fewest"].to_numpy(dtype=float)
+    matching = rows.merge(curves, on=CURVE_KEY, how="left")
+    return matching["n"].to_numpy(dtype=float), matching["fewest"].to_numpy(dtype=float)
 
 
 # ---- of the answer ---------------------------------------------------------------------------------------------------
-MOST_NAMES = 3  # named in a line
+MAX_NAMES = 3  # named in a warning
 
 
-def of_intervals(
-    results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", answers: Sequence[Answer]
+def answer_warnings(
+    results: Sequence[CaseResult], tables_by_name: "Mapping[str, pd.DataFrame]", answer: Sequence[Sentence]
 ) -> list[str]:
-    """Warnings on the intervals of the answer, at most a line each; and whether weights are wrong.
+    """Warnings on the intervals that the answer rests on, at most a line each; and on weights with a wrong mean.
 
-    answers: the parts of the answer. The number of marked rows in a table is given where it is shown."""
-    return [*(few(results) or rests(results, made, answers)), *rare.warnings(made.get("rare"))]
+    The number of rows with a note is given where a table is shown."""
+    warnings = few_realisations_warning(results) or narrow_interval_warning(results, tables_by_name, answer)
+    return [*warnings, *rare.warnings(tables_by_name.get("rare"))]
 
 
-def few(results: Sequence[CaseResult]) -> list[str]:
+def few_realisations_warning(results: Sequence[CaseResult]) -> list[str]:
     """A line on the cases whose intervals rest on too few realisations, if any."""
-    rough = {result.name: result.count for result in results if result.count < FEW}
-    if not rough:
+    counts = {result.name: result.count for result in results if result.count < FEW}
+    if not counts:
         return []
-    words = plural(
+    line = plural(
         "{cases}: intervals from {counts} realisation are rough: run at least {least}",
         "{cases}: intervals from {counts} realisations are rough: run at least {least}",
-        max(rough.values()),
-        cases=_named(list(rough)),
-        counts=files.span(list(rough.values())),
+        max(counts.values()),
+        cases=few(list(dict.fromkeys(counts)), MAX_NAMES),
+        counts=files.span(list(counts.values())),
         least=FEW,
     )
-    return [words]
+    return [line]
 
 
-def rests(results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", answers: Sequence[Answer]) -> list[str]:
+def narrow_interval_warning(
+    results: Sequence[CaseResult], tables_by_name: "Mapping[str, pd.DataFrame]", answer: Sequence[Sentence]
+) -> list[str]:
     """A line on the answer's intervals that are too narrow, with the realisations that they need, if any are."""
-    found = concerned(made, answers).values()
-    if not found:
+    rows_by_table = affected_rows(tables_by_name, answer).values()
+    if not rows_by_table:
         return []
-    count, names = sum(map(len, found)), _named(list(dict.fromkeys(name for rows in found for name in rows["filter"])))
-    enough = np.max(np.concatenate([needed(rows, made, results) for rows in found]))  # not-a-number if one is
-    if np.isfinite(enough):
-        words = plural(
+    count = sum(map(len, rows_by_table))
+    filters = few(list(dict.fromkeys(name for rows in rows_by_table for name in rows["filter"])), MAX_NAMES)
+    enough = np.max(np.concatenate([needed_realisations(rows, tables_by_name, results) for rows in rows_by_table]))
+    if np.isfinite(enough):  # it is NaN if the number is unknown for one of the rows
+        line = plural(
             "{count} interval of the answer is too narrow because few realisations decide it ({filters}): "
             "run with -n {needed}",
             "{count} intervals of the answer are too narrow because few realisations decide them "
             "({filters}): run with -n {needed}",
             count,
-            filters=names,
+            filters=filters,
             needed=roughly(float(enough)),
         )
     else:
-        words = plural(
+        line = plural(
             "{count} interval of the answer may be too narrow because rare realisations decide it and few or "
             "none occurred ({filters}): run with a larger -n",
             "{count} intervals of the answer may be too narrow because rare realisations decide them and few "
             "or none occurred ({filters}): run with a larger -n",
             count,
-            filters=names,
+            filters=filters,
         )
-    return [words]
+    return [line]
+
+
+def affected_rows(
+    tables_by_name: Mapping[str, "pd.DataFrame"], answer: Sequence[Sentence]
+) -> "dict[str, pd.DataFrame]":
+    """By table, the rows with a note on an interval that the answer rests on.
+
+    A note on what an interval leaves out is no reason for a warning."""
+    cited = {interval for sentence in answer for interval in sentence.intervals}
+    rows_by_table = {}
+    for name, table in tables_by_name.items():
+        if "note" not in table:
+            continue
+        notes = table["note"].mask(note_kinds(table) == VARIES.kind, "")
+        labels = {i.row for i in cited if i.table == name and concerns(notes.loc[i.row], i.name)}
+        if labels:
+            rows_by_table[name] = table.loc[sorted(labels)]
+    return rows_by_table
+
+
+def needed_realisations(
+    rows: "pd.DataFrame", tables_by_name: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]
+) -> np.ndarray:
+    """How many realisations (rows,) intervals with a note take, from the effective ones; NaN where unknown."""
+    n, fewest = supporting_counts(rows.drop(columns="n_eff", errors="ignore"), tables_by_name, results)
+    has_tails = (note_kinds(rows) == HEAVY.kind) & (fewest < EFFECTIVE)
+    with np.errstate(divide="ignore"):
+        return np.where(has_tails, n * EFFECTIVE / fewest, np.nan)
 
 
 def roughly(count: float) -> str:
     """A number of realisations, rounded up to one digit, as `-n` takes it."""
     power = 10 ** math.floor(math.log10(max(count, 1.0)))
     return f"{math.ceil(count / power) * power:.0e}".replace("e+0", "e").replace("e+", "e")
-
-
-def _named(names: Sequence[str]) -> str:
-    """A few names, and how many more; those that hold a comma are quoted."""
-    return seen.named(names, MOST_NAMES)

@@ -1,4 +1,4 @@
-"""Figures common to all studies, made from the tables alone: σ against time, gain against time."""
+"""Figures that all studies share, and what their figures are made of: names of keys, lines, panels, captions."""
 
 import re
 from collections import Counter
@@ -28,7 +28,7 @@ MOST = 8  # cases of a panel; the others are named in its caption
 MOST_PANELS = 12
 NEAR_ONE = 0.999  # probabilities above it differ only in further digits
 RARE = 0.1  # of a share's loss: below it the loss is drawn logarithmically
-MOST_GONE = 8  # names of what a figure leaves out
+MAX_MISSING_NAMES = 8  # names of what a figure leaves out
 WIDE = 20  # ratio of values from which an axis is logarithmic
 MOST_LINES = 12  # of a panel that several cases of more than FEW_FILTERS share
 FEW_FILTERS = 3  # distinguished by dash, while shades distinguish the cases
@@ -52,7 +52,7 @@ GAIN = ("t_s", "gain_percent", "gain_lo", "gain_hi", "exact_percent")
 def number(value: object, powers: bool = False) -> str:
     """A number for people: 0.001 as 10⁻³ (with powers, 0.1 as 10⁻¹), others at four digits; text unchanged. Numbers of
     a list one after the other."""
-    if isinstance(value, list | tuple) and all(isinstance(one, int | float) for one in value):
+    if isinstance(value, list | tuple) and all(isinstance(item, int | float) for item in value):
         return wording.in_a_row(map(number, value))
     if not isinstance(value, int | float) or isinstance(value, bool):
         return literal(str(value).replace("_", " "))  # of a list of choices, of a scenario
@@ -71,18 +71,18 @@ def in_short(result: CaseResult, key: str, value: object, among: Sequence[object
     unchanged."""
     if not isinstance(value, Mapping) or "kind" not in value:
         return value
-    alike = [one for one in among if isinstance(one, Mapping) and one.get("kind") == value["kind"]]
-    own = {name: one for name, one in value.items() if any(other.get(name) != one for other in alike)}
-    return in_words(result, key, {"kind": value["kind"], **own})
+    same_kind = [item for item in among if isinstance(item, Mapping) and item.get("kind") == value["kind"]]
+    differing = {name: item for name, item in value.items() if any(other.get(name) != item for other in same_kind)}
+    return in_words(result, key, {"kind": value["kind"], **differing})
 
 
 def in_words(result: CaseResult, key: str, value: Mapping) -> str:
     """A mapping that is a key's value: its kind, and each of its keys by name, with value and unit."""
     kind = [number(value["kind"])] if "kind" in value else []
-    own = [f"{key}.{name}" for name in value if name != "kind"]
-    named = zip(own, (one for name, one in value.items() if name != "kind"), strict=True)
+    keys = [f"{key}.{name}" for name in value if name != "kind"]
+    items = zip(keys, (item for name, item in value.items() if name != "kind"), strict=True)
     return ", ".join(
-        [*kind, *(f"{key_label(result, name).text} {with_its_unit(result, name, one)}" for name, one in named)]
+        [*kind, *(f"{key_label(result, name).text} {with_its_unit(result, name, item)}" for name, item in items)]
     )
 
 
@@ -103,14 +103,16 @@ def device(result: CaseResult) -> str:
 
 def swept(result: CaseResult, without: Iterable[str] = ()) -> str:
     """The swept keys of a case in short, but for some: "D_M = 10⁻³", "σ_V = 5 m/s"."""
-    told = [(key, value) for key, value in result.swept if key not in set(without)]
-    return ", ".join(f"{symbol_of(result, key)} = {with_its_unit(result, key, value)}" for key, value in told)
+    pairs = [(key, value) for key, value in result.swept if key not in set(without)]
+    return ", ".join(f"{symbol_of(result, key)} = {with_its_unit(result, key, value)}" for key, value in pairs)
 
 
 def shared_keys(results: Sequence[CaseResult]) -> set[str]:
     """The swept keys that have one value in all of several cases."""
     values = [dict(result.swept) for result in results]
-    return {key for key in values[0] if all(one.get(key) == values[0][key] for one in values)} if values[1:] else set()
+    if len(values) < 2:
+        return set()
+    return {key for key, value in values[0].items() if all(case_values.get(key) == value for case_values in values)}
 
 
 def with_its_unit(result: CaseResult, key: str, value: object) -> str:
@@ -121,10 +123,12 @@ def with_its_unit(result: CaseResult, key: str, value: object) -> str:
         return " ".join(filter(None, (number(value), unit_of(key_label(result, key).unit))))
     if not isinstance(value, int | float) or isinstance(value, bool):
         return number(value)
-    factor, own = in_degrees(key_label(result, key).unit)
-    shown = number(value, is_power(key)) if factor == 1.0 else turned_number(factor * value)
-    said = unit_of(own)
-    return f"{shown}{said}" if said.startswith("°") else " ".join(filter(None, (shown, said.partition("(")[0])))
+    factor, unit_name = in_degrees(key_label(result, key).unit)
+    text = number(value, is_power(key)) if factor == 1.0 else turned_number(factor * value)
+    unit_text = unit_of(unit_name)
+    if unit_text.startswith("°"):
+        return f"{text}{unit_text}"
+    return " ".join(filter(None, (text, unit_text.partition("(")[0])))
 
 
 def turned_number(degrees: float) -> str:
@@ -134,8 +138,8 @@ def turned_number(degrees: float) -> str:
 
 def key_label(result: CaseResult, key: str) -> Label:
     """The name of a key of a case, in the current language; its unit as in tables."""
-    found = label_of(result.spec, key)
-    return found._replace(text=tr(found.text))
+    key_text = label_of(result.spec, key)
+    return key_text._replace(text=tr(key_text.text))
 
 
 def unit_of(name: str) -> str:
@@ -150,14 +154,16 @@ def is_power(key: str) -> bool:
 
 def symbol_of(result: CaseResult, key: str) -> str:
     """The short name of a key of a case in figures: its letter if it has one (mathematical text), else its name."""
-    found = key_label(result, key)
-    return mathematical(found.symbol) if found.symbol else found.text
+    key_text = key_label(result, key)
+    return mathematical(key_text.symbol) if key_text.symbol else key_text.text
 
 
 def axis_of(result: CaseResult, key: str) -> str:
     """The label of a key's axis: name, letter, unit; values on it are times `axis_factor`."""
-    found = key_label(result, key)
-    return with_unit(" ".join(filter(None, (found.text, mathematical(found.symbol)))), in_degrees(found.unit)[1])
+    key_text = key_label(result, key)
+    return with_unit(
+        " ".join(filter(None, (key_text.text, mathematical(key_text.symbol)))), in_degrees(key_text.unit)[1]
+    )
 
 
 def axis_factor(result: CaseResult, key: str) -> float:
@@ -178,11 +184,11 @@ def mathematical(symbol: str) -> str:
 
 def letter(component: str) -> str:
     """A component of the tables on a figure's axis: "vb" as $v_\beta$; a longer name unchanged."""
-    found = re.fullmatch(r"([vVa]?)([a-z])", component)
-    if not found:
+    match = re.fullmatch(r"([vVa]?)([a-z])", component)
+    if not match:
         return literal(component)
-    base = GREEK.get(found[2], found[2])
-    return f"${found[1]}_{base}$" if found[1] else f"${base}$"
+    base = GREEK.get(match[2], match[2])
+    return f"${match[1]}_{base}$" if match[1] else f"${base}$"
 
 
 def in_degrees(unit: str) -> tuple[float, str]:
@@ -225,9 +231,9 @@ def line_of(x: np.ndarray, rows: Sequence["pd.Series"], columns: Sequence[str], 
     )
 
 
-def in_legend(drawn: Sequence[Panel]) -> list[Panel]:
+def in_legend(panels: Sequence[Panel]) -> list[Panel]:
     """Panels of many lines with one legend in a cell of its own, with names from the lines."""
-    keys = {mark.label: mark.style for panel in drawn for mark in panel.marks if isinstance(mark, Line) and mark.label}
+    keys = {mark.label: mark.style for panel in panels for mark in panel.marks if isinstance(mark, Line) and mark.label}
     blank = [
         replace(
             panel,
@@ -235,9 +241,9 @@ def in_legend(drawn: Sequence[Panel]) -> list[Panel]:
                 replace(m, label="", name=m.name or m.label) if isinstance(m, Line) else m for m in panel.marks
             ),
         )
-        for panel in drawn
+        for panel in panels
     ]
-    return [*blank, Panel(drawn[0].x, drawn[0].y, (), keys=tuple(keys.items()))]
+    return [*blank, Panel(panels[0].x, panels[0].y, (), keys=tuple(keys.items()))]
 
 
 def time_axis() -> Axis:
@@ -282,33 +288,36 @@ def plain(words: str) -> str:
 
 def families(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
     """Cases by config, in order: one panel each."""
-    found: dict[str, list[CaseResult]] = {}
+    groups: dict[str, list[CaseResult]] = {}
     for result in results:
-        found.setdefault(stem(result), []).append(result)
-    return found
+        groups.setdefault(stem(result), []).append(result)
+    return groups
 
 
-def by_panel(results: Sequence[CaseResult], most: float = MOST_LINES) -> dict[str, list[CaseResult]]:
-    """Cases that share a panel, by its title: those of a config; with several swept keys, those alike in all but the
-    last.
+def by_panel(results: Sequence[CaseResult], max_lines: float = MOST_LINES) -> dict[str, list[CaseResult]]:
+    """Group the cases that share a panel, by the panel's title.
 
-    Cases of many filters have a panel each where they would make more than so many lines together."""
-    found: dict[str, list[CaseResult]] = {}
-    several = len(families(results)) > 1
+    A panel holds the cases of one config; where several keys are swept, those alike in all but the last. Cases with
+    many filters get a panel each if together they would draw more than `max_lines` lines."""
+    has_several_families = len(families(results)) > 1
+    groups: dict[tuple[str, str, str], list[CaseResult]] = {}
     for result in results:
-        outer = result.swept[:-1]
-        words = ", ".join(f"{symbol_of(result, key)} = {with_its_unit(result, key, value)}" for key, value in outer)
-        of = (device(result) if several or not words else "", words)
-        found.setdefault("\0".join((stem(result), *filter(None, of))), []).append(result)
-    parted: list[tuple[str, list[CaseResult]]] = []
-    for key, members in found.items():
-        counts = [len(result.axes.filters) for result in members]
-        if sum(counts) <= most or max(counts) <= FEW_FILTERS or len(members) == 1:
-            parted.append((key.partition("\0")[2].replace("\0", ", "), members))
+        swept_text = ", ".join(
+            f"{symbol_of(result, key)} = {with_its_unit(result, key, value)}" for key, value in result.swept[:-1]
+        )
+        device_name = device(result) if has_several_families or not swept_text else ""
+        groups.setdefault((stem(result), device_name, swept_text), []).append(result)
+
+    titled: list[tuple[str, list[CaseResult]]] = []
+    for (_, *title_parts), members in groups.items():
+        line_counts = [len(result.axes.filters) for result in members]
+        if sum(line_counts) <= max_lines or max(line_counts) <= FEW_FILTERS or len(members) == 1:
+            titled.append((", ".join(filter(None, title_parts)), members))
         else:
-            start = [device(members[0])] if several else []
-            parted += [(", ".join([*start, swept(result) or result.name]), [result]) for result in members]
-    return distinct([(title, stem(members[0])) for title, members in parted], [members for _, members in parted])
+            prefix = [device(members[0])] if has_several_families else []
+            titled += [(", ".join([*prefix, swept(result) or result.name]), [result]) for result in members]
+    titles_and_stems = [(title, stem(members[0])) for title, members in titled]
+    return distinct(titles_and_stems, [members for _, members in titled])
 
 
 def distinct(titles: Sequence[tuple[str, str]], values: Sequence[Any]) -> dict[str, Any]:
@@ -318,11 +327,11 @@ def distinct(titles: Sequence[tuple[str, str]], values: Sequence[Any]) -> dict[s
     return dict(zip(names, values, strict=True))
 
 
-def spread_out(items: Sequence[Any], most: int) -> list[Any]:
+def spread_out(items: Sequence[Any], max_count: int) -> list[Any]:
     """At most so many of the items, evenly spaced from the first to the last."""
-    if len(items) <= most:
+    if len(items) <= max_count:
         return list(items)
-    return [items[i] for i in np.linspace(0, len(items) - 1, most).round().astype(int)]
+    return [items[i] for i in np.linspace(0, len(items) - 1, max_count).round().astype(int)]
 
 
 def realisations(results: Sequence[CaseResult]) -> str:
@@ -331,32 +340,38 @@ def realisations(results: Sequence[CaseResult]) -> str:
 
 
 def _of_realisations(counts: Sequence[int]) -> str:
-    least, most = min(counts), max(counts)
-    if least == most:
-        return plural("{count:,} realisation", "{count:,} realisations", most)
-    return plural("{least:,} to {count:,} realisations", "{least:,} to {count:,} realisations", most, least=least)
+    smallest, largest = min(counts), max(counts)
+    if smallest == largest:
+        return plural("{count:,} realisation", "{count:,} realisations", largest)
+    return plural("{least:,} to {count:,} realisations", "{least:,} to {count:,} realisations", largest, least=smallest)
 
 
-def left_out(every: Sequence[str], some: Sequence[str]) -> str:
+def left_out(all_names: Sequence[str], shown_names: Sequence[str]) -> str:
     """Words on the omissions of a figure, after its caption: how many of how many it shows, and which are missing."""
-    gone = [name for name in every if name not in some]
-    if not gone:
+    missing = [name for name in all_names if name not in shown_names]
+    if not missing:
         return ""
-    told = {"count": len(every) - len(gone), "all": len(every), "names": seen.named(map(plain, gone), MOST_GONE)}
-    return " " + tr("Shown: {count} of {all}; only in the tables: {names}.", **told)
+    fields = {
+        "count": len(all_names) - len(missing),
+        "all": len(all_names),
+        "names": seen.join_names(map(plain, missing), MAX_MISSING_NAMES),
+    }
+    return " " + tr("Shown: {count} of {all}; only in the tables: {names}.", **fields)
 
 
 def names_of(results: Sequence[CaseResult]) -> list[str]:
     """Distinct names of cases: by swept values, with the device where there are several."""
-    several = len(families(results)) > 1
-    found = [plain_label(one) if several or not one.swept else plain(swept(one)) for one in results]
-    return found if len(set(found)) == len(found) else [one.name for one in results]
+    has_several_devices = len(families(results)) > 1
+    names = [
+        plain_label(result) if has_several_devices or not result.swept else plain(swept(result)) for result in results
+    ]
+    return names if len(set(names)) == len(names) else [result.name for result in results]
 
 
-def cases_left_out(every: Sequence[CaseResult], some: Sequence[CaseResult]) -> str:
+def cases_left_out(all_results: Sequence[CaseResult], shown_results: Sequence[CaseResult]) -> str:
     """`left_out` of cases."""
-    names = dict(zip((one.name for one in every), names_of(every), strict=True))
-    return left_out(list(names.values()), [names[one.name] for one in some])
+    names = dict(zip((result.name for result in all_results), names_of(all_results), strict=True))
+    return left_out(list(names.values()), [names[result.name] for result in shown_results])
 
 
 def unswept(results: Sequence[CaseResult]) -> list[CaseResult]:
@@ -371,18 +386,18 @@ def named(experiment: Experiment, figure: str) -> list[str]:
 
 def shown(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
     """The results in a figure, of the cases named, at most eight evenly spaced; and words on the others."""
-    wanted = [result for result in results if result.name in set(names)]
-    some = spread_out(wanted, MOST)
-    return some, cases_left_out(wanted, some)
+    named_results = [result for result in results if result.name in set(names)]
+    visible = spread_out(named_results, MOST)
+    return visible, cases_left_out(named_results, visible)
 
 
 def shown_families(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
     """The results of a figure with a panel for each of `by_panel`: at most twelve panels of at most eight cases. If
     more, evenly spaced ones from the first to the last."""
-    wanted = [result for result in results if result.name in set(names)]
-    groups = spread_out(list(by_panel(wanted).values()), MOST_PANELS)
-    some = [result for members in groups for result in spread_out(members, MOST)]
-    return some, cases_left_out(wanted, some)
+    named_results = [result for result in results if result.name in set(names)]
+    groups = spread_out(list(by_panel(named_results).values()), MOST_PANELS)
+    visible = [result for members in groups for result in spread_out(members, MOST)]
+    return visible, cases_left_out(named_results, visible)
 
 
 def fitting_axis(label: str, marks: Sequence[Mark]) -> Axis:
@@ -421,34 +436,37 @@ def unbanded(figure: Figure) -> Figure:
 
 
 def joined(figure: Figure) -> Figure:
-    """The figure with lines that coincide in all its panels drawn once, their names joined by "=". Lines that are
-    named, by themselves or by a legend of their names, not those told apart by dash and shade."""
-    every = [{name: one for one in panel.marks if (name := _own_name(one, figure))} for panel in figure.panels]
-    alike: dict[str, list[str]] = {}
-    for name in dict.fromkeys(name for named in every for name in named):
-        first = next((one for one in alike if _coincide(one, name, every, figure)), name)
-        alike.setdefault(first, []).append(name)
-    renamed = {first: _joined_name(names) for first, names in alike.items()}
-    gone = {name for names in alike.values() for name in names[1:]}
-    if not gone:
-        return figure
+    """The figure with lines that coincide in all its panels drawn once, their names joined by "=".
 
-    def mark(one: Mark) -> Mark:
-        name = _own_name(one, figure)
-        if not (name and isinstance(one, Line)):
-            return one
-        return replace(one, label=one.label and renamed[name], name=one.name and renamed[name])
+    Lines that have a name of their own, in a legend or at their ends; not those that dash and shade distinguish."""
+    named_lines = [
+        {name: mark for mark in panel.marks if (name := _curve_name(mark, figure))} for panel in figure.panels
+    ]
+    groups: dict[str, list[str]] = {}
+    for name in dict.fromkeys(name for lines in named_lines for name in lines):
+        first = next((first for first in groups if _coincide(first, name, named_lines, figure)), name)
+        groups.setdefault(first, []).append(name)
+    duplicates = {name for names in groups.values() for name in names[1:]}
+    if not duplicates:
+        return figure
+    joined_names = {first: _joined_name(names) for first, names in groups.items()}
+
+    def rename(mark: Mark) -> Mark:
+        name = _curve_name(mark, figure)
+        if not (name and isinstance(mark, Line)):
+            return mark
+        return replace(mark, label=mark.label and joined_names[name], name=mark.name and joined_names[name])
 
     panels = tuple(
         replace(
             panel,
-            marks=tuple(mark(one) for one in panel.marks if _own_name(one, figure) not in gone),
-            keys=tuple((renamed.get(words, words), style) for words, style in panel.keys if words not in gone),
+            marks=tuple(rename(mark) for mark in panel.marks if _curve_name(mark, figure) not in duplicates),
+            keys=tuple((joined_names.get(key, key), style) for key, style in panel.keys if key not in duplicates),
         )
         for panel in figure.panels
     )
-    said = tr("Curves that coincide are drawn once, with both names.")
-    return replace(figure, panels=panels, caption=f"{figure.caption} {said}")
+    remark = tr("Curves that coincide are drawn once, with both names.")
+    return replace(figure, panels=panels, caption=f"{figure.caption} {remark}")
 
 
 def _joined_name(names: Sequence[str]) -> str:
@@ -459,112 +477,126 @@ def _joined_name(names: Sequence[str]) -> str:
     return " = ".join(names)
 
 
-def _own_name(mark: Mark, figure: Figure) -> str:
+def _curve_name(mark: Mark, figure: Figure) -> str:
     """The name of a curve that has one of its own, at its end or in a legend; empty for any other mark."""
     if not isinstance(mark, Line) or mark.style.dash is None or len(mark.x) < 2:
         return ""
     if mark.label:
         return mark.label if mark.name in ("", mark.label) else ""
-    return mark.name if any(mark.name == words for panel in figure.panels for words, _ in panel.keys) else ""
+    return mark.name if any(mark.name == key for panel in figure.panels for key, _ in panel.keys) else ""
 
 
-def _coincide(one: str, other: str, every: Sequence[Mapping[str, Mark]], figure: Figure) -> bool:
-    """Whether two curves cannot be told apart in any panel where they are drawn: values and bands nearer than half a
-    line's width, and to a per cent."""
-    drawn = False
-    for named, panel in zip(every, figure.panels, strict=True):
-        a, b = named.get(one), named.get(other)
-        if a is None and b is None:
+def _coincide(name: str, other_name: str, named_lines: Sequence[Mapping[str, Mark]], figure: Figure) -> bool:
+    """Whether two curves cannot be distinguished in any panel where they are drawn."""
+    is_drawn = False
+    for marks, panel in zip(named_lines, figure.panels, strict=True):
+        line, other = marks.get(name), marks.get(other_name)
+        if line is None and other is None:
             continue
-        if not (isinstance(a, Line) and isinstance(b, Line)) or not np.array_equal(a.x, b.x):
+        if not (isinstance(line, Line) and isinstance(other, Line)) or not np.array_equal(line.x, other.x):
             return False
-        log = panel.y.scale == "log"
-        lines = [
-            line
-            for line in named.values()
-            if isinstance(line, Line) and (line.y > 0 if log else np.isfinite(line.y)).any()
-        ]
-        if not lines:
+        is_log = panel.y.scale == "log"
+        visible = [mark for mark in marks.values() if isinstance(mark, Line) and _has_points(mark, is_log)]
+        if not visible:
             continue
-        low, high = (np.log10(end) if log else end for end in _holding(lines, panel.y))
-        drawn |= bool((a.y > 0 if log else np.isfinite(a.y)).any())
-        for first, second in ((a.y, b.y), (a.lo, b.lo), (a.hi, b.hi), (a.exact, b.exact)):
-            if first is None or second is None:
-                if first is not second:
-                    return False
-                continue
-            with np.errstate(divide="ignore", invalid="ignore"):
-                ours, theirs = (np.log10(part) if log else np.asarray(part, float) for part in (first, second))
-                within = np.log10(1 + SAME) if log else SAME * np.abs(ours) + SAME * LINE * (high - low)
-                near = np.abs(ours - theirs) <= np.minimum(LINE * (high - low), within)
-            if not (near | (ours == theirs) | (np.isnan(ours) & np.isnan(theirs))).all():
-                return False
-    return drawn
+        is_drawn |= _has_points(line, is_log)
+        low, high = _holding(visible, panel.y)
+        height = np.log10(high) - np.log10(low) if is_log else high - low
+        pairs = ((line.y, other.y), (line.lo, other.lo), (line.hi, other.hi), (line.exact, other.exact))
+        if not all(_values_coincide(*pair, height, is_log) for pair in pairs):
+            return False
+    return is_drawn
+
+
+def _has_points(line: Line, is_log: bool) -> bool:
+    return bool((line.y > 0 if is_log else np.isfinite(line.y)).any())
+
+
+def _values_coincide(values: np.ndarray | None, others: np.ndarray | None, height: float, is_log: bool) -> bool:
+    """Whether two columns of a curve are nearer to each other than half a line's width, and than a per cent.
+
+    height: of the panel, in units of the axis, or of its logarithm"""
+    if values is None or others is None:
+        return values is others
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ours, theirs = (np.log10(column) if is_log else np.asarray(column, float) for column in (values, others))
+        tolerance = np.log10(1 + SAME) if is_log else SAME * np.abs(ours) + SAME * LINE * height
+        is_near = np.abs(ours - theirs) <= np.minimum(LINE * height, tolerance)
+    return bool((is_near | (ours == theirs) | (np.isnan(ours) & np.isnan(theirs))).all())
 
 
 def ever_lost(lines: Sequence[Line]) -> tuple[tuple[Line, ...], str]:
     """The complements of shares that have a loss, and words on zeros, which a logarithmic axis lacks, for a caption."""
     losses = tuple(map(lost, lines))
-    drawn = tuple(line for line in losses if (line.y > 0).any())
+    visible = tuple(line for line in losses if (line.y > 0).any())
     names = [plain(line.name or line.label) for line in losses if not (line.y > 0).any()]
-    said = " " + tr("Zero throughout, so not drawn: {names}.", names=seen.named(names, MOST_GONE)) if names else ""
-    if any((line.y == 0).any() for line in drawn):
-        said += " " + tr("A zero has no point on this axis.")
-    return drawn, said
+    remark = (
+        " " + tr("Zero throughout, so not drawn: {names}.", names=seen.join_names(names, MAX_MISSING_NAMES))
+        if names
+        else ""
+    )
+    if any((line.y == 0).any() for line in visible):
+        remark += " " + tr("A zero has no point on this axis.")
+    return visible, remark
 
 
-def shared(drawn: Sequence[Panel]) -> list[Panel]:
+def shared(panels: Sequence[Panel]) -> list[Panel]:
     """Panels of lines side by side: those of one quantity share the axis of y that holds all."""
-    shown = [panel for panel in drawn if panel.marks]
-    lines = [mark for panel in shown for mark in panel.marks if isinstance(mark, Line)]
-    if len(shown) < 2 or len({panel.y.label for panel in shown}) > 1 or not lines or any(p.y.ticks for p in shown):
-        return list(drawn)
-    given = [panel.y for panel in shown if None not in panel.y.limits]
-    log = [panel.y for panel in shown if panel.y.scale == "log"]
-    own = shown[0].y
-    y = (given or log or [fitting_axis(own.label, lines) if own.limits == (0, None) else own])[0]
-    if not given:
+    filled = [panel for panel in panels if panel.marks]
+    lines = [mark for panel in filled for mark in panel.marks if isinstance(mark, Line)]
+    if len(filled) < 2 or len({panel.y.label for panel in filled}) > 1 or not lines or any(p.y.ticks for p in filled):
+        return list(panels)
+    limited = [panel.y for panel in filled if None not in panel.y.limits]
+    logarithmic = [panel.y for panel in filled if panel.y.scale == "log"]
+    first_axis = filled[0].y
+    y = (
+        limited
+        or logarithmic
+        or [fitting_axis(first_axis.label, lines) if first_axis.limits == (0, None) else first_axis]
+    )[0]
+    if not limited:
         y = replace(y, limits=_holding(lines, y))
-    return [replace(panel, y=y) for panel in drawn]
+    return [replace(panel, y=y) for panel in panels]
 
 
 def _holding(lines: Sequence[Line], y: Axis) -> tuple[float, float]:
-    """Limits that hold all lines, and their bands except ends far beyond them."""
-    values = np.concatenate(
-        [np.asarray(part, float) for one in lines for part in (one.y, one.exact) if part is not None]
-    )
-    bands = np.concatenate(
-        [np.asarray(part, float) for one in lines for part in (one.lo, one.hi) if part is not None] or [values]
-    )
-    log = y.scale == "log"
-    values, bands = (one[np.isfinite(one) & (one > 0 if log else True)] for one in (values, bands))
-    if log:
-        low = float(max(values.min() / WIDEST_BAND, bands.min(initial=values.min()))) / LOG_MARGIN
-        high = float(min(values.max() * WIDEST_BAND, bands.max(initial=values.max()))) * LOG_MARGIN
+    """Limits that hold all lines, and their bands except bounds far beyond them."""
+    values = _finite_values(y, [column for line in lines for column in (line.y, line.exact)])
+    bands = _finite_values(y, [column for line in lines for column in (line.lo, line.hi)])
+    lowest, highest = bands.min(initial=values.min()), bands.max(initial=values.max())
+    if y.scale == "log":
+        low = float(max(values.min() / WIDEST_BAND, lowest)) / LOG_MARGIN
+        high = float(min(values.max() * WIDEST_BAND, highest)) * LOG_MARGIN
         return y.limits[0] or low, high
     span = float(values.max() - values.min()) or 1.0
-    low = float(max(values.min() - span, bands.min(initial=values.min()))) - MARGIN * span
-    high = float(min(values.max() + span, bands.max(initial=values.max()))) + MARGIN * span
+    low = float(max(values.min() - span, lowest)) - MARGIN * span
+    high = float(min(values.max() + span, highest)) + MARGIN * span
     return low if y.limits[0] is None else y.limits[0], high
 
 
-def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: Component) -> Figure:
+def _finite_values(y: Axis, columns: Sequence[np.ndarray | None]) -> np.ndarray:
+    """The values of the columns that are known and that the axis can show."""
+    values = np.concatenate([np.zeros(0), *(np.asarray(column, float) for column in columns if column is not None)])
+    return values[np.isfinite(values) & (values > 0 if y.scale == "log" else True)]
+
+
+def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, component: Component) -> Figure:
     """σ(t) of one component: a panel for each config, a line for each filter and swept value.
 
     curves is tables.groups(table, "case", "filter", "component")."""
-    every = by_panel(results)
+    groups = by_panel(results)
     filters = filters_of(results)
-    panels = [_sigma_panel(title, members, curves, of, filters) for title, members in every.items()]
+    panels = [_sigma_panel(title, members, curves, component, filters) for title, members in groups.items()]
     panels = [panel for panel in panels if panel.marks]
     caption = tr(
         "Root-mean-square error of the {quantity} about the truth against time, of {realisations}. "
         "Bands: 95 % intervals; a band that is not visible is narrower than the line.",
-        quantity=of.words,
+        quantity=component.words,
         realisations=realisations(results),
     )
-    title = tr("σ of the {quantity}", quantity=of.words)
+    title = tr("σ of the {quantity}", quantity=component.words)
     figure = in_columns(Figure(name, title, caption, tuple(panels)))
-    return seen.begun(figure, seen.at_the_end(figure))
+    return figure
 
 
 def floored(figure: Figure, curves: "pd.DataFrame", component: str, factor: float = 1.0) -> Figure:
@@ -573,13 +605,13 @@ def floored(figure: Figure, curves: "pd.DataFrame", component: str, factor: floa
     rows = curves[curves["component"].eq(component) & curves["floor"].notna()] if "floor" in curves else curves[:0]
     if not len(rows) or len(figure.panels) != 1 or len(figure.panels[0].marks) > MOST_AT_ENDS:
         return figure
-    least = factor * rows.groupby("t_s", sort=True)["floor"].min()
+    lowest = factor * rows.groupby("t_s", sort=True)["floor"].min()
     (panel,) = figure.panels
-    line = Line(least.index.to_numpy(), least.to_numpy(), tr("floor"), GUIDE)
+    line = Line(lowest.index.to_numpy(), lowest.to_numpy(), tr("floor"), GUIDE)
     panel = replace(panel, marks=(*panel.marks, line))
     posterior = rows["floor_kind"].str.startswith("posterior").all()
-    said = tr("Grey: the floor, a posterior Cramér-Rao bound.") if posterior else tr(UNDER_UNBIASED)
-    return replace(figure, panels=(panel,), caption=f"{figure.caption} {said}")
+    remark = tr("Grey: the floor, a posterior Cramér-Rao bound.") if posterior else tr(UNDER_UNBIASED)
+    return replace(figure, panels=(panel,), caption=f"{figure.caption} {remark}")
 
 
 UNDER_UNBIASED = term("Grey: the floor, a Cramér-Rao bound of unbiased estimators.")
@@ -589,9 +621,9 @@ GUIDE = Style(GREY, 0, width_pt=0.8)
 def in_columns(figure: Figure) -> Figure:
     """A figure with as many columns as its panels fill, at one of the widths of a page."""
     count = len([panel for panel in figure.panels if panel.marks])
-    alike = tuple(shared(figure.panels))
-    one = {(panel.y.label, panel.y.scale, panel.y.limits, panel.y.ticks) for panel in alike if panel.marks}
-    figure = replace(figure, panels=alike, share_y=count > 1 and len(one) == 1)
+    panels = tuple(shared(figure.panels))
+    axes = {(panel.y.label, panel.y.scale, panel.y.limits, panel.y.ticks) for panel in panels if panel.marks}
+    figure = replace(figure, panels=panels, share_y=count > 1 and len(axes) == 1)
     if count == 1:
         wide = figure.panels[0].legend == "right"
         return replace(figure, columns=1, width_mm=WIDE_MM if wide else COLUMN_MM, panel_height_mm=64.0)
@@ -599,10 +631,10 @@ def in_columns(figure: Figure) -> Figure:
 
 
 def _sigma_panel(
-    title: str, members: Sequence[CaseResult], curves: Mapping, of: Component, filters: Sequence[str]
+    title: str, members: Sequence[CaseResult], curves: Mapping, component: Component, filters: Sequence[str]
 ) -> Panel:
-    marks = lines_of(members, curves, of.name, SIGMA, filters)
-    y = fitting_axis(sigma_of(of.symbol, of.unit), marks)
+    marks = lines_of(members, curves, component.name, SIGMA, filters)
+    y = fitting_axis(sigma_of(component.symbol, component.unit), marks)
     return keyed(Panel(time_axis(), y, tuple(marks), title), members, filters)
 
 
@@ -622,17 +654,17 @@ def lines_of(
     marks: list[Mark] = []
     for i, result in enumerate(members):
         for f in result.axes.filters:
-            own = rows.get((result.name, f, component))
-            if own is None:
+            case_rows = rows.get((result.name, f, component))
+            if case_rows is None:
                 continue
             style = look(filters.index(f), i, len(members))
             if len(members) == 1:
-                marks.append(line(own, columns, literal(f), style, literal(f)))
+                marks.append(line(case_rows, columns, literal(f), style, literal(f)))
             else:
                 key, value = result.swept[-1] if result.swept else ("", device(result))
-                among = [dict(one.swept).get(key) for one in members]
-                words = _shown_value(result, key, in_short(result, key, value, among)) if key else number(value)
-                marks.append(line(own, columns, words, style, f"{literal(f)}, {swept(result)}"))
+                values = [dict(one.swept).get(key) for one in members]
+                text = _shown_value(result, key, in_short(result, key, value, values)) if key else number(value)
+                marks.append(line(case_rows, columns, text, style, f"{literal(f)}, {swept(result)}"))
     return marks
 
 
@@ -643,11 +675,11 @@ def _shown_value(result: CaseResult, key: str, value: object) -> str:
     return turned_number(factor * float(str(value))) if is_turned else number(value, is_power(key))
 
 
-def family_panel(title: str, members: Sequence[CaseResult], rows: Mapping, words: str, filters: Sequence[str]) -> Panel:
+def family_panel(title: str, members: Sequence[CaseResult], rows: Mapping, label: str, filters: Sequence[str]) -> Panel:
     """A panel of any quantity of the members about one; rows by case, filter and its column, against t_s."""
     column = next(key[2] for key in rows)
     marks = lines_of(members, rows, column, ("t_s", column), filters)
-    return keyed(Panel(time_axis(), fitting_axis(words, marks), (Reference(1), *marks), title), members, filters)
+    return keyed(Panel(time_axis(), fitting_axis(label, marks), (Reference(1), *marks), title), members, filters)
 
 
 NEES = term("NEES per component\n(1 = consistent, below = pessimistic)")
@@ -655,21 +687,19 @@ NEES = term("NEES per component\n(1 = consistent, below = pessimistic)")
 
 def consistency(results: Sequence[CaseResult], table: "pd.DataFrame", experiment: Experiment) -> dict[str, Figure]:
     """The figure `consistency` of a table with NEES by case, filter and time, a panel for each config."""
-    rows = {(*key, "nees"): own for key, own in common.groups(table, "case", "filter").items()}
-    some, left_out = shown_families(results, named(experiment, "consistency"))
-    figure = nees_figure(nees_panels(some, rows), left_out)
-    begun = seen.all_begun({"consistency": figure}, {"consistency": seen.extremes})
-    return {name: one for name, one in begun.items() if one}
+    rows = {(*key, "nees"): filter_rows for key, filter_rows in common.groups(table, "case", "filter").items()}
+    visible, left_out = shown_families(results, named(experiment, "consistency"))
+    return {"consistency": nees_figure(nees_panels(visible, rows), left_out)}
 
 
 def nees_panels(results: Sequence[CaseResult], rows: Mapping) -> list[Panel]:
     """NEES against time, a panel for each config; rows by case, filter and `nees`."""
     filters = filters_of(results)
-    every = [family_panel(title, members, rows, tr(NEES), filters) for title, members in by_panel(results).items()]
-    return [panel for panel in every if len(panel.marks) > 1]
+    panels = [family_panel(title, members, rows, tr(NEES), filters) for title, members in by_panel(results).items()]
+    return [panel for panel in panels if len(panel.marks) > 1]
 
 
-def nees_figure(drawn: Sequence[Panel], left_out: str) -> Figure:
+def nees_figure(panels: Sequence[Panel], left_out: str) -> Figure:
     """The figure `consistency` of such panels; its caption names the panels left out."""
     caption = tr(
         "Mean of the normalised squared error eᵀP⁻¹e per estimated component, with the filter's own "
@@ -677,7 +707,7 @@ def nees_figure(drawn: Sequence[Panel], left_out: str) -> Figure:
         "pessimistic one."
     )
     title = tr("Consistency of the filters")
-    return in_columns(Figure("consistency", title, caption + left_out, tuple(drawn)))
+    return in_columns(Figure("consistency", title, caption + left_out, tuple(panels)))
 
 
 def keyed(panel: Panel, members: Sequence[CaseResult], filters: Sequence[str], baseline: bool = True) -> Panel:
@@ -686,10 +716,10 @@ def keyed(panel: Panel, members: Sequence[CaseResult], filters: Sequence[str], b
     filters as for `lines_of`; baseline: whether to draw the baseline filter."""
     if len(members) == 1:
         return panel
-    shown = {
+    visible_filters = {
         f for result in members for n, f in enumerate(result.axes.filters) if baseline or n != result.axes.baseline
     }
-    dashes = tuple((literal(f), Style(0, n, n)) for n, f in enumerate(filters) if f in shown)
+    dashes = tuple((literal(f), Style(0, n, n)) for n, f in enumerate(filters) if f in visible_filters)
     dashes = dashes if len(dashes) > 1 else ()
     title = key_title(members[0]) if members[0].swept else ""
     if sum(isinstance(mark, Line) for mark in panel.marks) > MOST_AT_ENDS:
@@ -717,59 +747,69 @@ def look(nth_filter: int, nth_case: int, cases: int) -> Style:
     return Style(colour, nth_filter, nth_filter)
 
 
-def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, of: Component) -> Figure:
-    """Relative gain of one component against time, a line for each case and filter. One panel where no config is swept;
-    else one for each of `by_panel`. gains is tables.groups(table, "case", "filter", "component")."""
-    base = results[0].axes.filters[results[0].axes.baseline]
+def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, component: Component) -> Figure:
+    """Relative gain of one component against time, a line for each case and filter.
+
+    One panel where no config is swept; else one for each of `by_panel`. gains is tables.groups(table, "case", "filter",
+    "component")."""
     caption = tr(
         "Relative gain in σ of the {quantity} against filter {base}, paired on common noise, of {realisations}. "
         "Bands: 95 % intervals. Below zero: a loss.",
-        quantity=of.words,
-        base=base,
+        quantity=component.words,
+        base=results[0].axes.filters[results[0].axes.baseline],
         realisations=realisations(results),
     )
-    y, title = (
-        Axis(tr("gain in $\\sigma$ of {symbol}, %", symbol=of.symbol)),
-        tr("Gain in σ of the {quantity}", quantity=of.words),
-    )
-    several = any(len(result.axes.filters) > 2 for result in results)
-    if any(result.swept for result in results) or (several and len(results) > 1):
-        drawn, filters = [], filters_of(results)
-        for words, members in by_panel(results).items():
-            lines = lines_of(members, gains, of.name, GAIN, filters)
-            panel = Panel(time_axis(), *_cut(y, lines), words)
-            drawn += [keyed(panel, members, filters, baseline=False)] if lines else []
-        return _gains_said(in_columns(Figure(name, title, caption, tuple(drawn))))
+    y = Axis(tr("gain in $\\sigma$ of {symbol}, %", symbol=component.symbol))
+    title = tr("Gain in σ of the {quantity}", quantity=component.words)
+    has_several_gains = any(len(result.axes.filters) > 2 for result in results)
+    if any(result.swept for result in results) or (has_several_gains and len(results) > 1):
+        panels, filters = [], filters_of(results)
+        for panel_title, members in by_panel(results).items():
+            if lines := lines_of(members, gains, component.name, GAIN, filters):
+                panel = Panel(time_axis(), *_cut(y, lines), panel_title)
+                panels.append(keyed(panel, members, filters, baseline=False))
+        return _with_remark_on_losses(in_columns(Figure(name, title, caption, tuple(panels))))
+    marks = _gain_lines(results, gains, component, has_several_gains)
+    # Many long names would cover the lines: the legend is beside the panel.
+    has_long_names = any(isinstance(mark, Line) and len(mark.label) > LONGEST_INSIDE for mark in marks)
+    is_beside = len(marks) > 3 and has_long_names
+    panel = Panel(time_axis(), *_cut(y, marks), direct=not is_beside, legend="right" if is_beside else "best")
+    width = PAGE_MM if is_beside else COLUMN_MM if len(results) < 3 else WIDE_MM
+    return _with_remark_on_losses(Figure(name, title, caption, (panel,), width_mm=width))
+
+
+def _gain_lines(
+    results: Sequence[CaseResult], gains: Mapping, component: Component, has_several_gains: bool
+) -> list[Mark]:
+    """The lines of a single panel of gains, named by case and filter as far as these differ."""
     marks: list[Mark] = []
     for i, result in enumerate(results):
-        for n, f in enumerate(result.axes.filters):
-            rows = gains.get((result.name, f, of.name))
+        for n, filter_name in enumerate(result.axes.filters):
+            rows = gains.get((result.name, filter_name, component.name))
             if rows is not None:
                 case = label(result) if len(results) > 1 else ""
-                words = ", ".join(filter(None, (case, literal(f) if several or len(results) == 1 else "")))
-                mark = n if several else i
-                marks.append(line(rows, GAIN, words, Style(i if len(results) > 1 else n, mark, mark), words))
-    # Many long names would cover the lines: the legend is beside the panel.
-    long = len(marks) > 3 and any(isinstance(mark, Line) and len(mark.label) > LONGEST_INSIDE for mark in marks)
-    panel = Panel(time_axis(), *_cut(y, marks), direct=not long, legend="right" if long else "best")
-    width = PAGE_MM if long else COLUMN_MM if len(results) < 3 else WIDE_MM
-    figure = Figure(name, title, caption, (panel,), width_mm=width)
-    return _gains_said(figure)
+                own_name = literal(filter_name) if has_several_gains or len(results) == 1 else ""
+                text = ", ".join(filter(None, (case, own_name)))
+                look_number = n if has_several_gains else i
+                style = Style(i if len(results) > 1 else n, look_number, look_number)
+                marks.append(line(rows, GAIN, text, style, text))
+    return marks
 
 
-def _gains_said(figure: Figure) -> Figure:
-    """A figure of gains with its first sentence, and a note where losses are cut."""
-    if any(panel.y.limits[0] == -LOSS for panel in figure.panels):
-        words = tr("Losses of over {loss:g} % lie below the axis: {names}.", loss=LOSS, names=seen.below(figure, -LOSS))
-        figure = replace(figure, caption=f"{figure.caption} {words}")
-    return seen.begun(figure, seen.most(figure))
+def _with_remark_on_losses(figure: Figure) -> Figure:
+    """A figure of gains, with a remark in its caption where losses are cut."""
+    if not any(panel.y.limits[0] == -LOSS for panel in figure.panels):
+        return figure
+    names = seen.lines_below(figure, -LOSS)
+    remark = tr("Losses of over {loss:g} % lie below the axis: {names}.", loss=LOSS, names=names)
+    return replace(figure, caption=f"{figure.caption} {remark}")
 
 
 def _cut(y: Axis, lines: Sequence[Mark]) -> tuple[Axis, tuple[Mark, ...]]:
     """The axis of gains and its marks: losses far beyond 100 % would hide everything else, and are cut."""
     values = [mark.y[np.isfinite(mark.y)] for mark in lines if isinstance(mark, Line)]
-    least = min((float(found.min()) for found in values if found.size), default=0.0)
-    return replace(y, limits=(-LOSS, 100.0)) if least < -2 * LOSS else y, (Reference(0), *lines)
+    lowest = min((float(column.min()) for column in values if column.size), default=0.0)
+    return replace(y, limits=(-LOSS, 100.0)) if lowest < -2 * LOSS else y, (Reference(0), *lines)
 
 
 def per_component(
@@ -780,60 +820,62 @@ def per_component(
 ) -> dict[str, Figure]:
     """gain_<component> and sigma_<component> of every component; each with the cases that the config names for it."""
     curves, gains = (common.groups(tables[name], "case", "filter", "component") for name in ("curves", "gains"))
-    made = {}
-    for of in components:
+    figures = {}
+    for component in components:
         for kind, draw, rows in (
             ("gain", gain_figure, gains),
             ("sigma", sigma_figure, curves),
             ("dynamic", dynamic_figure, curves),
         ):
-            name = f"{kind}_{of.name}"
-            some, left = shown_families(results, named(experiment, name))
-            figure = draw(name, some, rows, of) if some else None
+            name = f"{kind}_{component.name}"
+            visible, remark = shown_families(results, named(experiment, name))
+            figure = draw(name, visible, rows, component) if visible else None
             if figure and any(isinstance(mark, Line) for panel in figure.panels for mark in panel.marks):
                 if kind == "sigma" and len(results) == 1:
-                    figure = floored(figure, tables["curves"], of.name)
-                made[name] = replace(figure, caption=figure.caption + left)
-    return made
+                    figure = floored(figure, tables["curves"], component.name)
+                figures[name] = replace(figure, caption=figure.caption + remark)
+    return figures
 
 
-def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, of: Component) -> Figure | None:
+def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, component: Component) -> Figure | None:
     """Dynamic error (bias) and fluctuation error (spread) of one component, a panel for each case that has both. None
     where no case's bias exceeds its spread anywhere: then σ suffices."""
-    drawn: list[Panel] = []
+    panels: list[Panel] = []
     for result in results:
-        found = [
-            (f, curves[(result.name, f, of.name)]) for f in result.axes.filters if (result.name, f, of.name) in curves
+        filter_rows = [
+            (f, curves[(result.name, f, component.name)])
+            for f in result.axes.filters
+            if (result.name, f, component.name) in curves
         ]
-        if any((abs(rows["bias"]) > rows["spread"]).any() for _, rows in found):
-            panel = _dynamic_panel(result, found, of)
-            drawn.append(replace(panel, keys=()) if drawn else panel)
-    if not drawn:
+        if any((abs(rows["bias"]) > rows["spread"]).any() for _, rows in filter_rows):
+            panel = _dynamic_panel(result, filter_rows, component)
+            panels.append(replace(panel, keys=()) if panels else panel)
+    if not panels:
         return None
     caption = tr(
         "Errors of the {quantity} in cases with a mean error above the spread at some time: mean error "
         "(dynamic, bias) and standard deviation (fluctuation, spread) of {realisations}; σ² is the sum "
         "of their squares.",
-        quantity=of.words,
+        quantity=component.words,
         realisations=realisations(results),
     )
-    titles = [panel.title for panel in drawn]
+    titles = [panel.title for panel in panels]
     caption += left_out(titles, spread_out(titles, MOST_PANELS))
-    title = tr("Dynamic and fluctuation error of the {quantity}", quantity=of.words)
-    figure = in_columns(Figure(name, title, caption, tuple(spread_out(drawn, MOST_PANELS))))
-    return seen.begun(figure, seen.extremes(figure))
+    title = tr("Dynamic and fluctuation error of the {quantity}", quantity=component.words)
+    figure = in_columns(Figure(name, title, caption, tuple(spread_out(panels, MOST_PANELS))))
+    return figure
 
 
-def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Component) -> Panel:
+def _dynamic_panel(result: CaseResult, filter_rows: Sequence[tuple], component: Component) -> Panel:
     marks: list[Mark] = [Reference(0)]
-    for n, (f, rows) in enumerate(found):
+    for n, (f, rows) in enumerate(filter_rows):
         t = rows["t_s"].to_numpy()
         bias, half = rows["bias"].to_numpy(), Z95 * rows["bias_se"].to_numpy()
         name = literal(f)
         marks.append(Line(t, bias, "", Style(n, 0, n), bias - half, bias + half, name=tr("{name}: bias", name=name)))
         marks.append(Line(t, rows["spread"].to_numpy(), "", Style(n, 1, n), name=tr("{name}: spread", name=name)))
-    keys = [(literal(f), Style(n, None, n)) for n, (f, _) in enumerate(found)]
+    keys = [(literal(f), Style(n, None, n)) for n, (f, _) in enumerate(filter_rows)]
     keys += [(tr("bias"), Style(0, 0)), (tr("spread"), Style(0, 1))]
     title = swept(result) or device(result)
-    y = Axis(with_unit(tr("error of {symbol}", symbol=of.symbol), of.unit))
+    y = Axis(with_unit(tr("error of {symbol}", symbol=component.symbol), component.unit))
     return Panel(time_axis(), y, tuple(marks), title, tuple(keys))

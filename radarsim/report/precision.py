@@ -86,28 +86,28 @@ def least(result: CaseResult, curves: Table | None) -> int:
     Large errors have occurred where the effective realisations of any σ are under a third of all."""
     if curves is None:
         return FIRST
-    made = curves([result])
-    return FLOOR_OF_TAILS if (TAILED * made["n_eff"] < made["n"]).any() else FLOOR
+    rows = curves([result])
+    return FLOOR_OF_TAILS if (TAILED * rows["n_eff"] < rows["n"]).any() else FLOOR
 
 
 def worst(result: CaseResult, table: Table, of: Quantity = SIGMA) -> Cell | None:
     """The quantity of a case with the widest interval; None where the case has none. Where the case samples rare events
     of one filter, only its rate of them counts: other events stay rare."""
-    made = table([result])
+    rows = table([result])
     aimed_at = getattr(getattr(result.spec, "rare", None), "aimed_at", None)
     if of.last and aimed_at is not None:
-        made = made[made["filter"] == aimed_at]
-    if of.last and len(made):
-        made = made.groupby(["case", "filter", *filter(None, [of.per])], sort=False).tail(1)
-    if not len(made):
+        rows = rows[rows["filter"] == aimed_at]
+    if of.last and len(rows):
+        rows = rows.groupby(["case", "filter", *filter(None, [of.per])], sort=False).tail(1)
+    if not len(rows):
         return None
-    (value, lo, hi), _ = of.read(made)
+    (value, lo, hi), _ = of.read(rows)
     with np.errstate(divide="ignore", invalid="ignore"):
         percent = np.where(hi == lo, 0.0, 0.5 * (hi - lo) if of.kind == "signed" else 50 * (hi - lo) / value)
     percent = np.where(np.isnan(percent) | np.isnan(value), np.inf, percent)
     # Of equal ones the first: Gaussian errors without bias are all known equally well, up to rounding.
     first = int(np.flatnonzero(percent >= percent.max() * (1 - EQUAL))[0])
-    row = made.iloc[first]
+    row = rows.iloc[first]
     component, k = str(row.get(of.per, "")), int(row.get("k", 0))
     below = float(hi[first]) if value[first] == 0 and math.isinf(percent[first]) else None
     against = str(row.get("baseline", "")) if result.against else ""
@@ -136,9 +136,9 @@ def needed(
         # Half-widths go with 1/√n: looks far from enough are skipped.
         if cell.percent * math.sqrt(result.count / n) >= 2 * percent:
             continue
-        whole = grown(result, n)
-        wide = worst(whole, table, of)
-        if wide is not None and wide.percent < percent and n >= min(least(whole, curves), most):
+        scaled = grown(result, n)
+        widest = worst(scaled, table, of)
+        if widest is not None and widest.percent < percent and n >= min(least(scaled, curves), most):
             return n
     return None
 
@@ -147,7 +147,8 @@ def grown(result: CaseResult, n: int) -> CaseResult:
     """A case with its sums scaled to n realisations."""
     sums = {name: sums * (n / result.count) for name, sums in result.sums.items()}
     outside = None if result.outside is None else grown(result.outside, n)
-    return replace(result, count=n, sums=sums, against=tuple(grown(one, n) for one in result.against), outside=outside)
+    against = tuple(grown(baseline, n) for baseline in result.against)
+    return replace(result, count=n, sums=sums, against=against, outside=outside)
 
 
 def gaussian(result: CaseResult) -> CaseResult:

@@ -141,17 +141,17 @@ class Quantity:
 
         from radarsim.report.statistics import Estimate
 
-        if lacking := [one for one in (self.value, self.per) if one and one not in rows and len(rows)]:
-            raise ConfigError(f"quantity {self.name!r}: {self.table}.csv has no column {lacking[0]!r}")
+        if missing := [name for name in (self.value, self.per) if name and name not in rows and len(rows)]:
+            raise ConfigError(f"quantity {self.name!r}: {self.table}.csv has no column {missing[0]!r}")
         names = [self.value, *self.ends, self.known]
-        value, lo, hi, known = (
+        value, lo, hi, exact = (
             rows[name].to_numpy(dtype=float) if name in rows else np.full(len(rows), np.nan) for name in names
         )
         if self.ends[0] not in rows:
-            lo = hi = known = value
+            lo = hi = exact = value
         if self.rest:
-            value, lo, hi, known = 1 - value, 1 - hi, 1 - lo, 1 - known
-        return Estimate(value, lo, hi), known
+            value, lo, hi, exact = 1 - value, 1 - hi, 1 - lo, 1 - exact
+        return Estimate(value, lo, hi), exact
 
 
 SIGMA = Quantity(

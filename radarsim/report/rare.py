@@ -11,21 +11,24 @@ import numpy as np
 
 from radarsim.language import tr
 from radarsim.report import statistics, tables
+from radarsim.report.row_notes import RowNote, notes_where
 from radarsim.report.statistics import FEW_EVENTS
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-UNAIMED = 0.1  # share of Σw² that no shift leads to, from which on it is told
-ASTRAY = "much of it in ways that no shift leads to"
-FEW = f"under {FEW_EVENTS} effective events"
+UNGUIDED_SHARE = 0.1  # share of Σw² that no shift leads to, from which on a rate has a note
+UNGUIDED = RowNote("unguided", "much of it in ways that no shift leads to")
+UNDER_FEW_EVENTS = f"under {FEW_EVENTS} effective events"
+FEW = RowNote("few_events", UNDER_FEW_EVENTS)
 # 20 such events behind the rate do not tell: losses of lock of 10⁻⁶, shifted along the linear direction of each
 # hand-over, 200 × 10 000 bursts, had intervals that covered 81 %, and 5 events behind these. docs/rare.md has both
 # conditions and what they were measured to leave.
-HEAVY = f"interval of {FEW}: heavy weights"
-IN_PART = f"a part of it {FEW}"  # of a rate that is a sum, each part of which has weights of its own size
-ERRORS = 4.0  # standard errors of the mean weight beyond which it is not one; of fewer than FEW weights none is known
+HEAVY = RowNote("heavy_weights", f"interval of {UNDER_FEW_EVENTS}: heavy weights")
+# Of a rate that is a sum, each part of which has weights of its own size.
+IN_PART = RowNote("few_events_in_part", f"a part of it {UNDER_FEW_EVENTS}")
+MAX_MEAN_ERROR = 4.0  # standard errors of the mean weight from which it is not one; unknown for few weights
 
 
 class Drawn(NamedTuple):
@@ -46,17 +49,24 @@ class Counted(NamedTuple):
     fourth: np.ndarray
 
 
-def rate(of: Counted, drawn: Drawn) -> statistics.Estimate:
+def rate(event: Counted, drawn: Drawn) -> statistics.Estimate:
     """The probability of the event with its interval, from the weights."""
-    return statistics.weighted_rate(of.weight, of.squared, drawn.n, drawn.plain)
+    return statistics.weighted_rate(event.weight, event.squared, drawn.n, drawn.plain)
 
 
-def complement(of: statistics.Estimate) -> statistics.Estimate:
+def complement(probability: statistics.Estimate) -> statistics.Estimate:
     """One minus a probability."""
-    return statistics.Estimate(1 - of.value, 1 - of.hi, 1 - of.lo)
+    return statistics.Estimate(1 - probability.value, 1 - probability.hi, 1 - probability.lo)
 
 
-def rows(labels: Mapping[str, Any], event: str, sought: np.ndarray, of: Counted, drawn: Drawn) -> dict[str, Any]:
+def rows(
+    labels: Mapping[str, Any],
+    event: str,
+    sought: np.ndarray,
+    counted: Counted,
+    drawn: Drawn,
+    is_unguided_part: bool = False,
+) -> dict[str, Any]:
     """Probabilities of rare events, with the key `rare`: from the weights of realisations drawn for them.
 
     From labels (case, filter, k, t_s) of n rows and sought (n,). The interval is known from Σw², and that by
@@ -70,27 +80,31 @@ def rows(labels: Mapping[str, Any], event: str, sought: np.ndarray, of: Counted,
     variance_factor: how many times as many plain realisations give the same precision
     plain: number of the n drawn from the original law
     mean_weight, mean_weight_se: mean of all weights, which must be one, and its standard error"""
-    estimate, size = rate(of, drawn), len(sought)
-    variance = of.squared / drawn.n - estimate.value**2
+    estimate, size = rate(counted, drawn), len(sought)
+    variance = counted.squared / drawn.n - estimate.value**2
     with np.errstate(divide="ignore", invalid="ignore"):
-        factor = np.where(of.number > 0, estimate.value * (1 - estimate.value) / variance, np.nan)
+        factor = np.where(counted.number > 0, estimate.value * (1 - estimate.value) / variance, np.nan)
     mean = drawn.weight / drawn.n
     spread = np.sqrt(np.maximum(drawn.squared / drawn.n - mean**2, 0) / max(drawn.n - 1, 1))
-    effective = statistics.effective_events(of.weight, of.squared)
+    effective = statistics.effective_events(counted.weight, counted.squared)
     return {
         **labels,
         "event": np.full(size, event, dtype=object),
         "sought": sought,
         "n": np.full(size, drawn.n),
         "rate": estimate,
-        "events": of.number.astype(np.int64),
+        "events": counted.number.astype(np.int64),
         "n_eff": effective,
         "variance_factor": factor,
         "plain": np.full(size, drawn.plain).astype(np.int64),
         "mean_weight": np.full(size, mean),
         "mean_weight_se": np.full(size, spread),
-        "note": note(drawn, of),
+        "note": note(drawn, counted),
+        UNGUIDED_PART: np.full(size, is_unguided_part),
     }
+
+
+UNGUIDED_PART = "is_unguided_part"  # column of `rows`, not of the table: part of the sought event without a shift
 
 
 def note(drawn: Drawn, *events: Counted) -> np.ndarray:
@@ -99,35 +113,38 @@ def note(drawn: Drawn, *events: Counted) -> np.ndarray:
     Every row of every table with weighted rates may have one: shifts lead to the last scan alone, so that at other
     scans few weights, of any size, are behind a rate. Where an event is common, realisations without it are counted
     too."""
-    said = np.full(events[0].weight.shape, "", dtype=object)
-    for of in events:
-        having = statistics.effective_events(of.weight, of.squared)
-        lacking = statistics.effective_events(drawn.weight - of.weight, drawn.squared - of.squared)
-        few = np.minimum(having, lacking) < FEW_EVENTS
-        heavy = np.minimum(statistics.effective_events(of.squared, of.fourth), _weighing(of)) < FEW_EVENTS
-        said = np.where(said != "", said, np.where(few, FEW, np.where(heavy, HEAVY, "")).astype(object))
-    return said
+    notes = np.full(events[0].weight.shape, "", dtype=object)
+    for event in events:
+        with_event = statistics.effective_events(event.weight, event.squared)
+        without_event = statistics.effective_events(drawn.weight - event.weight, drawn.squared - event.squared)
+        are_few = np.minimum(with_event, without_event) < FEW_EVENTS
+        of_interval = np.minimum(statistics.effective_events(event.squared, event.fourth), _dominant_events(event))
+        of_event = notes_where(are_few, FEW, notes_where(of_interval < FEW_EVENTS, HEAVY))
+        notes = np.where(notes != "", notes, of_event)
+    return notes
 
 
-def _weighing(of: Counted) -> np.ndarray:
+def _dominant_events(event: Counted) -> np.ndarray:
     """How many of the events have weights of the size that dominates Σw², by the spread of all weights: n_eff²/number.
+
     For Gaussian logarithms of spread τ, w² has its mass 2τ above the middle: there are e^{−2τ²} of the events, and
     n_eff/number is e^{−τ²}. A sample that lacks the heavy ones still shows the spread of the others."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = statistics.effective_events(of.weight, of.squared) ** 2 / of.number
-    return np.where(of.number > 0, found, 0.0)
+        dominant = statistics.effective_events(event.weight, event.squared) ** 2 / event.number
+    return np.where(event.number > 0, dominant, 0.0)
 
 
 def table(parts: "Sequence[dict[str, Any]]") -> "pd.DataFrame | None":
-    """The table `rare` of cases' columns; None where no case has any."""
+    """The table `rare` of cases' columns from `rows`; None where no case has any."""
     if not parts:
         return None
-    made = tables.joined(parts)
-    return made.assign(note=made["note"].mask(_unaimed(made), ASTRAY))
+    rates = tables.joined(parts)
+    notes = notes_where(_is_unguided(rates), UNGUIDED, rates["note"].to_numpy(dtype=object))
+    return rates.assign(note=notes).drop(columns=UNGUIDED_PART)
 
 
-def told(row: "pd.Series") -> dict[str, Any]:
-    """A row of rare.csv in words: rate with interval, number of events, and effective ones."""
+def rate_fields(row: "pd.Series") -> dict[str, Any]:
+    """The fields of a sentence on a row of rare.csv: rate with interval, number of events, and effective ones."""
     return {
         "rate": row["rate"],
         "low": row["rate_lo"],
@@ -137,18 +154,13 @@ def told(row: "pd.Series") -> dict[str, Any]:
     }
 
 
-def unaimed(event: str, how: str) -> str:
-    """The name of an event without a shift of its own, part of a sampled one: `how` it comes about."""
-    return f"{event} {how}"
-
-
-def warnings(made: "pd.DataFrame | None") -> list[str]:
+def warnings(rates: "pd.DataFrame | None") -> list[str]:
     """A line on the worst case whose weights have a wrong mean, which makes every rate wrong."""
-    if made is None or not len(rows := made[made["n"] >= statistics.FEW]):
+    if rates is None or not len(rows := rates[rates["n"] >= statistics.FEW]):
         return []
-    off = (rows["mean_weight"] - 1).abs() - ERRORS * rows["mean_weight_se"]
-    worst = rows.iloc[int(off.to_numpy().argmax())]
-    if off.max() <= 0:
+    excess = (rows["mean_weight"] - 1).abs() - MAX_MEAN_ERROR * rows["mean_weight_se"]
+    worst = rows.iloc[int(excess.to_numpy().argmax())]
+    if excess.max() <= 0:
         return []
     return [
         tr(
@@ -161,9 +173,9 @@ def warnings(made: "pd.DataFrame | None") -> list[str]:
     ]
 
 
-def _unaimed(made: "pd.DataFrame") -> np.ndarray:
-    """The sampled rows (rows,) where events without a shift of their own dominate Σw² = (Σw)²/n_eff."""
-    sought, squared = made["sought"].astype(bool), made["rate"] ** 2 / made["n_eff"].clip(lower=1.0)
-    parts = ~sought & made["event"].str.startswith(tuple(unaimed(one, "") for one in made["event"][sought].unique()))
-    of_parts = squared.where(parts, 0.0).groupby([made[name] for name in ("case", "filter", "k")]).transform("max")
-    return (sought & (of_parts > UNAIMED * squared)).to_numpy()
+def _is_unguided(rates: "pd.DataFrame") -> np.ndarray:
+    """The sought rows (rows,) where a part of the event without a shift dominates Σw² = (Σw)²/n_eff."""
+    sought, squared = rates["sought"].astype(bool), rates["rate"] ** 2 / rates["n_eff"].clip(lower=1.0)
+    of_parts = squared.where(rates[UNGUIDED_PART].astype(bool), 0.0)
+    of_parts = of_parts.groupby([rates[name] for name in ("case", "filter", "k")]).transform("max")
+    return (sought & (of_parts > UNGUIDED_SHARE * squared)).to_numpy()

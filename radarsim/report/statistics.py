@@ -109,7 +109,7 @@ def furthest(looks: Values) -> float:
 ERROR_OF_PROGRAM = 5.85  # standard errors between a measured and an exact value: by chance once in 2·10⁸
 
 
-def standard_errors(of: Estimate, exact: Values) -> Values:
+def standard_errors(estimate: Estimate, exact: Values) -> Values:
     """Distance of a measured value from the exact one in its standard errors, from its 95 % interval; 0 or more.
 
     Towards the wider side of the interval the variance is taken to grow in proportion to the distance, as it does where
@@ -118,13 +118,13 @@ def standard_errors(of: Estimate, exact: Values) -> Values:
     rare, and of σ from 200 realisations on. Infinite where a value without width is off, NaN where either is unknown.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        off = np.subtract(exact, of.value)
-        up, down = np.subtract(of.hi, of.value), np.subtract(of.value, of.lo)
-        grown = np.where(off > 0, up - down, down - up)
-        unbounded = np.isinf(np.where(off > 0, of.hi, of.lo))
-        variance = up * down + np.maximum(grown, 0) * np.abs(off)
-        apart = np.where((off == 0) | unbounded, 0.0, Z95 * np.abs(off) / np.sqrt(variance))
-    return np.where(np.isnan(off) | np.isnan(up) | np.isnan(down), np.nan, apart)
+        difference = np.subtract(exact, estimate.value)
+        up, down = np.subtract(estimate.hi, estimate.value), np.subtract(estimate.value, estimate.lo)
+        growth = np.where(difference > 0, up - down, down - up)
+        unbounded = np.isinf(np.where(difference > 0, estimate.hi, estimate.lo))
+        variance = up * down + np.maximum(growth, 0) * np.abs(difference)
+        distance = np.where((difference == 0) | unbounded, 0.0, Z95 * np.abs(difference) / np.sqrt(variance))
+    return np.where(np.isnan(difference) | np.isnan(up) | np.isnan(down), np.nan, distance)
 
 
 def errors(moments: Values, n: Values) -> ErrorStatistics:
@@ -249,12 +249,12 @@ def difference(a: Estimate, b: Estimate, correlation: Values = 0.0) -> Estimate:
     times the correlation of the two, which is 0 of independent ones. NaN where infinite ones (a filter that never
     settles) leave it undefined. (Zou, Psychological Methods 12, 2007, 399.)"""
 
-    def joined(one: Values, other: Values) -> Values:
-        shared = np.where(np.equal(correlation, 0), 0.0, correlation * other)  # 0 · ∞ is no number
-        return np.hypot(one - shared, np.sqrt(1 - np.square(correlation)) * other)
+    def combine(width: Values, other_width: Values) -> Values:
+        shared = np.where(np.equal(correlation, 0), 0.0, correlation * other_width)  # 0 · ∞ is no number
+        return np.hypot(width - shared, np.sqrt(1 - np.square(correlation)) * other_width)
 
     with np.errstate(invalid="ignore"):
         value = np.subtract(a.value, b.value)
-        down = joined(np.subtract(a.value, a.lo), np.subtract(b.hi, b.value))
-        up = joined(np.subtract(a.hi, a.value), np.subtract(b.value, b.lo))
+        down = combine(np.subtract(a.value, a.lo), np.subtract(b.hi, b.value))
+        up = combine(np.subtract(a.hi, a.value), np.subtract(b.value, b.lo))
         return Estimate(value, value - down, value + up)

@@ -8,7 +8,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import tr
-from radarsim.report import panels, seen
+from radarsim.report import panels
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Style
 
 WIDE = 20  # ratio of swept values from which the axis is logarithmic
@@ -21,34 +21,34 @@ def figures(results: Sequence[CaseResult], curves: Mapping) -> dict[str, Figure]
     """A figure for each config that is swept over one key or two.
 
     curves is tables.groups(table, "case", "filter", "component")."""
-    drawn = {}
+    figures_by_name = {}
     for keys, groups in by_keys(results).items():
         name = "_".join(["sweep", *(key.rpartition(".")[2] for key in keys)])
         if len(keys) == 1:
-            drawn[name] = line_figure(name, keys[0], groups, curves)
+            figures_by_name[name] = line_figure(name, keys[0], groups, curves)
         elif len(keys) == 2:
-            several = len(groups) > 1
+            has_several_configs = len(groups) > 1
             for members in groups:
-                own = f"{name}_{panels.stem(members[0])}" if several else name
-                drawn[own] = map_figure(own, keys, members, curves)
-    return {name: figure for name, figure in drawn.items() if figure}
+                map_name = f"{name}_{panels.stem(members[0])}" if has_several_configs else name
+                figures_by_name[map_name] = map_figure(map_name, keys, members, curves)
+    return {name: figure for name, figure in figures_by_name.items() if figure}
 
 
 def by_keys(results: Sequence[CaseResult]) -> dict[tuple[str, ...], list[list[CaseResult]]]:
     """Swept cases by the keys that they differ in, those of each config together."""
-    found: dict[tuple[str, ...], list[list[CaseResult]]] = {}
+    groups: dict[tuple[str, ...], list[list[CaseResult]]] = {}
     for (_, keys), members in families(results).items():
-        found.setdefault(keys, []).append(members)
-    return found
+        groups.setdefault(keys, []).append(members)
+    return groups
 
 
 def families(results: Sequence[CaseResult]) -> dict[tuple[str, tuple[str, ...]], list[CaseResult]]:
     """Swept cases by their config and the keys that they differ in."""
-    found: dict = {}
+    groups: dict = {}
     for result in results:
         if result.swept:
-            found.setdefault((panels.stem(result), tuple(key for key, _ in result.swept)), []).append(result)
-    return {key: members for key, members in found.items() if len(members) > 1}
+            groups.setdefault((panels.stem(result), tuple(key for key, _ in result.swept)), []).append(result)
+    return {key: members for key, members in groups.items() if len(members) > 1}
 
 
 def components(result: CaseResult) -> list[tuple[str, str]]:
@@ -65,9 +65,9 @@ def places(result: CaseResult, key: str, values: Sequence) -> tuple[np.ndarray, 
     if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
         x = panels.axis_factor(result, key) * np.array(values, dtype=float)
         return x, Axis(label, "log" if x.min() > 0 and x.max() / x.min() > WIDE else "linear")
-    named = [panels.in_short(result, key, v, values) for v in values]
-    words = [panels.number(v if isinstance(v, str | list | tuple) else str(v)) for v in named]
-    ticks = tuple((float(i), textwrap.fill(one, BROAD, break_long_words=False)) for i, one in enumerate(words))
+    short_values = [panels.in_short(result, key, v, values) for v in values]
+    texts = [panels.number(v if isinstance(v, str | list | tuple) else str(v)) for v in short_values]
+    ticks = tuple((float(i), textwrap.fill(text, BROAD, break_long_words=False)) for i, text in enumerate(texts))
     return np.arange(float(len(values))), Axis(label, ticks=ticks)
 
 
@@ -83,14 +83,18 @@ def last(result: CaseResult, filter_name: str, component: str, curves: Mapping) 
 def line_figure(name: str, key: str, groups: Sequence[Sequence[CaseResult]], curves: Mapping) -> Figure | None:
     """σ at the last scan against one key, a line for each filter: a panel for each component; of several configs one
     for each of these, of the first component."""
-    members, several = [result for group in groups for result in group], len(groups) > 1
-    made = [
+    members, has_several_configs = [result for group in groups for result in group], len(groups) > 1
+
+    def title_of(result: CaseResult) -> str:
+        return panels.device(result) if has_several_configs else ""
+
+    panels_drawn = [
         panel
         for group in groups
-        for component in components(group[0])[: 1 if several else None]
-        if (panel := _line_panel(key, group, component, curves, panels.device(group[0]) if several else "")).marks
+        for component in components(group[0])[: 1 if has_several_configs else None]
+        if (panel := _line_panel(key, group, component, curves, title_of(group[0]))).marks
     ]
-    if not made:
+    if not panels_drawn:
         return None
     caption = tr(
         "σ at the last scan against the {key}, of {realisations} each. Bands: 95 % intervals.",
@@ -98,10 +102,10 @@ def line_figure(name: str, key: str, groups: Sequence[Sequence[CaseResult]], cur
         realisations=panels.realisations(members),
     )
     title = tr("σ over the {key}", key=panels.key_label(members[0], key).text)
-    figure = panels.in_columns(Figure(name, title, caption, tuple(made)))
-    if len(made[0].x.ticks) > FEW_NAMES:
-        figure = replace(figure, columns=min(2, len(made)))
-    return seen.begun(figure, seen.extremes(figure))
+    figure = panels.in_columns(Figure(name, title, caption, tuple(panels_drawn)))
+    if len(panels_drawn[0].x.ticks) > FEW_NAMES:
+        figure = replace(figure, columns=min(2, len(panels_drawn)))
+    return figure
 
 
 FEW_NAMES = 3  # on the axis of a panel of three beside each other
@@ -117,33 +121,33 @@ def _line_panel(
     x, axis = places(members[0], key, [dict(result.swept)[key] for result in members])
     if axis.ticks:
         leading = members[0].axes.components[0][0]
-        members = sorted(members, key=lambda one: last(one, filters[0], leading, curves)[0])
+        members = sorted(members, key=lambda result: last(result, filters[0], leading, curves)[0])
         _, axis = places(members[0], key, [dict(result.swept)[key] for result in members])
     order = np.argsort(x)
     marks = []
     for i, f in enumerate(filters):
-        found = factor * np.array([last(members[j], f, component[0], curves) for j in order])
-        if np.isfinite(found[:, 0]).any():
-            exact = found[:, 3] if np.isfinite(found[:, 3]).any() else None
-            at = np.arange(len(x)) + APART * (i - (len(filters) - 1) / 2) if axis.ticks else x[order]
+        sigma = factor * np.array([last(members[j], f, component[0], curves) for j in order])
+        if np.isfinite(sigma[:, 0]).any():
+            exact = sigma[:, 3] if np.isfinite(sigma[:, 3]).any() else None
+            positions = np.arange(len(x)) + APART * (i - (len(filters) - 1) / 2) if axis.ticks else x[order]
             style = Style(i, None if axis.ticks else i, i)
-            marks.append(Line(at, found[:, 0], panels.literal(f), style, found[:, 1], found[:, 2], exact))
-    words = tr("$\\sigma$ of {symbol} at the end", symbol=panels.letter(component[0]))
-    return Panel(axis, panels.fitting_axis(panels.with_unit(words, unit), marks), tuple(marks), title, direct=False)
+            marks.append(Line(positions, sigma[:, 0], panels.literal(f), style, sigma[:, 1], sigma[:, 2], exact))
+    label = tr("$\\sigma$ of {symbol} at the end", symbol=panels.letter(component[0]))
+    return Panel(axis, panels.fitting_axis(panels.with_unit(label, unit), marks), tuple(marks), title, direct=False)
 
 
 def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], curves: Mapping) -> Figure | None:
     """σ of the first component at the last scan over two keys: a map for each filter."""
     component, unit = members[0].axes.components[0]
     members = [result for result in members if component in dict(result.axes.components)]
-    shown = [key for key in keys if len({_hashable(dict(r.swept)[key]) for r in members}) > 1]
-    if len(shown) < 2:  # the component is of one value of a key alone
-        return line_figure(name, shown[0], [members], curves) if shown else None
+    varying = [key for key in keys if len({_hashable(dict(r.swept)[key]) for r in members}) > 1]
+    if len(varying) < 2:  # the component is of one value of a key alone
+        return line_figure(name, varying[0], [members], curves) if varying else None
     values = [list(dict.fromkeys(_hashable(dict(r.swept)[key]) for r in members)) for key in keys]
-    ranked = [sorted(v, key=lambda one: (isinstance(one, str), one)) for v in values]
+    ranked = [sorted(v, key=lambda value: (isinstance(value, str), value)) for v in values]
     (x, _), (y, _) = (places(members[0], key, v) for key, v in zip(keys, ranked, strict=True))
     across, up = (_named(members[0], key, v) for key, v in zip(keys, ranked, strict=True))
-    made = []
+    maps = []
     filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
     for f in filters[:MOST_PANELS]:
         grid = np.full((len(y), len(x)), np.nan)
@@ -152,8 +156,8 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
             grid[row, column] = last(result, f, component, curves)[0]
         if np.isfinite(grid).any():
             label = panels.with_unit(tr("$\\sigma$ of {symbol}", symbol=panels.letter(component)), unit)
-            made.append(Panel(across, up, (Heat(x, y, grid, label),), panels.literal(f)))
-    if not made:
+            maps.append(Panel(across, up, (Heat(x, y, grid, label),), panels.literal(f)))
+    if not maps:
         return None
     first, second = (panels.key_label(members[0], key).text for key in keys)
     caption = tr(
@@ -165,10 +169,10 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
     )
     caption += panels.left_out(filters, filters[:MOST_PANELS])
     title = tr("σ over the {first} and the {second}", first=first, second=second)
-    columns = min(2, len(made))
+    columns = min(2, len(maps))
     width = panels.WIDE_MM if columns == 1 else PAGE_MM
-    figure = Figure(name, title, caption, tuple(made), columns, width, 62)
-    return seen.begun(figure, seen.extremes(figure))
+    figure = Figure(name, title, caption, tuple(maps), columns, width, 62)
+    return figure
 
 
 def _named(result: CaseResult, key: str, values: Sequence) -> Axis:

@@ -42,34 +42,39 @@ def frame(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> "pd.DataFrame":
 def joined(parts: Iterable[Columns], columns: Sequence[str] = ()) -> "pd.DataFrame":
     """One DataFrame of cases' columns set one below the other, in the order of the first, or as named by `columns`. An
     `Estimate` makes three columns, see `spread`. Cases without rows do not count where others have some."""
-    every = [spread(part) for part in parts]
-    filled = [part for part in every if any(map(len, part.values()))] or every[:1]
-    if not filled:
+    spread_parts = [spread(part) for part in parts]
+    with_rows = [part for part in spread_parts if any(map(len, part.values()))] or spread_parts[:1]
+    if not with_rows:
         return frame({name: [] for name in columns})
-    return frame({name: np.concatenate([part[name] for part in filled]) for name in columns or filled[0]})
+    return frame({name: np.concatenate([part[name] for part in with_rows]) for name in columns or with_rows[0]})
 
 
 def spread(columns: Columns) -> dict[str, Any]:
     """Columns in which an estimate `x` is `x`, `x_lo` and `x_hi`; of `x|y` the ends are `y_lo` and `y_hi`."""
-    made: dict[str, Any] = {}
+    spread_columns: dict[str, Any] = {}
     for name, values in columns.items():
-        stem, given, ends = name.partition("|")
-        made |= (
-            interval_columns(stem, values, ends if given else None) if isinstance(values, Estimate) else {name: values}
-        )
-    return made
+        stem, has_stem, interval_name = name.partition("|")
+        if isinstance(values, Estimate):
+            spread_columns |= interval_columns(stem, values, interval_name if has_stem else None)
+        else:
+            spread_columns[name] = values
+    return spread_columns
 
 
 def stacked(parts: Sequence[Columns]) -> dict[str, Any]:
     """Columns of several parts of one case, concatenated."""
-    every = [spread(part) for part in parts]
-    return {name: np.concatenate([part[name] for part in every]) for name in every[0]} if every else {}
+    spread_parts = [spread(part) for part in parts]
+    if not spread_parts:
+        return {}
+    return {name: np.concatenate([part[name] for part in spread_parts]) for name in spread_parts[0]}
 
 
 def of_rows(rows: Sequence[Columns]) -> dict[str, np.ndarray]:
     """Columns of rows, each of single values by the column's name."""
-    every = [spread(row) for row in rows]
-    return {name: np.array([row[name] for row in every]) for name in every[0]} if every else {}
+    spread_rows = [spread(row) for row in rows]
+    if not spread_rows:
+        return {}
+    return {name: np.array([row[name] for row in spread_rows]) for name in spread_rows[0]}
 
 
 class Tables:
@@ -101,11 +106,11 @@ class Tables:
 
     def made(self, results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
         """All of them, with the rows of all cases."""
-        made = {
-            name: make(results) if of is None else joined(make(result) for result in results if of(result))
-            for name, (make, of) in self.declared.items()
+        tables = {
+            name: make(results) if applies is None else joined(make(result) for result in results if applies(result))
+            for name, (make, applies) in self.declared.items()
         }
-        return {name: table for name, table in made.items() if table is not None}
+        return {name: table for name, table in tables.items() if table is not None}
 
 
 def names(values: Sequence[str], index: np.ndarray) -> np.ndarray:
@@ -157,16 +162,16 @@ def components(result: CaseResult, c: np.ndarray) -> dict[str, np.ndarray]:
 
 def exact_first(rows: "pd.DataFrame", value: str, exact: str) -> np.ndarray:
     """A column (rows,) with the exact value in place of the measured one wherever it is known: what decides."""
-    known = rows[exact].to_numpy(dtype=float)
-    return np.where(np.isnan(known), rows[value].to_numpy(dtype=float), known)
+    exact_values = rows[exact].to_numpy(dtype=float)
+    return np.where(np.isnan(exact_values), rows[value].to_numpy(dtype=float), exact_values)
 
 
 def realisations(result: CaseResult) -> np.ndarray:
     """How many realisations stand behind each sum (F, K, C): all, or `estimates` where not all have an estimate.
 
     n: number of realisations behind the row"""
-    counted = result.sums.get("estimates")
-    return np.full(result.axes.available.shape, float(result.count)) if counted is None else np.asarray(counted)
+    estimates = result.sums.get("estimates")
+    return np.full(result.axes.available.shape, float(result.count)) if estimates is None else np.asarray(estimates)
 
 
 def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
@@ -185,22 +190,22 @@ def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
 
 def curve_columns(result: CaseResult, believed_sigma: np.ndarray | None = None) -> Columns:
     """The columns of `curves` for one case. believed_sigma (F, K, C): what its filters believe, NaN where unknown."""
-    axes, at = result.axes, shown(result)
-    f, k, c = at
-    n = realisations(result)[at]
-    moments = np.asarray(result.sums["error"])[at]
-    of = statistics.errors(moments, n)
+    axes, index = result.axes, shown(result)
+    f, k, c = index
+    n = realisations(result)[index]
+    moments = np.asarray(result.sums["error"])[index]
+    errors = statistics.errors(moments, n)
     return {
         **leading(result, f, k, **components(result, c)),
         "n": n.astype(np.int64),
-        "sigma": of.sigma,
-        "bias": of.bias,
-        "bias_se": of.bias_se,
-        "spread": of.spread,
-        "exact_sigma": np.asarray(axes.exact_sigma, dtype=float)[at],
-        "exact_bias": np.asarray(axes.exact_bias, dtype=float)[at],
+        "sigma": errors.sigma,
+        "bias": errors.bias,
+        "bias_se": errors.bias_se,
+        "spread": errors.spread,
+        "exact_sigma": np.asarray(axes.exact_sigma, dtype=float)[index],
+        "exact_bias": np.asarray(axes.exact_bias, dtype=float)[index],
         "n_eff": statistics.effective(moments[..., 1], moments[..., 3], n),
-        "believed_sigma": np.full(f.size, np.nan) if believed_sigma is None else believed_sigma[at],
+        "believed_sigma": np.full(f.size, np.nan) if believed_sigma is None else believed_sigma[index],
     }
 
 
@@ -220,23 +225,24 @@ def _gains(result: CaseResult) -> Columns:
     both = np.array(axes.available[b : b + 1] & axes.available)
     both[b] = False
     both &= "paired" in result.sums  # trackers keep tracks in realisations of their own
-    at = f, k, c = shown(result, both)
+    index = f, k, c = shown(result, both)
     error = np.asarray(result.sums["error"])
-    own, base = error[at], error[b, k, c]
-    cross = np.asarray(result.sums["paired"])[at] if f.size else np.zeros(0)  # a lone filter pairs with none
-    of = statistics.gain(own[:, 1], own[:, 3], base[:, 1], base[:, 3], cross, realisations(result)[at])
+    square, fourth = error[index][:, 1], error[index][:, 3]
+    base_square, base_fourth = error[b, k, c][:, 1], error[b, k, c][:, 3]
+    cross = np.asarray(result.sums["paired"])[index] if f.size else np.zeros(0)  # a lone filter pairs with none
+    gain = statistics.gain(square, fourth, base_square, base_fourth, cross, realisations(result)[index])
     return {
         **leading(result, f, k, baseline=np.full(f.size, axes.filters[b], dtype=object), **components(result, c)),
-        "gain_percent|gain": of,
-        "exact_percent": axes.exact_gains[at],
+        "gain_percent|gain": gain,
+        "exact_percent": axes.exact_gains[index],
     }
 
 
 def against_own(gains: "pd.DataFrame", results: Sequence[CaseResult]) -> "pd.DataFrame":
     """The rows of gains against the baselines of these results, not against further ones of their cases."""
-    own = {(result.name, result.baseline) for result in results}
+    own_pairs = {(result.name, result.baseline) for result in results}
     pairs = zip(gains["case"].tolist(), gains["baseline"].tolist(), strict=True)
-    return gains[np.array([pair in own for pair in pairs], dtype=bool)]
+    return gains[np.array([pair in own_pairs for pair in pairs], dtype=bool)]
 
 
 def below(parts: "Sequence[pd.DataFrame]") -> "pd.DataFrame":
@@ -268,7 +274,7 @@ def from_csv(content: bytes) -> "pd.DataFrame":
 def read_rows(rows: Sequence[Mapping[Any, Any]], names: Iterable[str]) -> "pd.DataFrame":
     """Columns of rows of a CSV file: numbers as numbers, NaN where a cell is empty."""
     columns = {name: [row[name] for row in rows] for name in names}
-    flags = {name for name, column in columns.items() if all(isinstance(one, bool) for one in column)}
+    flags = {name for name, column in columns.items() if all(isinstance(cell, bool) for cell in column)}
     read = {name: column if name in flags else _read(name, list(map(str, column))) for name, column in columns.items()}
     return frame(read)
 

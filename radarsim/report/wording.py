@@ -36,14 +36,14 @@ LONG = 8  # letters of an English label from which it does not set the width of 
 
 def labelled(label: str, text: str) -> str:
     """A line under a label; without one it stands under the line before."""
-    said, width = tr(label), max(len(tr(one)) for one in LABELS if len(one) < LONG) + 2
-    return f"{said:<{width}}{text}" if len(said) <= width - 2 else f"{said}  {text}"
+    label_text, width = tr(label), max(len(tr(name)) for name in LABELS if len(name) < LONG) + 2
+    return f"{label_text:<{width}}{text}" if len(label_text) <= width - 2 else f"{label_text}  {text}"
 
 
 def clock(seconds: float) -> str:
     """Seconds as h:mm:ss."""
-    whole = round(seconds)
-    return f"{whole // 3600}:{whole // 60 % 60:02}:{whole % 60:02}"
+    whole_seconds = round(seconds)
+    return f"{whole_seconds // 3600}:{whole_seconds // 60 % 60:02}:{whole_seconds % 60:02}"
 
 
 def plural(count: int, noun: str) -> str:
@@ -80,8 +80,8 @@ def interval(low: str, high: str) -> str:
 
 def estimate(values: Iterable[float], unit: str = "", form: str = ".4g") -> str:
     """A value with its unit and its 95 % interval, from the value and the two ends: 12.3 m [12, 12.6]."""
-    said, lo, hi = (numeral(format(one, form)).replace("inf", "∞") for one in values)
-    return f"{' '.join(filter(None, (said, unit)))} {interval(lo, hi)}"
+    value, low, high = (numeral(format(number, form)).replace("inf", "∞") for number in values)
+    return f"{' '.join(filter(None, (value, unit)))} {interval(low, high)}"
 
 
 def share(value: float, low: float, high: float) -> str:
@@ -91,14 +91,18 @@ def share(value: float, low: float, high: float) -> str:
     >>> share(100, 99.9962, 100), share(94.123, 93.9, 94.3), share(99.99, 99.9885, 99.9915)
     ('100 % [99.996, 100]', '94.12 % [93.90, 94.30]', '99.990 % [99.989, 99.992]')
     """
-    given, ends = [round(one, MOST_NINES) for one in (value, low, high)], (0.0, 100.0)
+    rounded, limits = [round(number, MOST_NINES) for number in (value, low, high)], (0.0, 100.0)
     for digits in range(2, MOST_NINES):
-        said = [f"{one:.{digits}f}" for one in given]
-        blurred = any((float(text) in ends) != (one in ends) for text, one in zip(said, given, strict=True))
-        if (said[1] != said[2] or low == high) and not blurred:
+        texts = [f"{number:.{digits}f}" for number in rounded]
+        is_blurred = any(
+            (float(text) in limits) != (number in limits) for text, number in zip(texts, rounded, strict=True)
+        )
+        if (texts[1] != texts[2] or low == high) and not is_blurred:
             break
-    of, *ends_said = (numeral(f"{one:.0f}" if one in ends else text) for one, text in zip(given, said, strict=True))
-    return f"{of} % {interval(*ends_said)}"
+    value_text, *bounds = (
+        numeral(f"{number:.0f}" if number in limits else text) for number, text in zip(rounded, texts, strict=True)
+    )
+    return f"{value_text} % {interval(*bounds)}"
 
 
 def unit(name: str) -> str:
@@ -131,13 +135,13 @@ def clauses(sentence: str) -> list[str]:
     >>> clauses("locked in 12 % [11; 13] (of 5; 6 lost); lost in 88 %")
     ['locked in 12 % [11; 13] (of 5; 6 lost)', 'lost in 88 %']
     """
-    found: list[str] = []
+    parts: list[str] = []
     for part in sentence.split("; "):
-        if found and any(found[-1].count(begin) > found[-1].count(end) for begin, end in ("[]", "()")):
-            found[-1] += f"; {part}"
+        if parts and any(parts[-1].count(opening) > parts[-1].count(closing) for opening, closing in ("[]", "()")):
+            parts[-1] += f"; {part}"
         else:
-            found.append(part)
-    return found
+            parts.append(part)
+    return parts
 
 
 def significant_digits(value: float, form: str = "#.4g") -> str:
@@ -181,16 +185,16 @@ def subscripts(text: str) -> Iterator[tuple[str, str]]:
         if n % 2 == 0:
             yield piece, ""
             continue
-        for accent, under, command, shift, shifted, letters, other in PARTS.findall(piece):
+        for accent, accented, command, shift, shifted, letters, character in PARTS.findall(piece):
             if accent:
-                yield under + {"dot": DOT_ABOVE, "hat": HAT_ABOVE}[accent], "i"
+                yield accented + {"dot": DOT_ABOVE, "hat": HAT_ABOVE}[accent], "i"
             elif command:
                 yield LETTERS.get(command, command), "i"
             elif shift:
                 inside = re.sub(r"\\([A-Za-z]+)", lambda m: LETTERS.get(m[1], m[1]), shifted.strip("{}"))
                 yield inside, {"_": "sub", "^": "sup"}[shift]
             else:
-                yield letters or other, "i" if letters else ""
+                yield letters or character, "i" if letters else ""
 
 
 def formulas(words: str) -> str:
@@ -199,7 +203,7 @@ def formulas(words: str) -> str:
     >>> formulas("σ_r² at the best D_M and g_{n−1}: sigma_range_m")
     '$σ_{r}$² at the best $D_{M}$ and $g_{n−1}$: sigma_range_m'
     """
-    return INDEXED.sub(lambda found: f"${found[1]}_{{{found[2] or found[3]}}}$", words.replace("$", r"\$"))
+    return INDEXED.sub(lambda match: f"${match[1]}_{{{match[2] or match[3]}}}$", words.replace("$", r"\$"))
 
 
 def spoken(text: str) -> str:

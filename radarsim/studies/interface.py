@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from radarsim.engine.results import Axes, CaseResult, Layout, Track
     from radarsim.report.drawing import Chart, Figure
     from radarsim.report.quantities import Component, Quantity
+    from radarsim.report.sentences import Sentence
     from radarsim.studies.floor import Floor
 
 
@@ -510,8 +511,11 @@ class Study(ABC):
         """The question of an experiment, in one sentence."""
 
     @abstractmethod
-    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
-        """The answer: sentences with numbers and 95 % intervals."""
+    def answer(
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]"
+    ) -> "Sequence[str | Sentence]":
+        """The answer: sentences with numbers and 95 % intervals. A `Sentence` names the intervals that it rests on,
+        for warnings; a plain text is taken to rest on σ and gain of every filter at the last scan."""
 
     def warnings(self, experiment: "Experiment") -> Sequence[str]:
         """Settings that are allowed but hardly intended, a line each; the run continues. Default: none."""

@@ -26,8 +26,8 @@
 `filters`, `baseline` and `scans` are added to the keys, with their marks. The tables curves, gains and `last`, figures,
 question and answer, claims and interpretations, and the use of recorded plots follow; `shipped/` beside the file holds
 configs. Claims find a case by its keys, `of: [{radar.scan_period_s: 2}]`, and are measured by functions
-of the file whose first argument is `seen`, or by those of `radarsim.papers.one_file_measures`. The alternatives of a choice set
-keys, `sets: {radar.scan_period_s: 2}`.
+of the file whose first argument is `seen`, or by those of `radarsim.papers.one_file_measures`. The alternatives of
+a choice set keys, `sets: {radar.scan_period_s: 2}`.
 
 A base for a kind of model derives from `OneFile` and gives `prepare`, with `axes` and `sums` from this module,
 `simulate`, and if it can `limits`, `drawing`, `tracker` and `likelihood`. `radarsim.studies.linear` is such a base.
@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import Axes, CaseResult, Layout
     from radarsim.report.drawing import Figure
+    from radarsim.report.sentences import Sentence
 
 
 class Measured(NamedTuple):
@@ -301,38 +302,48 @@ class OneFile(Study):
         """A text of the study, which the catalogue of its package translates."""
         return term(words, type(self).__module__.partition(".")[0])
 
-    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
-        from radarsim.report import panels
+    def answer(
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]"
+    ) -> "Sequence[str | Sentence]":
+        from radarsim.report import panels, sentences
 
-        quoted_results, further_sentences = panels.reported(results)
-        has_families = len(panels.families(results)) > 1  # configs of an `include`
-        sentences = [
-            f"{panels.stem(result)}: {sentence}" if has_families else sentence
-            for result in quoted_results
-            for sentence in self._sentences(result, tables)
-        ]
-        return [*sentences, *further_sentences]
+        reported, remark = panels.reported(results)
+        has_several_configs = len(panels.families(results)) > 1  # of an `include`
+        answer = []
+        for result in reported:
+            prefix = f"{panels.stem(result)}: " if has_several_configs else ""
+            answer += [sentence.with_text(prefix + sentence.text) for sentence in self._sentences(result, tables)]
+        return [*answer, *map(sentences.Sentence, remark)]
 
-    def _sentences(self, result: "CaseResult", tables_of_run: "Mapping[str, pd.DataFrame]") -> Iterator[str]:
+    def _sentences(self, result: "CaseResult", tables_by_name: "Mapping[str, pd.DataFrame]") -> "Iterator[Sentence]":
         """σ of the leading component at the last scan, and the gain of each filter."""
-        from radarsim.report import panels, tables, wording
+        from radarsim.report import panels, sentences, tables, wording
 
         leading = self.components[0]
-        last = tables.where(tables_of_run["last"], case=result.name, component=leading.name).to_dict("records")
+        last = tables.where(tables_by_name["last"], case=result.name, component=leading.name)
         keys: tuple[str, ...] = ("last_sigma", "last_lo", "last_hi")
-        estimates = [f"{row['filter']} {wording.estimate((row[key] for key in keys), tr(row['unit']))}" for row in last]
-        fields = {"quantity": self._term(leading.words or leading.name), "t": float(result.axes.t_s[-1])}
-        sentence = tr("σ of the {quantity} after {t:g} s: {filters}.", **fields, filters=listed(estimates))
-        yield panels.at_its_place(result, sentence)
-        gains = tables.where(tables_of_run["gains"], case=result.name, component=leading.name)
+        sigmas = [
+            f"{row['filter']} {wording.estimate((row[key] for key in keys), tr(row['unit']))}"
+            for row in last.to_dict("records")
+        ]
+        text = tr(
+            "σ of the {quantity} after {t:g} s: {filters}.",
+            quantity=self._term(leading.words or leading.name),
+            t=float(result.axes.t_s[-1]),
+            filters=listed(sigmas),
+        )
+        yield sentences.Sentence(panels.at_its_place(result, text), sentences.intervals("last", "last", last))
+        gains = tables.where(tables_by_name["gains"], case=result.name, component=leading.name)
         gains = gains[gains["k"] == gains["k"].max()]
         if len(gains):
             keys = ("gain_percent", "gain_lo", "gain_hi")
-            rows = gains.to_dict("records")
-            estimates = [f"{row['filter']} {wording.estimate((row[key] for key in keys), '%', '.3g')}" for row in rows]
-            baseline = result.axes.filters[result.axes.baseline]
-            sentence = tr("Gain against {base} there: {filters}.", base=baseline, filters=listed(estimates))
-            yield panels.at_its_place(result, sentence)
+            texts = [
+                f"{row['filter']} {wording.estimate((row[key] for key in keys), '%', '.3g')}"
+                for row in gains.to_dict("records")
+            ]
+            base = result.axes.filters[result.axes.baseline]
+            text = tr("Gain against {base} there: {filters}.", base=base, filters=listed(texts))
+            yield sentences.Sentence(panels.at_its_place(result, text), sentences.intervals("gains", "gain", gains))
 
     # ---- beside --------------------------------------------------------------------------------------------------
     def columns(self, spec: Any, filter_keys: Any) -> tuple[str, ...]:

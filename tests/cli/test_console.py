@@ -126,7 +126,7 @@ def test_a_narrow_table_leaves_out_what_is_there(monkeypatch):
     screen = Terminal()
     monkeypatch.setattr("sys.stdout", screen)
     row = {"filter": "f", "case": "a", "component": "x", "t_s": 1.0, "unit": "m", "exact_sigma": math.nan, "note": ""}
-    row |= {"sigma": 1.5, "sigma_lo": 1.0, "sigma_hi": 2.0, "gain_note": notes.HEAVY, "n_eff": 900.0}
+    row |= {"sigma": 1.5, "sigma_lo": 1.0, "sigma_hi": 2.0, "gain_note": str(notes.HEAVY), "n_eff": 900.0}
     last = pd.DataFrame([row | {"gain_percent": 3.25, "gain_lo": 1.0, "gain_hi": 5.0}])
     outcomes.show_rows("a", last, {"a": "a"})
     assert "3.25 %" in screen.getvalue()
@@ -206,9 +206,9 @@ def test_every_marked_interval_is_marked_on_the_terminal(capsys):
     row = {"case": "a", "component": "x", "t_s": 1.0, "unit": "m", "exact_sigma": float("nan"), "n_eff": 900.0}
     row |= {"sigma": 1.5, "sigma_lo": 1.0, "sigma_hi": 2.0, "gain_percent": 3.0, "gain_lo": 1.0, "gain_hi": 5.0}
     said = [
-        {"filter": "f", "note": notes.HEAVY, "gain_note": notes.HEAVY},
-        {"filter": "g", "note": "rarer ones may decide", "gain_note": notes.ALIKE},
-        {"filter": "h", "note": "", "gain_note": notes.HEAVY},  # the baseline has few
+        {"filter": "f", "note": str(notes.HEAVY), "gain_note": str(notes.HEAVY)},
+        {"filter": "g", "note": "rarer ones may decide", "gain_note": str(notes.ALIKE)},
+        {"filter": "h", "note": "", "gain_note": str(notes.HEAVY)},  # the baseline has few
         {"filter": "i", "note": "", "gain_note": ""},
         {"filter": "j", "note": "", "gain_note": float("nan"), "gain_lo": float("nan"), "gain_hi": float("nan")},
     ]

@@ -166,8 +166,8 @@ def test_names_with_commas_stay_one_name_in_a_row():
     from radarsim.report import notes, seen
 
     names = ["sequence", "cured", "cured, gated", "dense"]
-    assert language.few(names) == seen.named(names) == "sequence, cured, “cured, gated” and dense"
-    assert notes.few([SimpleNamespace(name=one, count=9) for one in names]) == [
+    assert language.few(names) == seen.join_names(names) == "sequence, cured, “cured, gated” and dense"
+    assert notes.few_realisations_warning([SimpleNamespace(name=one, count=9) for one in names]) == [
         "sequence, cured, “cured, gated” and dense: intervals from 9 realisations are rough: run at least 200"
     ]
     assert language.few(["cured, gated"]) == "cured, gated"

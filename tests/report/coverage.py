@@ -19,6 +19,7 @@ from radarsim.config.document import SHIPPED
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.report import notes
+from radarsim.report.row_notes import concerns
 from radarsim.report.statistics import Z95
 from radarsim.studies import registry
 
@@ -127,7 +128,7 @@ def shipped(config: str, overrides: Sequence[str] = ()) -> pd.DataFrame:
 
 def table(found: pd.DataFrame) -> str:
     """Coverage of marked and of unmarked intervals as Markdown: by study, then by what the note says."""
-    found = found.assign(marked=~found["note"].isin(("", notes.VARIES)))
+    found = found.assign(marked=~found["note"].isin(("", str(notes.VARIES))))
     lines = ["| | intervals | marked | of these hold | of the others hold |", "|---|---|---|---|---|"]
     for study, own in [*found.groupby("study"), ("all", found)]:
         count, held = own.groupby("marked")["intervals"].sum(), own.groupby("marked")["held"].sum()
@@ -166,7 +167,6 @@ def _of_run(run: int, made: dict[str, pd.DataFrame], whole: dict[str, pd.DataFra
         place = _index(name, whole[name]).get_indexer(_index(name, table))
         table, place = table[place >= 0], place[place >= 0]
         note = table["note"].to_numpy(dtype=object) if "note" in table else np.full(len(table), "", dtype=object)
-        values = [value for value, *_ in _intervals(name, table)]
         for value, lo, hi in _intervals(name, table):
             truth = whole[name][value].to_numpy(dtype=float)
             if (name, value) in EXACT and EXACT[name, value] in whole[name]:
@@ -179,7 +179,7 @@ def _of_run(run: int, made: dict[str, pd.DataFrame], whole: dict[str, pd.DataFra
             by_chance = (hi > lo + size) & np.isfinite(truth)
             held = (lo <= truth) & (truth <= hi)
             own = note.copy()
-            own[~np.isin(note, [one for one in set(note) if notes.is_of(one, value, values)])] = ""
+            own[[not concerns(one, value) for one in note]] = ""
             yield Seen(run, name, value, place[by_chance], own[by_chance], held[by_chance])
 
 
@@ -190,7 +190,7 @@ def _tables(experiment: Experiment, works: list[CaseWork], sums: list[np.ndarray
         for case, work, own in zip(experiment.cases, works, sums, strict=True)
     ]
     declared = registry.study(experiment.study).quantities()
-    return notes.noted(result.measured(results), results, exact=False, declared=declared)
+    return notes.add_notes(result.measured(results), results, exact=False, quantities=declared)
 
 
 def _index(name: str, table: pd.DataFrame) -> pd.MultiIndex:

@@ -1,6 +1,7 @@
 """Notes where an interval covers less than it says, none elsewhere; and what is said of them above an answer."""
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,19 +13,21 @@ from radarsim.app import result as output
 from radarsim.config.document import SHIPPED
 from radarsim.report import notes, statistics
 from radarsim.report.quantities import Quantity
+from radarsim.report.row_notes import has_note
+from radarsim.report.sentences import MeasuredInterval, Sentence, as_sentence
 from radarsim.report.statistics import FEW
 
 
 def test_effective_realisations_mark_a_row_whatever_n():
     n = np.full(5, 10_000.0)
     fewest = np.array([notes.EFFECTIVE - 1, notes.EFFECTIVE, np.inf, np.nan, 5.0])
-    assert list(notes.notes_on(n, fewest)) == [notes.HEAVY, "", "", "", notes.HEAVY]
+    assert list(notes.heavy_tail_notes(n, fewest)) == [notes.HEAVY, "", "", "", notes.HEAVY]
 
 
 @pytest.mark.parametrize("n", [20, 60, 300])
 def test_gaussian_errors_of_few_realisations_have_no_tails(n):
     """Half of them count, however few they are; those of a tenth of the realisations would."""
-    assert list(notes.notes_on(np.full(2, float(n)), np.array([n / 2, n / 10]))) == ["", notes.HEAVY]
+    assert list(notes.heavy_tail_notes(np.full(2, float(n)), np.array([n / 2, n / 10]))) == ["", notes.HEAVY]
 
 
 @pytest.mark.parametrize("count", [50, 300])
@@ -38,7 +41,7 @@ def test_a_gain_rests_on_the_fewer_of_its_two_filters():
     curves = pd.DataFrame([{**rows, "filter": "one", "n_eff": 2000.0}, {**rows, "filter": "two", "n_eff": 20.0}])
     gain = {"baseline": "two", "gain_percent": 0.5, "gain_lo": 0.0, "gain_hi": 1.0, "exact_percent": np.nan}
     gains = pd.DataFrame([{**rows, "filter": "one", **gain}])
-    noted = notes.noted({"curves": curves, "gains": gains.drop(columns="n")}, [])
+    noted = notes.add_notes({"curves": curves, "gains": gains.drop(columns="n")}, [])
     assert list(noted["curves"]["note"]) == ["", notes.HEAVY]
     assert list(noted["gains"]["note"]) == [notes.HEAVY]
 
@@ -47,7 +50,7 @@ def test_a_scan_near_one_with_heavy_tails_is_marked_too():
     of = [{"case": "a", "component": c, "k": k, "n": 5000, "filter": f} for f in "fg" for c in "xy" for k in range(60)]
     curves = pd.DataFrame(of).assign(sigma=1.0, sigma_lo=0.9, sigma_hi=1.1, n_eff=2500.0)
     curves.loc[(curves["filter"] == "g") & (curves["component"] == "x") & (curves["k"] == 20), "n_eff"] = 30.0
-    noted = notes.noted({"curves": curves}, [])["curves"].set_index(["filter", "component", "k"])["note"]
+    noted = notes.add_notes({"curves": curves}, [])["curves"].set_index(["filter", "component", "k"])["note"]
     near = noted[noted == notes.HEAVY].index.tolist()
     assert near == [("g", "x", k) for k in range(14, 27)]  # a tenth of 60 scans on either side
     assert (noted == "").sum() == 240 - 13
@@ -62,7 +65,7 @@ def test_gains_of_filters_that_err_nearly_alike_are_marked(half, exact, alike):
     curves = pd.DataFrame([{**row, "filter": name, "n_eff": 2500.0} for name in ("one", "two")])
     gain = {"gain_percent": 0.0, "gain_lo": -half, "gain_hi": half, "exact_percent": exact}
     gains = pd.DataFrame([{**row, "filter": "one", "baseline": "two", **gain}]).drop(columns="n")
-    noted = notes.noted({"curves": curves, "gains": gains}, [])["gains"]
+    noted = notes.add_notes({"curves": curves, "gains": gains}, [])["gains"]
     assert list(noted.get("note", [""])) == [notes.ALIKE if alike else ""]
 
 
@@ -74,7 +77,7 @@ def test_a_paired_quantity_that_a_study_declares_is_marked_likewise(value, alike
     above = {"above_percent": value, "above_lo": value - 0.3, "above_hi": value + 0.3}
     table = pd.DataFrame([{**row, "filter": "one", **above}]).drop(columns="n")
     declared = Quantity("above", "above", "apart", "above_percent|above", kind="signed", unit="%", paired=True)
-    noted = notes.noted({"curves": curves, "apart": table}, [], declared=[declared])["apart"]
+    noted = notes.add_notes({"curves": curves, "apart": table}, [], quantities=[declared])["apart"]
     assert list(noted.get("note", [""])) == [notes.ALIKE if alike else ""]
 
 
@@ -106,7 +109,7 @@ def test_a_gain_of_all_there_is_divides_by_nothing():
     gain = {"gain_percent": 100.0, "gain_lo": 100.0, "gain_hi": 100.0, "exact_percent": np.nan}
     gains = pd.DataFrame([{**row, "filter": "one", "baseline": "two", **gain}]).drop(columns="n")
     with np.errstate(all="raise"):
-        noted = notes.noted({"curves": curves, "gains": gains}, [])["gains"]
+        noted = notes.add_notes({"curves": curves, "gains": gains}, [])["gains"]
     assert list(noted.get("note", [""])) == [""]
 
 
@@ -116,9 +119,9 @@ def test_a_table_keeps_the_notes_that_it_brings():
     )
     table = table.assign(ratio=1.0, ratio_lo=0.9, ratio_hi=1.1)
     made = {"curves": pd.DataFrame(), "ratios": table.assign(note=["own", ""])}
-    assert list(notes.noted(made, [])["ratios"]["note"]) == ["own", ""]
+    assert list(notes.add_notes(made, [])["ratios"]["note"]) == ["own", ""]
     assert list(made["ratios"]["note"]) == ["own", ""]
-    assert "note" not in notes.noted(made | {"ratios": table.assign(note="")}, [])["ratios"]
+    assert "note" not in notes.add_notes(made | {"ratios": table.assign(note="")}, [])["ratios"]
 
 
 @pytest.mark.parametrize("exact", [True, False])
@@ -128,7 +131,7 @@ def test_no_note_stands_beside_an_exact_value(exact):
     curves = pd.DataFrame(
         [{**row, "k": k, "n_eff": 20.0, "exact_sigma": of} for k, of in enumerate((1.0, 5.0, np.nan))]
     )
-    noted = notes.noted({"curves": curves}, [], exact)["curves"]
+    noted = notes.add_notes({"curves": curves}, [], exact)["curves"]
     assert list(noted["note"]) == ["" if exact else notes.HEAVY] * 2 + [notes.HEAVY]
 
 
@@ -146,80 +149,114 @@ def test_the_answer_of_a_radar_that_misses_plots_stands_without_a_warning():
     assert "note" not in result.gains
 
 
-def given(*rows):
-    """An answer that gives the interval of σ of these rows of curves, to two digits."""
-    return lambda made: [f"{made['curves']['sigma_lo'][i]:.2g} {made['curves']['sigma_hi'][i]:.2g}" for i in rows]
+def sigma_of(*rows):
+    """A sentence that gives the interval of σ in these rows of curves."""
+    return Sentence("σ.", tuple(MeasuredInterval("curves", row, "sigma") for row in rows))
 
 
-def test_what_is_said_above_an_answer_is_of_the_intervals_that_it_gives():
-    """In one line, whatever other rows of whatever table are marked; none where none of its own is."""
+def test_warning_is_about_the_intervals_that_the_answer_rests_on():
+    """In one line, whatever other rows of whatever table have a note; none where none of its own has."""
     results = [SimpleNamespace(name="a", count=5000)]
     of = [{"case": "a", "component": "x", "k": k, "n": 5000, "filter": f} for f in "fg" for k in range(60)]
     curves = pd.DataFrame(of).assign(sigma=1.0, sigma_lo=0.9, sigma_hi=1.1, n_eff=2500.0)
     curves.loc[20, "n_eff"] = 30.0
-    made = notes.noted({"curves": curves, "gains": pd.DataFrame()}, results)
-    assert notes.heavy(made["curves"]).sum() == 13
-    assert not notes.of_intervals(results, made, [given(0, 59, 80)])
-    (line,) = notes.of_intervals(results, made, [given(0, 14, 80)])
+    made = notes.add_notes({"curves": curves, "gains": pd.DataFrame()}, results)
+    assert has_note(made["curves"]).sum() == 13
+    assert not notes.answer_warnings(results, made, [sigma_of(0, 59, 80)])
+    (line,) = notes.answer_warnings(results, made, [sigma_of(0, 14, 80)])
     assert line.startswith("1 interval of the answer is too narrow")
     assert "(f): run with -n 2e4" in line  # 5000 × 100/30
-    (line,) = notes.of_intervals(results, made, [given(14), given(15, 26, 27)])
+    (line,) = notes.answer_warnings(results, made, [sigma_of(14), sigma_of(15, 26, 27), sigma_of(14)])
     assert line.startswith("3 intervals of the answer are too narrow")
-    (line,) = notes.of_intervals([SimpleNamespace(name="a", count=FEW - 1)], made, [given(14)])
+    (line,) = notes.answer_warnings([SimpleNamespace(name="a", count=FEW - 1)], made, [sigma_of(14)])
     assert f"{FEW - 1} realisations are rough" in line
 
 
-def test_a_note_that_begins_with_the_name_of_an_interval_is_of_that_one_alone():
+def test_note_on_one_interval_gives_no_warning_of_another():
     row = {"case": "a", "filter": "f", "n": 5000, "sigma_lo": 0.9, "sigma_hi": 1.1, "gain_lo": 1.0, "gain_hi": 3.0}
-    made = {"stages": pd.DataFrame([row | {"note": notes.OF_GAIN + notes.HEAVY}]), "curves": pd.DataFrame()}
+    made = {"stages": pd.DataFrame([row | {"note": notes.HEAVY.about("gain")}]), "curves": pd.DataFrame()}
     results = [SimpleNamespace(name="a", count=5000)]
-    assert not notes.of_intervals(results, made, [lambda made: [str(made["stages"]["sigma_hi"][0])]])
-    (line,) = notes.of_intervals(results, made, [lambda made: [str(made["stages"]["gain_hi"][0])]])
+    assert str(made["stages"]["note"][0]).startswith("gain: under 100 effective")
+    assert not notes.answer_warnings(results, made, [Sentence("", (MeasuredInterval("stages", 0, "sigma"),))])
+    (line,) = notes.answer_warnings(results, made, [Sentence("", (MeasuredInterval("stages", 0, "gain"),))])
     assert "may be too narrow" in line
     assert "(f)" in line
 
 
+def test_note_on_what_an_interval_leaves_out_gives_no_warning():
+    row = {"case": "a", "filter": "f", "n": 5000, "ratio_lo": 0.9, "ratio_hi": 1.1, "note": notes.VARIES}
+    made = {"believed": pd.DataFrame([row]), "curves": pd.DataFrame()}
+    results = [SimpleNamespace(name="a", count=5000)]
+    assert not notes.answer_warnings(results, made, [Sentence("", (MeasuredInterval("believed", 0, "ratio"),))])
+
+
+def test_words_of_notes_and_sentences_change_no_number_and_no_mark(monkeypatch):
+    """The same tables, but for the notes' texts, and the same warnings, whatever is written in either."""
+    result = radarsim.run("orders", realisations=FEW)
+    (warning,) = (line for line in result.warnings if "of the answer" in line)
+    other_text = replace(notes.HEAVY, text="rarely large")
+    monkeypatch.setattr(notes, "HEAVY", other_text)
+    from radarsim.studies.ambiguous_doppler import words
+
+    answer = words.answer
+    monkeypatch.setattr(words, "answer", lambda *of: [one.with_text("nothing") for one in answer(*of)])
+    again = output.Result(result.experiment, result.cases, result.facts)
+    assert set(again.answer) == {"nothing"}
+    assert list(again.warnings) == list(result.warnings)
+    assert warning in again.warnings
+    for name, table in result.tables.items():
+        expected, numbers = (one.drop(columns="note", errors="ignore") for one in (table, again.tables[name]))
+        pd.testing.assert_frame_equal(numbers, expected)
+        assert ("note" in table) == ("note" in again.tables[name])
+        if "note" in table:
+            assert ((table["note"] == "") == (again.tables[name]["note"] == "")).all()
+
+
+def test_plain_text_of_a_user_study_rests_on_every_filter_at_the_last_scan():
+    rows = [{"case": "a", "filter": f, "component": "x", "k": k} for f in "fg" for k in (1, 2)]
+    made = {"curves": pd.DataFrame(rows), "gains": pd.DataFrame(rows[2:]).assign(baseline="f")}
+    sentence = as_sentence("Done.", made)
+    assert str(sentence) == "Done."
+    assert set(sentence.intervals) == {("curves", 1, "sigma"), ("curves", 3, "sigma"), ("gains", 1, "gain")}
+    assert as_sentence(sigma_of(2), made) == sigma_of(2)
+
+
 def check_notes_and_warning(config):
-    """Of a shipped config: no note beside an exact value; a sentence at most, true of the answer, or none needed."""
+    """Of a shipped config: no note beside an exact value; a warning at most, on intervals that are in the answer."""
     result = radarsim.run(config, realisations=FEW)
     study, made = output.study(result.experiment.study), result.tables
     for table in made.values():
         exact = [name for name in table if name in ("exact_sigma", "exact_percent", "exact_right")]
         if "note" in table and exact and study.exact_errors:
             assert not table.loc[table[exact].notna().all(axis=1), "note"].any()
-    said = [line for line in result.warnings if "of the answer" in line]
-    assert len(said) <= 1
+    warnings = [line for line in result.warnings if "of the answer" in line]
+    assert len(warnings) <= 1
     assert not any("rare event" in line for line in result.warnings)
-
-    def answer(widened):
-        """With intervals twice as wide in some rows of each table."""
-        wide = {name: notes._wider(table, at) for name, table in made.items() if len(at := widened(name, table))}
-        return list(study.answer(result.cases, {**made, **wide}))
-
-    found = notes.concerned(made, [lambda tables: study.answer(result.cases, tables)])
-    every = answer(lambda _, table: np.flatnonzero(notes.heavy(table) & (table.get("note", "") != notes.VARIES)))
-    own = answer(lambda name, table: table.index.get_indexer(found[name].index) if name in found else ())
-    assert own == every  # no other row's interval is in the answer
-    assert bool(said) == (every != list(result.answer)) == bool(found)
-    for line in said:
-        assert int(re.match(r"[\d,]+", line)[0].replace(",", "")) == sum(map(len, found.values()))
-        names = list(dict.fromkeys(name for rows in found.values() for name in rows["filter"]))
+    answer = [one for one in study.answer(result.cases, made) if not isinstance(one, str)]
+    assert len(answer) == len(study.answer(result.cases, made))  # no shipped study leaves it open
+    for table, row, name in (interval for sentence in answer for interval in sentence.intervals):
+        columns = [column for column in made[table] if str(column).startswith(name)]
+        assert {f"{name}_lo", f"{name}_hi"} <= set(columns) or {"lo", "hi"} <= set(made[table])
+        assert row in made[table].index
+    rows = notes.affected_rows(result._tables, answer).values()
+    assert bool(warnings) == bool(rows)
+    for line in warnings:
+        assert int(re.match(r"[\d,]+", line)[0].replace(",", "")) == sum(map(len, rows))
+        names = list(dict.fromkeys(name for of in rows for name in of["filter"]))
         assert all(name in line for name in names[:3])
-        asked = re.search(r"-n (\S+) would", line)
-        assert asked is None or float(asked[1]) > FEW
 
 
 @pytest.mark.slow_cases("sonar_missed")
 @pytest.mark.parametrize(
     "config", [pytest.param("ambiguous_missed", marks=pytest.mark.slow), "pulses_rls4", "sonar_missed", "rls2"]
 )
-def test_a_warning_is_true_of_the_answer(config):
+def test_warning_is_true_of_the_answer(config):
     check_notes_and_warning(config)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("config", sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml")))
-def test_of_every_shipped_config_the_warning_is_true_of_the_answer(config):
+def test_warning_is_true_of_the_answer_of_every_shipped_config(config):
     check_notes_and_warning(config)
 
 
@@ -227,10 +264,10 @@ def test_notes_say_what_their_rows_have():
     """Under a hundred: each marked row has so few, there or within a tenth of the run, and no other has."""
     made = radarsim.run("multimodel_1hz", realisations=1000).curves
     fewest = notes.nearby(made)
-    np.testing.assert_array_equal(notes.heavy(made), fewest < notes.EFFECTIVE)
-    assert set(made["note"]) == {"", notes.HEAVY}
+    np.testing.assert_array_equal(made["note"] != "", fewest < notes.EFFECTIVE)
+    assert set(made["note"]) == {"", str(notes.HEAVY)}
 
 
 def test_filters_whose_names_hold_a_comma_are_told_apart():
     results = [SimpleNamespace(name=name, count=FEW - 1) for name in ("PDA", "PDA, 4 of 6")]
-    assert notes.few(results)[0].startswith("PDA and “PDA, 4 of 6”: ")
+    assert notes.few_realisations_warning(results)[0].startswith("PDA and “PDA, 4 of 6”: ")

@@ -21,6 +21,7 @@ from radarsim.report import tables
 from radarsim.studies.interface import Paper, true_column
 from radarsim.studies.noise import noise_key
 from radarsim.studies.onefile import Component, Measured, OneFile
+from tests.answers import answer_texts
 from tests.tolerances import assert_rounded
 
 N = 4000
@@ -164,13 +165,13 @@ def test_question_answer_and_figures(made):
     study, results, every = made
     experiment = Experiment("walk", "walk", None, (case_of(study, 0.1), case_of(study)), N, 1)
     assert study.question(experiment) == "How well is a random walk followed? Filters: slow and quick."
-    answer = study.answer(results, every)
+    answer = answer_texts(study, results, every)
     assert answer[2].startswith("σ_w = 2 m: σ of the position after 78 s: slow ")
     assert answer[3].startswith("σ_w = 2 m: Gain against slow there: quick ")
     other = [replace(one, name=name, swept=()) for one, name in zip(results, ("walk", "stroll"), strict=True)]
     tables_of = {name: table.replace({one.name: own.name for one, own in zip(results, other, strict=True)})
                  for name, table in every.items()}  # fmt: skip
-    heads = [sentence.partition(": ")[0] for sentence in study.answer(other, tables_of)]
+    heads = [sentence.partition(": ")[0] for sentence in answer_texts(study, other, tables_of)]
     assert heads == ["walk", "walk", "stroll", "stroll"]
     drawn = study.figures(results, every, experiment)
     assert set(drawn) == {"sigma_x", "gain_x"}

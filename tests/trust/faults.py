@@ -206,7 +206,7 @@ def rows_under_another_component(right):
     return lambda result, c: right(result, len(result.axes.components) - 1 - c)
 
 
-@fault("report.notes:known", "report/test_notes.py::test_no_note_stands_beside_an_exact_value")
+@fault("report.notes:is_exact", "report/test_notes.py::test_no_note_stands_beside_an_exact_value")
 def notes_beside_exact_values(right):
     return lambda table: right(table) & False
 

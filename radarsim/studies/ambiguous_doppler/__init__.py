@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import Axes, CaseResult
     from radarsim.report.drawing import Figure
+    from radarsim.report.sentences import Sentence
     from radarsim.studies.ambiguous_doppler.config import Keys
     from radarsim.studies.ambiguous_doppler.study import Plan
     from radarsim.studies.ambiguous_doppler.track import Recorded
@@ -101,7 +102,7 @@ class AmbiguousDoppler(Study):
 
         return words.question(experiment)
 
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.ambiguous_doppler import words
 
         return words.answer(results, made)

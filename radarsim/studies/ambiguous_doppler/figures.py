@@ -12,7 +12,7 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.kernels.hypotheses import COLUMNS
 from radarsim.kernels.lanes import WIDTH
 from radarsim.language import term, tr
-from radarsim.report import panels, seen, sweeps, tables
+from radarsim.report import panels, sweeps, tables
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.report.quantities import RADIAL
 from radarsim.studies.ambiguous_doppler.kernels import records, sums
@@ -72,10 +72,8 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
     drawn |= hypotheses_figure(experiment.shown_in("hypotheses"))
     some, left_out = panels.shown(results, panels.named(experiment, "orders"))
     drawn |= orders_figure(some, made["orders"], left_out)
-    return {name: one for name, one in seen.all_begun(drawn, SEEN).items() if one} | rare_figure(results, made["folds"])
+    return {name: one for name, one in drawn.items() if one} | rare_figure(results, made["folds"])
 
-
-SEEN = {"right": seen.highest_at_the_end, "lost": seen.at_the_end, "orders": seen.highest_at_the_end}
 
 SHARES = {  # figure: column of folds.csv, what it is, caption
     "right": (
@@ -138,7 +136,7 @@ def rare_figure(results: Sequence[Result], table: "pd.DataFrame") -> dict[str, F
         realisations=panels.realisations(results),
     ) + "".join(dict.fromkeys(said))
     figure = panels.in_columns(Figure("right", tr("P(a fold is wrong)"), caption, tuple(drawn)))
-    return {"right": seen.begun(figure, seen.extremes(figure))}
+    return {"right": figure}
 
 
 def _share_panel(

@@ -8,6 +8,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels, rare, statistics
 from radarsim.report import tables as common
+from radarsim.report.row_notes import RowNote, notes_where
 from radarsim.studies.ambiguous_doppler.filters import FoldedAxes
 from radarsim.studies.ambiguous_doppler.kernels.records import BEYOND_SUM, BINS, COUNT_SUM, LISTED_SUM, RIGHT_SUM
 from radarsim.studies.ambiguous_doppler.kernels.sums import BEYOND, FULL, WRONG
@@ -17,11 +18,13 @@ if TYPE_CHECKING:
 
 Result = CaseResult[FoldedAxes]
 table = common.Tables()
-WRONG_FOLD = "wrong fold"  # the event of rare.csv
+WRONG_FOLD, NO_ROOM = "wrong fold", "wrong fold that found no room"  # events of rare.csv, the second part of the first
 # A velocity that is off by more than half the span, once in 10⁵, decides σ, and most samples hold none: they show no
 # tail. So σ is marked where fewer than so many were seen. Of `ambiguous_rls5`, 60 × 20 000 realisations, σ so marked
 # covers 45 %, and what is left unmarked 95 %.
-FEW_FOLDS = f"under {statistics.FEW_EVENTS} velocities off by half the span: rarer ones may decide"
+FEW_FOLDS = RowNote(
+    "few_folds", f"under {statistics.FEW_EVENTS} velocities off by half the span: rarer ones may decide"
+)
 
 
 @table.whole("curves")
@@ -57,7 +60,8 @@ def _noted(table: "pd.DataFrame", few: set[tuple[str, str, int]]) -> "pd.DataFra
     """Curves or gains with the note on the rows of these filters, or of what they are compared with."""
     sides = [table[["case", side, "k"]] for side in ("filter", "baseline") if side in table]
     rows = zip(*(side.itertuples(index=False, name=None) for side in sides), strict=True)
-    return table.assign(note=[FEW_FOLDS if any(one in few for one in row) else "" for row in rows])
+    has_few = np.array([any(side in few for side in row) for row in rows], dtype=bool)
+    return table.assign(note=notes_where(has_few, FEW_FOLDS))
 
 
 def _above_oracle(result: Result) -> statistics.Estimate:
@@ -133,15 +137,14 @@ def _rare_parts(result: Result) -> Iterator[dict[str, np.ndarray]]:
     yield _rare_rows(result, f, sought[f], WRONG, WRONG_FOLD)
     (own,) = np.nonzero(sought)
     if result.spec.filters[own[0]].hypotheses > 1:
-        yield _rare_rows(
-            result, own, np.zeros(own.size, dtype=bool), FULL, rare.unaimed(WRONG_FOLD, "that found no room")
-        )
+        yield _rare_rows(result, own, np.zeros(own.size, dtype=bool), FULL, NO_ROOM)
 
 
 def _rare_rows(result: Result, f: np.ndarray, sought: np.ndarray, event: int, name: str) -> dict[str, np.ndarray]:
     """Columns of rare.csv of filters f (n,), of an event by its place in the sums and its name."""
     k = np.full(f.size, len(result.axes.k) - 1)
-    return rare.rows(common.leading(result, f, k), name, sought, events(result, (f, k), event), drawn(result))
+    labels, counted = common.leading(result, f, k), events(result, (f, k), event)
+    return rare.rows(labels, name, sought, counted, drawn(result), is_unguided_part=event == FULL)
 
 
 @table("calibration")

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import CaseResult
     from radarsim.report.drawing import Figure
+    from radarsim.report.sentences import Sentence
     from radarsim.studies.discriminator.config import Keys
     from radarsim.studies.discriminator.study import Plan
     from radarsim.studies.floor import Floor
@@ -83,7 +84,7 @@ class Discriminator(Study):
 
         return words.question(experiment)
 
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.discriminator import words
 
         return words.answer(results, made)

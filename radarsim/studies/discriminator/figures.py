@@ -12,13 +12,13 @@ from radarsim.bursts import burst
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
-from radarsim.report import panels, seen, tables
+from radarsim.report import panels, tables
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
 from radarsim.studies.discriminator.study import estimate, prepare
 from radarsim.studies.discriminator.tables import last_locks
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 
 # ---- map -------------------------------------------------------------------------------------------------------------
@@ -35,13 +35,13 @@ def one_burst(case: Case, number: int) -> np.ndarray:
 
 
 # ---- figures ---------------------------------------------------------------------------------------------------------
-SYMBOLS = {
-    "phi0": ("$|\\Delta\\varphi_0|$, rad", term("phase")),
-    "f0": ("$|\\Delta f_0|$, Hz", term("Doppler frequency")),
-    "f1": ("$|\\Delta f_1|$, Hz/s", term("first derivative")),
-    "f2": ("$|\\Delta f_2|$, Hz/s²", term("second derivative")),
-    "f3": ("$|\\Delta f_3|$, Hz/s³", term("third derivative")),
-    "f4": ("$|\\Delta f_4|$, Hz/s⁴", term("fourth derivative")),
+SYMBOLS = {  # of errors, with the unit
+    "phi0": ("$|\\Delta\\varphi_0|$", "rad"),
+    "f0": ("$|\\Delta f_0|$", "Hz"),
+    "f1": ("$|\\Delta f_1|$", "Hz/s"),
+    "f2": ("$|\\Delta f_2|$", "Hz/s²"),
+    "f3": ("$|\\Delta f_3|$", "Hz/s³"),
+    "f4": ("$|\\Delta f_4|$", "Hz/s⁴"),
 }
 NAMES = {"phi0": "$\\varphi_0$"} | {f"f{n}": f"$f_{n}$" for n in range(5)}
 WHOLE = ("density", "steps")  # keys that take whole numbers
@@ -123,9 +123,8 @@ def residuals(result: CaseResult, made: Mapping, case: Case) -> Figure:
             Line(t, 3.0 * bound, "3σ", Style(1, 1)),
             Line(t, burst[:, n], tr("one burst"), Style(2, 2, 2, size_pt=2.4)),
         )
-        drawn.append(
-            Panel(Axis(tr(WINDOW), "log"), Axis(_with_unit(SYMBOLS[component][0]), "log"), marks, letter, direct=False)
-        )
+        y = Axis(panels.with_unit(*SYMBOLS[component]), "log")
+        drawn.append(Panel(Axis(tr(WINDOW), "log"), y, marks, letter, direct=False))
     caption = tr(
         "Windows of the estimator {name!r} and the absolute error of each component against the "
         "window's length: median and the band from 5 to 95 % of {count:,} bursts, locked or not. "
@@ -134,28 +133,8 @@ def residuals(result: CaseResult, made: Mapping, case: Case) -> Figure:
         name=name,
         count=result.count,
     )
-    last = last_locks(made, result, name)
-    sentence = tr(
-        "From the first window to the whole burst the median error falls {times:.3g} times in {component}; at the end "
-        "{share:.4g} % of the bursts are locked.",
-        **{"times": _fall(made["residuals"], result, name), "component": tr(SYMBOLS[result.axes.components[1][0]][1])},
-        share=100 * float(last["lock_rate"]),
-    )
     title = tr("Errors against the window (figure 2)")
-    return seen.begun(Figure("residuals", title, caption, tuple(drawn), 3, PAGE_MM, 52.0), sentence)
-
-
-def _fall(table: "pd.DataFrame", result: CaseResult, name: str) -> float:
-    """How many times less the median error of the Doppler frequency is at the last window than at the first."""
-    own = tables.where(table, case=result.name, filter=name)
-    median = own.loc[own["component"] == result.axes.components[1][0], "median"].to_numpy(float)
-    return float(median[0] / median[-1])
-
-
-def _with_unit(words: str) -> str:
-    """A symbol and its unit as the language spoken writes it."""
-    symbol, _comma, unit = words.rpartition(", ")
-    return panels.with_unit(symbol, unit)
+    return Figure("residuals", title, caption, tuple(drawn), 3, PAGE_MM, 52.0)
 
 
 def locks(result: CaseResult, made: Mapping) -> Figure:
@@ -176,7 +155,7 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
     lost = panel.y.scale == "log"
     title = tr("Bursts not locked against the window") if lost else tr("Locked bursts against the window")
     figure = Figure(*("locks", title, caption, (panel,)), width_mm=panels.WIDE_MM, panel_height_mm=80.0)
-    return seen.begun(figure, seen.at_the_end(figure))
+    return figure
 
 
 def _shares(x: Axis, marks: Sequence[Line], least: float | None = None) -> tuple[Panel, str]:
@@ -210,7 +189,7 @@ def accuracy(result: CaseResult, made: Mapping) -> Figure:
     )
     columns = min(3, max(1, len(drawn)))
     figure = Figure("accuracy", tr("Accuracy of the locked bursts"), caption, tuple(drawn), columns, PAGE_MM, 52.0)
-    return seen.begun(figure, seen.extremes(figure))
+    return figure
 
 
 def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mapping) -> Figure:
@@ -239,7 +218,7 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
     caption += said
     title = tr("Lock against the {called}", called=called)
     figure = Figure(name, title, caption, (panel,), width_mm=panels.WIDE_MM, panel_height_mm=70.0)
-    return seen.begun(figure, seen.extremes(figure))
+    return figure
 
 
 def _called(key: str, result: CaseResult) -> str:
@@ -272,7 +251,7 @@ def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], ma
     )
     columns = min(2, len(drawn))
     figure = Figure(name, tr("Where the sequence locks"), caption, tuple(drawn), columns, PAGE_MM, 70.0)
-    return seen.begun(figure, seen.extremes(figure))
+    return figure
 
 
 def region(keys: tuple[str, ...], members: Sequence[CaseResult], made: Mapping, x: np.ndarray, y: np.ndarray) -> Panel:

@@ -12,6 +12,7 @@ from radarsim.bursts import burst as model
 from radarsim.engine.results import CaseResult
 from radarsim.report import rare, statistics
 from radarsim.report import tables as common
+from radarsim.report.row_notes import notes_about
 from radarsim.studies.discriminator.kernels import LOCKS as COUNTED
 from radarsim.studies.discriminator.kernels import bin_edges
 
@@ -99,7 +100,7 @@ def _locks(result: CaseResult) -> common.Columns:
         rates = {name: rare.complement(rare.rate(lost, drawn(result))) for name, lost in every.items()}
         note = rare.note(drawn(result), every["lock"])
         so_far = rare.note(drawn(result), every["always_three"], every["always_posterior_three"])
-        note = np.where((note == "") & (so_far != ""), "always: " + so_far, note)
+        note = np.where(note == "", notes_about(so_far, "always"), note)
     return {
         **_labels(result, f, k),
         "n": np.full(f.size, result.count),

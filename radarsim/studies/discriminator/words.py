@@ -1,19 +1,22 @@
 """What P4's report says: the question of an experiment, and its answer in sentences."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, plural, tr
-from radarsim.report import panels, rare, tables, wording
+from radarsim.report import panels, rare, sentences, tables, wording
+from radarsim.report.sentences import Sentence
 from radarsim.studies.discriminator.kernels import LOCKS
 from radarsim.studies.discriminator.tables import last_locks
 
 if TYPE_CHECKING:
     import pandas as pd
+
+TablesByName = Mapping[str, "pd.DataFrame"]
 
 
 def question(experiment: Experiment) -> str:
@@ -26,132 +29,136 @@ def question(experiment: Experiment) -> str:
     )
 
 
-def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
+def answer(results: Sequence[CaseResult], tables_by_name: TablesByName) -> list[Sentence]:
     """Sentences with numbers: by case where nothing is swept, else the range of lock of each estimator."""
-    plain = [result for result in results if not result.swept]
-    if any(result.spec.rare is not None for result in results):
-        plain = list(results)  # what is sought is said of each
-    if not plain and len(results) > 1:
-        return [_over(results, made, name) for name in results[0].axes.filters]
-    sentences = plain or list(results)
-    return [
-        *_against_design(results, made),
-        *(
-            words
-            for result in sentences
-            for words in _of_one(result, made, f"{panels.plain_label(result)}, " if len(sentences) > 1 else "")
-        ),
-    ]
+    seeks_losses = any(result.spec.rare is not None for result in results)
+    reported = list(results) if seeks_losses else [result for result in results if not result.swept]
+    if not reported and len(results) > 1:
+        return [_range_of_locks(results, tables_by_name, name) for name in results[0].axes.filters]
+    reported = reported or list(results)
+    answer = _worst_against_design(results, tables_by_name)
+    for result in reported:
+        prefix = f"{panels.plain_label(result)}, " if len(reported) > 1 else ""
+        for sentence in _case_sentences(result, tables_by_name):
+            answer.append(sentence.with_text(prefix + sentence.text))
+    return answer
 
 
-def _against_design(results: Sequence[CaseResult], made: Mapping) -> list[str]:
-    """The case in which lock is lost the most often for its design, where losses are sought among several cases."""
-    found = []
-    for result in (one for one in results if one.spec.rare is not None and len(results) > 1):
-        rows = tables.groups(made["rare"], "case")[(result.name,)]
-        for _, row in rows[rows["sought"]].iterrows():
-            (of,) = (one for one in result.spec.estimators if one.name == row["filter"])
-            if of.schedule == "designed" and of.lock_probability < 1:
-                found.append((row["rate"] / (1 - of.lock_probability), 1 - of.lock_probability, row))
-    if not found:
+def _worst_against_design(results: Sequence[CaseResult], tables_by_name: TablesByName) -> list[Sentence]:
+    """The case in which lock is lost the most often for its design, where losses are sought in several cases."""
+    if len(results) < 2:
         return []
-    times, designed, row = max(found, key=lambda one: one[0])
-    return [
-        tr(
-            "{estimator} loses lock in {rate:.3g} [{low:.3g}, {high:.3g}] of the bursts where it was designed for "
-            "{designed:.3g}, {times:.3g} times as often, the most of {count} cases.",
-            estimator=row["filter"],
-            designed=designed,
-            times=times,
-            count=len(found),
-            **rare.told(row),
-        )
-    ]
+    losses = []
+    for result in (result for result in results if result.spec.rare is not None):
+        rates = tables.groups(tables_by_name["rare"], "case")[(result.name,)]
+        for _, row in rates[rates["sought"]].iterrows():
+            estimator = next(e for e in result.spec.estimators if e.name == row["filter"])
+            if estimator.schedule == "designed" and estimator.lock_probability < 1:
+                designed = 1 - estimator.lock_probability
+                losses.append((row["rate"] / designed, designed, row))
+    if not losses:
+        return []
+    times, designed, row = max(losses, key=lambda loss: loss[0])
+    text = tr(
+        "{estimator} loses lock in {rate:.3g} [{low:.3g}, {high:.3g}] of the bursts where it was designed for "
+        "{designed:.3g}, {times:.3g} times as often, the most of {count} cases.",
+        estimator=row["filter"],
+        designed=designed,
+        times=times,
+        count=len(losses),
+        **rare.rate_fields(row),
+    )
+    return [Sentence(text, sentences.intervals("rare", "rate", row))]
 
 
-def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:
-    """Lock and accuracy of the first estimator at its last window, and the locks of the others."""
+def _case_sentences(result: CaseResult, tables_by_name: TablesByName) -> list[Sentence]:
+    """Lock and accuracy of the first estimator at its last window, how often lock is lost, the locks of the others."""
     first, *others = result.axes.filters
-    row = last_locks(made, result, first)
+    case_sentences = [_first_estimator(result, last_locks(tables_by_name, result, first), first)]
+    if result.spec.rare is not None:
+        case_sentences.append(_rate_of_losses(tables.groups(tables_by_name["rare"], "case")[(result.name,)]))
+    if others:
+        rows = [last_locks(tables_by_name, result, name) for name in others]
+        locks = "; ".join(f"{name}, {_lock_rate(row)}" for name, row in zip(others, rows, strict=True))
+        case_sentences.append(Sentence(tr("locks of the others: {locks}.", locks=locks), _lock_intervals(*rows)))
+    return case_sentences
+
+
+def _first_estimator(result: CaseResult, row: "pd.Series[Any]", name: str) -> Sentence:
+    """How often an estimator is locked at its last window, and how accurate it is then.
+
+    Where losses of lock are sought, a part of the bursts is shifted: the rate of losses has a sentence of its own."""
     k = int(row["k"])
-    n = max(result.sums["locks"][0, k - 1, LOCKS.index("lock")], 1)  # of the plain bursts, where some are shifted
-    said = {"estimator": first, "lock": _lock(row), "bursts": result.count}
-    words = [
-        before
-        + plural(
+    fields: dict[str, Any] = {"estimator": name, "lock": _lock_rate(row), "bursts": result.count}
+    if not row["lock_rate"]:
+        text = plural(
             "{estimator}: {count} window, locked in {lock} of {bursts:,} bursts.",
             "{estimator}: {count} windows, locked in {lock} of {bursts:,} bursts.",
             k,
-            **said,
+            **fields,
         )
-    ]
-    rare_event = result.spec.rare is not None
-    if row["lock_rate"]:
-        bound = result.axes.posterior_sigma[0, k - 1] / result.axes.exact_sigma[0, k - 1]
-        ratio = np.sqrt(result.sums["error"][0, k - 1, :, 1] / n) / bound
-        said |= {"least": ratio.min(), "most": ratio.max()}
-    if row["lock_rate"] and rare_event:  # the lock is told by its losses: of these bursts some are shifted
-        words = [
-            before
-            + plural(
-                "{estimator}: {count} window; σ of the locked over the bound (forecast included) {least:.3f} to "
-                "{most:.3f}, of {plain:,} bursts without importance sampling.",
-                "{estimator}: {count} windows; σ of the locked over the bound (forecast included) {least:.3f} to "
-                "{most:.3f}, of {plain:,} bursts without importance sampling.",
-                k,
-                plain=int(n),
-                **said,
-            )
-        ]
-    elif row["lock_rate"]:
-        words = [
-            before
-            + plural(
-                "{estimator}: {count} window, locked in {lock} of {bursts:,} bursts; σ of the locked over the bound "
-                "(forecast included) {least:.3f} to {most:.3f}.",
-                "{estimator}: {count} windows, locked in {lock} of {bursts:,} bursts; σ of the locked over the bound "
-                "(forecast included) {least:.3f} to {most:.3f}.",
-                k,
-                **said,
-            )
-        ]
-    if rare_event:
-        words.append(before + _rare(tables.groups(made["rare"], "case")[(result.name,)]))
-    if others:
-        locks = "; ".join(f"{name}, {_lock(last_locks(made, result, name))}" for name in others)
-        words.append(before + tr("locks of the others: {locks}.", locks=locks))
-    return words
+        return Sentence(text, _lock_intervals(row))
+    plain_bursts = max(result.sums["locks"][0, k - 1, LOCKS.index("lock")], 1)
+    bound = result.axes.posterior_sigma[0, k - 1] / result.axes.exact_sigma[0, k - 1]
+    ratio = np.sqrt(result.sums["error"][0, k - 1, :, 1] / plain_bursts) / bound
+    fields |= {"least": ratio.min(), "most": ratio.max()}
+    if result.spec.rare is not None:
+        text = plural(
+            "{estimator}: {count} window; σ of the locked over the bound (forecast included) {least:.3f} to "
+            "{most:.3f}, of {plain:,} bursts without importance sampling.",
+            "{estimator}: {count} windows; σ of the locked over the bound (forecast included) {least:.3f} to "
+            "{most:.3f}, of {plain:,} bursts without importance sampling.",
+            k,
+            plain=int(plain_bursts),
+            **fields,
+        )
+        return Sentence(text)
+    text = plural(
+        "{estimator}: {count} window, locked in {lock} of {bursts:,} bursts; σ of the locked over the bound "
+        "(forecast included) {least:.3f} to {most:.3f}.",
+        "{estimator}: {count} windows, locked in {lock} of {bursts:,} bursts; σ of the locked over the bound "
+        "(forecast included) {least:.3f} to {most:.3f}.",
+        k,
+        **fields,
+    )
+    return Sentence(text, _lock_intervals(row))
 
 
-def _over(results: Sequence[CaseResult], made: Mapping, name: str) -> str:
+def _range_of_locks(results: Sequence[CaseResult], tables_by_name: TablesByName, name: str) -> Sentence:
     """The least and the largest lock of an estimator among swept cases."""
-    found = [result for result in results if name in result.axes.filters]
-    rows = {result.name: last_locks(made, result, name) for result in found}
-    found.sort(key=lambda result: rows[result.name]["lock_rate"])
-    ends = (found[0], found[-1])
-    least, most = (f"{_lock(rows[result.name])} ({panels.plain(panels.swept(result))})" for result in ends)
-    return plural(
+    cases = [result for result in results if name in result.axes.filters]
+    rows = {result.name: last_locks(tables_by_name, result, name) for result in cases}
+    cases.sort(key=lambda result: rows[result.name]["lock_rate"])
+    extremes = (cases[0], cases[-1])
+    least, most = (f"{_lock_rate(rows[result.name])} ({panels.plain(panels.swept(result))})" for result in extremes)
+    text = plural(
         "{estimator}: locked in {least} to {most}; {count} case of {realisations}.",
         "{estimator}: locked in {least} to {most}; {count} cases of {realisations}.",
-        len(found),
+        len(cases),
         estimator=name,
         least=least,
         most=most,
-        realisations=panels.realisations(found),
+        realisations=panels.realisations(cases),
     )
+    return Sentence(text, _lock_intervals(*(rows[result.name] for result in extremes)))
 
 
-def _lock(row: "pd.Series") -> str:
+def _lock_rate(row: "pd.Series[Any]") -> str:
     """A share of bursts with its interval."""
     return wording.share(*(100 * row[name] for name in ("lock_rate", "lock_lo", "lock_hi")))
 
 
-def _rare(rows: "pd.DataFrame") -> str:
+def _lock_intervals(*rows: "pd.Series[Any]") -> tuple[sentences.MeasuredInterval, ...]:
+    return sentences.intervals("locks", "lock", *rows)
+
+
+def _rate_of_losses(rates: "pd.DataFrame") -> Sentence:
     """How often lock is lost, by importance sampling, of the estimator for which it is sought."""
-    row = rows[rows["sought"]].iloc[0]
-    return tr(
+    row = rates[rates["sought"]].iloc[0]
+    text = tr(
         "{estimator}: lock is lost in {rate:.3g} [{low:.3g}, {high:.3g}] of the bursts, by importance sampling from "
         "{events:,} losses, {n_eff:,.0f} effective ones.",
         estimator=row["filter"],
-        **rare.told(row),
+        **rare.rate_fields(row),
     )
+    return Sentence(text, sentences.intervals("rare", "rate", row))

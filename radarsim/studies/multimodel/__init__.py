@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import CaseResult
     from radarsim.report.drawing import Figure
+    from radarsim.report.sentences import Sentence
     from radarsim.studies.multimodel.config import Keys
     from radarsim.studies.multimodel.study import Plan
     from radarsim.studies.multimodel.track import Recorded
@@ -99,7 +100,7 @@ class MultiModel(Study):
 
         return words.question(experiment)
 
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.multimodel import words
 
         return words.answer(results, made)

@@ -1,7 +1,7 @@
 """P2's figures: the flight (1-4), σ of height and its rate (5, 6), probabilities (7), families × rules, cost,
 consistency."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -56,13 +56,7 @@ def figures(
     drawn["families"] = families(chosen("families"), made)
     drawn["cost"] = cost(chosen("cost"), made)
     drawn["consistency"] = consistency(chosen("consistency"), made["consistency"])
-    return {name: figure for name, figure in seen.all_begun(drawn, SEEN).items() if figure is not None}
-
-
-SEEN: dict[str, Callable[[Figure], str]] = {
-    **{"probabilities": seen.highest_at_the_end, "families": seen.extremes},
-    **{"consistency": seen.extremes},
-}
+    return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
 def _several(name: str, title: str, caption: str, drawn: Sequence[Panel], height: float = 62.0) -> Figure | None:
@@ -243,14 +237,14 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
     figure = _several(f"sigma_{component}", tr("σ of {quantity}", quantity=quantity), caption, drawn, 76)
     if figure is None:
         return None
-    figure = seen.begun(figure, seen.at_the_end(figure))
+    figure = figure
     return _of_the_paper(figure, results, {"y": "5", "vy": "6"}[component])
 
 
 def _of_the_paper(figure: Figure | None, results: Sequence[CaseResult], number: str) -> Figure | None:
     """The figure with its number in the paper, where it is of the paper's own experiment."""
     own = figure is not None and all(result.name == "multimodel" for result in results)
-    return seen.numbered(figure, number) if figure and own else figure
+    return seen.with_figure_number(figure, number) if figure and own else figure
 
 
 def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure | None:

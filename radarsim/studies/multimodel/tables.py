@@ -92,7 +92,7 @@ def _stages(result: CaseResult) -> common.Columns:
                     "sigma": stage_sigma(result, f, s, c),
                     "baseline": axes.filters[b],
                     "gain_percent|gain": stage_gain(result, f, b, s, c) if f != b else nothing,
-                    "note": notes.HEAVY if few[f, s, c] else notes.OF_GAIN + notes.HEAVY if few[b, s, c] else "",
+                    "note": notes.HEAVY if few[f, s, c] else notes.HEAVY.about("gain") if few[b, s, c] else "",
                 }
                 rows.append(row)
     return common.of_rows(rows)

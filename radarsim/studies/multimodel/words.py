@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, plural, term, tr
-from radarsim.report import panels, tables, wording
+from radarsim.report import panels, sentences, tables, wording
+from radarsim.report.sentences import Sentence
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,63 +27,75 @@ def question(experiment: Experiment) -> str:
     )
 
 
-def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
-    """The filter that comes closest to the best one of every stage; else, and for one case, the least σ by stage."""
-    first = _closest_to_the_best(results, made["stages"])
-    if first and len(results) > 1:
-        return first
-    shown, others = panels.reported(results, 4)
+def answer(results: Sequence[CaseResult], tables_by_name: "Mapping[str, pd.DataFrame]") -> list[Sentence]:
+    """The filter that is closest to the best one of every stage.
+
+    Of one case, or where no filter can be compared so, the least σ of each stage."""
+    stages = tables_by_name["stages"]
+    closest = _closest_to_the_best(results, stages)
+    if closest and len(results) > 1:
+        return closest
+    reported, remark = panels.reported(results, 4)
     quantities = [("y", term("the height")), *([("vy", term("the rate of climb"))] if len(results) == 1 else [])]
-    told = [panels.at_its_place(result, _least(result, made["stages"], *of)) for result in shown for of in quantities]
-    return [*first, *told, *others]
+    least = [_least_sigma(result, stages, *quantity) for result in reported for quantity in quantities]
+    return [*closest, *least, *map(Sentence, remark)]
 
 
-def _closest_to_the_best(results: Sequence[CaseResult], stages: "pd.DataFrame") -> list[str]:
-    """The filter whose σ of the height is nowhere far above the least of a stage, that stage, and the next filter. Of
-    filters that all cases have; nothing where there are not two."""
+def _closest_to_the_best(results: Sequence[CaseResult], stages: "pd.DataFrame") -> list[Sentence]:
+    """The filter whose σ of the height is nowhere far above the least of a stage, that stage, and the next filter.
+
+    Of filters that all cases have; nothing where there are not two."""
     rows = stages[(stages["component"] == "y") & (stages["sigma"] > 0)]
     rows = rows[rows.groupby("filter")["case"].transform("nunique") == len(results)]
     if rows["filter"].nunique() < 2:
         return []
-    least = rows.loc[rows.groupby(["case", "stage"], sort=False)["sigma"].idxmin()].set_index(["case", "stage"])
-    best = least.loc[list(zip(rows["case"], rows["stage"], strict=True))]
-    rows = rows.assign(above=100 * (rows["sigma"].to_numpy() / best["sigma"].to_numpy() - 1))
-    worst = rows.loc[rows.groupby("filter", sort=False)["above"].idxmax()].sort_values("above", kind="stable")
-    row, second = worst.iloc[0], worst.iloc[1]
-    said = {"filter": row["filter"], "second": second["filter"], "more": _percent(second["above"])}
-    if not row["above"]:
-        return [tr("Least σ of the height in every stage: {filter}; next {second}, at most {more} above it.", **said)]
-    beaten_by = least.loc[(row["case"], row["stage"])]
-    called = dict(zip((result.name for result in results), panels.names_of(results), strict=True))
-    several = len(results) > 1
-    return [
-        tr(
-            "Closest to the best filter of {every}: {filter}, σ of the height at most {percent} above the least "
-            "({where}: {sigma}; {best}: {least}); next {second}, {more}.",
-            every=tr("each stage of every case") if several else tr("each stage"),
-            percent=_percent(row["above"]),
-            where=", ".join([*([called[row["case"]]] if several else []), tr(str(row["stage"]))]),
-            sigma=_sigma(row),
-            best=beaten_by["filter"],
-            least=_sigma(beaten_by),
-            **said,
-        )
-    ]
+    least = rows.loc[rows.groupby(["case", "stage"], sort=False)["sigma"].idxmin()]
+    least_by_stage = least.set_index(["case", "stage"])["sigma"]
+    least_sigma = least_by_stage.loc[list(zip(rows["case"], rows["stage"], strict=True))]
+    rows = rows.assign(above=100 * (rows["sigma"].to_numpy() / least_sigma.to_numpy() - 1))
+    worst_stages = rows.loc[rows.groupby("filter", sort=False)["above"].idxmax()]
+    worst_stages = worst_stages.sort_values("above", kind="stable")
+    closest, second = worst_stages.iloc[0], worst_stages.iloc[1]
+    fields = {"filter": closest["filter"], "second": second["filter"], "more": _percent(second["above"])}
+    if not closest["above"]:
+        text = tr("Least σ of the height in every stage: {filter}; next {second}, at most {more} above it.", **fields)
+        return [Sentence(text)]
+    best = least[(least["case"] == closest["case"]) & (least["stage"] == closest["stage"])].iloc[0]
+    text = tr(
+        "Closest to the best filter of {every}: {filter}, σ of the height at most {percent} above the least "
+        "({where}: {sigma}; {best}: {least}); next {second}, {more}.",
+        every=tr("each stage of every case") if len(results) > 1 else tr("each stage"),
+        percent=_percent(closest["above"]),
+        where=_stage_label(results, closest),
+        sigma=_sigma(closest),
+        best=best["filter"],
+        least=_sigma(best),
+        **fields,
+    )
+    return [Sentence(text, sentences.intervals("stages", "sigma", closest, best))]
+
+
+def _stage_label(results: Sequence[CaseResult], row: "pd.Series[Any]") -> str:
+    """The stage of a row, after its case where there are several."""
+    case_names = dict(zip((result.name for result in results), panels.names_of(results), strict=True))
+    stage = tr(str(row["stage"]))
+    return f"{case_names[row['case']]}, {stage}" if len(results) > 1 else stage
 
 
 def _percent(value: float) -> str:
     return f"{wording.number(value, 2)} %"
 
 
-def _least(result: CaseResult, stages: "pd.DataFrame", component: str, quantity: str) -> str:
+def _least_sigma(result: CaseResult, stages: "pd.DataFrame", component: str, quantity: str) -> Sentence:
     """The filter of the least σ in each stage, with the interval."""
-    rows: Any = tables.where(stages, case=result.name, component=component)
-    best = [own.loc[own["sigma"].idxmin()] for _, own in rows.groupby("stage", sort=False)]
-    said = "; ".join(f"{tr(str(row['stage']))}: {row['filter']}, {_sigma(row)}" for row in best)
-    return tr("Least σ of {quantity} by stage: {stages}.", quantity=quantity, stages=said)
+    rows = tables.where(stages, case=result.name, component=component)
+    best = rows.loc[rows.groupby("stage", sort=False)["sigma"].idxmin()]
+    clauses = [f"{tr(str(row['stage']))}: {row['filter']}, {_sigma(row)}" for _, row in best.iterrows()]
+    text = tr("Least σ of {quantity} by stage: {stages}.", quantity=quantity, stages="; ".join(clauses))
+    return Sentence(panels.at_its_place(result, text), sentences.intervals("stages", "sigma", best))
 
 
-def _sigma(row: "pd.Series") -> str:
+def _sigma(row: "pd.Series[Any]") -> str:
     """σ of a row of the stages with its interval, to three digits."""
     values = (float(f"{row[name]:.3g}") for name in ("sigma", "sigma_lo", "sigma_hi"))
     return wording.estimate(values, panels.unit_of(row["unit"]), ",.10g")

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import CaseResult
     from radarsim.report.drawing import Figure
+    from radarsim.report.sentences import Sentence
     from radarsim.studies.floor import Floor
     from radarsim.studies.pulses_to_tracks.config import Keys
     from radarsim.studies.pulses_to_tracks.study import Plan
@@ -84,7 +85,7 @@ class PulsesToTracks(Study):
 
         return words.question(experiment)
 
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.pulses_to_tracks import words
 
         return words.answer(results, made)

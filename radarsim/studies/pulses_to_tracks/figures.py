@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import term, tr
-from radarsim.report import panels, seen, sweeps, tables
+from radarsim.report import panels, sweeps, tables
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.report.quantities import RADIAL
 from radarsim.report.statistics import FEW_EVENTS
@@ -31,13 +31,7 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
         if found:
             drawn[name] = _figure(name, tr(title), tr(caption) + left_out, found)
     drawn |= threshold_figure(results, made)
-    return {name: one for name, one in seen.all_begun(drawn, SEEN).items() if one}
-
-
-SEEN = {
-    **{"locks": seen.extremes, "folds": seen.highest_at_the_end, "measured": seen.extremes},
-    **{"losses": seen.extremes, "threshold": seen.extremes},
-}
+    return {name: one for name, one in drawn.items() if one}
 
 
 def _figure(name: str, title: str, caption: str, found: list[Panel]) -> Figure:

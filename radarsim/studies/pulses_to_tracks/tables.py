@@ -13,6 +13,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import panels, statistics
 from radarsim.report import tables as common
 from radarsim.report.notes import EFFECTIVE, HEAVY
+from radarsim.report.row_notes import RowNote, notes_where
 from radarsim.studies.pulses_to_tracks import kernels as rec
 from radarsim.studies.pulses_to_tracks.filters import PulsesAxes
 
@@ -22,10 +23,10 @@ if TYPE_CHECKING:
 Result = CaseResult[PulsesAxes]
 table = common.Tables()
 MEASURED = 1  # number of the component that a burst's first number measures
-OF_ALL = f"sigma_all: {HEAVY}"  # where the lost among all bursts, few of them, decide
+OF_ALL = HEAVY.about("sigma_all")  # where the lost among all bursts, few of them, decide
 # A lost burst is rare and decides σ: where it is missing in a sample, nothing else in that tells of it. As many more
 # are supposed as the sample leaves possible (95 %); what they would add is marked from half of the interval on.
-UNSEEN = "bursts lost more rarely than seen here may decide"
+UNSEEN = RowNote("unseen_losses", "bursts lost more rarely than seen here may decide")
 UNSEEN_SHARE = 0.5
 
 
@@ -38,7 +39,7 @@ def unseen(result: Result) -> np.ndarray:
     return np.minimum(most / (result.count * result.axes.k.size), result.axes.most_lost)
 
 
-def marks(results: Sequence[Result]) -> dict[tuple[str, str, str, int], str]:
+def marks(results: Sequence[Result]) -> dict[tuple[str, str, str, int], RowNote]:
     """The notes on σ, by case, filter, component and scan, where losses that were not seen may decide."""
     found = {}
     for result in results:
@@ -50,7 +51,7 @@ def marks(results: Sequence[Result]) -> dict[tuple[str, str, str, int], str]:
     return found
 
 
-def noted(table: "pd.DataFrame", found: Mapping[tuple[str, str, str, int], str]) -> "pd.DataFrame":
+def noted(table: "pd.DataFrame", found: Mapping[tuple[str, str, str, int], RowNote]) -> "pd.DataFrame":
     """A table with the notes of its filters, or of their baselines."""
     if not found or not len(table):
         return table
@@ -61,7 +62,7 @@ def noted(table: "pd.DataFrame", found: Mapping[tuple[str, str, str, int], str])
         notes = [note or found.get(row, "") for note, row in zip(notes, zip(*of, strict=True), strict=True)]
     if "note" in table:
         notes = [note or own for note, own in zip(notes, table["note"], strict=True)]
-    return table.assign(note=notes) if any(notes) else table
+    return table.assign(note=np.array(notes, dtype=object)) if any(notes) else table
 
 
 def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
@@ -117,7 +118,7 @@ def _estimates(result: Result) -> common.Columns:
         "sigma_all": statistics.root_mean_square(of[:, 1, 0], of[:, 1, 1], n),
         "bound": axes.bound[f, k, c],
         "energy_db": axes.energy_db[k],
-        "note": np.where(few, OF_ALL, "").astype(object),
+        "note": notes_where(few, OF_ALL),
     }
 
 

@@ -1,36 +1,40 @@
-"""What the report of the chain asks and answers, in words."""
+"""What the report of the chain asks and answers, in sentences."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import listed, tr
-from radarsim.report import panels, tables, wording
+from radarsim.report import panels, sentences, tables, wording
+from radarsim.report.sentences import Sentence
 from radarsim.studies.pulses_to_tracks.tables import Result
 
 if TYPE_CHECKING:
     import pandas as pd
 
-OVER = ("over_ideal", "over_ideal_lo", "over_ideal_hi")
-ALIKE = 1.05  # σ over its idealisation's, up to which the idealisation holds
+TablesByName = Mapping[str, "pd.DataFrame"]
+RATIO = ("over_ideal", "over_ideal_lo", "over_ideal_hi")
+MAX_RATIO_OF_IDEAL = 1.05  # σ over its idealisation's, up to which the idealisation holds
 
 
 def warnings(experiment: Experiment) -> list[str]:
-    """Forecasts wider than the span of velocity, where a filter takes the nearest fold: no burst alone can tell it."""
+    """A line for each config whose forecasts are wider than the span of velocity, if a filter takes the nearest fold.
+
+    No burst alone can tell the fold then."""
     lines: dict[str, None] = {}
     for case in experiment.cases:
         spec = case.spec
         reach = 3 * spec.prior.sigma_velocity_mps
-        if reach > spec.span_mps / 2 and any(one.hypotheses == 1 for one in spec.filters):
-            words = tr(
+        if reach > spec.span_mps / 2 and any(f.hypotheses == 1 for f in spec.filters):
+            text = tr(
                 "3 σ of the velocity, {reach:g} m/s, are over half the span of {span:g} m/s: first bursts may be taken "
                 "in a wrong fold",
                 reach=reach,
                 span=spec.span_mps,
             )
-            lines[f"{case.stem}: prior.sigma_velocity_mps: {words}"] = None
+            lines[f"{case.stem}: prior.sigma_velocity_mps: {text}"] = None
     return list(lines)
 
 
@@ -43,80 +47,104 @@ def question(experiment: Experiment) -> str:
     )
 
 
-def answer(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> list[str]:
-    """Of several cases first each filter where it is furthest from its idealisation. For each case: the filters nearest
-    to their idealisation and furthest; of each its locks and σ; the burst."""
-    shown, others = panels.reported(results, 3)
-    of_all = _of_all(results, made) if len(results) > 1 else []
-    return [*of_all, *(sentence for result in shown for sentence in _sentences(result, made)), *others]
+def answer(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
+    """Sentences on σ over that of the filters' idealisations.
+
+    Of several cases, first each filter where it is furthest from its idealisation. For each case: the filters nearest
+    to their idealisation and furthest from it; the locks and σ of each; the burst."""
+    reported, remark = panels.reported(results, 3)
+    worst = _worst_of_all_cases(results, tables_by_name) if len(results) > 1 else []
+    of_cases = [sentence for result in reported for sentence in _case_sentences(result, tables_by_name)]
+    return [*worst, *of_cases, *map(Sentence, remark)]
 
 
-def _of_all(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> list[str]:
-    """Of each filter the largest σ of the range at the last scan over its idealisation's; none without any."""
-    last = tables.where(made["idealisations"], component="r").groupby(["case", "filter"], sort=False).tail(1)
-    places = dict(zip((result.name for result in results), panels.names_of(results), strict=True))
-    last = last[last["case"].isin(places)].dropna(subset=["over_ideal"])
-    worst = last.sort_values("over_ideal", kind="stable").groupby("filter", sort=False).tail(1)
-    found = [
-        f"{row['filter']} {wording.estimate((row[key] for key in OVER), form='.3g')} ({places[row['case']]})"
-        for row in worst.to_dict("records")
-    ]
-    words = tr(
+def _worst_of_all_cases(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
+    """The largest σ of the range of each filter at the last scan over its idealisation's; none without any."""
+    final = tables.where(tables_by_name["idealisations"], component="r")
+    final = final.groupby(["case", "filter"], sort=False).tail(1)
+    case_names = dict(zip((result.name for result in results), panels.names_of(results), strict=True))
+    final = final[final["case"].isin(case_names)].dropna(subset=["over_ideal"])
+    worst = final.sort_values("over_ideal", kind="stable").groupby("filter", sort=False).tail(1)
+    if not len(worst):
+        return []
+    ratios = [f"{row['filter']} {_ratio(row)} ({case_names[row['case']]})" for row in worst.to_dict("records")]
+    text = tr(
         "σ of the range at the last scan over its idealisation's, at worst of {count} cases: {found}.",
         count=len(results),
-        found="; ".join(found),
+        found="; ".join(ratios),
     )
-    return [words] if found else []
+    return [Sentence(text, _ratio_intervals(worst))]
 
 
-def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
-    axes, spec = result.axes, result.spec
+def _case_sentences(result: Result, tables_by_name: TablesByName) -> list[Sentence]:
+    axes = result.axes
     bound = axes.bound[..., 0][np.isfinite(axes.bound[..., 0])]
     if not bound.size:
         return []
-    low, high = float(axes.energy_db.min()), float(axes.energy_db.max())
+    case = panels.plain_label(result)
+    filters = [name for f, name in enumerate(axes.filters) if axes.ideal[f] >= 0]
+    case_sentences = []
+    if len(filters) > 1:
+        clause = _nearest_and_furthest(result, tables_by_name, filters)
+        case_sentences.append(clause.with_text(f"{case}: {clause.text}."))
+    for name in filters:
+        clause = _locks_and_ratio(result, tables_by_name, name)
+        case_sentences.append(clause.with_text(f"{case}, {name}: {clause.text}."))
+    return [*case_sentences, _burst_sentence(result, case, bound.min())]
+
+
+def _burst_sentence(result: Result, case: str, sigma: float) -> Sentence:
+    """What a burst allows: its pulses, length and energy, and the Fisher bound of the velocity."""
+    spec, energy_db = result.spec, result.axes.energy_db
+    low, high = float(energy_db.min()), float(energy_db.max())
     energy = tr("{low:.3g} dB", low=low) if high - low < 0.05 else tr("{low:.3g} to {high:.3g} dB", low=low, high=high)
-    case, names = panels.plain_label(result), [name for f, name in enumerate(axes.filters) if axes.ideal[f] >= 0]
-    burst = tr(
+    text = tr(
         "{case}: {pulses} pulses in {burst_ms:.3g} ms, {energy} in all, allow σ_V = {sigma:.3g} m/s (Fisher bound).",
         case=case,
         pulses=spec.pulses,
         burst_ms=1e3 * spec.burst_s,
         energy=energy,
-        sigma=bound.min(),
+        sigma=sigma,
     )
-    ends = [f"{case}: {_ends(result, made, names)}."] if len(names) > 1 else []
-    return [*ends, *(f"{case}, {name}: {_filter(result, made, name)}." for name in names), burst]
+    return Sentence(text)
 
 
-def _ends(result: Result, made: "Mapping[str, pd.DataFrame]", names: Sequence[str]) -> str:
+def _nearest_and_furthest(result: Result, tables_by_name: TablesByName, filters: Sequence[str]) -> Sentence:
     """The filters whose last σ of the range is nearest to their idealisation's and furthest from it."""
-    last = tables.where(made["idealisations"], case=result.name, component="r").groupby("filter", sort=False).tail(1)
-    last = last[last["filter"].isin(names)].sort_values("over_ideal", kind="stable").iloc[[0, -1]]
-    near, far = (wording.estimate((row[key] for key in OVER), form=".3g") for row in last.to_dict("records"))
-    best, worst = last["filter"]
-    return tr(
+    final = tables.where(tables_by_name["idealisations"], case=result.name, component="r")
+    final = final.groupby("filter", sort=False).tail(1)
+    final = final[final["filter"].isin(filters)].sort_values("over_ideal", kind="stable").iloc[[0, -1]]
+    nearest, furthest = final.to_dict("records")
+    text = tr(
         "with {best} σ of the range at the last scan is {near} times its idealisation's, with {worst} {far} times",
-        best=best,
-        near=near,
-        worst=worst,
-        far=far,
+        best=nearest["filter"],
+        near=_ratio(nearest),
+        worst=furthest["filter"],
+        far=_ratio(furthest),
     )
+    return Sentence(text, _ratio_intervals(final))
 
 
-def _filter(result: Result, made: "Mapping[str, pd.DataFrame]", name: str) -> str:
-    """Share of bursts that locked over all scans, and σ of the range at the last scan over its idealisation's."""
-    locks, ideal = (tables.where(made[t], case=result.name, filter=name) for t in ("locks", "idealisations"))
+def _locks_and_ratio(result: Result, tables_by_name: TablesByName, name: str) -> Sentence:
+    """The least share of a scan's bursts that lock, and σ of the range at the last scan over its idealisation's."""
+    locks = tables.where(tables_by_name["locks"], case=result.name, filter=name)
     worst = locks.iloc[int(locks["lock_rate"].to_numpy().argmin())]
-    locked = tr(
-        "at least {share} of the bursts of a scan lock",
-        share=wording.share(*(100 * worst[key] for key in ("lock_rate", "lock_lo", "lock_hi"))),
-    )
-    last = ideal[ideal["component"] == "r"].iloc[-1]
-    if last["over_ideal_hi"] <= ALIKE:
-        ratio = wording.estimate((last[key] for key in OVER), form=".4g")
-        words = tr("σ of the range at the last scan is that of its idealisation, {ratio} times", ratio=ratio)
+    share = wording.share(*(100 * worst[key] for key in ("lock_rate", "lock_lo", "lock_hi")))
+    locked = tr("at least {share} of the bursts of a scan lock", share=share)
+    ratios = tables.where(tables_by_name["idealisations"], case=result.name, filter=name, component="r")
+    final = ratios.iloc[-1]
+    if final["over_ideal_hi"] <= MAX_RATIO_OF_IDEAL:
+        ratio = tr(
+            "σ of the range at the last scan is that of its idealisation, {ratio} times", ratio=_ratio(final, ".4g")
+        )
     else:
-        ratio = wording.estimate((last[key] for key in OVER), form=".3g")
-        words = tr("σ of the range at the last scan is {ratio} times its idealisation's", ratio=ratio)
-    return f"{locked}; {words}"
+        ratio = tr("σ of the range at the last scan is {ratio} times its idealisation's", ratio=_ratio(final))
+    return Sentence(f"{locked}; {ratio}", (*sentences.intervals("locks", "lock", worst), *_ratio_intervals(final)))
+
+
+def _ratio(row: "Mapping[Any, Any] | pd.Series[Any]", form: str = ".3g") -> str:
+    return wording.estimate((row[key] for key in RATIO), form=form)
+
+
+def _ratio_intervals(rows: "pd.DataFrame | pd.Series[Any]") -> tuple[sentences.MeasuredInterval, ...]:
+    return sentences.intervals("idealisations", "over_ideal", rows)

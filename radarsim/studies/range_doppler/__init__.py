@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import Axes, CaseResult
     from radarsim.report.drawing import Chart, Figure
+    from radarsim.report.sentences import Sentence
     from radarsim.studies.floor import Floor
     from radarsim.studies.range_doppler.config import Keys
     from radarsim.studies.range_doppler.given import GivenGains
@@ -120,7 +121,7 @@ class RangeDoppler(Study):
 
         return words.question(experiment)
 
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.range_doppler import words
 
         return words.answer(results, made)

@@ -32,16 +32,13 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
     """sigma_r … gain_ar (the paper's figures 1a … 3b), and `settling` where the manoeuvre variance is swept."""
     drawn = panels.per_component(results, made, RADIAL, experiment)
     if experiment.stem == OF_THE_PAPER:
-        drawn = {name: seen.numbered(one, NUMBERS[name]) if name in NUMBERS else one for name, one in drawn.items()}
+        drawn |= {name: seen.with_figure_number(drawn[name], NUMBERS[name]) for name in drawn if name in NUMBERS}
     some = [result for result in results if result.name in set(panels.named(experiment, "settling"))]
     figure = settling_figure(some, made["steady"])
     drawn |= {"settling": figure} if figure else {}
     some, left_out = panels.shown_families(panels.unswept(results), panels.named(experiment, "consistency"))
     drawn |= {"consistency": consistency_figure(some, made["consistency"], left_out)} if some else {}
-    return {name: one for name, one in seen.all_begun(drawn, SEEN).items() if one}
-
-
-SEEN = {"consistency": seen.extremes}
+    return {name: one for name, one in drawn.items() if one}
 
 
 def consistency_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: str) -> Figure:

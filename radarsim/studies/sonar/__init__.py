@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import CaseResult
     from radarsim.report.drawing import Figure
+    from radarsim.report.sentences import Sentence
     from radarsim.studies.floor import Floor
     from radarsim.studies.interface import Draw, Plan, RecordedPlots, Tracker
     from radarsim.studies.sonar.config import Keys
@@ -59,7 +60,7 @@ class Part(ABC):
         """The question of cases with these keys."""
 
     @abstractmethod
-    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> list[str]:
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         """The answer to it."""
 
     @abstractmethod
@@ -103,7 +104,7 @@ class Smoothing(Part):
 
         return words.question(specs)
 
-    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> list[str]:
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.sonar import words
 
         return words.answer(results, tables)
@@ -151,7 +152,7 @@ class Manoeuvre(Part):
 
         return words.question(specs)
 
-    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> list[str]:
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.sonar.manoeuvre import words
 
         return words.answer(results, tables)
@@ -199,7 +200,7 @@ class Clutter(Part):
 
         return words.question(specs)
 
-    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> list[str]:
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.sonar.clutter import words
 
         return words.answer(results, tables)
@@ -297,7 +298,7 @@ class Sonar(Study):
         part, cases = by_part(experiment.cases)[-1]
         return part.question([case.spec for case in cases])
 
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> list[str]:
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         answers = (part.answer(members, made) for part, members in reversed(by_part(results)))
         return [sentence for answer in answers for sentence in answer]
 

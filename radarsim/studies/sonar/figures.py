@@ -10,7 +10,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
-from radarsim.report import panels, seen, tables
+from radarsim.report import panels, tables
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.report.quantities import Component
 from radarsim.studies.sonar.world import GivenPlotsAxes, SonarAxes
@@ -49,12 +49,6 @@ WHAT = {  # of the position or motion, by its name in the table
 DRAWN_FROM = {"missed": ("curves",), "believed": ("curves", "consistency")}
 
 
-SEEN = {
-    **{"plots": seen.extremes, "smoothing_gains": seen.at_the_end, "conversion": seen.extremes},
-    **{"believed": seen.extremes, "missed": seen.extremes},
-}
-
-
 def figures(
     results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]", experiment: Experiment
 ) -> dict[str, Figure | None]:
@@ -75,7 +69,7 @@ def figures(
     own = {name: draw(made[name]) for name, draw in of_tables.items() if name in made}
     own["believed"] = believed_figure(known, made["curves"], made["consistency"])
     own["missed"] = missed_figure(known, made["curves"])
-    return drawn | seen.all_begun(own, SEEN)
+    return drawn | own
 
 
 def case_lines(
@@ -126,7 +120,7 @@ def sigma_figure(
         same = panels.swept(results[0], without={key for key, _ in results[0].swept} - shared)
         caption += " " + tr("All panels: {values}.", values=panels.plain(same))
     figure = panels.in_columns(Figure(name, tr("σ of the {name}", name=of.words), caption, tuple(drawn)))
-    return seen.begun(figure, seen.at_the_end(figure))
+    return figure
 
 
 # ---- smoothing -----------------------------------------------------------------------------------------------------

@@ -1,11 +1,12 @@
 """Question and answer of the report on smoothed plots."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, tr
-from radarsim.report import notes, panels, tables, wording
+from radarsim.report import notes, panels, sentences, tables, wording
+from radarsim.report.sentences import Sentence
 from radarsim.studies.sonar.config import Keys, correlation_of
 from radarsim.studies.sonar.figures import BY_NAME
 from radarsim.studies.sonar.world import SonarAxes
@@ -13,7 +14,8 @@ from radarsim.studies.sonar.world import SonarAxes
 if TYPE_CHECKING:
     import pandas as pd
 
-DIGITS, EQUAL = 9, 1e-9  # decimals of σ, and a ratio's difference, to which filters are of equal accuracy
+SIGMA_DECIMALS, EQUAL_RATIOS = 9, 1e-9  # to which filters are of equal accuracy
+MIN_OPTIMISM = 1.05  # true over believed σ, by the interval, from which a filter is called optimistic
 
 
 def question(specs: Sequence[Keys]) -> str:
@@ -22,7 +24,7 @@ def question(specs: Sequence[Keys]) -> str:
         return tr(
             "What does it cost to convert range and bearing to x and y, and when does the conversion's bias matter?"
         )
-    if _correlated(specs):
+    if _has_correlated_errors(specs):
         return tr("What does it cost to ignore that the errors of neighbouring plots are correlated?")
     if any(spec.sensor.detection_probability < 1 or spec.sensor.missed_scans for spec in specs):
         return tr("What does a missed plot cost?")
@@ -30,87 +32,108 @@ def question(specs: Sequence[Keys]) -> str:
     return tr("How accurate are range and bearing smoothed by {filters}?", filters=few(names))
 
 
-def _correlated(specs: Sequence[Keys]) -> bool:
+def _has_correlated_errors(specs: Sequence[Keys]) -> bool:
     return any(correlation_of(spec.sensor.error_correlation, c) for spec in specs for c in range(3))
 
 
-def answer(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
-    """Sentences with 95 % intervals: σ of the first coordinate at the end, and the most optimistic filter. First, where
-    the question is about it: the bias of the conversion, what correlated errors do to a filter's own σ."""
-    shown, others = panels.reported(results)
-    best = [_best(result, made["curves"]) for result in shown]
-    optimistic = _most_optimistic(results, made)
-    if _correlated([result.spec for result in results]):
-        return [*optimistic, *best, *others]
-    return [*_converted(results, made), *best, *optimistic, *others]
+def answer(results: Sequence[CaseResult[SonarAxes]], tables_by_name: "Mapping[str, pd.DataFrame]") -> list[Sentence]:
+    """Sentences with 95 % intervals: σ of the first coordinate at the end, and the most optimistic filter.
+
+    First what the question is about: the bias of the conversion, or what correlated errors do to a filter's own σ."""
+    reported, remark = panels.reported(results)
+    sigma = [_final_sigma(result, tables_by_name["curves"]) for result in reported]
+    optimistic = _most_optimistic(results, tables_by_name)
+    if _has_correlated_errors([result.spec for result in results]):
+        return [*optimistic, *sigma, *map(Sentence, remark)]
+    return [*_bias_of_conversion(results, tables_by_name), *sigma, *optimistic, *map(Sentence, remark)]
 
 
-def _converted(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
-    """The largest bias of plots that are converted plainly, and of those without; none if none are plain."""
-    rows = made["conversion"] if "conversion" in made else made["curves"][:0].assign(frame="")
-    if not (rows["frame"] == "cartesian").any():
+def _bias_of_conversion(
+    results: Sequence[CaseResult[SonarAxes]], tables_by_name: "Mapping[str, pd.DataFrame]"
+) -> list[Sentence]:
+    """The largest bias of plots that are converted plainly, and of unbiased ones; none if none are plain."""
+    if "conversion" not in tables_by_name:
         return []
-    told = {}
-    for frame, own in rows.groupby("frame", sort=False):
-        worst = own.iloc[int(own["bias_m"].abs().to_numpy().argmax())]
-        result = next(result for result in results if result.name == worst["case"])
-        told[str(frame)] = {
-            "bias": wording.estimate((worst[key] for key in ("bias_m", "bias_lo", "bias_hi")), tr("m"), ".3g"),
-            "ratio": wording.number(float(worst["bias_to_sigma_range"]), 3),
-            "case": panels.plain(panels.swept(result, without=["frame"]) or panels.device(result)),
-        }
-    words = tr(
+    conversion = tables_by_name["conversion"]
+    worst = {
+        str(frame): rows.iloc[int(rows["bias_m"].abs().to_numpy().argmax())]
+        for frame, rows in conversion.groupby("frame", sort=False)
+    }
+    if "cartesian" not in worst:
+        return []
+    text = tr(
         "Largest bias of a plot along the line of sight, converted plainly: {bias}, {ratio} σ of the range ({case})",
-        **told["cartesian"],
+        **_bias_fields(results, worst["cartesian"]),
     )
-    if other := told.get("cartesian_unbiased"):
-        words += "; " + tr("converted without bias: {bias}, {ratio} σ ({case})", **other)
-    return [f"{words}."]
+    rows = [worst["cartesian"]]
+    if "cartesian_unbiased" in worst:
+        rows.append(worst["cartesian_unbiased"])
+        text += "; " + tr("converted without bias: {bias}, {ratio} σ ({case})", **_bias_fields(results, rows[-1]))
+    return [Sentence(f"{text}.", sentences.intervals("conversion", "bias", *rows))]
 
 
-def _best(result: CaseResult[SonarAxes], curves: "pd.DataFrame") -> str:
+def _bias_fields(results: Sequence[CaseResult[SonarAxes]], row: "pd.Series[Any]") -> dict[str, str]:
+    result = next(result for result in results if result.name == row["case"])
+    return {
+        "bias": wording.estimate((row[key] for key in ("bias_m", "bias_lo", "bias_hi")), tr("m"), ".3g"),
+        "ratio": wording.number(float(row["bias_to_sigma_range"]), 3),
+        "case": panels.plain(panels.swept(result, without=["frame"]) or panels.device(result)),
+    }
+
+
+def _final_sigma(result: CaseResult[SonarAxes], curves: "pd.DataFrame") -> Sentence:
     """The filters with the least and the largest σ at the end of a case."""
-    first = result.axes.components[0][0]
-    rows = tables.where(curves, case=result.name, component=first)
-    last = rows[rows["k"] == rows["k"].max()]
+    component = result.axes.components[0][0]
+    rows = tables.where(curves, case=result.name, component=component)
+    final = rows[rows["k"] == rows["k"].max()]
     # By exact values where all are known, so that filters of equal accuracy are not ranked by their noise.
-    order = (last["exact_sigma"] if last["exact_sigma"].notna().all() else last["sigma"]).round(DIGITS)
-    low, high = (_with(last.loc[order == end]) for end in (order.min(), order.max()))
-    said = {"quantity": BY_NAME[first].words, "t_s": last["t_s"].iloc[0], "least": low, "most": high}
+    order = final["exact_sigma"] if final["exact_sigma"].notna().all() else final["sigma"]
+    order = order.round(SIGMA_DECIMALS)
+    lowest, highest = (final.loc[order == extreme] for extreme in (order.min(), order.max()))
+    fields = {
+        "quantity": BY_NAME[component].words,
+        "t_s": final["t_s"].iloc[0],
+        "least": _filters_and_sigma(lowest),
+        "most": _filters_and_sigma(highest),
+    }
     if order.nunique() > 1:
-        words = tr("σ of the {quantity} after {t_s:g} s: least with {least}, largest with {most}.", **said)
+        text = tr("σ of the {quantity} after {t_s:g} s: least with {least}, largest with {most}.", **fields)
     else:
-        words = tr("σ of the {quantity} after {t_s:g} s: {least}.", **said)
-    return panels.at_its_place(result, words)
+        text = tr("σ of the {quantity} after {t_s:g} s: {least}.", **fields)
+    return Sentence(
+        panels.at_its_place(result, text), sentences.intervals("curves", "sigma", lowest.iloc[0], highest.iloc[0])
+    )
 
 
-def _with(rows: "pd.DataFrame") -> str:
+def _filters_and_sigma(rows: "pd.DataFrame") -> str:
     """Filters of equal σ, and it with the interval."""
     row = rows.iloc[0]
     sigma = wording.estimate((row[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(row["unit"]))
     return f"{few(list(rows['filter']))}, {sigma}"
 
 
-def _most_optimistic(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
+def _most_optimistic(
+    results: Sequence[CaseResult[SonarAxes]], tables_by_name: "Mapping[str, pd.DataFrame]"
+) -> list[Sentence]:
     """The filters, of complete state, that overestimate their accuracy the most; none if no filter does."""
-    names = [result.name for result in results]
-    curves = made["curves"][made["curves"]["case"].isin(names)]
-    table = curves.merge(made["consistency"][["case", "filter", "k"]].drop_duplicates())
-    ratio = notes.sigma_over_believed(table)
-    table = table.assign(ratio=ratio.value, ratio_lo=ratio.lo, ratio_hi=ratio.hi)
-    worst = table.iloc[int(table["ratio"].argmax())]
-    if worst["ratio_lo"] <= 1.05:
+    curves = tables_by_name["curves"]
+    curves = curves[curves["case"].isin([result.name for result in results])]
+    complete = set(tables_by_name["consistency"][["case", "filter", "k"]].itertuples(index=False, name=None))
+    curves = curves[[key in complete for key in curves[["case", "filter", "k"]].itertuples(index=False, name=None)]]
+    ratio = notes.sigma_over_believed(curves)
+    curves = curves.assign(ratio=ratio.value, ratio_lo=ratio.lo, ratio_hi=ratio.hi)
+    worst = curves.iloc[int(curves["ratio"].argmax())]
+    if worst["ratio_lo"] <= MIN_OPTIMISM:
         return []
     result = next(result for result in results if result.name == worst["case"])
-    there = tables.where(table, case=worst["case"], component=worst["component"], k=worst["k"])
-    alike = few(list(there["filter"][(there["ratio"] - worst["ratio"]).abs() < EQUAL]))
+    filters = tables.where(curves, case=worst["case"], component=worst["component"], k=worst["k"])
+    equal = few(list(filters["filter"][(filters["ratio"] - worst["ratio"]).abs() < EQUAL_RATIOS]))
     swept = panels.plain(panels.swept(result))
-    return [
-        tr(
-            "Most optimistic: {filter}; the true σ is {ratio} times the filter's own estimate ({quantity}, scan {k}).",
-            filter=f"{alike} ({swept})" if swept else alike,
-            ratio=wording.estimate((worst[key] for key in ("ratio", "ratio_lo", "ratio_hi")), form=".2f"),
-            quantity=BY_NAME[worst["component"]].words,
-            k=worst["k"],
-        )
-    ]
+    text = tr(
+        "Most optimistic: {filter}; the true σ is {ratio} times the filter's own estimate ({quantity}, scan {k}).",
+        filter=f"{equal} ({swept})" if swept else equal,
+        ratio=wording.estimate((worst[key] for key in ("ratio", "ratio_lo", "ratio_hi")), form=".2f"),
+        quantity=BY_NAME[worst["component"]].words,
+        k=worst["k"],
+    )
+    return [Sentence(text, sentences.intervals("curves", "sigma", worst))]

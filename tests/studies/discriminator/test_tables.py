@@ -13,6 +13,7 @@ from radarsim.studies.discriminator import study, words
 from radarsim.studies.discriminator import tables as report
 from radarsim.studies.discriminator.figures import one_burst
 from radarsim.studies.discriminator.kernels import bin_edges
+from tests.answers import answer_texts
 from tests.tolerances import rounding, sigma_error
 
 
@@ -125,7 +126,7 @@ def test_gains_are_left_to_studies_with_common_scans(made):
 
 
 def test_answer_names_every_estimator(made):
-    first, others = words.answer(made.cases, made.tables)
+    first, others = answer_texts(words, made.cases, made.tables)
     names = made.cases[0].axes.filters
     assert first.startswith(f"{names[0]}: ")
     assert all(re.search(rf"(: |; ){re.escape(name)}, \d+(\.\d\d)? % \[", others) for name in names[1:])

@@ -18,6 +18,7 @@ from radarsim.papers.verdict_rule import CONFIRMED
 from radarsim.report import figures, html
 from radarsim.report.drawing import Note
 from radarsim.studies.multimodel import STUDY, words
+from tests.answers import answer_texts
 from tests.tolerances import assert_rounded, rounding
 
 CLAIMS = claims_of(STUDY).claims
@@ -129,7 +130,7 @@ def test_filters_of_as_few_operations_are_named_together():
 
 
 def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):
-    first, height, climb = words.answer(result.cases, result.tables)
+    first, height, climb = answer_texts(words, result.cases, result.tables)
     for stage in ("start", "ballistic", "manoeuvre", "after"):
         assert stage in height
         assert stage in climb
@@ -153,11 +154,13 @@ def test_the_answer_on_several_cases_is_one_sentence():
     columns = {"sigma_lo": 1.0, "sigma_hi": 99.0, "component": "y", "unit": "m"}
     stages = pd.DataFrame(rows, columns=["case", "stage", "filter", "sigma"]).assign(**columns)
     cases = [SimpleNamespace(name=name, swept=(), spec=SimpleNamespace(device="")) for name in ("one", "two")]
-    (told,) = words.answer(cases, {"stages": stages})
+    (told,) = answer_texts(words, cases, {"stages": stages})
     assert "every case: a, σ of the height at most 10 % above the least (one, start: 11 m [1, 99]; b: 10 m" in told
-    alone = words.answer(cases, {"stages": stages[stages["filter"] == "b"]})
+    alone = answer_texts(words, cases, {"stages": stages[stages["filter"] == "b"]})
     assert [line.rpartition("start: ")[2] for line in alone] == ["b, 10 m [1, 99].", "b, 20 m [1, 99]."]
-    told, *_ = words.answer(cases[1:], {"stages": pd.concat([stages[3:], stages[3:].assign(component="vy")])})
+    told, *_ = answer_texts(
+        words, cases[1:], {"stages": pd.concat([stages[3:], stages[3:].assign(component="vy")], ignore_index=True)}
+    )
     assert told == "Least σ of the height in every stage: a; next b, at most 100 % above it."
 
 

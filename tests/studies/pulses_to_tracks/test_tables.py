@@ -12,6 +12,7 @@ from radarsim.report.statistics import FEW_EVENTS
 from radarsim.studies import registry
 from radarsim.studies.pulses_to_tracks import study, tables
 from radarsim.studies.pulses_to_tracks.tables import OF_ALL
+from tests.answers import answer_texts
 from tests.studies.pulses_to_tracks import naive
 from tests.studies.pulses_to_tracks.conftest import CURED, made
 from tests.tolerances import assert_rounded, rounding, sigma_error
@@ -93,7 +94,7 @@ def test_the_cure_is_the_cheapest_of_the_sequences(found):
 def test_sentences(found):
     one, experiment = registry.study("pulses_to_tracks"), load("pulses")
     assert one.question(experiment).startswith("What are the bursts of RLS 4 worth to the track")
-    told = one.answer(found.cases, found.tables)
+    told = answer_texts(one, found.cases, found.tables)
     assert told[-1] == "RLS 4: 16 pulses in 0.8 ms, 17.3 dB in all, allow σ_V = 1 m/s (Fisher bound)."
     assert len(told) == 7
     ratios = found.tables["idealisations"].query("component == 'r'").groupby("filter").tail(1)

@@ -15,6 +15,7 @@ from radarsim.studies.range_doppler import figures as range_doppler_figures
 from radarsim.studies.range_doppler import filters
 from radarsim.studies.range_doppler import tables as range_doppler
 from radarsim.studies.range_doppler import words as range_doppler_words
+from tests.answers import answer_texts
 from tests.tolerances import assert_rounded, rounding
 
 
@@ -79,8 +80,8 @@ def test_the_worst_is_named_by_exact_values():
     rows = rows.assign(
         sigma_lo=rows["sigma"] - 0.3, sigma_hi=rows["sigma"] + 0.3, bias=[-2.0, 1.9], exact_bias=[-1.8, 2.1]
     )
-    said = range_doppler_words._worst(rows)
-    assert said.endswith("at 20 s, largest bias 1.9 m at 20 s")
+    clause = range_doppler_words._worst_errors(rows, "r")
+    assert clause.text.endswith("at 20 s, largest bias 1.9 m at 20 s")
 
 
 def test_no_best_where_nothing_is_compared(paper):
@@ -192,13 +193,13 @@ def test_dynamic_error_is_drawn_where_there_is_one(expected_radar):
 
 def test_answer_tells_the_last_gain_of_each_component(paper):
     made = made_of(paper[1:2])
-    told = range_doppler_words.answer(paper[1:2], made)
+    told = answer_texts(range_doppler_words, paper[1:2], made)
     assert len(told) == 3
     assert "at 140 s, the last scan, σ is 18.3 % [" in told[0]
     assert "than with range alone" in told[0]
     assert "at best 34.6 % [" in told[0]
-    assert "RLS 1" in range_doppler_words.answer(paper, made_of(paper))[2]
-    assert "higher (RLS 1)" in range_doppler_words.answer(paper, made_of(paper))[2]
+    assert "RLS 1" in answer_texts(range_doppler_words, paper, made_of(paper))[2]
+    assert "higher (RLS 1)" in answer_texts(range_doppler_words, paper, made_of(paper))[2]
 
 
 S_BAND = {"sigma_range_m": 60, "sigma_velocity_mps": 3, "scan_period_s": 4}
@@ -210,23 +211,23 @@ def test_a_gain_that_has_not_settled_is_quoted_with_that_of_the_long_run(expecte
     C_theta, Lambda = 60**2 / (4 * 3) ** 2, 4**3 * 1e-3**0.5 / 60
     known = filters.exact_gains(np.array([C_theta]), np.array([Lambda]))[:, 0]
     results = [expected_radar("rls2", radar=S_BAND | {"detection_probability": detection})]
-    told = range_doppler_words.answer(results, made_of(results))[:3]
+    told = answer_texts(range_doppler_words, results, made_of(results))[:3]
     for sentence, gain in zip(told, known, strict=True):
         assert f"; not settled: {gain:.1f} % lower{words}" in sentence
     longer = [expected_radar("rls2", radar=S_BAND | {"detection_probability": detection}, scans=40)]
     if detection == 1:
-        assert "settled" not in " ".join(range_doppler_words.answer(longer, made_of(longer)))
+        assert "settled" not in " ".join(answer_texts(range_doppler_words, longer, made_of(longer)))
 
 
 def test_a_target_that_breaks_the_model_has_no_gain_of_the_long_run(expected_radar):
     target = {"kind": "jerk_pulse", "coefficients": [1e5, -250], "start_s": 20, "jerk_mps3": 1, "duration_s": 20}
     results = [expected_radar("rls2", radar=S_BAND, target=target)]
-    assert "settled" not in " ".join(range_doppler_words.answer(results, made_of(results)))
+    assert "settled" not in " ".join(answer_texts(range_doppler_words, results, made_of(results)))
 
 
 def test_of_several_radars_those_are_named_that_have_not_settled(expected_radar):
     results = [expected_radar("rls2", name="mine", radar=S_BAND), expected_radar("rls4", name="rls4")]
-    told = range_doppler_words.answer(results, made_of(results))[0]
+    told = answer_texts(range_doppler_words, results, made_of(results))[0]
     assert told.count("in the long run") == 1
     assert "not settled: 36.5 % lower (" in told
 
@@ -237,7 +238,7 @@ def test_answer_names_a_baseline_that_observes_more(expected_radar):
         for v in (1e-3, 1e-2)
     ]
     results = [expected_radar("rls2", filters=velocity)]
-    assert "than with filter 'D 0.001'" in range_doppler_words.answer(results, made_of(results))[0]
+    assert "than with filter 'D 0.001'" in answer_texts(range_doppler_words, results, made_of(results))[0]
 
 
 def test_inputs_have_a_row_for_each_radar_that_differs(expected_radar, swept):
@@ -273,11 +274,11 @@ def test_answer_tells_the_greatest_loss(expected_radar):
     results = [expected_radar("rls2", 1e-4, target=BRAKING, radar=sharp)]
     made = made_of(results)
     words = greatest_loss(made)
-    assert range_doppler_words.answer(results, made)[0].endswith(f"{words}.")
+    assert answer_texts(range_doppler_words, results, made)[0].endswith(f"{words}.")
     others = [expected_radar("rls2", name="calm"), expected_radar("rls5", name="fine"), *results]
     made = made_of(others)
     words = greatest_loss(made)
-    assert range_doppler_words.answer(others, made)[0].endswith(f"{words}, with RLS 2.")
+    assert answer_texts(range_doppler_words, others, made)[0].endswith(f"{words}, with RLS 2.")
 
 
 def test_answer_is_silent_of_a_loss_that_is_none(paper):
@@ -285,7 +286,7 @@ def test_answer_is_silent_of_a_loss_that_is_none(paper):
     made = made_of(one)
     first = made["gains"][made["gains"]["component"] == "r"]
     assert (first["gain_hi"] > -1).all()
-    assert "at worst" not in range_doppler_words.answer(one, made)[0]
+    assert "at worst" not in answer_texts(range_doppler_words, one, made)[0]
 
 
 @pytest.mark.parametrize(
@@ -304,11 +305,11 @@ def test_answer_is_silent_of_a_loss_that_is_none(paper):
 )
 def test_a_gain_in_words(gain, words):
     row = dict(zip(("gain_percent", "gain_lo", "gain_hi", "exact_percent"), gain, strict=False))
-    assert range_doppler_words._gain(row) == words
+    assert range_doppler_words._gain_text(row) == words
 
 
 def test_answer_tells_the_best_variance(swept):
-    told = range_doppler_words.answer(swept, made_of(swept))[0]  # before the gains: it is what is asked
+    told = answer_texts(range_doppler_words, swept, made_of(swept))[0]  # before the gains: it is what is asked
     assert told.startswith("Best manoeuvre variance D_M")
     assert "RLS 2: r 10⁻³ (σ 189.1 m, settled after 90 s); r+Vr 10⁻³ (σ 154." in told
 
@@ -320,7 +321,7 @@ def test_a_target_that_breaks_the_model(expected_radar):
     assert made["steady"].empty
     rows = made["curves"][(made["curves"]["component"] == "r") & (made["curves"]["filter"] == "r")]
     worst = rows.loc[rows["sigma"].idxmax()]
-    told = range_doppler_words.answer(results, made)[-1]
+    told = answer_texts(range_doppler_words, results, made)[-1]
     assert f"r: worst σ of the range {worst['sigma']:.4g} m [" in told
     assert f"at {worst['t_s']:g} s, largest bias " in told
 
@@ -328,7 +329,7 @@ def test_a_target_that_breaks_the_model(expected_radar):
 def test_answer_of_a_single_filter(expected_radar):
     one = {"name": "only", "observes": ["range"], "manoeuvre_variance": 1e-3}
     results = [expected_radar("rls2", filters=[one])]
-    (sentence,) = range_doppler_words.answer(results, made_of(results))
+    (sentence,) = answer_texts(range_doppler_words, results, made_of(results))
     assert "only: σ of the range at 140 s is 189.3 m" in sentence
 
 
@@ -336,7 +337,7 @@ def test_answer_of_a_single_filter(expected_radar):
 
 
 def told_of(results):
-    return range_doppler_words.answer(results, made_of(results))
+    return answer_texts(range_doppler_words, results, made_of(results))
 
 
 def test_answer_compares_at_a_common_time(expected_radar):

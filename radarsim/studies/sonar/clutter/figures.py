@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, listed, term, tr
-from radarsim.report import panels, seen, tables, wording
+from radarsim.report import panels, tables, wording
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.sonar.clutter.filters import ClutterAxes, TrackerSpec, conditions, gate_threshold, tracker_specs
 from radarsim.studies.sonar.clutter.tables import ENDED
@@ -41,13 +41,7 @@ def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, F
         "false_tracks": false_figure(results, made["tracking"]),
         "track_classes": classes_figure(results, made["track_classes"]),
     }
-    return seen.all_begun(drawn, SEEN)
-
-
-SEEN = {
-    **{"confirmation": seen.highest_at_the_end, "track_life": seen.extremes},
-    **{"false_tracks": seen.extremes, "track_classes": seen.extremes},
-}
+    return drawn
 
 
 def middle(results: Results) -> CaseResult[ClutterAxes]:
@@ -135,31 +129,29 @@ def life_figure(results: Results, made: "Mapping[str, pd.DataFrame]") -> Figure 
     cases = tracking[["case", *KEYS]].drop_duplicates("case")
     at_end = tables.where(curves, component="r", k=results[0].axes.k[-1]).merge(cases, on="case", how="left")
     ended = made["rare"][made["rare"]["sought"] & (made["rare"]["event"] == ENDED)] if "rare" in made else at_end[:0]
-    life = ("life_s", "life", Axis(tr("track life, s"), "log"), tracking, tr(LIFE))
+    life = ("life_s", "life", tr("track life"), "s", tracking, tr(LIFE))
     if len(ended):
-        y = Axis(tr("share of tracks ended by the last scan"), "log")
-        life = ("rate", "rate", y, ended.merge(cases, on="case", how="left"), tr(ENDS))
-    time, wrong, sigma = (
-        Axis(words, limits=(0, None))
-        for words in (
-            tr("time to confirmation, s"),
-            tr("share of wrong plots"),
-            tr("$\\sigma$ of $r$ of kept tracks, m"),
-        )
-    )
-    shown = (
+        rates = ended.merge(cases, on="case", how="left")
+        life = ("rate", "rate", tr("share of tracks ended by the last scan"), "", rates, tr(ENDS))
+    time, wrong = tr("time to confirmation"), tr("share of wrong plots")
+    quantities = (
         life,
-        ("time_to_confirm_s", "time", time, tracking, tr("mean time to its confirmation")),
-        ("wrong_share", "wrong", wrong, tracking, tr("weight of false plots among those used")),
-        ("sigma", "sigma", sigma, at_end, tr("root-mean-square error of the range of the tracks kept at the end")),
+        ("time_to_confirm_s", "time", time, "s", tracking, tr("mean time to its confirmation")),
+        ("wrong_share", "wrong", wrong, "", tracking, tr("weight of false plots among those used")),
+        (
+            *("sigma", "sigma", tr("$\\sigma$ of $r$ of kept tracks"), "m", at_end),
+            tr("root-mean-square error of the range of the tracks kept at the end"),
+        ),
     )
     drawn, said, level = [], [], []
-    for value, ends, y, table, words in shown:
+    for value, ends, quantity, unit, table, words in quantities:
         lines = _lines(by_line(table, column, results[0]), column, value, ends)
         known = [line.y[np.isfinite(line.y)] for line in lines]
         if all(np.ptp(values) <= LEVEL * values.max() for values in known if len(values)):
-            level += [_level(y.label, np.concatenate(known))]
+            level += [_level(quantity, unit, np.concatenate(known))]
         else:
+            label = panels.with_unit(quantity, unit)
+            y = Axis(label, "log") if value == life[0] else Axis(label, limits=(0, None))
             drawn.append(Panel(x, y, tuple(lines), direct=False))
             said.append(words)
     if not drawn:
@@ -177,13 +169,13 @@ def life_figure(results: Results, made: "Mapping[str, pd.DataFrame]") -> Figure 
     return Figure("track_life", tr("Track life and accuracy"), caption, tuple(drawn), columns, width, 58)
 
 
-def _level(label: str, values: np.ndarray) -> str:
+def _level(quantity: str, unit: str, values: np.ndarray) -> str:
     """A quantity that does not change, with its values (n,) over the trackers; empty where there is none."""
     if not len(values):
         return ""
-    name, _, unit = wording.spoken(label).rpartition(", ")
-    ends = dict.fromkeys(wording.number(float(end), 3) for end in (values.min(), values.max()))
-    return f"{name} ({'–'.join(ends)} {unit})"
+    extremes = dict.fromkeys(wording.number(float(end), 3) for end in (values.min(), values.max()))
+    number = " ".join(filter(None, ("–".join(extremes), panels.unit_of(unit))))
+    return f"{wording.spoken(quantity)} ({number})"
 
 
 def _lines(table: "pd.DataFrame", x: str, value: str, ends: str) -> list[Line]:

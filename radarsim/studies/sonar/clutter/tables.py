@@ -10,6 +10,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import rare, statistics
 from radarsim.report import tables as common
+from radarsim.report.row_notes import notes_where
 from radarsim.report.statistics import Z95, Estimate, Values
 from radarsim.report.tables import Columns, leading, of_rows, stacked
 from radarsim.studies.sonar.clutter.filters import ClutterAxes
@@ -310,7 +311,7 @@ def ends_note(
         matters = rare.rate(part, drawn).hi > least * rate
         said.append(rare.Counted(*(np.where(matters, own, of) for own, of in zip(part, whole, strict=True))))
     own_note, any_note = rare.note(drawn, whole), rare.note(drawn, *said)
-    in_part = np.where(any_note != "", rare.IN_PART, "").astype(object)
+    in_part = notes_where(any_note != "", rare.IN_PART)
     return np.where(own_note != "", own_note, in_part)
 
 

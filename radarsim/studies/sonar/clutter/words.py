@@ -1,13 +1,14 @@
 """Question and answer of the report on tracks among false plots."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import tr
-from radarsim.report import panels, rare, tables, wording
+from radarsim.report import panels, rare, sentences, tables, wording
+from radarsim.report.sentences import Sentence
 from radarsim.studies.sonar.clutter.filters import ClutterAxes
 from radarsim.studies.sonar.clutter.tables import ENDED, FALSE
 from radarsim.studies.sonar.config import Keys
@@ -24,69 +25,87 @@ def question(specs: Sequence[Keys]) -> str:
     )
 
 
-def answer(results: Sequence[CaseResult[ClutterAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
+def answer(results: Sequence[CaseResult[ClutterAxes]], tables_by_name: "Mapping[str, pd.DataFrame]") -> list[Sentence]:
     """Of the case in which tracks end most often: the tracker that keeps them longest, the others, what is rare.
 
     Of each: the time to a confirmed track, track life, false tracks per hour."""
-    tracking, events = made["tracking"], made.get("rare")
+    events = tables_by_name.get("rare")
+    ranked = _ranked_trackers(tables_by_name["tracking"], events)
+    case_name = ranked.groupby("case", sort=False)["ends"].min().idxmax()
+    result = next(result for result in results if result.name == case_name)
+    sought = None if events is None else events[(events["case"] == case_name) & events["sought"]]
+    longest, *others = (_tracker_clause(row, sought) for _, row in tables.where(ranked, case=case_name).iterrows())
+    case = panels.plain(panels.swept(result)) or panels.plain_label(result)
+    text = tr("Longest track life: {tracker}.", tracker=longest.text)
+    if len(results) > 1:
+        text = tr("Longest track life in the hardest case, {case}: {tracker}.", case=case, tracker=longest.text)
+    answer = [longest.with_text(text)]
+    if others:
+        clauses = sentences.join("; ", others)
+        answer.append(clauses.with_text(tr("The others there: {trackers}.", trackers=clauses.text)))
+    for event, make_sentence in ((FALSE, _false_tracks_sought), (ENDED, _ended_tracks_sought)):
+        if sought is not None and (sought["event"] == event).any():
+            answer.append(make_sentence(sought[sought["event"] == event]))
+    return answer
+
+
+def _ranked_trackers(tracking: "pd.DataFrame", events: "pd.DataFrame | None") -> "pd.DataFrame":
+    """The rows of `tracking` by how often tracks end, which `ends` gives, then by false tracks.
+
+    Ends by importance sampling where they are known of every tracker."""
     ends = tracking["ends_per_hour"].fillna(np.inf)
     if events is not None:
-        sought = events[events["sought"] & (events["event"] == ENDED)]
-        rates = tracking.merge(sought[["case", "filter", "rate"]], "left", ["case", "filter"])["rate"]
+        ended = events[events["sought"] & (events["event"] == ENDED)]
+        rates = tracking.merge(ended[["case", "filter", "rate"]], "left", ["case", "filter"])["rate"]
         ends = ends if rates.isna().any() else rates
-    ranked = tracking.assign(ends=ends).sort_values(["ends", "false_tracks_per_hour"], kind="stable")
-    name = ranked.groupby("case", sort=False)["ends"].min().idxmax()
-    result = next(one for one in results if one.name == name)
-    found = None if events is None else events[(events["case"] == name) & events["sought"]]
-    first, *others = (_of_tracker(row, found) for _, row in tables.where(ranked, case=name).iterrows())
-    case = panels.plain(panels.swept(result)) or panels.plain_label(result)
-    words = tr("Longest track life: {tracker}.", tracker=first)
-    if len(results) > 1:
-        words = tr("Longest track life in the hardest case, {case}: {tracker}.", case=case, tracker=first)
-    sentences = [words]
-    sentences += [tr("The others there: {trackers}.", trackers="; ".join(others))] if others else []
-    for event, said in ((FALSE, _by_importance), (ENDED, _ends_by_importance)):
-        if found is not None and (found["event"] == event).any():
-            sentences.append(said(found[found["event"] == event]))
-    return sentences
+    return tracking.assign(ends=ends).sort_values(["ends", "false_tracks_per_hour"], kind="stable")
 
 
-def _of_tracker(row: "pd.Series", events: "pd.DataFrame | None") -> str:
+def _tracker_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None") -> Sentence:
     """How surely and how soon a tracker confirms a track, how long it keeps it, and its false tracks."""
     if not row["confirmed"]:
-        return tr("{filter} confirms no track", filter=row["filter"])
-    return tr(
+        return Sentence(tr("{filter} confirms no track", filter=row["filter"]))
+    life = _life_clause(row, sought)
+    text = tr(
         "{filter} confirms {confirmed} after {time} on average, {life}, {rate} false tracks per hour",
         filter=row["filter"],
         confirmed=wording.share(*(100 * row[key] for key in ("confirmed", "confirmed_lo", "confirmed_hi"))),
-        time=_bounded(row, "time_to_confirm_s", "time", tr("s")),
-        life=_life(row, events),
-        rate=_bounded(row, "false_tracks_per_hour", "false"),
+        time=_estimate(row, "time_to_confirm_s", "time", tr("s")),
+        life=life.text,
+        rate=_estimate(row, "false_tracks_per_hour", "false"),
     )
+    given = (interval for name in ("confirmed", "time", "false") for interval in _tracking_interval(row, name))
+    return Sentence(text, (*given, *life.intervals))
 
 
-def _life(row: "pd.Series", events: "pd.DataFrame | None") -> str:
+def _tracking_interval(row: "pd.Series[Any]", name: str) -> tuple[sentences.MeasuredInterval, ...]:
+    return sentences.intervals("tracking", name, row)
+
+
+def _life_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None") -> Sentence:
     """How long a tracker keeps a track; where ends were sought, how many tracks have ended by the last scan."""
-    own = None if events is None else events[(events["filter"] == row["filter"]) & (events["event"] == ENDED)]
-    if own is not None and len(own):
-        rates = (100 * own.iloc[0][key] for key in ("rate", "rate_lo", "rate_hi"))
-        return tr("of its tracks {share} ended by the last scan", share=wording.estimate(rates, "%", ".2g"))
-    return (
-        tr("life {life}", life=_bounded(row, "life_s", "life", tr("s")))
-        if row["ends_per_hour"]
-        else tr("no track lost")
-    )
+    if sought is not None:
+        ended = sought[(sought["filter"] == row["filter"]) & (sought["event"] == ENDED)]
+        if len(ended):
+            rates = (100 * ended.iloc[0][key] for key in ("rate", "rate_lo", "rate_hi"))
+            share = wording.estimate(rates, "%", ".2g")
+            text = tr("of its tracks {share} ended by the last scan", share=share)
+            return Sentence(text, sentences.intervals("rare", "rate", ended.iloc[0]))
+    if not row["ends_per_hour"]:
+        return Sentence(tr("no track lost"))
+    text = tr("life {life}", life=_estimate(row, "life_s", "life", tr("s")))
+    return Sentence(text, _tracking_interval(row, "life"))
 
 
-def _bounded(row: "pd.Series", name: str, stem: str, unit: str = "") -> str:
+def _estimate(row: "pd.Series[Any]", column: str, interval: str, unit: str = "") -> str:
     """The value of a column with its interval, to three digits."""
-    values = (float(f"{row[key]:.3g}") for key in (name, f"{stem}_lo", f"{stem}_hi"))
+    values = (float(f"{row[key]:.3g}") for key in (column, f"{interval}_lo", f"{interval}_hi"))
     return wording.estimate(values, unit, ",.10g")
 
 
-def _by_importance(rows: "pd.DataFrame") -> str:
-    """What stands behind rates of false tracks that importance sampling found, by tracker."""
-    found = (
+def _false_tracks_sought(rows: "pd.DataFrame") -> Sentence:
+    """The events from which importance sampling has the rates of false tracks, by tracker."""
+    trackers = (
         tr(
             "{filter}, {events:,} of them, {n_eff:,.0f} effective",
             filter=row["filter"],
@@ -95,21 +114,22 @@ def _by_importance(rows: "pd.DataFrame") -> str:
         )
         for _, row in rows.iterrows()
     )
-    return tr("False tracks are drawn by importance sampling: {found}.", found="; ".join(found))
+    return Sentence(tr("False tracks are drawn by importance sampling: {found}.", found="; ".join(trackers)))
 
 
-def _ends_by_importance(rows: "pd.DataFrame") -> str:
-    """How rarely the target's track ends, and what stands behind these rates, by tracker."""
-    found = (
+def _ended_tracks_sought(rows: "pd.DataFrame") -> Sentence:
+    """How rarely the target's track ends by importance sampling, and from how many events, by tracker."""
+    trackers = (
         tr(
             "{filter}, {rate:.3g} [{low:.3g}, {high:.3g}] from {events:,} of them, {n_eff:,.0f} effective",
             filter=row["filter"],
-            **rare.told(row),
+            **rare.rate_fields(row),
         )
         for _, row in rows.iterrows()
     )
-    return tr(
+    text = tr(
         "The probability that the target's first confirmed track has ended by the last scan, by importance sampling: "
         "{found}.",
-        found="; ".join(found),
+        found="; ".join(trackers),
     )
+    return Sentence(text, sentences.intervals("rare", "rate", rows))

@@ -8,7 +8,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
-from radarsim.report import panels, seen, tables
+from radarsim.report import panels, tables
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.studies.sonar.figures import case_lines, ends
 from radarsim.studies.sonar.manoeuvre import exact
@@ -45,13 +45,7 @@ def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, F
         drawn["modes"] = _said(modes_figure(some, made["modes"]), left)
     if "uses" in made:
         drawn["uses"] = uses_figure([result for result in results if "uses" in result.sums], made["uses"])
-    return seen.all_begun(drawn, SEEN)
-
-
-SEEN = {
-    **{"detection": seen.extremes, "roc": seen.reading_at(0.01), "delay": seen.highest_at_the_end},
-    **{"modes": seen.extremes, "uses": seen.extremes},
-}
+    return drawn
 
 
 def shown(results: Results) -> tuple[list[CaseResult[ManoeuvreAxes]], str]:

@@ -1,11 +1,12 @@
 """Question and answer of the report on manoeuvres."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import term, tr
-from radarsim.report import panels, tables, wording
+from radarsim.report import panels, sentences, tables, wording
+from radarsim.report.sentences import Sentence
 from radarsim.studies.sonar.config import Keys
 from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes
 from radarsim.studies.sonar.manoeuvre.figures import USUAL, every_scan, last_of, usual
@@ -13,6 +14,15 @@ from radarsim.studies.sonar.manoeuvre.tables import NEAR
 
 if TYPE_CHECKING:
     import pandas as pd
+
+USES = {
+    "course": term("course"),
+    "speed": term("speed"),
+    "x_ahead": term("x ahead"),
+    "y_ahead": term("y ahead"),
+    "cpa": term("CPA"),
+    "t_cpa": term("time to CPA"),
+}
 
 
 def question(specs: Sequence[Keys]) -> str:
@@ -24,70 +34,76 @@ def question(specs: Sequence[Keys]) -> str:
     return tr("What do filters that respond to manoeuvres gain?")
 
 
-def answer(results: Sequence[CaseResult[ManoeuvreAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
+def answer(
+    results: Sequence[CaseResult[ManoeuvreAxes]], tables_by_name: "Mapping[str, pd.DataFrame]"
+) -> list[Sentence]:
     """Sentences with 95 % intervals: how often each manoeuvre is detected, and σ of uses against the covariance's."""
-    moving = [result for result in results if result.spec.detectors and result.axes.manoeuvre_s]
-    shown = panels.reported(moving, 2)[0] if "detections" in made else []
-    return [*filter(None, (_detected(result, made["detections"]) for result in shown)), *_first_order(results, made)]
+    answer = []
+    if "detections" in tables_by_name:
+        moving = [result for result in results if result.spec.detectors and result.axes.manoeuvre_s]
+        for result in panels.reported(moving, 2)[0]:
+            answer += _detection_sentence(result, tables_by_name["detections"])
+    return [*answer, *_sigma_of_uses(results, tables_by_name)]
 
 
-def _detected(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame") -> str:
-    """The detectors with the most and the fewest detections of a manoeuvre; empty where there are none."""
-    rows = detections[detections["case"] == result.name]
-    last = [last_of(usual(rows, name), "manoeuvre") for name in every_scan(result)]
-    found = [one.assign(decides=tables.exact_first(one, "probability", "exact")).iloc[0] for one in last if len(one)]
-    ranked = sorted(found, key=lambda row: row["decides"])
+def _detection_sentence(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame") -> list[Sentence]:
+    """The detectors with the most and the fewest detections of a manoeuvre; none where no detector has any."""
+    case_rows = detections[detections["case"] == result.name]
+    final_rows = [last_of(usual(case_rows, name), "manoeuvre") for name in every_scan(result)]
+    ranked = sorted(
+        (
+            rows.assign(decides=tables.exact_first(rows, "probability", "exact")).iloc[0]
+            for rows in final_rows
+            if len(rows)
+        ),
+        key=lambda row: row["decides"],
+    )
     if not ranked:
-        return ""
-    ends = [
+        return []
+    extremes = ranked[:: len(ranked) - 1 or 1]
+    texts = [
         f"{row['filter']}, {wording.estimate((row[key] for key in ('probability', 'lo', 'hi')), form='.3g')}"
-        for row in ranked[:: len(ranked) - 1 or 1]
+        for row in extremes
     ]
-    if len(ends) == 1:
-        words = tr(
+    if len(texts) == 1:
+        text = tr(
             "alarms a test at the end of the manoeuvre, at about {usual:g} false alarms: {one}.",
             usual=USUAL,
-            one=ends[0],
+            one=texts[0],
         )
     else:
-        words = tr(
+        text = tr(
             "alarms a test at the end of the manoeuvre, at about {usual:g} false alarms: most with {most}, least with "
             "{least}.",
             usual=USUAL,
-            most=ends[-1],
-            least=ends[0],
+            most=texts[-1],
+            least=texts[0],
         )
-    return panels.at_its_place(result, words)
+    return [Sentence(panels.at_its_place(result, text), sentences.intervals("detections", "probability", *extremes))]
 
 
-def _first_order(results: Sequence[CaseResult[ManoeuvreAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
+def _sigma_of_uses(
+    results: Sequence[CaseResult[ManoeuvreAxes]], tables_by_name: "Mapping[str, pd.DataFrame]"
+) -> list[Sentence]:
     """Measured σ of uses over that from the covariance, for the first case's first filter at the last time; or none."""
-    if "uses" not in made:
+    if "uses" not in tables_by_name:
         return []
-    rows = made["uses"]
-    first = rows.iloc[0]
-    rows = tables.where(rows, case=first["case"], filter=first["filter"])
-    rows = rows[rows["k"] == rows["k"].max()]
-    ratios = []
-    for row in rows.itertuples():
-        ratio = f"{tr(USES[row.component])} {wording.estimate((row.ratio, row.ratio_lo, row.ratio_hi), form='.3f')}"
-        ratios.append(tr("{ratio} (near zero)", ratio=ratio) if row.first_order == NEAR else ratio)
-    return [
-        tr(
-            "Measured σ of the track's uses over that from its covariance ({filter}, {t_s:g} s, {case}): {ratios}.",
-            filter=first["filter"],
-            t_s=rows.iloc[0]["t_s"],
-            case=next(panels.plain_label(one) for one in results if one.name == first["case"]),
-            ratios=", ".join(ratios),
-        )
-    ]
+    uses = tables_by_name["uses"]
+    first = uses.iloc[0]
+    uses = tables.where(uses, case=first["case"], filter=first["filter"])
+    uses = uses[uses["k"] == uses["k"].max()]
+    text = tr(
+        "Measured σ of the track's uses over that from its covariance ({filter}, {t_s:g} s, {case}): {ratios}.",
+        filter=first["filter"],
+        t_s=uses.iloc[0]["t_s"],
+        case=next(panels.plain_label(result) for result in results if result.name == first["case"]),
+        ratios=", ".join(_ratio(row) for _, row in uses.iterrows()),
+    )
+    return [Sentence(text, sentences.intervals("uses", "ratio", uses))]
 
 
-USES = {
-    "course": term("course"),
-    "speed": term("speed"),
-    "x_ahead": term("x ahead"),
-    "y_ahead": term("y ahead"),
-    "cpa": term("CPA"),
-    "t_cpa": term("time to CPA"),
-}
+def _ratio(row: "pd.Series[Any]") -> str:
+    """The ratio of a use's σ with its interval, and whether the first order that the covariance takes is doubtful."""
+    values = wording.estimate((row[key] for key in ("ratio", "ratio_lo", "ratio_hi")), form=".3f")
+    ratio = f"{tr(USES[row['component']])} {values}"
+    return tr("{ratio} (near zero)", ratio=ratio) if row["first_order"] == NEAR else ratio

@@ -9,6 +9,7 @@ from radarsim.report import wording
 from radarsim.studies.sonar.clutter import figures, words
 from radarsim.studies.sonar.clutter import tables as report
 from radarsim.studies.sonar.clutter.kernels import tracker
+from tests.answers import answer_texts
 from tests.tolerances import assert_rounded, share_error
 
 
@@ -53,11 +54,11 @@ def test_a_tracker_that_confirms_nothing_keeps_no_track(result):
     table = result.tables["tracking"].copy()
     lost = table["filter"] == "PDA"
     table.loc[lost, ["confirmed", "ends_per_hour", "life_s", "time_to_confirm_s"]] = [0.0, np.nan, np.nan, np.nan]
-    first, others = words.answer(result.cases, {"tracking": table})
+    first, others = answer_texts(words, result.cases, {"tracking": table})
     assert ": nearest confirms " in first
     assert others == "The others there: PDA confirms no track."
     table.loc[:, ["confirmed", "ends_per_hour"]] = [0.0, np.nan]
-    assert "confirms no track" in words.answer(result.cases, {"tracking": table})[0]
+    assert "confirms no track" in answer_texts(words, result.cases, {"tracking": table})[0]
 
 
 def test_tables_say_what_the_sums_hold(result):

@@ -13,6 +13,7 @@ from radarsim.report.drawing import Reference
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.exact import sigma_acceleration
 from radarsim.studies.sonar.manoeuvre import exact
+from tests.answers import answer_texts
 from tests.studies.sonar.precision import PARABOLA, TERMS
 from tests.tolerances import assert_rounded, sigma_error
 
@@ -148,7 +149,7 @@ def test_a_detector_that_never_has_its_plots():
     result = radarsim.run(made)
     assert "detections" not in result.tables
     assert set(output.case_figures(result.cases, result.tables, made)) & OWN == {"uses"}
-    assert STUDY.answer(result.cases, result.tables)
+    assert answer_texts(STUDY, result.cases, result.tables)
 
 
 def test_claims_are_judged(result, tables):
@@ -169,7 +170,7 @@ def test_claims_are_judged(result, tables):
 
 
 def test_words(result, tables):
-    told = STUDY.answer(result.cases, tables)
+    told = answer_texts(STUDY, result.cases, tables)
     assert STUDY.question(result.experiment).startswith("How reliably and how soon is a manoeuvre detected")
     assert any("10 plots" in sentence for sentence in told)
     assert any(
