@@ -23,6 +23,7 @@ from radarsim.report import tables as common
 from radarsim.report.claims import page
 from radarsim.report.claims.page import OVER, with_classes
 from radarsim.report.drawing import Figure, reworded
+from radarsim.report.page_figure import DrawnFigure
 from radarsim.report.wording import estimate, spoken
 from radarsim.studies.interface import Study
 from radarsim.studies.registry import quantities, study
@@ -406,7 +407,7 @@ def write_files(
     *,
     draw: bool = True,
     made: "Mapping[str, pd.DataFrame] | None" = None,
-    formats: Sequence[str] = ("svg", "png"),
+    formats: Sequence[str] = ("svg",),
     width_mm: float | None = None,
 ) -> Written:
     """Write all outputs of an experiment into folder; each file completely or not at all.
@@ -433,13 +434,14 @@ def write_files(
     except OF_AUTHORS:  # in a package's figures or words, on which the tables do not depend
         files.replace_all(folder, contents, stale=files.outputs)
         raise
+    drawings: list[DrawnFigure] = []
     if draw:
-        from radarsim.report.figures import save  # Matplotlib
+        from radarsim.report import figures  # Matplotlib
 
         made_by = f"radarsim {files.versions()['radarsim']}, {experiment.stem}, config {files.asked(experiment)}"
-        for name, figure in described.items():
-            saved = save(figure, formats, width_mm, made_by)
-            contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
+        drawings = [figures.draw(figure, formats, width_mm, made_by) for figure in described.values()]
+        for name, drawing in zip(described, drawings, strict=True):
+            contents |= {f"figures/{name}.{kind}": data for kind, data in drawing.files.items()}
         contents["figures/captions.md"] = captions(described).encode()
     drawn = time.perf_counter()
     warned = of_intervals(results, made)
@@ -448,7 +450,7 @@ def write_files(
     report = html.report_page(
         experiment,
         made,
-        list(described.values()),
+        drawings,
         record,
         answer,
         question,

@@ -27,15 +27,15 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.config.fields import Model
 from radarsim.config.load import as_yaml
 from radarsim.language import called, current, numeral, plural, speaking, term, tr
-from radarsim.report import chart, files, wording
+from radarsim.report import files, page_figure, wording
 from radarsim.report import tables as common
-from radarsim.report.chart import spoken
 from radarsim.report.claims import page as claims_page
 from radarsim.report.claims import rule
 from radarsim.report.claims.judge import LOOKED
 from radarsim.report.claims.over import PaperReadings
-from radarsim.report.drawing import Figure, Line
-from radarsim.report.wording import number
+from radarsim.report.drawing import COLUMN_MM
+from radarsim.report.page_figure import DrawnFigure
+from radarsim.report.wording import number, spoken, subscripts
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -162,14 +162,9 @@ def as_text(name: str, value: object) -> str:
 
 # ---- html ------------------------------------------------------------------------------------------------------------
 NOT_SETTLED = term("not settled in the run")
-SCRIPT = (
-    *(term("Light page"), term("Dark page"), term("exact")),
-    *(term("Logarithmic axes"), term("Linear axes"), term("Show all")),
-)
+SCRIPT = (term("Light page"), term("Dark page"))
 ROWS = 200  # of a table shown in the page
 ALL_ROWS = 800  # of all of them together: the page stays under 1.5 MB
-MOST_POINTS = 16_000  # of all curves of a page together, which keeps it small
-LEAST_POINTS = 50  # of one curve, however many there are
 MOST_SEEN = 200  # letters of an answer above its figure
 FIRST, FIRST_PANELS = 2, 4  # figures that are not folded, and their panels
 LONG = 300  # letters of a sentence that is shown in its clauses
@@ -180,7 +175,7 @@ SHOWN_FACTS = ("threads", "seconds", "kernel_seconds", "realisations_computed", 
 def report_page(
     experiment: Experiment,
     made: "Mapping[str, pd.DataFrame]",
-    figures: Sequence[Figure],
+    figures: Sequence[DrawnFigure],
     record: Mapping[str, Any],
     answer: Sequence[str],
     question: str,
@@ -193,11 +188,11 @@ def report_page(
 ) -> str:
     """The page of an experiment: question, answer, request, figures, claims, exact values, tables, provenance.
 
-    figures are described ones (none with --no-figures); record is run.json's; inputs, agreement and cost (against
+    figures are drawn ones (none with --no-figures); record is run.json's; inputs, agreement and cost (against
     accuracy) are tables, or None. drawn_from and readings: of the study, see `Study`."""
-    figures = [one for one in figures if one.name != "claims"]  # the page has them in a table, a line each
+    figures = [drawn for drawn in figures if drawn.figure.name != "claims"]  # the page has them in a table
     written = {name for name, table in made.items() if f"{name}.csv" in record["outputs"] and len(table)}
-    sources = {one.name: tables_of(one.name, drawn_from, written) for one in figures}
+    sources = {drawn.figure.name: tables_of(drawn.figure.name, drawn_from, written) for drawn in figures}
     claims = _claims(made["claims"], sources, written, readings)
     answer = in_clauses(answer)
     return whole(
@@ -219,7 +214,7 @@ def report_page(
         first=_first(figures),
         files=_files(figures, record["outputs"]),
         sources=sources,
-        titles={one.name: spoken(one.title) for one in figures},
+        titles={drawn.figure.name: spoken(drawn.figure.title) for drawn in figures},
         judged={name: [one["id"] for one in claims if name in one["figures"]] for name in sources},
         tables=_tables({name: table for name, table in made.items() if name != "claims" and len(table)}),
         facts=[(name.replace("_", " "), cell(record[name])) for name in SHOWN_FACTS if name in record],
@@ -227,9 +222,9 @@ def report_page(
     )
 
 
-def _first(figures: Sequence[Figure]) -> int:
+def _first(figures: Sequence[DrawnFigure]) -> int:
     """How many figures are not folded: the first one, others while their panels are few together."""
-    panels = [sum(bool(panel.marks) for panel in one.panels) for one in figures[:FIRST]]
+    panels = [sum(bool(panel.marks) for panel in drawn.figure.panels) for drawn in figures[:FIRST]]
     return max(1, sum(sum(panels[: n + 1]) <= FIRST_PANELS for n in range(len(panels))))
 
 
@@ -255,7 +250,7 @@ def comparison(
     sentences: Sequence[str],
     notes: Sequence[str],
     warnings: Sequence[str],
-    figures: Sequence[Figure],
+    figures: Sequence[DrawnFigure],
     made: "pd.DataFrame",
     differing: "Mapping[str, pd.DataFrame]",
     outputs: Collection[str],
@@ -299,7 +294,7 @@ def followed(
     source: str,
     answer: Sequence[str],
     plots: Sequence[str],
-    figures: Sequence[Figure],
+    figures: Sequence[DrawnFigure],
     tables: Mapping[str, Sequence[Mapping[str, object]]],
     yaml: str,
     command: str,
@@ -376,7 +371,7 @@ def _template(name: str) -> "Template":
 
 def _sentence(words: str) -> "Markup":
     """A sentence in which numbers stay with their units, and with ± before them; letters with an index as formulas."""
-    return chart.html(wording.formulas(wording.unbroken(words)))
+    return marked_up(wording.formulas(wording.unbroken(words)))
 
 
 def _measured(part: Mapping[str, Any]) -> str:
@@ -487,29 +482,36 @@ def _table(name: str, table: "pd.DataFrame", most: int = ROWS) -> dict[str, Any]
     return shown | {"notes": said}
 
 
-def _figures(figures: Sequence[Figure]) -> list[dict[str, Any]]:
-    """The figures as charts; where there are many curves, each is drawn with fewer points."""
-    lines = sum(isinstance(mark, Line) for figure in figures for panel in figure.panels for mark in panel.marks)
-    points = max(LEAST_POINTS, min(chart.POINTS, MOST_POINTS // max(1, lines)))
-    made = []
-    for figure in figures:
-        drawn = chart.chart(figure, points)
-        safe = _json([panel.data for panel in drawn.panels])
-        named = {
-            "name": figure.name,
-            "title": spoken(figure.title),
-            "heading": chart.html(figure.title),
-            "caption": spoken(figure.caption),
+def _figures(figures: Sequence[DrawnFigure]) -> list[dict[str, Any]]:
+    """What a page shows of each figure."""
+    return [
+        {
+            "name": drawn.figure.name,
+            "heading": marked_up(drawn.figure.title),
+            "caption": spoken(drawn.figure.caption),
+            "wide": drawn.figure.width_mm > 1.3 * COLUMN_MM,
+            "svg": page_figure.embed(drawn, f"svg{n}"),
         }
-        made.append({**named, "chart": drawn, "data": safe})
-    return made
+        for n, drawn in enumerate(figures)
+    ]
 
 
-def _files(figures: Sequence[Figure], outputs: Collection[str]) -> dict[str, list[str]]:
+def marked_up(text: str) -> "Markup":
+    """A text with formulas for a page: <i>, <sub>, <sup>; everything else is escaped."""
+    from markupsafe import Markup, escape
+
+    return Markup("").join(
+        Markup("<{0}>{1}</{0}>").format(Markup(kind), piece) if kind else escape(piece)
+        for piece, kind in subscripts(text)
+    )
+
+
+def _files(figures: Sequence[DrawnFigure], outputs: Collection[str]) -> dict[str, list[str]]:
     """The formats of each figure's files beside the page."""
     kinds = ("svg", "png", "pdf")
-    found = {one.name: [kind for kind in kinds if f"figures/{one.name}.{kind}" in outputs] for one in figures}
-    return {name: own for name, own in found.items() if own}
+    names = [drawn.figure.name for drawn in figures]
+    found = {name: [kind for kind in kinds if f"figures/{name}.{kind}" in outputs] for name in names}
+    return {name: formats for name, formats in found.items() if formats}
 
 
 def words_of_script(own: Sequence[str] = ()) -> "Markup":

@@ -101,7 +101,7 @@ def test_the_report_shows_what_the_terminal_says(tmp_path, monkeypatch):
     assert re.search(r"Advice: the stated values of \w+.* agree with 40 rows\.", text)
     for name in ("plan", "track", "residuals", "nis"):
         assert f'id="figure-{name}"' in text
-        assert (tmp_path / f"out/figures/{name}.png").stat().st_size > 1000
+        assert (tmp_path / f"out/figures/{name}.svg").stat().st_size > 1000
     assert "Errors against the truth" in text
     assert f"report   {tmp_path / 'out/report.html'}" in result.stdout
 

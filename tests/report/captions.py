@@ -12,8 +12,8 @@ import numpy as np
 from radarsim.app.result import names_in
 from radarsim.language import called, tr
 from radarsim.report import panels, seen
-from radarsim.report.chart import spoken
 from radarsim.report.drawing import Line
+from radarsim.report.wording import spoken
 from tests.tolerances import rounding
 
 RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"

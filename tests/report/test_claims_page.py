@@ -1,10 +1,10 @@
 """The page's headline, its lines, and the forest plot, by hand."""
 
-from radarsim.report import chart
 from radarsim.report.claims import page
 from radarsim.report.claims.judge import NOT_RUN
 from radarsim.report.claims.rule import CONFIRMED, DEPENDS, REFUTED, UNDECIDED
 from radarsim.report.drawing import Line, Note
+from radarsim.report.figures import MARKERS
 
 
 def row(claim="P9.1", kind=REFUTED, **more):
@@ -83,7 +83,7 @@ def test_what_lies_beyond_the_rim_has_an_arrow():
         for mark in panel.marks
         if isinstance(mark, Line) and mark.x.size and abs(mark.x[0]) == page.BEYOND
     }
-    left, right = chart.MARKERS.index("m-3.1 0l5.4-3v6z"), chart.MARKERS.index("m3.1 0l-5.4-3v6z")
+    left, right = MARKERS.index("<"), MARKERS.index(">")
     assert arrows == {right: ([page.BEYOND], [1.0]), left: ([-page.BEYOND], [2.0])}
 
 
