@@ -294,9 +294,9 @@ def _page(
     cases = [case for run in runs for case in _cases(run)]
     names = [case.name for case in cases]
     unique = len(set(names)) == len(names) and len({case.study for case in cases}) == 1
-    differing = html.asked(cases) if unique else {}
+    differing = html.settings_tables(cases) if unique else {}
     labels = [run.label for run in runs]
-    return html.comparison(labels, sentences, notes, warnings, drawings, made, differing, outputs)
+    return html.comparison_page(labels, sentences, notes, warnings, drawings, made, differing, outputs)
 
 
 def _cases(run: Run) -> list[Case]:

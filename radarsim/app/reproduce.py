@@ -142,7 +142,7 @@ def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
     from radarsim.report import html
     from radarsim.report.claims import page
 
-    html.write(Path(out))  # two processes may have written it at once, one without the other's run
+    html.write_index(Path(out))  # two processes may have written it at once, one without the other's run
     rows = experiment.claims(out=out).rows
     classes, _ = page.counts(rows)
     longest = max(done, key=lambda one: one.seconds)

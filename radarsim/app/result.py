@@ -153,7 +153,7 @@ class Result(Shown):
         facts["warnings"] = [*self.faults, *facts["warnings"]]
         write = partial(write_files, draw=bool(formats), formats=formats, width_mm=width_mm)
         self.written = write(self.experiment, self.cases, folder, facts, made=self.tables)
-        html.write(Path(out))
+        html.write_index(Path(out))
         self.check()
         return self.written
 

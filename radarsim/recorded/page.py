@@ -534,14 +534,14 @@ def write(
 
     name = os.path.basename(os.fspath(source))
     drawings = {stem: draw(figure) for stem, figure in figures(followed).items()}
-    page = html.followed(
+    page = html.track_page(
         experiment.stem,
         name,
         _said(verdict(followed, judged, advised)) or [_unjudged(followed)],
         _said(rows(followed)),
         list(drawings.values()),
         {tr(ERRORS): errors(followed), tr(TESTS): tests(judged), tr("Tracks"): _tracks(followed)},
-        html.yaml_of(experiment.resolved),
+        html.config_yaml(experiment.resolved),
         f"radarsim track {_typed(experiment)} {name}",
     )
     contents = {NAME: page.encode()}

@@ -72,13 +72,14 @@ class LegendPlan:
     """How the lines of a figure are named.
 
     panels: those with marks; at_ends: which of them name lines at their ends; panel_legends: a legend for each panel,
-    or None; common: the figure's legend, or None; beside: it stands beside the only panel."""
+    or None; common: the figure's legend, or None; stands_beside: the figure's
+    legend stands beside its only panel."""
 
     panels: tuple[Panel, ...]
     at_ends: tuple[bool, ...]
     panel_legends: tuple[Legend | None, ...]
     common: Legend | None
-    beside: bool
+    stands_beside: bool
 
 
 def plan_legends(figure: Figure) -> LegendPlan:
@@ -96,10 +97,10 @@ def plan_legends(figure: Figure) -> LegendPlan:
     if merged is None or len(all_titles) > 1:
         legends = [Legend(own_keys, title) if own_keys else None for own_keys, title in zip(keys, titles, strict=True)]
         return LegendPlan(panels, at_ends, tuple(legends), None, False)
-    beside = len(panels) == 1 and panels[0].legend == "right" and len(merged) <= MAX_NAMES_BESIDE
+    stands_beside = len(panels) == 1 and panels[0].legend == "right" and len(merged) <= MAX_NAMES_BESIDE
     ordered = dict(sorted(merged.items(), key=lambda key: key[1] is None))  # crosses explain all curves: they come last
     common = Legend(ordered, next(iter(all_titles), "")) if merged else None
-    return LegendPlan(panels, at_ends, (None,) * len(panels), common, beside)
+    return LegendPlan(panels, at_ends, (None,) * len(panels), common, stands_beside)
 
 
 def _merge_keys(panel_keys: Sequence[LegendKeys]) -> LegendKeys | None:
@@ -353,7 +354,7 @@ def _legend_fits_cell(figure: Figure, plan: LegendPlan, rows: int, columns: int)
 def _legends_height_mm(figure: Figure, plan: LegendPlan, rows: int, columns: int, in_cell: bool) -> float:
     """Height that legends below the panels add to a figure."""
     height = 0.0
-    if plan.common is not None and not in_cell and not plan.beside:
+    if plan.common is not None and not in_cell and not plan.stands_beside:
         height += plan.common.height_mm(figure.width_mm)
     legends = [legend for legend in plan.panel_legends if legend is not None]
     return height + rows * max([legend.height_mm(figure.width_mm / columns) for legend in legends], default=0.0)
@@ -382,7 +383,7 @@ def _draw_common_legend(
     """Draw the figure's legend: beside its only panel, in a free cell, or below all panels."""
     if plan.common is None:
         return
-    if plan.beside:
+    if plan.stands_beside:
         _draw_legend(grid.flat[0], plan.common, 1, loc="upper left", bbox_to_anchor=(1.01, 1.0))
     elif in_cell:
         cell_columns = plan.common.columns(figure.width_mm / columns - SIDE_MM)
@@ -506,14 +507,14 @@ def _line_values(axes: Axes, panel: Panel, line: Line) -> list[ValueMark]:
     indices = np.array(_marker_indices(line), int)
     x, y = np.asarray(line.x, float)[indices], np.asarray(line.y, float)[indices]
     with np.errstate(divide="ignore", invalid="ignore"):
-        places = _page_points(axes, x, y)
-    inside = _inside(axes, places)
+        points = _page_points(axes, x, y)
+    inside = _inside(axes, points)
     columns = [None if ends is None else np.asarray(ends, float)[indices] for ends in (line.lo, line.hi, line.exact)]
     marks = []
     for n in np.flatnonzero(inside):
         lo, hi, exact = (None if column is None else float(column[n]) for column in columns)
         text = value_text(line.name or line.label, panel, float(x[n]), float(y[n]), lo, hi, exact)
-        marks.append(ValueMark(float(places[n, 0]), float(places[n, 1]), text))
+        marks.append(ValueMark(float(points[n, 0]), float(points[n, 1]), text))
     return marks
 
 
@@ -549,12 +550,12 @@ def _page_points(axes: Axes, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return (pixels * [1, -1] + [0, canvas.bbox.y1]) * 72 / canvas.dpi
 
 
-def _inside(axes: Axes, places: np.ndarray) -> np.ndarray:
+def _inside(axes: Axes, points: np.ndarray) -> np.ndarray:
     """Which points of the SVG lie in a panel or on its edge."""
     canvas = axes.figure
     box = Bbox(axes.get_window_extent().get_points() * 72 / canvas.dpi)
     height = canvas.bbox.y1 * 72 / canvas.dpi
-    x, y = places[:, 0], height - places[:, 1]
+    x, y = points[:, 0], height - points[:, 1]
     return (x >= box.x0 - 1) & (x <= box.x1 + 1) & (y >= box.y0 - 1) & (y <= box.y1 + 1)
 
 
@@ -619,8 +620,8 @@ class RoundLocator(Locator):
     On an axis of x there are at most as many as leave gaps between their numbers. texts: the numbers of the last
     ticks, by their values."""
 
-    def __init__(self, log: bool, wanted: int, scans: Scans | None = None):
-        self.log, self.wanted, self.scans = log, wanted, scans
+    def __init__(self, log: bool, tick_count: int, scans: Scans | None = None):
+        self.log, self.tick_count, self.scans = log, tick_count, scans
         self.texts: dict[float, str] = {}
         self._last_axis: tuple[float, float, float] | None = None
 
@@ -639,13 +640,13 @@ class RoundLocator(Locator):
     def _spaced_ticks(self, scale: Scale) -> list[tuple[float, str]]:
         """As many ticks as wanted, or fewer that leave gaps between their numbers."""
         if self.scans:
-            choices = (scales.scan_ticks(self.scans, count) for count in range(self.wanted, 1, -1))
+            choices = (scales.scan_ticks(self.scans, count) for count in range(self.tick_count, 1, -1))
             return next((ticks for ticks in choices if has_gaps(scale, ticks)), scales.scan_ticks(self.scans, 1))
-        ticks = scale.ticks(self.wanted)
-        for wanted in range(self.wanted - 1, 1, -1):
+        ticks = scale.ticks(self.tick_count)
+        for count in range(self.tick_count - 1, 1, -1):
             if has_gaps(scale, ticks):
                 break
-            ticks = scale.ticks(wanted)
+            ticks = scale.ticks(count)
         while not has_gaps(scale, ticks):
             ticks = ticks[::2]
         return ticks
@@ -665,7 +666,7 @@ def has_gaps(scale: Scale, ticks: Sequence[tuple[float, str]]) -> bool:
     half_widths = [LETTER_EM * STYLE["xtick.labelsize"] * len(text) / 2 for _, text in ticks]
     centres = [float(scale.position(value)) for value, _ in ticks]
     neighbours = zip(pairwise(centres), pairwise(half_widths), strict=True)
-    return all(right - left >= a + b + TICK_GAP_PT for (left, right), (a, b) in neighbours)
+    return all(c - b >= half_b + half_c + TICK_GAP_PT for (b, c), (half_b, half_c) in neighbours)
 
 
 def _colour(style: Style) -> str | tuple[float, float, float, float]:
@@ -864,22 +865,22 @@ def _separate_names(names: list[Annotation]) -> None:
     assert axes is not None  # every name is written into a panel
     box = axes.get_window_extent()
     step = 1.2 * STYLE["font.size"] * axes.figure.dpi / 72
-    wanted = [axes.transData.transform(name.xy)[1] for name in names]
-    order = np.argsort(wanted, kind="stable")
-    positions = spread_positions(np.array(wanted)[order], step, box.y0 + step / 2, box.y1 - step / 2)
+    line_ends = [axes.transData.transform(name.xy)[1] for name in names]
+    order = np.argsort(line_ends, kind="stable")
+    positions = spread_positions(np.array(line_ends)[order], step, box.y0 + step / 2, box.y1 - step / 2)
     for i, y in zip(order, positions, strict=True):
         names[i].set_position((1.015, axes.transAxes.inverted().transform((0, y))[1]))
         names[i].xyann = (1.015, axes.transAxes.inverted().transform((0, y))[1])
         names[i].anncoords = "axes fraction"
 
 
-def spread_positions(wanted: np.ndarray, step: float, low: float, high: float) -> np.ndarray:
-    """Rising positions at least `step` apart, nearest to the wanted ones (rising) in squares, inside low … high.
+def spread_positions(targets: np.ndarray, step: float, low: float, high: float) -> np.ndarray:
+    """Rising positions at least `step` apart, nearest to the targets (rising) in squares, inside low … high.
 
     Pool-adjacent-violators on positions less their own multiple of the step."""
-    offsets = step * np.arange(len(wanted))
+    offsets = step * np.arange(len(targets))
     groups: list[list[float]] = []
-    for value in np.clip(wanted, low, high) - offsets:
+    for value in np.clip(targets, low, high) - offsets:
         groups.append([value])
         while len(groups) > 1 and np.mean(groups[-2]) > np.mean(groups[-1]):
             groups[-2:] = [groups[-2] + groups[-1]]

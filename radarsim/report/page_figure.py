@@ -17,6 +17,7 @@ from radarsim.report.scales import tick_text
 from radarsim.report.wording import interval, number, spoken
 
 HEADLINE_ID = "headline"  # of the group in the SVG that holds a figure's headline
+FORBIDDEN_IN_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
 NAMESPACE = re.compile(r"^\{[^}]*\}")
 LONG_DECIMALS = re.compile(r"(\.\d\d)\d+")  # 0.01 point is below what a screen resolves
 ROTATION_BY_ZERO = re.compile(r"^rotate\(-?0(?:\.0*)?(?: [^)]*)?\)$")
@@ -53,7 +54,6 @@ class DrawnFigure:
     headline_pt: float = 0.0
 
 
-# ---- texts -----------------------------------------------------------------------------------------------------------
 def value_text(
     name: str, panel: Panel, x: float, y: float, lo: float | None, hi: float | None, exact: float | None
 ) -> str:
@@ -81,30 +81,29 @@ def _under_label(label: str, text: str) -> str:
 
 def _coordinate(axis: Axis, value: float) -> str:
     """A value on an axis: the text of its tick where the axis is one of categories, else the number."""
-    is_categorical = bool(axis.ticks) and [at for at, _ in axis.ticks] == list(range(len(axis.ticks)))
-    nearby = [text for at, text in axis.ticks if abs(at - value) < TICK_REACH] if is_categorical else []
+    is_categorical = bool(axis.ticks) and [tick for tick, _ in axis.ticks] == list(range(len(axis.ticks)))
+    nearby = [text for tick, text in axis.ticks if abs(tick - value) < TICK_REACH] if is_categorical else []
     return spoken(nearby[0]) if nearby else number(value)
 
 
-# ---- embedding -------------------------------------------------------------------------------------------------------
-def embed(drawn: DrawnFigure, prefix: str) -> Markup:
+def embed(drawing: DrawnFigure, prefix: str) -> Markup:
     """The SVG element of a drawn figure for a page. Its ids begin with `prefix`, which is the figure's alone."""
-    root = ElementTree.fromstring(drawn.svg)
+    root = ElementTree.fromstring(FORBIDDEN_IN_XML.sub("�", drawing.svg.decode("utf-8")))
     width, height = (float(value) for value in root.attrib["viewBox"].split()[2:])
     _simplify(root, _new_ids(root, prefix))
     for parent in list(root.iter()):
         for child in [child for child in parent if _is_left_out(child)]:
             parent.remove(child)
     _unwrap_groups(root)
-    top = drawn.headline_pt
+    top = drawing.headline_pt
     root.attrib = {
         "class": "figure",
         "role": "group",
-        "aria-label": spoken(drawn.figure.title),
+        "aria-label": spoken(drawing.figure.title),
         "viewBox": f"0 {top:.4g} {width:.5g} {height - top:.5g}",
         "style": f"--width:{width:.0f}",
     }
-    root.extend(_value_groups(drawn))
+    root.extend(_value_groups(drawing))
     return Markup(ElementTree.tostring(root, encoding="unicode"))
 
 
@@ -205,9 +204,9 @@ def _unwrap_groups(root: ElementTree.Element) -> None:
             del child.attrib["style"]
 
 
-def _value_groups(drawn: DrawnFigure) -> Iterator[ElementTree.Element]:
+def _value_groups(drawing: DrawnFigure) -> Iterator[ElementTree.Element]:
     """A group for each panel, with an invisible shape over each value, whose title is the value's text."""
-    for title, marks in drawn.values:
+    for title, marks in drawing.values:
         label = {"role": "group", "aria-label": title} if title else {}
         group = ElementTree.Element("g", {"class": "values"} | label)
         for mark in marks:

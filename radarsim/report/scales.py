@@ -17,7 +17,7 @@ TICK_DIGITS = 6
 WIDE_RATIO = 20.0  # of the values of a map, from which its colours are logarithmic
 MIN_SCANS = 5  # from which ticks stand at scans
 MIN_LAST_GAP = 0.5  # between the last two ticks at scans, in intervals
-MAX_EXTRA_TICKS = 3  # more than wanted, on a logarithmic axis
+MAX_EXTRA_TICKS = 3  # more than asked for, on a logarithmic axis
 MAX_DECADES = 7  # labelled on a logarithmic axis
 
 
@@ -41,32 +41,32 @@ class Scale:
             low, high = math.log10(low), math.log10(high)
         return self.start + (self.end - self.start) * (v - low) / (high - low)
 
-    def ticks(self, wanted: int) -> list[tuple[float, str]]:
-        """About `wanted` round values on the axis, with their text."""
+    def ticks(self, count: int) -> list[tuple[float, str]]:
+        """About `count` round values on the axis, with their text."""
         if self.log and self.high / self.low >= 10:
-            return decades(self.low, self.high, wanted)
-        return [(v, tick_text(v)) for v in steps(self.low, self.high, wanted)]
+            return decades(self.low, self.high, count)
+        return [(v, tick_text(v)) for v in steps(self.low, self.high, count)]
 
 
-def steps(low: float, high: float, wanted: int) -> list[float]:
-    """Multiples of a round step between low and high, about `wanted` of them."""
-    rough = (high - low) / max(wanted, 1)
+def steps(low: float, high: float, count: int) -> list[float]:
+    """Multiples of a round step between low and high, about `count` of them."""
+    rough = (high - low) / max(count, 1)
     power = 10.0 ** math.floor(math.log10(rough))
     step = next(s for s in STEPS if s * power >= rough * (1 - 1e-9)) * power
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [n * step for n in range(first, last + 1)]
 
 
-def decades(low: float, high: float, wanted: int) -> list[tuple[float, str]]:
-    """Powers of ten, and 2 and 5 times these if that gives not many more than wanted."""
+def decades(low: float, high: float, count: int) -> list[tuple[float, str]]:
+    """Powers of ten, and 2 and 5 times these if that gives not many more than `count`."""
     first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
     stride = max(1, -(-(last - first + 1) // MAX_DECADES))
     exponents = range(first, last + 1, stride)
     ticks = list(zip((10.0**n for n in exponents), powers(exponents), strict=True))
-    fine = [m * 10.0**n for n in range(first - 1, last + 1) for m in (2, 5) if low <= m * 10.0**n <= high]
-    if stride > 1 or len(ticks) + len(fine) > wanted + MAX_EXTRA_TICKS:
+    multiples = [m * 10.0**n for n in range(first - 1, last + 1) for m in (2, 5) if low <= m * 10.0**n <= high]
+    if stride > 1 or len(ticks) + len(multiples) > count + MAX_EXTRA_TICKS:
         return ticks
-    return sorted([*ticks, *((v, tick_text(v)) for v in fine)])
+    return sorted([*ticks, *((v, tick_text(v)) for v in multiples)])
 
 
 def powers(exponents: Sequence[int]) -> list[str]:
@@ -108,8 +108,8 @@ def scan_ticks(scans: Scans, intervals: int) -> list[tuple[float, str]]:
     divisors = [n for n in strides if count % n == 0 and intervals / 2 <= count / n <= intervals + 1]
     stride = (divisors or [n for n in strides if count / n <= intervals])[0]
     numbers = list(range(0, count + 1, stride))
-    if rest := count - numbers[-1]:
-        numbers = [*(numbers[:-1] if rest < MIN_LAST_GAP * stride and len(numbers) > 1 else numbers), count]
+    if last_gap := count - numbers[-1]:
+        numbers = [*(numbers[:-1] if last_gap < MIN_LAST_GAP * stride and len(numbers) > 1 else numbers), count]
     return [(n * scans.last / count, tick_text(n * scans.last / count)) for n in numbers]
 
 

@@ -189,11 +189,11 @@ def test_extent_in_words():
 
 def test_many_long_tables_share_the_room_of_a_page():
     long = pd.DataFrame({"k": range(5000), "sigma": 1.0})
-    shown = html._tables({f"table {i}": long for i in range(15)} | {"short": long.head(30)})
-    assert sum(len(table["rows"]) for table in shown) <= html.ALL_ROWS
+    shown = html._page_tables({f"table {i}": long for i in range(15)} | {"short": long.head(30)})
+    assert sum(len(table["rows"]) for table in shown) <= html.MAX_PAGE_ROWS
     assert len(shown[-1]["rows"]) == 30
     assert all(table["cut"] and table["count"] == 5000 for table in shown[:-1])
-    assert len(html._tables({"alone": long})[0]["rows"]) == html.ROWS
+    assert len(html._page_tables({"alone": long})[0]["rows"]) == html.MAX_ROWS
 
 
 @pytest.mark.slow

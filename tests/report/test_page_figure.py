@@ -109,6 +109,10 @@ def test_text_stays_text_and_is_escaped():
     assert ">time, s</text>" in page_svg(panel(curve()))
 
 
+def test_control_characters_are_replaced():
+    assert ">a�b�</text>" in page_svg(panel(curve(label="a\x07b\uffff")))
+
+
 def test_the_page_is_drawn_from_the_bytes_of_the_file():
     described = Figure("one", "One", "A figure.", (panel(curve()),))
     drawn = figures.draw(described, ("svg", "pdf"))
