@@ -21,8 +21,8 @@ import radarsim
 from radarsim.app import result as output
 from radarsim.app.compare import described
 from radarsim.report import figures
-from radarsim.report.chart import spoken
 from radarsim.report.drawing import Figure
+from radarsim.report.wording import spoken
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "pictures"

@@ -23,6 +23,7 @@ from radarsim.report import files
 from radarsim.report import tables as common
 from radarsim.report.compare import Side
 from radarsim.report.drawing import Chart, Figure, reworded
+from radarsim.report.page_figure import DrawnFigure
 from radarsim.report.quantities import COMMON, FLOORS, Quantity
 from radarsim.studies import registry
 
@@ -133,17 +134,16 @@ def compare(
     folder = Path(out) / FOLDER
     warnings += _replaced(folder, runs)
     contents = {"comparison.csv": common.to_csv(made)}
+    drawings: list[DrawnFigure] = []
     if formats:
-        from radarsim.report.figures import save  # Matplotlib
+        from radarsim.report.figures import draw  # Matplotlib
 
-        for name, figure in described.items():
-            saved = save(figure, formats, width_mm)
-            contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
+        drawings = [draw(figure, formats, width_mm) for figure in described.values()]
+        for name, drawing in zip(described, drawings, strict=True):
+            contents |= {f"figures/{name}.{kind}": data for kind, data in drawing.files.items()}
         if described:
             contents["figures/captions.md"] = captions(described).encode()
-    contents["compare.html"] = _page(
-        runs, sentences, notes, warnings, list(described.values()), made, contents
-    ).encode()
+    contents["compare.html"] = _page(runs, sentences, notes, warnings, drawings, made, contents).encode()
     contents["compare.json"] = files.to_json(_record(runs, contents))
     files.replace_all(folder, contents, stale=partial(files.outputs, name="compare.json"))
     return replace(found, folder=folder, files=tuple(sorted(contents)), warnings=tuple(warnings))
@@ -285,7 +285,7 @@ def _page(
     sentences: Sequence[str],
     notes: Sequence[str],
     warnings: Sequence[str],
-    described: "Sequence[Any]",
+    drawings: Sequence[DrawnFigure],
     made: "pd.DataFrame",
     outputs: Collection[str],
 ) -> str:
@@ -294,9 +294,9 @@ def _page(
     cases = [case for run in runs for case in _cases(run)]
     names = [case.name for case in cases]
     unique = len(set(names)) == len(names) and len({case.study for case in cases}) == 1
-    differing = html.asked(cases) if unique else {}
+    differing = html.settings_tables(cases) if unique else {}
     labels = [run.label for run in runs]
-    return html.comparison(labels, sentences, notes, warnings, described, made, differing, outputs)
+    return html.comparison_page(labels, sentences, notes, warnings, drawings, made, differing, outputs)
 
 
 def _cases(run: Run) -> list[Case]:

@@ -261,12 +261,12 @@ def check(
 
 
 def formats(figures: bool | str | Iterable[str]) -> tuple[str, ...]:
-    """The file formats of the figures: True for svg and png; none for False or None. Raises ConfigError for an unknown
+    """The file formats of the figures: True for svg; none for False or None. Raises ConfigError for an unknown
     format."""
     if faults := _formats(figures):
         raise ConfigError(*faults)
     if isinstance(figures, bool) or figures is None:
-        return FORMATS[:2] if figures else ()
+        return FORMATS[:1] if figures else ()
     return (figures,) if isinstance(figures, str) else tuple(figures)
 
 

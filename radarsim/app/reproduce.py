@@ -139,7 +139,7 @@ def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
     """The closing lines: what extensions say, time, where the results are."""
     from radarsim.report import html
 
-    html.write(Path(out))  # two processes may have written it at once, one without the other's run
+    html.write_index(Path(out))  # two processes may have written it at once, one without the other's run
     longest = max(done, key=lambda one: one.seconds)
     failed = [one.stem for one in done if one.faults]
     guide = Path(out) / "README.md"

@@ -21,6 +21,7 @@ from radarsim.language import ENGLISH, called, current, plural, tr
 from radarsim.report import files, notes, outside, panels, seen, sentences
 from radarsim.report import tables as common
 from radarsim.report.drawing import Figure, reworded
+from radarsim.report.page_figure import DrawnFigure
 from radarsim.report.row_notes import has_note, with_note_texts
 from radarsim.report.sentences import Sentence
 from radarsim.report.wording import estimate, spoken
@@ -158,7 +159,7 @@ class Result(Shown):
         facts["warnings"] = [*self.faults, *facts["warnings"]]
         write = partial(write_files, draw=bool(formats), formats=formats, width_mm=width_mm)
         self.written = write(self.experiment, self.cases, folder, facts, made=self._tables)
-        html.write(Path(out))
+        html.write_index(Path(out))
         self.check()
         return self.written
 
@@ -383,7 +384,7 @@ def write_files(
     *,
     draw: bool = True,
     made: "Mapping[str, pd.DataFrame] | None" = None,
-    formats: Sequence[str] = ("svg", "png"),
+    formats: Sequence[str] = ("svg",),
     width_mm: float | None = None,
 ) -> Written:
     """Write all outputs of an experiment into folder; each file completely or not at all.
@@ -410,13 +411,14 @@ def write_files(
     except OF_AUTHORS:  # in a package's figures or words, on which the tables do not depend
         files.replace_all(folder, contents, stale=files.outputs)
         raise
+    drawings: list[DrawnFigure] = []
     if draw:
-        from radarsim.report.figures import save  # Matplotlib
+        from radarsim.report import figures  # Matplotlib
 
         made_by = f"radarsim {files.versions()['radarsim']}, {experiment.stem}, config {files.asked(experiment)}"
-        for name, figure in described.items():
-            saved = save(figure, formats, width_mm, made_by)
-            contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
+        drawings = [figures.draw(figure, formats, width_mm, made_by) for figure in described.values()]
+        for name, drawing in zip(described, drawings, strict=True):
+            contents |= {f"figures/{name}.{kind}": data for kind, data in drawing.files.items()}
         contents["figures/captions.md"] = captions(described).encode()
     drawn = time.perf_counter()
     made = {name: with_note_texts(table) for name, table in made.items()}
@@ -425,7 +427,7 @@ def write_files(
     report = html.report_page(
         experiment,
         made,
-        list(described.values()),
+        drawings,
         record,
         answer.texts,
         question,

@@ -319,12 +319,12 @@ def seconds(experiment: Experiment, figures: bool | str | Sequence[str], width_m
     described = output.case_figures([result], made, experiment) if formats else {}
     if not described:
         return SPARE * tables
-    from radarsim.report.figures import save
+    from radarsim.report.figures import draw
 
     names = experiment.drawn(described) or list(described)
     started = time.perf_counter()
     for name in dict.fromkeys((names[0], names[-1])):
-        save(described[name], formats, width_mm, "")
+        draw(described[name], formats, width_mm)
     each = (time.perf_counter() - started) / len(dict.fromkeys((names[0], names[-1])))
     return SPARE * (tables + each * (len(experiment.figures) or len(names)))
 

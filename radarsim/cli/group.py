@@ -356,7 +356,7 @@ format_option = click.option(
     "formats",
     type=click.Choice(["svg", "png", "pdf"]),
     multiple=True,
-    help="File format of the figures; repeatable; default: svg and png.",
+    help="File format of the figures; repeatable; default: svg.",
 )
 width_option = click.option(
     "--width",
@@ -388,6 +388,6 @@ def drawing_options(command: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(command)
     def taking(no_figures: bool, formats: tuple[str, ...], width_mm: float | None, **others: Any) -> None:
-        command(drawing=Drawing(() if no_figures else formats or ("svg", "png"), width_mm), **others)
+        command(drawing=Drawing(() if no_figures else formats or ("svg",), width_mm), **others)
 
     return figures_option(format_option(width_option(taking)))

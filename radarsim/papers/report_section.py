@@ -117,13 +117,13 @@ def _measured_value(part: Mapping[str, Any]) -> str:
     """The measured value of a part of a claim; an infinite settling time as text."""
     if math.isinf(part["measured"]) and "settling" in part["what"]:
         return tr(html.NOT_SETTLED)
-    return html.cell(part["measured"])
+    return html.cell_text(part["measured"])
 
 
 def _interval(part: Mapping[str, Any]) -> str:
     """The interval of a part of a claim; a dash without a sampling error."""
     lo, hi = shown_interval(part)
-    return "–" if lo == hi else f"{html.cell(lo)} … {html.cell(hi)}"
+    return "–" if lo == hi else f"{html.cell_text(lo)} … {html.cell_text(hi)}"
 
 
 def _css_class(verdict: str) -> str:

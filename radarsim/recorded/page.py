@@ -530,27 +530,28 @@ def write(
     """Write the page and `figures/` into a folder; the names of the figures. Raises StoreError, and ConfigError, with
     nothing written, where a file would overwrite the plots or the config."""
     from radarsim.report import files, html
-    from radarsim.report.figures import save
+    from radarsim.report.figures import draw
 
-    made, name = figures(followed), os.path.basename(os.fspath(source))
-    page = html.followed(
+    name = os.path.basename(os.fspath(source))
+    drawings = {stem: draw(figure) for stem, figure in figures(followed).items()}
+    page = html.track_page(
         experiment.stem,
         name,
         _said(verdict(followed, judged, advised)) or [_unjudged(followed)],
         _said(rows(followed)),
-        list(made.values()),
+        list(drawings.values()),
         {tr(ERRORS): errors(followed), tr(TESTS): tests(judged), tr("Tracks"): _tracks(followed)},
-        html.yaml_of(experiment.resolved),
+        html.config_yaml(experiment.resolved),
         f"radarsim track {_typed(experiment)} {name}",
     )
     contents = {NAME: page.encode()}
-    for name, one in made.items():
-        contents |= {f"figures/{name}.{kind}": data for kind, data in save(one).items()}
+    for stem, drawing in drawings.items():
+        contents |= {f"figures/{stem}.{kind}": data for kind, data in drawing.files.items()}
     for path in (Path(folder, name) for name in contents):
         if any(files.same_file(path, one) for one in (source, experiment.path) if one):
             raise ConfigError(f"{path}: would be overwritten; choose another folder")
     files.replace_all(Path(folder), contents)
-    return list(made)
+    return list(drawings)
 
 
 def _typed(experiment: Experiment) -> str:

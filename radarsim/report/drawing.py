@@ -1,4 +1,4 @@
-"""Figures as data: panels of marks. Independent of how they are drawn (report/figures.py)."""
+"""Figures as data: panels of marks, independent of how they are drawn (report/figures.py)."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -26,7 +26,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Style:
-    """How a mark is distinguished, in grey too: each number picks from a list of its own.
+    """The look that distinguishes a mark, in grey too: each number picks from a list of its own.
 
     colour: an int picks a distinct colour, GREY none of these, a float from 0 to 1 a shade of an ordered scale. dash
     and marker: ints, None for no line or no marker. flat: a line ends where its data end, like a bar, however wide."""
@@ -41,9 +41,11 @@ class Style:
 
 @dataclass(frozen=True)
 class Line:
-    """A series y (n,) over x (n,), with its 95 % band lo … hi and its exact values (small crosses) where known. The
-    label is written at the line's end where labels fit, else in a legend. dash None leaves markers alone (scatter),
-    with whiskers for lo … hi. name identifies the line where the label leaves that to keys or to another panel."""
+    """A series y (n,) over x (n,), with its 95 % band lo … hi and its exact values (small crosses) where known.
+
+    The label is written at the line's end where labels fit, else in a legend. dash None draws markers without a line
+    (scatter), with whiskers for lo … hi. name identifies the line where the label leaves that to keys or to another
+    panel."""
 
     x: np.ndarray
     y: np.ndarray
@@ -57,7 +59,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Reference:
-    """A thin line across the panel at a value of x or y ("across" says which), with words beside it."""
+    """A thin line across the panel at a value of x or y ("across" says which), with a label."""
 
     value: float
     across: str = "y"
@@ -77,8 +79,9 @@ class Bars:
 
 @dataclass(frozen=True)
 class Heat:
-    """A map of values (len(y), len(x)) over the cells' centres, with its colour bar's label. Values are written in if
-    few."""
+    """A map of values (len(y), len(x)) over the centres of its cells, with the label of its colour bar.
+
+    Where there are few values, they are written into the cells."""
 
     x: np.ndarray
     y: np.ndarray
@@ -88,9 +91,9 @@ class Heat:
 
 @dataclass(frozen=True)
 class Note:
-    """Words near a point of the data: above or below it ("n", "s"), to its right or left ("e", "w").
+    """Text near a point of the data: above or below it ("n", "s"), to its right or left ("e", "w").
 
-    "on": upon it, which interrupts its line. "e" alone: beside it, and be it outside the panel. "top": along the
+    "on": upon the point, which interrupts its line. "e" alone: to its right, outside the panel too. "top": along the
     panel's top, whatever y."""
 
     x: float
@@ -100,18 +103,18 @@ class Note:
 
 
 Mark = Line | Reference | Bars | Heat | Note
-MARKED = ("label", "name", "text")  # words of marks
+MARK_TEXTS = ("label", "name", "text")  # fields of marks that hold text
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes. keys explain styles (not single lines) in a small legend: (words, style), under key_title.
+    """One pair of axes. keys explain styles (not single lines) in a small legend: (text, style), under key_title.
 
-    direct: lines are named at their ends where the names fit; else always in the figure's legend, below the panels;
-    "right": beside a single panel; "none": they are named in another panel. line_title: what these names are. A remark
-    is above the panel, at its right.
-    A panel without marks adds its keys to the legend. crosses: the name of the exact values' crosses; empty: exact.
-    equal: x and y have one scale, as on a map. height_mm: other than the figure's, in a figure of one column."""
+    direct: lines are named at their ends where the names fit, else in a legend; not direct: always in a legend. legend:
+    "right" puts it beside a single panel, "none" leaves the names to another panel. line_title: what these names are. A
+    remark is above the panel, at its right. A panel without marks adds its keys to the legend. crosses: the name of the
+    exact values' crosses; empty: exact. equal: x and y have one scale, as on a map. height_mm: instead of the figure's,
+    in a figure of one column."""
 
     x: Axis
     y: Axis
@@ -132,7 +135,7 @@ class Panel:
 class Figure:
     """A figure of one or more panels in rows of `columns`; the caption describes content and marks.
 
-    headline is the run's answer in a sentence of plain text, above its first figure."""
+    headline is the run's answer in a sentence of plain text, which its first figure bears."""
 
     name: str
     title: str
@@ -145,32 +148,41 @@ class Figure:
     headline: str = ""
 
 
-def reworded(figure: Figure, said: Callable[[str], str]) -> Figure:
-    """The figure with every text replaced by a function."""
-
-    def with_words(one: Any, *names: str) -> Any:
-        return replace(one, **{name: said(getattr(one, name)) for name in names if hasattr(one, name)})
-
-    def mark(one: Mark) -> Mark:
-        return replace(one, names=tuple(map(said, one.names))) if isinstance(one, Bars) else with_words(one, *MARKED)
-
-    def axis(one: Axis) -> Axis:
-        return replace(one, label=said(one.label), ticks=tuple((value, said(words)) for value, words in one.ticks))
-
+def reworded(figure: Figure, translate: Callable[[str], str]) -> Figure:
+    """The figure with every text replaced by what a function makes of it."""
     panels = tuple(
         replace(
-            with_words(panel, "title", "key_title", "line_title", "remark", "crosses"),
-            **{"x": axis(panel.x), "y": axis(panel.y), "marks": tuple(map(mark, panel.marks))},
-            keys=tuple((said(words), style) for words, style in panel.keys),
+            _translated(panel, translate, "title", "key_title", "line_title", "remark", "crosses"),
+            x=_translated_axis(panel.x, translate),
+            y=_translated_axis(panel.y, translate),
+            marks=tuple(_translated_mark(mark, translate) for mark in panel.marks),
+            keys=tuple((translate(text), style) for text, style in panel.keys),
         )
         for panel in figure.panels
     )
-    return replace(with_words(figure, "title", "caption"), panels=panels)
+    return replace(_translated(figure, translate, "title", "caption"), panels=panels)
+
+
+def _translated(item: Any, translate: Callable[[str], str], *fields: str) -> Any:
+    return replace(item, **{name: translate(getattr(item, name)) for name in fields if hasattr(item, name)})
+
+
+def _translated_mark(mark: Mark, translate: Callable[[str], str]) -> Mark:
+    if isinstance(mark, Bars):
+        return replace(mark, names=tuple(map(translate, mark.names)))
+    translated: Mark = _translated(mark, translate, *MARK_TEXTS)
+    return translated
+
+
+def _translated_axis(axis: Axis, translate: Callable[[str], str]) -> Axis:
+    ticks = tuple((value, translate(text)) for value, text in axis.ticks)
+    return replace(axis, label=translate(axis.label), ticks=ticks)
 
 
 @dataclass(frozen=True)
 class Chart:
-    """One chart for all radars of a study: figures by their name, a table, a sentence for each case, a live page.
+    """The chart of a study for all radars: figures by their name, a table, a sentence for each case, a page with
+    sliders.
 
     page is the text of one self-contained HTML file."""
 

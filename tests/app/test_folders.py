@@ -165,7 +165,7 @@ def test_records_of_strangers_neither_end_nor_hold_up_the_index(tmp_path):
     (tmp_path / "year" / "run.json").write_text(json.dumps(strange))
     os.mkfifo(tmp_path / "pipe" / "run.json")
     os.mkfifo(tmp_path / "year" / "claims.csv")
-    html.write(tmp_path)
+    html.write_index(tmp_path)
     assert "rls2/report.html" in (tmp_path / "index.html").read_text()
     with pytest.raises(StoreError, match="is no regular file"):
         doctor.inspected(tmp_path / "pipe")

@@ -18,9 +18,8 @@ from radarsim.studies.registry import study
 
 TABLES = {"curves.csv", "gains.csv", "steady.csv", "consistency.csv", "radar.csv"}
 TABLES |= {"claims.csv"}
-FIGURES = {f"figures/{k}_{c}.{f}" for k in ("sigma", "gain") for c in ("r", "Vr", "ar") for f in ("svg", "png")}
-FIGURES |= {f"figures/{name}.{kind}" for name in ("consistency",) for kind in ("svg", "png")}
-FIGURES |= {"figures/captions.md"}
+FIGURES = {f"figures/{k}_{c}.svg" for k in ("sigma", "gain") for c in ("r", "Vr", "ar")}
+FIGURES |= {"figures/consistency.svg", "figures/captions.md"}
 RUN = {"stop": "done", "threads": 2, "seconds": 1.5, "warnings": ["watch out"], "identities": {"rls2": "ab"}}
 
 
@@ -132,11 +131,11 @@ def test_page_is_whole_and_leads_nowhere(written):
     beside = set(written.files)  # leads to its own tables and figures, and fetches none
     assert all(address.startswith("#") or address == "data:," or address in beside for address in page.addresses)
     assert "http://" not in re.sub(r'xmlns(:\w+)?="[^"]*"', "", text)
-    assert page.tags.count("script") == 7 + 2  # the numbers of each figure, the page's own, and its words
+    assert page.tags.count("script") == 2  # the page's own, and its words
     assert "Content-Security-Policy" in text
     ids = re.findall(r'\bid="([^"]+)"', text)
     assert len(ids) == len(set(ids))
-    assert text.count('class="chart"') == 7  # a panel each
+    assert text.count('<svg class="figure"') == 7
     assert str(escape(written.answer[0])) in text.replace("\u00a0", " ")
     assert "<i>C</i><sub>θ</sub>" in text[text.index('id="asked"') : text.index('class="rest"')]
     assert "(1 rows)" not in text
@@ -162,7 +161,7 @@ def test_the_first_figure_bears_the_first_sentence_of_the_answer_and_no_other_do
 
 def test_names_are_escaped(written):
     text = (written.folder / "report.html").read_text()
-    scripts = {"<script>", '<script type="application/json">', '<script type="application/json" id="words">'}
+    scripts = {"<script>", '<script type="application/json" id="words">'}
     assert set(re.findall("<script[^>]*>", text)) == scripts
     assert text.count("<script>") == 1
     assert "&lt;script&gt;" in text
@@ -190,11 +189,11 @@ def test_extent_in_words():
 
 def test_many_long_tables_share_the_room_of_a_page():
     long = pd.DataFrame({"k": range(5000), "sigma": 1.0})
-    shown = html._tables({f"table {i}": long for i in range(15)} | {"short": long.head(30)})
-    assert sum(len(table["rows"]) for table in shown) <= html.ALL_ROWS
+    shown = html._page_tables({f"table {i}": long for i in range(15)} | {"short": long.head(30)})
+    assert sum(len(table["rows"]) for table in shown) <= html.MAX_PAGE_ROWS
     assert len(shown[-1]["rows"]) == 30
     assert all(table["cut"] and table["count"] == 5000 for table in shown[:-1])
-    assert len(html._tables({"alone": long})[0]["rows"]) == html.ROWS
+    assert len(html._page_tables({"alone": long})[0]["rows"]) == html.MAX_ROWS
 
 
 @pytest.mark.slow

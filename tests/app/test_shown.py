@@ -6,7 +6,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure as Canvas
 
 import radarsim
-from radarsim.report.figures import COLOURS, MARKERS
+from radarsim.report.colours import COLOURS
+from radarsim.report.figures import MARKERS
 
 
 @pytest.fixture(scope="module")

@@ -109,28 +109,12 @@ class Chromium:
         """The pointer to a place of the window."""
         self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
 
-    def click(self, selector: str, nth: int = 0, times: int = 1) -> None:
-        """A true click on the nth element that a selector finds, or several at once."""
+    def click(self, selector: str, nth: int = 0) -> None:
+        """A true click on the nth element that a selector finds."""
         x, y = self.place(selector, nth)
         self.move(x, y)
-        for count in range(1, times + 1):
-            for kind in ("mousePressed", "mouseReleased"):
-                self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=count)
-
-    def drag(self, start: tuple[float, float], end: tuple[float, float], touch: bool = False) -> None:
-        """The pointer, or a finger, from one place of the window to another."""
-        between = [(start[0] + s * (end[0] - start[0]), start[1] + s * (end[1] - start[1])) for s in (0.3, 0.7, 1.0)]
-        if touch:
-            for kind, at in (("touchStart", start), *(("touchMove", one) for one in between), ("touchEnd", None)):
-                points = [] if at is None else [{"x": at[0], "y": at[1]}]
-                self.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
-            return
-        self.move(*start)
-        held = {"button": "left", "clickCount": 1}
-        self.call("Input.dispatchMouseEvent", type="mousePressed", x=start[0], y=start[1], **held)
-        for x, y in between:
-            self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y, button="left", buttons=1)
-        self.call("Input.dispatchMouseEvent", type="mouseReleased", x=end[0], y=end[1], **held)
+        for kind in ("mousePressed", "mouseReleased"):
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
     def place(self, selector: str, nth: int = 0) -> tuple[float, float]:
         """The middle of an element, scrolled into view."""
@@ -142,10 +126,10 @@ class Chromium:
         )
         return tuple(box)
 
-    def key(self, name: str, shift: bool = False) -> None:
+    def key(self, name: str) -> None:
         """A key pressed and released."""
         for kind in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=name, code=name, modifiers=8 * shift)
+            self.call("Input.dispatchKeyEvent", type=kind, key=name, code=name)
 
     def complaints(self) -> list[str]:
         """Errors and warnings that the page has put into the console since it was opened."""

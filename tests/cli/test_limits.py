@@ -184,7 +184,7 @@ def test_what_writing_takes_is_measured_by_case_and_figure(monkeypatch, figures,
     ticks = iter(range(100))
     monkeypatch.setattr(writing.time, "perf_counter", lambda: float(next(ticks)))
     saved = []
-    monkeypatch.setattr("radarsim.report.figures.save", lambda *given: saved.append(given) or {})
+    monkeypatch.setattr("radarsim.report.figures.draw", lambda *given: saved.append(given))
     experiment = load("range_doppler", ["realisations=2000", *overrides])
     found = writing.seconds(experiment, figures, None)
     assert len(saved) == 2 * figures

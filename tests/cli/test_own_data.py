@@ -198,9 +198,8 @@ def test_the_command_tells_gaps_missing_values_and_draws(tmp_path):
         "gaps     1 longer than three times the usual interval of 10 s; the longest 110 s, after 180 s" in result.stdout
     )
     assert "NIS" in result.stdout
-    assert {path.name for path in (report / "figures").iterdir()} == {
-        f"{n}.{k}" for n in ("plan", "track", "residuals", "nis") for k in ("svg", "png")
-    }
+    names = {path.name for path in (report / "figures").iterdir()}
+    assert names == {"plan.svg", "track.svg", "residuals.svg", "nis.svg"}
     written = table_of(track)
     assert written[0] == ["t_s", "filter", "component", "unit", "estimate", "sigma"]
     assert len(written) - 1 == 2 * 3 * 50 - 2 - 2 - 1  # before its start a filter gives what it observes alone

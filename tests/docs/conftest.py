@@ -7,7 +7,10 @@ import pytest
 def without_drawing(monkeypatch):
     """Runs that draw no figure but write its files: drawing is most of an example's time, and tested elsewhere."""
     from radarsim.report import figures
+    from radarsim.report.page_figure import DrawnFigure
 
+    svg = b'<svg viewBox="0 0 1 1"></svg>'
+    monkeypatch.setattr(figures, "save", lambda figure, formats=("svg",), *_: dict.fromkeys(formats, svg))
     monkeypatch.setattr(
-        figures, "save", lambda figure, formats=("svg", "png"), *_: dict.fromkeys(formats, b"<svg></svg>")
+        figures, "draw", lambda figure, formats=("svg",), *_: DrawnFigure(figure, dict.fromkeys(formats, svg), svg)
     )

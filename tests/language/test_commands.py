@@ -54,7 +54,7 @@ def test_the_live_page_is_russian_in_its_body_and_in_what_its_script_says(drawn)
     said = json.loads(re.search(r'id="words">(.*?)</script>', page)[1])
     script = page[page.rindex("<script>") :]
     asked = {
-        *re.findall(r'\b(?:said|filled|part\(\w+,)\(?"([^"]+)"', script),
+        *re.findall(r'\b(?:translated|filled|part\(\w+,)\(?"([^"]+)"', script),
         *re.findall(r'"((?:takes|adds|the acc|{size})[^"]+)"', script),
     }
     assert asked | {"range", "velocity", "acceleration"} == set(SAID)

@@ -101,7 +101,7 @@ def test_the_report_shows_what_the_terminal_says(tmp_path, monkeypatch):
     assert re.search(r"Advice: the stated values of \w+.* agree with 40 rows\.", text)
     for name in ("plan", "track", "residuals", "nis"):
         assert f'id="figure-{name}"' in text
-        assert (tmp_path / f"out/figures/{name}.png").stat().st_size > 1000
+        assert (tmp_path / f"out/figures/{name}.svg").stat().st_size > 1000
     assert "Errors against the truth" in text
     assert f"report   {tmp_path / 'out/report.html'}" in result.stdout
 
@@ -130,7 +130,7 @@ def test_a_ratio_beyond_doubt_is_no_number_and_a_line_without_label_goes_on():
 
 def test_the_page_is_in_one_language():
     with speaking("ru"):
-        page_text = html.followed("rls2", "plots.csv", [], [], [], {}, "", "")
+        page_text = html.track_page("rls2", "plots.csv", [], [], [], {}, "", "")
     assert "Что дают фильтры конфигурации rls2 по отметкам plots.csv?" in page_text
     assert not {"Plots", "Figures", "Config", "Contents", "Answer"} & set(re.findall(r'[>"](\w+)[<"]', page_text))
 

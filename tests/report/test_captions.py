@@ -14,7 +14,7 @@ FEW = ("rls2", "pulses_rls5", "ambiguous_rls2")
 
 def unclosed(answer):
     """The paragraphs of an answer whose brackets do not close."""
-    parts = html.in_clauses(answer)
+    parts = html.split_into_clauses(answer)
     return [part for part in parts if any(part.count(a) != part.count(b) for a, b in ("[]", "()"))]
 
 

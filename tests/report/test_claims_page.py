@@ -5,8 +5,8 @@ from radarsim.papers.claims_page import _class_lines, claims_page
 from radarsim.papers.claims_table import NOT_RUN
 from radarsim.papers.forest_plot import BEYOND, MAX_DRAWN_MARGINS, _drawn_distance, forest_plot
 from radarsim.papers.verdict_rule import CONFIRMED, DEPENDS, REFUTED, UNDECIDED
-from radarsim.report import chart
 from radarsim.report.drawing import Line, Note
+from radarsim.report.figures import MARKERS
 
 
 def row(claim="P9.1", kind=REFUTED, **more):
@@ -93,7 +93,7 @@ def test_what_lies_beyond_the_rim_has_an_arrow():
         for mark in panel.marks
         if isinstance(mark, Line) and mark.x.size and abs(mark.x[0]) == BEYOND
     }
-    left, right = chart.MARKERS.index("m-3.1 0l5.4-3v6z"), chart.MARKERS.index("m3.1 0l-5.4-3v6z")
+    left, right = MARKERS.index("<"), MARKERS.index(">")
     assert arrows == {right: ([BEYOND], [1.0]), left: ([-BEYOND], [2.0])}
 
 

@@ -133,7 +133,7 @@ def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
     assert reported(tmp_path / "rls2")["P1.18"] == phrase
     assert "P1.18  depends    RLS 2" in printed("claims", "rls2", "--out", tmp_path)
     assert f"P1.18  {phrase}: RLS 2" in printed("claims", "rls2", "--parts", "--out", tmp_path)
-    html.write(tmp_path)
+    html.write_index(tmp_path)
     assert "1 confirmed, 2 depend on what the paper leaves open" in (tmp_path / "index.html").read_text()
     rows = list_claims.claims("rls2", out=tmp_path).rows
     assert drawn(rows)["P1.18"] == DEPENDS

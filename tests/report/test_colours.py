@@ -9,7 +9,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from radarsim.report import chart, figures
+from radarsim.report import colours, figures
+from tests.tolerances import assert_rounded
 
 TO_XYZ = np.array(
     [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
@@ -23,7 +24,8 @@ SEEN = {
     "grey": np.tile(TO_XYZ[1], (3, 1)),
 }
 APART = {"all": 12.0, "protanopia": 8.0, "deuteranopia": 8.0, "tritanopia": 8.0, "grey": 3.0}
-PAGES = {"light": (0, "#ffffff"), "dark": (1, "#0f1419")}
+DARK_PAGE = "#0f1419"
+HALF_TURN = [[-0.574, 1.430, 0.144], [0.426, 0.430, 0.144], [0.426, 1.430, -0.856]]  # CSS: hue-rotate(180deg)
 
 
 def lab(colour, sight):
@@ -69,29 +71,38 @@ def test_the_difference_is_that_of_the_published_table(one, other, difference):
     assert ciede2000(one, other) == pytest.approx(difference, abs=5e-5)
 
 
-@pytest.mark.parametrize("page", PAGES)
+def on_dark_page(colour):
+    """A colour of a figure as the style sheet of a dark page shows it: inverted, its hue turned back, screened."""
+    figure, page = (np.array([int(c[i : i + 2], 16) / 255 for i in (1, 3, 5)]) for c in (colour, DARK_PAGE))
+    seen = 1 - (1 - np.clip(np.array(HALF_TURN) @ (1 - figure), 0, 1)) * (1 - page)
+    return "#" + "".join(f"{round(255 * channel):02x}" for channel in seen)
+
+
 @pytest.mark.parametrize("sight", SEEN)
-def test_every_two_colours_are_told_apart(page, sight):
-    colours = [pair[PAGES[page][0]] for pair in chart.COLOURS]
-    assert len(set(colours)) == 10
-    least = min(ciede2000(lab(a, sight), lab(b, sight)) for a, b in combinations(colours, 2))
+def test_every_two_colours_are_told_apart(sight):
+    assert len(set(colours.COLOURS)) == 10
+    least = min(ciede2000(lab(a, sight), lab(b, sight)) for a, b in combinations(colours.COLOURS, 2))
     assert least > APART[sight]
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_colours_fall_in_lightness_by_even_steps(page):
-    lightness = np.array([lab(pair[PAGES[page][0]], "all")[0] for pair in chart.LADDER])
-    steps = np.diff(lightness) * (1 if page == "light" else -1)
+def test_colours_rise_in_lightness_by_even_steps():
+    steps = np.diff([lab(colour, "all")[0] for colour in colours.LADDER])
     assert steps.min() > 3.5
     assert steps.max() < 8
 
 
-def test_few_curves_lie_far_apart_in_grey():
-    """The first colours in the order of use."""
-    lightness = [lab(light, "all")[0] for light, _ in chart.COLOURS[:4]]
+def test_the_first_colours_lie_far_apart_in_grey():
+    lightness = [lab(colour, "all")[0] for colour in colours.COLOURS[:4]]
     assert min(abs(a - b) for a, b in combinations(lightness, 2)) > 14
 
 
-def test_letters_in_colours_can_be_read():
-    for light, _ in chart.COLOURS:
-        assert chart.contrast(figures.readable(light), "#ffffff") >= 4.5
+@pytest.mark.parametrize("colour", [*colours.COLOURS, colours.NEUTRAL])
+def test_curves_stand_out_from_light_and_dark_pages_and_their_names_can_be_read(colour):
+    assert colours.contrast(colour, "#ffffff") >= 3
+    assert colours.contrast(on_dark_page(colour), DARK_PAGE) >= 4.5
+    assert colours.contrast(figures.readable_colour(colour), "#ffffff") >= 4.5
+
+
+def test_contrast_is_that_of_the_standard():
+    assert_rounded(colours.contrast("#ffffff", "#000000"), 21, operations=4)
+    assert colours.contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.005)

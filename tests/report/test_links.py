@@ -11,7 +11,7 @@ MADE = ("curves", "gains", "locks", "detections", "consistency")
 def test_a_figure_has_the_tables_that_its_study_declares_or_those_of_its_name():
     declared = {"lock": ("locks",), "detection": ("detections",), "accuracy": ("curves",), "cost": ("stages",)}
     found = {
-        name: html.tables_of(name, declared, MADE)
+        name: html.tables_behind_figure(name, declared, MADE)
         for name in ("sigma_r", "gain_Vr", "sweep_dt", "dynamic_r", "locks", "lock_noise", "detection", "cost", "map")
     }
     assert found == {
@@ -28,18 +28,18 @@ def test_a_claim_leads_to_the_figure_of_its_component():
         "missed": ("curves",),
         "locks": ("locks",),
     }
-    assert html.figures_of([("gains", "Vr")], drawn) == ["gain_Vr"]
-    assert html.figures_of([("curves", "r"), ("gains", "r")], drawn) == ["sigma_r", "gain_r"]
-    assert html.figures_of([("curves", "ar")], drawn) == ["sigma_r", "missed"]  # its own is not drawn
-    assert html.figures_of([("locks", ""), ("none", "")], drawn) == ["locks"]
-    assert html.figures_of([], drawn) == []
+    assert html.figures_showing_tables([("gains", "Vr")], drawn) == ["gain_Vr"]
+    assert html.figures_showing_tables([("curves", "r"), ("gains", "r")], drawn) == ["sigma_r", "gain_r"]
+    assert html.figures_showing_tables([("curves", "ar")], drawn) == ["sigma_r", "missed"]  # its own is not drawn
+    assert html.figures_showing_tables([("locks", ""), ("none", "")], drawn) == ["locks"]
+    assert html.figures_showing_tables([], drawn) == []
 
 
 def test_of_an_answer_so_much_stands_above_its_figure_that_both_are_seen():
     short, long = "a" * 90, "; ".join(["b" * 150] * 3)
-    assert html.in_clauses([short, long]) == [short, "b" * 150 + ";", "b" * 150 + ";", "b" * 150]
-    assert html.seen_at_once([short, short, short]) == 2
-    assert html.seen_at_once([long]) == 1
+    assert html.split_into_clauses([short, long]) == [short, "b" * 150 + ";", "b" * 150 + ";", "b" * 150]
+    assert html.count_visible_sentences([short, short, short]) == 2
+    assert html.count_visible_sentences([long]) == 1
 
 
 @pytest.mark.parametrize("code", language.known())
@@ -49,5 +49,5 @@ def test_no_interval_of_an_answer_is_cut(code):
         value, in_row = wording.estimate((98.74, 97.5, 100.0), "%"), wording.in_a_row(["0.5", "1.5"])
         one = f"{value} ({in_row}; {wording.interval('1', '2')})"
         row = wording.in_a_row(map(wording.number, (700.5, 800.5)))
-        parts = html.in_clauses(["; ".join([one, row] * 9)])
+        parts = html.split_into_clauses(["; ".join([one, row] * 9)])
     assert [part.removesuffix(";") for part in parts] == [one, row] * 9

@@ -10,7 +10,7 @@ from radarsim.app import result as output
 from radarsim.app import run
 from radarsim.language import speaking
 from radarsim.papers.claim_rows import measured_words
-from radarsim.report import chart, figures, panels, sweeps, tables
+from radarsim.report import figures, panels, sweeps, tables, wording
 from radarsim.report.drawing import Line
 
 
@@ -39,7 +39,7 @@ def test_one_key_is_a_family_of_curves():
     [("r", "r"), ("Vr", "V_r"), ("b", "β"), ("vb", "v_β"), ("ab", "a_β"), ("ve", "v_ε"), ("speed", "speed")],
 )
 def test_axes_name_components_by_their_letters(component, words):
-    assert chart.spoken(panels.letter(component)) == words
+    assert wording.spoken(panels.letter(component)) == words
 
 
 def test_two_keys_are_a_map():
@@ -116,9 +116,9 @@ def test_two_keys_make_a_panel_a_value_and_a_map_and_leave_nothing_out():
         assert [panel.title for panel in described[name].panels] == [f"$σ_V$ = {v} m/s" for v in (1, 5, 15)], name
         lines = [[mark for mark in panel.marks if isinstance(mark, Line)] for panel in described[name].panels]
         assert {len(own) for own in lines} == {3 if name == "gain_r" else 6}
-    plan = figures.named(described["sigma_r"])
+    plan = figures.plan_legends(described["sigma_r"])
     assert plan.at_ends == (True,) * 3
-    assert {line.label for line in figures.lines(plan.panels[0])} == {"10⁻⁴", "10⁻³", "10⁻²"}
+    assert {line.label for line in figures.named_lines(plan.panels[0])} == {"10⁻⁴", "10⁻³", "10⁻²"}
     assert list(plan.common.keys) == ["r", "r+Vr", "exact"]
     assert plan.common.title == "at the lines: $D_M$, (m/s³)²"
     assert described["sweep_sigma_velocity_mps_manoeuvre_variance"].panels[0].marks[0].values.shape == (3, 3)

@@ -344,7 +344,7 @@ def page(own: Sequence[Place], known: Sequence[Place]) -> str:
     """The live page: one's own radars first, then those that are known, as settings to begin from."""
     data = [dict(zip(("name", "r", "v", "dt", "dm"), (one.name, *one.inputs), strict=True)) for one in [*own, *known]]
     parts = [resources.files(__package__).joinpath("live", name).read_text(encoding="utf-8") for name in LIVE]
-    return html.live(tr("What Doppler gains for a radar"), parts, json.dumps(data), SAID)
+    return html.live_page(tr("What Doppler gains for a radar"), parts, json.dumps(data), SAID)
 
 
 LIVE = ("body.html.j2", "style.css", "script.js")

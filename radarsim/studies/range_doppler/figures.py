@@ -10,9 +10,10 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.language import tr
 from radarsim.report import panels, seen, tables, wording
-from radarsim.report.chart import Scale, spoken
 from radarsim.report.drawing import GREY, Axis, Figure, Line, Note, Panel, Reference, Style
 from radarsim.report.quantities import RADIAL
+from radarsim.report.scales import Scale
+from radarsim.report.wording import spoken
 from radarsim.studies.range_doppler.tables import PERIODS, Result
 
 if TYPE_CHECKING:
@@ -147,15 +148,15 @@ def _labels(points: Sequence[tuple[float, float, str]], limit: float, x: Scale, 
     Points at one place share a label."""
     joined: list[tuple[float, float, str]] = []
     for t, sigma, words in sorted(points):
-        if joined and math.dist(*((x.place(at[0]), y.place(at[1])) for at in ((t, sigma), joined[-1]))) < TOUCHING:
+        if joined and math.dist(*((x.position(u), y.position(v)) for u, v, *_ in ((t, sigma), joined[-1]))) < TOUCHING:
             joined[-1] = (*joined[-1][:2], f"{joined[-1][2]}, {words}")
         else:
             joined.append((t, sigma, words))
-    line = (float(x.place(limit)),) * 2 + (0.0, 1.0)  # left, right, lower and upper edge, as shares of the panel
+    line = (float(x.position(limit)),) * 2 + (0.0, 1.0)  # left, right, lower and upper edge, as shares of the panel
     ways: list[tuple[float, list[Note], tuple[float, ...]]] = [(0.0, [], (-1.0,) * 4)]  # the best, by the last label
     before = 0.0, 0.0
     for t, sigma, words in joined:
-        u, v, wide = float(x.place(t)), float(y.place(sigma)), LETTER * len(words)
+        u, v, wide = float(x.position(t)), float(y.position(sigma)), LETTER * len(words)
         steep = (before[1] - v) * wide > TOUCHING * (u - before[0])  # a curve that falls from the left is in the way
         own = ("ne", (u, u + wide, v, v + HIGH), 0.0), ("nw", (u - wide, u, v, v + HIGH), steep + 0.1 + 9 * (u < wide))
         ways = [

@@ -173,5 +173,5 @@ def test_time_per_update_stands_in_the_record_and_the_report_alone(tmp_path):
     assert all(seconds > 0 for seconds in measured.values())
     page = (folder / "report.html").read_text()
     assert "Cost against accuracy" in page
-    assert html.cell(1e9 * measured["Kalman-2 1"]) in page
+    assert html.cell_text(1e9 * measured["Kalman-2 1"]) in page
     assert not any("measured, ns" in path.read_text() for path in folder.glob("*.csv"))

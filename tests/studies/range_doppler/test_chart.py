@@ -157,7 +157,7 @@ def test_the_page_is_whole_and_fetches_nothing(made):
 def test_a_name_cannot_break_out_of_the_page():
     from radarsim.report import html
 
-    text = html.live("t", ("<main></main>", "", ""), json.dumps([{"name": "</script><script>alert(1)"}]))
+    text = html.live_page("t", ("<main></main>", "", ""), json.dumps([{"name": "</script><script>alert(1)"}]))
     assert "</script><script>alert" not in text
     assert "\\u003c/script\\u003e" in text
 

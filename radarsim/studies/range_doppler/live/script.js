@@ -86,11 +86,11 @@ const radar = (() => {
 })();
 
 (() => {
-  const { setting, ALLOWED } = radar, NAMES = ["range", "velocity", "acceleration"].map(said), STEPS = 1000;
+  const { setting, ALLOWED } = radar, NAMES = ["range", "velocity", "acceleration"].map(translated), STEPS = 1000;
   const [LEFT, RIGHT, TOP, BOTTOM] = [48, 412, 8, 226];
   const node = (id) => document.getElementById(id);
-  const short = (x, digits = 4) => local(String(Number(x.toPrecision(digits))));
-  const filled = (text, values) => said(text).replace(/\{(\w+)\}/g, (_, name) => values[name]);
+  const short = (x, digits = 4) => localNumeral(String(Number(x.toPrecision(digits))));
+  const filled = (text, values) => translated(text).replace(/\{(\w+)\}/g, (_, name) => values[name]);
 
   function put(svg, tag, attributes, text) {
     const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
@@ -160,7 +160,7 @@ const radar = (() => {
 
   function redraw() {
     shown = radar.sigmas(setting);
-    const t = (n) => n * setting.dt, time = [0, t(setting.k - 1), false, said("time, s")];
+    const t = (n) => n * setting.dt, time = [0, t(setting.k - 1), false, translated("time, s")];
     const places = [];
     for (let i = 0; i < 3; i++) {
       const of = (rows) => rows.map((row, n) => [t(n), row[i]]), all = [...shown.one, ...shown.two].map((row) => row[i]).filter((s) => s !== null);
@@ -195,7 +195,7 @@ const radar = (() => {
       const [a, b, g] = [shown.one[n][i], shown.two[n][i], shown.gain[n][i]].map((s) => (s === null ? "–" : short(s)));
       return `${name} ${a} → ${b} (${g} %)`;
     });
-    node("read").textContent = filled("Scan {k}, {t} s: {values}", { k: n + 1, t: short(n * setting.dt), values: told.join(COMMA ? "; " : ", ") });
+    node("read").textContent = filled("Scan {k}, {t} s: {values}", { k: n + 1, t: short(n * setting.dt), values: told.join(HAS_DECIMAL_COMMA ? "; " : ", ") });
   }
 
   function readable(svg) {
@@ -246,7 +246,7 @@ const radar = (() => {
       if (value !== null) { setting[name] = value; changed(field); }
       field.setAttribute("aria-invalid", String(value === null));
     });
-    field.title = filled("from {low} to {high}", { low: local(String(ALLOWED[name][0])), high: local(String(ALLOWED[name][1])) });
+    field.title = filled("from {low} to {high}", { low: localNumeral(String(ALLOWED[name][0])), high: localNumeral(String(ALLOWED[name][1])) });
   }
   for (const one of JSON.parse(node("data").textContent)) {
     const button = document.createElement("button");
