@@ -134,8 +134,9 @@ def weighted_errors(
 
 
 def consistency(believed: np.ndarray, bias: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Expected normalised squared error tr(P⁻¹(S + m mᵀ)) (…,). It is the size of the state for a consistent filter and
-    larger for an optimistic one."""
+    """The expected normalised squared error tr(P⁻¹(S + m mᵀ)) (…,).
+
+    It equals the size of the state for a consistent filter, and is larger for an optimistic one."""
     moment = covariance + bias[..., :, None] * bias[..., None, :]
     return np.trace(np.linalg.solve(believed, moment), axis1=-2, axis2=-1)
 

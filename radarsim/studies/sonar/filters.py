@@ -46,7 +46,7 @@ class ModelPair(NamedTuple):
 
 
 class DetectorTest(NamedTuple):
-    """A test of the last plots, every so many scans, with thresholds (G, T); none where only a filter needs it."""
+    """A test of the last plots every so many scans, with thresholds (G, T); no thresholds if only a filter needs it."""
 
     plots: int
     every: int
@@ -160,8 +160,10 @@ def settled_gain(period: float, sigma: float, size: int, manoeuvre_variance: flo
 
 
 def window_weights(plots: Plots, k: int, length: int, size: int) -> tuple[int, np.ndarray, np.ndarray]:
-    """Least squares on the last `length` plots up to scan k, extrapolated to k where k itself is missed. Returns the
-    first scan of the window, the weights (M, 3, n) of the plots from there on, and the covariance (M, 3, 3)."""
+    """Least squares on the last `length` plots up to scan k, extrapolated to k where k itself is missed.
+
+    Returns the first scan of the window, the weights (M, 3, n) of the plots from there on, and the covariance (M, 3,
+    3)."""
     is_detected = plots.weight[:, : k + 1] > 0
     count = np.cumsum(is_detected, axis=1)
     inside = is_detected & (count > count[:, -1:] - length)

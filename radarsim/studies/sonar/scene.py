@@ -37,8 +37,9 @@ class Scene:
         return Plots(self.t[:scans], weight, self.period, self.nominal[c])
 
     def patterns(self) -> tuple[np.ndarray, np.ndarray]:
-        """All patterns (M, K') of plots in the first scans, with their probabilities (M,). K' is the number of scans up
-        to which there are at most 2 ** MOST_OPEN patterns."""
+        """All patterns (M, K') of plots in the first scans, with their probabilities (M,).
+
+        K' is the number of scans up to which there are at most 2 ** MOST_OPEN patterns."""
         reach = int(np.searchsorted(np.cumsum(self.certain < 0), MOST_OPEN, side="right"))
         free = np.flatnonzero(self.certain[:reach] < 0)
         detected = np.tile(np.maximum(self.certain[:reach], 0), (2 ** len(free), 1))

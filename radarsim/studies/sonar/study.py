@@ -58,8 +58,9 @@ def conversion(case: Case, scene: Scene) -> patterns.Conversion:
 def designs(
     specs: Sequence[filters.FilterSpec], scene: Scene, detected: np.ndarray
 ) -> list[list[filters.FilterDesign]]:
-    """The designs of each filter in each coordinate, for patterns detected (M, K') of plots. A filter that responds to
-    manoeuvres has none, because its gains depend on the plots."""
+    """The designs of each filter in each coordinate, for patterns detected (M, K') of plots.
+
+    A filter that responds to manoeuvres has no design, because its gains depend on the plots."""
     return [
         [filters.design_filter(spec, c, scene.plots(c, detected)) for c in range(len(scene.nominal))]
         if spec.response is None
@@ -82,8 +83,9 @@ def drawn_plots(
 
 
 def truth_of(scene: Scene, deviation: np.ndarray, count: int, size: int) -> np.ndarray:
-    """True states (count, K, C size), size components of each coordinate, of realisations with a deviation from
-    `drawn_plots`; a view that cannot be written where all have the same."""
+    """True states (count, K, C size), with size components of each coordinate, by a deviation from `drawn_plots`.
+
+    A read-only view if all realisations have the same states."""
     K, C, _ = scene.truth.shape
     true = scene.truth[..., :size].reshape(K, -1)
     if deviation.shape[-1] == 1:

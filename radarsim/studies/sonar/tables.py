@@ -21,7 +21,8 @@ table = common.Tables()
 
 # ---- parts of tables ----------------------------------------------------------------------------------------------
 def coordinate_rows(result: CaseResult[SonarAxes], mask: np.ndarray) -> tuple[Index, dict[str, np.ndarray]]:
-    """Where mask (F, K, C) is true: indices (filter, scan, coordinate), each (n,), and the first columns of these rows.
+    """The indices (filter, scan, coordinate), each (n,), where mask (F, K, C) is true, and the rows' first columns.
+
     Rows are ordered by filter, coordinate, scan."""
     f, c, k = np.nonzero(np.moveaxis(mask, 1, 2))
     names, units = zip(*result.axes.coordinates, strict=True)
@@ -96,7 +97,7 @@ def _operations(results: Sequence[CaseResult[SonarAxes]]) -> "pd.DataFrame":
 
 # ---- smoothing -----------------------------------------------------------------------------------------------------
 def textbook(result: CaseResult[GivenPlotsAxes]) -> bool:
-    """Whether the paper's closed forms apply: known plots, equal intervals and weights, white errors, none missed."""
+    """Whether the closed forms apply: known association, equal intervals and weights, white errors, no misses."""
     sensor, target = result.spec.sensor, result.spec.target
     has_all_plots = sensor.detection_probability == 1 and not sensor.missed_scans and not sensor.further
     polynomial = target.kind == "polynomial" and result.spec.frame == target.frame == "polar"

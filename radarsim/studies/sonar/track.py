@@ -132,8 +132,9 @@ class Tracker:
     def _residuals(
         self, z: np.ndarray, weight: np.ndarray, sigma: np.ndarray, value: np.ndarray, spread: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Residuals, their normalised squares and their σ (F, n, C) of plots z (C, n); value and its σ `spread`
-        (F, n, C)."""
+        """Residuals, their normalised squares and their σ (F, n, C), of plots z (C, n).
+
+        value and spread (F, n, C) are the estimates and their σ."""
         residual = np.where(weight > 0, z, np.nan).T[None] - value
         with np.errstate(divide="ignore", invalid="ignore"):
             variance = np.where(weight > 0, sigma[:, None] ** 2 / weight, np.nan).T[None]
@@ -239,9 +240,10 @@ def unwrap_bearings(bearing: np.ndarray) -> np.ndarray:
 
 
 class PlotLikelihood:
-    """How likely tracks are under a filter's model: a polynomial of its degree in each coordinate, whose next
-    derivative is random; errors of range, bearing and a third coordinate that are independent. The state before the
-    first whole plot is taken as unknown."""
+    """The likelihood of tracks under a filter's model.
+
+    A polynomial of the filter's degree in each coordinate, whose next derivative is random, and independent errors of
+    range, bearing and a third coordinate. The state before the first complete plot is taken as unknown."""
 
     def __init__(self, case: Case, number: int, tracks: Sequence[Mapping[str, np.ndarray]]):
         self.spec: Any = case.spec

@@ -113,8 +113,9 @@ class MultiTracker:
         return np.stack([nu_r, nu_b]), (bb * nu_r**2 - 2 * rb * nu_r * nu_b + rr * nu_b**2) / (rr * bb - rb**2)
 
     def _owners(self, distance: np.ndarray) -> np.ndarray:
-        """The track (n,) that each plot goes to, -1 for none: the nearest one, but confirmed tracks first. Only
-        probabilistic association takes more than one plot, and only for a track of two plots or more."""
+        """The track (n,) that each plot goes to, -1 for none: the nearest track, but confirmed tracks first.
+
+        Only probabilistic association takes more than one plot, and only for a track of two plots or more."""
         owner = np.full(distance.shape[1], -1)
         takes_several = np.array(
             [self.rule.association == tracker.PDA and self._settled(track) for track in self.alive]

@@ -75,8 +75,9 @@ class Alarms(NamedTuple):
 # ---- tests --------------------------------------------------------------------------------------------------------
 @inline
 def parabola(recent, length, longest, i):
-    """Normal equations of a parabola: Y (6), b (3) relative to the newest plot, and the newest plot. Without the newest
-    plot's value the sums lose no digits."""
+    """The normal equations of a parabola, Y (6) and b (3), relative to the newest plot; and the newest plot.
+
+    Relative to the newest plot the sums lose no digits."""
     newest = get(recent, i)
     Y, b = steps.normal_equations(recent, length, longest, i, newest, 0.5)
     return Y, b, newest
@@ -176,9 +177,10 @@ def next_mode(T, threshold, mode, quiet, patience):
 
 @inline
 def update_adaptive(filters, plots, f, c, rules, size, length, dt, period):
-    """Update an adaptive filter with one scan, in place; further rows MODE, QUIET, PLOTS. It is growing memory of
-    degree size - 1, restarted with the last `length` plots at every change of mode. An alarm sets the mode, and `quiet`
-    successive tests without one reset it; see AdaptiveRules."""
+    """Update an adaptive filter with one scan, in place; its rows are MODE, QUIET, PLOTS.
+
+    It is growing memory of degree size - 1, restarted with the last `length` plots at every change of mode. An alarm
+    sets the mode, and `quiet` successive tests without an alarm reset it; see AdaptiveRules."""
     ax, ay, am, ap, az, aw, an = memory_addresses(filters, plots, f, c)
     T, recent, raises = plots.T[rules.detector[f], rules.group[f, c]], plots.recent[c], rules.raises[f]
     statistic, ar, longest = address(T), address(recent), recent.shape[1]
@@ -283,8 +285,10 @@ def imm_step(first, second, mu, chain, tau, Q, z, w):
 
 @inline
 def update_imm(filters, plots, f, c, pairs, size, dt, period, sigma):
-    """Update an IMM with one scan, in place; further rows STATE, COVARIANCE and PROBABILITY. Both models start by least
-    squares on the first `size` plots, with the stationary probabilities of their Markov chain."""
+    """Update an IMM with one scan, in place; its rows are STATE, COVARIANCE and PROBABILITY.
+
+    Both models start by least squares on the first `size` plots, with the stationary probabilities of their Markov
+    chain."""
     ax, ay, am, ap, az, aw, an = memory_addresses(filters, plots, f, c)
     tau, per, unit, ones, zeros = dt / period, 1.0 / period, 1.0 / sigma, full(1.0), full(0.0)
     first_scans, half, F = full(size - 0.5), full(0.5), algebra.constant_acceleration(dt)

@@ -31,8 +31,10 @@ PLACED = 8.0  # as world.PLACED
 
 
 class Detections(NamedTuple):
-    """Which scans give a plot: key (2,) of the noise stream; certain (K,) is 1 where a scan always gives one, 0 where
-    it never does, else -1, which means with this probability."""
+    """Which scans give a plot.
+
+    key (2,) of the noise stream; certain (K,) is 1 where a scan always gives a plot, 0 where it never does, and -1
+    where it does with `probability`."""
 
     key: np.ndarray
     certain: np.ndarray
@@ -224,8 +226,10 @@ def keep_errors(x, course, c, n, first, count, errors):
 
 # ---- a block ------------------------------------------------------------------------------------------------------
 class Chunk(NamedTuple):
-    """A chunk of a block at a scan: `count` realisations from number `first` of the block on, scan k, and dt since the
-    scan before; used (CHUNK,) is 1 for these realisations; the course of the targets in all coordinates."""
+    """A chunk of a block at scan k, dt after the previous scan.
+
+    `count` realisations from number `first` of the block on; used (CHUNK,) is 1 for these realisations; course: of the
+    targets in all coordinates."""
 
     first: int
     count: int

@@ -88,8 +88,9 @@ def measure(key, first, pair, step, fresh, mean, c0, c1):
 
 @kernel
 def move_and_measure(world, first, k, plots):
-    """Compute scan k of all coordinates in place: plots (C, 4, n) holds plot, error, and deviation of value and rate. C
-    is even."""
+    """Compute scan k of all coordinates in place.
+
+    plots (C, 4, n) holds plot, error, and deviation of value and rate; C is even."""
     pairs = plots.shape[0] // 2
     for p in range(pairs):
         c0, c1 = plots[2 * p], plots[2 * p + 1]

@@ -150,7 +150,7 @@ def least_squares(Y, n, w, tau, c, size):
 # ---- Kalman filter of state and carried error ---------------------------------------------------------------------
 @inline
 def predicted_joint(J, w, tau, model):
-    """F J Fᵀ + Q; the variance of the error remains that of a stationary process, 1 / w."""
+    """Predict the joint covariance: F J Fᵀ + Q; the error stays stationary, with variance 1 / w."""
     ones, zeros, c, F = full(1.0), full(0.0), model.c, algebra.constant_acceleration(tau)
     P = algebra.predicted_covariance(J[:6], F, manoeuvre_covariance(model.q, tau, model.size))
     e = algebra.predicted(J[6:9], F)

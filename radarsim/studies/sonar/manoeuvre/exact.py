@@ -122,8 +122,9 @@ QUANTITIES = (("course", "rad"), ("speed", "m/s"), ("x_ahead", "m"), ("y_ahead",
 
 
 def stack_last(parts: list[np.ndarray]) -> np.ndarray:
-    """Stack arrays of one shape (…,) along a last axis; each stays contiguous in memory, which saves a quarter of the
-    time."""
+    """Stack arrays of one shape (…,) along a last axis.
+
+    Each array stays contiguous in memory, which saves a quarter of the time."""
     return np.moveaxis(np.stack(parts), 0, -1)
 
 
@@ -218,8 +219,9 @@ def false_alarm(k: Values, coordinates: int | np.ndarray = 1) -> Any:
 
 
 def detection(k: Values, shift: Values, coordinates: int = 1) -> Any:
-    """Probability of an alarm in a test where the mean of â is `shift` σ_a from zero; broadcasts. For several
-    coordinates the shift is the root of the sum of squares."""
+    """The probability of an alarm in a test where the mean of â is `shift` σ_a from zero; broadcasts.
+
+    For several coordinates the shift is the root of the sum of squares."""
     from scipy import special, stats  # here, because they take a second to load
 
     if coordinates == 1:
@@ -230,8 +232,9 @@ def detection(k: Values, shift: Values, coordinates: int = 1) -> Any:
 
 
 def shift_for(probability: float, k: float) -> float:
-    """Acceleration, in units of σ_a, that a test of one coordinate at threshold k detects with this probability. Zero
-    if false alarms alone reach the probability. At k = 1 and 0.683 it is 1.456."""
+    """The acceleration, in σ_a, that a test of one coordinate at threshold k detects with this probability.
+
+    Zero if false alarms alone reach the probability. At k = 1 and 0.683 it is 1.456."""
     from scipy.optimize import brentq
 
     if detection(k, 0.0) >= probability:
@@ -251,7 +254,9 @@ def acceleration_law(
 
 
 def probability_by_then(p: np.ndarray) -> np.ndarray:
-    """Probability (…, n) that a first event has come by each of n independent tests of probabilities p (…, n). Tests of
-    overlapping windows are not independent; their law is multivariate normal and has no closed form. For them this is
-    an upper bound if the target does not manoeuvre and errors are white (Šidák 1967), because alarms come in runs."""
+    """Probability (…, n) that a first event has come by each of n independent tests of probabilities p (…, n).
+
+    Tests of overlapping windows are not independent; their law is multivariate normal and has no closed form. For them
+    this is an upper bound if the target does not manoeuvre and errors are white (Šidák 1967), because alarms come in
+    runs."""
     return 1 - np.cumprod(1 - p, axis=-1)

@@ -81,7 +81,7 @@ def phases(target: Target, t: np.ndarray) -> np.ndarray:
 
 # ---- from keys to rules and tests ---------------------------------------------------------------------------------
 def responding_filters(spec: Keys, specs: Sequence[FilterSpec]) -> list[FilterSpec]:
-    """The filters of a case, of which those that respond to manoeuvres have their rule or models."""
+    """The filters of a case; those that respond to manoeuvres get their rule or their models."""
     scale = lateral_scale(spec, 2)
     return [
         replace(
@@ -138,9 +138,10 @@ def shift_laws(scene: Scene, c: int, detected: np.ndarray, plots: int, k: int) -
 
 
 def exact_alarms(spec: Keys, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Probability (D, G, T, K) of an alarm at a test, and shift (D, G, K) of its mean; NaN where not known. Both are
-    means over the patterns of plots in which there is a test. In the cartesian frames weights depend on the plots, and
-    nothing is known."""
+    """Probability (D, G, T, K) of an alarm at a test, and shift (D, G, K) of its mean; NaN where not known.
+
+    Both are means over the patterns of plots in which there is a test. In the cartesian frames weights depend on the
+    plots, and no law is known."""
     K, C = scene.truth.shape[:2]
     max_thresholds = max((len(detector.levels()) for detector in spec.detectors), default=0)
     alarms = np.full((len(spec.detectors), C + 1, max_thresholds, K), np.nan)
@@ -177,7 +178,7 @@ def _alarm_law(laws: np.ndarray, limits: np.ndarray, weight: np.ndarray) -> tupl
 
 
 def independent(detector: Detector, scene: Scene) -> bool:
-    """Whether a detector's tests are independent of one another: windows apart, errors white, no random motion."""
+    """Whether the tests of a detector are independent: windows do not overlap, errors are white, no random motion."""
     are_apart, certain = detector.test_every >= detector.plots, (scene.certain > 0).all()
     return bool(are_apart and certain and not scene.rho.any() and not scene.walk.any())
 

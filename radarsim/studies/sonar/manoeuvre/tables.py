@@ -254,6 +254,7 @@ def _uses(result: CaseResult[ManoeuvreAxes]) -> Columns:
 
 def _distance(sums: np.ndarray, true: np.ndarray, closing: np.ndarray) -> np.ndarray:
     """Distance from zero (F, U, A), in believed σ, of the value that each quantity depends on; infinite for positions.
+
     The closest approach depends on its distance and on the relative speed `closing` (A,), whose σ is that of the
     speed."""
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -306,7 +306,7 @@ class TrackerLaws(NamedTuple):
 class EndSums(NamedTuple):
     """Sums of a block by weights w, for F trackers over K scans."""
 
-    #: (F, K, END_KINDS, 4) Σw, Σw², number, Σw⁴ of realisations whose first confirmed track of the target ends at a scan
+    #: (F, K, END_KINDS, 4) Σw, Σw², number, Σw⁴ of realisations whose first confirmed track ends at a scan
     ended: np.ndarray
     ended_drawn: np.ndarray  #: (F, 3) number of realisations drawn as they are, Σw and Σw² of all
 
