@@ -126,7 +126,7 @@ def tracker_of(plan) -> dict:
     assert not cells.ring
     numbers = {"joint": int(of.association[0] == PDA), "nq": cells.nq, "nb": cells.nb}
     numbers |= {"levels": len(of.thresholds), "shares": len(field.share)}
-    assert numbers["shares"] <= 40  # MOST_IN_CELL
+    assert numbers["shares"] <= 40  # MAX_MEAN_IN_CELL
     for name in ("gate", "m", "n", "misses", "speed", "lost"):
         numbers[name] = float(getattr(of, name)[0])
     numbers |= {"detection": float(of.detection), "inside": float(of.inside[0]), "assumed": float(of.density)}

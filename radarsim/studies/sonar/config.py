@@ -177,7 +177,7 @@ class Polynomial(Model):
     )
 
     @cross_check
-    def _ahead(self) -> Iterator[At]:
+    def _positive_range(self) -> Iterator[At]:
         if self.frame == "polar" and self.range_m is not None and self.range_m[0] <= 0:
             yield at("range_m", "must begin with a positive range")
 
@@ -191,7 +191,7 @@ class Polynomial(Model):
         """Range at the first plot, m; converts lateral distances to angles."""
         if self.range_m is not None:
             return self.range_m[0]
-        return _from_origin(*(given[0] for given in (self.x_m, self.y_m) if given))
+        return _from_origin(*(derivatives[0] for derivatives in (self.x_m, self.y_m) if derivatives))
 
 
 def _from_origin(*coordinates: float) -> float:
@@ -516,9 +516,9 @@ class RareTracks(Model):
     def shares(self) -> tuple[float, float, float]:
         """Shares of the laws that false tracks are drawn from: as they are, so that they are confirmed, and held on."""
         laws = ("false_tracks", "long_false_tracks")
-        each = (1.0 - fields.PLAIN_SHARE) / max(sum(event in self.events for event in laws), 1)
-        found, long = (each if event in self.events else 0.0 for event in laws)
-        return fields.PLAIN_SHARE, found, long
+        law_share = (1.0 - fields.PLAIN_SHARE) / max(sum(event in self.events for event in laws), 1)
+        confirmed_share, long_share = (law_share if event in self.events else 0.0 for event in laws)
+        return fields.PLAIN_SHARE, confirmed_share, long_share
 
     @property
     def seeks_false_tracks(self) -> bool:
@@ -585,9 +585,9 @@ class Keys(fields.Study):
 
     @cross_check
     def _long_enough(self) -> Iterator[At]:
-        most = max(fields.readable(self.filters, lambda member: member.degree), default=0) + 1
-        if self.scans < most:
-            yield at("scans", f"must be >= {most} for a filter of degree {most - 1}")
+        min_scans = max(fields.readable(self.filters, lambda member: member.degree), default=0) + 1
+        if self.scans < min_scans:
+            yield at("scans", f"must be >= {min_scans} for a filter of degree {min_scans - 1}")
 
     @cross_check
     def _misses_within_scans(self) -> Iterator[At]:
@@ -673,7 +673,7 @@ class Keys(fields.Study):
             yield "detectors"
         if self.uses is not None:
             yield "uses"
-        yield from (f"filters.{i}.kind" for i, one in enumerate(self.filters) if one.kind in RESPONDING_KINDS)
+        yield from (f"filters.{i}.kind" for i, member in enumerate(self.filters) if member.kind in RESPONDING_KINDS)
 
     @cross_check
     def _detectors_fit(self) -> Iterator[At]:

@@ -134,8 +134,9 @@ def weighted_errors(
 
 
 def consistency(believed: np.ndarray, bias: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Expected normalised squared error tr(P⁻¹(S + m mᵀ)) (…,). It is the size of the state for a consistent filter and
-    larger for an optimistic one."""
+    """The expected normalised squared error tr(P⁻¹(S + m mᵀ)) (…,).
+
+    It equals the size of the state for a consistent filter, and is larger for an optimistic one."""
     moment = covariance + bias[..., :, None] * bias[..., None, :]
     return np.trace(np.linalg.solve(believed, moment), axis1=-2, axis2=-1)
 
@@ -143,17 +144,17 @@ def consistency(believed: np.ndarray, bias: np.ndarray, covariance: np.ndarray) 
 # ---- exact values ----------------------------------------------------------------------------------------------------
 def true_errors(scene: Scene, design: FilterDesign, c: int) -> tuple[np.ndarray, np.ndarray]:
     """Bias (M, K, 3) and covariance (M, K, 3, 3) of the errors of a filter in coordinate c."""
-    t, scans, known = design.plots.t, len(design.plots.t), design.known
+    t, scans, estimated_sizes = design.plots.t, len(design.plots.t), design.known
     truth, sigma = scene.truth[:scans, c], scene.sigma[:scans, c]
     sigma = np.where(np.isfinite(sigma), sigma, 0.0)
     recursion = design.recursion
     if recursion is not None:
         steps = step_correlations(scene.rho[c], t, scene.period)
         return recursive_errors(recursion.gain, recursion.carry, t, truth, steps, sigma, scene.walk[c])
-    bias, covariance = np.zeros((len(known), scans, 3)), np.zeros((len(known), scans, 3, 3))
+    bias, covariance = np.zeros((len(estimated_sizes), scans, 3)), np.zeros((len(estimated_sizes), scans, 3, 3))
     for k, (first, weights) in enumerate(design.window_rows):
         C = error_covariance(sigma[first : k + 1], scene.rho[c], t[first : k + 1], scene.period)
-        origin = first if known[:, k].min() >= design.spec.size else 0
+        origin = first if estimated_sizes[:, k].min() >= design.spec.size else 0
         bias[:, k], covariance[:, k] = weighted_errors(weights, first, t, truth, C, scene.walk[c], origin)
     return bias, covariance
 
@@ -174,30 +175,32 @@ def exact_values(
             continue
         design = designs[f][c]
         bias, S = true_errors(scene, design, c)
-        known, n = design.known, design.spec.size
-        reach = known.shape[1]
+        estimated_sizes, n = design.known, design.spec.size
+        reach = estimated_sizes.shape[1]
         for j in range(n):
-            share = probability[:, None] * (known > j)
+            share = probability[:, None] * (estimated_sizes > j)
             with np.errstate(invalid="ignore", divide="ignore"):
                 square = (share * (S[:, :, j, j] + bias[:, :, j] ** 2)).sum(axis=0) / share.sum(axis=0)
                 values["sigma"][f, :reach, c, j] = np.sqrt(square)
                 values["bias"][f, :reach, c, j] = (share * bias[:, :, j]).sum(axis=0) / share.sum(axis=0)
-        values["ahead"][f, :reach, c] = _ahead(scene, c, bias, S, probability[:, None] * (known >= n))
+        values["ahead"][f, :reach, c] = _extrapolated_sigma(
+            scene, c, bias, S, probability[:, None] * (estimated_sizes >= n)
+        )
         if probability.size == 1:
-            complete = np.flatnonzero(known[0] >= n)
+            complete = np.flatnonzero(estimated_sizes[0] >= n)
             believed, true = design.covariance[0, complete, :n, :n], S[0, complete, :n, :n]
-            values["nees"][f, complete, c] = _nees(believed, bias[0, complete, :n], true)
+            values["nees"][f, complete, c] = _expected_nees(believed, bias[0, complete, :n], true)
     return values
 
 
-def _nees(believed: np.ndarray, bias: np.ndarray, S: np.ndarray) -> np.ndarray:
+def _expected_nees(believed: np.ndarray, bias: np.ndarray, S: np.ndarray) -> np.ndarray:
     """Expected NEES (n,), computed in units of the believed σ, so that the matrices are well conditioned."""
     unit = np.sqrt(np.diagonal(believed, axis1=1, axis2=2))
     units = unit[:, :, None] * unit[:, None, :]
     return consistency(believed / units, bias / unit, S / units)
 
 
-def _ahead(scene: Scene, c: int, bias: np.ndarray, S: np.ndarray, share: np.ndarray) -> np.ndarray:
+def _extrapolated_sigma(scene: Scene, c: int, bias: np.ndarray, S: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Exact σ (K',) of the value extrapolated to the next scan; NaN for the last scan."""
     reach = S.shape[1]
     out = np.full(reach, np.nan)

@@ -38,10 +38,10 @@ COMPONENTS = (
     Component("ve", "rad/s", "$v_\\varepsilon$", term("rate of elevation")),
     Component("ae", "rad/s2", "$a_\\varepsilon$", term("second rate of elevation")),
 )
-BY_NAME = {one.name: one for one in COMPONENTS}
+BY_NAME = {component.name: component for component in COMPONENTS}
 
 
-WHAT = {  # of the position or motion, by its name in the table
+QUANTITY_TERMS = {  # of the position or motion, by its name in the table
     "smoothed": term("smoothed"),
     "extrapolated": term("extrapolated"),
     "acceleration": term("acceleration"),
@@ -50,37 +50,41 @@ DRAWN_FROM = {"missed": ("curves",), "believed": ("curves", "consistency")}
 
 
 def figures(
-    results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]", experiment: Experiment
+    results: Sequence[CaseResult[SonarAxes]], tables_by_name: "Mapping[str, pd.DataFrame]", experiment: Experiment
 ) -> dict[str, Figure | None]:
     """sigma_<component> of every component that some case has; and the figures of filters that know their plots."""
-    curves = tables.groups(made["curves"], "case", "filter", "component")
-    drawn: dict[str, Figure | None] = {}
-    for of in COMPONENTS:
-        name = f"sigma_{of.name}"
-        having = [result for result in results if of.name in dict(result.axes.components)]
-        chosen, left_out = panels.shown(having, panels.named(experiment, name))
+    curves = tables.groups(tables_by_name["curves"], "case", "filter", "component")
+    figures_by_name: dict[str, Figure | None] = {}
+    for component in COMPONENTS:
+        name = f"sigma_{component.name}"
+        results_with_component = [result for result in results if component.name in dict(result.axes.components)]
+        chosen, left_out = panels.shown(results_with_component, panels.named(experiment, name))
         if chosen:
-            figure = sigma_figure(name, chosen, curves, of, left_out)
+            figure = sigma_figure(name, chosen, curves, component, left_out)
             if figure and len(results) == 1:
-                figure = panels.floored(figure, made["curves"], of.name, panels.in_degrees(of.unit)[0])
-            drawn[name] = figure
-    known: Any = [result for result in results if isinstance(result.axes, GivenPlotsAxes)]
+                figure = panels.floored(
+                    figure, tables_by_name["curves"], component.name, panels.in_degrees(component.unit)[0]
+                )
+            figures_by_name[name] = figure
+    given_plots_results: Any = [result for result in results if isinstance(result.axes, GivenPlotsAxes)]
     of_tables = {"plots": plots_figure, "smoothing_gains": gains_figure, "conversion": conversion_figure}
-    own = {name: draw(made[name]) for name, draw in of_tables.items() if name in made}
-    own["believed"] = believed_figure(known, made["curves"], made["consistency"])
-    own["missed"] = missed_figure(known, made["curves"])
-    return drawn | own
+    smoothing_figures = {name: draw(tables_by_name[name]) for name, draw in of_tables.items() if name in tables_by_name}
+    smoothing_figures["believed"] = believed_figure(
+        given_plots_results, tables_by_name["curves"], tables_by_name["consistency"]
+    )
+    smoothing_figures["missed"] = missed_figure(given_plots_results, tables_by_name["curves"])
+    return figures_by_name | smoothing_figures
 
 
 def case_lines(
     result: CaseResult[SonarAxes], groups: "Mapping[Any, pd.DataFrame]", component: str, columns: Sequence[str]
 ) -> list[Line]:
     """A line for each filter of a case that has rows; groups are by case, filter and component."""
-    places = enumerate((result.name, f, component) for f in result.axes.filters)
-    return [panels.line(groups[place], columns, place[1], n) for n, place in places if place in groups]
+    keys = enumerate((result.name, f, component) for f in result.axes.filters)
+    return [panels.line(groups[key], columns, key[1], n) for n, key in keys if key in groups]
 
 
-def ends(result: CaseResult) -> list[Reference]:
+def manoeuvre_lines(result: CaseResult) -> list[Reference]:
     """Lines at the start and the end of a manoeuvre, where there is one."""
     times = getattr(result.axes, "manoeuvre_s", None) or ()
     return [Reference(when, "x") for when in times if 0 < when < result.axes.t_s[-1]]
@@ -90,36 +94,36 @@ def sigma_figure(
     name: str,
     results: Sequence[CaseResult[SonarAxes]],
     curves: "Mapping[Any, pd.DataFrame]",
-    of: Component,
+    component: Component,
     left_out: str,
 ) -> Figure | None:
     """σ(t) of one component: a panel for each case, a line for each filter."""
-    drawn = []
-    factor, unit = panels.in_degrees(of.unit)
+    figure_panels = []
+    factor, unit = panels.in_degrees(component.unit)
     shared = panels.shared_keys(results)
     for result in results:
-        marks = [panels.scaled(one, factor) for one in case_lines(result, curves, of.name, panels.SIGMA)]
+        marks = [panels.scaled(line, factor) for line in case_lines(result, curves, component.name, panels.SIGMA)]
         if marks:
-            y = panels.fitting_axis(panels.sigma_of(of.symbol, unit), marks)
-            shown: tuple[Mark, ...] = (*ends(result), *marks)
+            y = panels.fitting_axis(panels.sigma_of(component.symbol, unit), marks)
+            marks_of_panel: tuple[Mark, ...] = (*manoeuvre_lines(result), *marks)
             title = panels.swept(result, without=shared)
-            drawn.append(Panel(panels.time_axis(), y, shown, title, direct=False))
-    if not drawn:
+            figure_panels.append(Panel(panels.time_axis(), y, marks_of_panel, title, direct=False))
+    if not figure_panels:
         return None
     caption = (
         tr(
             "Root-mean-square error of the {name} about the truth against time, of {count:,} realisations. "
             "Bands: 95 % intervals; a band that is not visible is narrower than the line.",
-            name=of.words,
+            name=component.words,
             count=results[0].count,
         )
-        + (" " + tr("Dotted: beginning and end of the manoeuvre.") if any(map(ends, results)) else "")
+        + (" " + tr("Dotted: beginning and end of the manoeuvre.") if any(map(manoeuvre_lines, results)) else "")
         + left_out
     )
     if shared:
         same = panels.swept(results[0], without={key for key, _ in results[0].swept} - shared)
         caption += " " + tr("All panels: {values}.", values=panels.plain(same))
-    figure = panels.in_columns(Figure(name, tr("σ of the {name}", name=of.words), caption, tuple(drawn)))
+    figure = panels.in_columns(Figure(name, tr("σ of the {name}", name=component.words), caption, tuple(figure_panels)))
     return figure
 
 
@@ -131,19 +135,25 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
         return None
     accuracy: list[Mark] = [Reference(1.0, label=tr("one plot"))]
     bought: list[Mark] = []
-    for n, (what, part) in enumerate(rows.groupby("what", sort=False)):
+    for n, (quantity, quantity_rows) in enumerate(rows.groupby("what", sort=False)):
         accuracy.append(
-            panels.line(part, ("plots", "ratio", "ratio_lo", "ratio_hi", "formula"), tr(WHAT[str(what)]), n)
+            panels.line(
+                quantity_rows,
+                ("plots", "ratio", "ratio_lo", "ratio_hi", "formula"),
+                tr(QUANTITY_TERMS[str(quantity)]),
+                n,
+            )
         )
         x, measured, formula = (
-            part[key].to_numpy(dtype=float)[1:] for key in ("plots", "bought_percent", "formula_bought_percent")
+            quantity_rows[key].to_numpy(dtype=float)[1:]
+            for key in ("plots", "bought_percent", "formula_bought_percent")
         )
-        bought.append(Line(x, measured, tr(WHAT[str(what)]), Style(n, n, n), exact=formula))
+        bought.append(Line(x, measured, tr(QUANTITY_TERMS[str(quantity)]), Style(n, n, n), exact=formula))
     x_axis = panels.counts(tr("plots n"), float(rows["plots"].max()))
     left = Axis(tr("$\\sigma$ / $\\sigma$ of a plot"), limits=(0, None))
-    lost = bool((rows["bought_percent"] < 0).any())  # by chance: of few realisations
-    right = Axis(tr("gained by the n-th plot, %"), limits=(None if lost else 0, None))
-    drawn = (
+    has_loss = bool((rows["bought_percent"] < 0).any())  # by chance: of few realisations
+    right = Axis(tr("gained by the n-th plot, %"), limits=(None if has_loss else 0, None))
+    figure_panels = (
         Panel(x_axis, left, tuple(accuracy), key_title=tr("measured"), direct=False, crosses=tr("the paper's formula")),
         Panel(x_axis, right, tuple(bought), direct=False, crosses=tr("the paper's formula")),
     )
@@ -152,7 +162,7 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
         "of a single plot, growing memory of degree 1. Right: by how "
         "much the n-th plot lowers that σ."
     )
-    return Figure("plots", tr("Benefit of each further plot"), caption, drawn, 2, PAGE_MM)
+    return Figure("plots", tr("Benefit of each further plot"), caption, figure_panels, 2, PAGE_MM)
 
 
 def gains_figure(table: "pd.DataFrame") -> Figure:
@@ -193,14 +203,14 @@ def believed_figure(
     left: list[Mark] = []
     right: list[Mark] = [Reference(1.0, label=tr("consistent"))]
     for n, f in enumerate(cases[0].axes.filters):
-        places = [(r.name, f) for r in cases]
-        rows = true_rows.loc[places]
+        keys = [(r.name, f) for r in cases]
+        rows = true_rows.loc[keys]
         true, claimed = rows["sigma"].to_numpy() / sigma, rows["believed_sigma"].to_numpy() / sigma
-        ends = (rows[key].to_numpy() / sigma for key in ("sigma_lo", "sigma_hi"))
-        left.append(Line(rho, true, f, Style(n, n, n), *ends))
+        bounds = (rows[key].to_numpy() / sigma for key in ("sigma_lo", "sigma_hi"))
+        left.append(Line(rho, true, f, Style(n, n, n), *bounds))
         if np.max(np.abs(claimed / true - 1)) > 0.05:
             left.append(Line(rho, claimed, tr("{f}: own σ", f=f), Style(n, None, n)))
-        rows = consistency_rows.loc[places].assign(rho=rho)
+        rows = consistency_rows.loc[keys].assign(rho=rho)
         right.append(panels.line(rows, ("rho", "nees", "nees_lo", "nees_hi", "exact_nees"), f, n))
     caption = tr(
         "Left: σ of the {name} at plot {last} in σ of a plot, true (lines) and the filter's own (markers "
@@ -211,11 +221,11 @@ def believed_figure(
     )
     x = Axis(tr("correlation $\\rho$ of neighbouring errors"))
     y = Axis(tr("$\\sigma$ / $\\sigma$ of a plot"), limits=(0, 1.75))
-    drawn = (
+    figure_panels = (
         Panel(x, y, tuple(left), direct=False, legend="upper left"),
         Panel(x, Axis(tr("normalised squared error"), "log"), tuple(right), direct=False),
     )
-    return Figure("believed", tr("Consistency of a filter"), caption, drawn, 2, PAGE_MM)
+    return Figure("believed", tr("Consistency of a filter"), caption, figure_panels, 2, PAGE_MM)
 
 
 def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.DataFrame") -> Figure | None:
@@ -223,10 +233,10 @@ def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.Dat
     cases = [r for r in results if r.spec.frame == "polar"]
     if len({r.spec.sensor.detection_probability for r in cases}) < 2:
         return None
-    of = BY_NAME[cases[0].axes.components[0][0]]
-    groups = tables.groups(curves[curves["component"] == of.name], "case", "filter")
-    y = Axis(panels.sigma_of(of.symbol, of.unit), limits=(0, None))
-    drawn = []
+    component = BY_NAME[cases[0].axes.components[0][0]]
+    groups = tables.groups(curves[curves["component"] == component.name], "case", "filter")
+    y = Axis(panels.sigma_of(component.symbol, component.unit), limits=(0, None))
+    figure_panels = []
     for f in cases[0].axes.filters:
         marks = []
         for n, result in enumerate(cases):
@@ -236,17 +246,17 @@ def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.Dat
                 marks.append(
                     panels.line(groups[result.name, f], panels.SIGMA, probability, style, f"$P_D$ = {probability}")
                 )
-        drawn.append(Panel(panels.time_axis(), y, tuple(marks), f, key_title="$P_D$", direct=False))
+        figure_panels.append(Panel(panels.time_axis(), y, tuple(marks), f, key_title="$P_D$", direct=False))
     gap = cases[0].spec.sensor.missed_scans
     caption = tr(
         "σ of the {name} for several detection probabilities (legend), one panel per filter, of "
         "{count:,} realisations. Exact values are means over all patterns of misses, where these can be "
         "enumerated.",
-        name=of.words,
+        name=component.words,
         count=cases[0].count,
     ) + (tr(" Scans {scans} never give a plot.", scans=", ".join(map(str, gap))) if gap else "")
-    columns = min(3, len(drawn))
-    return Figure("missed", tr("What missed plots cost"), caption, tuple(drawn), columns, PAGE_MM, 54)
+    columns = min(3, len(figure_panels))
+    return Figure("missed", tr("What missed plots cost"), caption, tuple(figure_panels), columns, PAGE_MM, 54)
 
 
 def conversion_figure(table: "pd.DataFrame") -> Figure | None:

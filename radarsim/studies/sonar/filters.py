@@ -46,7 +46,7 @@ class ModelPair(NamedTuple):
 
 
 class DetectorTest(NamedTuple):
-    """A test of the last plots, every so many scans, with thresholds (G, T); none where only a filter needs it."""
+    """A test of the last plots every so many scans, with thresholds (G, T); no thresholds if only a filter needs it."""
 
     plots: int
     every: int
@@ -59,10 +59,10 @@ def detector_arrays(
     """The measured detectors, then those that adaptive filters need in addition; phase (K,) of the manoeuvre.
 
     needed holds plots, and scans from one test to the next."""
-    tests, none = list(measured), np.zeros((coordinates + 1, 0))
+    tests, no_thresholds = list(measured), np.zeros((coordinates + 1, 0))
     for plots, every in needed:
         if (plots, every) not in [test[:2] for test in tests]:
-            tests.append(DetectorTest(plots, every, none))
+            tests.append(DetectorTest(plots, every, no_thresholds))
     count = np.array([test.thresholds.shape[1] for test in tests], dtype=np.int64)
     threshold = np.zeros((len(tests), coordinates + 1, max(count, default=0)))
     for d, test in enumerate(tests):
@@ -91,7 +91,7 @@ class Plots:
         return (self.t[k] - self.t[k - 1]) / self.period if k else 0.0
 
     def moments(self) -> np.ndarray:
-        """The number (M, K) of distinct times of plots so far: as many unknowns of a polynomial can be determined."""
+        """The number (M, K) of distinct times of plots so far: as many coefficients of a polynomial are determined."""
         fresh, last = self.weight > 0, np.full(len(self.weight), -np.inf)
         for k, time in enumerate(self.t):
             last, fresh[:, k] = np.where(fresh[:, k], time, last), fresh[:, k] & (time > last)
@@ -132,7 +132,7 @@ def recursive(
     patterns, scans = plots.weight.shape
     gain, P = np.zeros((patterns, scans, 4)), np.zeros((patterns, scans, 3, 3))
     carry, times = step_correlations(rho, plots.t, plots.period), plots.moments()
-    before = zero = np.zeros(patterns)
+    previous_count = zero = np.zeros(patterns)
     Y, J = (zero,) * 8, (zero,) * 10
     variance = plots.scaled(manoeuvre_variance or 0.0, size)
     with np.errstate(divide="ignore", invalid="ignore"):  # of choices that are not taken
@@ -141,8 +141,8 @@ def recursive(
             Y, K, packed = steps.least_squares(Y, times[:, k] - (w > 0), w, step, carry[k], size)
             if manoeuvre_variance is not None:
                 model = steps.Model(size, max(size, start), carry[k], variance, fixed)
-                J, K, packed = steps.kalman(J, (K, packed), before, w, step, model)
-            gain[:, k], P[:, k], before = np.stack(K, axis=1), unpack(packed), times[:, k]
+                J, K, packed = steps.kalman(J, (K, packed), previous_count, w, step, model)
+            gain[:, k], P[:, k], previous_count = np.stack(K, axis=1), unpack(packed), times[:, k]
     scale = plots.period ** -np.arange(3.0)
     covariance = P * plots.sigma**2 * np.outer(scale, scale)
     return Design(size, gain * np.append(scale, 1.0), carry, covariance, plots.moments())
@@ -160,11 +160,13 @@ def settled_gain(period: float, sigma: float, size: int, manoeuvre_variance: flo
 
 
 def window_weights(plots: Plots, k: int, length: int, size: int) -> tuple[int, np.ndarray, np.ndarray]:
-    """Least squares on the last `length` plots up to scan k, extrapolated to k where k itself is missed. Returns the
-    first scan of the window, the weights (M, 3, n) of the plots from there on, and the covariance (M, 3, 3)."""
-    seen = plots.weight[:, : k + 1] > 0
-    count = np.cumsum(seen, axis=1)
-    inside = seen & (count > count[:, -1:] - length)
+    """Least squares on the last `length` plots up to scan k, extrapolated to k where k itself is missed.
+
+    Returns the first scan of the window, the weights (M, 3, n) of the plots from there on, and the covariance (M, 3,
+    3)."""
+    is_detected = plots.weight[:, : k + 1] > 0
+    count = np.cumsum(is_detected, axis=1)
+    inside = is_detected & (count > count[:, -1:] - length)
     first = int(np.argmax(inside.any(axis=0))) if inside.any() else k
     w = np.where(inside, plots.weight[:, : k + 1], 0.0)[:, first:]
     since = (plots.t[first : k + 1] - plots.t[k]) / plots.period
@@ -286,14 +288,14 @@ def shared_bank(specs: Sequence[FilterSpec], designs: Sequence[Sequence[FilterDe
     weights, inverse = np.zeros((F, K, C, 3, longest)), np.zeros((F, K, C, 6))
     detected = np.stack([p.weight[0] > 0 for p in plots], axis=1)
     order = np.cumsum(detected, axis=0) - 1
-    known = np.stack([np.stack([design.known[0] for design in row], axis=1) for row in designs])
+    estimated_sizes = np.stack([np.stack([design.known[0] for design in row], axis=1) for row in designs])
     for f, spec in enumerate(specs):
         for c, design in enumerate(designs[f]):
             if design.recursion is None:
                 weights[f, :, c] = ring_weights(design, order[:, c], longest)
             else:
                 gain[f, :, c], carry[f, :, c] = design.recursion.gain[0], design.recursion.carry
-            inverse[f, :, c] = packed_inverse(design.covariance[0], known[f, :, c] == spec.size, spec.size)
+            inverse[f, :, c] = packed_inverse(design.covariance[0], estimated_sizes[f, :, c] == spec.size, spec.size)
     return SharedBank(
         gain=gain,
         carry=carry,
@@ -301,7 +303,7 @@ def shared_bank(specs: Sequence[FilterSpec], designs: Sequence[Sequence[FilterDe
         length=length,
         weights=weights,
         slot=np.where(detected, order % max(longest, 1), -1),
-        known=known,
+        known=estimated_sizes,
         size=np.array([f.size for f in specs]),
         inverse=inverse,
     )

@@ -37,8 +37,9 @@ class Scene:
         return Plots(self.t[:scans], weight, self.period, self.nominal[c])
 
     def patterns(self) -> tuple[np.ndarray, np.ndarray]:
-        """All patterns (M, K') of plots in the first scans, with their probabilities (M,). K' is the number of scans up
-        to which there are at most 2 ** MOST_OPEN patterns."""
+        """All patterns (M, K') of plots in the first scans, with their probabilities (M,).
+
+        K' is the number of scans up to which there are at most 2 ** MOST_OPEN patterns."""
         reach = int(np.searchsorted(np.cumsum(self.certain < 0), MOST_OPEN, side="right"))
         free = np.flatnonzero(self.certain[:reach] < 0)
         detected = np.tile(np.maximum(self.certain[:reach], 0), (2 ** len(free), 1))
@@ -55,10 +56,10 @@ def build_scene(case: Case) -> Scene:
     t, sigma = schedule(sensor, spec.scans)
     with np.errstate(invalid="ignore", divide="ignore"):
         polar, cartesian = courses(spec.target, t, third)
-    if not (away := polar[:, 0, 0] > NEAREST_M).all():
-        k = int(np.argmin(away))
-        least = f"its range must stay > {NEAREST_M:g} m"
-        fault = f"{least}, is {polar[k, 0, 0]:.3g} m at {t[k]:g} s, plot {k + 1} of {len(t)}"
+    if not (is_far_enough := polar[:, 0, 0] > NEAREST_M).all():
+        k = int(np.argmin(is_far_enough))
+        requirement = f"its range must stay > {NEAREST_M:g} m"
+        fault = f"{requirement}, is {polar[k, 0, 0]:.3g} m at {t[k]:g} s, plot {k + 1} of {len(t)}"
         raise ConfigError(f"{case.name}: target: {fault}")
     if third is not None:
         first_sonar = np.isin(np.arange(len(t)), np.flatnonzero(sigma[:, 0] == sensor.sigma_range_m))
@@ -95,10 +96,10 @@ def schedule(sensor: Sensor, scans: int) -> tuple[np.ndarray, np.ndarray]:
     """Times (K,) of all sonars' plots, in order, and σ (K, 2) of range and bearing, infinite where not measured."""
     t = [np.arange(scans) * sensor.scan_period_s]
     sigma = [np.tile([sensor.sigma_range_m, sensor.sigma_bearing_rad], (scans, 1))]
-    for further in sensor.further:
-        times = np.arange(further.first_s, t[0][-1] + 1e-9, further.scan_period_s)
+    for further_sensor in sensor.further:
+        times = np.arange(further_sensor.first_s, t[0][-1] + 1e-9, further_sensor.scan_period_s)
         t.append(times)
-        spread = [np.inf if s is None else s for s in (further.sigma_range_m, further.sigma_bearing_rad)]
+        spread = [np.inf if s is None else s for s in (further_sensor.sigma_range_m, further_sensor.sigma_bearing_rad)]
         sigma.append(np.tile(spread, (len(times), 1)))
     order = np.argsort(np.concatenate(t), kind="stable")
     return np.concatenate(t)[order], np.concatenate(sigma)[order]
@@ -144,8 +145,8 @@ def filter_specs(spec: Keys) -> list[FilterSpec]:
     scale = lateral_scale(spec, 2)
     specs = []
     for member in spec.filters:
-        given = member.error_correlation
-        rho = spec.sensor.error_correlation if given is None else given
+        filter_correlation = member.error_correlation
+        rho = spec.sensor.error_correlation if filter_correlation is None else filter_correlation
         correlated = member.kind in CORRELATED
         specs.append(
             FilterSpec(

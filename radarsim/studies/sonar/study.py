@@ -17,9 +17,7 @@ from radarsim.studies.noise import noise_key
 from radarsim.studies.sonar import filters
 from radarsim.studies.sonar.config import Keys
 from radarsim.studies.sonar.exact import exact_values
-from radarsim.studies.sonar.kernels import detector
-from radarsim.studies.sonar.kernels import patterns as pattern_kernels
-from radarsim.studies.sonar.kernels import shared_gains as kernels
+from radarsim.studies.sonar.kernels import detector, patterns, shared_gains
 from radarsim.studies.sonar.scene import Scene, build_scene, filter_specs, third_coordinate
 from radarsim.studies.sonar.world import GivenPlotsAxes, conversion_bias, step_correlations
 
@@ -29,7 +27,7 @@ THIRD = {"depth": ("d", "m"), "elevation": ("e", "rad")}
 
 
 # ---- what the kernels observe -------------------------------------------------------------------------------------
-def world(case: Case, scene: Scene) -> kernels.World:
+def world(case: Case, scene: Scene) -> shared_gains.World:
     """The kernels' world; its coordinates are padded to an even number."""
     K, C = scene.sigma.shape
     wide = C + C % 2
@@ -39,17 +37,17 @@ def world(case: Case, scene: Scene) -> kernels.World:
     sigma = np.where(np.isfinite(scene.sigma), scene.sigma, 0.0)
     fresh[:, :C], truth[:, :C], walk[:C] = sigma * np.sqrt(1 - steps[:, :C] ** 2), scene.truth, scene.walk
     dt = np.diff(scene.t, prepend=scene.t[0])
-    return kernels.World(noise_key(case, "plots"), noise_key(case, "motion"), dt, truth, steps, fresh, walk)
+    return shared_gains.World(noise_key(case, "plots"), noise_key(case, "motion"), dt, truth, steps, fresh, walk)
 
 
-def detections(case: Case, scene: Scene) -> pattern_kernels.Detections:
+def detections(case: Case, scene: Scene) -> patterns.Detections:
     """Which scans give a plot."""
-    return pattern_kernels.Detections(noise_key(case, "misses"), scene.certain, scene.probability)
+    return patterns.Detections(noise_key(case, "misses"), scene.certain, scene.probability)
 
 
-def conversion(case: Case, scene: Scene) -> pattern_kernels.Conversion:
+def conversion(case: Case, scene: Scene) -> patterns.Conversion:
     """How plots are converted to the frame of the filters."""
-    return pattern_kernels.Conversion(
+    return patterns.Conversion(
         weight=(scene.nominal / scene.sigma) ** 2,
         frame=FRAMES.index(case.spec.frame),
         measured=np.ascontiguousarray(scene.polar[:, :2, 0]),
@@ -60,8 +58,9 @@ def conversion(case: Case, scene: Scene) -> pattern_kernels.Conversion:
 def designs(
     specs: Sequence[filters.FilterSpec], scene: Scene, detected: np.ndarray
 ) -> list[list[filters.FilterDesign]]:
-    """The designs of each filter in each coordinate, for patterns detected (M, K') of plots. A filter that responds to
-    manoeuvres has none, because its gains depend on the plots."""
+    """The designs of each filter in each coordinate, for patterns detected (M, K') of plots.
+
+    A filter that responds to manoeuvres has no design, because its gains depend on the plots."""
     return [
         [filters.design_filter(spec, c, scene.plots(c, detected)) for c in range(len(scene.nominal))]
         if spec.response is None
@@ -71,28 +70,30 @@ def designs(
 
 
 def drawn_plots(
-    world: kernels.World, detections: pattern_kernels.Detections, first: int, count: int, what: int = 0
+    world: shared_gains.World, detections: patterns.Detections, first: int, count: int, source_row: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Plots of realisations first … first + count - 1 (C, count, K), or their errors (what = 1), not-a-number where a
-    scan gives none; and the deviation of the target's value and rate (C, 2, count, K), or (C, 2, 1, 1) where none moves
-    at random. C is the world's padded number of coordinates."""
+    """Draw the plots (C, count, K) of realisations first … first + count - 1, or their errors (source_row 1).
+
+    NaN where a scan gives no plot. Also returns the deviation of the target's value and rate (C, 2, count, K), or
+    (C, 2, 1, 1) if no target moves at random. C is the world's padded number of coordinates."""
     K, C = world.fresh.shape
     plots, deviation = np.empty((C, K, count)), np.zeros((C, 2, K, count) if world.walk.any() else (C, 2, 1, 1))
-    pattern_kernels.fill_plots(world, detections, first, what, plots, deviation)
+    patterns.fill_plots(world, detections, first, source_row, plots, deviation)
     return plots.swapaxes(1, 2), deviation.swapaxes(2, 3)
 
 
 def truth_of(scene: Scene, deviation: np.ndarray, count: int, size: int) -> np.ndarray:
-    """True states (count, K, C size), size components of each coordinate, of realisations with a deviation from
-    `drawn_plots`; a view that cannot be written where all have the same."""
+    """True states (count, K, C size), with size components of each coordinate, by a deviation from `drawn_plots`.
+
+    A read-only view if all realisations have the same states."""
     K, C, _ = scene.truth.shape
     true = scene.truth[..., :size].reshape(K, -1)
     if deviation.shape[-1] == 1:
         return np.broadcast_to(true, (count, K, C * size))
-    made = np.empty((C * size, K, count))
-    made[:] = true.T[..., None]
-    made.reshape(C, size, K, count)[:, :2] += deviation[:C].swapaxes(2, 3)
-    return made.transpose(2, 1, 0)
+    states = np.empty((C * size, K, count))
+    states[:] = true.T[..., None]
+    states.reshape(C, size, K, count)[:, :2] += deviation[:C].swapaxes(2, 3)
+    return states.transpose(2, 1, 0)
 
 
 # ---- labels -------------------------------------------------------------------------------------------------------
@@ -139,18 +140,20 @@ def axes(
     scene: Scene,
     specs: Sequence[filters.FilterSpec],
     values: Mapping[str, np.ndarray],
-    known: np.ndarray | None = None,
+    estimated_sizes: np.ndarray | None = None,
 ) -> GivenPlotsAxes:
-    """Labels and exact values; known (F, K, C) estimated components, by default as many as plots may determine."""
+    """Labels and exact values of a case.
+
+    estimated_sizes (F, K, C): numbers of estimated components, by default as many as the plots may determine."""
     size = values["sigma"].shape[3]
     possible = (scene.certain != 0).astype(float)[None]
-    sizes = np.array([one.size for one in specs])
-    if known is None:
+    sizes = np.array([filter_spec.size for filter_spec in specs])
+    if estimated_sizes is None:
         times = [scene.plots(c, possible).moments()[0] for c in range(len(scene.nominal))]
-        known = np.minimum(np.stack(times, axis=1)[None], sizes[:, None, None])
+        estimated_sizes = np.minimum(np.stack(times, axis=1)[None], sizes[:, None, None])
     plain = spec.frame == "cartesian"
     return GivenPlotsAxes(
-        **common_labels(spec, scene, sizes, known[..., None] > np.arange(size), values),
+        **common_labels(spec, scene, sizes, estimated_sizes[..., None] > np.arange(size), values),
         rho=scene.rho,
         sigma_of_plots=np.where(possible.T > 0, scene.sigma, np.inf),
         conversion_bias=float(conversion_bias(scene.polar[0, 0, 0], spec.sensor.sigma_bearing_rad)) if plain else 0.0,
@@ -165,38 +168,38 @@ def shapes(F: int, K: int, C: int, size: int) -> dict[str, tuple[int, ...]]:
     return sums | {"error": (F, K, C * size, 4), "joint": (F, K, C, 4), "ahead": (F, K, C, 4)}
 
 
-def empty_sums(F: int, K: int, C: int) -> kernels.Sums:
+def empty_sums(F: int, K: int, C: int) -> shared_gains.Sums:
     """The sums that the kernels add to: always three components in a coordinate."""
     tails = {"error": (3, 4), "paired": (3,), "joint": (4,), "ahead": (4,), "believed": (3,), "estimates": (3,)}
-    return kernels.Sums(**{name: np.zeros((F, K, C, *tail)) for name, tail in tails.items()})
+    return shared_gains.Sums(**{name: np.zeros((F, K, C, *tail)) for name, tail in tails.items()})
 
 
-def packed(layout: Layout, sums: kernels.Sums, **more: np.ndarray) -> np.ndarray:
-    """The sums of a block in the order of a layout, without those that it does not contain; more: those of one part."""
+def packed(layout: Layout, sums: shared_gains.Sums, **more: np.ndarray) -> np.ndarray:
+    """The sums of a block in the order of a layout, without those that it does not contain; more: sums of one part."""
     size = layout.shapes["error"][2] // sums.error.shape[2]
     arrays = dict(more)
     for name, values in sums._asdict().items():
         if name in layout.shapes:
-            own = values if name in ("joint", "ahead") else values[:, :, :, :size]
-            arrays[name] = own.reshape(layout.shapes[name])
+            part = values if name in ("joint", "ahead") else values[:, :, :, :size]
+            arrays[name] = part.reshape(layout.shapes[name])
     return layout.pack(**{name: values for name, values in arrays.items() if name in layout.shapes})
 
 
-def of_components(each: np.ndarray) -> np.ndarray:
-    """Errors (F, n, K, C S) of those (F, K, C, S, n) of each coordinate."""
-    return np.moveaxis(each.reshape(*each.shape[:2], -1, each.shape[4]), 3, 1)
+def of_components(errors: np.ndarray) -> np.ndarray:
+    """Reorder errors (F, K, C, S, n) to (F, n, K, C S)."""
+    return np.moveaxis(errors.reshape(*errors.shape[:2], -1, errors.shape[4]), 3, 1)
 
 
 @dataclass(frozen=True)
 class RealisationPlan:
-    """A plan of filters whose gains differ between realisations; kept (A,) are scans whose estimates are kept."""
+    """A plan of filters whose gains differ between realisations; kept (A,) are the scans whose estimates are stored."""
 
     layout: Layout
     axes: GivenPlotsAxes
-    world: kernels.World
-    detections: pattern_kernels.Detections
-    conversion: pattern_kernels.Conversion
-    bank: pattern_kernels.RealisationBank
+    world: shared_gains.World
+    detections: patterns.Detections
+    conversion: patterns.Conversion
+    bank: patterns.RealisationBank
     detectors: detector.Detectors
     kept: np.ndarray
     block: int = BLOCK
@@ -208,28 +211,29 @@ class RealisationPlan:
 
     def errors(self, first: int, count: int) -> np.ndarray:
         """The errors (F, count, K, C S) of one block's realisations."""
-        return of_components(self.block_sums(first, count, count).each)
+        return of_components(self.block_sums(first, count, count).realisation_errors)
 
-    def block_sums(self, first: int, count: int, kept: int = 0) -> pattern_kernels.BlockSums:
+    def block_sums(self, first: int, count: int, error_count: int = 0) -> patterns.BlockSums:
         """The sums of one block as the kernels compute them, and the errors of all its realisations or of none."""
         F, K, C = self.bank.carry.shape
         D, G, T = self.detectors.threshold.shape
         alarms = detector.Alarms(np.zeros((D, G, K)), np.zeros((D, G, T, K)), np.zeros((D, G, T, K)))
         estimates = np.zeros((len(self.kept), F, 2, 6, count))
-        each = np.full((F, K, C, int(self.bank.size.max()), kept), np.nan)
+        errors = np.full((F, K, C, int(self.bank.size.max()), error_count), np.nan)
         modes = np.zeros((F, K, C, 3))
-        sums = pattern_kernels.BlockSums(empty_sums(F, K, C), alarms, modes, self.kept, estimates, each)
+        sums = patterns.BlockSums(empty_sums(F, K, C), alarms, modes, self.kept, estimates, errors)
         inputs = (self.world, self.detections, self.conversion, self.bank, self.detectors)
-        pattern_kernels.simulate_block(*inputs, first, count, self.axes.baseline, sums)
+        patterns.simulate_block(*inputs, first, count, self.axes.baseline, sums)
         return sums
 
 
 def realisation_plan(
     case: Case, scene: Scene, specs: Sequence[filters.FilterSpec], detectors: detector.Detectors
 ) -> RealisationPlan:
-    """The plan of a case whose gains differ between realisations, with exact values by patterns of plots. None are
-    known in the cartesian frames, where weights depend on the plots."""
-    spec, (K, C), size = case.spec, scene.sigma.shape, max(one.size for one in specs)
+    """The plan of a case whose gains differ between realisations, with exact values by patterns of plots.
+
+    No values are known in the cartesian frames, where weights depend on the plots."""
+    spec, (K, C), size = case.spec, scene.sigma.shape, max(filter_spec.size for filter_spec in specs)
     if spec.frame == "polar":
         detected, probability = scene.patterns()
         values = exact_values(scene, designs(specs, scene, detected), probability, size)
@@ -254,8 +258,8 @@ class SharedPlan:
 
     layout: Layout
     axes: GivenPlotsAxes
-    world: kernels.World
-    bank: kernels.SharedBank
+    world: shared_gains.World
+    bank: shared_gains.SharedBank
     believed: np.ndarray
     block: int = BLOCK
     gaussian = True
@@ -271,11 +275,12 @@ class SharedPlan:
         """The errors (F, count, K, C S) of one block's realisations."""
         return of_components(self._simulated(first, count, count)[1])
 
-    def _simulated(self, first: int, count: int, kept: int) -> tuple[kernels.Sums, np.ndarray]:
-        """The sums of one block, and the errors (F, K, C, S, kept) of all its realisations or of none."""
-        sums, each = empty_sums(*self.bank.known.shape), np.empty((*self.bank.known.shape, self.bank.size.max(), kept))
-        kernels.simulate_block(self.world, self.bank, first, count, self.axes.baseline, sums, each)
-        return sums, each
+    def _simulated(self, first: int, count: int, error_count: int) -> tuple[shared_gains.Sums, np.ndarray]:
+        """The sums of one block, and the errors (F, K, C, S, error_count) of all its realisations or of none."""
+        sums = empty_sums(*self.bank.known.shape)
+        errors = np.empty((*self.bank.known.shape, self.bank.size.max(), error_count))
+        shared_gains.simulate_block(self.world, self.bank, first, count, self.axes.baseline, sums, errors)
+        return sums, errors
 
 
 def prepare(case: Case) -> SharedPlan | RealisationPlan:
@@ -288,12 +293,12 @@ def prepare(case: Case) -> SharedPlan | RealisationPlan:
 
 
 def _shared_plan(case: Case, scene: Scene, specs: list[filters.FilterSpec]) -> SharedPlan:
-    size = max(one.size for one in specs)
-    designed = designs(specs, scene, np.maximum(scene.certain, 0)[None])
-    bank = filters.shared_bank(specs, designed)
+    size = max(filter_spec.size for filter_spec in specs)
+    designs_by_filter = designs(specs, scene, np.maximum(scene.certain, 0)[None])
+    bank = filters.shared_bank(specs, designs_by_filter)
     F, K, C = bank.known.shape
-    covariance = np.array([[design.covariance[0] for design in row] for row in designed])
-    values = exact_values(scene, designed, np.ones(1), size)
+    covariance = np.array([[design.covariance[0] for design in row] for row in designs_by_filter])
+    values = exact_values(scene, designs_by_filter, np.ones(1), size)
     return SharedPlan(
         layout=Layout(**shapes(F, K, C, size)),
         axes=axes(case.spec, scene, specs, values, bank.known),

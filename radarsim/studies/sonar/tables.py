@@ -20,8 +20,9 @@ table = common.Tables()
 
 
 # ---- parts of tables ----------------------------------------------------------------------------------------------
-def of_coordinates(result: CaseResult[SonarAxes], mask: np.ndarray) -> tuple[Index, dict[str, np.ndarray]]:
-    """Where mask (F, K, C) is true: indices (filter, scan, coordinate), each (n,), and the first columns of these rows.
+def coordinate_rows(result: CaseResult[SonarAxes], mask: np.ndarray) -> tuple[Index, dict[str, np.ndarray]]:
+    """The indices (filter, scan, coordinate), each (n,), where mask (F, K, C) is true, and the rows' first columns.
+
     Rows are ordered by filter, coordinate, scan."""
     f, c, k = np.nonzero(np.moveaxis(mask, 1, 2))
     names, units = zip(*result.axes.coordinates, strict=True)
@@ -29,7 +30,7 @@ def of_coordinates(result: CaseResult[SonarAxes], mask: np.ndarray) -> tuple[Ind
 
 
 # ---- tables -------------------------------------------------------------------------------------------------------
-def complete(result: CaseResult[SonarAxes]) -> np.ndarray:
+def complete_counts(result: CaseResult[SonarAxes]) -> np.ndarray:
     """The number of realisations (F, K, C) in which the state of a filter is complete in a coordinate."""
     counts = np.asarray(result.sums["estimates"])
     split = counts.reshape(*counts.shape[:2], len(result.axes.coordinates), -1)
@@ -39,18 +40,18 @@ def complete(result: CaseResult[SonarAxes]) -> np.ndarray:
 @table("extrapolation")
 def _extrapolation(result: CaseResult[SonarAxes]) -> Columns:
     """σ of each coordinate extrapolated by one scan, in the row of the scan that it is extrapolated from."""
-    n = complete(result)
+    n = complete_counts(result)
     mask = n > 0
     mask[:, -1] = False
-    at, columns = of_coordinates(result, mask)
-    of = statistics.errors(result.sums["ahead"][at], n[at])
+    index, columns = coordinate_rows(result, mask)
+    statistics_of_errors = statistics.errors(result.sums["ahead"][index], n[index])
     return {
         **columns,
-        "n": n[at].astype(np.int64),
-        "sigma": of.sigma,
-        "bias": of.bias,
-        "bias_se": of.bias_se,
-        "exact_sigma": result.axes.exact_ahead[at],
+        "n": n[index].astype(np.int64),
+        "sigma": statistics_of_errors.sigma,
+        "bias": statistics_of_errors.bias,
+        "bias_se": statistics_of_errors.bias_se,
+        "exact_sigma": result.axes.exact_ahead[index],
     }
 
 
@@ -65,14 +66,14 @@ def _curves(result: CaseResult[SonarAxes]) -> Columns:
 @table("consistency")
 def _normalised_errors(result: CaseResult[SonarAxes]) -> Columns:
     """NEES of a coordinate's state, where it is complete; the bounds are shared among all scans of a filter."""
-    n = complete(result)
-    at, columns = of_coordinates(result, n > 0)
-    looks = np.sum(n > 0, axis=1)[at[0], at[2]]
-    size, n = result.axes.sizes[at[0]], n[at]
-    joint = result.sums["joint"][at]
+    n = complete_counts(result)
+    index, columns = coordinate_rows(result, n > 0)
+    looks = np.sum(n > 0, axis=1)[index[0], index[2]]
+    size, n = result.axes.sizes[index[0]], n[index]
+    joint = result.sums["joint"][index]
     mean = statistics.mean_square(joint[:, 0] / size, joint[:, 1] / size**2, n)
     bounds = statistics.normalised_bounds(size * n, looks)
-    nees = notes.normalised("nees", mean, bounds, result.axes.exact_nees[at] / size)
+    nees = notes.normalised("nees", mean, bounds, result.axes.exact_nees[index] / size)
     return {**columns, "n": n.astype(np.int64), **nees}
 
 
@@ -94,16 +95,22 @@ def _operations(results: Sequence[CaseResult[SonarAxes]]) -> "pd.DataFrame":
 
 # ---- smoothing -----------------------------------------------------------------------------------------------------
 def textbook(result: CaseResult[GivenPlotsAxes]) -> bool:
-    """Whether the paper's closed forms apply: known plots, equal intervals and weights, white errors, none missed."""
+    """Whether the closed forms apply: known association, equal intervals and weights, white errors, no misses."""
     sensor, target = result.spec.sensor, result.spec.target
-    complete = sensor.detection_probability == 1 and not sensor.missed_scans and not sensor.further
+    has_all_plots = sensor.detection_probability == 1 and not sensor.missed_scans and not sensor.further
     polynomial = target.kind == "polynomial" and result.spec.frame == target.frame == "polar"
     straight = polynomial and not any(any(c[2:]) for c in (target.range_m, target.bearing_rad))
-    known = isinstance(result.axes, GivenPlotsAxes)
-    return known and complete and straight and not target.fluctuation_mps2 and not result.axes.rho.any()
+    is_known_association = isinstance(result.axes, GivenPlotsAxes)
+    return (
+        is_known_association
+        and has_all_plots
+        and straight
+        and not target.fluctuation_mps2
+        and not result.axes.rho.any()
+    )
 
 
-def _width(result: CaseResult[GivenPlotsAxes]) -> int:
+def _components_per_coordinate(result: CaseResult[GivenPlotsAxes]) -> int:
     """Components of a coordinate."""
     return len(result.axes.components) // len(result.axes.coordinates)
 
@@ -121,39 +128,39 @@ def _plots(result: CaseResult[GivenPlotsAxes]) -> Columns:
     """
     return stacked(
         [
-            _bought(result, f, c, what)
+            _plot_gains(result, f, c, quantity)
             for f, member in enumerate(result.spec.filters)
             if member.kind == "growing_memory"
             for c in range(len(result.axes.coordinates))
-            for what in ("smoothed", "extrapolated", "acceleration")[: member.degree + 1]
+            for quantity in ("smoothed", "extrapolated", "acceleration")[: member.degree + 1]
         ]
     )
 
 
-def _bought(result: CaseResult[GivenPlotsAxes], f: int, c: int, what: str) -> Columns:
+def _plot_gains(result: CaseResult[GivenPlotsAxes], f: int, c: int, quantity: str) -> Columns:
     axes, member = result.axes, result.spec.filters[f]
-    n = np.arange(member.degree + 1, len(axes.k) + (what != "extrapolated"))
+    n = np.arange(member.degree + 1, len(axes.k) + (quantity != "extrapolated"))
     formula: np.ndarray = np.full(len(n), np.nan)
-    if what == "acceleration":
+    if quantity == "acceleration":
         unit, formula = axes.sigma[c] / axes.scan_period_s**2, np.asarray(exact.sigma_acceleration(n, 1.0))
-        moments = result.sums["error"][f, n - 1, _width(result) * c + 2]
-    elif what == "extrapolated":
+        moments = result.sums["error"][f, n - 1, _components_per_coordinate(result) * c + 2]
+    elif quantity == "extrapolated":
         unit, moments = axes.sigma[c], result.sums["ahead"][f, n - 1, c]
     else:
-        unit, moments = axes.sigma[c], result.sums["error"][f, n - 1, _width(result) * c]
+        unit, moments = axes.sigma[c], result.sums["error"][f, n - 1, _components_per_coordinate(result) * c]
     if member.degree == 1:
-        known = exact.sigma_smoothed if what == "smoothed" else exact.sigma_extrapolated
-        formula = np.asarray(known(n))
-    of = statistics.root_mean_square(moments[:, 1], moments[:, 3], result.count)
+        formula_function = exact.sigma_smoothed if quantity == "smoothed" else exact.sigma_extrapolated
+        formula = np.asarray(formula_function(n))
+    rms = statistics.root_mean_square(moments[:, 1], moments[:, 3], result.count)
     return {
         **leading(result, np.full(len(n), f)),
         "degree": np.full(len(n), member.degree),
         "component": np.full(len(n), axes.coordinates[c][0], dtype=object),
-        "what": np.full(len(n), what, dtype=object),
+        "what": np.full(len(n), quantity, dtype=object),
         "plots": n,
-        "ratio": statistics.Estimate(*(part / unit for part in of)),
+        "ratio": statistics.Estimate(*(bound / unit for bound in rms)),
         "formula": formula,
-        "bought_percent": np.append(np.nan, 100 * (1 - of.value[1:] / of.value[:-1])),
+        "bought_percent": np.append(np.nan, 100 * (1 - rms.value[1:] / rms.value[:-1])),
         "formula_bought_percent": np.append(np.nan, 100 * (1 - formula[1:] / formula[:-1])),
     }
 
@@ -174,12 +181,12 @@ def _gains(result: CaseResult[GivenPlotsAxes]) -> Columns:
         plain = member.kind in ("growing_memory", "kalman") and not member.manoeuvre_variance and member.degree == 1
         for c, (name, _) in enumerate(axes.coordinates) if plain else ():
             unit = axes.sigma[c] ** 2
-            square, fourth = result.sums["error"][f, 1:, _width(result) * c, 1::2].T
-            of = statistics.root_mean_square(square, fourth, result.count)
+            square, fourth = result.sums["error"][f, 1:, _components_per_coordinate(result) * c, 1::2].T
+            rms = statistics.root_mean_square(square, fourth, result.count)
             joint = result.sums["joint"][f, 1:, c]
             both = statistics.mean(joint[:, 2], joint[:, 3], result.count)
-            A = statistics.Estimate(*(part**2 / unit for part in of))
-            B = statistics.Estimate(*(part * axes.scan_period_s / unit for part in both))
+            A = statistics.Estimate(*(bound**2 / unit for bound in rms))
+            B = statistics.Estimate(*(bound * axes.scan_period_s / unit for bound in both))
             columns = leading(result, np.full(len(n), f), component=np.full(len(n), name, dtype=object)) | {"plots": n}
             parts.append(columns | {"A": A, "A_formula": A_formula, "B": B, "B_formula": B_formula})
     return stacked(parts)
@@ -199,9 +206,12 @@ def _conversion(result: CaseResult[GivenPlotsAxes]) -> Columns:
     """
     axes, sensor = result.axes, result.spec.sensor
     r, b = axes.polar[0, :2, 0]
-    of = statistics.errors(result.sums["error"][0, 0, [0, _width(result)]], result.count)
+    statistics_of_errors = statistics.errors(
+        result.sums["error"][0, 0, [0, _components_per_coordinate(result)]], result.count
+    )
     along = np.array([np.cos(b), np.sin(b)])
-    bias, half = float(along @ of.bias), statistics.Z95 * float(np.hypot(*(along * of.bias_se)))
+    bias = float(along @ statistics_of_errors.bias)
+    half = statistics.Z95 * float(np.hypot(*(along * statistics_of_errors.bias_se)))
     row = {
         **{"case": result.name, "frame": result.spec.frame, "range_m": float(r)},
         **{"sigma_range_m": sensor.sigma_range_m, "sigma_bearing_rad": sensor.sigma_bearing_rad},

@@ -32,7 +32,7 @@ class SonarAxes(Axes):
 
 @dataclass(frozen=True, kw_only=True)
 class GivenPlotsAxes(SonarAxes):
-    """Labels of cases whose filters know the target's plots: smoothing, and manoeuvres."""
+    """Labels of cases whose filters have known association: smoothing, and manoeuvres."""
 
     rho: np.ndarray  #: (C,) correlation of the errors of neighbouring plots.
     sigma_of_plots: np.ndarray  #: (K, C) standard deviation of each plot, infinite where there never is a plot.
@@ -49,8 +49,9 @@ Values = float | np.ndarray
 
 # ---- errors of plots -------------------------------------------------------------------------------------------------
 def correlation(rho: float, lags: np.ndarray) -> np.ndarray:
-    """ρ to the power of the lags, in periods, an array of any shape (P3 eq. 15). A negative ρ has a meaning at whole
-    periods only, so its lags are rounded."""
+    """ρ to the power of the lags, in periods, an array of any shape (P3 eq. 15).
+
+    A negative ρ has a meaning at whole periods only, so its lags are rounded."""
     if rho < 0:
         lags = np.rint(lags)
         return np.where(lags % 2 == 1, -1.0, 1.0) * np.abs(rho) ** lags
@@ -93,8 +94,9 @@ def turning(
 
 
 def _arc(position: np.ndarray, speed: float, course: float, rate: float, elapsed: np.ndarray) -> np.ndarray:
-    """States (2, n, 3) after `elapsed` seconds of a turn. The chord of an arc of angle a has length speed · elapsed ·
-    sinc(a / 2)."""
+    """States (2, n, 3) after `elapsed` seconds of a turn.
+
+    The chord of an arc of angle a has length speed · elapsed · sinc(a / 2)."""
     half = rate * elapsed / 2
     chord = speed * elapsed * np.sinc(half / np.pi)
     heading = course + 2 * half
@@ -106,8 +108,9 @@ def _arc(position: np.ndarray, speed: float, course: float, rate: float, elapsed
 def accelerating(
     x: float, y: float, speed: float, course: float, acceleration: float, start: float, end: float, t: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """States (K, 3) in x and y of a target on a straight course, accelerated along it from start to end (s, m/s²). The
-    acceleration acts from the very start, and no longer at the end."""
+    """States (K, 3) in x and y of a target on a straight course, accelerated from start to end (s, m/s²).
+
+    The acceleration acts from the very start, and no longer at the end."""
     on, off = np.maximum(t - start, 0.0), np.maximum(t - end, 0.0)
     distance = speed * t + acceleration * (on**2 - off**2) / 2
     rate = speed + acceleration * (on - off)
@@ -147,8 +150,9 @@ def polynomials(coefficients: Sequence[Sequence[float]], t: np.ndarray) -> tuple
 def converted(
     r: np.ndarray, b: np.ndarray, sigma_r: Values, sigma_b: Values
 ) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Plain conversion: x, y and the linearised covariance (xx, xy, yy) of plots r, b; broadcasts. The mean of x and y
-    is exp(-σ_b²/2) times the true value: see `conversion_bias`."""
+    """Plain conversion: x, y and the linearised covariance (xx, xy, yy) of plots r, b; broadcasts.
+
+    The mean of x and y is exp(-σ_b²/2) times the true value: see `conversion_bias`."""
     c, s = np.cos(b), np.sin(b)
     along, across = sigma_r**2 + 0 * r, (r * sigma_b) ** 2
     return r * c, r * s, (along * c**2 + across * s**2, (along - across) * c * s, along * s**2 + across * c**2)

@@ -1,7 +1,7 @@
 """P3's figures of tracks among false plots: a map, confirmation, track life and accuracy, false tracks, classes."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -9,76 +9,84 @@ from radarsim.engine.results import CaseResult
 from radarsim.language import few, listed, term, tr
 from radarsim.report import panels, tables, wording
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Style
-from radarsim.studies.sonar.clutter.filters import ClutterAxes, TrackerSpec, conditions, gate_threshold, tracker_specs
+from radarsim.studies.sonar.clutter.filters import (
+    ClutterAxes,
+    TrackerSpec,
+    gate_threshold,
+    tracker_specs,
+    tracking_conditions,
+)
 from radarsim.studies.sonar.clutter.tables import ENDED
 from radarsim.studies.sonar.clutter.track import confirmed_tracks, false_plots, target_plots
+from radarsim.studies.sonar.config import Keys
 
 if TYPE_CHECKING:
     import pandas as pd
 
-KEYS = {  # columns of the table of tracking, and the keys that they hold
+SWEPT_KEYS = {  # columns of the table `tracking`, and the keys whose values they hold
     "false_plots_per_km2": "sensor.false_plots_per_km2",
     "detection_probability": "sensor.detection_probability",
     "gate_probability": "gate_probability",
 }
-LIFE = term("mean time between ends of a confirmed track (no point: no end occurred)")
-ENDS = term("probability, by importance sampling, that the target's first confirmed track has ended")
-ZERO_AWAY = 3.0  # from zero to the least value above it on a logarithmic axis, as a factor
-UPPER = Style(GREY, None, 4)
-LEVEL = 0.02  # of its largest value: what changes less over a sweep is said, not drawn
+LIFE_CAPTION = term("mean time between ends of a confirmed track (no point: no end occurred)")
+ENDS_CAPTION = term("probability, by importance sampling, that the target's first confirmed track has ended")
+ZERO_FACTOR = 3.0  # between zero and the smallest positive value on a logarithmic axis
+UPPER_END_STYLE = Style(GREY, None, 4)
+MAX_LEVEL_SHARE = 0.02  # of its largest value: a quantity that changes less over a sweep is not drawn, only named
 Results = Sequence[CaseResult[ClutterAxes]]
 DRAWN_FROM = {"confirmation": ("tracks",), "track_life": ("tracking", "curves", "rare"), "false_tracks": ("tracking",)}
 
 
-def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, Figure | None]:
+def figures(results: Results, tables_by_name: "Mapping[str, pd.DataFrame]") -> dict[str, Figure | None]:
     """The figures of these cases, all of which have trackers."""
     if not results:
         return {}
-    drawn = {
-        "track_life": life_figure(results, made),
-        "track_map": map_figure(middle(results)),
-        "confirmation": confirmation_figure(results, made["tracks"]),
-        "false_tracks": false_figure(results, made["tracking"]),
-        "track_classes": classes_figure(results, made["track_classes"]),
+    figures_by_name = {
+        "track_life": life_figure(results, tables_by_name),
+        "track_map": map_figure(middle_case(results)),
+        "confirmation": confirmation_figure(results, tables_by_name["tracks"]),
+        "false_tracks": false_figure(results, tables_by_name["tracking"]),
+        "track_classes": classes_figure(results, tables_by_name["track_classes"]),
     }
-    return drawn
+    return figures_by_name
 
 
-def middle(results: Results) -> CaseResult[ClutterAxes]:
+def middle_case(results: Results) -> CaseResult[ClutterAxes]:
     """The case in the middle, for figures of a single case."""
     return results[(len(results) - 1) // 2]
 
 
 def axis_over(result: CaseResult[ClutterAxes], column: str, table: "pd.DataFrame") -> "tuple[Axis, pd.DataFrame]":
-    """An axis of the swept values of a column of KEYS, logarithmic if they span more than a factor of twenty, and the
-    rows with their places on it: zero stands left of the least one."""
-    label, values = panels.axis_of(result, KEYS[column]), np.unique(table[column].to_numpy(float))
-    above = values[values > 0]
-    if not len(above) or above[-1] / above[0] <= panels.WIDE:
+    """An axis of the swept values of a column of SWEPT_KEYS, and the rows with their positions on it.
+
+    It is logarithmic if the values span more than a factor of twenty; zero then stands left of the smallest one."""
+    label, values = panels.axis_of(result, SWEPT_KEYS[column]), np.unique(table[column].to_numpy(float))
+    positive = values[values > 0]
+    if not len(positive) or positive[-1] / positive[0] <= panels.WIDE:
         return Axis(label), table
     if values[0] > 0:
         return Axis(label, "log"), table
-    zero = above[0] / ZERO_AWAY
-    ticks = ((zero, "0"), *((float(value), wording.number(float(value), 4)) for value in above))
+    zero = positive[0] / ZERO_FACTOR
+    ticks = ((zero, "0"), *((float(value), wording.number(float(value), 4)) for value in positive))
     return Axis(label, "log", ticks=ticks), table.assign(**{column: table[column].replace(0.0, zero)})
 
 
 def swept_column(tracking: "pd.DataFrame") -> str | None:
-    """The column of KEYS that has the most different values; None if all cases have the same ones."""
-    counts = {column: tracking[column].nunique() for column in KEYS}
-    column = max(KEYS, key=lambda key: counts[key])
+    """The column of SWEPT_KEYS that has the most different values; None if all cases have the same ones."""
+    counts = {column: tracking[column].nunique() for column in SWEPT_KEYS}
+    column = max(SWEPT_KEYS, key=lambda key: counts[key])
     return column if counts[column] > 1 else None
 
 
-def by_line(tracking: "pd.DataFrame", column: str, result: CaseResult[ClutterAxes]) -> "pd.DataFrame":
-    """The rows with the name of their line, over column, in place of the filter: the tracker and what else is swept.
+def with_line_names(tracking: "pd.DataFrame", column: str, result: CaseResult[ClutterAxes]) -> "pd.DataFrame":
+    """The rows with the label of their line in place of the filter: the tracker and all swept values but the column's.
 
     result is one of the cases."""
-    others = [other for other in KEYS if other != column and tracking[other].nunique() > 1]
+    other_keys = [key for key in SWEPT_KEYS if key != column and tracking[key].nunique() > 1]
     names = tracking["filter"].map(panels.literal).astype(object)
-    for other in others:
-        symbol = panels.symbol_of(result, KEYS[other])
-        names = names + [f", {symbol} = {panels.with_its_unit(result, KEYS[other], v)}" for v in tracking[other]]
+    for key in other_keys:
+        symbol = panels.symbol_of(result, SWEPT_KEYS[key])
+        names = names + [f", {symbol} = {panels.with_its_unit(result, SWEPT_KEYS[key], v)}" for v in tracking[key]]
     return tracking.assign(filter=names)
 
 
@@ -86,9 +94,9 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
     """Probability of a confirmed track against time: a panel for each case, a line for each tracker."""
     groups = tables.groups(tracks, "case", "filter")
     confirmed = ("t_s", "confirmed", "confirmed_lo", "confirmed_hi", "exact_confirmed")
-    drawn: list[Panel] = []
-    some = panels.spread_out(results, panels.MOST)
-    for result in some:
+    figure_panels: list[Panel] = []
+    shown_results = panels.spread_out(results, panels.MOST)
+    for result in shown_results:
         marks = []
         for n, f in enumerate(result.axes.filters):
             if (result.name, f) in groups:
@@ -96,10 +104,10 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
                 marks.append(panels.line(rows, confirmed, panels.literal(f), n))
                 marks.append(panels.line(rows, ("t_s", "kept", "kept_lo", "kept_hi"), "", Style(n, n, None, 0.7)))
         if marks:
-            keys = ((tr("thin: kept at that time"), Style(0, 0, None, 0.7)),) if not drawn else ()
+            keys = ((tr("thin: kept at that time"), Style(0, 0, None, 0.7)),) if not figure_panels else ()
             y = Axis(tr("probability"), limits=(0, 1))
-            drawn.append(Panel(panels.time_axis(), y, tuple(marks), _swept(result), keys, direct=False))
-    if not drawn:
+            figure_panels.append(Panel(panels.time_axis(), y, tuple(marks), _swept_values(result), keys, direct=False))
+    if not figure_panels:
         return None
     caption = (
         tr(
@@ -107,102 +115,128 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
             "lines: that a confirmed track exists and is on the target. Bands: 95 % intervals.",
             realisations=panels.realisations(results),
         )
-    ) + panels.cases_left_out(results, some)
+    ) + panels.cases_left_out(results, shown_results)
     title = tr("Probability of a confirmed track")
-    return Figure("confirmation", title, caption, tuple(drawn), min(2, len(drawn)), PAGE_MM)
+    return Figure("confirmation", title, caption, tuple(figure_panels), min(2, len(figure_panels)), PAGE_MM)
 
 
-def _swept(result: CaseResult[ClutterAxes]) -> str:
+def _swept_values(result: CaseResult[ClutterAxes]) -> str:
     """The swept keys of a case and their values, at length."""
     pairs = ((panels.key_label(result, key).text, panels.with_its_unit(result, key, v)) for key, v in result.swept)
     return ", ".join(f"{name}: {value}" for name, value in pairs)
 
 
-def life_figure(results: Results, made: "Mapping[str, pd.DataFrame]") -> Figure | None:
-    """Track life, time to confirmation, wrong plots and accuracy of the tracks kept, over what is swept."""
-    tracking = made["tracking"]
+def life_figure(results: Results, tables_by_name: "Mapping[str, pd.DataFrame]") -> Figure | None:
+    """Track life, time to confirmation, wrong plots and accuracy of the tracks kept, over the swept key."""
+    tracking = tables_by_name["tracking"]
     column = swept_column(tracking)
     if column is None:
         return None
     x, tracking = axis_over(results[0], column, tracking)
-    curves = made["curves"]
-    cases = tracking[["case", *KEYS]].drop_duplicates("case")
-    at_end = tables.where(curves, component="r", k=results[0].axes.k[-1]).merge(cases, on="case", how="left")
-    ended = made["rare"][made["rare"]["sought"] & (made["rare"]["event"] == ENDED)] if "rare" in made else at_end[:0]
-    life = ("life_s", "life", tr("track life"), "s", tracking, tr(LIFE))
-    if len(ended):
-        rates = ended.merge(cases, on="case", how="left")
-        life = ("rate", "rate", tr("share of tracks ended by the last scan"), "", rates, tr(ENDS))
-    time, wrong = tr("time to confirmation"), tr("share of wrong plots")
-    quantities = (
-        life,
-        ("time_to_confirm_s", "time", time, "s", tracking, tr("mean time to its confirmation")),
-        ("wrong_share", "wrong", wrong, "", tracking, tr("weight of false plots among those used")),
-        (
-            *("sigma", "sigma", tr("$\\sigma$ of $r$ of kept tracks"), "m", at_end),
-            tr("root-mean-square error of the range of the tracks kept at the end"),
-        ),
-    )
-    drawn, said, level = [], [], []
-    for value, ends, quantity, unit, table, words in quantities:
-        lines = _lines(by_line(table, column, results[0]), column, value, ends)
-        known = [line.y[np.isfinite(line.y)] for line in lines]
-        if all(np.ptp(values) <= LEVEL * values.max() for values in known if len(values)):
-            level += [_level(quantity, unit, np.concatenate(known))]
+    figure_panels, clauses, level_quantities = [], [], []
+    for quantity in _life_quantities(tracking, tables_by_name, results[0].axes.k[-1]):
+        lines = _lines(with_line_names(quantity.table, column, results[0]), column, quantity.value, quantity.bounds)
+        line_values = [line.y[np.isfinite(line.y)] for line in lines]
+        if all(np.ptp(values) <= MAX_LEVEL_SHARE * values.max() for values in line_values if len(values)):
+            level_quantities.append(_level_quantity(quantity.name, quantity.unit, np.concatenate(line_values)))
         else:
-            label = panels.with_unit(quantity, unit)
-            y = Axis(label, "log") if value == life[0] else Axis(label, limits=(0, None))
-            drawn.append(Panel(x, y, tuple(lines), direct=False))
-            said.append(words)
-    if not drawn:
+            figure_panels.append(Panel(x, quantity.axis, tuple(lines), direct=False))
+            clauses.append(quantity.clause)
+    if not figure_panels:
         return None
-    words = listed(said)
+    text = listed(clauses)
     caption = tr(
         "{panels}, of {realisations}. Bands: 95 % intervals.",
-        panels=words[0].upper() + words[1:],
+        panels=text[0].upper() + text[1:],
         realisations=panels.realisations(results),
     )
-    if level := [words for words in level if words]:
-        caption += " " + tr("Not drawn, as it does not change over the sweep: {quantities}.", quantities=listed(level))
-    columns = min(2, len(drawn))
+    if not_drawn := [text for text in level_quantities if text]:
+        caption += " " + tr(
+            "Not drawn, as it does not change over the sweep: {quantities}.", quantities=listed(not_drawn)
+        )
+    columns = min(2, len(figure_panels))
     width = panels.WIDE_MM if columns == 1 else PAGE_MM
-    return Figure("track_life", tr("Track life and accuracy"), caption, tuple(drawn), columns, width, 58)
+    return Figure("track_life", tr("Track life and accuracy"), caption, tuple(figure_panels), columns, width, 58)
 
 
-def _level(quantity: str, unit: str, values: np.ndarray) -> str:
-    """A quantity that does not change, with its values (n,) over the trackers; empty where there is none."""
+class _LifeQuantity(NamedTuple):
+    """A quantity of the figure of track life: columns of its value and interval, name, unit, rows, and clause."""
+
+    value: str
+    bounds: str
+    name: str
+    unit: str
+    is_logarithmic: bool
+    table: "pd.DataFrame"
+    clause: str
+
+    @property
+    def axis(self) -> Axis:
+        label = panels.with_unit(self.name, self.unit)
+        return Axis(label, "log") if self.is_logarithmic else Axis(label, limits=(0, None))
+
+
+def _life_quantities(
+    tracking: "pd.DataFrame", tables_by_name: "Mapping[str, pd.DataFrame]", last_scan: int
+) -> tuple[_LifeQuantity, ...]:
+    """The quantities of the figure of track life; the share of ended tracks replaces the life where it was sampled."""
+    cases = tracking[["case", *SWEPT_KEYS]].drop_duplicates("case")
+    at_end = tables.where(tables_by_name["curves"], component="r", k=last_scan).merge(cases, on="case", how="left")
+    life = _LifeQuantity("life_s", "life", tr("track life"), "s", True, tracking, tr(LIFE_CAPTION))
+    rare_events = tables_by_name.get("rare")
+    if rare_events is not None:
+        ended = rare_events[rare_events["sought"] & (rare_events["event"] == ENDED)]
+        if len(ended):
+            name, rates = tr("share of tracks ended by the last scan"), ended.merge(cases, on="case", how="left")
+            life = _LifeQuantity("rate", "rate", name, "", True, rates, tr(ENDS_CAPTION))
+    time, wrong, sigma = (tr("time to confirmation"), tr("share of wrong plots"), tr("$\\sigma$ of $r$ of kept tracks"))
+    time_clause, wrong_clause = tr("mean time to its confirmation"), tr("weight of false plots among those used")
+    sigma_clause = tr("root-mean-square error of the range of the tracks kept at the end")
+    return (
+        life,
+        _LifeQuantity("time_to_confirm_s", "time", time, "s", False, tracking, time_clause),
+        _LifeQuantity("wrong_share", "wrong", wrong, "", False, tracking, wrong_clause),
+        _LifeQuantity("sigma", "sigma", sigma, "m", False, at_end, sigma_clause),
+    )
+
+
+def _level_quantity(name: str, unit: str, values: np.ndarray) -> str:
+    """A quantity that does not change, with the range of its values (n,) over the trackers; empty without values."""
     if not len(values):
         return ""
-    extremes = dict.fromkeys(wording.number(float(end), 3) for end in (values.min(), values.max()))
-    number = " ".join(filter(None, ("–".join(extremes), panels.unit_of(unit))))
-    return f"{wording.spoken(quantity)} ({number})"
+    bounds = dict.fromkeys(wording.number(float(end), 3) for end in (values.min(), values.max()))
+    number = " ".join(filter(None, ("–".join(bounds), panels.unit_of(unit))))
+    return f"{wording.spoken(name)} ({number})"
 
 
-def _lines(table: "pd.DataFrame", x: str, value: str, ends: str) -> list[Line]:
-    """A line for each filter of a table's values over x, none where infinite; an infinite end of an interval too."""
+def _lines(table: "pd.DataFrame", x: str, value: str, bounds: str) -> list[Line]:
+    """A line for each filter of a table's values over x, without infinite values and without infinite interval ends."""
     lines = []
     for n, (name, rows) in enumerate(table.groupby("filter", sort=False)):
         rows = rows.sort_values(x).replace(np.inf, np.nan)
-        lo, hi = (rows[key].where(np.isfinite(rows[key]), rows[value]) for key in (f"{ends}_lo", f"{ends}_hi"))
+        lo, hi = (rows[key].where(np.isfinite(rows[key]), rows[value]) for key in (f"{bounds}_lo", f"{bounds}_hi"))
         lines.append(panels.line(rows.assign(lo=lo, hi=hi), (x, value, "lo", "hi"), str(name), n))
     return lines
 
 
 def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
-    """False tracks per hour over what is swept, on a logarithmic axis; of none that occurred, how many there may be.
-    Without false plots there are no false tracks, and no point."""
+    """False tracks per hour over the swept key, on a logarithmic axis.
+
+    Where none occurred, the upper end of the interval. Without false plots there are no false tracks, and no point."""
     column, rate = swept_column(tracking), "false_tracks_per_hour"
     rows = tracking[tracking["false_plots_per_km2"] > 0]
     if column is None or not (rows[rate] > 0).any():
         return None
     rules: dict[str, list[str]] = {}
-    for name, count, of in rows[["filter", "m", "of"]].drop_duplicates("filter").itertuples(index=False, name=None):
-        rules.setdefault(tr("{count} of {of}", count=int(count), of=int(of)), []).append(name)
-    x, rows = axis_over(results[0], column, by_line(rows, column, results[0]))
-    none = rows[rows[rate] == 0]
-    upper = Line(none[column].to_numpy(), none["false_hi"].to_numpy(), "", UPPER)
+    for name, count, rule_scans in (
+        rows[["filter", "m", "of"]].drop_duplicates("filter").itertuples(index=False, name=None)
+    ):
+        rules.setdefault(tr("{count} of {of}", count=int(count), of=int(rule_scans)), []).append(name)
+    x, rows = axis_over(results[0], column, with_line_names(rows, column, results[0]))
+    without_tracks = rows[rows[rate] == 0]
+    upper = Line(without_tracks[column].to_numpy(), without_tracks["false_hi"].to_numpy(), "", UPPER_END_STYLE)
     rows = rows.assign(**{name: rows[name].where(rows[rate] > 0) for name in (rate, "false_lo", "false_hi")})
-    keys = ((tr("none occurred: upper end of the interval"), UPPER),) if len(none) else ()
+    keys = ((tr("none occurred: upper end of the interval"), UPPER_END_STYLE),) if len(without_tracks) else ()
     marks = (*_lines(rows, column, rate, "false"), *([upper] if keys else []))
     caption = tr(
         "False tracks confirmed per hour in the whole sector; every false plot starts a tentative track. Plots that "
@@ -210,15 +244,15 @@ def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
         rules="; ".join(f"{rule} ({few(names)})" for rule, names in rules.items()),
         realisations=panels.realisations(results),
     )
-    if never := rows.groupby("filter", sort=False)[rate].sum().loc[lambda rates: rates == 0].index.tolist():
-        caption += " " + tr("Zero throughout, so not drawn: {names}.", names=few(never))
+    if zero_names := rows.groupby("filter", sort=False)[rate].sum().loc[lambda rates: rates == 0].index.tolist():
+        caption += " " + tr("Zero throughout, so not drawn: {names}.", names=few(zero_names))
     panel = Panel(x, Axis(tr("false tracks per hour"), "log"), marks, keys=keys, direct=False)
     return Figure("false_tracks", tr("False tracks"), caption, (panel,), width_mm=panels.WIDE_MM)
 
 
 def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
     """Error rates of the classification by the score, over its threshold, of one case."""
-    case = middle(results)
+    case = middle_case(results)
     table = classes[(classes["case"] == case.name) & (classes["n_false"] > 0)]
     if table.empty:
         return None
@@ -226,76 +260,60 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
     x = Axis(tr("threshold of the score"))
     false = _lines(table[table["false_called_true"] > 0], "threshold", "false_called_true", "false")
     true = _lines(table, "threshold", "true_called_false", "true")
-    drawn = []
+    figure_panels = []
     if false:
         longest = max(false, key=lambda mark: len(mark.x))
         bound = Line(longest.x, np.exp(-longest.x), tr("bound"), Style(GREY, 1, None))
         y = Axis(tr("share of false tracks declared true"), "log")
-        drawn.append(Panel(x, y, (*false, bound), direct=False))
+        figure_panels.append(Panel(x, y, (*false, bound), direct=False))
     if true:
         y = Axis(tr("share of target's tracks declared false"), limits=(0, None))
-        drawn.append(Panel(x, y, tuple(true), direct=False))
+        figure_panels.append(Panel(x, y, tuple(true), direct=False))
     caption = tr(
         "Error rates of declaring a track true once its score (logarithm of the likelihood ratio) "
         "reaches a threshold, of {realisations} of each kind. Left: tracks started by false plots, at "
         "most exp(−threshold) of them (bound). Right: the target's first tracks. Bands: 95 % intervals.",
         realisations=panels.realisations(results),
-    ) + (tr(" Case: {swept}.", swept=_swept(case)) if case.swept else "")
+    ) + (tr(" Case: {swept}.", swept=_swept_values(case)) if case.swept else "")
     return (
-        Figure("track_classes", tr("True and false tracks by score"), caption, tuple(drawn), 2, PAGE_MM)
-        if drawn
+        Figure("track_classes", tr("True and false tracks by score"), caption, tuple(figure_panels), 2, PAGE_MM)
+        if figure_panels
         else None
     )
 
 
-NEAR_M = 2500.0  # the map shows what is nearer than this to the target's course
-EVERY = 4  # scans between the gates that the map shows
+MAP_MARGIN_M = 2500.0  # around the target's course
+GATE_INTERVAL_SCANS = 4  # scans between the gates that the map shows
 Curve = tuple[np.ndarray, np.ndarray]  # distances north and east, m
 
 
 def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
-    """Realisation 0 of a case on a map, near the target's course: its course and plots, false plots, and the confirmed
-    tracks and gates of the first tracker that has to find its plots."""
-    spec, axes, specs = result.spec, result.axes, tracker_specs(result.spec)
+    """A map of realisation 0 of a case near the target's course.
+
+    The course and the target's plots, false plots, and the confirmed tracks and gates of the first tracker that has to
+    find its plots."""
+    spec, axes = result.spec, result.axes
     z, true = target_plots(axes.world, axes.detections, 0)
-    course = _flat(*true.T)
-    (south, north), (west, east) = ((side.min() - NEAR_M, side.max() + NEAR_M) for side in course)
-    scans, near_ones = [], []
-    for k, t in enumerate(np.cumsum(axes.world.dt)):
-        r, b = false_plots(axes.field, 0, k)
-        x, y = _flat(r, b)
-        near = (south < x) & (x < north) & (west < y) & (y < east)
-        near_ones.append(np.stack([x[near], y[near]]))
-        own = z[k][:, None] if np.isfinite(z[k, 0]) else np.zeros((2, 0))
-        scans.append((t, *np.concatenate([own, np.stack([r[near], b[near]])], axis=1)))
-    f = next((i for i, one in enumerate(specs) if one.association != "known"), None)
-    found = [] if f is None else confirmed_tracks(specs[f], conditions(spec), scans)
-    states = [np.array(track.states) for track in found]
-    every = [_flat(own[:, 0], own[:, 2]) for own in states]
-    order = sorted(range(len(found)), key=lambda n: _distance(every[n], course))
-    tracks, false = [every[n] for n in order], np.concatenate(near_ones, axis=1)
-    gates = [
-        _ellipse(gate, specs[f or 0])
-        for n in order[:1]
-        for k, gate in zip(found[n].scans, found[n].gates, strict=True)
-        if not k % EVERY
-    ]
-    marks = [_on_map((false[0], false[1]), tr("false plots"), Style(GREY, None, 0, 1.1, 1.0))]
+    course = _north_east(*true.T)
+    (south, north), (west, east) = ((side.min() - MAP_MARGIN_M, side.max() + MAP_MARGIN_M) for side in course)
+    scans, (false_north, false_east) = _plots_within(axes, z, (south, north), (west, east))
+    f, tracks, gates = _tracks_and_gates(spec, scans, course)
+    marks = [_map_line((false_north, false_east), tr("false plots"), Style(GREY, None, 0, 1.1, 1.0))]
     curves = (
-        (tr("its gates"), [gate for gate in gates if np.isfinite(gate[0]).all()], Style(3, 0, None, 0.6)),
+        (tr("its gates"), gates, Style(3, 0, None, 0.6)),
         (tr("other tracks"), tracks[1:], Style(GREY, 0, None, 1.0)),
         (tr("track nearest to the course"), tracks[:1], Style(2, 0, None, 1.8)),
     )
-    for label, drawn, style in curves:
-        marks += [_on_map(one, "" if n else label, style) for n, one in enumerate(drawn)]
-    marks.append(_on_map(course, tr("target"), Style(1, 1, None)))
-    marks.append(_on_map(_flat(*z[np.isfinite(z[:, 0])].T), tr("target plots"), Style(1, None, 1, 1.1, 2.0)))
+    for label, group, style in curves:
+        marks += [_map_line(curve, "" if n else label, style) for n, curve in enumerate(group)]
+    marks.append(_map_line(course, tr("target"), Style(1, 1, None)))
+    marks.append(_map_line(_north_east(*z[np.isfinite(z[:, 0])].T), tr("target plots"), Style(1, None, 1, 1.1, 2.0)))
     caption = tr(
         "Confirmed tracks near the target: {tracks}, among {false} false plots in {k} scans. The target's course and "
         "plots, the false plots of all scans, the tracks, and at every fourth scan the gate of the one nearest to the "
         "course, in realisation 0 of {name}, tracker {tracker}.",
         tracks=len(tracks),
-        false=len(false[0]),
+        false=len(false_north),
         name=panels.plain_label(result),
         tracker="" if f is None else spec.filters[f].name,
         k=len(axes.k),
@@ -306,25 +324,67 @@ def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
     return Figure("track_map", title, caption, (panel,), width_mm=panels.WIDE_MM, panel_height_mm=100)
 
 
-def _on_map(curve: Curve, label: str, style: Style) -> Line:
+def _plots_within(
+    axes: ClutterAxes, z: np.ndarray, north_limits: tuple[float, float], east_limits: tuple[float, float]
+) -> tuple[list[tuple[float, np.ndarray, np.ndarray]], Curve]:
+    """Scans (t, r, b) with the target's plots z (K, 2) and the false plots within limits; and these false plots."""
+    scans, false_positions = [], []
+    for k, t in enumerate(np.cumsum(axes.world.dt)):
+        r, b = false_plots(axes.field, 0, k)
+        x, y = _north_east(r, b)
+        is_near = (north_limits[0] < x) & (x < north_limits[1]) & (east_limits[0] < y) & (y < east_limits[1])
+        false_positions.append(np.stack([x[is_near], y[is_near]]))
+        target_plot = z[k][:, None] if np.isfinite(z[k, 0]) else np.zeros((2, 0))
+        r, b = np.concatenate([target_plot, np.stack([r[is_near], b[is_near]])], axis=1)
+        scans.append((float(t), r, b))
+    north, east = np.concatenate(false_positions, axis=1)
+    return scans, (north, east)
+
+
+def _tracks_and_gates(
+    spec: Keys, scans: Sequence[tuple[float, np.ndarray, np.ndarray]], course: Curve
+) -> tuple[int | None, list[Curve], list[Curve]]:
+    """The first tracker that has to find its plots, its confirmed tracks, and gates of the nearest track.
+
+    Tracks are ordered by their distance to the course."""
+    specs = tracker_specs(spec)
+    f = next((i for i, tracker in enumerate(specs) if tracker.association != "known"), None)
+    if f is None:
+        return None, [], []
+    histories = confirmed_tracks(specs[f], tracking_conditions(spec), scans)
+    states = [np.array(track.states) for track in histories]
+    track_curves = [_north_east(track_states[:, 0], track_states[:, 2]) for track_states in states]
+    order = sorted(range(len(histories)), key=lambda n: _median_distance(track_curves[n], course))
+    gates = [
+        _gate_outline(gate, specs[f])
+        for n in order[:1]
+        for k, gate in zip(histories[n].scans, histories[n].gates, strict=True)
+        if not k % GATE_INTERVAL_SCANS
+    ]
+    return f, [track_curves[n] for n in order], [gate for gate in gates if np.isfinite(gate[0]).all()]
+
+
+def _map_line(curve: Curve, label: str, style: Style) -> Line:
     return Line(curve[1] * 1e-3, curve[0] * 1e-3, label, style)
 
 
-def _flat(r: np.ndarray, b: np.ndarray) -> Curve:
-    """Distances north and east."""
+def _north_east(r: np.ndarray, b: np.ndarray) -> Curve:
+    """Distances north and east of a position in range and bearing."""
     return r * np.cos(b), r * np.sin(b)
 
 
-def _distance(track: Curve, course: Curve) -> float:
+def _median_distance(track: Curve, course: Curve) -> float:
     """The median distance of a track's points to the course, m."""
-    north, east = (own[:, None] - other for own, other in zip(track, course, strict=True))
+    north, east = (
+        track_values[:, None] - course_values for track_values, course_values in zip(track, course, strict=True)
+    )
     return float(np.median(np.hypot(north, east).min(axis=1)))
 
 
-def _ellipse(gate: np.ndarray, tracker: TrackerSpec) -> Curve:
+def _gate_outline(gate: np.ndarray, tracker: TrackerSpec) -> Curve:
     """The edge of a gate on the map; an open gate is drawn as if its probability were 0.9999."""
     angle, (r, b, rr, rb, bb) = np.linspace(0, 2 * np.pi, 61), gate
     size = np.sqrt(gate_threshold(min(tracker.gate_probability, 0.9999)))
     low = rb / np.sqrt(rr)
     u, v = size * np.cos(angle), size * np.sin(angle)
-    return _flat(r + np.sqrt(rr) * u, b + low * u + np.sqrt(max(bb - low**2, 0.0)) * v)
+    return _north_east(r + np.sqrt(rr) * u, b + low * u + np.sqrt(max(bb - low**2, 0.0)) * v)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from radarsim.studies.sonar.clutter.kernels.tracker import KNOWN, NEAREST, OPEN, PDA, Cells, Field, Trackers
+from radarsim.studies.sonar.clutter.kernels.tracker import KNOWN, NEAREST, OPEN_GATE, PDA, Cells, Field, Trackers
 from radarsim.studies.sonar.config import Keys, Sector
 from radarsim.studies.sonar.kernels.patterns import Detections
 from radarsim.studies.sonar.kernels.shared_gains import World
@@ -38,14 +38,16 @@ class ClutterAxes(SonarAxes):
 # ---- filters ---------------------------------------------------------------------------------------------------------
 ASSOCIATIONS = {"nearest": NEAREST, "pda": PDA, "known": KNOWN}
 THRESHOLDS = np.arange(0.0, 15.5, 0.5)  # of the score, in natural logarithms
-CELL = 8.0  # size of a cell in σ of a plot, in each direction; about the size of a settled gate
-MOST_IN_CELL = 4.0  # mean number of false plots: more cells to look at, but fewer plots outside the gate
-MOST_CELLS = 1 << 22
+CELL_SIGMAS = 8.0  # size of a cell in σ of a plot, in each direction; about the size of a settled gate
+MAX_MEAN_IN_CELL = 4.0  # mean number of false plots: more cells to look at, but fewer plots outside the gate
+MAX_CELLS = 1 << 22
 
 
 @dataclass(frozen=True)
 class TrackerSpec:
-    """A configured tracker; speed in m/s, lost in σ of a plot, variance (2,) of a manoeuvre in each coordinate."""
+    """A configured tracker.
+
+    speed in m/s; lost in σ of a plot; variance (2,) of a manoeuvre in each coordinate."""
 
     association: str
     gate_probability: float
@@ -58,8 +60,9 @@ class TrackerSpec:
 
 
 class Conditions(NamedTuple):
-    """What trackers know of the plots: period in s, sigma (2,) in m and rad, detection probability, and the density of
-    false plots per m²."""
+    """What trackers know about the plots.
+
+    period in s, sigma (2,) in m and rad, probability of detection, density of false plots per m²."""
 
     period: float
     sigma: np.ndarray
@@ -67,8 +70,8 @@ class Conditions(NamedTuple):
     density: float
 
 
-def conditions(spec: Keys) -> Conditions:
-    """The conditions of a case."""
+def tracking_conditions(spec: Keys) -> Conditions:
+    """The conditions that the trackers of a case assume."""
     sensor = spec.sensor
     sigma = np.array([sensor.sigma_range_m, sensor.sigma_bearing_rad])
     return Conditions(sensor.scan_period_s, sigma, sensor.detection_probability, sensor.false_plots_per_km2 / 1e6)
@@ -94,11 +97,11 @@ def tracker_specs(spec: Keys) -> list[TrackerSpec]:
 
 def gate_threshold(probability: float) -> float:
     """χ² with two degrees of freedom that an innovation stays below with this probability; a large number for 1."""
-    return -2.0 * math.log1p(-probability) if probability < 1 else OPEN
+    return -2.0 * math.log1p(-probability) if probability < 1 else OPEN_GATE
 
 
-def poisson_share(mean: float) -> np.ndarray:
-    """Distribution function (J,) of a Poisson number, up to where it is 1 to the last digit."""
+def poisson_cdf(mean: float) -> np.ndarray:
+    """Distribution function (J,) of a Poisson number, until it is 1 to the last digit."""
     term, total, out = math.exp(-mean), 0.0, []
     for j in range(1, 100_000):
         total += term
@@ -109,45 +112,47 @@ def poisson_share(mean: float) -> np.ndarray:
     return np.array([*out[:-1], 1.0])
 
 
-def field(key: np.ndarray, sector: Sector, given: Conditions) -> Field:
-    """The field of false plots of a sector; key (2,) of its noise. Cells have the size of the plots' σ at the mean
-    range of the sector, times CELL, and contain fewer false plots than MOST_IN_CELL in the mean."""
+def field(key: np.ndarray, sector: Sector, conditions: Conditions) -> Field:
+    """The field of false plots in a sector; key (2,) of its noise.
+
+    Cells measure CELL_SIGMAS σ of a plot at the mean range of the sector, and contain fewer false plots than
+    MAX_MEAN_IN_CELL in the mean."""
     near, far = sector.range_m
     b0, b1 = sector.bearing_rad
     q0, q1 = near**2 / 2, far**2 / 2
     middle = math.sqrt(q0 + q1)
-    sigma, density = given.sigma, given.density
-    area = (CELL * sigma[0] * middle) * (CELL * sigma[1])
-    scale = min(1.0, math.sqrt(MOST_IN_CELL / max(density * area, 1e-12)))
-    nq = max(1, round((q1 - q0) / (scale * CELL * sigma[0] * middle)))
-    nb = max(1, round((b1 - b0) / (scale * CELL * sigma[1])))
-    while nq * nb > MOST_CELLS:
+    sigma, density = conditions.sigma, conditions.density
+    area = (CELL_SIGMAS * sigma[0] * middle) * (CELL_SIGMAS * sigma[1])
+    scale = min(1.0, math.sqrt(MAX_MEAN_IN_CELL / max(density * area, 1e-12)))
+    nq = max(1, round((q1 - q0) / (scale * CELL_SIGMAS * sigma[0] * middle)))
+    nb = max(1, round((b1 - b0) / (scale * CELL_SIGMAS * sigma[1])))
+    while nq * nb > MAX_CELLS:
         nq, nb = max(1, nq // 2), max(1, nb // 2)
     dq, db = (q1 - q0) / nq, (b1 - b0) / nb
     ring = abs(b1 - b0 - 2 * math.pi) < 1e-9
-    return Field(key, poisson_share(density * dq * db), Cells(q0, dq, nq, b0, db, nb, ring, density))
+    return Field(key, poisson_cdf(density * dq * db), Cells(q0, dq, nq, b0, db, nb, ring, density))
 
 
-def trackers(specs: Sequence[TrackerSpec], given: Conditions) -> Trackers:
-    """The arrays of trackers that know these conditions."""
-    variance = np.stack([one.variance for one in specs])
+def trackers(specs: Sequence[TrackerSpec], conditions: Conditions) -> Trackers:
+    """Trackers as arrays for the kernels."""
+    variance = np.stack([spec.variance for spec in specs])
     return Trackers(
-        association=np.array([ASSOCIATIONS[one.association] for one in specs]),
-        gate=np.array([gate_threshold(one.gate_probability) for one in specs]),
-        inside=np.array([one.gate_probability for one in specs]),
-        m=np.array([float(one.m) for one in specs]),
-        n=np.array([float(one.n) for one in specs]),
-        misses=np.array([float(one.misses) for one in specs]),
-        speed=np.array([one.speed for one in specs]),
-        lost=np.array([one.lost for one in specs]),
-        manoeuvre=variance * given.period**4 / given.sigma**2,
+        association=np.array([ASSOCIATIONS[spec.association] for spec in specs]),
+        gate=np.array([gate_threshold(spec.gate_probability) for spec in specs]),
+        inside=np.array([spec.gate_probability for spec in specs]),
+        m=np.array([float(spec.m) for spec in specs]),
+        n=np.array([float(spec.n) for spec in specs]),
+        misses=np.array([float(spec.misses) for spec in specs]),
+        speed=np.array([spec.speed for spec in specs]),
+        lost=np.array([spec.lost for spec in specs]),
+        manoeuvre=variance * conditions.period**4 / conditions.sigma**2,
         thresholds=THRESHOLDS,
-        **given._asdict(),
+        **conditions._asdict(),
     )
 
 
 # ---- initiation ------------------------------------------------------------------------------------------------------
-def confirmed_by(probability: np.ndarray, m: int, n: int) -> np.ndarray:
+def confirmation_probabilities(probability: np.ndarray, m: int, n: int) -> np.ndarray:
     """Probability (K,) that a track of the target was confirmed by each scan, without false plots and with open gates.
 
     probability (K,) of a plot at each scan. The law is that of a Markov chain over the age of the track and its plots
@@ -173,7 +178,9 @@ def confirmed_by(probability: np.ndarray, m: int, n: int) -> np.ndarray:
     return out
 
 
-def false_pairs(sector: Sector, given: Conditions, tracker: TrackerSpec, scans: int, nodes: int = 48) -> np.ndarray:
+def false_pair_probabilities(
+    sector: Sector, conditions: Conditions, tracker: TrackerSpec, scans: int, nodes: int = 48
+) -> np.ndarray:
     """Probability (K,) that a track begun by a false plot at scan 1 is confirmed at each scan by the rule 2 of n.
 
     Before its second plot the predicted position of a track is its first plot, and its gate is an ellipse in range and
@@ -184,18 +191,18 @@ def false_pairs(sector: Sector, given: Conditions, tracker: TrackerSpec, scans: 
     u, w = (u + 1) / 2, w / 2
     r, b = np.sqrt(2 * (0.5 * (near**2 + (far**2 - near**2) * u))), b0 + (b1 - b0) * u
     gate = gate_threshold(tracker.gate_probability)
-    variance_r, variance_b = 2 * given.sigma**2
-    out, none = np.zeros(scans), np.ones((nodes, nodes))
+    variance_r, variance_b = 2 * conditions.sigma**2
+    out, no_plot = np.zeros(scans), np.ones((nodes, nodes))
     for k in range(1, min(tracker.n, scans)):
-        reach = tracker.speed * k * given.period
+        reach = tracker.speed * k * conditions.period
         half_r, half_b = np.sqrt(gate * (variance_r + reach**2)), np.sqrt(gate * (variance_b + (reach / r) ** 2))
-        mean = given.density * _area(r, b, half_r, half_b, sector)
-        out[k] = np.einsum("i,j,ij->", w, w, none * -np.expm1(-mean))
-        none *= np.exp(-mean)
+        mean = conditions.density * _ellipse_areas(r, b, half_r, half_b, sector)
+        out[k] = np.einsum("i,j,ij->", w, w, no_plot * -np.expm1(-mean))
+        no_plot *= np.exp(-mean)
     return out
 
 
-def _area(
+def _ellipse_areas(
     r: np.ndarray, b: np.ndarray, half_r: float, half_b: np.ndarray, sector: Sector, nodes: int = 64
 ) -> np.ndarray:
     """Areas (i, j), m², within the sector of the ellipses about (r_i, b_j) with half-axes half_r and half_b_i."""

@@ -14,8 +14,8 @@ from radarsim.report.row_notes import notes_where
 from radarsim.report.statistics import Z95, Estimate, Values
 from radarsim.report.tables import Columns, leading, of_rows, stacked
 from radarsim.studies.sonar.clutter.filters import ClutterAxes
-from radarsim.studies.sonar.clutter.kernels import tracker as at
-from radarsim.studies.sonar.clutter.kernels.rare import DROPPED, DROPPED_AFTER, KINDS, LOST, LOST_AFTER
+from radarsim.studies.sonar.clutter.kernels import tracker
+from radarsim.studies.sonar.clutter.kernels.rare import DROPPED, DROPPED_AFTER, END_KINDS, LOST, LOST_AFTER
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,50 +23,51 @@ if TYPE_CHECKING:
 table = common.Tables()
 FALSE = "false track"
 ENDED = "target's track ended"
-PART = 0.05  # of a rate: what is less does not decide whether its interval holds
-HOW = {"target's track dropped": [DROPPED, DROPPED_AFTER], "target's track lost": [LOST, LOST_AFTER]}
-BESIDE = [DROPPED_AFTER, LOST_AFTER]
+MIN_SHARE = 0.05  # of a rate: a smaller part of it does not decide whether its interval holds
+KINDS_BY_EVENT = {"target's track dropped": [DROPPED, DROPPED_AFTER], "target's track lost": [LOST, LOST_AFTER]}
+BESIDE_KINDS = [DROPPED_AFTER, LOST_AFTER]
 
 
-def trackers(result: CaseResult[ClutterAxes]) -> np.ndarray:
+def tracker_indices(result: CaseResult[ClutterAxes]) -> np.ndarray:
     """Indices (n,) of the filters that have to find their plots; the others cannot lose a track."""
     return np.flatnonzero([kind != "known" for kind in result.axes.associations])
 
 
-def per_hour(result: CaseResult[ClutterAxes]) -> float:
+def scans_per_hour(result: CaseResult[ClutterAxes]) -> float:
     """Scans per hour."""
     return 3600.0 / result.axes.scan_period_s
 
 
-def false_plots(result: CaseResult[ClutterAxes]) -> float:
-    """Mean number of false plots a scan in the whole sector."""
+def mean_false_plots(result: CaseResult[ClutterAxes]) -> float:
+    """Mean number of false plots per scan in the whole sector."""
     return result.spec.sensor.false_plots_per_km2 * result.axes.area_m2 / 1e6
 
 
-def held(result: CaseResult[ClutterAxes], at: tuple[Any, ...]) -> rare.Counted:
-    """Tracks begun by false plots that were held for at least so many scans, by their weights; at filter and scan."""
-    return rare.Counted(*np.moveaxis(result.sums["held"][at], -1, 0))
+def held_tracks(result: CaseResult[ClutterAxes], index: tuple[Any, ...]) -> rare.Counted:
+    """Weighted numbers of tracks that false plots began and that lived for 1 … K scans; index of filter and scan."""
+    return rare.Counted(*np.moveaxis(result.sums["held"][index], -1, 0))
 
 
-def drawn(result: CaseResult[ClutterAxes], f: int | np.ndarray) -> rare.Drawn:
-    """How the tracks of filter f that false plots begin were drawn, where false tracks are rare."""
+def sampling_weights(result: CaseResult[ClutterAxes], f: int | np.ndarray) -> rare.Drawn:
+    """The sampling weights of tracks of filter f that false plots begin, where false tracks are rare."""
     return rare.Drawn(result.count, *np.moveaxis(result.sums["drawn"][f], -1, 0))
 
 
-def false_tracks(result: CaseResult[ClutterAxes], f: int) -> tuple[Estimate, np.ndarray, np.ndarray]:
-    """The probability that a track begun by a false plot is confirmed; scans with a confirmed one, and confirmed ones.
-    The last two count all realisations; where false tracks are rare, by their weights."""
+def false_track_rates(result: CaseResult[ClutterAxes], f: int) -> tuple[Estimate, np.ndarray, np.ndarray]:
+    """The probability that a false plot's track is confirmed, and the numbers of scans with one and of confirmations.
+
+    The numbers are those of all realisations; where false tracks are rare, weighted."""
     if "held" not in result.sums:
         begun = result.sums["begun"][f]
-        alive, found = begun[:, at.FALSE_KEPT].sum(), begun[:, at.FALSE_FOUND].sum()
-        return statistics.rate(found, result.count), alive, found
-    confirmed = held(result, (f, 0))
-    return rare.rate(confirmed, drawn(result, f)), held(result, (f,)).weight.sum(), confirmed.weight
+        alive, newly_confirmed = begun[:, tracker.FALSE_KEPT].sum(), begun[:, tracker.FALSE_FOUND].sum()
+        return statistics.rate(newly_confirmed, result.count), alive, newly_confirmed
+    confirmed = held_tracks(result, (f, 0))
+    return rare.rate(confirmed, sampling_weights(result, f)), held_tracks(result, (f,)).weight.sum(), confirmed.weight
 
 
 # ---- statistics ------------------------------------------------------------------------------------------------------
-def poisson(count: Values, exposure: Values) -> Estimate:
-    """Rate of a Poisson number over an exposure with Garwood's 95 % interval, approximated by Wilson and Hilferty."""
+def poisson_rate(count: Values, exposure: Values) -> Estimate:
+    """The rate of Poisson events over an exposure with Garwood's 95 % interval, approximated by Wilson and Hilferty."""
     count = np.asarray(count, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         low = count * np.maximum(1 - 1 / (9 * count) - Z95 / (3 * np.sqrt(count)), 0) ** 3
@@ -74,23 +75,24 @@ def poisson(count: Values, exposure: Values) -> Estimate:
         return Estimate(count / exposure, np.where(count > 0, low, 0.0) / exposure, high / exposure)
 
 
-def ratio(sums: np.ndarray, n: int) -> Estimate:
-    """Σa/Σb with its 95 % interval from sums (5,) Σa, Σa², Σb, Σb², Σab over n realisations. The interval is that of
-    the logarithm, from the spread of a − R b over realisations (the delta method). Without any event it is that of a
-    Poisson number; without exposure it is NaN."""
-    a, aa, b, bb, ab = (float(part) for part in sums)
+def ratio_of_sums(sums: np.ndarray, n: int) -> Estimate:
+    """The ratio Σa/Σb with its 95 % interval, from sums (5,) Σa, Σa², Σb, Σb², Σab over n realisations.
+
+    The interval is that of the logarithm, from the spread of a − R b over realisations (the delta method). Without any
+    event it is that of a Poisson number; without exposure it is NaN."""
+    a, aa, b, bb, ab = (float(number) for number in sums)
     if b <= 0:
         return Estimate(np.nan, np.nan, np.nan)
     if a <= 0 or n < 2:
-        return Estimate(*(float(part) for part in poisson(a, b)))
+        return Estimate(*(float(number) for number in poisson_rate(a, b)))
     value = a / b
     spread = np.sqrt(max(aa - 2 * value * ab + value**2 * bb, 0.0) * n / (n - 1)) / b
     factor = float(np.exp(statistics.student(n - 1) * spread / value))
     return Estimate(value, value / factor, value * factor)
 
 
-def mean_of_counts(times: np.ndarray, counts: np.ndarray) -> Estimate:
-    """Mean time of events counted at times (K,), with its 95 % interval."""
+def mean_event_time(times: np.ndarray, counts: np.ndarray) -> Estimate:
+    """The mean time of events with counts (K,) at times (K,), with its 95 % interval."""
     n = counts.sum()
     if n < 1:
         return Estimate(np.nan, np.nan, np.nan)
@@ -113,16 +115,21 @@ def _tracks(result: CaseResult[ClutterAxes]) -> Columns:
     tentative: number of realisations that have a tentative one
     lost, dropped, tentative_dropped: number that have lost or dropped a confirmed one, or dropped a tentative one
     """
-    chosen, K, n = trackers(result), len(result.axes.k), result.count
-    counts = np.asarray(result.sums["counts"])[chosen]
-    shown = {"tentative": at.TRYING, "lost": at.LOST, "dropped": at.DROPPED, "tentative_dropped": at.FAILED}
+    filter_indices, K, n = tracker_indices(result), len(result.axes.k), result.count
+    counts = np.asarray(result.sums["counts"])[filter_indices]
+    kinds_by_column = {
+        "tentative": tracker.TRYING,
+        "lost": tracker.LOST,
+        "dropped": tracker.DROPPED,
+        "tentative_dropped": tracker.FAILED,
+    }
     return {
-        **leading(result, np.repeat(chosen, K), np.tile(np.arange(K), len(chosen))),
-        "n": np.full(len(chosen) * K, n),
-        "confirmed": statistics.rate(np.cumsum(counts[:, :, at.FOUND], axis=1).ravel(), n),
-        "exact_confirmed": result.axes.exact_confirmed[chosen].ravel(),
-        "kept": statistics.rate(counts[:, :, at.KEPT].ravel(), n),
-        **{name: counts[:, :, place].ravel().astype(np.int64) for name, place in shown.items()},
+        **leading(result, np.repeat(filter_indices, K), np.tile(np.arange(K), len(filter_indices))),
+        "n": np.full(len(filter_indices) * K, n),
+        "confirmed": statistics.rate(np.cumsum(counts[:, :, tracker.FOUND], axis=1).ravel(), n),
+        "exact_confirmed": result.axes.exact_confirmed[filter_indices].ravel(),
+        "kept": statistics.rate(counts[:, :, tracker.KEPT].ravel(), n),
+        **{name: counts[:, :, kind].ravel().astype(np.int64) for name, kind in kinds_by_column.items()},
     }
 
 
@@ -148,39 +155,41 @@ def _tracking(result: CaseResult[ClutterAxes]) -> Columns:
     false_tracks_per_hour ± false [1/h]: rate of confirmed false tracks over the sector
     false_tracks_at_once, false_life_s: mean number of these at a time, and mean life of one
     """
-    return of_rows([_summary(result, f) for f in trackers(result)])
+    return of_rows([_summary(result, f) for f in tracker_indices(result)])
 
 
 def _summary(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
-    tracker, sensor, n = result.spec.filters[f], result.spec.sensor, result.count
+    member, sensor, n = result.spec.filters[f], result.spec.sensor, result.count
     counts, ratios = (result.sums[name][f] for name in ("counts", "ratios"))
-    found, (false, alive, false_found) = counts[:, at.FOUND], false_tracks(result, f)
-    ends_per_hour = Estimate(*(part * per_hour(result) for part in ratio(ratios[at.ENDS_PER_SCAN], n)))
+    first_confirmed, (false, alive, false_found) = counts[:, tracker.FOUND], false_track_rates(result, f)
+    ends_per_hour = Estimate(
+        *(rate * scans_per_hour(result) for rate in ratio_of_sums(ratios[tracker.ENDS_PER_SCAN], n))
+    )
     any_false = sensor.false_plots_per_km2 > 0
-    false_per_hour = Estimate(*(false_plots(result) * per_hour(result) * part for part in false))
+    false_per_hour = Estimate(*(mean_false_plots(result) * scans_per_hour(result) * rate for rate in false))
     with np.errstate(divide="ignore", invalid="ignore"):
         life = Estimate(
-            *(3600.0 / np.float64(part) for part in (ends_per_hour.value, ends_per_hour.hi, ends_per_hour.lo))
+            *(3600.0 / np.float64(rate) for rate in (ends_per_hour.value, ends_per_hour.hi, ends_per_hour.lo))
         )
         false_life = alive * result.axes.scan_period_s / false_found
-        in_gate = counts[:, at.FALSE].sum() / counts[:, at.LOOKED].sum()
+        in_gate = counts[:, tracker.FALSE].sum() / counts[:, tracker.LOOKED].sum()
     return {
-        **{"case": result.name, "filter": result.axes.filters[f], "association": tracker.association},
-        **{"gate_probability": tracker.gate_probability, "m": tracker.rule.m, "of": tracker.rule.n, "n": n},
+        **{"case": result.name, "filter": result.axes.filters[f], "association": member.association},
+        **{"gate_probability": member.gate_probability, "m": member.rule.m, "of": member.rule.n, "n": n},
         "detection_probability": sensor.detection_probability,
         "false_plots_per_km2": sensor.false_plots_per_km2,
         "false_in_gate": in_gate,
-        "confirmed": statistics.rate(found.sum(), n),
-        "time_to_confirm_s|time": mean_of_counts(np.asarray(result.axes.t_s, dtype=float), found),
-        "kept_at_end|kept": statistics.rate(counts[-1, at.KEPT], n),
-        **{"lost": int(counts[:, at.LOST].sum()), "dropped": int(counts[:, at.DROPPED].sum())},
+        "confirmed": statistics.rate(first_confirmed.sum(), n),
+        "time_to_confirm_s|time": mean_event_time(np.asarray(result.axes.t_s, dtype=float), first_confirmed),
+        "kept_at_end|kept": statistics.rate(counts[-1, tracker.KEPT], n),
+        **{"lost": int(counts[:, tracker.LOST].sum()), "dropped": int(counts[:, tracker.DROPPED].sum())},
         "ends_per_hour|ends": ends_per_hour,
         "life_s|life": life,
-        "wrong_share|wrong": ratio(ratios[at.WRONG_PER_PLOT], n),
+        "wrong_share|wrong": ratio_of_sums(ratios[tracker.WRONG_PER_PLOT], n),
         "false_confirmed": false if any_false else Estimate(0.0, 0.0, 0.0),
         "exact_false_confirmed": result.axes.exact_begun[f].sum() if any_false else 0.0,
         "false_tracks_per_hour|false": false_per_hour,
-        "false_tracks_at_once": false_plots(result) * alive / n,
+        "false_tracks_at_once": mean_false_plots(result) * alive / n,
         "false_life_s": false_life,
     }
 
@@ -198,23 +207,23 @@ def _gates(result: CaseResult[ClutterAxes]) -> Columns:
     false_in_gate ± false: mean number of false plots in it
     """
     counts, filters = np.asarray(result.sums["counts"]), result.spec.filters
-    f, k = np.nonzero(counts[:, :, at.LOOKED] > 0)
+    f, k = np.nonzero(counts[:, :, tracker.LOOKED] > 0)
     rows = counts[f, k]
-    gate = np.array([one.gate_probability for one in filters])
-    matched = np.array([one.association == "known" and not one.manoeuvre_variance for one in filters])
-    exact = np.where(matched & straight(result) & (not result.spec.target.fluctuation_mps2), gate, np.nan)
+    gate = np.array([member.gate_probability for member in filters])
+    matched = np.array([member.association == "known" and not member.manoeuvre_variance for member in filters])
+    exact = np.where(matched & has_straight_course(result) & (not result.spec.target.fluctuation_mps2), gate, np.nan)
     return {
         **leading(result, f, k),
-        "n": rows[:, at.LOOKED].astype(np.int64),
-        "plots": rows[:, at.PLOTS].astype(np.int64),
-        "inside": statistics.rate(rows[:, at.INSIDE], rows[:, at.PLOTS]),
+        "n": rows[:, tracker.LOOKED].astype(np.int64),
+        "plots": rows[:, tracker.PLOTS].astype(np.int64),
+        "inside": statistics.rate(rows[:, tracker.INSIDE], rows[:, tracker.PLOTS]),
         "exact_inside": exact[f],
-        "false_in_gate|false": poisson(rows[:, at.FALSE], rows[:, at.LOOKED]),
-        "exact_false_in_gate": rows[:, at.EXPECTED] / rows[:, at.LOOKED],
+        "false_in_gate|false": poisson_rate(rows[:, tracker.FALSE], rows[:, tracker.LOOKED]),
+        "exact_false_in_gate": rows[:, tracker.EXPECTED] / rows[:, tracker.LOOKED],
     }
 
 
-def straight(result: CaseResult[ClutterAxes]) -> bool:
+def has_straight_course(result: CaseResult[ClutterAxes]) -> bool:
     """Whether range and bearing change at constant rates, as the trackers' model assumes."""
     target = result.spec.target
     polar = target.kind == "polynomial" and target.frame == "polar"
@@ -235,18 +244,18 @@ def _classes(result: CaseResult[ClutterAxes]) -> Columns:
     false_called_true ± false: share of the false ones called true
     bound: the latter is at most, exp(−threshold)
     """
-    chosen, thresholds = trackers(result), result.axes.thresholds
-    scores = np.asarray(result.sums["scores"])[:, chosen]
+    filter_indices, thresholds = tracker_indices(result), result.axes.thresholds
+    scores = np.asarray(result.sums["scores"])[:, filter_indices]
     true, false = scores[:, :, :-1].reshape(2, -1)
     n_true, n_false = np.broadcast_to(scores[:, :, -1:], scores[:, :, :-1].shape).reshape(2, -1)
     return {
-        **leading(result, np.repeat(chosen, len(thresholds))),
-        "threshold": np.tile(thresholds, len(chosen)),
+        **leading(result, np.repeat(filter_indices, len(thresholds))),
+        "threshold": np.tile(thresholds, len(filter_indices)),
         "n_true": n_true.astype(np.int64),
         "true_called_false|true": statistics.rate(n_true - true, n_true),
         "n_false": n_false.astype(np.int64),
         "false_called_true|false": statistics.rate(false, n_false),
-        "bound": np.tile(np.exp(-thresholds), len(chosen)),
+        "bound": np.tile(np.exp(-thresholds), len(filter_indices)),
     }
 
 
@@ -259,60 +268,65 @@ def _rare(results: Sequence[CaseResult[ClutterAxes]]) -> "pd.DataFrame | None":
     target has ended by each scan (target's track ended; `sought` by the last one), and by the last one how: target's
     track dropped, target's track lost; of further realisations, so that no other table changes by that.
     """
-    made = {"held": _rare_false, "ended": _rare_ends}
-    return rare.table([rows(one) for one in results for name, rows in made.items() if name in one.sums])
+    makers = {"held": _rare_false, "ended": _rare_ends}
+    return rare.table(
+        [make_rows(result) for result in results for name, make_rows in makers.items() if name in result.sums]
+    )
 
 
 def _rare_false(result: CaseResult[ClutterAxes]) -> dict[str, Any]:
-    chosen = trackers(result)
-    shown = held(result, (chosen,)).number > 0
-    shown[:, 0] = True
-    row, k = np.nonzero(shown)
-    f, sought = chosen[row], k == 0
-    rows = rare.rows(leading(result, f, k), f"{FALSE} held", sought, held(result, (f, k)), drawn(result, f))
+    filter_indices = tracker_indices(result)
+    is_shown = held_tracks(result, (filter_indices,)).number > 0
+    is_shown[:, 0] = True
+    row, k = np.nonzero(is_shown)
+    f, sought = filter_indices[row], k == 0
+    rows = rare.rows(
+        leading(result, f, k), f"{FALSE} held", sought, held_tracks(result, (f, k)), sampling_weights(result, f)
+    )
     return {**rows, "event": np.where(sought, FALSE, rows["event"])}
 
 
 def _rare_ends(result: CaseResult[ClutterAxes]) -> dict[str, Any]:
-    return stacked([_ended(result, f) for f in trackers(result)])
+    return stacked([_ended(result, f) for f in tracker_indices(result)])
 
 
 def _ended(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
     by_scan, last = np.cumsum(result.sums["ended"][f], axis=0), len(result.axes.k) - 1
     ended = by_scan.sum(axis=1)
     k = np.flatnonzero((ended[:, 2] > 0) | (np.arange(last + 1) == last))
-    drawn, whole = rare.Drawn(result.count, *result.sums["ended_drawn"][f]), rare.Counted(*ended[k].T)
-    curve = rare.rows(leading(result, np.full(len(k), f), k), ENDED, k == last, whole, drawn)
-    curve["note"] = ends_note(drawn, by_scan[k], false_plots(result) > 0)
+    weights, total = rare.Drawn(result.count, *result.sums["ended_drawn"][f]), rare.Counted(*ended[k].T)
+    curve = rare.rows(leading(result, np.full(len(k), f), k), ENDED, k == last, total, weights)
+    curve["note"] = ends_note(weights, by_scan[k], mean_false_plots(result) > 0)
     label = leading(result, np.array([f]), np.array([last]))
-    made = [curve]
-    for how, kinds in HOW.items():
-        own = rare.Counted(*by_scan[last, kinds].sum(axis=0)[:, None])
-        rows = rare.rows(label, how, np.array([False]), own, drawn)
-        made.append(rows | {"note": ends_note(drawn, by_scan[[last]], false_plots(result) > 0, kinds)})
-    return stacked(made)
+    parts = [curve]
+    for event, kinds in KINDS_BY_EVENT.items():
+        event_counts = rare.Counted(*by_scan[last, kinds].sum(axis=0)[:, None])
+        rows = rare.rows(label, event, np.array([False]), event_counts, weights)
+        parts.append(rows | {"note": ends_note(weights, by_scan[[last]], mean_false_plots(result) > 0, kinds)})
+    return stacked(parts)
 
 
 def ends_note(
-    drawn: rare.Drawn, ended: np.ndarray, among_false: bool, kinds: Sequence[int] = range(KINDS)
+    weights: rare.Drawn, ended: np.ndarray, among_false: bool, kinds: Sequence[int] = range(END_KINDS)
 ) -> np.ndarray:
-    """Notes (n,) on rates of ends of some kinds, from sums (n, KINDS, 4): of all or a part that matters.
+    """Notes (n,) on the rates at which tracks end in some of the ways, from sums (n, END_KINDS, 4).
 
-    Runs of misses have equal weights, and many; the few tracks that end by far plots, or by false ones beside the
-    target's, have large ones, which the whole does not show while they are few. A part matters where it may be over a
-    share of PART, by its interval; the last one does anyhow, since it is small where those are missing. among_false:
-    whether there are false plots."""
-    whole = rare.Counted(*ended[:, list(kinds)].sum(axis=1).T)
-    said, rate = [whole], rare.rate(whole, drawn).value
-    parts = [(own, PART) for own in HOW.values() if len(own) < len(kinds)]
-    parts += [([kind for kind in kinds if kind in BESIDE], 0.0)] if among_false else []
-    for own_kinds, least in parts:
-        part = rare.Counted(*ended[:, own_kinds].sum(axis=1).T)
-        matters = rare.rate(part, drawn).hi > least * rate
-        said.append(rare.Counted(*(np.where(matters, own, of) for own, of in zip(part, whole, strict=True))))
-    own_note, any_note = rare.note(drawn, whole), rare.note(drawn, *said)
+    The many tracks that end by runs of misses have equal weights. The few that end by far plots, or by false ones
+    beside the target's, have large weights, which the total does not show while they are few. So a part of the total is
+    judged as well if by its interval it may exceed MIN_SHARE of the rate; the part beside the target's always, because
+    it seems small where such tracks were missed. among_false: whether there are false plots."""
+    total = rare.Counted(*ended[:, list(kinds)].sum(axis=1).T)
+    noted_counts, rate = [total], rare.rate(total, weights).value
+    parts = [(event_kinds, MIN_SHARE) for event_kinds in KINDS_BY_EVENT.values() if len(event_kinds) < len(kinds)]
+    parts += [([kind for kind in kinds if kind in BESIDE_KINDS], 0.0)] if among_false else []
+    for part_kinds, min_share in parts:
+        part_counts = rare.Counted(*ended[:, part_kinds].sum(axis=1).T)
+        matters = rare.rate(part_counts, weights).hi > min_share * rate
+        pairs = zip(part_counts, total, strict=True)
+        noted_counts.append(rare.Counted(*(np.where(matters, part, all_ends) for part, all_ends in pairs)))
+    total_note, any_note = rare.note(weights, total), rare.note(weights, *noted_counts)
     in_part = notes_where(any_note != "", rare.IN_PART)
-    return np.where(own_note != "", own_note, in_part)
+    return np.where(total_note != "", total_note, in_part)
 
 
 tables = table.made

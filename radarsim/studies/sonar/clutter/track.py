@@ -15,28 +15,27 @@ from radarsim.engine.results import Track
 from radarsim.errors import ConfigError
 from radarsim.studies.interface import Draw, Drawn
 from radarsim.studies.noise import noise_key
-from radarsim.studies.sonar import study as base
+from radarsim.studies.sonar import study
 from radarsim.studies.sonar.clutter import filters
 from radarsim.studies.sonar.clutter.filters import Conditions, TrackerSpec, trackers
-from radarsim.studies.sonar.clutter.kernels import tracker as kernels
+from radarsim.studies.sonar.clutter.kernels import tracker
 from radarsim.studies.sonar.clutter.study import SIZE, detected_plots
-from radarsim.studies.sonar.kernels import patterns as pattern_kernels
-from radarsim.studies.sonar.kernels import shared_gains as sonar_kernels
+from radarsim.studies.sonar.kernels import patterns, shared_gains
 from radarsim.studies.sonar.kernels.steps import CHUNK
 from radarsim.studies.sonar.scene import build_scene
-from radarsim.studies.sonar.track import MOST_ROWS
+from radarsim.studies.sonar.track import MAX_ROWS
 
 
 # ---- multitrack ------------------------------------------------------------------------------------------------------
 @dataclass
 class TrackHistory:
-    """One track: its lane (chunk, index), its state under the rules, and the estimates at each of its scans.
+    """A track: its lane (chunk, index), its state under the rules, and the estimates at each of its scans.
 
     scans holds the numbers of the scans; states (n, 4) r, vr, b, vb with variances (n, 4), NaN for rates not yet known;
     scores (n,); gates (n, 5) the predicted position and the covariance of its innovation."""
 
     lane: tuple[int, int]
-    state: int = kernels.TENTATIVE
+    state: int = tracker.TENTATIVE
     age: int = 1
     hits: int = 1
     misses: int = 0
@@ -51,14 +50,16 @@ class TrackHistory:
 
 
 class MultiTracker:
-    """The tracks of one tracker, alive and ended."""
+    """All tracks of one tracker, alive and ended."""
 
-    def __init__(self, spec: TrackerSpec, given: Conditions):
-        arrays = trackers([spec], given)
-        self.spec, self.given, self.manoeuvre = spec, given, arrays.manoeuvre[0]
+    def __init__(self, spec: TrackerSpec, conditions: Conditions):
+        arrays = trackers([spec], conditions)
+        self.spec, self.conditions, self.manoeuvre = spec, conditions, arrays.manoeuvre[0]
         association, gate = int(arrays.association[0]), arrays.gate[0]
-        self.rule = kernels.Rule(association, gate, given.detection, spec.gate_probability, given.density, spec.speed)
-        self.chunks: list[kernels.Tracks] = []
+        self.rule = tracker.AssociationRule(
+            association, gate, conditions.detection, spec.gate_probability, conditions.density, spec.speed
+        )
+        self.chunks: list[tracker.Tracks] = []
         self.free: list[tuple[int, int]] = []
         self.alive: list[TrackHistory] = []
         self.ended: list[TrackHistory] = []
@@ -68,13 +69,13 @@ class MultiTracker:
         predicted = self._predicted(dt)
         innovations, distance = self._distances(predicted, r, b)
         owner = self._owners(distance)
-        taken = [np.zeros((6, CHUNK)) for _ in self.chunks]
+        associations = [np.zeros((6, CHUNK)) for _ in self.chunks]
         for a, track in enumerate(self.alive):
-            self._associate(track, predicted[a], innovations[:, a, owner == a], taken)
-        new = [self._begin(r[p], b[p], taken) for p in np.flatnonzero(owner < 0)]
-        for chunk, rows in zip(self.chunks, taken, strict=True):
-            joint = self.rule.association == kernels.PDA
-            kernels.update(chunk, dt, self.given.period, self.given.sigma, self.manoeuvre, joint, rows)
+            self._associate(track, predicted[a], innovations[:, a, owner == a], associations)
+        new = [self._begin(r[p], b[p], associations) for p in np.flatnonzero(owner < 0)]
+        for chunk, rows in zip(self.chunks, associations, strict=True):
+            joint = self.rule.association == tracker.PDA
+            tracker.update(chunk, dt, self.conditions.period, self.conditions.sigma, self.manoeuvre, joint, rows)
         for track, gate in zip(self.alive, predicted, strict=True):
             self._judge(track)
             track.gates.append(gate)
@@ -86,18 +87,18 @@ class MultiTracker:
         self._remove_ended()
 
     def _predicted(self, dt: float) -> np.ndarray:
-        """Positions and innovation covariances (A, 5) of the live tracks; after one plot widened by targets' speed."""
+        """Positions and innovation covariances (A, 5) of live tracks; after one plot widened by the target speed."""
         rows = []
         for chunk in self.chunks:
             rows.append(np.empty((5, CHUNK)))
-            kernels.predict(chunk, dt, self.given.period, self.given.sigma, self.manoeuvre, rows[-1])
+            tracker.predict(chunk, dt, self.conditions.period, self.conditions.sigma, self.manoeuvre, rows[-1])
         out = np.array([rows[c][:, i] for c, i in (track.lane for track in self.alive)]).reshape(-1, 5)
         for track, row in zip(self.alive, out, strict=True):
             track.since += dt
             if not self._settled(track):
                 reach = self.spec.speed * track.since
                 row[2] += reach**2
-                row[4] += (reach / max(row[0], kernels.CLOSEST)) ** 2
+                row[4] += (reach / max(row[0], tracker.MIN_RANGE_M)) ** 2
         return out
 
     def _settled(self, track: TrackHistory) -> bool:
@@ -112,66 +113,70 @@ class MultiTracker:
         return np.stack([nu_r, nu_b]), (bb * nu_r**2 - 2 * rb * nu_r * nu_b + rr * nu_b**2) / (rr * bb - rb**2)
 
     def _owners(self, distance: np.ndarray) -> np.ndarray:
-        """The track (n,) that each plot goes to, -1 for none: the nearest one, but confirmed tracks first. Only
-        probabilistic association takes more than one plot, and only for a track of two plots or more."""
+        """The track (n,) that each plot goes to, -1 for none: the nearest track, but confirmed tracks first.
+
+        Only probabilistic association takes more than one plot, and only for a track of two plots or more."""
         owner = np.full(distance.shape[1], -1)
-        several = np.array([self.rule.association == kernels.PDA and self._settled(track) for track in self.alive])
-        confirmed = np.array([track.state == kernels.CONFIRMED for track in self.alive])
+        takes_several = np.array(
+            [self.rule.association == tracker.PDA and self._settled(track) for track in self.alive]
+        )
+        confirmed = np.array([track.state == tracker.CONFIRMED for track in self.alive])
         busy = np.zeros(len(self.alive), dtype=bool)
         for group in (confirmed, ~confirmed) if len(self.alive) else ():
             a, p = np.nonzero((distance <= self.rule.gate) & group[:, None])
             order = np.argsort(distance[a, p], kind="stable")
             for track, plot in zip(a[order], p[order], strict=True):
-                if owner[plot] < 0 and (several[track] or not busy[track]):
+                if owner[plot] < 0 and (takes_several[track] or not busy[track]):
                     owner[plot], busy[track] = track, True
         return owner
 
     def _associate(
-        self, track: TrackHistory, gate: np.ndarray, innovations: np.ndarray, taken: list[np.ndarray]
+        self, track: TrackHistory, gate: np.ndarray, innovations: np.ndarray, associations: list[np.ndarray]
     ) -> None:
-        """Associate a track with the plots that it owns, given their innovations (2, n); writes to its chunk's rows."""
+        """Associate a track with the plots that it owns, by their innovations (2, n); write to its chunk's rows."""
         nu = np.ascontiguousarray(innovations)
-        result = kernels.associate_innovations(self.rule, self._settled(track), gate[0], tuple(gate[2:]), *nu)
+        result = tracker.associate_innovations(self.rule, self._settled(track), gate[0], tuple(gate[2:]), *nu)
         chunk, i = track.lane
-        taken[chunk][:, i] = result.taken, result.nu_r, result.nu_b, result.rr, result.rb, result.bb
+        associations[chunk][:, i] = result.has_plot, result.nu_r, result.nu_b, result.rr, result.rb, result.bb
         track.age, track.score = track.age + 1, track.score + result.score
-        if result.taken:
+        if result.has_plot:
             track.hits, track.misses, track.since = track.hits + 1, 0, 0.0
         else:
             track.misses += 1
 
-    def _begin(self, r: float, b: float, taken: list[np.ndarray]) -> TrackHistory:
+    def _begin(self, r: float, b: float, associations: list[np.ndarray]) -> TrackHistory:
         """A track of one plot, in a free lane."""
         if not self.free:
             self.free = [(len(self.chunks), i) for i in reversed(range(CHUNK))]
-            self.chunks.append(kernels.no_tracks())
-            taken.append(np.zeros((6, CHUNK)))
+            self.chunks.append(tracker.no_tracks())
+            associations.append(np.zeros((6, CHUNK)))
         chunk, i = self.free.pop()
-        kernels.clear(self.chunks[chunk], i)
-        taken[chunk][:, i] = 1.0, r, b, 0.0, 0.0, 0.0
+        tracker.clear_track(self.chunks[chunk], i)
+        associations[chunk][:, i] = 1.0, r, b, 0.0, 0.0, 0.0
         return TrackHistory((chunk, i))
 
     def _judge(self, track: TrackHistory) -> None:
         rule = float(self.spec.m), float(self.spec.n), float(self.spec.misses)
-        state = kernels.next_state(track.state, float(track.hits), float(track.misses), float(track.age), *rule)
+        state = tracker.next_state(track.state, float(track.hits), float(track.misses), float(track.age), *rule)
         chunk, i = track.lane
         uncertain = self.chunks[chunk].P[:, 0, i].max() > self.spec.lost**2
-        track.state = kernels.NONE if track.state == kernels.CONFIRMED and uncertain else state
-        track.was_confirmed |= track.state == kernels.CONFIRMED
+        track.state = tracker.NONE if track.state == tracker.CONFIRMED and uncertain else state
+        track.was_confirmed |= track.state == tracker.CONFIRMED
 
     def _record(self, track: TrackHistory, scan: int) -> None:
         chunk, i = track.lane
-        tracks, unit = self.chunks[chunk], np.repeat(self.given.sigma, 2) / np.tile([1.0, self.given.period], 2)
+        tracks = self.chunks[chunk]
+        unit = np.repeat(self.conditions.sigma, 2) / np.tile([1.0, self.conditions.period], 2)
         x, P = tracks.x[:, :2, i].ravel(), tracks.P[:, [0, 3], i].ravel()
-        known = np.array([True, self._settled(track)] * 2)
+        is_known = np.array([True, self._settled(track)] * 2)
         track.scans.append(scan)
-        track.states.append(np.where(known, x, np.nan))
-        track.variances.append(np.where(known, P * unit**2, np.nan))
+        track.states.append(np.where(is_known, x, np.nan))
+        track.variances.append(np.where(is_known, P * unit**2, np.nan))
         track.scores.append(track.score)
 
     def _remove_ended(self) -> None:
-        ended = [track for track in self.alive if track.state == kernels.NONE]
-        self.alive = [track for track in self.alive if track.state != kernels.NONE]
+        ended = [track for track in self.alive if track.state == tracker.NONE]
+        self.alive = [track for track in self.alive if track.state != tracker.NONE]
         self.free += [track.lane for track in ended]
         self.ended += ended
 
@@ -182,57 +187,58 @@ class MultiTracker:
 
 
 def confirmed_tracks(
-    spec: TrackerSpec, given: Conditions, scans: Iterable[tuple[float, np.ndarray, np.ndarray]]
+    spec: TrackerSpec, conditions: Conditions, scans: Iterable[tuple[float, np.ndarray, np.ndarray]]
 ) -> list[TrackHistory]:
     """The confirmed tracks over scans (t, r (n,), b (n,)) in order of time."""
-    tracker, last = MultiTracker(spec, given), None
+    multi_tracker, last = MultiTracker(spec, conditions), None
     for k, (t, r, b) in enumerate(scans):
-        tracker.process(k, 0.0 if last is None else t - last, r, b)
+        multi_tracker.process(k, 0.0 if last is None else t - last, r, b)
         last = t
-    return tracker.confirmed()
+    return multi_tracker.confirmed()
 
 
 # ---- track -----------------------------------------------------------------------------------------------------------
 def target_plots(
-    world: sonar_kernels.World, detections: pattern_kernels.Detections, realisation: int
+    world: shared_gains.World, detections: patterns.Detections, realisation: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Plots (K, 2) of the target in one realisation, NaN where missed, and its true positions (K, 2)."""
-    plots, deviation = base.drawn_plots(world, detections, realisation, 1)
+    plots, deviation = study.drawn_plots(world, detections, realisation, 1)
     return plots[:, 0].T, world.truth[..., 0] + deviation[:, 0, 0].T
 
 
-def all_plots(field: kernels.Field, first: int, own: np.ndarray, scan: int = 0) -> np.ndarray:
-    """All plots (3, n, K, M) of realisations from `first` on and scans from `scan` on, as `fill_scans` orders
-    them; own (2, n, K) the target's, NaN where there is none."""
-    cells, there = field.cells, np.isfinite(own[0])
+def sector_plots(field: tracker.Field, first: int, target_positions: np.ndarray, scan: int = 0) -> np.ndarray:
+    """All plots (3, n, K, M) in the sector, of realisations from `first` on and scans from `scan` on.
+
+    In the order of `tracker.fill_scans`; target_positions (2, n, K) are the target's plots, NaN where there is none."""
+    cells, has_target = field.cells, np.isfinite(target_positions[0])
     expected = cells.density * cells.dq * cells.nq * cells.db * cells.nb
-    room, most = 0, int(expected + 6 * np.sqrt(expected) + 5)
-    while most > room:
-        room, made = most, np.empty((*there.shape, 3, most))
-        most = kernels.fill_scans(field, first, scan, own, there, made)
-    return made[..., : max(most, 1)].transpose(2, 0, 1, 3)
+    capacity, needed = 0, int(expected + 6 * np.sqrt(expected) + 5)
+    while needed > capacity:
+        capacity, plots = needed, np.empty((*has_target.shape, 3, needed))
+        needed = tracker.fill_scans(field, first, scan, target_positions, has_target, plots)
+    return plots[..., : max(needed, 1)].transpose(2, 0, 1, 3)
 
 
-def false_plots(field: kernels.Field, realisation: int, scan: int) -> np.ndarray:
+def false_plots(field: tracker.Field, realisation: int, scan: int) -> np.ndarray:
     """All false plots (2, n) of a scan, range and bearing."""
-    plots = all_plots(field, realisation, np.full((2, 1, 1), np.nan), scan)[:2, 0, 0]
+    plots = sector_plots(field, realisation, np.full((2, 1, 1), np.nan), scan)[:2, 0, 0]
     return plots[:, np.isfinite(plots[0])]
 
 
 def drawing(case: Case) -> Draw:
-    """All plots in the sector of realisations of a case, those of a scan in order of bearing.
+    """Draw all plots in the sector in realisations of a case, ordered by bearing in each scan.
 
     true_target is 1 for the target's plots and 0 for false ones; true_range_m and true_bearing_rad are the target's."""
     spec, scene = case.spec, build_scene(case)
-    field = filters.field(noise_key(case, "false"), spec.sensor.sector, filters.conditions(spec))
-    world, detections = base.world(case, scene), detected_plots(case, scene)
+    field = filters.field(noise_key(case, "false"), spec.sensor.sector, filters.tracking_conditions(spec))
+    world, detections = study.world(case, scene), detected_plots(case, scene)
 
     def draw(first: int, count: int) -> Drawn:
-        own, deviation = base.drawn_plots(world, detections, first, count)
-        r, b, target = all_plots(field, first, own)
-        truth = base.truth_of(scene, deviation, count, SIZE)
-        beside = {"true_target": target, "true_range_m": truth[..., 0], "true_bearing_rad": truth[..., SIZE]}
-        return Drawn(scene.t, {"range_m": r, "bearing_rad": b}, base.labels(spec, SIZE), truth, beside, first)
+        target_positions, deviation = study.drawn_plots(world, detections, first, count)
+        r, b, target = sector_plots(field, first, target_positions)
+        truth = study.truth_of(scene, deviation, count, SIZE)
+        truth_columns = {"true_target": target, "true_range_m": truth[..., 0], "true_bearing_rad": truth[..., SIZE]}
+        return Drawn(scene.t, {"range_m": r, "bearing_rad": b}, study.labels(spec, SIZE), truth, truth_columns, first)
 
     return draw
 
@@ -242,9 +248,9 @@ class Tracker:
 
     Every confirmed track is returned, from its first plot on. A row without range or bearing is not a plot, but its
     time is that of a scan. Filters with association `known` are left out; raises ConfigError where there are no others.
-    How tracks share plots stands above."""
+    `MultiTracker` decides how tracks share plots."""
 
-    most_rows = MOST_ROWS
+    most_rows = MAX_ROWS
     several = True
 
     def __init__(self, case: Case):
@@ -253,8 +259,8 @@ class Tracker:
     def feed(self, columns: Mapping[str, np.ndarray]) -> Track:
         """The tracks over all rows: columns (n,), NaN where a value is missing."""
         spec, specs = self.case.spec, filters.tracker_specs(self.case.spec)
-        chosen = [f for f, one in enumerate(specs) if one.association != "known"]
-        if not chosen:
+        filter_indices = [f for f, tracker_spec in enumerate(specs) if tracker_spec.association != "known"]
+        if not filter_indices:
             raise ConfigError(
                 f"{self.case.name}: filters: it is not known which plots are the target's: use nearest or pda"
             )
@@ -262,8 +268,8 @@ class Tracker:
         plots = np.stack([columns["range_m"], columns["bearing_rad"]])
         complete = np.isfinite(plots).all(axis=0)
         scans = [(time, *plots[:, complete & (row == k)]) for k, time in enumerate(t)]
-        by_filter = {f: confirmed_tracks(specs[f], filters.conditions(spec), scans) for f in chosen}
-        tracks = [(f, n, track) for f, found in by_filter.items() for n, track in enumerate(found, start=1)]
+        by_filter = {f: confirmed_tracks(specs[f], filters.tracking_conditions(spec), scans) for f in filter_indices}
+        tracks = [(f, n, track) for f, histories in by_filter.items() for n, track in enumerate(histories, start=1)]
         estimate, sigma = np.full((2, len(tracks), len(t), 4), np.nan)
         score = np.full((len(tracks), len(t)), np.nan)
         for i, (_, _, track) in enumerate(tracks):
@@ -271,7 +277,7 @@ class Tracker:
             score[i, track.scans] = track.scores
         return Track(
             filters=tuple(spec.filters[f].name for f, _, _ in tracks),
-            components=base.labels(spec, SIZE),
+            components=study.labels(spec, SIZE),
             t_s=t,
             estimate=estimate,
             sigma=sigma,

@@ -14,7 +14,16 @@ from radarsim.kernels.lanes import address
 from radarsim.kernels.random import U, uniforms
 from radarsim.studies.sonar.kernels import detector
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK, Sums, move_and_measure
-from radarsim.studies.sonar.kernels.steps import ROW, Filters, Model, Plots, copy_row, fit, recur, remember
+from radarsim.studies.sonar.kernels.steps import (
+    ROW,
+    Filters,
+    Model,
+    Plots,
+    copy_row,
+    fit_window,
+    remember_plots,
+    update_recursive,
+)
 from radarsim.studies.sonar.kernels.sums import Course, add_ahead, add_sums, rows_of
 
 INFORMATION, COVARIANCE, FIXED, WINDOW, ADAPTIVE, IMM = range(6)
@@ -22,8 +31,10 @@ PLACED = 8.0  # as world.PLACED
 
 
 class Detections(NamedTuple):
-    """Which scans give a plot: key (2,) of the noise stream; certain (K,) is 1 where a scan always gives one, 0 where
-    it never does, else -1, which means with this probability."""
+    """Which scans give a plot.
+
+    key (2,) of the noise stream; certain (K,) is 1 where a scan always gives a plot, 0 where it never does, and -1
+    where it does with `probability`."""
 
     key: np.ndarray
     certain: np.ndarray
@@ -62,11 +73,13 @@ class BlockSums(NamedTuple):
     alarms: detector.Alarms
     #: (F, K, C, 3) Σp, Σp² of the probability of a manoeuvre, Σ of the plots in memory; of filters that respond
     modes: np.ndarray
-    at: np.ndarray  #: (A,) scans whose estimates are kept
+    kept_scans: np.ndarray  #: (A,) scans whose estimates are kept
     #: (A, F, 2, 6, count) of the first two coordinates: value, rate, believed variance of the value, covariance,
     #: variance of the rate, and 1 where the state is complete
-    kept: np.ndarray
-    each: np.ndarray  #: (F, K, C, S, count or 0) errors of all realisations, NaN where a filter has no estimate
+    kept_estimates: np.ndarray
+    realisation_errors: (
+        np.ndarray
+    )  #: (F, K, C, S, count or 0) errors of all realisations, NaN where a filter has no estimate
 
 
 # ---- plots --------------------------------------------------------------------------------------------------------
@@ -83,32 +96,34 @@ def detect(detections, first, k, detected):
 
 
 @kernel
-def fill_plots(world, detections, first, what, plots, deviation):
-    """Plots (C, K, n), or errors (what = 1), of realisations from `first` on, not-a-number where there is none; and the
-    deviation of value and rate (C, 2, K, n), where a target moves at random."""
-    room, detected, scans = np.zeros((plots.shape[0], 4, CHUNK)), np.empty(CHUNK), plots.shape[1]
+def fill_plots(world, detections, first, source_row, plots, deviation):
+    """Write plots (C, K, n) of realisations from `first` on, NaN where there is none, or their errors.
+
+    source_row 0 for plots, 1 for errors. deviation (C, 2, K, n) of value and rate is written where a target moves at
+    random."""
+    work, detected, scans = np.zeros((plots.shape[0], 4, CHUNK)), np.empty(CHUNK), plots.shape[1]
     moves = np.any(world.walk > 0.0)
     for done in range(0, plots.shape[2], CHUNK):
         n = min(CHUNK, plots.shape[2] - done)
-        room[:] = 0.0
+        work[:] = 0.0
         for k in range(scans):
-            move_and_measure(world, first + done, k, room)
+            move_and_measure(world, first + done, k, work)
             detect(detections, first + done, k, detected)
             for c in range(plots.shape[0]):
-                seen, to = room[c, what], plots[c, k]
+                values, plots_of_scan = work[c, source_row], plots[c, k]
                 for i in range(n):
-                    to[done + i] = seen[i] if detected[i] > 0.0 else np.nan
+                    plots_of_scan[done + i] = values[i] if detected[i] > 0.0 else np.nan
                 if moves:
                     for j in range(2):
                         for i in range(n):
-                            deviation[c, j, k, done + i] = room[c, 2 + j, i]
+                            deviation[c, j, k, done + i] = work[c, 2 + j, i]
 
 
 @kernel
-def convert(conversion, sigma, k, plots, detected, place, z, weight):
+def convert(conversion, sigma, k, plots, detected, running_mean, z, weight):
     """Plots z (C, n) in the coordinates of the filters and their weights (C, n), from measured plots (C', 4, n).
 
-    sigma (C,) of a nominal plot; place (3, n) holds mean range and bearing of the last plots, and their number. The
+    sigma (C,) of a nominal plot; running_mean (3, n): mean range and bearing of the last plots, and their number. The
     plain conversion computes weights at the plot itself, the unbiased one at earlier plots: a weight that is correlated
     with the error of its own plot would cause a bias again. Bordonaro, Willett and Bar-Shalom (2014) decorrelate it
     likewise, by the predicted position. See `world.places`."""
@@ -132,13 +147,13 @@ def convert(conversion, sigma, k, plots, detected, place, z, weight):
             xx, yy = sr * co * co + across * si * si, sr * si * si + across * co * co
         else:
             r_now, b_now = r, b
-            if place[2, i] > 0.0:
-                r, b = place[0, i], place[1, i]
+            if running_mean[2, i] > 0.0:
+                r, b = running_mean[0, i], running_mean[1, i]
                 co, si = np.cos(b), np.sin(b)
             if detected[i] > 0.0:
-                place[2, i] = min(place[2, i] + 1.0, PLACED)
-                place[0, i] += (r_now - place[0, i]) / place[2, i]
-                place[1, i] += (b_now - place[1, i]) / place[2, i]
+                running_mean[2, i] = min(running_mean[2, i] + 1.0, PLACED)
+                running_mean[0, i] += (r_now - running_mean[0, i]) / running_mean[2, i]
+                running_mean[1, i] += (b_now - running_mean[1, i]) / running_mean[2, i]
             power, twice = 0.5 * grow * (r * r + sr), shrink * (co * co - si * si)
             xx, yy = power * (1.0 + twice) - r * r * co * co, power * (1.0 - twice) - r * r * si * si
         weight[0, i], weight[1, i] = detected[i] * nominal_x / xx, detected[i] * nominal_y / yy
@@ -158,26 +173,26 @@ def filter_scan(bank, f, c, k, dt, filters, plots):
     """Update filter f in coordinate c with scan k, in place, dt after the scan before."""
     size, length, kind, period = bank.size[f], bank.length[f], bank.kind[f], bank.period
     if kind == ADAPTIVE:
-        detector.adapt(filters, plots, f, c, bank.adaptive, size, length, dt, period)
+        detector.update_adaptive(filters, plots, f, c, bank.adaptive, size, length, dt, period)
     elif kind == IMM:
-        detector.interact(filters, plots, f, c, bank.interacting, size, dt, period, bank.sigma[c])
+        detector.update_imm(filters, plots, f, c, bank.interacting, size, dt, period, bank.sigma[c])
     elif kind == WINDOW:
-        fit(filters, plots, f, c, length, size, period)
+        fit_window(filters, plots, f, c, length, size, period)
     else:
         gain = bank.settled[f, c]
         fixed = (gain[0], gain[1], gain[2])
         model = Model(size, max(size, length), bank.carry[f, k, c], bank.manoeuvre[f, c], fixed)
-        recur(filters, plots, f, c, kind != INFORMATION, model, dt, period)
+        update_recursive(filters, plots, f, c, kind != INFORMATION, model, dt, period)
 
 
 # ---- sums ---------------------------------------------------------------------------------------------------------
 @part
-def add_modes(kind, further, used, out, modes):
-    """Add the modes of a filter of this kind, with these further rows, to modes (3,); out (3,) is scratch."""
+def add_modes(kind, kind_rows, used, out, modes):
+    """Add the modes of a filter to modes (3,); kind_rows are its rows in `Filters`, out (3,) is scratch."""
     if kind == ADAPTIVE:
-        detector.mode_sums(further, detector.MODE, detector.PLOTS, used, out)
+        detector.mode_sums(kind_rows, detector.MODE, detector.PLOTS, used, out)
     elif kind == IMM:
-        detector.mode_sums(further, detector.PROBABILITY + 1, -1, used, out)
+        detector.mode_sums(kind_rows, detector.PROBABILITY + 1, -1, used, out)
     else:
         return
     for j in range(3):
@@ -185,32 +200,36 @@ def add_modes(kind, further, used, out, modes):
 
 
 @part
-def keep(x, P, n, size, units, first, count, kept):
-    """Store the estimate of a coordinate and its believed covariance, of `count` realisations, in kept (6, total) from
-    `first` on; n (CHUNK,) plots so far, units (σ, period)."""
+def keep(x, P, n, size, units, first, count, estimates):
+    """Store the estimate of a coordinate and its believed covariance, of `count` realisations, in estimates (6, total).
+
+    From number `first` on; n (CHUNK,) plots so far, units (σ, period)."""
     sigma, period = units
     for i in range(count):
-        kept[0, first + i], kept[1, first + i] = x[0, i], x[1, i]
-        kept[5, first + i] = 1.0 if n[i] >= size else 0.0
-        kept[2, first + i] = P[0, i] * sigma * sigma
-        kept[3, first + i] = P[1, i] * sigma * sigma / period
-        kept[4, first + i] = P[3, i] * sigma * sigma / (period * period)
+        estimates[0, first + i], estimates[1, first + i] = x[0, i], x[1, i]
+        estimates[5, first + i] = 1.0 if n[i] >= size else 0.0
+        estimates[2, first + i] = P[0, i] * sigma * sigma
+        estimates[3, first + i] = P[1, i] * sigma * sigma / period
+        estimates[4, first + i] = P[3, i] * sigma * sigma / (period * period)
 
 
 @part
-def keep_errors(x, course, c, n, first, count, each):
-    """Store the errors of `count` realisations in a coordinate in each (S, total) from `first` on, not-a-number where a
-    component has no estimate; n (CHUNK,) plots so far."""
+def keep_errors(x, course, c, n, first, count, errors):
+    """Store the errors of `count` realisations in a coordinate in errors (S, total) from number `first` on.
+
+    NaN where a component has no estimate; n (CHUNK,) plots so far."""
     truth, shift = course.truth[c], course.shift[c]
-    for j in range(each.shape[0]):
+    for j in range(errors.shape[0]):
         for i in range(count):
-            each[j, first + i] = x[j, i] - (truth[j] + shift[j, i]) if n[i] > j + 0.5 else np.nan
+            errors[j, first + i] = x[j, i] - (truth[j] + shift[j, i]) if n[i] > j + 0.5 else np.nan
 
 
 # ---- a block ------------------------------------------------------------------------------------------------------
 class Chunk(NamedTuple):
-    """A chunk of a block at a scan: `count` realisations from number `first` of the block on, scan k, and dt since the
-    scan before; used (CHUNK,) is 1 for these realisations; the course of the targets in all coordinates."""
+    """A chunk of a block at scan k, dt after the previous scan.
+
+    `count` realisations from number `first` of the block on; used (CHUNK,) is 1 for these realisations; course: of the
+    targets in all coordinates."""
 
     first: int
     count: int
@@ -230,13 +249,21 @@ def step_filters(bank, baseline, chunk, filters, plots, out, sums):
         for j in range(bank.size.size):  # the baseline first: gains of the others refer to its estimates
             f = baseline if j == 0 else (j - 1 if j <= baseline else j)
             filter_scan(bank, f, c, k, chunk.dt, filters, plots)
-            add_modes(bank.kind[f], filters.further[f, c], chunk.used, out, sums.modes[f, k, c])
-            for a in range(sums.at.size if c < 2 else 0):
-                if sums.at[a] == k:
-                    kept = sums.kept[a, f, c]
-                    keep(filters.x[f, c], filters.P, n, bank.size[f], units, chunk.first, chunk.count, kept)
-            if sums.each.shape[4] > 0:
-                keep_errors(filters.x[f, c], course, c, n, chunk.first, chunk.count, sums.each[f, k, c, : bank.size[f]])
+            add_modes(bank.kind[f], filters.kind_rows[f, c], chunk.used, out, sums.modes[f, k, c])
+            for a in range(sums.kept_scans.size if c < 2 else 0):
+                if sums.kept_scans[a] == k:
+                    estimates = sums.kept_estimates[a, f, c]
+                    keep(filters.x[f, c], filters.P, n, bank.size[f], units, chunk.first, chunk.count, estimates)
+            if sums.realisation_errors.shape[4] > 0:
+                keep_errors(
+                    filters.x[f, c],
+                    course,
+                    c,
+                    n,
+                    chunk.first,
+                    chunk.count,
+                    sums.realisation_errors[f, k, c, : bank.size[f]],
+                )
             rows = rows_of(filters.x[f, c], course, c, n, chunk.used)
             add_sums(rows, filters.P, bank.size[f], x_base, size_base, units, (f, k, c), out, sums.errors)
 
@@ -244,36 +271,39 @@ def step_filters(bank, baseline, chunk, filters, plots, out, sums):
 @kernel
 def simulate_block(world, detections, conversion, bank, detectors, first, total, baseline, sums):
     """Add the sums of realisations first … first + total - 1 to sums, a BlockSums; gains refer to filter `baseline`.
-    The last chunk is always computed in full, and only the realisations asked for are summed."""
+
+    The last chunk is always computed in full, but only the requested realisations are summed."""
     F, K, C = bank.carry.shape
     rows = detector.ROWS if (bank.kind == IMM).any() else 10
-    x, Y, further = np.empty((F, C, 4, CHUNK)), np.empty((F, C, 8, CHUNK)), np.empty((F, C, rows, CHUNK))
-    filters = Filters(x, Y, further, np.empty((6, CHUNK)))
+    x, Y, kind_rows = np.empty((F, C, 4, CHUNK)), np.empty((F, C, 8, CHUNK)), np.empty((F, C, rows, CHUNK))
+    filters = Filters(x, Y, kind_rows, np.empty((6, CHUNK)))
     z, weight, n, n_now = np.empty((C, CHUNK)), np.empty((C, CHUNK)), np.empty((C, CHUNK)), np.empty((C, CHUNK))
     recent, T = np.empty((C, 3, bank.memory, ROW)), np.empty((detectors.plots.size, C + 1, CHUNK))
     plots, measured = Plots(z, weight, n, n_now, recent, T), np.empty((world.walk.size, 4, CHUNK))
-    shift, place, detected = np.zeros((C, 3, CHUNK)), np.empty((3, CHUNK)), np.empty(CHUNK)
+    shift, running_mean, detected = np.zeros((C, 3, CHUNK)), np.empty((3, CHUNK)), np.empty(CHUNK)
     passed, used, out = np.empty((*detectors.threshold.shape, CHUNK)), np.ones(CHUNK), np.empty(7)
     for done in range(0, total, CHUNK):
-        x[:], Y[:], further[:], recent[:], measured[:], n_now[:], place[:] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        x[:], Y[:], kind_rows[:], recent[:], measured[:], n_now[:], running_mean[:] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         used[total - done :], passed[:] = 0.0, 0.0
         for k in range(K):
             dt, course = world.dt[k], Course(world.truth[k], shift)
             move_and_measure(world, first + done, k, measured)
             detect(detections, first + done, k, detected)
-            convert(conversion, bank.sigma, k, measured, detected, place, z, weight)
+            convert(conversion, bank.sigma, k, measured, detected, running_mean, z, weight)
             for c in range(C):
                 copy_row(measured[c, 2], shift[c, 0])
                 copy_row(measured[c, 3], shift[c, 1])
             if k > 0:
                 for c in range(C):
                     for f in range(F):
-                        ahead = sums.errors.ahead[f, k - 1, c]
-                        add_ahead(rows_of(x[f, c], course, c, n_now[c], used), bank.size[f], dt, address(out), ahead)
+                        sums_ahead = sums.errors.ahead[f, k - 1, c]
+                        add_ahead(
+                            rows_of(x[f, c], course, c, n_now[c], used), bank.size[f], dt, address(out), sums_ahead
+                        )
             count_plots(weight, n, n_now)
             for c in range(C):
                 if recent.shape[2] > 0:
-                    remember(recent[c], z[c], weight[c], dt / bank.period)
+                    remember_plots(recent[c], z[c], weight[c], dt / bank.period)
             detector.detector_statistics(detectors, k, recent, bank.sigma, n_now, weight, T)
             detector.add_alarms(detectors, k, T, used, passed, sums.alarms)
             chunk = Chunk(done, min(CHUNK, total - done), k, dt, used, course)

@@ -57,45 +57,47 @@ class Sums(NamedTuple):
 
 # ---- the world ----------------------------------------------------------------------------------------------------
 @part
-def push(key, first, pair, dt, walk, one, two):
-    """Move the deviations of value and rate from the course, one and two (2, n), by random accelerations walk (2,)."""
-    k0, k1, start, walk_one, walk_two = key[0], key[1], U(first), walk[0], walk[1]
-    for i in range(one.shape[1]):
+def push(key, first, pair, dt, walk, c0, c1):
+    """Move the deviations of value and rate from the course, c0 and c1 (2, n), by random accelerations walk (2,)."""
+    k0, k1, start, walk_0, walk_1 = key[0], key[1], U(first), walk[0], walk[1]
+    for i in range(c0.shape[1]):
         a, b = normals(k0, k1, start + U(i), pair)
-        a, b = walk_one * a, walk_two * b
-        one[0, i] += dt * (one[1, i] + 0.5 * dt * a)
-        one[1, i] += dt * a
-        two[0, i] += dt * (two[1, i] + 0.5 * dt * b)
-        two[1, i] += dt * b
+        a, b = walk_0 * a, walk_1 * b
+        c0[0, i] += dt * (c0[1, i] + 0.5 * dt * a)
+        c0[1, i] += dt * a
+        c1[0, i] += dt * (c1[1, i] + 0.5 * dt * b)
+        c1[1, i] += dt * b
 
 
 @part
-def measure(key, first, pair, step, fresh, mean, one, two):
-    """Plots of two coordinates, rows 0 of one and two (3, n), from their errors, rows 1, and the deviations, rows 2. An
-    error becomes step · error + fresh · normal (P3 eq. 15), stationary from the first plot on; step, fresh and mean
+def measure(key, first, pair, step, fresh, mean, c0, c1):
+    """Compute the plots of two coordinates c0 and c1 (3, n): plots in row 0, errors in row 1, deviations in row 2.
+
+    An error becomes step · error + fresh · normal (P3 eq. 15), stationary from the first plot on; step, fresh and mean
     (2,)."""
     k0, k1, start = key[0], key[1], U(first)
-    step_one, step_two, fresh_one, fresh_two = step[0], step[1], fresh[0], fresh[1]
-    mean_one, mean_two = mean[0], mean[1]
-    for i in range(one.shape[1]):
+    step_0, step_1, fresh_0, fresh_1 = step[0], step[1], fresh[0], fresh[1]
+    mean_0, mean_1 = mean[0], mean[1]
+    for i in range(c0.shape[1]):
         a, b = normals(k0, k1, start + U(i), pair)
-        a, b = step_one * one[1, i] + fresh_one * a, step_two * two[1, i] + fresh_two * b
-        one[1, i], two[1, i] = a, b
-        one[0, i] = mean_one + one[2, i] + a
-        two[0, i] = mean_two + two[2, i] + b
+        a, b = step_0 * c0[1, i] + fresh_0 * a, step_1 * c1[1, i] + fresh_1 * b
+        c0[1, i], c1[1, i] = a, b
+        c0[0, i] = mean_0 + c0[2, i] + a
+        c1[0, i] = mean_1 + c1[2, i] + b
 
 
 @kernel
 def move_and_measure(world, first, k, plots):
-    """Compute scan k of all coordinates in place: plots (C, 4, n) holds plot, error, and deviation of value and rate. C
-    is even."""
+    """Compute scan k of all coordinates in place.
+
+    plots (C, 4, n) holds plot, error, and deviation of value and rate; C is even."""
     pairs = plots.shape[0] // 2
     for p in range(pairs):
-        one, two = plots[2 * p], plots[2 * p + 1]
+        c0, c1 = plots[2 * p], plots[2 * p + 1]
         if k > 0 and (world.walk[2 * p] > 0.0 or world.walk[2 * p + 1] > 0.0):
-            push(world.motion, first, k * pairs + p, world.dt[k], world.walk[2 * p : 2 * p + 2], one[2:], two[2:])
+            push(world.motion, first, k * pairs + p, world.dt[k], world.walk[2 * p : 2 * p + 2], c0[2:], c1[2:])
         step, fresh = world.steps[k, 2 * p : 2 * p + 2], world.fresh[k, 2 * p : 2 * p + 2]
-        measure(world.plots, first, k * pairs + p, step, fresh, world.truth[k, 2 * p : 2 * p + 2, 0], one, two)
+        measure(world.plots, first, k * pairs + p, step, fresh, world.truth[k, 2 * p : 2 * p + 2, 0], c0, c1)
 
 
 # ---- one scan of a filter -----------------------------------------------------------------------------------------
@@ -202,17 +204,19 @@ def ahead_sums(x, shift, truth, dt, n):
 
 @part
 def add_sums(bank, x, plots, truth, k, n, baseline, sums):
-    """Add the errors of scan k: x (F, C, 4, CHUNK), plots (C, 4, CHUNK), truth (C, 3)."""
+    """Add the errors at scan k: x (F, C, 4, CHUNK), plots (C, 4, CHUNK), truth (C, 3)."""
     for f in range(x.shape[0]):
         for c in range(x.shape[1]):
-            own, both, joint = error_sums(x[f, c], x[baseline, c], plots[c, 2:], truth[c], bank.inverse[f, k, c], n)
-            known = bank.known[f, k, c]
-            for j in range(known):
+            powers_of_error, paired, joint = error_sums(
+                x[f, c], x[baseline, c], plots[c, 2:], truth[c], bank.inverse[f, k, c], n
+            )
+            size = bank.known[f, k, c]
+            for j in range(size):
                 for q in range(4):
-                    sums.error[f, k, c, j, q] += own[4 * j + q]
+                    sums.error[f, k, c, j, q] += powers_of_error[4 * j + q]
                 if j < bank.known[baseline, k, c]:
-                    sums.paired[f, k, c, j] += both[j]
-            if known == bank.size[f]:
+                    sums.paired[f, k, c, j] += paired[j]
+            if size == bank.size[f]:
                 for q in range(4):
                     sums.joint[f, k, c, q] += joint[q]
 
@@ -223,27 +227,28 @@ def add_ahead(bank, x, plots, truth, k, dt, n, sums):
     for f in range(x.shape[0]):
         for c in range(x.shape[1]):
             if bank.known[f, k - 1, c] == bank.size[f]:
-                found = ahead_sums(x[f, c], plots[c, 2:], truth[c, 0], dt, n)
+                powers_of_error = ahead_sums(x[f, c], plots[c, 2:], truth[c, 0], dt, n)
                 for q in range(4):
-                    sums.ahead[f, k - 1, c, q] += found[q]
+                    sums.ahead[f, k - 1, c, q] += powers_of_error[q]
 
 
 @part
-def keep_errors(x, plots, truth, each):
-    """Errors of x (F, C, 4, CHUNK) into each (F, C, S, n)."""
-    for f in range(each.shape[0]):
-        for c in range(each.shape[1]):
-            for j in range(each.shape[2]):
-                for i in range(each.shape[3]):
+def keep_errors(x, plots, truth, errors):
+    """Write the errors of x (F, C, 4, CHUNK) to errors (F, C, S, n)."""
+    for f in range(errors.shape[0]):
+        for c in range(errors.shape[1]):
+            for j in range(errors.shape[2]):
+                for i in range(errors.shape[3]):
                     true = truth[c, j] + plots[c, 2 + j, i] if j < 2 else truth[c, j]
-                    each[f, c, j, i] = x[f, c, j, i] - true
+                    errors[f, c, j, i] = x[f, c, j, i] - true
 
 
 @kernel
-def simulate_block(world, bank, first, count, baseline, sums, each):
-    """Add the sums of realisations first … first + count - 1; gains refer to filter `baseline`. each (F, K, C, S, count
-    or 0) takes the errors of all of them. The last chunk is always computed in full, and only the realisations asked
-    for are summed."""
+def simulate_block(world, bank, first, count, baseline, sums, errors):
+    """Add the sums of realisations first … first + count - 1; gains refer to filter `baseline`.
+
+    errors (F, K, C, S, count or 0) takes the errors of all realisations. The last chunk is always computed in full, but
+    only the requested realisations are summed."""
     filters, scans, coordinates = bank.gain.shape[:3]
     x = np.empty((filters, coordinates, 4, CHUNK))
     ring = np.empty((coordinates, bank.weights.shape[4], CHUNK))
@@ -257,5 +262,5 @@ def simulate_block(world, bank, first, count, baseline, sums, each):
                 add_ahead(bank, x, plots, world.truth[k], k, world.dt[k], n, sums)
             advance(bank, x, ring, plots, k, world.dt[k])
             add_sums(bank, x, plots, world.truth[k], k, n, baseline, sums)
-            if each.shape[4] > 0:
-                keep_errors(x, plots, world.truth[k], each[:, k, :, :, done : done + n])
+            if errors.shape[4] > 0:
+                keep_errors(x, plots, world.truth[k], errors[:, k, :, :, done : done + n])

@@ -51,9 +51,9 @@ class Filters(NamedTuple):
 
     x: np.ndarray  #: (F, C, 4, CHUNK) state
     Y: np.ndarray  #: (F, C, 8, CHUNK) information
-    #: (F, C, >= 10, CHUNK) rows by kind of filter: here the joint covariance J; see `detector.adapt`,
-    #: `detector.interact`
-    further: np.ndarray
+    #: (F, C, >= 10, CHUNK) rows by kind of filter: here the joint covariance J; see `detector.update_adaptive`,
+    #: `detector.update_imm`
+    kind_rows: np.ndarray
     P: np.ndarray  #: (6, CHUNK) of the filter that was updated last
 
 
@@ -73,20 +73,20 @@ class Plots(NamedTuple):
 def leading_inverse(Y, rank):
     """Inverse of the leading block of size rank (0 to 3) of a packed matrix; zero outside."""
     y00, y01, y02, y11, y12, y22 = Y
-    one, zero = full(1.0), full(0.0)
-    least, half, most = full(0.5), full(1.5), full(2.5)
+    ones, zeros = full(1.0), full(0.0)
+    above_0, above_1, above_2 = full(0.5), full(1.5), full(2.5)
     c0, c1, c2 = y11 * y22 - y12 * y12, y02 * y12 - y01 * y22, y01 * y12 - y02 * y11  # cofactors of the first row
     minor = y00 * y11 - y01 * y01
-    determinant = where_greater(rank, half, minor, where_greater(rank, least, y00, one))
-    scale = 1.0 / where_greater(rank, most, y00 * c0 + y01 * c1 + y02 * c2, determinant)  # divisions are expensive
-    p00 = where_greater(rank, half, y11, where_greater(rank, least, one, zero))
+    determinant = where_greater(rank, above_1, minor, where_greater(rank, above_0, y00, ones))
+    scale = 1.0 / where_greater(rank, above_2, y00 * c0 + y01 * c1 + y02 * c2, determinant)  # divisions are expensive
+    p00 = where_greater(rank, above_1, y11, where_greater(rank, above_0, ones, zeros))
     return (
-        scale * where_greater(rank, most, c0, p00),
-        scale * where_greater(rank, most, c1, where_greater(rank, half, zero - y01, zero)),
-        scale * where_greater(rank, most, c2, zero),
-        scale * where_greater(rank, most, y00 * y22 - y02 * y02, where_greater(rank, half, y00, zero)),
-        scale * where_greater(rank, most, y01 * y02 - y00 * y12, zero),
-        scale * where_greater(rank, most, minor, zero),
+        scale * where_greater(rank, above_2, c0, p00),
+        scale * where_greater(rank, above_2, c1, where_greater(rank, above_1, zeros - y01, zeros)),
+        scale * where_greater(rank, above_2, c2, zeros),
+        scale * where_greater(rank, above_2, y00 * y22 - y02 * y02, where_greater(rank, above_1, y00, zeros)),
+        scale * where_greater(rank, above_2, y01 * y02 - y00 * y12, zeros),
+        scale * where_greater(rank, above_2, minor, zeros),
     )
 
 
@@ -99,9 +99,9 @@ def normal_equations(recent, length, longest, i, origin, half):
     zero = full(0.0)
     Y, b = (zero, zero, zero, zero, zero, zero), (zero, zero, zero)
     for j in range(length):
-        here = j * PITCH + i
-        z = get(recent, here) - origin
-        age, w = get(recent, longest * PITCH + here), get(recent, 2 * longest * PITCH + here)
+        slot = j * PITCH + i
+        z = get(recent, slot) - origin
+        age, w = get(recent, longest * PITCH + slot), get(recent, 2 * longest * PITCH + slot)
         h = (1.0, zero - age, half * age * age)
         Y, b = algebra.add_outer(Y, w, h), algebra.add_scaled(b, w * z, h)
     return Y, b
@@ -131,30 +131,30 @@ def least_squares(Y, n, w, tau, c, size):
     row H = H₀ - c H₀ F(-age) and R = 1 - c²; with c = 0 it is the plot itself. With fewer plots than unknowns a
     polynomial of lower degree is determined. A plot at the very time of the last one contains nothing new of an error
     that is correlated."""
-    one, zero = full(1.0), full(0.0)
+    ones, zeros = full(1.0), full(0.0)
     age, c_last = Y[6] + tau, Y[7] * c
     new = 1.0 - c_last * c_last
-    w_new = where_greater(new, full(NOTHING_NEW), w / new, zero)
+    w_new = where_greater(new, full(NOTHING_NEW), w / new, zeros)
     second = -0.5 if size == 3 else 0.0
     H = (1.0 - c_last, c_last * age, second * (c_last * age) * age)
     Y = algebra.add_outer(algebra.predicted_information(Y[:6], tau), w_new, H)
-    rank, most = n + where_greater(w, zero, one, zero), full(float(size))
-    P = leading_inverse(Y, where_greater(rank, most, most, rank))
+    rank, full_rank = n + where_greater(w, zeros, ones, zeros), full(float(size))
+    P = leading_inverse(Y, where_greater(rank, full_rank, full_rank, rank))
     k0, k1, k2 = algebra.times(P, (w_new * H[0], w_new * H[1], w_new * H[2]))
     carried = 1.0 if c != 0.0 else 0.0
-    k3 = carried * where_greater(w_new, zero, 1.0 - k0, zero)
-    age, c_last = where_greater(w, zero, zero, age), where_greater(w, zero, one, c_last)
+    k3 = carried * where_greater(w_new, zeros, 1.0 - k0, zeros)
+    age, c_last = where_greater(w, zeros, zeros, age), where_greater(w, zeros, ones, c_last)
     return (*Y, age, c_last), (k0, k1, k2, k3), P
 
 
 # ---- Kalman filter of state and carried error ---------------------------------------------------------------------
 @inline
 def predicted_joint(J, w, tau, model):
-    """F J Fᵀ + Q; the variance of the error remains that of a stationary process, 1 / w."""
-    one, zero, c, F = full(1.0), full(0.0), model.c, algebra.constant_acceleration(tau)
+    """Predict the joint covariance: F J Fᵀ + Q; the error stays stationary, with variance 1 / w."""
+    ones, zeros, c, F = full(1.0), full(0.0), model.c, algebra.constant_acceleration(tau)
     P = algebra.predicted_covariance(J[:6], F, manoeuvre_covariance(model.q, tau, model.size))
     e = algebra.predicted(J[6:9], F)
-    return (*P, c * e[0], c * e[1], c * e[2], c * c * J[9] + (1.0 - c * c) / where_greater(w, zero, w, one))
+    return (*P, c * e[0], c * e[1], c * e[2], c * c * J[9] + (1.0 - c * c) / where_greater(w, zeros, w, ones))
 
 
 @inline
@@ -163,14 +163,14 @@ def joint_gain(J, w, fixed):
 
     fixed (3) is the gain of a filter of fixed gain, or KALMAN_GAIN. Where value plus error is known already, a plot
     contains nothing new."""
-    zero, one = full(0.0), full(1.0)
+    zeros, ones = full(0.0), full(1.0)
     h = (J[0] + J[6], J[1] + J[7], J[2] + J[8], J[6] + J[9])
     S = h[0] + h[3]
-    detected = where_greater(w, zero, where_greater(S, full(NOTHING_NEW), one, zero), zero)
-    per = detected / where_greater(S, full(NOTHING_NEW), S, one)
+    detected = where_greater(w, zeros, where_greater(S, full(NOTHING_NEW), ones, zeros), zeros)
+    per = detected / where_greater(S, full(NOTHING_NEW), S, ones)
     K = (h[0] * per, h[1] * per, h[2] * per, h[3] * per)
     if fixed[0] > 0.0:
-        K = (fixed[0] * detected, fixed[1] * detected, fixed[2] * detected, zero)
+        K = (fixed[0] * detected, fixed[1] * detected, fixed[2] * detected, zeros)
     return K, h, S
 
 
@@ -212,12 +212,14 @@ def updated_state(x, z, K, dt, period, c):
 
 
 @inline
-def memory_of(filters, plots, f, c):
-    """Addresses of a filter's x, Y, further rows and P, then of its coordinate's z, weight and n; they must outlive it.
+def memory_addresses(filters, plots, f, c):
+    """Addresses of a filter's x, Y, rows of its kind and P, then of its coordinate's z, weight and n.
+
+    The arrays must outlive the addresses.
     Numba would count a reference to each array wherever it is passed on."""
-    x, Y, further, P = filters.x[f, c], filters.Y[f, c], filters.further[f, c], filters.P
+    x, Y, kind_rows, P = filters.x[f, c], filters.Y[f, c], filters.kind_rows[f, c], filters.P
     z, w, n = plots.z[c], plots.weight[c], plots.n[c]
-    return address(x), address(Y), address(further), address(P), address(z), address(w), address(n)
+    return address(x), address(Y), address(kind_rows), address(P), address(z), address(w), address(n)
 
 
 @inline
@@ -234,11 +236,11 @@ def put_information(a, i, Y):
 
 
 @inline
-def recur(filters, plots, f, c, by_covariance, model, dt, period):
+def update_recursive(filters, plots, f, c, by_covariance, model, dt, period):
     """Update the memory of a recursive filter with one scan, in place.
 
     by_covariance: after the model's start the filter switches from information to the joint covariance."""
-    ax, ay, aj, ap, az, aw, an = memory_of(filters, plots, f, c)
+    ax, ay, aj, ap, az, aw, an = memory_addresses(filters, plots, f, c)
     tau = dt / period
     for i in range(GROUPS):
         w, n = get(aw, i), get(an, i)
@@ -255,34 +257,34 @@ def recur(filters, plots, f, c, by_covariance, model, dt, period):
 
 # ---- windows ------------------------------------------------------------------------------------------------------
 @kernel
-def remember(recent, z, weight, tau):
+def remember_plots(recent, z, weight, tau):
     """Add the plots of a scan to recent (3, L, ROW), the last L plots: plot, age, weight, the newest first."""
     a, az, aw, length = address(recent), address(z), address(weight), recent.shape[1]
     zero, ages, weights = full(0.0), length * PITCH, 2 * length * PITCH
     for i in range(GROUPS):
         w = get(aw, i)
         for j in range(length - 1, 0, -1):
-            here, older = j * PITCH + i, (j - 1) * PITCH + i
-            put(a, here, where_greater(w, zero, get(a, older), get(a, here)))
-            put(a, ages + here, where_greater(w, zero, get(a, ages + older), get(a, ages + here)) + tau)
-            put(a, weights + here, where_greater(w, zero, get(a, weights + older), get(a, weights + here)))
+            slot, older = j * PITCH + i, (j - 1) * PITCH + i
+            put(a, slot, where_greater(w, zero, get(a, older), get(a, slot)))
+            put(a, ages + slot, where_greater(w, zero, get(a, ages + older), get(a, ages + slot)) + tau)
+            put(a, weights + slot, where_greater(w, zero, get(a, weights + older), get(a, weights + slot)))
         put(a, i, where_greater(w, zero, get(az, i), get(a, i)))
         put(a, ages + i, where_greater(w, zero, zero, get(a, ages + i) + tau))
         put(a, weights + i, where_greater(w, zero, w, get(a, weights + i)))
 
 
 @inline
-def fit(filters, plots, f, c, length, size, period):
+def fit_window(filters, plots, f, c, length, size, period):
     """Least squares on the last `length` of recent plots."""
-    ax, _, _, ap, _, _, _ = memory_of(filters, plots, f, c)
+    ax, _, _, ap, _, _, _ = memory_addresses(filters, plots, f, c)
     recent, n = plots.recent[c], plots.n_now[c]
     a, an, longest = address(recent), address(n), recent.shape[1]
     per, twice, half, zero = 1.0 / period, 1.0 / (period * period), 0.5 if size == 3 else 0.0, full(0.0)
-    most = full(float(size))
+    full_rank = full(float(size))
     for i in range(GROUPS):
         Y, b = normal_equations(a, length, longest, i, zero, half)
         rank = get(an, i)
-        P = leading_inverse(Y, where_greater(rank, most, most, rank))
+        P = leading_inverse(Y, where_greater(rank, full_rank, full_rank, rank))
         r, v, acceleration = algebra.times(P, b)
         lanes.put3(ax, i, (r, per * v, twice * acceleration), GROUPS)
         put6(ap, i, P, GROUPS)

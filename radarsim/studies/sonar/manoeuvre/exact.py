@@ -32,7 +32,7 @@ from radarsim.studies.sonar.world import GivenPlotsAxes, Values
 class UsesAxes:
     """True values of the quantities derived from a track, at A times."""
 
-    at: np.ndarray  #: (A,) scans, counted from 0.
+    scans: np.ndarray  #: (A,) scans, counted from 0.
     true: np.ndarray  #: (A, 6) true values of `QUANTITIES`.
     closing_mps: np.ndarray  #: (A,) speed of the target relative to the own ship, m/s.
 
@@ -51,8 +51,8 @@ class ManoeuvreAxes(GivenPlotsAxes):
 
 
 # ---- switched --------------------------------------------------------------------------------------------------------
-class Switched(NamedTuple):
-    """σ (K,) of the straight line held, of the parabola held, and of the one that the alarm picks, m plots each."""
+class SwitchedWindow(NamedTuple):
+    """σ (K,) of a straight line, of a parabola, and of the one of both that an alarm selects, through m plots."""
 
     line: np.ndarray
     parabola: np.ndarray
@@ -61,38 +61,48 @@ class Switched(NamedTuple):
 
 def switched_window(
     course: np.ndarray, sigma: float, dt: float, memory: int, plots: int, threshold_k: float
-) -> Switched:
-    """σ at every scan from the `memory`-th on: course (K,) are the true values, plots those of the detector. An alarm
-    is a squared acceleration of over k times its own variance; with it the parabola is taken, without it the straight
-    line."""
+) -> SwitchedWindow:
+    """σ at every scan from the `memory`-th on, for the true values course (K,) and a detector of `plots` plots.
+
+    There is an alarm if the squared acceleration exceeds k times its own variance. An alarm selects the parabola,
+    otherwise the straight line is used."""
     line, parabola = (_last_value(memory, degree, dt) for degree in (1, 2))
     acceleration = np.zeros(memory)
     acceleration[memory - plots :] = _acceleration(plots, dt)
     windows = np.lib.stride_tricks.sliding_window_view(course, memory)
     truth = course[memory - 1 :]
     spread = sigma * np.linalg.norm(acceleration)
-    ends = np.sqrt(threshold_k) * spread
+    limit = np.sqrt(threshold_k) * spread
     mean = windows @ acceleration
-    low, high = (-ends - mean) / spread, (ends - mean) / spread
+    low, high = (-limit - mean) / spread, (limit - mean) / spread
     squares = []
     for weights in (line, parabola):
         bias = windows @ weights - truth
         slope = float(sigma**2 * (weights @ acceleration) / spread)  # of the error on the acceleration, per σ of it
-        rest = float(sigma**2 * weights @ weights - slope**2)
-        squares.append((bias**2 + slope**2 + rest, _outside(bias, slope, rest, low, high)))
-    (whole_line, alarmed_line), (whole_parabola, alarmed) = squares
-    return Switched(*(np.sqrt(each) for each in (whole_line, whole_parabola, whole_line - alarmed_line + alarmed)))
+        residual_variance = float(sigma**2 * weights @ weights - slope**2)
+        squares.append(
+            (bias**2 + slope**2 + residual_variance, _mean_square_in_alarms(bias, slope, residual_variance, low, high))
+        )
+    (line_square, line_in_alarms), (parabola_square, parabola_in_alarms) = squares
+    return SwitchedWindow(
+        *(
+            np.sqrt(mean_square)
+            for mean_square in (line_square, parabola_square, line_square - line_in_alarms + parabola_in_alarms)
+        )
+    )
 
 
-def _outside(bias: np.ndarray, slope: float, rest: float, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """E e² over the realisations with an alarm, z < low or z > high, where e = bias + slope z + an independent rest."""
+def _mean_square_in_alarms(
+    bias: np.ndarray, slope: float, residual_variance: float, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """E e² over the realisations with an alarm, z < low or z > high; e = bias + slope z + an independent error."""
     from scipy.special import ndtr
 
     density_low, density_high = (np.exp(-(z**2) / 2) / np.sqrt(2 * np.pi) for z in (low, high))
     share = ndtr(low) + ndtr(-high)
     first = density_high - density_low
     second = share + high * density_high - low * density_low
-    return (bias**2 + rest) * share + 2 * bias * slope * first + slope**2 * second
+    return (bias**2 + residual_variance) * share + 2 * bias * slope * first + slope**2 * second
 
 
 def _last_value(plots: int, degree: int, dt: float) -> np.ndarray:
@@ -111,65 +121,66 @@ def _acceleration(plots: int, dt: float) -> np.ndarray:
 QUANTITIES = (("course", "rad"), ("speed", "m/s"), ("x_ahead", "m"), ("y_ahead", "m"), ("cpa", "m"), ("t_cpa", "s"))
 
 
-def last(parts: list[np.ndarray]) -> np.ndarray:
-    """Stack arrays of one shape (…,) along a last axis; each stays contiguous in memory, which saves a quarter of the
-    time."""
+def stack_last(parts: list[np.ndarray]) -> np.ndarray:
+    """Stack arrays of one shape (…,) along a last axis.
+
+    Each array stays contiguous in memory, which saves a quarter of the time."""
     return np.moveaxis(np.stack(parts), 0, -1)
 
 
-def flat(state: np.ndarray, polar: bool) -> np.ndarray:
+def cartesian_track(state: np.ndarray, polar: bool) -> np.ndarray:
     """x, y and their rates (…, 4) of a state."""
     if not polar:
-        return last([state[..., 0, 0], state[..., 1, 0], state[..., 0, 1], state[..., 1, 1]])
+        return stack_last([state[..., 0, 0], state[..., 1, 0], state[..., 0, 1], state[..., 1, 1]])
     (r, vr), (b, vb) = np.moveaxis(state, (-2, -1), (0, 1))
     c, s = np.cos(b), np.sin(b)
-    return last([r * c, r * s, vr * c - r * vb * s, vr * s + r * vb * c])
+    return stack_last([r * c, r * s, vr * c - r * vb * s, vr * s + r * vb * c])
 
 
-def uses(track: np.ndarray, own: np.ndarray, horizon: float) -> np.ndarray:
+def uses(track: np.ndarray, ship: np.ndarray, horizon: float) -> np.ndarray:
     """The QUANTITIES (…, 6) of x, y and their rates (…, 4).
 
-    own (…, 4) are those of the vessel that the closest approach refers to; horizon in s. t_cpa is counted from now, and
+    ship (…, 4) are those of the vessel that the closest approach refers to; horizon in s. t_cpa counts from now, and is
     negative where the closest approach has passed."""
     x, y, vx, vy = np.moveaxis(track, -1, 0)
-    px, py, wx, wy = np.moveaxis(track - own, -1, 0)
+    px, py, wx, wy = np.moveaxis(track - ship, -1, 0)
     square = wx**2 + wy**2
     with np.errstate(divide="ignore", invalid="ignore"):  # a target without relative motion has no closest approach
-        cpa, when = np.abs(px * wy - py * wx) / np.sqrt(square), -(px * wx + py * wy) / square
-    ahead = x + horizon * vx, y + horizon * vy
-    return last([np.arctan2(vy, vx), np.hypot(vx, vy), *ahead, cpa, when])
+        cpa, t_cpa = np.abs(px * wy - py * wx) / np.sqrt(square), -(px * wx + py * wy) / square
+    position_ahead = x + horizon * vx, y + horizon * vy
+    return stack_last([np.arctan2(vy, vx), np.hypot(vx, vy), *position_ahead, cpa, t_cpa])
 
 
-def gradients(track: np.ndarray, own: np.ndarray, horizon: float) -> np.ndarray:
+def gradients(track: np.ndarray, ship: np.ndarray, horizon: float) -> np.ndarray:
     """Derivatives (…, 6, 4) of the QUANTITIES with respect to x, y and their rates.
 
     Let u be the unit vector from the own ship to the target at the closest approach, which is normal to the relative
     velocity; then d cpa = u · (dp + t_cpa dv). At a distance of zero u is one of the two normals and the first order
     fails, because a distance cannot be negative."""
     vx, vy = track[..., 2], track[..., 3]
-    px, py, wx, wy = np.moveaxis(track - own, -1, 0)
-    zero, one, ahead = np.zeros_like(vx), np.ones_like(vx), np.full_like(vx, horizon)
+    px, py, wx, wy = np.moveaxis(track - ship, -1, 0)
+    zeros, ones, horizons = np.zeros_like(vx), np.ones_like(vx), np.full_like(vx, horizon)
     with np.errstate(divide="ignore", invalid="ignore"):
         power, speed, fast = vx**2 + vy**2, np.hypot(vx, vy), wx**2 + wy**2
-        when = -(px * wx + py * wy) / fast
+        t_cpa = -(px * wx + py * wy) / fast
         side = np.where(px * wy - py * wx < 0, -1.0, 1.0) / np.sqrt(fast)
         ux, uy = side * wy, -side * wx
         rows = [
-            [zero, zero, -vy / power, vx / power],
-            [zero, zero, vx / speed, vy / speed],
-            [one, zero, ahead, zero],
-            [zero, one, zero, ahead],
-            [ux, uy, ux * when, uy * when],
-            [-wx / fast, -wy / fast, -(px + 2 * when * wx) / fast, -(py + 2 * when * wy) / fast],
+            [zeros, zeros, -vy / power, vx / power],
+            [zeros, zeros, vx / speed, vy / speed],
+            [ones, zeros, horizons, zeros],
+            [zeros, ones, zeros, horizons],
+            [ux, uy, ux * t_cpa, uy * t_cpa],
+            [-wx / fast, -wy / fast, -(px + 2 * t_cpa * wx) / fast, -(py + 2 * t_cpa * wy) / fast],
         ]
     return np.moveaxis(np.stack([np.stack(row) for row in rows]), (0, 1), (-2, -1))
 
 
-def variances(state: np.ndarray, P: np.ndarray, polar: bool, own: np.ndarray, horizon: float) -> np.ndarray:
+def variances(state: np.ndarray, P: np.ndarray, polar: bool, ship: np.ndarray, horizon: float) -> np.ndarray:
     """First-order variances (…, 6) of the QUANTITIES from the covariances (…, 2, 3) of the two coordinates."""
-    track = flat(state, polar)
+    track = cartesian_track(state, polar)
     x, y, vx, vy = (track[..., None, i] for i in range(4))
-    g = np.moveaxis(gradients(track, own, horizon), -1, 0)
+    g = np.moveaxis(gradients(track, ship, horizon), -1, 0)
     if polar:
         b, vb = state[..., None, 1, 0], state[..., None, 1, 1]
         c, s = np.cos(b), np.sin(b)
@@ -208,8 +219,9 @@ def false_alarm(k: Values, coordinates: int | np.ndarray = 1) -> Any:
 
 
 def detection(k: Values, shift: Values, coordinates: int = 1) -> Any:
-    """Probability of an alarm in a test where the mean of â is `shift` σ_a from zero; broadcasts. For several
-    coordinates the shift is the root of the sum of squares."""
+    """The probability of an alarm in a test where the mean of â is `shift` σ_a from zero; broadcasts.
+
+    For several coordinates the shift is the root of the sum of squares."""
     from scipy import special, stats  # here, because they take a second to load
 
     if coordinates == 1:
@@ -220,8 +232,9 @@ def detection(k: Values, shift: Values, coordinates: int = 1) -> Any:
 
 
 def shift_for(probability: float, k: float) -> float:
-    """Acceleration, in units of σ_a, that a test of one coordinate at threshold k detects with this probability. Zero
-    if false alarms alone reach the probability. At k = 1 and 0.683 it is 1.456."""
+    """The acceleration, in σ_a, that a test of one coordinate at threshold k detects with this probability.
+
+    Zero if false alarms alone reach the probability. At k = 1 and 0.683 it is 1.456."""
     from scipy.optimize import brentq
 
     if detection(k, 0.0) >= probability:
@@ -240,8 +253,10 @@ def acceleration_law(
     return weights @ course, np.einsum("mi,ij,mj->m", weights, C, weights) + (moved**2).sum(axis=1)
 
 
-def by_then(p: np.ndarray) -> np.ndarray:
-    """Probability (…, n) that a first event has come by each of n independent tests of probabilities p (…, n). Tests of
-    overlapping windows are not independent; their law is multivariate normal and has no closed form. For them this is
-    an upper bound if the target does not manoeuvre and errors are white (Šidák 1967), because alarms come in runs."""
+def probability_by_then(p: np.ndarray) -> np.ndarray:
+    """Probability (…, n) that a first event has come by each of n independent tests of probabilities p (…, n).
+
+    Tests of overlapping windows are not independent; their law is multivariate normal and has no closed form. For them
+    this is an upper bound if the target does not manoeuvre and errors are white (Šidák 1967), because alarms come in
+    runs."""
     return 1 - np.cumprod(1 - p, axis=-1)

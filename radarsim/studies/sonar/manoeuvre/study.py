@@ -12,8 +12,7 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Layout
-from radarsim.studies.sonar import filters
-from radarsim.studies.sonar import study as base
+from radarsim.studies.sonar import filters, study
 from radarsim.studies.sonar.config import RESPONDING_KINDS, Accelerating, Detector, Filter, Keys, Target, Turning, Uses
 from radarsim.studies.sonar.filters import AdaptiveRule, DetectorTest, FilterSpec, ModelPair, detector_arrays
 from radarsim.studies.sonar.kernels.detector import Detectors
@@ -24,7 +23,7 @@ from radarsim.studies.sonar.world import error_covariance
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan(base.RealisationPlan):
+class Plan(study.RealisationPlan):
     """A plan of a case with detectors, filters that respond to manoeuvres, or uses of a track."""
 
     axes: ManoeuvreAxes
@@ -34,11 +33,15 @@ class Plan(base.RealisationPlan):
     def simulate(self, first: int, count: int) -> np.ndarray:
         """The sums of one block, in the order of the layout."""
         sums = self.block_sums(first, count)
-        measured = len(self.spec.detectors)
-        more = {name: values[:measured] for name, values in sums.alarms._asdict().items()} | {"modes": sums.modes}
+        detector_count = len(self.spec.detectors)
+        part_sums = {name: values[:detector_count] for name, values in sums.alarms._asdict().items()} | {
+            "modes": sums.modes
+        }
         if self.spec.uses and self.axes.uses:
-            more["uses"] = use_sums(self.spec.uses, self.spec.frame, self.axes.uses, self.scene.t[self.kept], sums.kept)
-        return base.packed(self.layout, sums.errors, **more)
+            part_sums["uses"] = use_sums(
+                self.spec.uses, self.spec.frame, self.axes.uses, self.scene.t[self.kept], sums.kept_estimates
+            )
+        return study.packed(self.layout, sums.errors, **part_sums)
 
 
 def prepare(case: Case) -> Plan:
@@ -46,13 +49,13 @@ def prepare(case: Case) -> Plan:
     spec, scene = case.spec, build_scene(case)
     specs = responding_filters(spec, filter_specs(spec))
     detectors = all_detectors(spec, scene, specs)
-    plan = base.realisation_plan(case, scene, specs, detectors)
-    at = np.zeros(0, dtype=np.int64)
+    plan = study.realisation_plan(case, scene, specs, detectors)
+    use_scans = np.zeros(0, dtype=np.int64)
     if spec.uses:
-        at = np.searchsorted(scene.t, np.array(spec.uses.at_s or [scene.t[-1]]) - 1e-9)
-    more = shapes(spec, detectors, len(scene.t), len(at))
-    fields = vars(plan) | {"kept": at, "layout": Layout(**plan.layout.shapes, **more)}
-    return Plan(**fields | {"axes": axes(spec, scene, plan.axes, detectors.phase, at)}, spec=spec, scene=scene)
+        use_scans = np.searchsorted(scene.t, np.array(spec.uses.at_s or [scene.t[-1]]) - 1e-9)
+    more = shapes(spec, detectors, len(scene.t), len(use_scans))
+    fields = vars(plan) | {"kept": use_scans, "layout": Layout(**plan.layout.shapes, **more)}
+    return Plan(**fields | {"axes": axes(spec, scene, plan.axes, detectors.phase, use_scans)}, spec=spec, scene=scene)
 
 
 def manoeuvre_times(target: Target) -> tuple[float, float] | None:
@@ -63,8 +66,8 @@ def manoeuvre_times(target: Target) -> tuple[float, float] | None:
     if isinstance(target, Accelerating):
         end = math.inf if target.end_s is None else target.end_s
         return (target.start_s, end) if target.acceleration_mps2 else None
-    given = (target.range_m, target.bearing_rad) if target.frame == "polar" else (target.x_m, target.y_m)
-    curved = any(any(coefficients[2:]) for coefficients in given if coefficients)
+    derivatives = (target.range_m, target.bearing_rad) if target.frame == "polar" else (target.x_m, target.y_m)
+    curved = any(any(coefficients[2:]) for coefficients in derivatives if coefficients)
     return (0.0, math.inf) if curved else None
 
 
@@ -78,15 +81,19 @@ def phases(target: Target, t: np.ndarray) -> np.ndarray:
 
 # ---- from keys to rules and tests ---------------------------------------------------------------------------------
 def responding_filters(spec: Keys, specs: Sequence[FilterSpec]) -> list[FilterSpec]:
-    """The filters of a case, of which those that respond to manoeuvres have their rule or models."""
+    """The filters of a case; those that respond to manoeuvres get their rule or their models."""
     scale = lateral_scale(spec, 2)
     return [
-        replace(one, response=_response(member, scale), length=member.detector.plots if member.detector else one.length)
-        for one, member in zip(specs, spec.filters, strict=True)
+        replace(
+            filter_spec,
+            response=_filter_response(member, scale),
+            length=member.detector.plots if member.detector else filter_spec.length,
+        )
+        for filter_spec, member in zip(specs, spec.filters, strict=True)
     ]
 
 
-def _response(member: Filter, scale: np.ndarray) -> AdaptiveRule | ModelPair | None:
+def _filter_response(member: Filter, scale: np.ndarray) -> AdaptiveRule | ModelPair | None:
     """The response of a configured filter to manoeuvres; scale (C,) converts (m/s²)² to each coordinate's units."""
     if member.manoeuvre_variances and member.stay_probabilities:
         return ModelPair(scale[:, None] * np.array(member.manoeuvre_variances), np.array(member.stay_probabilities))
@@ -111,7 +118,9 @@ def thresholds(detector: Detector, coordinates: int) -> np.ndarray:
 def all_detectors(spec: Keys, scene: Scene, specs: Sequence[FilterSpec]) -> Detectors:
     """The measured detectors of a case, then those of its adaptive filters."""
     C = len(scene.nominal)
-    measured = [DetectorTest(one.plots, one.test_every, thresholds(one, C)) for one in spec.detectors]
+    measured = [
+        DetectorTest(detector.plots, detector.test_every, thresholds(detector, C)) for detector in spec.detectors
+    ]
     return detector_arrays(measured, filters.needed_tests(specs), phases(spec.target, scene.t), C)
 
 
@@ -129,12 +138,13 @@ def shift_laws(scene: Scene, c: int, detected: np.ndarray, plots: int, k: int) -
 
 
 def exact_alarms(spec: Keys, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Probability (D, G, T, K) of an alarm at a test, and shift (D, G, K) of its mean; NaN where not known. Both are
-    means over the patterns of plots in which there is a test. In the cartesian frames weights depend on the plots, and
-    nothing is known."""
+    """Probability (D, G, T, K) of an alarm at a test, and shift (D, G, K) of its mean; NaN where not known.
+
+    Both are means over the patterns of plots in which there is a test. In the cartesian frames weights depend on the
+    plots, and no law is known."""
     K, C = scene.truth.shape[:2]
-    most = max((len(detector.levels()) for detector in spec.detectors), default=0)
-    alarms = np.full((len(spec.detectors), C + 1, most, K), np.nan)
+    max_thresholds = max((len(detector.levels()) for detector in spec.detectors), default=0)
+    alarms = np.full((len(spec.detectors), C + 1, max_thresholds, K), np.nan)
     shifts = np.full((len(spec.detectors), C + 1, K), np.nan)
     if spec.frame != "polar":
         return alarms, shifts
@@ -146,8 +156,8 @@ def exact_alarms(spec: Keys, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
             share = probability[tested]
             if share.sum() > 0:
                 laws = [shift_laws(scene, c, detected[tested], detector.plots, k) for c in range(C)]
-                found = _alarm_law(np.array(laws), limits, share / share.sum())
-                alarms[d, :, : limits.shape[1], k], shifts[d, :, k] = found
+                law = _alarm_law(np.array(laws), limits, share / share.sum())
+                alarms[d, :, : limits.shape[1], k], shifts[d, :, k] = law
     return alarms, shifts
 
 
@@ -160,21 +170,23 @@ def _alarm_law(laws: np.ndarray, limits: np.ndarray, weight: np.ndarray) -> tupl
     for c in range(C):
         alarms[c] = exact.detection(limits[c][:, None] * ratio[c], shift[c]) @ weight
         shifts[c] = np.abs(shift[c]) @ weight
-    together = np.sqrt((shift**2).sum(axis=0))
-    shifts[C] = together @ weight
+    joint_shift = np.sqrt((shift**2).sum(axis=0))
+    shifts[C] = joint_shift @ weight
     if np.allclose(ratio, ratio[0], rtol=1e-9):
-        alarms[C] = exact.detection(limits[C][:, None] * ratio[0], together, C) @ weight
+        alarms[C] = exact.detection(limits[C][:, None] * ratio[0], joint_shift, C) @ weight
     return alarms, shifts
 
 
 def independent(detector: Detector, scene: Scene) -> bool:
-    """Whether a detector's tests are independent of one another: windows apart, errors white, no random motion."""
-    apart, certain = detector.test_every >= detector.plots, (scene.certain > 0).all()
-    return bool(apart and certain and not scene.rho.any() and not scene.walk.any())
+    """Whether the tests of a detector are independent: windows do not overlap, errors are white, no random motion."""
+    are_apart, certain = detector.test_every >= detector.plots, (scene.certain > 0).all()
+    return bool(are_apart and certain and not scene.rho.any() and not scene.walk.any())
 
 
-def axes(spec: Keys, scene: Scene, common: base.GivenPlotsAxes, phase: np.ndarray, at: np.ndarray) -> ManoeuvreAxes:
-    """Labels of a case and its exact laws; phase (K,) of the manoeuvre, at (A,) scans of uses."""
+def axes(
+    spec: Keys, scene: Scene, common: study.GivenPlotsAxes, phase: np.ndarray, use_scans: np.ndarray
+) -> ManoeuvreAxes:
+    """Labels of a case and its exact laws; phase (K,) of the manoeuvre, use_scans (A,)."""
     alarms, shifts = exact_alarms(spec, scene)
     return ManoeuvreAxes(
         **vars(common),
@@ -184,55 +196,55 @@ def axes(spec: Keys, scene: Scene, common: base.GivenPlotsAxes, phase: np.ndarra
         independent=tuple(independent(detector, scene) for detector in spec.detectors),
         phase=phase,
         manoeuvre_s=manoeuvre_times(spec.target),
-        uses=uses_axes(spec.uses, spec, scene, at) if spec.uses else None,
+        uses=uses_axes(spec.uses, spec, scene, use_scans) if spec.uses else None,
     )
 
 
 # ---- uses ---------------------------------------------------------------------------------------------------------
 def own_ship(uses: Uses, t: np.ndarray) -> np.ndarray:
     """The own ship's x, y and rates (n, 4) at times t."""
-    own = uses.own_ship
-    rate = own.speed_mps * np.array([math.cos(own.course_rad), math.sin(own.course_rad)])
-    return np.concatenate([np.array([own.x_m, own.y_m]) + t[:, None] * rate, np.tile(rate, (len(t), 1))], axis=1)
+    ship = uses.own_ship
+    rate = ship.speed_mps * np.array([math.cos(ship.course_rad), math.sin(ship.course_rad)])
+    return np.concatenate([np.array([ship.x_m, ship.y_m]) + t[:, None] * rate, np.tile(rate, (len(t), 1))], axis=1)
 
 
-def uses_axes(uses: Uses, spec: Keys, scene: Scene, at: np.ndarray) -> UsesAxes:
-    """True values at scans (A,): the closest approach at constant courses, the position where the target will be."""
-    t = scene.t[at]
-    track, own = exact.flat(scene.truth[at, :2, :2], spec.frame == "polar"), own_ship(uses, t)
-    true = exact.uses(track, own, uses.horizon_s)
+def uses_axes(uses: Uses, spec: Keys, scene: Scene, use_scans: np.ndarray) -> UsesAxes:
+    """True values at use_scans (A,): the closest approach at constant courses, the target's future position."""
+    t = scene.t[use_scans]
+    track, ship_states = exact.cartesian_track(scene.truth[use_scans, :2, :2], spec.frame == "polar"), own_ship(uses, t)
+    true = exact.uses(track, ship_states, uses.horizon_s)
     _, later = courses(spec.target, t + uses.horizon_s, None)
     true[:, 2:4] = later[:, :2, 0]
-    relative = track - own
-    return UsesAxes(at=at, true=true, closing_mps=np.hypot(relative[:, 2], relative[:, 3]))
+    relative = track - ship_states
+    return UsesAxes(scans=use_scans, true=true, closing_mps=np.hypot(relative[:, 2], relative[:, 3]))
 
 
 def estimated_uses(
-    uses: Uses, frame: str, t: np.ndarray, x: np.ndarray, P: np.ndarray, known: np.ndarray
+    uses: Uses, frame: str, t: np.ndarray, x: np.ndarray, P: np.ndarray, is_known: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Uses of tracks and their first-order σ (F, n, 6), NaN where a state is not complete.
 
-    t (n,) from the first plot; x (F, n, C, 3), P (F, n, C, 3, 3) and known (F, n, C, 3), of which the first two
+    t (n,) from the first plot; x (F, n, C, 3), P (F, n, C, 3, 3) and is_known (F, n, C, 3), of which the first two
     coordinates are used."""
-    state, polar, own = x[:, :, :2, :2], frame == "polar", own_ship(uses, t)
+    state, polar, ship_states = x[:, :, :2, :2], frame == "polar", own_ship(uses, t)
     spread = np.stack([P[:, :, :2, 0, 0], P[:, :, :2, 0, 1], P[:, :, :2, 1, 1]], axis=-1)
-    complete = np.all(known[:, :, :2, :2], axis=(2, 3), keepdims=True)[..., 0]
-    values = exact.uses(exact.flat(state, polar), own, uses.horizon_s)
-    variance = exact.variances(state, spread, polar, own, uses.horizon_s)
+    complete = np.all(is_known[:, :, :2, :2], axis=(2, 3), keepdims=True)[..., 0]
+    values = exact.uses(exact.cartesian_track(state, polar), ship_states, uses.horizon_s)
+    variance = exact.variances(state, spread, polar, ship_states, uses.horizon_s)
     return np.where(complete, values, np.nan), np.where(complete, np.sqrt(variance), np.nan)
 
 
-def use_sums(uses: Uses, frame: str, labels: UsesAxes, t: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """Sums (F, A, 6, 5) over the complete states of the estimates kept (A, F, 2, 6, count) at times t (A,)."""
-    polar, own = frame == "polar", own_ship(uses, t)
-    A, F = kept.shape[:2]
+def use_sums(uses: Uses, frame: str, labels: UsesAxes, t: np.ndarray, estimates_of_scans: np.ndarray) -> np.ndarray:
+    """Sums (F, A, 6, 5) over the complete states of estimates_of_scans (A, F, 2, 6, count) at times t (A,)."""
+    polar, ship_states = frame == "polar", own_ship(uses, t)
+    A, F = estimates_of_scans.shape[:2]
     sums = np.zeros((F, A, len(exact.QUANTITIES), 5))
     for a, f in np.ndindex(A, F):
-        complete = (kept[a, f, :, 5] > 0).all(axis=0)
-        estimates = np.moveaxis(kept[a, f][:, :, complete], -1, 0)
-        values = exact.uses(exact.flat(estimates[..., :2], polar), own[a], uses.horizon_s)
+        complete = (estimates_of_scans[a, f, :, 5] > 0).all(axis=0)
+        estimates = np.moveaxis(estimates_of_scans[a, f][:, :, complete], -1, 0)
+        values = exact.uses(exact.cartesian_track(estimates[..., :2], polar), ship_states[a], uses.horizon_s)
         e = exact.errors(values, labels.true[a])
-        spread = exact.variances(estimates[..., :2], estimates[..., 2:5], polar, own[a], uses.horizon_s)
+        spread = exact.variances(estimates[..., :2], estimates[..., 2:5], polar, ship_states[a], uses.horizon_s)
         sums[f, a] = np.stack([part.sum(axis=0) for part in (np.ones_like(e), e, e**2, e**4, spread)], axis=-1)
     return sums
 

@@ -22,52 +22,52 @@ PHASES = np.array(["steady", "manoeuvre", "after"], dtype=object)
 EVENTS = np.array(["false alarm", "alarm", "all clear"], dtype=object)  # the first of a phase
 JOINT = "joint"
 NEAR = "fails: near zero"
-NEAR_ZERO = 3.0  # in σ: speeds and distances, which cannot be negative, are not of first order nearer to zero
+MAX_SIGMAS_NEAR_ZERO = 3.0  # nearer to zero the errors of speeds and distances, never negative, are not of first order
 
 
-def measured(result: CaseResult[ManoeuvreAxes]) -> bool:
+def has_detectors(result: CaseResult[ManoeuvreAxes]) -> bool:
     """Whether a case has detectors."""
     return bool(result.spec.detectors)
 
 
-def groups(result: CaseResult[ManoeuvreAxes]) -> list[str]:
+def group_names(result: CaseResult[ManoeuvreAxes]) -> list[str]:
     """Names of the groups: each coordinate, then all of them jointly."""
     return [*(name for name, _ in result.axes.coordinates), JOINT]
 
 
-def _tested(result: CaseResult[ManoeuvreAxes]) -> tuple[Index, dict[str, np.ndarray]]:
+def _test_rows(result: CaseResult[ManoeuvreAxes]) -> tuple[Index, dict[str, np.ndarray]]:
     """Indices (detector, group, threshold, scan), each (n,), of all tests, in this order, and their first columns."""
     tested = np.asarray(result.sums["tested"])
     count = np.array([limits.shape[1] for limits in result.axes.thresholds])
-    there = np.arange(result.sums["alarms"].shape[2]) < count[:, None]
-    d, g, t, k = np.nonzero((tested[:, :, None] > 0) & there[:, None, :, None])
-    return (d, g, t, k), _of_thresholds(result, d, g, t) | {
+    is_threshold = np.arange(result.sums["alarms"].shape[2]) < count[:, None]
+    d, g, t, k = np.nonzero((tested[:, :, None] > 0) & is_threshold[:, None, :, None])
+    return (d, g, t, k), _threshold_columns(result, d, g, t) | {
         "k": np.asarray(result.axes.k)[k],
         "t_s": np.asarray(result.axes.t_s, dtype=float)[k],
     }
 
 
-def _of_thresholds(
+def _threshold_columns(
     result: CaseResult[ManoeuvreAxes], d: np.ndarray, g: np.ndarray, t: np.ndarray, **labels: np.ndarray
 ) -> dict[str, np.ndarray]:
     """The first columns of thresholds t of detectors d in groups g, each (n,); `filter` is the detector.
 
     false_alarm_probability is that of the exact law; labels are further columns after the component."""
-    chosen = result.axes.thresholds
-    k = np.array([chosen[i][j, m] for i, j, m in zip(d, g, t, strict=True)])
-    freedom = np.where(g == len(groups(result)) - 1, len(groups(result)) - 1, 1)
+    thresholds = result.axes.thresholds
+    k = np.array([thresholds[i][j, m] for i, j, m in zip(d, g, t, strict=True)])
+    freedom = np.where(g == len(group_names(result)) - 1, len(group_names(result)) - 1, 1)
     return {
         "case": np.full(d.size, result.name, dtype=object),
-        "filter": common.names([one.name for one in result.spec.detectors], d),
-        "component": common.names(groups(result), g),
+        "filter": common.names([detector.name for detector in result.spec.detectors], d),
+        "component": common.names(group_names(result), g),
         **labels,
-        "plots": np.array([one.plots for one in result.spec.detectors], dtype=np.int64)[d],
+        "plots": np.array([detector.plots for detector in result.spec.detectors], dtype=np.int64)[d],
         "threshold_k": k,
         "false_alarm_probability": exact.false_alarm(k, freedom),
     }
 
 
-@table("detections", measured)
+@table("detections", has_detectors)
 def _detections(result: CaseResult[ManoeuvreAxes]) -> Columns:
     """Alarms of each detector, at each of n tests.
 
@@ -76,20 +76,20 @@ def _detections(result: CaseResult[ManoeuvreAxes]) -> Columns:
     probability: of an alarm
     """
     axes = result.axes
-    at, columns = _tested(result)
-    d, g, _, k = at
+    index, columns = _test_rows(result)
+    d, g, _, k = index
     n = np.asarray(result.sums["tested"])[d, g, k]
-    of = statistics.rate(np.asarray(result.sums["alarms"])[at], n)
+    rates = statistics.rate(np.asarray(result.sums["alarms"])[index], n)
     return columns | {
         "n": n.astype(np.int64),
         "phase": PHASES[axes.phase[k]],
         "shift": axes.shifts[d, g, k],
-        **interval_columns("probability", of, ""),
-        "exact": axes.exact_alarms[at],
+        **interval_columns("probability", rates, ""),
+        "exact": axes.exact_alarms[index],
     }
 
 
-@table("delays", measured)
+@table("delays", has_detectors)
 def _delays(result: CaseResult[ManoeuvreAxes]) -> Columns:
     """How soon the first event of a phase comes.
 
@@ -99,27 +99,27 @@ def _delays(result: CaseResult[ManoeuvreAxes]) -> Columns:
     independent: what independent tests would give
     """
     axes, K = result.axes, len(result.axes.k)
-    at, columns = _tested(result)
-    d, k = at[0], at[3]
+    index, columns = _test_rows(result)
+    d, k = index[0], index[3]
     phase, since = axes.phase, phase_starts(result)
     p = np.where(phase == 2, 1 - axes.exact_alarms, axes.exact_alarms)
     first = np.asarray(result.sums["first"])
     reached, law = np.zeros(first.shape), np.full(first.shape, np.nan)
-    for part in range(3):
-        scans = np.arange(K)[phase == part]
+    for phase_number in range(3):
+        scans = np.arange(K)[phase == phase_number]
         reached[..., scans] = np.cumsum(first[..., scans], axis=-1)
-        law[..., scans] = exact.by_then(np.nan_to_num(p[..., scans]))
+        law[..., scans] = exact.probability_by_then(np.nan_to_num(p[..., scans]))
     # If the law of any test of the phase is unknown, so is that of the first event.
     unknown = np.isnan(p) & (np.asarray(result.sums["tested"])[:, :, None] > 0)
     law[unknown.any(axis=-1)] = np.nan
-    of = statistics.rate(reached[at], result.count)
+    rates = statistics.rate(reached[index], result.count)
     return columns | {
         "n": np.full(d.size, result.count, dtype=np.int64),
         "event": EVENTS[phase[k]],
         "delay_s": columns["t_s"] - since[phase[k]],
-        **interval_columns("probability", of, ""),
-        "exact": np.where(np.array(axes.independent)[d], law[at], np.nan),
-        "independent": law[at],
+        **interval_columns("probability", rates, ""),
+        "exact": np.where(np.array(axes.independent)[d], law[index], np.nan),
+        "independent": law[index],
     }
 
 
@@ -129,7 +129,7 @@ def phase_starts(result: CaseResult[ManoeuvreAxes]) -> np.ndarray:
     return np.array([0.0, *times])
 
 
-@table("classes", measured)
+@table("classes", has_detectors)
 def _classes(result: CaseResult[ManoeuvreAxes]) -> Columns:
     """Tracks classed by their alarms: called manoeuvring if there was one in a phase, of which k is the last scan.
 
@@ -138,29 +138,29 @@ def _classes(result: CaseResult[ManoeuvreAxes]) -> Columns:
     error_probability: that a steady track is called manoeuvring, or a manoeuvring one steady
     """
     delays = _delays(result)
-    last = np.concatenate([_last_of(delays, event) for event in EVENTS[:2]])
+    last = np.concatenate([_last_rows(delays, event) for event in EVENTS[:2]])
     rows = {name: values[last] for name, values in delays.items()}
     steady = rows["event"] == EVENTS[0]
     wrong = np.where(steady, rows["probability"], 1 - rows["probability"])
-    of = statistics.rate(np.rint(wrong * rows["n"]), rows["n"])
+    rates = statistics.rate(np.rint(wrong * rows["n"]), rows["n"])
     names = list(rows)
     return {name: rows[name] for name in names[: names.index("n") + 1]} | {
         "truth": PHASES[np.where(steady, 0, 1)],
         "duration_s": rows["delay_s"],
         "called_manoeuvring": rows["probability"],
-        "error_probability|": of,
+        "error_probability|": rates,
         "exact": np.where(steady, rows["exact"], 1 - rows["exact"]),
     }
 
 
-def _last_of(rows: Columns, event: str) -> np.ndarray:
+def _last_rows(rows: Columns, event: str) -> np.ndarray:
     """Indices of the last rows of an event, one for each detector, component and threshold, in order."""
-    at = np.flatnonzero(rows["event"] == event)
-    keys = [tuple(rows[name][i] for name in ("filter", "component", "threshold_k")) for i in at]
-    return np.array(sorted(dict(zip(keys, at, strict=True)).values()), dtype=np.int64)
+    indices = np.flatnonzero(rows["event"] == event)
+    keys = [tuple(rows[name][i] for name in ("filter", "component", "threshold_k")) for i in indices]
+    return np.array(sorted(dict(zip(keys, indices, strict=True)).values()), dtype=np.int64)
 
 
-@table("thresholds", measured)
+@table("thresholds", has_detectors)
 def _thresholds(result: CaseResult[ManoeuvreAxes]) -> Columns:
     """Thresholds of each detector with full windows, and the accelerations that they detect.
 
@@ -171,15 +171,21 @@ def _thresholds(result: CaseResult[ManoeuvreAxes]) -> Columns:
     acceleration_for_50_percent, acceleration_for_68_percent, acceleration_for_90_percent [unit]: detected so often
     """
     axes = result.axes
-    places = [(d, *place) for d, limits in enumerate(axes.thresholds) for place in np.ndindex(*limits.shape)]
-    d, g, t = np.array(places, dtype=np.int64).T
+    indices = [
+        (d, *group_and_threshold)
+        for d, limits in enumerate(axes.thresholds)
+        for group_and_threshold in np.ndindex(*limits.shape)
+    ]
+    d, g, t = np.array(indices, dtype=np.int64).T
     units = [f"{unit}/s2" for _, unit in axes.coordinates]
-    columns = _of_thresholds(result, d, g, t, unit=common.names([*units, ""], g))
-    k, n, joint = columns["threshold_k"], columns["plots"], g == len(groups(result)) - 1
+    columns = _threshold_columns(result, d, g, t, unit=common.names([*units, ""], g))
+    k, n, joint = columns["threshold_k"], columns["plots"], g == len(group_names(result)) - 1
     sigma = np.append(axes.sigma, np.nan)[g]
     per_sigma = np.where(joint, np.nan, sigma_acceleration(n.astype(float), axes.scan_period_s))
     reach = {
-        f"acceleration_for_{percent}_percent": sigma * per_sigma * [exact.shift_for(percent / 100, one) for one in k]
+        f"acceleration_for_{percent}_percent": sigma
+        * per_sigma
+        * [exact.shift_for(percent / 100, threshold) for threshold in k]
         for percent in (50, 68, 90)
     }
     return {
@@ -226,21 +232,21 @@ def _uses(result: CaseResult[ManoeuvreAxes]) -> Columns:
         return {}
     f, u, a = np.nonzero(np.moveaxis(sums[..., 0] > 0, 1, 2))
     n, first, square, fourth, spread = np.moveaxis(sums[f, a, u], -1, 0)
-    of = statistics.root_mean_square(square, fourth, n)
+    rms = statistics.root_mean_square(square, fourth, n)
     distance = _distance(sums, uses.true, uses.closing_mps)[f, u, a]
-    compared = notes.ratio_columns(of, np.sqrt(spread / n))
+    compared = notes.ratio_columns(rms, np.sqrt(spread / n))
     verdict = np.select(
-        [distance < NEAR_ZERO, compared["ratio_lo"] > 1.05, compared["ratio_hi"] < 0.95],
+        [distance < MAX_SIGMAS_NEAR_ZERO, compared["ratio_lo"] > 1.05, compared["ratio_hi"] < 0.95],
         [NEAR, "error larger", "error smaller"],
         "holds within 5 %",
     )
     names, units = zip(*QUANTITIES, strict=True)
     return {
-        **leading(result, f, uses.at[a], component=common.names(names, u), unit=common.names(units, u)),
+        **leading(result, f, uses.scans[a], component=common.names(names, u), unit=common.names(units, u)),
         "n": n.astype(np.int64),
         "true_value": uses.true[a, u],
         "bias": first / n,
-        **(compared | {"sigma": of}),
+        **(compared | {"sigma": rms}),
         "distance_in_sigma": distance,
         "first_order": verdict.astype(object),
         "note": np.full(f.size, notes.VARIES, dtype=object),
@@ -249,6 +255,7 @@ def _uses(result: CaseResult[ManoeuvreAxes]) -> Columns:
 
 def _distance(sums: np.ndarray, true: np.ndarray, closing: np.ndarray) -> np.ndarray:
     """Distance from zero (F, U, A), in believed σ, of the value that each quantity depends on; infinite for positions.
+
     The closest approach depends on its distance and on the relative speed `closing` (A,), whose σ is that of the
     speed."""
     with np.errstate(invalid="ignore", divide="ignore"):

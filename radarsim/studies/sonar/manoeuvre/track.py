@@ -17,8 +17,10 @@ class Tracker(base.Tracker):
         """The filters; those that respond to manoeuvres have their rule or models."""
         return study.responding_filters(self.spec, super().specs())
 
-    def derived(self, t: np.ndarray, x: np.ndarray, P: np.ndarray, known: np.ndarray) -> base.Derived:
+    def derived(self, t: np.ndarray, x: np.ndarray, P: np.ndarray, is_known: np.ndarray) -> base.DerivedQuantities:
         """The uses of the tracks."""
         if self.spec.uses is None:
-            return super().derived(t, x, P, known)
-        return base.Derived(QUANTITIES, *study.estimated_uses(self.spec.uses, self.spec.frame, t, x, P, known))
+            return super().derived(t, x, P, is_known)
+        return base.DerivedQuantities(
+            QUANTITIES, *study.estimated_uses(self.spec.uses, self.spec.frame, t, x, P, is_known)
+        )

@@ -16,7 +16,7 @@ from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter import filters as design
 from radarsim.studies.sonar.clutter import tables, track
 from radarsim.studies.sonar.clutter.kernels import tracker as places
-from radarsim.studies.sonar.clutter.kernels.rare import outside
+from radarsim.studies.sonar.clutter.kernels.rare import probability_outside_gate
 from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
 from radarsim.studies.sonar.kernels.steps import CHUNK
 from tests.studies.sonar.clutter import naive_ends
@@ -78,12 +78,12 @@ def test_the_probability_outside_a_gate_is_that_of_a_sum(gate):
             S *= np.outer(sigma, sigma)
             for reach in (0.0, 0.5, 1.0, 1.5):
                 off = reach * math.sqrt(gate * size) * sigma * generator.uniform(-1, 1, 2)
-                c = outside(tuple(off), (S[0, 0], S[0, 1], S[1, 1]), gate, tuple(sigma))
+                c = probability_outside_gate(tuple(off), (S[0, 0], S[0, 1], S[1, 1]), gate, tuple(sigma))
                 # What the kernel states of gates up to 60 σ² wide, and each part of the quadrature; 48 nodes have
                 # an error of 2·10⁻¹⁰ at most where a gate is up to 2000 σ² wide.
                 wanted, precision = naive_ends.missing(off, S, gate, sigma), 3e-13 if gate * size <= 60 else 1e-9
                 assert c == pytest.approx(wanted, abs=precision)
-    assert outside((1.0, 0.0), (900.0, 0.0, 3e-4), 1e30, tuple(sigma)) == 0.0
+    assert probability_outside_gate((1.0, 0.0), (900.0, 0.0, 3e-4), 1e30, tuple(sigma)) == 0.0
 
 
 RULES = [(0.9, 3, 4, 4), (0.95, 3, 4, 4), (0.98, 4, 6, 4), (0.98, 3, 4, 5), (0.99, 2, 3, 5), (0.98, 3, 5, 6)]
@@ -147,7 +147,7 @@ def test_weights_and_ends_are_the_twins(density, detection):
     keys = keys_of(filters, density, detection, scans)
     case = load(keys).cases[0]
     plan = STUDY.prepare(case)
-    given, ends, seen = design.conditions(case.spec), plan.ends, np.zeros(4)
+    given, ends, seen = design.tracking_conditions(case.spec), plan.ends, np.zeros(4)
     truth = plan.axes.world.truth[:, :2, 0]
     for realisation in range(40):
         sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
@@ -268,7 +268,7 @@ def test_few_events_in_one_way_of_ending_are_told():
     assert tables.ends_note(drawn, sure, True)[0] == ""
     assert tables.ends_note(drawn, unsure, True)[0] == rare.IN_PART
     assert tables.ends_note(drawn, unsure, False)[0] == ""
-    kinds = tables.HOW["target's track dropped"]
+    kinds = tables.KINDS_BY_EVENT["target's track dropped"]
     assert tables.ends_note(drawn, ways, False, kinds)[0] == ""
     row = {"case": "c", "filter": "f", "k": 9, "t_s": 1.0, "event": "e", "sought": True, "n": 4000, "rate": 1e-3}
     row |= {"n_eff": 1e3, "mean_weight": 1.0, "mean_weight_se": 0.1, "note": rare.IN_PART}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from radarsim.studies.sonar.clutter import filters, track
-from radarsim.studies.sonar.clutter.kernels.tracker import OPEN
+from radarsim.studies.sonar.clutter.kernels.tracker import OPEN_GATE
 from tests.studies.sonar.precision import LINE, TERMS
 from tests.tolerances import Z, assert_rounded
 
@@ -76,10 +76,10 @@ def test_more_tracks_than_a_chunk_holds():
 
 def test_gate_thresholds_and_poisson_distribution():
     assert_rounded(filters.gate_threshold(0.99), -2 * np.log(0.01), condition=100)  # of 1 − 0.99
-    assert filters.gate_threshold(1.0) == OPEN
+    assert filters.gate_threshold(1.0) == OPEN_GATE
     from scipy import stats
 
     for mean in (0.0, 0.01, 1.5, 40.0):
-        share = filters.poisson_share(mean)
+        share = filters.poisson_cdf(mean)
         assert_rounded(share, stats.poisson.cdf(np.arange(share.size), mean), condition=1 + mean, operations=10)
         assert share[-1] == 1.0

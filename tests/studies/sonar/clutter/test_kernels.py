@@ -155,14 +155,14 @@ def test_the_area_of_a_gate_within_the_sector_is_that_of_its_points(seed):
     inside = (np.abs(bearing) <= half) & (ranges >= 1e3) & (ranges <= 15e3)
     scale = math.pi * root[0, 0] * root[1, 1]
     det = S[0] * S[2] - S[1] ** 2
-    found = places.area_within.py_func(places.Gate(r, b, S, True), det, threshold, cells)
+    found = places.gate_area.py_func(places.Gate(r, b, S, True), det, threshold, cells)
     assert found == pytest.approx(scale * (ranges * inside).mean(), abs=8 / n * scale * (r + root[0, 0]))
 
 
 def test_a_gate_within_the_sector_has_its_own_area_and_an_open_one_the_sectors():
     _, cells, _ = gate_and_sector(1)
     small = places.Gate(8e3, 0.3, (900.0, 0.0, 3e-4), True)
-    area = places.area_within.py_func(small, 900.0 * 3e-4, 9.0, cells)
+    area = places.gate_area.py_func(small, 900.0 * 3e-4, 9.0, cells)
     assert_rounded(area, 8e3 * math.pi * 9 * math.sqrt(0.27), operations=8)
-    whole = places.area_within.py_func(small, 0.27, places.OPEN, cells)
+    whole = places.gate_area.py_func(small, 0.27, places.OPEN_GATE, cells)
     assert_rounded(whole, 0.5 * (15e3**2 - 1e6) * cells.nb * cells.db, operations=8)

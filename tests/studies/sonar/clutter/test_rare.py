@@ -15,7 +15,7 @@ from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter import filters as design
 from radarsim.studies.sonar.clutter import track
 from radarsim.studies.sonar.clutter.kernels import tracker as places
-from radarsim.studies.sonar.clutter.kernels.rare import Shift
+from radarsim.studies.sonar.clutter.kernels.rare import FalseTrackLaws
 from tests.studies.sonar.clutter.naive_false import FalseTrack
 from tests.studies.sonar.clutter.test_study import config, simulated, tracker
 from tests.studies.sonar.precision import LINE, TERMS
@@ -40,7 +40,7 @@ def plan_of(*of, **more):
 def reseeded(plan, seed):
     """The plan under other false plots."""
     keys = [random.stream(seed, str(i)) for i in range(4)]
-    shift = None if plan.shift is None else Shift(keys[2], keys[3], plan.shift.shares)
+    shift = None if plan.shift is None else FalseTrackLaws(keys[2], keys[3], plan.shift.shares)
     field = plan.field_about_false._replace(key=keys[1])
     return replace(plan, seeds=keys[0], field_about_false=field, shift=shift)
 
@@ -95,7 +95,7 @@ def test_weights_and_lives_are_the_twins(density, rare):
     filters = [tracker("near"), tracker("pda", "pda", 3, 5), tracker("wide", m=4, n=6, gate=0.9999)]
     case = case_of(filters, density, scans=12, rare=rare)
     plan = STUDY.prepare(case)
-    given, shares, seen = design.conditions(case.spec), plan.shift.shares, np.zeros(3)
+    given, shares, seen = design.tracking_conditions(case.spec), plan.shift.shares, np.zeros(3)
     for realisation in range(150):
         sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
         u, v = uniforms(plan.seeds, realisation)

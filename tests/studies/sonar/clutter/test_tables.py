@@ -160,25 +160,25 @@ def test_intervals_of_a_ratio_and_of_a_poisson_number_cover():
         held = rng.poisson(30, n) + 1.0
         ends = rng.poisson(0.02 * held)
         sums = [ends.sum(), (ends**2).sum(), held.sum(), (held**2).sum(), (ends * held).sum()]
-        of = report.ratio(np.array(sums, dtype=float), n)
+        of = report.ratio_of_sums(np.array(sums, dtype=float), n)
         inside += of.lo <= 0.02 <= of.hi
     assert inside >= stats.binom.ppf(5e-5, 1000, 0.94)
     count = rng.poisson(7.0, 20_000)
-    of = report.poisson(count, 1.0)
+    of = report.poisson_rate(count, 1.0)
     assert np.mean((of.lo <= 7.0) & (of.hi >= 7.0)) >= 0.95 - share_error(0.05, 20_000)
     # Wilson and Hilferty's largest error is that of two events, 0.2246 for 0.2422; of none the end is zero.
     assert of.lo == pytest.approx(np.where(count, stats.chi2.ppf(0.025, 2 * count) / 2, 0.0), abs=0.0176)
 
 
 def test_ratio_without_events_or_exposure():
-    none = report.ratio(np.array([0.0, 0.0, 100.0, 1.0, 0.0]), 10)
+    none = report.ratio_of_sums(np.array([0.0, 0.0, 100.0, 1.0, 0.0]), 10)
     assert (none.value, none.lo) == (0.0, 0.0)
     assert none.hi == pytest.approx(3.689 / 100, rel=0.006)  # Wilson and Hilferty's 3.668
-    assert np.isnan(report.ratio(np.zeros(5), 10).value)
+    assert np.isnan(report.ratio_of_sums(np.zeros(5), 10).value)
 
 
 def test_mean_time_has_the_interval_of_its_spread():
-    of = report.mean_of_counts(np.array([0.0, 5.0, 10.0]), np.array([0.0, 300.0, 100.0]))
+    of = report.mean_event_time(np.array([0.0, 5.0, 10.0]), np.array([0.0, 300.0, 100.0]))
     assert of.value == 6.25
     assert of.hi - of.value == pytest.approx(1.966 * np.sqrt(4.6875 / 399), rel=5e-4 / 1.966)  # Student's printed value
-    assert np.isnan(report.mean_of_counts(np.array([0.0]), np.array([0.0])).value)
+    assert np.isnan(report.mean_event_time(np.array([0.0]), np.array([0.0])).value)

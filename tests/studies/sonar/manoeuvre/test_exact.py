@@ -59,7 +59,7 @@ def test_a_random_push_adds_to_the_variance():
 
 
 def test_first_of_independent_tests():
-    assert exact.by_then(np.array([0.5, 0.0, 0.5])).tolist() == [0.5, 0.5, 0.75]
+    assert exact.probability_by_then(np.array([0.5, 0.0, 0.5])).tolist() == [0.5, 0.5, 0.75]
 
 
 # ---- the degree of a window switched by the detector -----------------------------------------------------------------
@@ -110,16 +110,16 @@ P = np.array([[[100.0, 5.0, 1.0], [1e-4, 1e-6, 4e-8]], [[25.0, -1.0, 0.5], [4e-5
 def test_flat_states_move_as_their_rates_say():
     dt = 1e-4
     later = POLAR + np.stack([POLAR[..., 1] * dt, np.zeros((2, 2))], axis=-1)
-    now, then = (exact.flat(state, True) for state in (POLAR, later))
+    now, then = (exact.cartesian_track(state, True) for state in (POLAR, later))
     (r, vr), (_, vb) = np.abs(np.moveaxis(POLAR, 0, -1))
     # The difference's own error, dt/2 times the acceleration, and rounding of the range.
     allowed = dt / 2 * (2 * vr * vb + r * vb**2) + rounding(operations=4) * r / dt
     assert (np.abs((then - now)[:, :2] / dt - now[:, 2:]) <= allowed[:, None]).all()
-    assert exact.flat(np.array([[1.0, 2.0], [3.0, 4.0]]), False).tolist() == [1.0, 3.0, 2.0, 4.0]
+    assert exact.cartesian_track(np.array([[1.0, 2.0], [3.0, 4.0]]), False).tolist() == [1.0, 3.0, 2.0, 4.0]
 
 
 def test_closest_approach_is_the_least_distance():
-    track = exact.flat(POLAR, True)
+    track = exact.cartesian_track(POLAR, True)
     found = exact.uses(track, OWN, 60.0)
     t = np.linspace(-3000, 3000, 600_001)
     for one, row in zip(track, found, strict=True):
@@ -135,7 +135,7 @@ def test_closest_approach_is_the_least_distance():
 
 
 def test_gradients_are_derivatives():
-    track = exact.flat(POLAR, True)
+    track = exact.cartesian_track(POLAR, True)
     found = exact.gradients(track, OWN, 60.0)
     distance, speed = np.hypot(*(track - OWN).T[:2]), np.minimum(np.hypot(*track.T[2:]), np.hypot(*(track - OWN).T[2:]))
     reach = np.abs(track[:, :2]).max(axis=1) + 60 * np.abs(track[:, 2:]).max(axis=1)
@@ -160,8 +160,8 @@ def test_spread_is_that_of_samples(polar):
         xx, xv, vv = np.moveaxis(spread[i], -1, 0)
         factor = np.linalg.cholesky(np.stack([np.stack([xx, xv], -1), np.stack([xv, vv], -1)], -2))
         drawn = state[i] + np.einsum("cij,ncj->nci", factor, rng.standard_normal((n, 2, 2)))
-        true = exact.uses(exact.flat(state[i], polar), OWN, 60.0)
-        e = exact.errors(exact.uses(exact.flat(drawn, polar), OWN, 60.0), true)
+        true = exact.uses(exact.cartesian_track(state[i], polar), OWN, 60.0)
+        e = exact.errors(exact.uses(exact.cartesian_track(drawn, polar), OWN, 60.0), true)
         assert e.std(axis=0) == pytest.approx(np.sqrt(found[i]), rel=sigma_error(n))
 
 
@@ -171,7 +171,7 @@ def test_the_first_order_fails_on_a_collision_course():
     n, rng = 200_000, np.random.default_rng(6)
     drawn = state + np.array([[10.0, 0.1], [1e-3, 1e-5]]) * rng.standard_normal((n, 2, 2))
     spread = np.array([[100.0, 0.0, 0.01], [1e-6, 0.0, 1e-10]])
-    cpa = exact.uses(exact.flat(drawn, True), np.zeros(4), 60.0)[:, 4]
+    cpa = exact.uses(exact.cartesian_track(drawn, True), np.zeros(4), 60.0)[:, 4]
     sigma = np.sqrt(exact.variances(state, spread, True, np.zeros(4), 60.0)[4])
     assert np.sqrt((cpa**2).mean()) == pytest.approx(sigma, rel=sigma_error(n))
     assert cpa.mean() == pytest.approx(sigma * np.sqrt(2 / np.pi), abs=mean_error(n, cpa.std()))

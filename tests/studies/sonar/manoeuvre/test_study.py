@@ -119,11 +119,11 @@ def test_first_events_of_independent_tests_are_exact_and_alarms_come_in_runs():
             p = law[1, g, :2][:, scans]
             p = 1 - p if part == 2 else p
             detected = np.cumsum(sums["first"][1, g, :2][:, scans], axis=1)
-            assert within(detected, N, exact.by_then(p), ALL).all()
+            assert within(detected, N, exact.probability_by_then(p), ALL).all()
     # Overlapping windows on a steady leg: no oftener than if they were independent (Šidák), and by far.
     scans = np.arange(5, 13)
     detected = sums["first"][0, 0][:, scans].sum(axis=1) / N
-    independent = exact.by_then(law[0, 0][:, scans])[:, -1]
+    independent = exact.probability_by_then(law[0, 0][:, scans])[:, -1]
     assert (detected < independent).all()
     assert detected[0] < independent[0] - share_error(0.5, N)
 
