@@ -375,7 +375,7 @@ def tracks():
     one = work(*RUNS["folds missed"][:2])
     folded = ambiguous_plots.Recorded().simulated(one.case, 3)
     made["folded plots"] = np.nan_to_num(folded["velocity_mps"])
-    made["folds of one"] = np.nan_to_num(folds.simulated_lists(one.plan.world, one.plan.banks, 0)[1])
+    made["folds of one"] = np.nan_to_num(folds.simulate_hypotheses(one.plan.world, one.plan.banks, 0)[1])
     measured = {name: folded[name] for name in ("t_s", "range_m", "velocity_mps")}
     for options in one.case.spec.filters:
         if likelihood := ambiguous_plots.Recorded().likelihood(one.case, options.name, [measured]):

@@ -47,7 +47,7 @@ def fan(case: Case, number: int, scans: int) -> Fan:
         world = plan.world._replace(
             truth=plan.world.truth[:k].copy(), t=plan.world.t[:k].copy(), spans=plan.world.spans[:k].copy()
         )
-        plots, out, listed = sums.simulated_lists(world, plan.banks, 0)
+        plots, out, listed = sums.simulate_hypotheses(world, plan.banks, 0)
         count = int(out[0, -1, records.COUNT, LANE])
         which = int(plots[:, records.DETECTED, LANE].sum()) % 2  # each plot is written from one list into the other
         own = listed.reshape(COLUMNS, -1)[4 * which : 4 * which + 4, :count]

@@ -228,11 +228,11 @@ def banks(spec: Any, shares: Callable[[Any], np.ndarray]) -> records.Banks:
     names = [one.name for one in spec.filters]
     oracles = [i for i, one in enumerate(spec.filters) if one.doppler == "unfolded" and one.combine is None]
     made, count = gathered.banks, len(gathered.banks)
-    held = np.zeros((count, spec.scans, records.MEMBERS, 3))
+    held = np.zeros((count, spec.scans, records.MAX_MEMBERS, 3))
     for b, one in enumerate(made):
         if one.shares:
             held[b] = np.frombuffer(one.shares).reshape(held.shape[1:])
-    parts, orders = np.zeros((count, records.MEMBERS), np.int64), np.zeros((count, records.MEMBERS), np.int64)
+    parts, orders = np.zeros((count, records.MAX_MEMBERS), np.int64), np.zeros((count, records.MAX_MEMBERS), np.int64)
     for b, one in enumerate(made):
         parts[b, : len(one.parts)], orders[b, : len(one.orders)] = one.parts, one.orders
     whole = {"dtype": np.int64}
@@ -240,17 +240,17 @@ def banks(spec: Any, shares: Callable[[Any], np.ndarray]) -> records.Banks:
     return records.Banks(
         designs=plain(list(gathered.designs.values()), len(gathered.designs), records.DESIGN),
         kind=plain([one.kind for one in made], count, **whole),
-        parts=parts,
+        members=parts,
         orders=orders,
         size=plain([len(one.parts) for one in made], count, **whole),
-        most=plain([one.most for one in made], count, **whole),
-        deepest=plain([one.deepest for one in made], count),
-        reads=plain([one.reads for one in made], count, **whole),
+        max_hypotheses=plain([one.most for one in made], count, **whole),
+        max_depth=plain([one.deepest for one in made], count),
+        member_field=plain([one.reads for one in made], count, **whole),
         stay=plain([one.stay for one in made], count),
         unfolding=plain([one.unfolding for one in made], count, **whole),
         shares=held,
         bank=plain(bank, len(bank), **whole),
-        place=plain(place, len(place), **whole),
+        estimate_field=plain(place, len(place), **whole),
         baseline=names.index(spec.baseline) if spec.baseline else 0,
         oracle=oracles[0] if oracles else -1,
     )

@@ -224,9 +224,9 @@ def prepare(case: Case) -> Plan:
         spread=filters.spread(spec.target),
         sigma=np.array([radar.sigma_range_m, radar.sigma_velocity_mps]),
         spans=np.resize(np.array(radar.spans_mps), spec.scans),
-        turn=np.resize(np.arange(len(radar.spans_mps)), spec.scans),
-        joint=plain(radar.joint_spans_mps if solves else 0.0, rates, rates),
-        detection=float(radar.detection_probability),
+        rate_index=np.resize(np.arange(len(radar.spans_mps)), spec.scans),
+        joint_spans=plain(radar.joint_spans_mps if solves else 0.0, rates, rates),
+        detection_probability=float(radar.detection_probability),
     )
     banks = filters.banks(spec, lambda one: shares(spec, one, observed))
     shapes, labels, mixture = dict(records.shapes(len(spec.filters), spec.scans)), axes(spec, observed, banks), None
@@ -244,7 +244,7 @@ def shares(spec: Any, one: Any, observed: records.World) -> np.ndarray:
     members = filters.members(one)
     of = [filters.gains(member, spec.prior, observed.sigma, spec.radar.scan_period_s, spec.scans) for member in members]
     drawn = filters.drawn_motions(observed.t)
-    made = np.zeros((spec.scans, records.MEMBERS, 3))
+    made = np.zeros((spec.scans, records.MAX_MEMBERS, 3))
     if one.combine == "intersection":
         bias, noise = filters.errors(of, drawn, observed.sigma)
         made[:, : len(members)] = filters.widths(bias, noise, members, spec.prior)
@@ -265,13 +265,13 @@ def axes(spec: Any, observed: records.World, banks: records.Banks) -> FoldedAxes
     }
     right = np.full(shape[:2], np.nan)
     available = np.broadcast_to(np.array([filters.components(one) for one in spec.filters])[:, None], shape)
-    if observed.detection == 1:
+    if observed.detection_probability == 1:
         for f, one in enumerate(spec.filters):
             found = exact_values(spec, one, observed, banks.shares[banks.bank[f]])
             for name, values in found.items():
                 known[name][f] = np.where(available[f], values, np.nan)
             if one.doppler == "remainder":
-                joint = np.concatenate([[0.0], observed.joint[observed.turn[1:], observed.turn[:-1]]])
+                joint = np.concatenate([[0.0], observed.joint_spans[observed.rate_index[1:], observed.rate_index[:-1]]])
                 velocities = observed.truth[:, 1]
                 right[f] = filters.remainders_right(
                     velocities, observed.spread, observed.t, observed.sigma[1], observed.spans, joint
@@ -291,7 +291,7 @@ def axes(spec: Any, observed: records.World, banks: records.Banks) -> FoldedAxes
         exact_bias=known["bias"],
         spans=observed.spans,
         folded=np.array([one.folds for one in spec.filters]),
-        remembers=records.remembers(banks)[banks.bank],
+        remembers=records.keeps_several(banks)[banks.bank],
         combines=np.array([one.combine is not None for one in spec.filters]),
         exact_right=right,
         oracle_sigma=known["oracle_sigma"],
@@ -351,4 +351,4 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
 
 def errors(plan: Plan, first: int, count: int) -> np.ndarray:
     """The errors (F, count, K, 3) of plain realisations; not-a-number where a filter has not started."""
-    return sums.errors_of(plan.world, plan.banks, first, count)
+    return sums.simulate_errors(plan.world, plan.banks, first, count)

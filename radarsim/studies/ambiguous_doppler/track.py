@@ -20,7 +20,7 @@ from radarsim.studies.ambiguous_doppler import filters
 from radarsim.studies.ambiguous_doppler.config import joint_span
 from radarsim.studies.ambiguous_doppler.kernels import rows as kernels
 from radarsim.studies.ambiguous_doppler.kernels import sums
-from radarsim.studies.ambiguous_doppler.kernels.steps import remainder
+from radarsim.studies.ambiguous_doppler.kernels.steps import chinese_remainder
 from radarsim.studies.ambiguous_doppler.study import COMPONENTS, prepare
 from radarsim.studies.interface import BIAS, Draw, Drawn, RecordedPlots, usual_interval_s
 
@@ -108,10 +108,10 @@ class Folds:
         most = float(np.max(S))
         if not most > 0:
             raise PlotFault("velocity_mps: a filter's numbers are lost in rounding: split the file here")
-        if 2 * kernels.FARTHEST * math.sqrt(most) / self.span * count > kernels.MOST_LOOKED_AT:
-            sigma, few = f"its σ before, {math.sqrt(most):g} m/s", f"{kernels.MOST_LOOKED_AT:g} sequences"
+        if 2 * kernels.FARTHEST * math.sqrt(most) / self.span * count > kernels.MAX_SEQUENCES:
+            sigma, few = f"its σ before, {math.sqrt(most):g} m/s", f"{kernels.MAX_SEQUENCES:g} sequences"
             raise PlotFault(f"velocity_mps: {sigma}, leaves more than {few} of folds by {self.span:g} m/s")
-        return kernels.folds_near(most, self.span)
+        return kernels.nearby_folds(most, self.span)
 
     def innovations(self, e: np.ndarray, S: np.ndarray) -> np.ndarray:
         """Innovations e + n D (..., folds) of the folds that matter; e (...) as measured, S (...) variances."""
@@ -129,7 +129,7 @@ class Folds:
         joint = joint_span(self.span, before[1]) if before else 0.0
         if before is None or joint == 0:
             return np.nan
-        return remainder(v, self.span, *before, joint)
+        return chinese_remainder(v, self.span, *before, joint)
 
 
 class Single:
@@ -426,7 +426,7 @@ def drawing(case: Case) -> Draw:
     plan = prepare(case)
 
     def draw(first: int, count: int) -> Drawn:
-        plots, truth = sums.drawn_plots(plan.world, first, count)
+        plots, truth = sums.simulate_plots(plan.world, first, count)
         columns = {name: plots[..., i] for i, (name, _) in enumerate(MEASURED)}
         return Drawn(plan.axes.t_s, columns, COMPONENTS, truth, first=first)
 

@@ -27,7 +27,7 @@ HOW = {"range only": "none", "oracle": "unfolded", "nearest fold": "nearest"}
 def compared(case, lanes=8):
     """Of some realisations: plots as the twins take them, and outputs (B, K, OUTPUT) of the kernels."""
     plan = study.prepare(case)
-    plots, out = sums.simulated(plan.world, plan.banks, 16)
+    plots, out = sums.simulate_outputs(plan.world, plan.banks, 16)
     columns = plots[:, [records.RANGE, records.VELOCITY, records.UNFOLDED, records.DETECTED]]
     for lane in range(lanes):
         yield plan, columns[:, :, lane], out[..., lane]

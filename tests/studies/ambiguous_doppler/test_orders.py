@@ -25,7 +25,7 @@ PULSE |= {"start_s": 60.0, "duration_s": 30.0}
 
 def outputs(case):
     plan = study.prepare(case)
-    plots, out = sums.simulated(plan.world, plan.banks, 8)
+    plots, out = sums.simulate_outputs(plan.world, plan.banks, 8)
     columns = plots[:, [records.RANGE, records.VELOCITY, records.UNFOLDED, records.DETECTED]]
     return plan, columns, out
 
@@ -79,7 +79,7 @@ def test_orders_within_remembered_hypotheses(most, prune_below, orders, detectio
     case = made("RLS 2", filters, 6, PULSE | {"start_s": 20.0, "duration_s": 10.0}, **keys)
     plan, plots, out = outputs(case)
     assert len(out) == 1  # the two filters share a list
-    assert plan.banks.place.tolist() == [records.MEAN, records.BEST]
+    assert plan.banks.estimate_field.tolist() == [records.MEAN, records.BEST]
     for lane in range(2):
         own = plots[:, :, lane]
         found = naive.together(twins(case), own, plan.world.spans, 0.95, most, prune_below, 24)
@@ -102,7 +102,7 @@ def test_combinations_read_what_their_members_estimate():
     plan, _, out = outputs(case)
     for f, place in enumerate((records.MEAN, records.BEST)):
         bank = plan.banks.bank[f]
-        parts = out[plan.banks.parts[bank, :6]][:, :, place : place + 3]
+        parts = out[plan.banks.members[bank, :6]][:, :, place : place + 3]
         assert (np.abs(parts - out[bank][None, :, :3]).min(axis=0) == 0).all()
     assert np.abs(out[plan.banks.bank[0]] - out[plan.banks.bank[1]]).max() > 1
 
@@ -112,7 +112,7 @@ def test_intersection_of_intervals():
     plan, _, out = outputs(case)
     one, widths = case.spec.filters[0], plan.banks.shares[plan.banks.bank[0]]
     members, own = filters.members(one), out[plan.banks.bank[0]]
-    parts = out[plan.banks.parts[plan.banks.bank[0], : len(members)]]
+    parts = out[plan.banks.members[plan.banks.bank[0], : len(members)]]
     seen = set()
     for k in range(15):
         for lane in range(8):

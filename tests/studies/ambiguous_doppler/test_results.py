@@ -158,7 +158,7 @@ def test_track_over_simulated_plots_is_the_study(keys):
     names = [one.name for one in case.spec.filters]
     assert set(names) - set(made.filters) == {"oracle"}  # recorded velocities are folded
     for f, name in enumerate(made.filters):
-        bank, place = (of[names.index(name)] for of in (plan.banks.bank, plan.banks.place))
+        bank, place = (of[names.index(name)] for of in (plan.banks.bank, plan.banks.estimate_field))
         apart = np.abs(made.estimate[f] - out[bank, :, place : place + 3, 3])[started]
         assert (apart <= tolerances(case, seen)[0]).all()
         assert np.isnan(made.estimate[f][~started]).all()
@@ -192,7 +192,7 @@ def test_track_follows_combined_orders_as_the_study_does(doppler, more):
     velocity = plots[:, records.UNFOLDED if doppler == "unfolded" else records.VELOCITY, 3]
     found = track.Tracker(case).feed({"t_s": plan.world.t, "range_m": plots[:, 0, 3], "velocity_mps": velocity})
     for f, name in enumerate(found.filters):
-        place = plan.banks.place[f]
+        place = plan.banks.estimate_field[f]
         own = out[plan.banks.bank[f], :, place : place + 3, 3]
         assert (np.abs(found.estimate[f] - own) <= tolerances(case, np.ones(12))[0]).all(), name
     # The sigma that is given beside is that of an expected error where it is exact.
@@ -276,8 +276,8 @@ def test_plots_with_too_many_folds_have_no_likelihood():
 def test_sequences_of_folds_are_counted_before_they_are_made():
     folds = track.Folds(load("ambiguous_rls4").cases[0].spec.radar)
     folds.begin(0.0, 18.0)
-    most = (rows.MOST_LOOKED_AT / 2) ** 2 * 4  # a reach of half as many spans as may be, to either side
-    assert folds.innovations(np.zeros(1), np.array([most * 0.999])).shape[1] <= rows.MOST_LOOKED_AT + 1
+    most = (rows.MAX_SEQUENCES / 2) ** 2 * 4  # a reach of half as many spans as may be, to either side
+    assert folds.innovations(np.zeros(1), np.array([most * 0.999])).shape[1] <= rows.MAX_SEQUENCES + 1
     for e, S in ((np.zeros(1), most * 1.001), (np.zeros(300), most / 299**2), (np.zeros(1), np.nan), (np.zeros(1), 0)):
         with pytest.raises(PlotFault, match="velocity_mps"):
             folds.innovations(e, np.array([S]))
