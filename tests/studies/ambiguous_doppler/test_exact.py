@@ -158,4 +158,4 @@ def test_product_of_teunissen():
         np.eye(3), np.zeros((2, 3)), np.zeros((2, 3)), np.array([4.0, 9.0]), np.ones(2), np.zeros((2, 3, 3))
     )
     expected = [0.6826894921370859, 0.6826894921370859**2]
-    assert_rounded(exact.all_right(of, np.array([4.0, 6.0])), expected, operations=5)
+    assert_rounded(exact.nearest_fold_probability(of, np.array([4.0, 6.0])), expected, operations=5)

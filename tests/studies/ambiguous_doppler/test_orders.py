@@ -155,10 +155,10 @@ def test_published_numbers_of_the_manoeuvre():
     """
     spec, t = load("orders").cases[1].spec, np.arange(15) * 10.0
     members = [Member(order, how, {1: 4.0, 2: 1e-3}[order]) for how in ("unfolded", "none") for order in (1, 2)]
-    of = [filters.gains(one, spec.prior, np.array([250.0, 15.0]), 10.0, 15) for one in members]
+    of = [filters.kalman_gains(one, spec.prior, np.array([250.0, 15.0]), 10.0, 15) for one in members]
     motion = physics.acceleration_pulse([100e3, -250.0], 20.0, 60.0, 30.0, t)
-    bias, noise = filters.errors(of, motion[None], np.array([250.0, 15.0]))
-    E = filters.joint(bias, noise, np.ones(1))[-1, 0]
+    bias, noise = filters.linear_errors(of, motion[None], np.array([250.0, 15.0]))
+    E = filters.joint_moments(bias, noise, np.ones(1))[-1, 0]
     assert np.sqrt(np.diag(E)[:2]) == pytest.approx([162, 347], abs=0.5)  # as printed
     assert 1 / np.sqrt(np.linalg.inv(E).sum()) == pytest.approx(155, abs=0.5)
     one, two = np.sqrt([noise[-1, i, 0, i, 0] for i in range(2)])

@@ -53,7 +53,7 @@ def brute(case, seed, n, f=0):
 
 def linear_of(case):
     one = case.spec.filters[0]
-    return study.linear(study.prepare(case).world, case.spec, one)
+    return study.linear_innovations(study.prepare(case).world, case.spec, one)
 
 
 def plots_covariance(case):
@@ -109,7 +109,7 @@ def test_where_truth_and_filter_agree_distances_are_half_of_those_between_sequen
     precision = {"condition": scaled_condition(plots_covariance(case)), "operations": 60}  # ten operations a scan
     assert_rounded(L[1:] @ L[1:].T, np.eye(11), size=1, **precision)  # the first range tells nothing
     m = np.array([[1.0, 0, 0, 0, 0, 0], [0, 1, -1, 0, 2, 0]])
-    found = study.of_sequences(of.until(6), m, 0.0)
+    found = study.sequence_half_spaces(of.until(6), m, 0.0)
     assert_rounded(found.distance, np.linalg.norm(m @ A.T, axis=1) / 2, **precision)
     assert_rounded(np.linalg.norm(found.units, axis=1), np.ones(2), operations=20)
 
@@ -117,17 +117,17 @@ def test_where_truth_and_filter_agree_distances_are_half_of_those_between_sequen
 def test_short_vectors_are_all_that_there_are():
     """Against all whole numbers in a box, of a skew basis."""
     A = np.array([[1.0, 7.9, 3.1], [0.0, 1.0, -4.2], [0.0, 0.0, 1.5], [0.3, -0.2, 0.1]])
-    T = filters.reduced(A, np.eye(3))
+    T = filters.reduce_basis(A, np.eye(3))
     assert np.array_equal(T, np.rint(T))
     assert np.rint(abs(np.linalg.det(T))) == 1  # that of whole numbers is whole
     assert np.linalg.norm(A @ T, axis=0).max() < np.linalg.norm(A, axis=0).max()
-    found = {tuple(m) for m in filters.within(A, T, 5.0, 1000)}
+    found = {tuple(m) for m in filters.lattice_vectors(A, T, 5.0, 1000)}
     box = np.array(list(itertools.product(range(-60, 61), range(-12, 13), range(-4, 5))), dtype=float)
     expected = {tuple(m) for m in box[(np.linalg.norm(box @ A.T, axis=1) <= 5.0) & box.any(axis=1)]}
     assert found == expected
     assert len(found) == 38
-    with pytest.raises(filters.TooMany):
-        filters.within(A, T, 5.0, 10)
+    with pytest.raises(filters.TooManyVectors):
+        filters.lattice_vectors(A, T, 5.0, 10)
 
 
 def each(plan, n):
@@ -156,9 +156,9 @@ def test_folds_are_wrong_just_where_the_half_spaces_are(one, keys):
     case = case_of(one, 5, **keys)
     plan, of = study.prepare(case), linear_of(case)
     if one["hypotheses"] == 1:
-        found = study.nearest_folds(of)
+        found = study.nearest_fold_half_spaces(of)
     else:
-        found = study.sequences(of, study.bases(of), filters.BOTTOMLESS, 8.5)
+        found = study.half_spaces_within(of, study.reduced_bases(of), filters.UNLIMITED_DEPTH, 8.5)
     normals, wrong = each(plan, 120)
     assert 30 < wrong.sum() < 90
     assert np.array_equal((normals @ found.units.T > found.distance).any(axis=1), wrong)
@@ -169,8 +169,8 @@ def test_what_is_dropped_early_is_dropped_in_a_half_space():
     one, keys = ALL | {"prune_below": 0.05}, {"prior": NARROW, "repetition_rate_hz": 1000.0}
     case = case_of(one, 6, **keys)
     of = linear_of(case)
-    found = study.sequences(of, study.bases(of), -math.log(0.05), 8.0)
-    at_last = study.sequences(of, study.bases(of), filters.BOTTOMLESS, 8.0)
+    found = study.half_spaces_within(of, study.reduced_bases(of), -math.log(0.05), 8.0)
+    at_last = study.half_spaces_within(of, study.reduced_bases(of), filters.UNLIMITED_DEPTH, 8.0)
     normals, wrong = each(study.prepare(case), 400)
     within = (normals @ found.units.T > found.distance).any(axis=1)
     assert not (wrong & ~within).any()
@@ -218,7 +218,7 @@ def test_two_scans_are_wrong_as_often_as_the_integral_over_a_hexagon_says(hertz)
     """Of two folds all that decides lies in a plane, where the right ones hold a cell of six sides about the origin."""
     case = case_of(ALL, 2, prior=NARROW, variance=0.0, repetition_rate_hz=hertz)
     of = linear_of(case)
-    found = study.sequences(of, study.bases(of), filters.BOTTOMLESS, 9.0)
+    found = study.half_spaces_within(of, study.reduced_bases(of), filters.UNLIMITED_DEPTH, 9.0)
     basis = np.linalg.svd(found.units, full_matrices=False)[2][:2]
     plane = found.units @ basis.T
     assert_rounded(np.linalg.norm(plane, axis=1), np.ones(len(plane)), operations=20)
@@ -235,8 +235,8 @@ def test_a_hundred_thousandth_lies_in_its_bracket():
     """The nearest two half-spaces never meet, and all of them together bound the rate from above."""
     case = case_of(MEMORY | {"hypotheses": 1000, "prune_below": 1e-9}, 10, repetition_rate_hz=970.0)
     plan, of = study.prepare(case), linear_of(case)
-    found = study.half_spaces(of, case.spec.filters[0])
-    chance = study.chances(found)
+    found = study.find_half_spaces(of, case.spec.filters[0])
+    chance = study.probabilities(found)
     assert found.units[0] == pytest.approx(-found.units[1], abs=rounding(operations=20))
     mean, error = rate(plan, 20_000)
     assert 3e-6 < mean < 3e-5

@@ -133,7 +133,7 @@ def test_fan_holds_what_the_filter_estimates():
     """The weighted mean of the listed hypotheses is the filter's estimate, scan by scan."""
     case = load("ambiguous_rls4").cases[0]
     plan = study.prepare(case)
-    _, out = study.sums.simulated(plan.world, plan.banks, 0)
+    _, out = study.sums.simulate_outputs(plan.world, plan.banks, 0)
     shown, (tolerance, _) = figures.fan(case, 5, 6), tolerances(case, np.ones(15))
     for k, (v, a, p) in enumerate(shown.lists):
         mean = out[plan.banks.bank[5], k, :3, 7]
@@ -147,7 +147,7 @@ def test_track_over_simulated_plots_is_the_study(keys):
     """Recorded at the config's own times, the trackers' estimates are those of the kernels."""
     case = load("ambiguous_rls4", [*keys, "filters.2.hypotheses=2"]).cases[0]
     plan = study.prepare(case)
-    plots, out = study.sums.simulated(plan.world, plan.banks, 8)
+    plots, out = study.sums.simulate_outputs(plan.world, plan.banks, 8)
     columns = track.Recorded().simulated(case, 11)
     seen = ~np.isnan(columns["range_m"])
     assert np.array_equal(columns["range_m"][seen], plots[seen, 0, 3])
@@ -188,7 +188,7 @@ def test_track_follows_combined_orders_as_the_study_does(doppler, more):
     keys[-1] += "acceleration_g: 2, start_s: 60, duration_s: 30}"
     case = load("ambiguous_rls2", [*keys, "baseline=likelihood"]).cases[0]
     plan = study.prepare(case)
-    plots, out = study.sums.simulated(plan.world, plan.banks, 8)
+    plots, out = study.sums.simulate_outputs(plan.world, plan.banks, 8)
     velocity = plots[:, records.UNFOLDED if doppler == "unfolded" else records.VELOCITY, 3]
     found = track.Tracker(case).feed({"t_s": plan.world.t, "range_m": plots[:, 0, 3], "velocity_mps": velocity})
     for f, name in enumerate(found.filters):
@@ -224,7 +224,7 @@ def test_a_remainder_is_followed_as_the_study_does():
     one = "{name: remainder, doppler: remainder, manoeuvre_variance: 1e-3}"
     case = load("ambiguous_rls4", [*keys, f"filters=[{one}]"]).cases[0]
     plan = study.prepare(case)
-    _, out = study.sums.simulated(plan.world, plan.banks, 8)
+    _, out = study.sums.simulate_outputs(plan.world, plan.banks, 8)
     columns = track.Recorded().simulated(case, 11)
     made = track.Tracker(case).feed(columns)
     there = np.isfinite(made.estimate[0, :, 0])
@@ -235,12 +235,12 @@ def test_a_remainder_is_followed_as_the_study_does():
 
 def test_a_velocity_counts_in_the_remainder_as_it_folds():
     """However many spans too large it is written."""
-    folds = track.Folds(load("ambiguous_rls4", ["radar.repetition_rate_hz=[1000, 1200]"]).cases[0].spec.radar)
-    folds.begin(0.0, 15.0)
+    folds = track.FoldResolver(load("ambiguous_rls4", ["radar.repetition_rate_hz=[1000, 1200]"]).cases[0].spec.radar)
+    folds.begin_row(0.0, 15.0)
     assert np.isnan(folds.remainder(2.0 + 15 * 2**20))
-    folds.begin(10.0, 18.0)
+    folds.begin_row(10.0, 18.0)
     assert folds.remainder(5.0 + 18 * 2**40) == -13.0  # -13 + 15 = 2 and -13 + 18 = 5, and no other in ± 45
-    folds.begin(20.0, 15.0)
+    folds.begin_row(20.0, 15.0)
     assert folds.remainder(3.7e16) == 40.0  # folded -5; 40 is the nearest of -5 + 15 n to 5 + 18 m, which has 41
 
 
@@ -274,8 +274,8 @@ def test_plots_with_too_many_folds_have_no_likelihood():
 
 
 def test_sequences_of_folds_are_counted_before_they_are_made():
-    folds = track.Folds(load("ambiguous_rls4").cases[0].spec.radar)
-    folds.begin(0.0, 18.0)
+    folds = track.FoldResolver(load("ambiguous_rls4").cases[0].spec.radar)
+    folds.begin_row(0.0, 18.0)
     most = (rows.MAX_SEQUENCES / 2) ** 2 * 4  # a reach of half as many spans as may be, to either side
     assert folds.innovations(np.zeros(1), np.array([most * 0.999])).shape[1] <= rows.MAX_SEQUENCES + 1
     for e, S in ((np.zeros(1), most * 1.001), (np.zeros(300), most / 299**2), (np.zeros(1), np.nan), (np.zeros(1), 0)):

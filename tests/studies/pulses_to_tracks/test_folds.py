@@ -80,7 +80,7 @@ def textbook(plan, case, f, count):
             if k:
                 variance = one.manoeuvre_variance if k >= 2 else 0.0
 
-                def predict(track, variance=variance, missed=plan.world.missed[k]):
+                def predict(track, variance=variance, missed=plan.world.model_defects[k]):
                     track.predict(10.0, variance, missed)
 
                 every.take_range(noise[k][i], 50.0, predict)

@@ -11,7 +11,7 @@ from radarsim.bursts.kernels.scoring import SAMPLES, SIZE, STATE
 from radarsim.kernels.random import fill_normal_pairs
 from radarsim.studies.pulses_to_tracks import filters, study
 from radarsim.studies.pulses_to_tracks import kernels as chain
-from radarsim.studies.pulses_to_tracks.kernels import LOCKED, Sums, draw_sums, estimate, room_for
+from radarsim.studies.pulses_to_tracks.kernels import LOCKED, Sums, draw_sums, estimate_bursts, burst_arrays
 from tests.studies.pulses_to_tracks import naive
 from tests.studies.pulses_to_tracks.conftest import CURED, IDEAL, RANGE, SEQUENCE, SPECTRUM, A, made
 from tests.tolerances import assert_rounded, rounding
@@ -25,7 +25,7 @@ SHORT_PRIOR = {"sigma_velocity_mps": 3.0, "sigma_acceleration_mps2": 2.0}
 
 def samples_of(plan, k, who):
     """Complex samples (8, pulses) of the bursts of scan k, turned back by the true phase, and the room they are in."""
-    room = room_for(len(plan.world.mean), plan.world.reversed.size)
+    room = burst_arrays(len(plan.world.mean), plan.world.bit_reversed.size)
     draw_sums(plan.world, k, who, room[3], room[4], room[2])
     drawn = room[2].reshape(-1, 4, lanes.WIDTH)
     return (drawn[:, 0] + 1j * drawn[:, 1]).T, room
@@ -55,8 +55,8 @@ def test_the_estimator_is_p4s_on_the_same_sums(plan):
     for f in (1, 4):
         _, room = samples_of(plan, SCAN, WHO)
         found = np.zeros((8, 2))
-        estimate(plan.world, plan.filters, f, SCAN, 0, WHO, own, room, found)
-        windows, work = own_sums(plan, f), room_for(len(plan.world.mean), 1)[0]
+        estimate_bursts(plan.world, plan.filters, f, SCAN, 0, WHO, own, room, found)
+        windows, work = own_sums(plan, f), burst_arrays(len(plan.world.mean), 1)[0]
         for n in range(8):
             b = plan.world.to_turns @ own[n]
             work[(lanes.PRIOR + 1) * lanes.WIDTH + n], work[(lanes.PRIOR + 2) * lanes.WIDTH + n] = b
@@ -79,7 +79,7 @@ def test_the_estimator_is_p4s_on_the_samples_themselves(plan, f):
     own = forecasts(plan)
     u, room = samples_of(plan, SCAN, WHO)
     found = np.zeros((8, 2))
-    estimate(plan.world, plan.filters, f, SCAN, 0, WHO, own, room, found)
+    estimate_bursts(plan.world, plan.filters, f, SCAN, 0, WHO, own, room, found)
     physics, windows = plan.world.physics[SCAN].copy(), own_sums(plan, f)
     physics["mode"] = SAMPLES
     state, none = np.zeros(1, STATE)[0], np.zeros((1, 1))
@@ -92,7 +92,7 @@ def test_the_estimator_is_p4s_on_the_samples_themselves(plan, f):
         samples = np.stack([u[n].real, u[n].imag])
         errors = np.zeros((len(windows), SIZE))
         sequence.run_sequence(physics, np.zeros(1, np.int64), samples, none, windows, options, state, errors)
-        last, x = plan.filters.last[f].copy(), np.zeros((1, SIZE))
+        last, x = plan.filters.last_options[f].copy(), np.zeros((1, SIZE))
         last["windows"] = 1
         sequence.polish(physics, samples, windows[-1:], last, np.array(state["x"]), np.zeros(SIZE), x)
         expected = plan.world.measured @ x[0]
@@ -103,7 +103,7 @@ def test_ideal_errors_are_the_score_at_the_truth(plan):
     f = 3
     u, room = samples_of(plan, SCAN, WHO)
     found = np.zeros((8, 2))
-    estimate(plan.world, plan.filters, f, SCAN, 0, WHO, np.zeros((8, 2)), room, found)
+    estimate_bursts(plan.world, plan.filters, f, SCAN, 0, WHO, np.zeros((8, 2)), room, found)
     tau = np.arange(u.shape[1]) / u.shape[1]
     powers = tau[:, None] ** np.arange(2)
     x = np.linalg.solve(powers.T @ powers, powers.T @ u.imag.T).T / (2 * math.pi)
@@ -113,9 +113,9 @@ def test_ideal_errors_are_the_score_at_the_truth(plan):
 def test_the_highest_line_is_that_of_the_discrete_transform(plan):
     f = 2
     u, room = samples_of(plan, SCAN, WHO)
-    own, lines = forecasts(plan), plan.world.reversed.size
+    own, lines = forecasts(plan), plan.world.bit_reversed.size
     found = np.zeros((8, 2))
-    estimate(plan.world, plan.filters, f, SCAN, 0, WHO, own, room, found)
+    estimate_bursts(plan.world, plan.filters, f, SCAN, 0, WHO, own, room, found)
     variance = float(plan.world.physics[SCAN]["sigma"]) ** 2
     for n in range(8):
         b = np.zeros(6)
@@ -128,7 +128,7 @@ def test_lines_lie_where_they_do_beside_the_true_frequency(plan):
     """The true Doppler frequency plus the offset is a whole number of lines."""
     t = plan.axes.t_s
     velocity = -250.0 + 4.0 * t
-    lines = 2 * velocity / 0.03 / 4e3 * plan.world.reversed.size + plan.world.offset
+    lines = 2 * velocity / 0.03 / 4e3 * plan.world.bit_reversed.size + plan.world.offset
     # Of up to some ten thousand lines, by six operations.
     np.testing.assert_allclose(lines, np.rint(lines), rtol=0, atol=rounding(np.abs(lines).max(), 6))
 
@@ -158,7 +158,7 @@ def normals(plan, which, pair, n):
 def textbook(plan, case, f, count):
     """Errors (K, count, 3) of filter f, one realisation after the other."""
     spec, one = case.spec, case.spec.filters[f]
-    size = filters.parameters(one) if one.takes else 0
+    size = filters.parameter_count(one) if one.takes else 0
     errors = np.zeros((spec.scans, count, 3))
     designation = normals(plan, 2, 0, count)
     noise = [normals(plan, 0, k, count)[0] for k in range(spec.scans)]
@@ -175,7 +175,7 @@ def textbook(plan, case, f, count):
         for k in range(spec.scans):
             if k:
                 track.predict(
-                    10.0, one.manoeuvre_variance if k >= (2 if one.takes else 3) else 0.0, plan.world.missed[k]
+                    10.0, one.manoeuvre_variance if k >= (2 if one.takes else 3) else 0.0, plan.world.model_defects[k]
                 )
                 track.take([0], np.array([50.0 * noise[k][i]]) - track.x[:1], [2500.0])
             if one.takes:
@@ -197,7 +197,7 @@ def estimated(plan, one, f, k, track, samples, drawn, size):
     b = np.zeros(6)
     b[1:3] = plan.world.to_turns @ forecast
     if one.estimator == "spectrum":
-        return naive.spectrum(samples, variance, b, size, plan.world.reversed.size, plan.world.offset[k])
+        return naive.spectrum(samples, variance, b, size, plan.world.bit_reversed.size, plan.world.offset[k])
     menu, entry = plan.menus[f], 0
     if one.forecast == "track":
         spreads = [menu.spreads(e) for e in range(len(menu.windows))]

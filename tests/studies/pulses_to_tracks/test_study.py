@@ -27,11 +27,11 @@ def test_the_bound_is_that_of_a_sinusoid():
     expected = 0.03 / 2 * omega / (2 * math.pi)
     for size in (2, 3):
         # κ of three powers of time is 286; a length is taken for N T_p, and N² − 1 for a sum.
-        assert_rounded(filters.bounds(burst, size)[0], expected, condition=286, operations=2 * pulses)
-    assert math.isinf(filters.bounds(burst, 2)[1])
+        assert_rounded(filters.fisher_bounds(burst, size)[0], expected, condition=286, operations=2 * pulses)
+    assert math.isinf(filters.fisher_bounds(burst, 2)[1])
     # Of a chirp: var of the rate of ω, 360/(snr N (N² − 1)(N² − 4) T_p⁴) (Djuric & Kay 1990).
     rate = math.sqrt(360 / (snr * pulses * (pulses**2 - 1) * (pulses**2 - 4))) / period**2
-    found = filters.bounds(burst, 3)[1]
+    found = filters.fisher_bounds(burst, 3)[1]
     assert_rounded(found, 0.03 / 2 * rate / (2 * math.pi), condition=286, operations=2 * pulses)
 
 
@@ -130,7 +130,7 @@ def test_menus_serve_every_forecast():
     case = made([SEQUENCE, SEQUENCE | {"name": "a", "observes": A}], burst={"pulses": 512, "snr_db": 10.0})
     plan = study.prepare(case)
     for one, menu in zip(case.spec.filters, plan.menus, strict=True):
-        widest = filters.widest(case.spec, one)
+        widest = filters.widest_forecast(case.spec, one)
         assert menu.top == widest
         assert len(menu.windows) == menu.levels[0] * menu.levels[1]
         spreads = [menu.spreads(e) for e in range(len(menu.windows))]
@@ -154,7 +154,7 @@ def test_a_narrow_gate_takes_nothing_and_leaves_range_alone():
 
 def test_exact_is_known_of_range_and_idealisations_alone():
     case = made([RANGE, IDEAL, CURED])
-    known = [filters.known(one) for one in case.spec.filters]
+    known = [filters.has_exact_errors(one) for one in case.spec.filters]
     assert known == [True, True, False]
     axes = study.prepare(case).axes
     assert np.isnan(axes.exact_sigma[2]).all()

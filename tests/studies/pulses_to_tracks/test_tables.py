@@ -180,4 +180,4 @@ def test_what_a_lost_burst_adds():
         answers = [ends([1.0 if j <= k < j + until else 0.0 for k in range(6)]) for j in range(6)]
         expected = np.square(answers).sum(axis=0) * 300.0**2 / 12
         # Covariances of a track after six scans, whose gains are differences: κ of some thousand at most.
-        np.testing.assert_allclose(plan.axes.losses[f, -1], expected, rtol=rounding(1e3, 60))
+        np.testing.assert_allclose(plan.axes.lost_squares[f, -1], expected, rtol=rounding(1e3, 60))
