@@ -384,7 +384,7 @@ def tracks():
     likelihood = range_doppler_plots.PlotLikelihood(one.case, None, [recorded])
     made["linear likelihood"] = np.array([likelihood(likelihood.stated), likelihood(likelihood.stated, 0.1, 0.5)])
     one = work(*RUNS["multimodel families"][:2])
-    z, R, _ = multimodel.measured(one.plan, 0)
+    z, R, _ = multimodel.simulate_plots(one.plan, 0)
     made["multimodel plots"], made["multimodel covariances"] = z, R
     made["multimodel drawn"] = np.stack(list(multimodel_plots.drawing(one.case)(0, 3).columns.values()))
     r = np.linalg.norm(z[:, :, 0], axis=1)

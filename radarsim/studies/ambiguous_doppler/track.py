@@ -64,7 +64,7 @@ def prior_covariance(member: filters.Member, spec: Any) -> tuple[float, ...]:
 
 
 @lru_cache(maxsize=64)
-def _motion(order: int, variance: float, dt: float) -> tuple[np.ndarray, tuple[float, ...], tuple[np.ndarray, ...]]:
+def packed_motion(order: int, variance: float, dt: float) -> tuple[np.ndarray, tuple[float, ...], tuple[np.ndarray, ...]]:
     """The matrix F of a motion over dt, and F and Q packed; cached, as most intervals of a recording are the same."""
     F, Q = filters.model(order, variance, dt)
     return F, pack_transition(F), pack(Q)
@@ -159,7 +159,7 @@ class SingleFollower:
         self.nis = np.full(2, np.nan)
         F, gains, had_range = np.eye(3), [np.zeros(3), np.zeros(3)], self.has_range
         if self.has_row:
-            F, f, q = _motion(self.member.order, self.member.manoeuvre_variance, t - self.last_t)
+            F, f, q = packed_motion(self.member.order, self.member.manoeuvre_variance, t - self.last_t)
             self.x = np.array(predicted(self.x, f))
             self.P = np.array(predicted_covariance(self.P, f, q))
             self.right_covariance = predicted_covariance(self.right_covariance, f, q)
@@ -555,7 +555,7 @@ class PlotLikelihood:
         """The arrays of a track for the kernel."""
         dt = np.diff(columns["t_s"], prepend=columns["t_s"][0])
         steps, step_indices = np.unique(dt, return_inverse=True)
-        motions = [_motion(self.member.order, 1.0, step) for step in steps.tolist()]
+        motions = [packed_motion(self.member.order, 1.0, step) for step in steps.tolist()]
         f, q = (np.array([motion[i] for motion in motions], dtype=float)[step_indices] for i in (1, 2))
         rows = np.array(plot_rows(columns))
         folds = FoldResolver(self.spec.radar)

@@ -151,7 +151,7 @@ class Work(NamedTuple):
     measured: np.ndarray  #: (n, 2) the bursts' velocity and acceleration, minus the truth
     ages: np.ndarray  #: (n,) scans since a burst was lost
     passes: np.ndarray  #: (n,) passes over a window's data
-    burst_arrays: tuple[np.ndarray, ...]  #: see the function `burst_arrays`
+    burst_arrays: tuple[np.ndarray, ...]  #: see `allocate_burst_arrays`
     hypotheses: Hypotheses  #: for filters that keep several
 
 
@@ -417,8 +417,8 @@ def estimate_bursts(world, filters, f, k, entry, realisations, forecast, work_ar
             estimates[n, c] = total
 
 
-def burst_arrays(blocks: int, lines: int) -> tuple:
-    """Work arrays for eight bursts: estimates, sums of a window, sums drawn, normals, a spectrum."""
+def allocate_burst_arrays(blocks: int, lines: int) -> tuple:
+    """Allocate work arrays for eight bursts: estimates, sums of a window, block sums, normals, a spectrum."""
     return (
         *(rows(WORK), rows(4 * blocks), rows(4 * blocks), rows(2 * BLOCKS_AT_ONCE), rows(2 * BLOCKS_AT_ONCE)),
         *(rows(lines), rows(lines)),
@@ -758,7 +758,7 @@ def simulate_block(world, filters, sums, first, count) -> np.ndarray:
         measured=np.zeros((count, 2)),
         ages=np.zeros(count, np.int64),
         passes=np.zeros(count),
-        burst_arrays=burst_arrays(world.mean.shape[0], world.bit_reversed.size),
+        burst_arrays=allocate_burst_arrays(world.mean.shape[0], world.bit_reversed.size),
         hypotheses=allocate_hypotheses(count, int(filters.filters["max_hypotheses"].max())),
     )
     run_block(world, filters, first, work, errors, sums)

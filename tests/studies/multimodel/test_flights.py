@@ -40,7 +40,7 @@ def test_a_flight_is_within_the_printed_axes(name):
 
 @pytest.mark.parametrize("name", sorted(UNFLYABLE))
 def test_one_that_cannot_be_flown_says_why(name):
-    with pytest.raises(world.Unflyable, match="hits the ground"):
+    with pytest.raises(world.ImpossibleFlight, match="hits the ground"):
         flown(FLIGHTS[name])
 
 

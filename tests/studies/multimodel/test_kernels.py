@@ -6,7 +6,7 @@ import pytest
 from radarsim.kernels.lanes import WIDTH, rows
 from radarsim.studies.multimodel.kernels import hypothesis, records
 from radarsim.studies.multimodel.kernels import strip as strips
-from radarsim.studies.multimodel.kernels.strip import frame
+from radarsim.studies.multimodel.kernels.strip import pack_frame
 from tests.studies.multimodel import naive
 from tests.tolerances import assert_rounded, rounding, scaled_condition
 
@@ -19,7 +19,7 @@ RULES = {
 }
 UPPER = np.triu_indices(3)
 DT = 0.05
-FRAME = frame(np.eye(3), 0.0, (1.0, 1.0, 1.0), 1, False, 1.0)
+FRAME = pack_frame(np.eye(3), 0.0, (1.0, 1.0, 1.0), 1, False, 1.0)
 
 OPERATIONS = 200  # of an update of nine states by three numbers: terms of the products that an element is summed of
 EXPONENT = 50  # a weight is the exponential of so much at most, which multiplies a relative error

@@ -61,7 +61,7 @@ def full(packed):
 def test_plots_have_the_stated_errors_and_covariances():
     plan = work(scans=60).plan
     z, R, detected = (
-        np.concatenate([multimodel.measured(plan, 8 * g)[i] for g in range(60)], axis=-1) for i in range(3)
+        np.concatenate([multimodel.simulate_plots(plan, 8 * g)[i] for g in range(60)], axis=-1) for i in range(3)
     )
     assert detected.all()
     truth = plan.world.truth[:, 0::3]
@@ -82,7 +82,7 @@ def test_sums_equal_the_twin_on_the_same_plots(sensor, conversion):
     case = work(sensor={**SENSOR, **sensor, "conversion": conversion})
     plan, first = case.plan, 5
     sums = plan.layout.unpack(case.simulate(first, 1))
-    z, R, detected = (part[..., 0] for part in multimodel.measured(plan, first))
+    z, R, detected = (part[..., 0] for part in multimodel.simulate_plots(plan, first))
     t = plan.axes.t_s
     times = plan.world.times[plan.world.intervals]
     z = np.where(detected[:, None] > 0, z, np.nan)
@@ -122,7 +122,7 @@ def test_covariance_at_the_prediction_is_computed_there():
     case = work(filters=filters)
     plan = case.plan
     sums = plan.layout.unpack(case.simulate(0, 1))
-    z, R, _ = (part[..., 0] for part in multimodel.measured(plan, 0))
+    z, R, _ = (part[..., 0] for part in multimodel.simulate_plots(plan, 0))
     a, b, g = plan.world.weights.reshape(3, 3)
     x, P, covariance = np.zeros(9), np.zeros((9, 9)), full(R)
     x[0::3], x[1::3] = a @ z[:3], b @ z[:3]
@@ -176,7 +176,7 @@ def test_plots_beyond_the_edge_are_missed_and_nothing_is_not_a_number():
     edge = inline_flight(position_m=[2e3, 8e3, -60e3], velocity_mps=[0, 0, 50])
     sensor = {**SENSOR, "antenna_elevation_deg": 0, "sigma_elevation_deg": 1, "sigma_azimuth_deg": 1}
     case = work(target=edge, sensor=sensor)
-    detected = np.concatenate([multimodel.measured(case.plan, 8 * g)[2] for g in range(8)], axis=1)
+    detected = np.concatenate([multimodel.simulate_plots(case.plan, 8 * g)[2] for g in range(8)], axis=1)
     assert 0.2 < 1 - detected[3:].mean() < 0.8
     assert np.isfinite(case.simulate(0, 64)).all()
 
@@ -199,7 +199,7 @@ def test_impossible_flights_are_refused(target, words):
 def test_plots_of_the_local_frame():
     sensor = {"sigma_x_m": 5, "sigma_y_m": 10, "sigma_z_m": 20, "scan_period_s": 0.5}
     case = work(sensor=sensor)
-    z, R, _ = multimodel.measured(case.plan, 0)
+    z, R, _ = multimodel.simulate_plots(case.plan, 0)
     np.testing.assert_array_equal(R[7, :, 2], [25, 0, 0, 100, 0, 400])
     error = (z - case.plan.world.truth[:, 0::3, None]) / np.array([5, 10, 20])[:, None]
     assert abs(error.std() - 1) < 0.05
@@ -260,7 +260,7 @@ def test_axes_describe_the_reported_scans():
 def test_track_over_recorded_plots_equals_the_experiment():
     case = work()
     plan, sensor = case.plan, case.case.spec.sensor
-    z, *_ = multimodel.measured(plan, 0)
+    z, *_ = multimodel.simulate_plots(plan, 0)
     R = physics.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
     biconical = to_biconical(physics.to_antenna(z[:, :, 0], R, sensor.antenna_height_m))
     t = np.concatenate([plan.axes.t_s[:1] - 1.5, plan.axes.t_s[:1] - 1.0, plan.axes.t_s[:1] - 0.5, plan.axes.t_s])

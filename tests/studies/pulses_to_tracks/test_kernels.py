@@ -11,7 +11,7 @@ from radarsim.bursts.kernels.scoring import SAMPLES, SIZE, STATE
 from radarsim.kernels.random import fill_normal_pairs
 from radarsim.studies.pulses_to_tracks import filters, study
 from radarsim.studies.pulses_to_tracks import kernels as chain
-from radarsim.studies.pulses_to_tracks.kernels import LOCKED, Sums, draw_sums, estimate_bursts, burst_arrays
+from radarsim.studies.pulses_to_tracks.kernels import LOCKED, Sums, allocate_burst_arrays, draw_sums, estimate_bursts
 from tests.studies.pulses_to_tracks import naive
 from tests.studies.pulses_to_tracks.conftest import CURED, IDEAL, RANGE, SEQUENCE, SPECTRUM, A, made
 from tests.tolerances import assert_rounded, rounding
@@ -25,7 +25,7 @@ SHORT_PRIOR = {"sigma_velocity_mps": 3.0, "sigma_acceleration_mps2": 2.0}
 
 def samples_of(plan, k, who):
     """Complex samples (8, pulses) of the bursts of scan k, turned back by the true phase, and the room they are in."""
-    room = burst_arrays(len(plan.world.mean), plan.world.bit_reversed.size)
+    room = allocate_burst_arrays(len(plan.world.mean), plan.world.bit_reversed.size)
     draw_sums(plan.world, k, who, room[3], room[4], room[2])
     drawn = room[2].reshape(-1, 4, lanes.WIDTH)
     return (drawn[:, 0] + 1j * drawn[:, 1]).T, room
@@ -56,7 +56,7 @@ def test_the_estimator_is_p4s_on_the_same_sums(plan):
         _, room = samples_of(plan, SCAN, WHO)
         found = np.zeros((8, 2))
         estimate_bursts(plan.world, plan.filters, f, SCAN, 0, WHO, own, room, found)
-        windows, work = own_sums(plan, f), burst_arrays(len(plan.world.mean), 1)[0]
+        windows, work = own_sums(plan, f), allocate_burst_arrays(len(plan.world.mean), 1)[0]
         for n in range(8):
             b = plan.world.to_turns @ own[n]
             work[(lanes.PRIOR + 1) * lanes.WIDTH + n], work[(lanes.PRIOR + 2) * lanes.WIDTH + n] = b

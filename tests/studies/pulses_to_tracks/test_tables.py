@@ -11,7 +11,7 @@ from radarsim.report.drawing import Line
 from radarsim.report.statistics import FEW_EVENTS
 from radarsim.studies import registry
 from radarsim.studies.pulses_to_tracks import study, tables
-from radarsim.studies.pulses_to_tracks.tables import OF_ALL
+from radarsim.studies.pulses_to_tracks.tables import SIGMA_ALL_NOTE
 from tests.studies.pulses_to_tracks import naive
 from tests.studies.pulses_to_tracks.conftest import CURED, made
 from tests.tolerances import assert_rounded, rounding, sigma_error
@@ -56,14 +56,14 @@ def test_estimates_beside_the_bound(found):
 
 def test_sigma_of_all_bursts_is_marked_where_few_lost_ones_decide(swept):
     """At −4 dB 94 of 600 bursts of the spectrum are lost and make its σ_all; at 14 dB none is."""
-    for result, expected in zip(swept.cases, (OF_ALL, None, ""), strict=True):
+    for result, expected in zip(swept.cases, (SIGMA_ALL_NOTE, None, ""), strict=True):
         if expected is None:  # marked already, as losses may be missing
             continue
         made = tables.tables([result])["estimates"]
         own = made[made["filter"] == "spectrum"]
         square, fourth = result.sums["measured"][result.axes.filters.index("spectrum"), :, 0, 1].T
         few = 600 / (600 * fourth / square**2 - 1) < 200
-        assert few.tolist() == [expected == OF_ALL] * 4
+        assert few.tolist() == [expected == SIGMA_ALL_NOTE] * 4
         assert own["note"].tolist() == [expected] * 4
 
 
