@@ -51,7 +51,7 @@ def _few_folds(results: Sequence[Result]) -> set[tuple[str, str, int]]:
         if "events" in result.sums:
             events_seen = events(result, tuple(np.indices(beyond.shape)), BEYOND)
             beyond = statistics.effective_events(events_seen.weight, events_seen.squared)
-        few_events = unfolding(result)[:, None] & (beyond < statistics.FEW_EVENTS)
+        few_events = unfolding_filters(result)[:, None] & (beyond < statistics.FEW_EVENTS)
         rows |= {(result.name, result.axes.filters[f], int(result.axes.k[k])) for f, k in np.argwhere(few_events)}
     return rows
 
@@ -99,7 +99,7 @@ def _folds(result: Result) -> report_tables.Columns:
     beyond ±: share whose velocity is off by more than half the span
     """
     axes = result.axes
-    visible = np.broadcast_to(unfolding(result)[:, None], axes.exact_right.shape)
+    visible = np.broadcast_to(unfolding_filters(result)[:, None], axes.exact_right.shape)
     indices = f, k = np.nonzero(visible & (np.asarray(result.sums["estimates"])[..., 0] > 0))
     n = np.asarray(result.sums["estimates"])[..., 0][indices]
     folds = np.asarray(result.sums["folds"])[indices]
@@ -108,8 +108,8 @@ def _folds(result: Result) -> report_tables.Columns:
     if "events" in result.sums:
         counts = np.full(f.size, float(result.count))
         wrong_events, beyond_events = (events(result, (f, k), event) for event in (WRONG, BEYOND))
-        right, beyond = rare.complement(rare.rate(wrong_events, drawn(result))), rare.rate(beyond_events, drawn(result))
-        note = rare.note(drawn(result), wrong_events, beyond_events)
+        right, beyond = rare.complement(rare.rate(wrong_events, sampling(result))), rare.rate(beyond_events, sampling(result))
+        note = rare.note(sampling(result), wrong_events, beyond_events)
     return {
         **report_tables.leading(result, f, k),
         "n": counts.astype(np.int64),
@@ -122,23 +122,23 @@ def _folds(result: Result) -> report_tables.Columns:
     }
 
 
-def unfolding(result: Result) -> np.ndarray:
+def unfolding_filters(result: Result) -> np.ndarray:
     """Which filters (F,) unfold the velocity and combine no members by shares or intervals."""
     return np.array([options.folds and options.combine in (None, "likelihood") for options in result.spec.filters])
 
 
-def drawn(result: Result) -> rare.Drawn:
+def sampling(result: Result) -> rare.Drawn:
     """The weights of the realisations of a case with rare wrong folds."""
     return rare.Drawn(result.count, *np.asarray(result.sums["drawn"]))
 
 
-def events(result: Result, at: tuple[np.ndarray, ...], event: int) -> rare.Counted:
+def events(result: Result, indices: tuple[np.ndarray, ...], event: int) -> rare.Counted:
     """The weighted counts of realisations with an event (WRONG, BEYOND or FULL), at filters and scans."""
-    return rare.Counted(*np.moveaxis(np.asarray(result.sums["events"])[(*at, event)], -1, 0))
+    return rare.Counted(*np.moveaxis(np.asarray(result.sums["events"])[(*indices, event)], -1, 0))
 
 
 def _rare_tables(result: Result) -> Iterator[dict[str, np.ndarray]]:
-    (f,) = np.nonzero(unfolding(result) & ~result.axes.combines)
+    (f,) = np.nonzero(unfolding_filters(result) & ~result.axes.combines)
     aimed_at = np.array([options.name == result.spec.rare.filter for options in result.spec.filters])
     yield _rare_rows(result, f, aimed_at[f], WRONG, WRONG_FOLD)
     (aimed_filter,) = np.nonzero(aimed_at)
@@ -155,7 +155,7 @@ def _rare_tables(result: Result) -> Iterator[dict[str, np.ndarray]]:
 def _rare_rows(result: Result, f: np.ndarray, aimed_at: np.ndarray, event: int, name: str) -> dict[str, np.ndarray]:
     """Columns of rare.csv for filters f (n,) and an event, by its number in the sums and its name."""
     k = np.full(f.size, len(result.axes.k) - 1)
-    return rare.rows(report_tables.leading(result, f, k), name, aimed_at, events(result, (f, k), event), drawn(result))
+    return rare.rows(report_tables.leading(result, f, k), name, aimed_at, events(result, (f, k), event), sampling(result))
 
 
 @table("calibration")

@@ -92,14 +92,14 @@ def mixed_own(listed, count, shares, block, means, mean):
 
 
 @inline
-def mixed_cross(listed, count, shares, block, means, mean, others, other):
+def mixed_cross(listed, count, shares, block, means, mean, other_means, other_mean):
     """Block between two axes: Σ mu (P + d e') over the listed hypotheses."""
     if count == 1:
         return get6(block, listed[0]) + get3(block, listed[0] + 6)
     c = full(0.0), full(0.0), full(0.0), full(0.0), full(0.0), full(0.0), full(0.0), full(0.0), full(0.0)
     for n in range(count):
         mu, P = get(shares, n), get6(block, listed[n]) + get3(block, listed[n] + 6)
-        d, e = offset(means, listed[n], mean), offset(others, listed[n], other)
+        d, e = offset(means, listed[n], mean), offset(other_means, listed[n], other_mean)
         c = (
             c[0] + mu * (P[0] + d[0] * e[0]),
             c[1] + mu * (P[1] + d[0] * e[1]),
@@ -140,12 +140,12 @@ def mix_hypotheses(work, listed, count):
 
 
 @inline
-def put_hypothesis(target, means, own, cross):
+def put_hypothesis(target, means, own_blocks, cross):
     """Write means and packed covariances of the three axes into a hypothesis."""
     put9(target, rec.MEAN, means[0] + means[1] + means[2])
-    put6(target, rec.OWN, own[0])
-    put6(target, rec.OWN + 6, own[1])
-    put6(target, rec.OWN + 12, own[2])
+    put6(target, rec.OWN, own_blocks[0])
+    put6(target, rec.OWN + 6, own_blocks[1])
+    put6(target, rec.OWN + 12, own_blocks[2])
     put9(target, rec.CROSS, cross[0])
     put9(target, rec.CROSS + 9, cross[1])
     put9(target, rec.CROSS + 18, cross[2])
@@ -154,8 +154,8 @@ def put_hypothesis(target, means, own, cross):
 @part
 def merge(work, listed, count, target):
     """Merge the listed hypotheses by their shares into the hypothesis at the address `target`."""
-    means, own, cross = mix_hypotheses(work, listed, count)
-    put_hypothesis(target, means, own, cross)
+    means, own_blocks, cross = mix_hypotheses(work, listed, count)
+    put_hypothesis(target, means, own_blocks, cross)
 
 
 # ---- prediction and update: eqs. (6) and (9) --------
@@ -179,11 +179,11 @@ def advance(work, listed, count, target, model, result, plot, noise):
 @inline
 def predict_and_update(work, mixture, F, Q, target, result, plot, noise):
     """Predict a mixture (means, own blocks, blocks between axes), update it with a plot, write it; see `advance`."""
-    means, own, cross = mixture
+    means, own_blocks, cross = mixture
     x, y, z = predicted(means[0], F), predicted(means[1], F), predicted(means[2], F)
-    xx = predicted_covariance(own[0], F, Q)
-    yy = predicted_covariance(own[1], F, Q)
-    zz = predicted_covariance(own[2], F, Q)
+    xx = predicted_covariance(own_blocks[0], F, Q)
+    yy = predicted_covariance(own_blocks[1], F, Q)
+    zz = predicted_covariance(own_blocks[2], F, Q)
     xy, xz, yz = predicted_cross(cross[0], F), predicted_cross(cross[1], F), predicted_cross(cross[2], F)
 
     R = get6(noise, 0)

@@ -311,9 +311,9 @@ def put_output(work, listed, bank, rules, reported, out):
         return
     merge(work, listed, count, row(work, rec.SPARE))
     for axis in range(3):
-        own = rec.SPARE + rec.OWN + 6 * axis
+        block = rec.SPARE + rec.OWN + 6 * axis
         put3(out, 3 * axis, get3(work, rec.SPARE + rec.MEAN + 3 * axis))
-        put3(out, rec.VARIANCE + 3 * axis, (get(work, own), get(work, own + 3), get(work, own + 5)))
+        put3(out, rec.VARIANCE + 3 * axis, (get(work, block), get(work, block + 3), get(work, block + 5)))
         put(out, rec.POSITION_COVARIANCE + axis, get(work, rec.SPARE + rec.CROSS + 9 * axis))
     for j in range(size):
         put(out, rec.MODELS + j, get(work, bank + j * rec.HYPOTHESIS + rec.PROBABILITY))
