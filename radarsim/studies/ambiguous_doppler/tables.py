@@ -108,7 +108,10 @@ def _folds(result: Result) -> report_tables.Columns:
     if "events" in result.sums:
         counts = np.full(f.size, float(result.count))
         wrong_events, beyond_events = (events(result, (f, k), event) for event in (WRONG, BEYOND))
-        right, beyond = rare.complement(rare.rate(wrong_events, sampling(result))), rare.rate(beyond_events, sampling(result))
+        right, beyond = (
+            rare.complement(rare.rate(wrong_events, sampling(result))),
+            rare.rate(beyond_events, sampling(result)),
+        )
         note = rare.note(sampling(result), wrong_events, beyond_events)
     return {
         **report_tables.leading(result, f, k),
@@ -155,7 +158,9 @@ def _rare_tables(result: Result) -> Iterator[dict[str, np.ndarray]]:
 def _rare_rows(result: Result, f: np.ndarray, aimed_at: np.ndarray, event: int, name: str) -> dict[str, np.ndarray]:
     """Columns of rare.csv for filters f (n,) and an event, by its number in the sums and its name."""
     k = np.full(f.size, len(result.axes.k) - 1)
-    return rare.rows(report_tables.leading(result, f, k), name, aimed_at, events(result, (f, k), event), sampling(result))
+    return rare.rows(
+        report_tables.leading(result, f, k), name, aimed_at, events(result, (f, k), event), sampling(result)
+    )
 
 
 @table("calibration")

@@ -64,7 +64,9 @@ def prior_covariance(member: filters.Member, spec: Any) -> tuple[float, ...]:
 
 
 @lru_cache(maxsize=64)
-def packed_motion(order: int, variance: float, dt: float) -> tuple[np.ndarray, tuple[float, ...], tuple[np.ndarray, ...]]:
+def packed_motion(
+    order: int, variance: float, dt: float
+) -> tuple[np.ndarray, tuple[float, ...], tuple[np.ndarray, ...]]:
     """The matrix F of a motion over dt, and F and Q packed; cached, as most intervals of a recording are the same."""
     F, Q = filters.model(order, variance, dt)
     return F, pack_transition(F), pack(Q)

@@ -12,7 +12,7 @@ from radarsim.studies.pulses_to_tracks import kernels as chain
 from radarsim.studies.pulses_to_tracks import study
 from radarsim.studies.pulses_to_tracks.kernels import LISTED, NUMBER, RIGHT, TAKEN, WRONG_FOLD, Sums
 from tests.studies.pulses_to_tracks.conftest import RANGE, SPECTRUM, A, make_case, plan_and_sums
-from tests.studies.pulses_to_tracks.test_kernels import LOCKED_OFF, SPEC, textbook_estimate, normals, samples_of
+from tests.studies.pulses_to_tracks.test_kernels import LOCKED_OFF, SPEC, normals, samples_of, textbook_estimate
 from tests.tolerances import sigma_error
 
 N = 2048
