@@ -488,8 +488,8 @@ def remainder_probability(
                 mean[k] + covariance / delta_variance * (delta - centre),
                 (u_variance - covariance**2 / delta_variance) ** 0.5,
             )
-            inside = normal((joint[k] / 2 - u) / off) - normal((-joint[k] / 2 - u) / off)
-            right[k] += float(np.sum(half * NODE_WEIGHTS * density * inside))
+            probability = normal((joint[k] / 2 - u) / off) - normal((-joint[k] / 2 - u) / off)
+            right[k] += float(np.sum(half * NODE_WEIGHTS * density * probability))
     return right
 
 

@@ -32,7 +32,7 @@ def _curves(results: Sequence[Result]) -> "pd.DataFrame":
 
 @table.whole("gains")
 def _gains(results: Sequence[Result]) -> "pd.DataFrame":
-    """As everywhere; and against the filter whose velocity is unfolded by the truth, the oracle.
+    """As in other studies; and relative to the oracle, the filter whose velocity is unfolded by the truth.
 
     above_oracle_percent ± above_oracle: by how much σ is above the oracle's, paired; empty without such a filter
     """
@@ -47,11 +47,11 @@ def _few_folds(results: Sequence[Result]) -> set[tuple[str, str, int]]:
     """Case, filter and scan of each σ of a filter that unfolds which is off by half the span in few realisations."""
     rows = set()
     for result in results:
-        beyond = np.asarray(result.sums["folds"])[..., BEYOND_SUM]
+        beyond_counts = np.asarray(result.sums["folds"])[..., BEYOND_SUM]
         if "events" in result.sums:
-            events_seen = events(result, tuple(np.indices(beyond.shape)), BEYOND)
-            beyond = statistics.effective_events(events_seen.weight, events_seen.squared)
-        few_events = unfolding_filters(result)[:, None] & (beyond < statistics.FEW_EVENTS)
+            events_seen = events(result, tuple(np.indices(beyond_counts.shape)), BEYOND)
+            beyond_counts = statistics.effective_events(events_seen.weight, events_seen.squared)
+        few_events = unfolding_filters(result)[:, None] & (beyond_counts < statistics.FEW_EVENTS)
         rows |= {(result.name, result.axes.filters[f], int(result.axes.k[k])) for f, k in np.argwhere(few_events)}
     return rows
 
@@ -103,24 +103,23 @@ def _folds(result: Result) -> report_tables.Columns:
     indices = f, k = np.nonzero(visible & (np.asarray(result.sums["estimates"])[..., 0] > 0))
     n = np.asarray(result.sums["estimates"])[..., 0][indices]
     folds = np.asarray(result.sums["folds"])[indices]
-    right, beyond, counts = statistics.rate(folds[:, RIGHT_SUM], n), statistics.rate(folds[:, BEYOND_SUM], n), n
+    right_rate, beyond_rate = (statistics.rate(folds[:, index], n) for index in (RIGHT_SUM, BEYOND_SUM))
+    counts = n
     note = np.full(f.size, "", dtype=object)
     if "events" in result.sums:
         counts = np.full(f.size, float(result.count))
         wrong_events, beyond_events = (events(result, (f, k), event) for event in (WRONG, BEYOND))
-        right, beyond = (
-            rare.complement(rare.rate(wrong_events, sampling(result))),
-            rare.rate(beyond_events, sampling(result)),
-        )
+        right_rate = rare.complement(rare.rate(wrong_events, sampling(result)))
+        beyond_rate = rare.rate(beyond_events, sampling(result))
         note = rare.note(sampling(result), wrong_events, beyond_events)
     return {
         **report_tables.leading(result, f, k),
         "n": counts.astype(np.int64),
-        "right": right,
+        "right": right_rate,
         "exact_right": axes.exact_right[indices],
         "listed": folds[:, LISTED_SUM] / n,
         "hypotheses": folds[:, COUNT_SUM] / n,
-        "beyond": beyond,
+        "beyond": beyond_rate,
         "note": note,
     }
 

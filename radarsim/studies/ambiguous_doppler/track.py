@@ -255,7 +255,7 @@ class InteractingFollower:
             models = [
                 filters.model(member.order, member.manoeuvre_variance, t - self.last_t) for member in self.members
             ]
-            F, Q = (np.array(part) for part in zip(*models, strict=True))
+            F, Q = (np.array(matrices) for matrices in zip(*models, strict=True))
             f = pack_transition(F)
             self.x, self.P = np.array(predicted(self.x, f)), np.array(predicted_covariance(self.P, f, pack(Q)))
         self.last_t = t

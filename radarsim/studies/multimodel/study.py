@@ -74,8 +74,9 @@ def stages(spec: Keys, t: np.ndarray, reported: np.ndarray) -> tuple[np.ndarray,
     """The stage of each scan (K,), and lengths (S, 2): scans of a stage from the third on, and the reported ones."""
     stage = np.searchsorted(np.array(spec.target.stage_ends_s), t, side="right").astype(np.int64)
     in_track = np.arange(len(t)) >= records.START
-    inside = stage == np.arange(len(spec.target.stages))[:, None]
-    return stage, np.stack([(inside & in_track).sum(axis=1), (inside & in_track & reported).sum(axis=1)], axis=1) * 1.0
+    in_stage = stage == np.arange(len(spec.target.stages))[:, None]
+    counts = [(in_stage & in_track).sum(axis=1), (in_stage & in_track & reported).sum(axis=1)]
+    return stage, np.stack(counts, axis=1) * 1.0
 
 
 def prepare(case: Case) -> Plan:

@@ -108,7 +108,7 @@ def fly(
     for phase, end_s in zip(phases, bounds, strict=True):
         is_last = end_s >= t[-1]
         end_s = min(end_s, float(t[-1]))
-        inside = (t >= begin_s) & ((t <= end_s) if is_last else (t < end_s))
+        in_phase = (t >= begin_s) & ((t <= end_s) if is_last else (t < end_s))
         arguments = (phase, coefficient, lag)
         solution = solve_ivp(
             derivative, (begin_s, end_s), state, "DOP853", dense_output=True, args=arguments, rtol=TOLERANCE, atol=1e-6
@@ -116,10 +116,10 @@ def fly(
         if not solution.success:
             raise ImpossibleFlight(f"the flight cannot be integrated beyond {solution.t[-1]:.6g} s")
         assert solution.sol is not None  # by dense_output
-        states = solution.sol(t[inside]).T if inside.any() else ()  # a phase may pass between two plots
+        states = solution.sol(t[in_phase]).T if in_phase.any() else ()  # a phase may pass between two plots
         state = solution.y[:, -1]
         states_by_scan += [
-            _kinematics(time, state_at_time, arguments) for time, state_at_time in zip(t[inside], states, strict=True)
+            _kinematics(time, state_at_time, arguments) for time, state_at_time in zip(t[in_phase], states, strict=True)
         ]
         if is_last:
             break
@@ -394,9 +394,9 @@ def plot_truth(case: Case, t: np.ndarray, x: np.ndarray) -> np.ndarray:
     R = physics.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
     antenna = physics.to_antenna(position, R, sensor.antenna_height_m)
     r = np.linalg.norm(antenna, axis=1)
-    outside = antenna[:, 0] <= r * np.sqrt(2 * strip.MIN_U2)
-    if outside.any():
-        time_s = t[np.argmax(outside)]
+    is_outside = antenna[:, 0] <= r * np.sqrt(2 * strip.MIN_U2)
+    if is_outside.any():
+        time_s = t[np.argmax(is_outside)]
         raise ConfigError(
             f"{case.name}: target: leaves the antenna's sector at {time_s:.6g} s: it must stay in front of it"
         )

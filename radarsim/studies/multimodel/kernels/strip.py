@@ -192,12 +192,12 @@ def noise_at_prediction(frame, mean, wait, plot_noise, noise):
     r = root(x * x + y * y + z * z)
     scale, min_u, unit = 1.0 / r, full(MIN_U), full(1.0)
     sine_e, sine_a, u = y * scale, z * scale, x * scale
-    inside = where_greater(u, min_u, unit, full(0.0))
-    sine_e, sine_a = sine_e * inside, sine_a * inside
+    in_sector = where_greater(u, min_u, unit, full(0.0))
+    sine_e, sine_a = sine_e * in_sector, sine_a * in_sector
     u = where_greater(u, min_u, u, unit)
     p = covariance(frame, r, sine_e, root(unit - sine_e * sine_e), sine_a, root(unit - sine_a * sine_a), u)
     for i in range(6):
-        put(noise, i, where_greater(inside, full(0.5), p[i], get(plot_noise, i)))
+        put(noise, i, where_greater(in_sector, full(0.5), p[i], get(plot_noise, i)))
 
 
 @kernel
