@@ -223,7 +223,7 @@ class SingleFollower:
 
 
 def list_limits(options: Any) -> tuple[bool, int, float]:
-    """The hypotheses that a filter keeps: merge, max_count and min_ratio of `kernels.take_velocity`."""
+    """The hypotheses that a filter keeps: merge, max_count and min_ratio of `take_velocity`."""
     return options.merge == "each_scan", options.hypotheses or 1, options.prune_below or 0.0
 
 
@@ -247,7 +247,7 @@ class InteractingFollower:
         self.has_range = False
 
     def step(self, t: float, z: float, v: float, span: float = np.nan) -> RowResult:
-        """As `Single.step`."""
+        """As `SingleFollower.step`."""
         self.folds.begin_row(t, span)
         self.nis = np.full(2, np.nan)
         self._mix(1 if np.isnan(self.last_t) else max(1, round((t - self.last_t) / self.radar.scan_period_s)))
@@ -376,7 +376,7 @@ class CombiningFollower:
         self.first_t = np.nan
 
     def step(self, t: float, z: float, v: float, span: float = np.nan) -> RowResult:
-        """As `Single.step`."""
+        """As `SingleFollower.step`."""
         self.first_t = t if np.isnan(self.first_t) else self.first_t
         estimates = np.array([single.step(t, z, v, span).estimate for single in self.singles])
         motions = self._motions(t)
